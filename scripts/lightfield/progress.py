@@ -1,0 +1,46 @@
+"""Progress of long work: views done, rate, and time left, readable on a terminal and in a log."""
+
+import sys
+import time
+
+
+def duration(seconds: float) -> str:
+    """Return a duration as a person reads it: ``42 s``, ``3 min 05 s``, ``2 h 07 min``."""
+    if seconds < 99.5:
+        return f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 100:
+        return f"{minutes} min {rest:02d} s"
+    return f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+class Progress:
+    """Counts finished pieces of work and prints a line at most every ``interval`` seconds.
+
+    Whole lines, never carriage returns, so that several shards can share one log.
+    """
+
+    def __init__(self, total: int, label: str, unit: str = "views", interval: float = 5.0) -> None:
+        self.total = total
+        self.label = label
+        self.unit = unit
+        self.interval = interval
+        self.count = 0
+        self.started = self.printed = time.monotonic()
+
+    def done(self, count: int = 1) -> None:
+        """Count ``count`` more pieces as finished."""
+        self.count += count
+        now = time.monotonic()
+        if now - self.printed < self.interval and self.count < self.total:
+            return
+        self.printed = now
+        elapsed = now - self.started
+        left = elapsed / self.count * (self.total - self.count)
+        print(
+            f"{self.label}: {self.count} of {self.total} {self.unit}, "
+            f"{elapsed / self.count:.3g} s each, "
+            + (f"{duration(left)} left" if left else f"done in {duration(elapsed)}"),
+            file=sys.stderr,
+            flush=True,
+        )
