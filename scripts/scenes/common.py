@@ -4,6 +4,7 @@ Units are metres and radians, Z is up, the ground is z = 0. Everything is determ
 numbers come from a `numpy.random.Generator` that the builder seeds.
 """
 
+import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,6 +24,11 @@ Color = tuple[float, float, float]
 def steps(full: float, detail: float, least: int = 3) -> int:
     """A number of segments or copies, `full` at detail 1 and scaled by it, at least `least`."""
     return max(least, round(full * detail))
+
+
+def random_stream(seed: int, name: str) -> np.random.Generator:
+    """Random numbers of one element's own, so that a change to it leaves the others as they are."""
+    return np.random.default_rng([seed, zlib.crc32(name.encode())])
 
 
 # --- Shapes ---------------------------------------------------------------------------------------
@@ -79,6 +85,34 @@ def join(shapes: Iterable[Shape]) -> Shape:
             + [s[len(p.quads) :] for p, s in zip(parts, slots, strict=True)]
         ),
     )
+
+
+def copies(shape: Shape, rotations: Array, positions: Array) -> Shape:
+    """One shape that holds a copy at each position (n, 3), turned by its 3 × 3 matrix (n, 3, 3).
+
+    The matrices may scale too. For what is many and small: leaves, blades of grass, pebbles.
+    """
+    count, size = len(positions), len(shape.vertices)
+    vertices = np.einsum("nij,vj->nvi", rotations, shape.vertices) + positions[:, None]
+    starts = (np.arange(count, dtype=np.int32) * size)[:, None, None]
+    quads, triangles = (
+        shape.face_slots()[: len(shape.quads)],
+        shape.face_slots()[len(shape.quads) :],
+    )
+    return Shape(
+        vertices.reshape(-1, 3),
+        (shape.quads + starts).reshape(-1, 4),
+        (shape.triangles + starts).reshape(-1, 3),
+        np.concatenate([np.tile(quads, count), np.tile(triangles, count)]),
+    )
+
+
+def frames(forward: Array, up: Array) -> Array:
+    """Rotations (n, 3, 3) that take +Y to `forward` (n, 3), and +Z as near `up` as can be."""
+    y = forward / np.linalg.norm(forward, axis=-1, keepdims=True)
+    x = np.cross(y, up)
+    x /= np.maximum(np.linalg.norm(x, axis=-1, keepdims=True), 1e-9)
+    return np.stack([x, y, np.cross(x, y)], axis=-1)
 
 
 def transform(
@@ -326,10 +360,15 @@ def scatter(
 def point_light(
     name: str, location: Sequence[float], watts: float, color: Color, radius: float
 ) -> bpy.types.Object:
-    """A spherical lamp; a radius of 0.02 m or more keeps its highlights calm."""
+    """A spherical lamp that lights but is not itself seen: give it a flame or bulb to be seen.
+
+    A radius of 0.02 m or more keeps the noise down.
+    """
     light = bpy.data.lights.new(name, "POINT")
     light.energy, light.color, light.shadow_soft_size = watts, color, radius
-    return place(name, light, transform(location))
+    lamp = place(name, light, transform(location))
+    lamp.visible_camera = lamp.visible_glossy = lamp.visible_transmission = False
+    return lamp
 
 
 def area_light(
