@@ -1,0 +1,391 @@
+"""Camera rigs against Blender: its own icosphere, vertex normals, cross products and mathutils."""
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lightfield import rigs
+from lightfield.errors import UserError
+
+LENS: dict[str, Any] = {
+    "camera": {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT", "fisheye_fov": math.pi},
+    "resolution": [64, 64],
+    "sensor_size": [36.0, 36.0],
+}
+
+# Every dataset of SILVR: the number of views as published, and the rig.
+SILVR: dict[str, tuple[int, dict[str, Any]]] = {
+    "barbershop cuboid": (
+        1400,
+        {"type": "cuboid", "cameras": [10, 30, 10], "size": [1, 3, 1], "center": [0.2, -0.4, 1.05]},
+    ),
+    "lone_monk cuboid": (2226, {"type": "cuboid", "cameras": [21, 21, 16], "size": [4, 4, 3]}),
+    "garden cuboid": (1806, {"type": "cuboid", "cameras": [21, 21, 11], "size": [2, 2, 1]}),
+    "barbershop sphere": (
+        642,
+        {"type": "sphere", "subdivisions": 4, "size": 1.45, "center": [0.2, -0.4, 1.05]},
+    ),
+    "lone_monk sphere": (642, {"type": "sphere", "subdivisions": 4, "size": 4.0}),
+    "garden sphere": (642, {"type": "sphere", "subdivisions": 4, "size": 1.7}),
+    "evaluation sphere": (42, {"type": "sphere", "subdivisions": 2, "size": 0.5}),
+}
+
+# What the addon has beside those, and the keys that a scene may add.
+OTHERS: dict[str, tuple[int, dict[str, Any]]] = {
+    "plane": (35, {"type": "plane", "cameras": [7, 5], "size": [2, 1, 1]}),
+    "cylinder": (60, {"type": "cylinder", "cameras": [12, 5], "size": [1, 1, 2]}),
+    "cylinder inside": (36, {"type": "cylinder", "cameras": [12, 3], "face_inside": True}),
+    "sphere inside": (162, {"type": "sphere", "subdivisions": 3, "face_inside": True}),
+    "twelve": (12, {"type": "sphere", "subdivisions": 1}),
+    "turned cuboid": (
+        94,
+        {
+            "type": "cuboid",
+            "cameras": [3, 4, 5],
+            "size": [1, 2, 3],
+            "rotation": [20, -35, 110],
+            "center": [3, -2, 1],
+        },
+    ),
+    "turned sphere": (
+        162,
+        {"type": "sphere", "subdivisions": 3, "rotation": [90, 45, -60], "center": [0, 0, 2]},
+    ),
+}
+
+# The addon's method, by Blender's own means; nothing of the project is imported here.
+BLENDER = r"""
+import json, math, sys
+import bpy
+import numpy as np
+from mathutils import Euler, Matrix, Vector
+
+
+def grid(columns, rows):
+    for row in range(rows):
+        for column in range(columns):
+            yield row * columns + column, column / (columns - 1), row / (rows - 1)
+
+
+def local(rig):
+    kind = rig["type"]
+    if kind == "plane":
+        for i, u, v in grid(*rig["cameras"]):
+            yield f"view_{i:04d}f", (u - 0.5, 0, 0.5 - v), Euler((math.pi / 2, 0, 0))
+    elif kind == "cuboid":
+        nx, ny, nz = rig["cameras"]
+        for i, u, v in grid(nx, nz):
+            yield f"view_f{i:04d}f", (u - 0.5, 0.5, 0.5 - v), Euler((math.pi / 2, 0, 0))
+        for i, u, v in grid(nx, nz):
+            yield f"view_b{i:04d}f", (0.5 - u, -0.5, 0.5 - v), Euler((math.pi / 2, 0, math.pi))
+        for i, u, v in grid(ny, nz):
+            yield f"view_l{i:04d}f", (-0.5, u - 0.5, 0.5 - v), Euler((math.pi / 2, 0, math.pi / 2))
+        for i, u, v in grid(ny, nz):
+            yield f"view_r{i:04d}f", (0.5, 0.5 - u, 0.5 - v), Euler((math.pi / 2, 0, -math.pi / 2))
+        for i, u, v in grid(nx, ny):
+            yield f"view_u{i:04d}f", (0.5 - u, v - 0.5, 0.5), Euler((math.pi, 0, 0))
+        for i, u, v in grid(nx, ny):
+            yield f"view_d{i:04d}f", (u - 0.5, 0.5 - v, -0.5), Euler((0, 0, 0))
+    elif kind == "cylinder":
+        columns, rows = rig["cameras"]
+        for row in range(rows):
+            for column in range(columns):
+                a = column * 2 * math.pi / columns
+                turned = -a + (math.pi if rig.get("face_inside") else 0)
+                place = (0.5 * math.sin(a), 0.5 * math.cos(a), 0.5 - row / (rows - 1))
+                yield f"view_{row * columns + column:04d}f", place, Euler((math.pi / 2, 0, turned))
+    elif kind == "sphere":
+        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=rig["subdivisions"], radius=0.5)
+        bpy.ops.object.editmode_toggle()
+        bpy.ops.mesh.delete(type="EDGE_FACE")
+        bpy.ops.object.editmode_toggle()
+        inside = rig.get("face_inside")
+        for i, vertex in enumerate(bpy.context.active_object.data.vertices):
+            normal = vertex.normal
+            side = Vector((0, 0, 1)).cross(normal)
+            if side.length <= 0.0001:
+                side = Vector((0, 1, 0)).cross(normal)
+            up = side.cross(normal)
+            basis = Matrix.Identity(3)
+            basis.col[0] = side if inside else -side
+            basis.col[1] = -up
+            basis.col[2] = normal if inside else -normal
+            yield f"view_{i:04d}f", vertex.co, basis.to_euler()
+
+
+out = {}
+for label, rig in json.load(sys.stdin).items():
+    size = rig.get("size", 1)
+    size = Matrix.Diagonal(size if isinstance(size, list) else [size] * 3)
+    turn = Euler([math.radians(a) for a in rig.get("rotation", (0, 0, 0))]).to_matrix()
+    center = Vector(rig.get("center", (0, 0, 0)))
+    views = list(local(rig))
+    out[label + " names"] = [name for name, _, _ in views]
+    out[label + " positions"] = [turn @ (size @ Vector(place)) + center for _, place, _ in views]
+    turned = [turn @ euler.to_matrix() for _, _, euler in views]
+    out[label + " matrices"] = [np.array(matrix) for matrix in turned]
+    out[label + " eulers"] = [matrix.to_euler() for matrix in turned]
+for n in range(1, 8):
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=n, radius=1.0)
+    vertices = bpy.context.active_object.data.vertices
+    points = np.empty(3 * len(vertices), np.float32)
+    vertices.foreach_get("co", points)
+    out[f"icosphere {n}"] = points.reshape(-1, 3)
+np.savez(sys.argv[1], **out)
+"""
+
+
+@pytest.fixture(scope="module")
+def blender(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    path = tmp_path_factory.mktemp("blender") / "poses.npz"
+    subprocess.run(
+        [sys.executable, "-c", BLENDER, str(path)],
+        input=json.dumps({label: rig for label, (_, rig) in {**SILVR, **OTHERS}.items()}),
+        text=True,
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
+    return dict(np.load(path))
+
+
+@pytest.mark.parametrize("label", [*SILVR, *OTHERS])
+def test_every_camera_is_where_blender_puts_it(label: str, blender: dict[str, Any]) -> None:
+    count, rig = {**SILVR, **OTHERS}[label]
+    views = rigs.poses(rig)
+    assert len(views) == count == rigs.view_count(rig)
+    assert [view.name for view in views] == blender[f"{label} names"].tolist()
+    matrices = np.stack([view.matrix() for view in views])
+    np.testing.assert_allclose(
+        [view.position for view in views], blender[f"{label} positions"], rtol=0, atol=1e-6
+    )
+    np.testing.assert_allclose(matrices[:, :3, :3], blender[f"{label} matrices"], rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(matrices[:, :3, 3], [view.position for view in views])
+
+
+def test_the_silvr_rigs_have_7358_cameras() -> None:
+    counts = [rigs.view_count(rig) for label, (_, rig) in SILVR.items()]
+    assert sum(counts[:6]) == 7358
+
+
+@pytest.mark.parametrize("label", ["garden sphere", "turned sphere", "turned cuboid"])
+def test_euler_angles_are_those_that_blender_chooses(label: str, blender: dict[str, Any]) -> None:
+    """Of the two sets of angles; where their sums are equal, rounding decides in Blender."""
+    _, rig = {**SILVR, **OTHERS}[label]
+    ours = np.array([view.rotation for view in rigs.poses(rig)])
+    theirs = blender[f"{label} eulers"].astype(float)
+    other = np.array([1, -1, 1]) * ours + math.pi
+    other = (other + math.pi) % (2 * math.pi) - math.pi
+    tie = np.abs(np.abs(ours).sum(1) - np.abs(other).sum(1)) < 1e-5
+    off = np.abs((ours - theirs + math.pi) % (2 * math.pi) - math.pi)
+    assert tie.mean() < 0.15
+    # Angles lose their meaning towards gimbal lock in proportion to cos(ry).
+    assert (off * np.abs(np.cos(theirs[:, 1:2])))[~tie].max() < 2e-6
+
+
+@pytest.mark.parametrize("subdivisions", range(1, 8))
+def test_icosphere_is_blenders(subdivisions: int, blender: dict[str, Any]) -> None:
+    theirs = blender[f"icosphere {subdivisions}"]
+    np.testing.assert_allclose(rigs.icosphere(subdivisions), theirs, rtol=0, atol=1e-6)
+    assert rigs.view_count({"type": "sphere", "subdivisions": subdivisions}) == len(theirs)
+
+
+def test_sphere_cameras_look_outward_and_upright_and_the_poles_face_up_and_down() -> None:
+    views = rigs.poses({"type": "sphere", "subdivisions": 3, "size": 2})
+    for view in views:
+        matrix = view.matrix()
+        np.testing.assert_allclose(-matrix[:3, 2], view.position, atol=1e-7)
+        assert abs(np.linalg.det(matrix) - 1) < 1e-9
+        assert matrix[2, 1] >= -1e-9
+    bottom, top = views[0], views[11]
+    np.testing.assert_allclose(bottom.matrix()[:3, :3], np.eye(3), atol=1e-9)
+    np.testing.assert_allclose(top.matrix()[:3, :3], np.diag([-1, 1, -1]), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("rig", "expected"),
+    [
+        ({"type": "plane", "cameras": [1, 3]}, {0.0}),
+        ({"type": "cuboid", "cameras": [1, 3, 2]}, {-0.5, 0.0, 0.5}),
+        ({"type": "lattice", "cameras": [1, 2, 2]}, {0.0}),
+    ],
+)
+def test_an_axis_of_one_camera_sits_in_the_middle(rig: Any, expected: set[float]) -> None:
+    assert {view.position[0] for view in rigs.poses(rig)} == expected
+
+
+def test_lattice_is_the_corners_of_a_cube_and_level() -> None:
+    views = rigs.poses({"type": "lattice", "cameras": [2, 2, 2], "size": 2, "center": [1, 2, 3]})
+    corners = {(x, y, z) for x in (0, 2) for y in (1, 3) for z in (2, 4)}
+    assert {view.position for view in views} == corners
+    assert [view.name for view in views] == [f"view_{i:04d}f" for i in range(8)]
+    for view in views:
+        np.testing.assert_allclose(view.matrix()[:3, 2], [0, -1, 0], atol=1e-9)
+
+
+def test_face_inside_turns_cameras_half_way_about_their_up_axis() -> None:
+    rig = {"type": "cuboid", "cameras": [2, 2, 2]}
+    for out, inside in zip(rigs.poses(rig), rigs.poses({**rig, "face_inside": True}), strict=True):
+        flipped = out.matrix() @ np.diag([-1, 1, -1, 1])
+        np.testing.assert_allclose(inside.matrix(), flipped, atol=1e-9)
+
+
+def test_cube_map_faces_look_along_six_axes_of_the_camera() -> None:
+    rig = {"type": "plane", "cameras": [2, 1], "cube_map": True}
+    views = rigs.poses(rig)
+    assert rigs.view_count(rig) == len(views) == 12
+    assert [view.name for view in views[6:]] == [f"view_0001f_{face}" for face in "fblrud"]
+    # The plane's camera looks along +Y with +Z up: look and up of each face, by hand.
+    expected = {
+        "f": ([0, 1, 0], [0, 0, 1]),
+        "b": ([0, -1, 0], [0, 0, 1]),
+        "l": ([-1, 0, 0], [0, 0, 1]),
+        "r": ([1, 0, 0], [0, 0, 1]),
+        "u": ([0, 0, 1], [0, -1, 0]),
+        "d": ([0, 0, -1], [0, 1, 0]),
+    }
+    for view in views:
+        look, up = expected[view.name[-1]]
+        matrix = view.matrix()
+        np.testing.assert_allclose(-matrix[:3, 2], look, atol=1e-9)
+        np.testing.assert_allclose(matrix[:3, 1], up, atol=1e-9)
+        assert np.linalg.det(matrix[:3, :3]) == pytest.approx(1)
+
+
+def test_cube_map_refuses_a_lens_that_is_not_90_degrees() -> None:
+    rig = {"type": "plane", "cameras": [1, 1], "cube_map": True}
+    with pytest.raises(UserError, match="cube_map"):
+        rigs.lightfield(rig, LENS)
+    wide = np.diag([0.5, 0.5, -1, -1]).tolist()
+    with pytest.raises(UserError, match="fov: 90"):
+        rigs.lightfield(rig, {**LENS, "camera": {"type": "PERSP", "projection_matrix": wide}})
+    square = np.diag([1.0, 1.0, -1, -1]).tolist()
+    camera = {"type": "PERSP", "projection_matrix": square}
+    assert len(rigs.lightfield(rig, {**LENS, "camera": camera})["frames"]) == 6
+
+
+def test_lightfield_json_holds_what_silvrs_readers_read() -> None:
+    content = rigs.lightfield(
+        {"type": "cuboid", "cameras": [3, 2, 2], "evaluation_split": "odd"}, LENS
+    )
+    content = json.loads(json.dumps(content, allow_nan=False))
+    assert content["lf_type"] == "CUBOID"
+    assert content["camera"] == LENS["camera"]
+    assert content["resolution"] == [64, 64]
+    for frame in content["frames"]:
+        matrix = np.array(frame["world_matrix"])
+        np.testing.assert_array_equal(matrix[:3, 3], frame["position"])
+        np.testing.assert_array_equal(matrix[3], [0, 0, 0, 1])
+        turned = rigs.euler_to_matrix(np.array(frame["rotation"]))
+        np.testing.assert_allclose(matrix[:3, :3], turned, atol=1e-11)
+        number = int(frame["name"][len("view_x") : -1])
+        assert frame["split"] == ("test" if number % 2 else "train")
+
+
+def test_more_than_9999_views_keep_one_name_each() -> None:
+    names = [view.name for view in rigs.poses({"type": "plane", "cameras": [101, 101]})]
+    assert names[9999:10001] == ["view_9999f", "view_10000f"]
+    assert len(set(names)) == 10201
+
+
+def test_poses_from_csv_and_lightfield_json_agree(tmp_path: Path) -> None:
+    rig = {"type": "sphere", "subdivisions": 1, "size": 3, "rotation": [10, 20, 30]}
+    content = rigs.lightfield(rig, LENS)
+    (tmp_path / "lightfield.json").write_text(json.dumps(content))
+    rows = [[f["name"], *f["position"], *f["rotation"]] for f in content["frames"]]
+    lines = ["name,x,y,z,rx,ry,rz", *(",".join(map(str, row)) for row in rows)]
+    (tmp_path / "poses.csv").write_text("\n".join(lines) + "\n")
+    for file, lf_type in (("lightfield.json", "SPHERE"), ("poses.csv", "PLANE")):
+        again = {"type": "poses", "file": str(tmp_path / file)}
+        assert rigs.view_count(again) == 12
+        assert rigs.poses(again) == rigs.poses(rig)
+        assert rigs.lightfield(again, LENS)["lf_type"] == lf_type
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "message"),
+    [
+        ("p.csv", "name,x,y\n", "row 1: must be name,x,y,z,rx,ry,rz"),
+        ("p.csv", "name,x,y,z,rx,ry,rz\na,1,2,3,4,5\n", "row 2: has 6 values, not 7"),
+        ("p.csv", "name,x,y,z,rx,ry,rz\na,1,2,3,4,5,6\nb,1,2,3,4,x,6\n", "row 3: ry: .*'x'"),
+        ("p.csv", "name,x,y,z,rx,ry,rz\na,1,2,3,4,5,nan\n", "row 2: rz: .*finite"),
+        ("p.csv", "name,x,y,z,rx,ry,rz\n../a,1,2,3,4,5,6\n", "row 2: name: .*file name"),
+        ("p.csv", "name,x,y,z,rx,ry,rz\na,1,2,3,4,5,6\na,1,2,3,4,5,6\n", "row 3: name: .*twice"),
+        ("p.csv", "name,x,y,z,rx,ry,rz\n", "holds no pose"),
+        ("p.json", "{", "is not JSON"),
+        ("p.json", "{}", "frames: must be a list"),
+        ("p.json", '{"frames": [{"name": "a"}]}', r"frames\[0\]: position: .*None"),
+        (
+            "p.json",
+            '{"frames": [{"name": "a", "position": [0, 0, true], "rotation": [0, 0, 0]}]}',
+            r"frames\[0\]: position\[2\]: .*True",
+        ),
+        ("p.json", '{"frames": [], "lf_type": "CONE"}', "lf_type: must be one of PLANE"),
+        ("missing.json", None, "cannot be read"),
+        ("missing.csv", None, "cannot be read"),
+    ],
+)
+def test_a_malformed_pose_file_is_named_with_row_and_key(
+    file: str, text: str | None, message: str, tmp_path: Path
+) -> None:
+    path = tmp_path / file
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(UserError, match=message) as error:
+        rigs.poses({"type": "poses", "file": str(path)})
+    assert str(path) in str(error.value)
+
+
+@pytest.mark.parametrize("label", [*SILVR, "plane", "cylinder"])
+@pytest.mark.parametrize("limit", [12, 20, 42, 100, 500, 10_000])
+def test_thin_is_the_same_rig_within_the_limit(label: str, limit: int) -> None:
+    _, rig = {**SILVR, **OTHERS}[label]
+    thinner = rigs.thin(rig, limit)
+    assert rigs.view_count(thinner) == len(rigs.poses(thinner)) <= limit
+    kept = {key: value for key, value in rig.items() if key not in ("cameras", "subdivisions")}
+    assert kept == {key: thinner[key] for key in kept}
+    if rigs.view_count(rig) <= limit:
+        assert thinner == rig
+        return
+    # Nothing denser of the same kind fits.
+    if rig["type"] == "sphere":
+        denser = [{**thinner, "subdivisions": thinner["subdivisions"] + 1}]
+    else:
+        counts = thinner["cameras"]
+        denser = [
+            {**thinner, "cameras": [n + (i == axis) for i, n in enumerate(counts)]}
+            for axis in range(len(counts))
+            if counts[axis] < rig["cameras"][axis]
+        ]
+    assert all(rigs.view_count(more) > limit for more in denser)
+
+
+def test_thin_keeps_proportions_and_two_cameras_an_axis() -> None:
+    _, rig = SILVR["lone_monk cuboid"]
+    shares = np.array(rigs.thin(rig, 600)["cameras"]) / rig["cameras"]
+    assert np.ptp(shares) < 0.1
+    _, rig = SILVR["barbershop cuboid"]
+    assert min(rigs.thin(rig, 42)["cameras"]) >= 2
+    assert rigs.thin({"type": "plane", "cameras": [9, 1]}, 4)["cameras"] == [4, 1]
+    lattice = {"type": "lattice", "cameras": [2, 2, 2]}
+    assert rigs.thin(lattice, 8) == lattice
+    assert rigs.thin({**lattice, "cube_map": True}, 24)["cameras"] == [2, 2, 1]
+
+
+def test_thin_takes_an_even_subset_of_a_pose_file(tmp_path: Path) -> None:
+    path = tmp_path / "poses.csv"
+    rows = [f"v{i},{i},0,0,0,0,0" for i in range(101)]
+    path.write_text("\n".join(["name,x,y,z,rx,ry,rz", *rows]))
+    thinner = rigs.thin({"type": "poses", "file": str(path)}, 5)
+    assert rigs.view_count(thinner) == 5
+    assert [view.name for view in rigs.poses(thinner)] == ["v0", "v25", "v50", "v75", "v100"]
+
+
+@pytest.mark.parametrize("label", ["garden sphere", "garden cuboid"])
+def test_thin_says_when_no_such_rig_is_small_enough(label: str) -> None:
+    with pytest.raises(UserError, match="cannot have as few as 5 views"):
+        rigs.thin(SILVR[label][1], 5)
