@@ -248,11 +248,12 @@ def noise(points: ArrayLike, seed: int, octaves: int = 1) -> Array:
 
     Ken Perlin, "Improving Noise", SIGGRAPH 2002, with an integer hash in place of the table.
     """
-    p = np.asarray(points, float)
-    total = np.zeros(p.shape[:-1])
+    shape = np.shape(points)[:-1]
+    p = np.asarray(points, float).reshape(-1, 3)
+    total = np.zeros(len(p))
     for octave in range(octaves):
         total += _perlin(p * 2.0**octave, seed + 101 * octave) / 2.0**octave
-    return total
+    return total.reshape(shape)
 
 
 def _perlin(p: Array, seed: int) -> Array:
