@@ -1,0 +1,416 @@
+"""The export for instant-ngp, read back as its loader reads it (nerf_loader.cu), in float32."""
+
+import json
+import math
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import export_instant_ngp
+import numpy as np
+import pytest
+from lightfield import images, lenses, rigs
+from lightfield.errors import UserError
+
+RIG: dict[str, Any] = {
+    "type": "cylinder",
+    "cameras": [3, 2],
+    "size": [1.5, 1.5, 1],
+    "center": [0.4, -0.7, 1.2],
+    "rotation": [15, -25, 40],
+    "evaluation_split": "odd",
+}
+PERSPECTIVE = {
+    "lens": "rectilinear",
+    "resolution": [64, 48],
+    "focal_length": 20,
+    "sensor_size": [36, 30],
+    "principal_point": [29.5, 26.25],
+}
+FISHEYE = {"lens": "equidistant", "resolution": [64, 64], "fov": 180}
+WIDE = {"lens": "equidistant", "resolution": [65, 65], "fov": 220}
+PANORAMA = {"lens": "equirectangular", "resolution": [64, 32]}
+
+
+def written(tmp_path: Path, camera: Any, rig: Any = RIG, **extra: Any) -> dict[str, Any]:
+    lens = lenses.from_camera(camera)
+    content = rigs.lightfield(rig, lens.to_lightfield()) | extra
+    (tmp_path / "lightfield.json").write_text(json.dumps(content))
+    return content
+
+
+def export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *arguments: Any) -> dict[str, Any]:
+    paths = ["--input-cfg", tmp_path / "lightfield.json", "--output", tmp_path / "transforms.json"]
+    command = ["export_instant_ngp.py", *map(str, [*paths, *arguments])]
+    monkeypatch.setattr(sys, "argv", command)
+    export_instant_ngp.main()
+    result: dict[str, Any] = json.loads((tmp_path / "transforms.json").read_text())
+    return result
+
+
+class Loader:
+    """instant-ngp's reading of a transforms.json: camera matrices and the ray of a pixel."""
+
+    def __init__(self, transforms: dict[str, Any]) -> None:
+        self.json = transforms
+        self.scale = np.float32(transforms.get("scale", 0.33))
+        self.offset = np.array(transforms.get("offset", [0.5, 0.5, 0.5]), np.float32)
+
+    def position(self, nerf: Any) -> Any:
+        x, y, z = np.asarray(nerf, np.float32) * self.scale + self.offset
+        return np.array([y, z, x])
+
+    def camera(self, frame: int) -> tuple[Any, Any]:
+        matrix = np.array(self.json["frames"][frame]["transform_matrix"], np.float32)
+        axes = matrix[:3, :3] * np.float32([1, -1, -1])
+        return axes[[1, 2, 0]], self.position(matrix[:3, 3])
+
+    def ray(self, frame: int, x: float, y: float) -> tuple[Any, Any]:
+        """Return origin and unnormalised direction; the direction is zero where it refuses."""
+        axes, origin = self.camera(frame)
+        width, height = np.float32(self.json["w"]), np.float32(self.json["h"])
+        u = np.float32(x) / width - np.float32(self.json["cx"]) / width
+        v = np.float32(y) / height - np.float32(self.json["cy"]) / height
+        if "ftheta_p0" in self.json:
+            across, down = u * width, v * height
+            radius = np.sqrt(across * across + down * down)
+            angle = np.float32(0)
+            for power in range(4, -1, -1):
+                angle = angle * radius + np.float32(self.json[f"ftheta_p{power}"])
+            if np.cos(angle) <= np.finfo(np.float32).tiny or radius == 0:
+                return origin, np.zeros(3)
+            side = np.sin(angle) / radius
+            local = np.array([side * across, side * down, np.cos(angle)])
+        elif self.json.get("latlong"):
+            theta = (y / height - 0.5) * math.pi
+            phi = (x / width - 0.5) * math.pi * 2
+            local = np.array(
+                [
+                    math.sin(phi) * math.cos(theta),
+                    math.sin(theta),
+                    math.cos(phi) * math.cos(theta),
+                ]
+            )
+        else:
+            local = np.array([u * width / self.json["fl_x"], v * height / self.json["fl_y"], 1])
+        return origin, axes @ local.astype(np.float32)
+
+
+def silvr_orientation(point: Any) -> list[float]:
+    x, y, z = point
+    return [y, -x, z]
+
+
+def seen_at(content: dict[str, Any], frame: int, point: Any) -> tuple[float, float]:
+    """Return the pixel at which lightfield.json says that a world point is seen."""
+    matrix = np.array(content["frames"][frame]["world_matrix"])
+    x, y, z = matrix[:3, :3].T @ (np.asarray(point) - matrix[:3, 3])
+    width, height = content["resolution"]
+    camera = content["camera"]
+    if camera["type"] == "PERSP":
+        clip = np.array(camera["projection_matrix"]) @ [x, y, z, 1]
+        return (1 + clip[0] / clip[3]) / 2 * width, (1 - clip[1] / clip[3]) / 2 * height
+    if camera["panorama_type"] == "EQUIRECTANGULAR":
+        longitude, latitude = math.atan2(x, -z), math.asin(y / math.hypot(x, y, z))
+        return (0.5 + longitude / (2 * math.pi)) * width, (0.5 - latitude / math.pi) * height
+    radius = math.acos(-z / math.hypot(x, y, z)) / camera["fisheye_fov"] * width
+    side = math.hypot(x, y)
+    return width / 2 + radius * x / side, height / 2 - radius * y / side
+
+
+def angle_between(a: Any, b: Any) -> float:
+    a, b = np.asarray(a, float), np.asarray(b, float)
+    return math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b))
+
+
+@pytest.mark.parametrize("camera", [PERSPECTIVE, FISHEYE, WIDE, PANORAMA])
+def test_the_loaders_ray_of_a_pixel_meets_the_point_seen_there(
+    camera: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = written(tmp_path, camera)
+    transforms = export(tmp_path, monkeypatch, "--scale", 0.1, "--offset", 0.5, 0.75, 0.4)
+    loader = Loader(transforms)
+    widest = {"rectilinear": 0.8, "equidistant": 1.55, "equirectangular": 3.1}[camera["lens"]]
+    random = np.random.default_rng(7)
+    for frame in range(len(content["frames"])):
+        matrix = np.array(content["frames"][frame]["world_matrix"])
+        for theta in (0.02, 0.3, *random.uniform(0, widest, 20)):
+            phi = random.uniform(0, 2 * math.pi)
+            ray = [
+                math.sin(theta) * math.cos(phi),
+                math.sin(theta) * math.sin(phi),
+                -math.cos(theta),
+            ]
+            point = matrix[:3, :3] @ ray * random.uniform(0.5, 20) + matrix[:3, 3]
+            origin, direction = loader.ray(frame, *seen_at(content, frame, point))
+            target = loader.position(silvr_orientation(point))
+            assert angle_between(direction, target - origin) < 1e-4
+
+
+def test_a_camera_worked_by_hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A level camera at (1, 2, 3) looking along +Y, and one at (3, 2, 3) looking straight down."""
+    rows = ["name,x,y,z,rx,ry,rz", f"a,1,2,3,{math.pi / 2},0,0", "b,3,2,3,0,0,0"]
+    (tmp_path / "poses.csv").write_text("\n".join(rows))
+    rig = {"type": "poses", "file": str(tmp_path / "poses.csv")}
+    written(tmp_path, {"lens": "rectilinear", "resolution": [256, 256], "focal_length": 18}, rig)
+    transforms = export(tmp_path, monkeypatch, "--scale", 0.1, "--offset", 0.5, 0.5, 0.2)
+    level, down = (frame["transform_matrix"] for frame in transforms["frames"])
+    np.testing.assert_allclose(
+        level, [[0, 0, -1, 2], [-1, 0, 0, -1], [0, 1, 0, 3], [0, 0, 0, 1]], atol=1e-9
+    )
+    np.testing.assert_allclose(
+        down, [[0, 1, 0, 2], [-1, 0, 0, -3], [0, 0, 1, 3], [0, 0, 0, 1]], atol=1e-9
+    )
+    # The mean camera, (2, 2, 3), is (2, −2, 3) there.
+    np.testing.assert_allclose(transforms["offset"], [0.3, 0.7, -0.1], atol=1e-12)
+    assert transforms["scale"] == 0.1
+    assert transforms["camera_angle_x"] == pytest.approx(math.pi / 2)
+    assert (transforms["fl_x"], transforms["cx"], transforms["w"]) == (128, 128, 256)
+
+
+def test_frames_keep_the_views_order_which_natural_sorting_leaves_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig = {"type": "plane", "cameras": [10001, 1]}
+    content = written(tmp_path, {**FISHEYE, "resolution": [1, 1]}, rig)
+    content["frames"] = [*content["frames"][:12], *content["frames"][9990:]]
+    (tmp_path / "lightfield.json").write_text(json.dumps(content))
+    transforms = export(tmp_path, monkeypatch)
+    paths = [frame["file_path"] for frame in transforms["frames"]]
+    assert paths == [f"{frame['name']}.png" for frame in content["frames"]]
+
+    def natural(path: str) -> list[Any]:
+        return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path)]
+
+    assert sorted(paths, key=natural) == paths
+
+
+def test_fisheye_beyond_ninety_degrees_and_the_exact_centre_are_hidden(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = written(tmp_path, WIDE)
+    for frame in content["frames"]:
+        images.write_png(tmp_path / f"{frame['name']}.png", np.ones((65, 65, 3), np.uint8))
+    loader = Loader(export(tmp_path, monkeypatch))
+    for frame in content["frames"]:
+        mask = images.read_image(tmp_path / f"dynamic_mask_{frame['name']}.png").channels["Y"]
+        for y in range(0, 65, 4):
+            for x in range(0, 65, 4):
+                _, direction = loader.ray(0, x + 0.5, y + 0.5)
+                assert (mask[y, x] == 255) == (not direction.any())
+    assert mask[32, 32] == 255
+
+
+def test_pixels_without_a_source_are_hidden(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = written(tmp_path, PERSPECTIVE)
+    pixels = np.full((48, 64, 4), 200, np.uint8)
+    pixels[:5, :7, 3] = 0
+    for frame in content["frames"][1:]:
+        images.write_png(tmp_path / f"{frame['name']}.png", pixels[:, :, :3])
+    images.write_png(tmp_path / "view_0000f.png", pixels)
+    export(tmp_path, monkeypatch)
+    assert [path.name for path in tmp_path.glob("dynamic_mask_*")] == [
+        "dynamic_mask_view_0000f.png"
+    ]
+    mask = images.read_image(tmp_path / "dynamic_mask_view_0000f.png").channels["Y"]
+    np.testing.assert_array_equal(mask == 255, pixels[:, :, 3] == 0)
+
+
+def rendered(
+    tmp_path: Path, content: dict[str, Any], camera: Any, meaning: str, distance: float
+) -> None:
+    """Write EXR views of a sphere around each camera: every pixel with a ray at one distance."""
+    lens = lenses.from_camera(camera)
+    width, height = content["resolution"]
+    x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    cosine = -lens.rays(x, y)[..., 2]
+    depth = distance * cosine if meaning == "z" else np.full_like(cosine, distance)
+    depth = np.where(np.isnan(cosine), np.inf, depth).astype(np.float32)
+    colour = np.full((height, width), 0.25, np.float16)
+    for frame in content["frames"]:
+        images.write_exr(
+            tmp_path / f"{frame['name']}.exr",
+            {"R": colour, "G": colour, "B": colour, "Z": depth},
+            {images.DEPTH_ATTRIBUTE: meaning},
+        )
+
+
+@pytest.mark.parametrize("meaning", ["z", "distance"])
+@pytest.mark.parametrize("camera", [PERSPECTIVE, FISHEYE])
+def test_the_loaders_depth_is_the_true_distance(
+    camera: Any, meaning: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = written(tmp_path, camera, depth=meaning)
+    rendered(tmp_path, content, camera, meaning, 3.25)
+    transforms = export(
+        tmp_path, monkeypatch, "--image-suffix", ".exr", "--depth-dir", tmp_path / "depth"
+    )
+    loader = Loader(transforms)
+    frame = transforms["frames"][1]
+    depth = images.read_image(tmp_path / frame["depth_path"]).channels["Y"]
+    assert depth.dtype == np.uint16
+    width, height = content["resolution"]
+    for x, y in ((5, 40), (30, 20), (50, 11), (32, 2)):
+        _, direction = loader.ray(1, x + 0.5, y + 0.5)
+        length = float(np.linalg.norm(direction))
+        target = length * float(depth[y, x]) * transforms["integer_depth_scale"]
+        assert target == pytest.approx(3.25, abs=0.0006 * length)
+    if camera is FISHEYE:
+        assert depth[0, 0] == depth[height - 1, width - 1] == 0
+
+
+def test_exr_views_become_files_that_the_loader_accepts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = written(tmp_path, FISHEYE)
+    rendered(tmp_path, content, FISHEYE, "z", 2.0)
+    transforms = export(tmp_path, monkeypatch, "--image-suffix", ".exr")
+    assert [frame["file_path"] for frame in transforms["frames"]] == [
+        f"instant_ngp/{frame['name']}.exr" for frame in content["frames"]
+    ]
+    y, x = np.mgrid[:64, :64] + 0.5
+    outside = np.hypot(x - 32, y - 32) > 32
+    for frame in transforms["frames"]:
+        channels = images.read_image(tmp_path / frame["file_path"]).channels
+        assert {name: pixels.dtype for name, pixels in channels.items()} == dict.fromkeys(
+            "RGB", np.dtype(np.float16)
+        )
+        np.testing.assert_array_equal(channels["R"], np.where(outside, -1, 0.25))
+
+
+def in_unit_cube(loader: Loader, points: Any) -> bool:
+    return all(
+        np.all(np.abs(loader.position(silvr_orientation(point)) - 0.5) <= 0.5 + 1e-6)
+        for point in points
+    )
+
+
+def test_fitted_to_the_rig_its_box_is_a_fifth_of_the_cube_and_centred(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = written(tmp_path, FISHEYE, {"type": "sphere", "subdivisions": 2, "center": [5, 6, 7]})
+    loader = Loader(export(tmp_path, monkeypatch))
+    positions = np.array(
+        [loader.position(silvr_orientation(frame["position"])) for frame in content["frames"]]
+    )
+    np.testing.assert_allclose((positions.min(0) + positions.max(0)) / 2, 0.5, atol=1e-6)
+    assert np.ptp(positions, axis=0).max() == pytest.approx(0.2, abs=1e-6)
+
+
+def test_fitted_to_depth_the_scene_is_within_the_cube(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig = {"type": "sphere", "subdivisions": 1, "size": 0.02, "center": [1, -2, 3]}
+    content = written(tmp_path, FISHEYE, rig, depth="distance")
+    rendered(tmp_path, content, FISHEYE, "distance", 4.0)
+    transforms = export(tmp_path, monkeypatch, "--depth-bounds")
+    loader = Loader(transforms)
+    assert in_unit_cube(loader, [frame["position"] for frame in content["frames"]])
+    # Of a sphere seen evenly from its centre, nine tenths lie within ±0.9 radii along any axis.
+    assert transforms["scale"] == pytest.approx(1 / (2 * 0.9 * 4.0), rel=0.05)
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    assert in_unit_cube(loader, [1, -2, 3] + 0.85 * 4.0 * corners)
+
+
+def test_split_gives_odd_sequence_numbers_to_the_test_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written(tmp_path, FISHEYE)
+    everything = export(tmp_path, monkeypatch, "--split")
+    parts = {}
+    for part in ("train", "test"):
+        parts[part] = json.loads((tmp_path / f"transforms_{part}.json").read_text())
+        assert parts[part] | {"frames": 0} == everything | {"frames": 0}
+    names = [Path(frame["file_path"]).stem for frame in parts["test"]["frames"]]
+    assert names == ["view_0001f", "view_0003f", "view_0005f"]
+    assert len(parts["train"]["frames"]) == 3
+    assert len(everything["frames"]) == 6
+
+
+def test_boxes_and_scales_are_passed_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written(tmp_path, FISHEYE)
+    transforms = export(
+        tmp_path, monkeypatch, "--aabb-scale", 16, "--render-aabb", *[0.1, 0.2, 0.3, 0.7, 0.8, 0.9]
+    )
+    assert transforms["aabb_scale"] == 16
+    assert transforms["render_aabb"] == [[0.1, 0.2, 0.3], [0.7, 0.8, 0.9]]
+
+
+@pytest.mark.parametrize("lens", ["equisolid", "stereographic"])
+def test_other_fisheyes_are_followed_to_a_quarter_of_a_pixel(
+    lens: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera: dict[str, Any] = {"lens": lens, "resolution": [512, 512], "fov": 180}
+    if lens == "equisolid":
+        camera |= {"focal_length": 36 / 2 / 2 / math.sin(math.pi / 4)}
+    written(tmp_path, camera)
+    loader = Loader(export(tmp_path, monkeypatch))
+    for x in np.linspace(258, 509, 40):
+        radius = (x - 256) / 256
+        if lens == "equisolid":
+            angle = 2 * math.asin(radius * math.sin(math.pi / 4))
+        else:
+            angle = 2 * math.atan(radius)
+        axes, _ = loader.camera(0)
+        _, direction = loader.ray(0, x, 256)
+        pixel = 2 * math.sin(math.pi / 4) / math.cos(angle / 2) / 256
+        assert abs(angle_between(direction, axes[:, 2]) - angle) < 0.25 * pixel
+
+
+@pytest.mark.parametrize(
+    ("camera", "arguments", "message"),
+    [
+        (
+            {"lens": "orthographic", "resolution": [512, 512], "fov": 180},
+            [],
+            "lightfield.json: camera: instant-ngp cannot follow",
+        ),
+        (
+            {"lens": "equirectangular", "resolution": [64, 32], "latitude": [-45, 45]},
+            [],
+            "instant-ngp cannot follow",
+        ),
+        (FISHEYE, ["--offset", 0, 0, 0], "--offset: goes with --scale"),
+        (FISHEYE, ["--scale", 0], "--scale: is 0"),
+        (FISHEYE, ["--image-suffix", ".exr"], "view_0000f.exr: no such file"),
+        (FISHEYE, ["--depth-bounds"], "view_0000f.exr: no such file"),
+    ],
+)
+def test_what_cannot_be_exported_is_an_error(
+    camera: Any,
+    arguments: list[Any],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    written(tmp_path, camera)
+    with pytest.raises(UserError, match=message):
+        export(tmp_path, monkeypatch, *arguments)
+    assert not (tmp_path / "transforms.json").exists()
+
+
+def test_views_of_another_size_or_of_unknown_depth_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = written(tmp_path, FISHEYE)
+    small = np.zeros((8, 8), np.float16)
+    for frame in content["frames"]:
+        images.write_exr(tmp_path / f"{frame['name']}.exr", dict.fromkeys("RGBZ", small))
+    with pytest.raises(UserError, match=r"view_0000f.exr: is 8 × 8, but .* says 64 × 64"):
+        export(tmp_path, monkeypatch, "--image-suffix", ".exr")
+    black = np.zeros((64, 64), np.float16)
+    for frame in content["frames"]:
+        images.write_exr(tmp_path / f"{frame['name']}.exr", dict.fromkeys("RGBZ", black))
+    with pytest.raises(UserError, match="depth: is None; must be z or distance"):
+        export(tmp_path, monkeypatch, "--depth-bounds")
+
+
+def test_a_split_that_the_rig_does_not_have_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written(tmp_path, FISHEYE, {"type": "plane", "cameras": [3, 1]})
+    with pytest.raises(UserError, match="none has the split 'train'"):
+        export(tmp_path, monkeypatch, "--split")
