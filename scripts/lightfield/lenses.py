@@ -36,7 +36,7 @@ Array = npt.NDArray[Any]
 Pair = tuple[float, float]
 
 SENSOR_WIDTH = 36.0  # mm, Blender's default
-CLIP = (0.1, 100.0)  # m, Blender's default camera clipping, which its projection matrix contains
+CLIP = (0.1, 1000.0)  # m, a new Blender camera's clipping, which its projection matrix contains
 # Blender keeps angles in float32, whose π, π/2 and 2π exceed the true ones by less than this.
 ANGLE_SLACK = 1e-6
 CUBE_FACES = "fblrud"
