@@ -1,0 +1,37 @@
+"""Compute a lens map once, for reproject.py --lens-map to apply to every view of a rig.
+
+Takes the same flags for the geometry as reproject.py. With --cubemap it writes a map for each
+face, FILE's name with _f, _b, _l, _r, _u or _d before the suffix.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+from lightfield import cli, lens_map
+from lightfield.lens_arguments import add_geometry_flags, geometry, joined
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the program's command line."""
+    p = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    p.add_argument("file", type=Path, metavar="FILE", help="lens map to write, .npy")
+    add_geometry_flags(p)
+    return p
+
+
+def main() -> None:
+    """Run the program on the command line's arguments."""
+    arguments = parser().parse_args(joined(sys.argv[1:]))
+    work = geometry(arguments)
+    path: Path = arguments.file
+    for target in work.targets:
+        made = work.compute(target)
+        lens_map.report(made)
+        lens_map.save(path.with_name(path.stem + target.suffix + path.suffix), made)
+
+
+if __name__ == "__main__":
+    cli.run(main)
