@@ -161,7 +161,7 @@ class RadialLens(Lens):
             ray = np.stack(
                 [sin * np.where(r > 0, u / r, 0), sin * np.where(r > 0, v / r, 1), -cos], axis=-1
             )
-            ray[~(r <= self._limit * _slack(x.dtype))] = np.nan
+            ray[~((r <= self._limit * _slack(x.dtype)) & np.isfinite(r))] = np.nan
         return np.asarray(ray, x.dtype)
 
     def pixels(self, rays: Array) -> Array:
@@ -491,8 +491,8 @@ class Polynomial(RadialLens):
         theta = np.arctan2(sin, cos)
         r = self._increasing.inverse(theta)
         hole = self._increasing.value(0.0)
-        if hole < self._increasing.value(max(self._unit)):
-            r = np.where(theta < hole, 0, r)
+        if 2 * hole < self._increasing.value(max(self._unit)):
+            r = np.where(theta.astype(np.float64) < hole, 0, r)
         return self._sign * r
 
     def _camera(self) -> dict[str, Any]:
@@ -563,7 +563,8 @@ class KannalaBrandt(RadialLens):
 class Equirectangular(Lens):
     """Longitude linear in x, latitude linear in y, in radians. Source: Cycles' EQUIRECTANGULAR.
 
-    A ray outside a partial range of longitudes goes to the side of the frame that it is nearer.
+    A ray outside a partial range of longitudes goes to the side of the frame that it is nearer;
+    a pole, which has every longitude, goes to longitude 0.
     """
 
     longitude: Pair = (-math.pi, math.pi)
@@ -604,7 +605,8 @@ class Equirectangular(Lens):
         (west, east), (south, north) = self.longitude, self.latitude
         with np.errstate(invalid="ignore", divide="ignore"):
             rays = rays / np.abs(rays).max(axis=-1, keepdims=True)
-        longitude = np.arctan2(rays[..., 0], -rays[..., 2])
+        # 0 − z, not −z: atan2(0, −0) is π, and a pole belongs to longitude 0.
+        longitude = np.arctan2(rays[..., 0], 0 - rays[..., 2])
         latitude = np.arctan2(rays[..., 1], np.hypot(rays[..., 0], rays[..., 2]))
         turns = np.round((longitude - (west + east) / 2) / (2 * math.pi))
         longitude = longitude - 2 * math.pi * turns
@@ -686,15 +688,18 @@ class CubeMap(Lens):
     def pixels(self, rays: Array) -> Array:
         (rays,) = _as_float(rays)
         rotations = [cube_face_rotation(face).astype(rays.dtype) for face in CUBE_FACES]
-        index = np.argmax(np.stack([-(rays @ r[:, 2]) for r in rotations]), axis=0)
         out = np.full((*rays.shape[:-1], 2), np.nan, rays.dtype)
-        # The strip's last column of a face must not round to the first column of the next.
-        for i, rotation in enumerate(rotations):
-            chosen = index == i
-            pixel = self.face.pixels(rays[chosen] @ rotation)
-            last = np.nextafter(rays.dtype.type((i + 1) * self.height), rays.dtype.type(0))
-            pixel[..., 0] = np.minimum(pixel[..., 0] + i * self.height, last)
-            out[chosen] = pixel
+        with np.errstate(invalid="ignore"):
+            # The face that a ray meets is the one whose axis it is nearest.
+            index = np.argmax(np.stack([-(rays @ r[:, 2]) for r in rotations]), axis=0)
+            for i, rotation in enumerate(rotations):
+                chosen = index == i
+                x, y = np.moveaxis(self.face.pixels(rays[chosen] @ rotation), -1, 0)
+                # Rounding must not carry a pixel to the next face of the strip, which is no
+                # neighbour in space.
+                first, end = np.asarray([i, i + 1], rays.dtype) * self.height
+                out[chosen, 0] = np.clip(x + first, first, np.nextafter(end, first))
+                out[chosen, 1] = np.clip(y, 0, self.height)
         return out
 
     @property

@@ -1,0 +1,634 @@
+"""The lenses against Cycles, OpenCV, mpmath and SILVR's files, and against their own inverses."""
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import mpmath
+import numpy as np
+import pytest
+from lightfield.depth import z_from_distance
+from lightfield.errors import UserError
+from lightfield.lenses import (
+    CUBE_FACES,
+    CubeMap,
+    Equidistant,
+    Equirectangular,
+    Equisolid,
+    KannalaBrandt,
+    Lens,
+    Orthographic,
+    Polynomial,
+    Rectilinear,
+    Stereographic,
+    cube_face_rotation,
+    from_camera,
+    from_lightfield,
+)
+from scipy.spatial.transform import Rotation
+
+BLENDER_POLYNOMIAL = (-1.17e-05, -0.0199887, -3.3525e-06, 3.09927e-06, -2.60646e-08)
+OPENCV = (-0.01, 0.03, -0.02, 0.003)
+SIZE = {"width": 2048, "height": 1536}
+SHIFTED = {**SIZE, "principal_point": (900.25, 1000.5)}
+
+LENSES: dict[str, Lens] = {
+    "rectilinear": Rectilinear(**SIZE, focal_length=18),
+    "rectilinear shifted": Rectilinear(**SHIFTED, focal_length=18, sensor_size=(36, 20)),
+    "rectilinear 0.01°": Rectilinear(**SIZE, focal_length=18 / math.tan(math.radians(0.005))),
+    "rectilinear 179.9°": Rectilinear(**SIZE, focal_length=18 / math.tan(math.radians(89.95))),
+    "equidistant 180°": Equidistant(**SIZE, fov=math.pi),
+    "equidistant 0.01°": Equidistant(**SIZE, fov=math.radians(0.01)),
+    "equidistant shifted 220°": Equidistant(**SHIFTED, fov=math.radians(220)),
+    "equidistant 359°": Equidistant(**SIZE, fov=math.radians(359)),
+    "equisolid 180°": Equisolid(**SIZE, focal_length=10.5, fov=math.pi),
+    "equisolid shifted 359°": Equisolid(**SHIFTED, focal_length=7, fov=math.radians(359)),
+    "stereographic 180°": Stereographic(**SIZE, fov=math.pi),
+    "stereographic shifted 340°": Stereographic(**SHIFTED, fov=math.radians(340)),
+    "orthographic 180°": Orthographic(**SIZE, fov=math.pi),
+    "orthographic shifted 100°": Orthographic(**SHIFTED, fov=math.radians(100)),
+    "polynomial": Polynomial(**SIZE, coefficients=BLENDER_POLYNOMIAL, fov=math.pi),
+    "polynomial turned": Polynomial(
+        **SHIFTED, coefficients=(0, 0.08, 1e-4, -1e-5, 0), fov=math.radians(200)
+    ),
+    "kannala_brandt": KannalaBrandt(**SIZE, focal_length=11, coefficients=OPENCV, fov=3.5),
+    "kannala_brandt shifted": KannalaBrandt(
+        **SHIFTED, focal_length=11, coefficients=(0, 0, 0, 0), fov=math.radians(300)
+    ),
+    "equirectangular": Equirectangular(**SIZE),
+    "equirectangular part": Equirectangular(**SIZE, longitude=(-1, 2.5), latitude=(-0.5, 1.2)),
+    "cube map": CubeMap(width=6 * 512, height=512),
+}
+
+CAMERAS: dict[str, tuple[Lens, dict[str, object]]] = {
+    "perspective": (
+        Rectilinear(width=96, height=64, focal_length=20),
+        {"type": "PERSP", "lens": 20},
+    ),
+    "perspective shifted": (
+        Rectilinear(width=64, height=96, focal_length=20, principal_point=(25.6, 43.52)),
+        {"type": "PERSP", "lens": 20, "shift_x": 0.1, "shift_y": -0.07},
+    ),
+    "equidistant": (
+        Equidistant(width=96, height=64, fov=math.radians(180)),
+        {"panorama_type": "FISHEYE_EQUIDISTANT", "fisheye_fov": math.radians(180)},
+    ),
+    "equidistant 360°": (
+        Equidistant(width=64, height=80, fov=math.radians(360)),
+        {"panorama_type": "FISHEYE_EQUIDISTANT", "fisheye_fov": math.radians(360)},
+    ),
+    "equidistant shifted": (
+        Equidistant(width=96, height=64, fov=3, principal_point=(38.4, 28.16)),
+        {
+            "panorama_type": "FISHEYE_EQUIDISTANT",
+            "fisheye_fov": 3,
+            "shift_x": 0.1,
+            "shift_y": -0.06,
+        },
+    ),
+    "equisolid": (
+        Equisolid(width=96, height=64, focal_length=9, fov=math.radians(220)),
+        {
+            "panorama_type": "FISHEYE_EQUISOLID",
+            "fisheye_lens": 9,
+            "fisheye_fov": math.radians(220),
+        },
+    ),
+    "equisolid portrait shifted": (
+        Equisolid(width=64, height=96, focal_length=9, fov=3, principal_point=(25.6, 41.28)),
+        {
+            "panorama_type": "FISHEYE_EQUISOLID",
+            "fisheye_lens": 9,
+            "fisheye_fov": 3,
+            "shift_x": 0.1,
+            "shift_y": -0.07,
+        },
+    ),
+    "polynomial": (
+        Polynomial(width=96, height=64, coefficients=BLENDER_POLYNOMIAL, fov=math.pi),
+        {
+            "panorama_type": "FISHEYE_LENS_POLYNOMIAL",
+            "fisheye_fov": math.pi,
+            **{f"fisheye_polynomial_k{i}": k for i, k in enumerate(BLENDER_POLYNOMIAL)},
+        },
+    ),
+    "polynomial turned": (
+        Polynomial(width=96, height=64, coefficients=(0.05, 0.07, 0, 1e-5, 0), fov=3),
+        {
+            "panorama_type": "FISHEYE_LENS_POLYNOMIAL",
+            "fisheye_fov": 3,
+            **{f"fisheye_polynomial_k{i}": k for i, k in enumerate((0.05, 0.07, 0, 1e-5, 0))},
+        },
+    ),
+    "equirectangular": (
+        Equirectangular(width=96, height=64),
+        {"panorama_type": "EQUIRECTANGULAR"},
+    ),
+    "equirectangular part": (
+        Equirectangular(width=96, height=64, longitude=(-1, 2), latitude=(-0.5, 1)),
+        {
+            "panorama_type": "EQUIRECTANGULAR",
+            "longitude_min": -1,
+            "longitude_max": 2,
+            "latitude_min": -0.5,
+            "latitude_max": 1,
+        },
+    ),
+}
+
+
+def angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the angle between unit rays, accurate however small."""
+    return 2 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+
+
+def grid(lens: Lens, dtype: type, steps: int = 129) -> tuple[np.ndarray, np.ndarray]:
+    """Return points of the whole frame: its edges, its exact centre, and the odd ones between."""
+    x = np.linspace(0, lens.width, steps).astype(dtype)
+    y = np.linspace(0, lens.height, steps).astype(dtype)
+    return np.meshgrid(x, y)
+
+
+@pytest.fixture(scope="module")
+def cycles(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
+    """What Cycles' cameras see, by the name in `CAMERAS`."""
+    output = tmp_path_factory.mktemp("cycles") / "positions.npz"
+    cases = [
+        {
+            "name": name,
+            "resolution": [lens.width, lens.height],
+            # The settings that the lenses fix: the sensor's width counts, wide or high.
+            "camera": {"type": "PANO", "sensor_fit": "HORIZONTAL", "sensor_width": 36} | camera,
+        }
+        for name, (lens, camera) in CAMERAS.items()
+    ]
+    program = Path(__file__).with_name("cycles_positions.py")
+    subprocess.run(
+        [sys.executable, program, output],
+        input=json.dumps(cases),
+        text=True,
+        check=True,
+        capture_output=True,
+    )
+    return dict(np.load(output))
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_rays_and_pixels_are_those_of_cycles(name: str, cycles: dict[str, np.ndarray]) -> None:
+    lens = CAMERAS[name][0]
+    hit = cycles[name + ".rays"]
+    x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
+    rays = lens.rays(x, y)
+    seen = np.isfinite(rays).all(axis=-1)
+    np.testing.assert_array_equal(seen, np.isfinite(hit).all(axis=-1))
+    # Positions are float32: a few 1e-7 in the median, some 1e-6 where a surface is grazed.
+    difference = angle(rays, hit)[seen]
+    assert np.median(difference) < 1e-6
+    assert difference.max() < 2e-5
+    offset = lens.pixels(hit)[seen] - np.stack([x, y], axis=-1)[seen]
+    assert np.abs(offset).max() < 1e-3
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_cycles_depth_is_z_for_perspective_and_distance_otherwise(
+    name: str, cycles: dict[str, np.ndarray]
+) -> None:
+    rays, distance = cycles[name + ".rays"], cycles[name + ".distance"]
+    seen = np.isfinite(distance)
+    depth = distance
+    if name.startswith("perspective"):
+        depth = z_from_distance(distance, rays)
+    np.testing.assert_allclose(cycles[name + ".depth"][seen], depth[seen], rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", [name for name in CAMERAS if name.startswith("perspective")])
+def test_projection_matrix_is_blenders(name: str, cycles: dict[str, np.ndarray]) -> None:
+    matrix = CAMERAS[name][0].to_lightfield()["camera"]["projection_matrix"]
+    np.testing.assert_allclose(matrix, cycles[name + ".matrix"], rtol=1e-6, atol=1e-7)
+
+
+def test_kannala_brandt_is_opencvs_fisheye() -> None:
+    lens = KannalaBrandt(
+        width=640,
+        height=480,
+        focal_length=12,
+        sensor_size=(36, 30),
+        principal_point=(310, 250),
+        coefficients=OPENCV,
+    )
+    matrix = np.array([[12 / 36 * 640, 0, 310], [0, 12 / 30 * 480, 250], [0, 0, 1]])
+    random = np.random.default_rng(4)
+    theta, phi = random.uniform(0, 1.5, 1000), random.uniform(-np.pi, np.pi, 1000)
+    # OpenCV's cameras look along +Z with +Y down.
+    points = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], 1)
+    expected, _ = cv2.fisheye.projectPoints(
+        points[:, None] * 3, np.zeros(3), np.zeros(3), matrix, np.array(OPENCV)
+    )
+    rays = points * [1, -1, -1]
+    np.testing.assert_allclose(lens.pixels(rays), expected[:, 0], atol=1e-9)
+    assert angle(lens.rays(expected[:, 0, 0], expected[:, 0, 1]), rays).max() < 1e-12
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("name", LENSES)
+def test_pixels_undo_rays_over_the_whole_frame(name: str, dtype: type) -> None:
+    lens = LENSES[name]
+    x, y = grid(lens, dtype)
+    if isinstance(lens, CubeMap | Equirectangular):
+        # Pixels on a border between faces, at a pole or on the seam have a twin of the same ray.
+        x, y = x[1:-1, 1:-1] + dtype(0.25), y[1:-1, 1:-1] + dtype(0.25)
+    rays = lens.rays(x, y)
+    seen = np.isfinite(rays[..., 0])
+    pixels = lens.pixels(rays)
+    assert rays.dtype == pixels.dtype == dtype
+    assert seen.mean() > 0.3
+    error = np.abs(pixels - np.stack([x, y], axis=-1))[seen]
+    assert error.max() < (1e-9 if dtype == np.float64 else 0.01)
+    np.testing.assert_allclose(np.linalg.norm(rays[seen], axis=-1), 1, rtol=4 * np.finfo(dtype).eps)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("name", LENSES)
+def test_rays_undo_pixels_for_every_ray_seen(name: str, dtype: type) -> None:
+    lens = LENSES[name]
+    rays = lens.rays(*grid(lens, dtype))
+    rays = rays[np.isfinite(rays[..., 0])]
+    again = lens.rays(*np.moveaxis(lens.pixels(rays), -1, 0))
+    assert angle(again, rays).max() < (1e-9 if dtype == np.float64 else 2e-5)
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_lightfield_json_brings_the_lens_back(name: str) -> None:
+    lens = LENSES[name]
+    text = json.dumps(lens.to_lightfield(), allow_nan=False)
+    assert from_lightfield(json.loads(text)) == replace(lens, sensor_size=lens.sensor)
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_resized_keeps_the_field_of_view(name: str) -> None:
+    lens = LENSES[name]
+    small = lens.resized(lens.width // 8, lens.height // 8)
+    x, y = grid(small, np.float64, 33)
+    np.testing.assert_allclose(small.rays(x, y), lens.rays(x * 8, y * 8), atol=1e-12)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("name", LENSES)
+def test_rays_of_any_length_and_of_none(name: str, dtype: type) -> None:
+    lens = LENSES[name]
+    ray = (
+        np.array([0.02, -0.03, -0.9], dtype)
+        if "0.01°" not in name
+        else np.array([2e-5, -3e-5, -0.9], dtype)
+    )
+    tiny, huge = np.finfo(dtype).tiny * 1e6, np.finfo(dtype).max / 4
+    expected = lens.pixels(ray)
+    assert np.isfinite(expected).all()
+    for length in (tiny, huge):
+        np.testing.assert_allclose(lens.pixels(ray * dtype(length)), expected, rtol=1e-5)
+    for bad in ([0, 0, 0], [np.nan, 0, -1], [0, np.inf, -1], [-np.inf, np.inf, np.nan]):
+        assert np.isnan(lens.pixels(np.array(bad, dtype))).all()
+    for x, y in ((np.nan, 5), (5, np.inf)):
+        assert np.isnan(lens.rays(np.array(x, dtype), np.array(y, dtype))).all()
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_shapes(name: str) -> None:
+    lens = LENSES[name]
+    x, y = lens.width / 2 + 3, lens.height / 2 + 2
+    assert lens.rays(x, y).shape == (3,)
+    assert lens.rays(np.full((4, 1), x), np.full(5, y)).shape == (4, 5, 3)
+    assert lens.pixels(np.empty((0, 3))).shape == (0, 2)
+    np.testing.assert_allclose(lens.pixels(lens.rays(x, y)), [x, y], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_z_depth_is_for_lenses_within_180_degrees(name: str) -> None:
+    lens = LENSES[name]
+    cos = -lens.rays(*grid(lens, np.float64))[..., 2]
+    if lens.has_z_depth:
+        assert np.nanmin(cos) > -1e-6
+    # A lens that says no may still have a frame that stops earlier.
+    elif "kannala" not in name and "polynomial" not in name:
+        assert np.nanmin(cos) < 0
+
+
+def test_exact_centre_looks_along_the_axis() -> None:
+    for lens in LENSES.values():
+        if not isinstance(lens, CubeMap | Equirectangular | Polynomial):
+            np.testing.assert_array_equal(lens.rays(*lens.center), [0, 0, -1])
+            np.testing.assert_array_equal(lens.pixels(np.array([0.0, 0, -1])), lens.center)
+
+
+def test_beyond_the_field_of_view_is_nan() -> None:
+    degrees = np.array([0, 20, 40, 60, 80, 100, 120, 140, 160, 180])
+    theta = np.radians(degrees)
+    rays = np.stack([np.sin(theta), 0 * theta, -np.cos(theta)], axis=-1)
+    size = {"width": 64, "height": 48}
+    for lens, last in (
+        (Rectilinear(**size, focal_length=18), 80),
+        (Equidistant(**size, fov=math.radians(130)), 60),
+        (Equidistant(**size, fov=math.radians(360)), 180),
+        (Equisolid(**size, focal_length=10, fov=math.radians(250)), 120),
+        (Stereographic(**size, fov=math.radians(290)), 140),
+        (Orthographic(**size, fov=math.radians(180)), 80),
+        (Polynomial(**size, coefficients=(0, -0.1, 0, 0, 0), fov=math.radians(210)), 100),
+        (KannalaBrandt(**size, focal_length=10, coefficients=(0, 0, 0, 0), fov=3), 80),
+    ):
+        seen = np.isfinite(lens.pixels(rays)).all(axis=-1)
+        np.testing.assert_array_equal(seen, degrees <= last, err_msg=str(lens))
+    for lens in (Equirectangular(**size), CubeMap(width=96, height=16)):
+        assert np.isfinite(lens.pixels(rays)).all()
+
+
+def test_image_circle_of_a_non_square_fisheye_touches_all_four_edges() -> None:
+    for lens in (
+        Equidistant(width=96, height=64, fov=2),
+        Stereographic(width=96, height=64, fov=2),
+        Orthographic(width=96, height=64, fov=2),
+    ):
+        for x, y in ((0, 32), (96, 32), (48, 0), (48, 64)):
+            assert math.isclose(math.acos(-lens.rays(x, y)[2]), 1, rel_tol=1e-12)
+        assert np.isnan(lens.rays(0, 0)).all()
+
+
+@pytest.mark.parametrize("turning", [(0.1, -1e-3), (0.05, -5e-4)])
+def test_polynomial_ends_at_its_turning_point(turning: tuple[float, float]) -> None:
+    # θ = a r + b r³ turns at r = √(−a / 3b).
+    a, b = turning
+    radius = math.sqrt(-a / (3 * b))
+    lens = Polynomial(width=200, height=200, coefficients=(0, -a, 0, -b, 0), fov=math.pi)
+    millimetre = 200 / 36
+    inside, outside = 100 + radius * (1 - 1e-6) * millimetre, 100 + radius * 1.01 * millimetre
+    assert np.isfinite(lens.rays(inside, 100)).all()
+    assert np.isnan(lens.rays(outside, 100)).all()
+    largest = a * radius + b * radius**3
+    for theta, seen in ((largest * 0.999999, True), (largest * 1.0001, False)):
+        pixel = lens.pixels(np.array([math.sin(theta), 0, -math.cos(theta)]))
+        assert np.isfinite(pixel).all() == seen
+        if seen:
+            root = mpmath.polyroots([-theta, a, 0, b], maxsteps=500, extraprec=200, asc=True)
+            expected = min(float(r.real) for r in root if r.real > 0)
+            assert math.isclose((pixel[0] - 100) / millimetre, expected, rel_tol=1e-9)
+
+
+def test_kannala_brandt_ends_at_its_turning_point() -> None:
+    # r = f (θ − θ³ / 3) turns at θ = 1, r = 2 f / 3.
+    lens = KannalaBrandt(
+        width=200, height=200, focal_length=12, coefficients=(-1 / 3, 0, 0, 0), fov=math.pi
+    )
+    scale = 12 * 200 / 36
+    assert np.isfinite(lens.rays(100 + scale * 0.6666, 100)).all()
+    assert np.isnan(lens.rays(100 + scale * 0.6667, 100)).all()
+    assert np.isnan(lens.pixels(np.array([math.sin(1.001), 0, -math.cos(1.001)]))).all()
+
+
+def test_hole_of_a_polynomial_lens() -> None:
+    # θ = 0.01 + 0.1 r leaves a hole; a hole within a pixel belongs to the centre.
+    axis = np.array([0.0, 0, -1])
+    for width, closed in ((100, True), (2000, False)):
+        lens = Polynomial(
+            width=width, height=width, coefficients=(-0.01, -0.1, 0, 0, 0), fov=math.pi
+        )
+        pixel = lens.pixels(axis)
+        assert (pixel == width / 2).all() if closed else np.isnan(pixel).all()
+
+
+def test_near_the_rim_of_wide_lenses_nothing_cancels() -> None:
+    # 1e-6 rad from the backward axis, in float32, where θ alone would be 10 % off.
+    gap = np.float32(1e-6)
+    ray = np.array([gap, 0, 1], np.float32)
+    with mpmath.workdps(30):
+        theta = mpmath.pi - mpmath.atan(mpmath.mpf(float(gap)))
+        fov = math.radians(359.9995)
+        expected = 1000 + 1000 * float(mpmath.tan(theta / 2) / mpmath.tan(mpmath.mpf(fov) / 4))
+    lens = Stereographic(width=2000, height=2000, fov=math.radians(359.9999))
+    x = lens.pixels(ray)[0] - 1000
+    ratio = math.tan(math.radians(359.9999) / 4) / math.tan(fov / 4)
+    assert math.isclose(x * ratio, expected - 1000, rel_tol=1e-6)
+
+
+def test_equirectangular_poles_and_seam() -> None:
+    lens = Equirectangular(width=360, height=180)
+    for dtype in (np.float32, np.float64):
+        rays = np.array([[0, 1, 0], [0, -1, 0], [1, 0, 0], [0, 0, -1]], dtype)
+        expected = [[180, 0], [180, 180], [270, 90], [180, 90]]
+        np.testing.assert_allclose(lens.pixels(rays), expected, atol=1e-4)
+        backward = lens.pixels(np.array([[0, 0, 1], [-1e-30, 0, 1], [1e-30, 0, 1]], dtype))[:, 0]
+        np.testing.assert_allclose(backward, [360, 0, 360], atol=1e-4)
+    part = Equirectangular(width=100, height=100, longitude=(0, 1), latitude=(0, 1))
+    east = np.array([math.sin(-0.1), 0, -math.cos(-0.1)])
+    np.testing.assert_allclose(part.pixels(east), [-10, 100], atol=1e-12)
+
+
+def test_cube_faces_are_turned_as_the_sides_of_a_cuboid_rig() -> None:
+    # Blender's XYZ Euler angles of each side, as SILVR's cuboid has them.
+    half = math.pi / 2
+    sides = {
+        "f": (half, 0, 0),
+        "b": (half, 0, math.pi),
+        "l": (half, 0, half),
+        "r": (half, 0, -half),
+        "u": (math.pi, 0, 0),
+        "d": (0, 0, 0),
+    }
+    assert "".join(sides) == CUBE_FACES
+    front = Rotation.from_euler("xyz", sides["f"]).as_matrix()
+    lens = CubeMap(width=60, height=10)
+    for i, (face, euler) in enumerate(sides.items()):
+        rotation = front.T @ Rotation.from_euler("xyz", euler).as_matrix()
+        np.testing.assert_allclose(cube_face_rotation(face), rotation, atol=1e-15)
+        pinhole = Rectilinear(width=10, height=10, focal_length=18)
+        x, y = np.meshgrid(np.arange(10) + 0.5, np.arange(10) + 0.5)
+        expected = pinhole.rays(x, y) @ rotation.T
+        np.testing.assert_allclose(lens.rays(x + 10 * i, y), expected, atol=1e-15)
+        np.testing.assert_allclose(
+            lens.pixels(expected), np.stack([x + 10 * i, y], axis=-1), atol=1e-12
+        )
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_no_ray_falls_between_cube_faces(dtype: type) -> None:
+    lens = CubeMap(width=6 * 64, height=64)
+    corners = np.array(
+        [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z],
+        dtype,
+    )
+    corners /= np.linalg.norm(corners, axis=-1, keepdims=True)
+    again = lens.rays(*np.moveaxis(lens.pixels(corners), -1, 0))
+    assert angle(again, corners).max() < 10 * np.finfo(dtype).eps
+
+
+README = {"resolution": [2048, 2048], "sensor_size": [36.0, 36.0]}
+
+
+def test_reads_silvrs_documented_files() -> None:
+    # The README of https://github.com/IDLabMedia/image-lens-reproject, its three examples.
+    size = {"width": 2048, "height": 2048, "sensor_size": (36.0, 36.0)}
+    fov = 3.1415927410125732
+    rectilinear = {
+        "camera": {
+            "focal_length": 36.0,
+            "lens_unit": "MILLIMETERS",
+            "projection_matrix": [[2.0, 0, 0, 0], [0, 2.0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 1.0]],
+            "type": "PERSP",
+        }
+    }
+    assert from_lightfield(README | rectilinear) == Rectilinear(**size, focal_length=36)
+    equidistant = {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT", "fisheye_fov": fov}
+    lens = from_lightfield(README | {"camera": equidistant})
+    assert lens == Equidistant(**size, fov=fov)
+    assert lens.has_z_depth
+    equisolid = {
+        "type": "PANO",
+        "panorama_type": "FISHEYE_EQUISOLID",
+        "lens": 12.5,
+        "fisheye_fov": fov,
+    }
+    expected = Equisolid(**size, focal_length=12.5, fov=fov)
+    assert from_lightfield(README | {"camera": equisolid}) == expected
+
+
+def test_reads_what_silvrs_tools_write() -> None:
+    # The addon's config.py, the reprojection tool's config.cpp.
+    equisolid = {"panorama_type": "FISHEYE_EQUISOLID", "fisheye_lens": 10.5, "fisheye_fov": 3.0}
+    lens = from_lightfield({"resolution": [64, 64], "camera": {"type": "PANO", **equisolid}})
+    assert lens == Equisolid(width=64, height=64, focal_length=10.5, fov=3.0)
+    ranges = {"latitude_min": -1, "latitude_max": 1, "longitude_min": -2, "longitude_max": 2}
+    for name in ("EQUIRECTANGULAR", "RECTILINEAR"):
+        camera = {"type": "PANO", "panorama_type": name, **ranges}
+        lens = from_lightfield({"resolution": [64, 32], "camera": camera})
+        expected = Equirectangular(width=64, height=32, longitude=(-2, 2), latitude=(-1, 1))
+        assert lens == expected
+    # Blender's own matrix of a 50 mm lens on 36 mm, shift (0.1, −0.07), 96 × 64.
+    matrix = [[2.7777777, 0, 0.2, 0], [0, 4.1666665, -0.21, 0], [0, 0, -1, -0.2], [0, 0, -1, 0]]
+    for unit in ({"lens_unit": "MILLIMETERS", "focal_length": 50.0}, {"lens_unit": "FOV"}):
+        camera = {"type": "PERSP", "projection_matrix": matrix, **unit}
+        lens = from_lightfield({"resolution": [96, 64], "sensor_size": [36, 24], "camera": camera})
+        assert isinstance(lens, Rectilinear)
+        assert math.isclose(lens.focal_length, 50, rel_tol=1e-6)
+        np.testing.assert_allclose(lens.center, [48 - 9.6, 32 - 0.07 * 96], rtol=1e-6)
+    camera = {"type": "PERSP", "lens_unit": "FOV", "angle": 2 * math.atan(0.5)}
+    lens = from_lightfield({"resolution": [64, 96], "sensor_size": [24, 36], "camera": camera})
+    assert isinstance(lens, Rectilinear)
+    assert math.isclose(lens.focal_length, 36)
+
+
+def test_silvrs_readers_find_their_keys() -> None:
+    # The keys that config.cpp reads for each of its lenses.
+    size = {"width": 64, "height": 48}
+    cfg = Rectilinear(**size, focal_length=18).to_lightfield()
+    assert cfg["camera"]["type"] == "PERSP"
+    assert cfg["camera"]["lens_unit"] == "MILLIMETERS"
+    assert cfg["camera"]["focal_length"] == 18
+    assert cfg["resolution"] == [64, 48]
+    assert cfg["sensor_size"] == [36, 27]
+    cfg = Equidistant(**size, fov=3.0).to_lightfield()
+    assert cfg["camera"] == {
+        "type": "PANO",
+        "panorama_type": "FISHEYE_EQUIDISTANT",
+        "fisheye_fov": 3.0,
+    }
+    cfg = Equisolid(**size, focal_length=9, fov=3.0).to_lightfield()
+    assert cfg["camera"]["fisheye_lens"] == cfg["camera"]["lens"] == 9
+    cfg = Equirectangular(**size).to_lightfield()
+    assert cfg["camera"]["longitude_min"] == -math.pi
+    assert cfg["camera"]["latitude_max"] == math.pi / 2
+
+
+CAMERA_YAML = [
+    (
+        {"lens": "rectilinear", "focal_length": 18, "sensor_size": [36, 24]},
+        Rectilinear(width=96, height=64, focal_length=18, sensor_size=(36, 24)),
+    ),
+    (
+        {"lens": "rectilinear", "fov": 90, "sensor_size": 20, "principal_point": [40, 30]},
+        Rectilinear(
+            width=96,
+            height=64,
+            focal_length=10,
+            sensor_size=(20, 20 * 64 / 96),
+            principal_point=(40, 30),
+        ),
+    ),
+    ({"lens": "equidistant", "fov": 180}, Equidistant(width=96, height=64, fov=math.pi)),
+    (
+        {"lens": "equisolid", "fov": 180, "focal_length": 10.5},
+        Equisolid(width=96, height=64, fov=math.pi, focal_length=10.5),
+    ),
+    ({"lens": "stereographic", "fov": 180}, Stereographic(width=96, height=64, fov=math.pi)),
+    ({"lens": "orthographic", "fov": 180}, Orthographic(width=96, height=64, fov=math.pi)),
+    (
+        {"lens": "polynomial", "fov": 180, "coefficients": [0, -0.1, 0, 0, 0]},
+        Polynomial(width=96, height=64, fov=math.pi, coefficients=(0, -0.1, 0, 0, 0)),
+    ),
+    (
+        {"lens": "kannala_brandt", "focal_length": 10, "coefficients": [0, 0, 0, 0]},
+        KannalaBrandt(width=96, height=64, focal_length=10, coefficients=(0, 0, 0, 0)),
+    ),
+    ({"lens": "equirectangular"}, Equirectangular(width=96, height=64)),
+    (
+        {"lens": "equirectangular", "longitude": [0, 180], "latitude": [0, 90]},
+        Equirectangular(width=96, height=64, longitude=(0, math.pi), latitude=(0, math.pi / 2)),
+    ),
+]
+
+
+@pytest.mark.parametrize(("camera", "expected"), CAMERA_YAML)
+def test_scene_yaml(camera: dict[str, object], expected: Lens) -> None:
+    lens = from_camera({"resolution": [96, 64], **camera})
+    assert type(lens) is type(expected)
+    assert lens.sensor == pytest.approx(expected.sensor, rel=1e-12)
+    x, y = grid(lens, np.float64, 17)
+    np.testing.assert_allclose(lens.rays(x, y), expected.rays(x, y), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("camera", "message"),
+    [
+        ({"lens": "equidistant"}, r"camera\.fov"),
+        ({"lens": "equidistant", "fov": 361}, "fov: 361 degrees"),
+        ({"lens": "orthographic", "fov": 181}, "fov: 181 degrees"),
+        ({"lens": "stereographic", "fov": 360}, "fov: 360 degrees"),
+        ({"lens": "rectilinear", "fov": 180}, "fov: 180 degrees"),
+        ({"lens": "rectilinear"}, "focal_length"),
+        ({"lens": "equisolid", "fov": 180}, "focal_length"),
+        ({"lens": "equisolid", "fov": 180, "focal_length": -1}, "focal_length: -1"),
+        ({"lens": "polynomial", "fov": 180, "coefficients": [1, 2]}, "coefficients"),
+        ({"lens": "polynomial", "fov": 180, "coefficients": [0.1, 0, 0, 0, 0]}, "k1 to k4"),
+        ({"lens": "polynomial", "fov": 90, "coefficients": [1, 1, 0, 0, 0]}, "k0 = 1"),
+        ({"lens": "kannala_brandt", "focal_length": 9, "coefficients": [1]}, "coefficients"),
+        ({"lens": "equirectangular", "latitude": [10, -10]}, "latitude"),
+        ({"lens": "equirectangular", "latitude": [-100, 0]}, "latitude"),
+        ({"lens": "equirectangular", "longitude": [-180, 181]}, "longitude"),
+        ({"lens": "equirectangular", "principal_point": [0, 0]}, "principal_point"),
+        ({"lens": "cube_map"}, "width is 6 times its height"),
+        ({"lens": "pinhole"}, "pinhole"),
+        ({"lens": "equidistant", "fov": 180, "sensor_size": 0}, "sensor_size"),
+    ],
+)
+def test_a_lens_that_cannot_be_is_refused(camera: dict[str, object], message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        from_camera({"resolution": [96, 64], **camera})
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"resolution": None}, "resolution"),
+        ({"camera": {"type": "ORTHO"}}, "ORTHO"),
+        ({"camera": {"type": "PANO"}}, "panorama_type"),
+        ({"camera": {"type": "PANO", "panorama_type": "MIRRORBALL"}}, "MIRRORBALL"),
+        ({"camera": {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT"}}, "fisheye_fov"),
+        ({"camera": {"type": "PERSP", "lens_unit": "FOV"}}, "angle"),
+        ({"camera": {"type": "PERSP", "lens_unit": "INCH"}}, "INCH"),
+        ({"camera": {"type": "PERSP", "lens_unit": "MILLIMETERS"}}, "focal_length"),
+    ],
+)
+def test_a_bad_lightfield_json_names_its_key(change: dict[str, object], message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        from_lightfield(README | {"camera": {"type": "PANO"}} | change)
