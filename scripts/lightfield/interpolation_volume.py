@@ -16,7 +16,8 @@ A camera's field of view, as far as it lies within 90° of its axis, is a cone. 
 convex it holds all rays to a cell if it holds those to the cell's corners. Each side of the cone
 and each corner then bound the point by a plane, and the volume is a convex polyhedron: nothing is
 sampled. For 180° fisheyes, as SILVR has, the result is exact. Other fields of view are
-`CONE_SIDES`-sided pyramids; what a lens sees beyond 90° is not counted, unless it sees all round.
+`CONE_SIDES`-sided pyramids inside the cone, which takes less than 1e-4 off the volume; what a lens
+sees beyond 90° is not counted, unless it sees all round.
 """
 
 import math
