@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from lightfield import cli, images, instant_ngp, lenses, rigs
 from lightfield.errors import UserError
 from lightfield.files import read_json, write_json

@@ -16,6 +16,7 @@ from scenes.common import (
     Color,
     Shape,
     add,
+    animate,
     box,
     copies,
     finish,
@@ -52,6 +53,7 @@ FIRE = (3.1, 1.1)
 TORII = (0.2, -8.5)
 MAPLE = (-2.35, -3.35)
 ROCK_ISLANDS = ((2.75, -2.05, 0.75), (-1.85, 2.55, 0.5))  # x, y, radius
+FLOOR_LANTERNS = ((-0.72, -3.25), (0.85, -3.3))
 STONE_LANTERNS = ((4.95, 3.1, 1.0), (-1.3, -5.2, 1.1), (-4.6, 4.2, 0.9))  # x, y, scale
 GROVES = ((-5.5, 6.4, 6.5, 9.5), (2.2, -8.5, 9.0, -5.2))  # of bamboo: rectangles x0, y0, x1, y1
 
@@ -60,6 +62,9 @@ SUN_AZIMUTH, SUN_ELEVATION = np.radians(-128.0), np.radians(27.0)
 SKY_SUN_AZIMUTH = np.radians(-35.5)
 
 FLAME_COLOR: Color = (1.0, 0.42, 0.12)
+FLAME_HEIGHT, FLAME_GLOW = 1.15, 34.0  # metres; radiance a metre
+FOG_COLOR: Color = (0.62, 0.60, 0.62)  # radiance
+FOG_DENSITY = 0.016  # share of the light lost a metre
 CANDLE_COLOR: Color = (1.0, 0.55, 0.22)
 
 
@@ -94,7 +99,20 @@ def build(parameters: Mapping[str, Any]) -> None:
     mirror(recipe)
     rocks(recipe)
     stone_lanterns(recipe)
+    paper_lanterns(recipe)
+    fire(recipe)
+    candles(recipe)
+    pond(recipe)
+    torii(recipe)
     bamboo(recipe)
+    maple(recipe)
+    pines(recipe)
+    woods(recipe)
+    shrubs(recipe)
+    grass(recipe)
+    fallen_leaves(recipe, stones)
+    mountains(recipe)
+    fog(recipe)
 
 
 # --- Where things are -----------------------------------------------------------------------------
@@ -173,9 +191,25 @@ def standing(
     matrices = []
     for (x, y), z in zip(points, heights, strict=True):
         size = random.uniform(*scale)
-        turn = (*random.normal(0, tilt, 2), random.uniform(0, TAU)) if tilt else None
-        rotation = turn or (0.0, 0.0, random.uniform(0, TAU))
+        rotation = (*random.normal(0, tilt, 2), random.uniform(0, TAU))
         matrices.append(transform((x, y, z - sink * size), rotation, size))
+    return matrices
+
+
+def lying(random: np.random.Generator, points: Array, scale: tuple[float, float]) -> list[Matrix]:
+    """Places on the ground at points (n, 2) that follow its slope, turned and scaled at random."""
+    x, y = points.T
+    step = 0.25
+    slope_x = (ground_height(x + step, y) - ground_height(x - step, y)) / (2 * step)
+    slope_y = (ground_height(x, y + step) - ground_height(x, y - step)) / (2 * step)
+    up = np.stack([-slope_x, -slope_y, np.ones_like(x)], axis=-1)
+    angle = random.uniform(0, TAU, len(points))
+    forward = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(x)], axis=-1)
+    forward[:, 2] = slope_x * forward[:, 0] + slope_y * forward[:, 1]
+    matrices = []
+    for turn, px, py, pz in zip(frames(forward, up), x, y, ground_height(x, y), strict=True):
+        size = Matrix.Scale(random.uniform(*scale), 4)
+        matrices.append(Matrix.Translation((px, py, pz)) @ Matrix(turn.tolist()).to_4x4() @ size)
     return matrices
 
 
@@ -766,6 +800,518 @@ def stone_lanterns(recipe: Recipe) -> None:
         point_light(f"Lantern light.{i}", (x, y, z + 1.2 * size), 14.0, CANDLE_COLOR, 0.06)
 
 
+def paper_lanterns(recipe: Recipe) -> None:
+    """A string of paper globes across the path, and two framed floor lanterns beside it."""
+    wood = wood_material()
+    globes = [
+        mesh(f"Globe.{i}", globe(recipe), paper_material(f"Globe paper.{i}", tint))
+        for i, tint in enumerate(((0.88, 0.82, 0.68), (0.78, 0.12, 0.06)))
+    ]
+    ends = np.array([(-1.35, -4.35, 2.55), (2.3, -4.5, 2.6)])
+    t = np.linspace(0, 1, 25)[:, None]
+    rope = ends[0] + t * (ends[1] - ends[0]) - (0, 0, 1.4) * t * (1 - t)
+    dark = plain("Rope", (0.05, 0.04, 0.03), Roughness=0.9)
+    add("Lantern rope", tube(rope, 0.006, 5), dark)
+    for i, (x, y, z) in enumerate(ends):
+        add(
+            f"Lantern pole.{i}", tube([(x, y, -0.1), (x, y, 1.0), (x, y, z + 0.08)], 0.03, 12), wood
+        )
+    for i, k in enumerate((4, 9, 14, 19)):
+        x, y, z = rope[k] - (0, 0, 0.26)
+        place(f"Globe.{i}", globes[i % 2], transform((x, y, z), (0, 0, i)))
+        point_light(f"Globe light.{i}", (x, y, z), 9.0, CANDLE_COLOR, 0.05)
+    width, height = 0.13, 0.52
+    bars = [
+        box((0.022, 0.022, height), 0.004, 1).moved(sx * width, sy * width, height / 2)
+        for sx in (-1, 1)
+        for sy in (-1, 1)
+    ]
+    for z in (0.09, 0.3, height - 0.02):
+        bars += [box((2 * width, 0.016, 0.016)).moved(0, s * width, z) for s in (-1, 1)]
+        bars += [box((0.016, 2 * width, 0.016)).moved(s * width, 0, z) for s in (-1, 1)]
+    frame = mesh("Floor lantern frame", join(bars), wood, smooth=False)
+    w, low, high = width - 0.006, 0.09, height - 0.02
+    ring = np.array([(-w, -w), (w, -w), (w, w), (-w, w)])
+    rows = np.stack([np.column_stack([ring, np.full(4, z)]) for z in (low, high)])
+    panes = mesh(
+        "Floor lantern paper",
+        sheet(rows, closed=True),
+        paper_material("Floor lantern paper", (0.88, 0.80, 0.64)),
+        smooth=False,
+    )
+    for i, (x, y) in enumerate(FLOOR_LANTERNS):
+        spot = transform((x, y, 0.0), (0, 0, 0.2 + i))
+        place(f"Floor lantern frame.{i}", frame, spot)
+        place(f"Floor lantern paper.{i}", panes, spot)
+        point_light(f"Floor lantern light.{i}", (x, y, 0.24), 5.0, CANDLE_COLOR, 0.04)
+
+
+def globe(recipe: Recipe) -> Shape:
+    """A paper globe on hoops of bamboo, 0.4 m across, open above and below."""
+    t = np.linspace(0.12, np.pi - 0.12, recipe.steps(90, 12))
+    radius = 0.20 * np.sin(t) ** 0.8 * (1 - 0.03 * np.abs(np.sin(t * 9)))
+    profile = np.column_stack([radius, -0.19 * np.cos(t)])
+    return lathe(profile, recipe.steps(40, 8), capped=False)
+
+
+# --- Fire and candles -----------------------------------------------------------------------------
+
+
+def flame_material() -> bpy.types.Material:
+    """The fire's volume: glowing gas that rises and licks; heights from 0 to FLAME_HEIGHT."""
+    made, graph = material("Flames")
+    where = graph.add("ShaderNodeTexCoord").outputs["Object"]
+    rising = graph.add("ShaderNodeMapping", {"Vector": where, "Scale": (1.0, 1.0, 0.55)})
+    animate(rising.inputs["Location"], "default_value", -0.045, 2)
+    tongues = graph.noise(rising, 4.0, 2.0, 0.6, 0.0, 0.0)
+    animate(tongues.node.inputs["W"], "default_value", 0.035)
+    x, y, z = graph.xyz(where)
+    height = graph.math("DIVIDE", z, FLAME_HEIGHT)
+    radius = graph.math(
+        "SQRT", graph.math("ADD", graph.math("MULTIPLY", x, x), graph.math("MULTIPLY", y, y))
+    )
+    swing = graph.math("MULTIPLY", graph.math("SUBTRACT", tongues, 0.5), 0.85)
+    swing = graph.math("MULTIPLY", swing, graph.math("ADD", height, 0.25))
+    reach = graph.math("MULTIPLY", graph.math("SUBTRACT", 1.0, height), 0.27)
+    inside = graph.math("SUBTRACT", graph.math("SUBTRACT", reach, radius), swing)
+    heat = graph.span(inside, 0.0, 1.0, 0.0, 0.16)
+    heat = graph.math("MULTIPLY", heat, graph.span(height, 0.0, 1.0, -0.02, 0.12))
+    tint = graph.ramp(
+        heat, [(0.0, (0.9, 0.08, 0.01)), (0.5, (1.0, 0.30, 0.05)), (1.0, (1.0, 0.62, 0.22))]
+    )
+    glow = graph.math("MULTIPLY", graph.math("POWER", heat, 1.7), FLAME_GLOW)
+    return finish(
+        made, graph, volume=graph.add("ShaderNodeEmission", {"Color": tint, "Strength": glow})
+    )
+
+
+def fire(recipe: Recipe) -> None:
+    """An iron bowl with burning logs. The flames light by a lamp, which keeps the noise down."""
+    x, y = FIRE
+    iron = plain("Iron", (0.03, 0.028, 0.026), Metallic=0.8, Roughness=0.55)
+    n = recipe.steps(48, 8)
+    bowl = lathe(
+        [
+            (0.05, 0.30),
+            (0.24, 0.34),
+            (0.36, 0.46),
+            (0.40, 0.60),
+            (0.43, 0.60),
+            (0.43, 0.58),
+            (0.41, 0.575),
+        ][::-1],
+        n,
+        capped=False,
+    )
+    inner = lathe([(0.0, 0.36), (0.22, 0.38), (0.34, 0.48), (0.40, 0.60)], n, capped=False)
+    legs = [
+        tube(
+            [(0.30 * c, 0.30 * s, 0.42), (0.36 * c, 0.36 * s, 0.2), (0.44 * c, 0.44 * s, -0.05)],
+            0.022,
+            8,
+        )
+        for c, s in ((np.cos(a), np.sin(a)) for a in (0.4, 0.4 + TAU / 3, 0.4 + 2 * TAU / 3))
+    ]
+    add("Fire bowl", join([bowl, inner, *legs]), iron, matrix=transform((x, y, 0)))
+    embers, graph = material("Embers")
+    glow = graph.noise(graph.coordinates(), 14.0, 4.0, 0.7)
+    heat = graph.span(glow, 0.0, 1.0, 0.48, 0.66)
+    surface = graph.principled(
+        Base_Color=graph.mix(heat, (0.015, 0.013, 0.012), (0.10, 0.09, 0.085)),
+        Roughness=0.9,
+        Emission_Color=(1.0, 0.16, 0.02),
+        Emission_Strength=graph.math("MULTIPLY", heat, 5.0),
+    )
+    finish(embers, graph, surface)
+    embers.cycles.emission_sampling = "NONE"
+    random = recipe.random("fire")
+    logs = []
+    for k in range(9):
+        angle, tip = k * 2.4 + random.normal(0, 0.2), random.uniform(0.05, 0.14)
+        foot = 0.27 * np.array([np.cos(angle), np.sin(angle)])
+        ends = np.array([(*foot, 0.44), (*(-tip * foot), 0.58 + 0.2 * random.random())])
+        path = ends[0] + np.linspace(0, 1, 6)[:, None] * (ends[1] - ends[0])
+        logs.append(tube(path, 0.045 * random.uniform(0.7, 1.1, 6), recipe.steps(12, 5)))
+    bed = icosphere(recipe.steps(4, 2))
+    lumps = 1 + 0.25 * noise(bed.vertices * 4, 71, 2)
+    logs.append(
+        Shape(
+            bed.vertices * (0.3, 0.3, 0.08) * lumps[:, None] + (0, 0, 0.42), triangles=bed.triangles
+        )
+    )
+    add("Logs", join(logs), embers, matrix=transform((x, y, 0)))
+    domain = box((0.74, 0.74, FLAME_HEIGHT)).moved(0, 0, FLAME_HEIGHT / 2)
+    flames = add("Flames", domain, flame_material(), matrix=transform((x, y, 0.46)))
+    flames.visible_diffuse = flames.visible_shadow = False
+    point_light("Fire light", (x, y, 0.95), 90.0, FLAME_COLOR, 0.16)
+
+
+def candle_parts(recipe: Recipe) -> tuple[Shape, Shape]:
+    """A candle 0.2 m high (wax, and wick as slot 1), and its flame."""
+    n = recipe.steps(28, 8)
+    wax = lathe(
+        [(0.036, 0.0), (0.033, 0.01), (0.032, 0.19), (0.029, 0.20), (0.024, 0.193), (0.0, 0.185)], n
+    )
+    drips = 1 + 0.06 * noise(wax.vertices * (40, 40, 9), 81, 2)[:, None] * (1, 1, 0)
+    wax = Shape(wax.vertices * drips, wax.quads, wax.triangles)
+    wick = tube([(0, 0, 0.18), (0, 0.001, 0.2), (0.003, 0.002, 0.212)], 0.0017, 5).painted(1)
+    t = np.linspace(0, 1, recipe.steps(14, 6))
+    flame = lathe(
+        np.column_stack([0.0105 * np.sin(np.pi * t**0.62) * (1 - 0.3 * t), 0.2 + 0.052 * t]),
+        recipe.steps(14, 6),
+    )
+    return join([wax, wick]), flame
+
+
+def candles(recipe: Recipe) -> None:
+    """Candles at the statue's feet, on the rocks' side, and afloat on the pond."""
+    made, graph = material("Wax")
+    z = graph.xyz(graph.add("ShaderNodeTexCoord").outputs["Object"])["Z"]
+    warm = graph.span(z, 0.0, 0.9, 0.06, 0.2)
+    surface = graph.principled(
+        Base_Color=(0.82, 0.72, 0.55),
+        Roughness=0.45,
+        Emission_Color=(1.0, 0.36, 0.10),
+        Emission_Strength=graph.math("MULTIPLY", warm, warm),
+    )
+    wax = finish(made, graph, surface)
+    light, graph = material("Candle flame")
+    z = graph.xyz(graph.add("ShaderNodeTexCoord").outputs["Object"])["Z"]
+    tint = graph.ramp(
+        graph.span(z, 0.0, 1.0, 0.2, 0.252),
+        [
+            (0.0, (0.15, 0.2, 0.8)),
+            (0.2, (1.0, 0.45, 0.12)),
+            (0.6, (1.0, 0.72, 0.32)),
+            (1.0, (1.0, 0.4, 0.08)),
+        ],
+    )
+    finish(light, graph, graph.add("ShaderNodeEmission", {"Color": tint, "Strength": 9.0}))
+    wax.cycles.emission_sampling = light.cycles.emission_sampling = "NONE"
+    shape, flame = candle_parts(recipe)
+    wax_mesh = mesh("Candle", shape, wax, plain("Wick", (0.01, 0.01, 0.01)), smooth=0.7)
+    flame_mesh = mesh("Candle flame", flame, light)
+    random = recipe.random("candles")
+    sx, sy = STATUE
+    spots = [
+        (sx + dx, sy - 0.85 - dy, 0.0)
+        for dx, dy in (
+            (-0.62, 0.08),
+            (-0.48, 0.0),
+            (-0.40, 0.17),
+            (0.47, 0.02),
+            (0.60, 0.14),
+            (0.70, 0.0),
+        )
+    ]
+    spots += [(sx + dx, sy - 0.70, 0.14) for dx in (-0.28, -0.12, 0.05, 0.3)]
+    spots += [
+        (ROCK_ISLANDS[1][0] + dx, ROCK_ISLANDS[1][1] + dy, 0.0)
+        for dx, dy in ((0.55, -0.42), (0.68, -0.28), (0.42, -0.58))
+    ]
+    floating = [(-3.95, 0.2), (-4.3, 1.25), (-4.75, -0.35), (-5.2, 0.75), (-5.9, 1.6)]
+    spots += [(px, py, WATER_LEVEL - 0.01) for px, py in floating]
+    cup = plain("Candle cup", (0.10, 0.03, 0.02), Roughness=0.35)
+    cup_mesh = mesh(
+        "Candle cup",
+        lathe(
+            [
+                (0.03, -0.015),
+                (0.075, 0.0),
+                (0.095, 0.035),
+                (0.09, 0.035),
+                (0.07, 0.012),
+                (0.0, 0.01),
+            ],
+            recipe.steps(28, 8),
+        ),
+        cup,
+    )
+    for i, (x, y, base) in enumerate(spots):
+        on_water = base < 0
+        size = random.uniform(0.8, 1.15)
+        tall = 0.35 if on_water else random.uniform(0.5, 1.3)
+        spot = transform((x, y, base), (0, 0, random.uniform(0, TAU)), (size, size, size * tall))
+        place(f"Candle.{i:02d}", wax_mesh, spot)
+        tip = base + 0.2 * size * tall
+        flame_object = place(f"Candle flame.{i:02d}", flame_mesh, transform((x, y, tip - 0.2)))
+        flame_object.visible_diffuse = flame_object.visible_shadow = False
+        if on_water:
+            place(f"Candle cup.{i:02d}", cup_mesh, transform((x, y, base)))
+    for i, (x, y, z) in enumerate(
+        (
+            (sx - 0.5, sy - 0.95, 0.32),
+            (sx + 0.58, sy - 0.92, 0.32),
+            (-1.3, 2.1, 0.3),
+            (-4.6, 0.5, 0.12),
+        )
+    ):
+        point_light(f"Candle light.{i}", (x, y, z), 3.0, CANDLE_COLOR, 0.03)
+
+
+# --- Water ----------------------------------------------------------------------------------------
+
+
+def pond(recipe: Recipe) -> None:
+    """Clear water over a dark bed: ripples that run with the frames, lily pads, flowers, carp."""
+    random = recipe.random("pond")
+    made, graph = material("Water")
+    where = graph.add("ShaderNodeTexCoord").outputs["Object"]
+    drift = graph.add("ShaderNodeMapping", {"Vector": where, "Scale": (1.0, 1.6, 1.0)})
+    animate(drift.inputs["Location"], "default_value", 0.012, 0)
+    ripples = graph.noise(drift, 5.0, 3.0, 0.55, 0.0, 0.0)
+    animate(ripples.node.inputs["W"], "default_value", 0.04)
+    normal = graph.bump(ripples, 0.045)
+    share = graph.add("ShaderNodeFresnel", {"IOR": 1.33, "Normal": normal})
+    clear = graph.add("ShaderNodeBsdfTransparent", {"Color": (0.62, 0.74, 0.66)})
+    shine = graph.add(
+        "ShaderNodeBsdfAnisotropic", {"Color": (1.0, 1.0, 1.0), "Roughness": 0.02, "Normal": normal}
+    )
+    finish(made, graph, graph.add("ShaderNodeMixShader", {0: share, 1: clear, 2: shine}))
+    angle = np.linspace(0, TAU, recipe.steps(120, 16), endpoint=False)
+    shore = pond_shore(angle)
+    share_of = np.linspace(1.0, 0.02, recipe.steps(12, 3))[:, None, None]
+    rim = POND_CENTER + share_of * (shore - POND_CENTER)
+    add("Water", sheet(np.dstack([rim, np.full(rim.shape[:2], WATER_LEVEL)]), closed=True), made)
+
+    pad = leaf_material("Lily pad", (0.035, 0.09, 0.02), (0.09, 0.17, 0.035), 0.1)
+    around = np.linspace(0.16, TAU - 0.16, recipe.steps(40, 8))
+    disc = np.array([0.05, 0.6, 0.97, 1.0])[:, None, None] * np.stack(
+        [np.cos(around), np.sin(around)], axis=-1
+    )
+    rows = np.dstack(
+        [disc, np.broadcast_to(np.array([0.0, 0.002, 0.006, 0.03])[:, None], disc.shape[:2])]
+    )
+    pads = mesh("Lily pad", sheet(rows[::-1]), pad)
+    corners = (*(POND_CENTER - 3.2), *(POND_CENTER + 3.2))
+    spots = spread(
+        random,
+        34,
+        corners,
+        0.30,
+        lambda x, y: (
+            (pond_distance(x, y) < -0.45)
+            & (noise(np.stack([x, y, 0 * x], axis=-1) / 1.3, 91) > 0.02)
+        ),
+    )
+    scatter(
+        "Lily pad",
+        [pads],
+        [
+            transform(
+                (x, y, WATER_LEVEL + 0.008),
+                (0, 0, random.uniform(0, TAU)),
+                random.uniform(0.10, 0.19),
+            )
+            for x, y in spots
+        ],
+    )
+    bloom = mesh(
+        "Water lily",
+        lily(recipe),
+        leaf_material("Lily petal", (0.72, 0.30, 0.42), (0.85, 0.62, 0.68), 0.3),
+    )
+    scatter(
+        "Water lily",
+        [bloom],
+        [
+            transform(
+                (x + 0.1, y, WATER_LEVEL + 0.015),
+                (0, 0, random.uniform(0, TAU)),
+                random.uniform(0.8, 1.2),
+            )
+            for x, y in spots[::6]
+        ],
+    )
+    carp(recipe)
+    iris(recipe)
+
+
+def pond_shore(angle: Array) -> Array:
+    """The pond's outline (n, 2) where `pond_distance` is 0, by angle."""
+    reach = -(
+        pond_distance(np.full_like(angle, POND_CENTER[0]), np.full_like(angle, POND_CENTER[1]))
+    )
+    direction = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    for _ in range(30):
+        points = POND_CENTER + reach[:, None] * direction
+        reach = reach - 0.7 * pond_distance(*points.T)
+    return POND_CENTER + reach[:, None] * direction
+
+
+def lily(recipe: Recipe) -> Shape:
+    u, v = np.meshgrid(np.linspace(0, 1, recipe.steps(7, 3)), np.linspace(-1, 1, 5), indexing="ij")
+    petal = np.stack(
+        [0.022 * np.sin(np.pi * (0.1 + 0.9 * u)) * v, 0.085 * u, 0.03 * u**2 + 0.006 * v * v],
+        axis=-1,
+    )
+    rings = []
+    for count, lift, size in ((9, 0.1, 1.0), (8, 0.6, 0.9), (6, 1.3, 0.75)):
+        angle = (np.arange(count) + 0.3 * size) * TAU / count
+        out = np.stack([np.cos(angle), np.sin(angle), np.full(count, lift)], axis=-1)
+        turn = frames(out, np.broadcast_to((0.0, 0.0, 1.0), out.shape))
+        rings.append(copies(sheet(petal), turn * size, np.full((count, 3), (0, 0, 0.01))))
+    return join(rings)
+
+
+def carp(recipe: Recipe) -> None:
+    """Koi under the surface."""
+    made, graph = material("Koi")
+    patches = graph.noise(graph.coordinates(), 5.0, 2.0)
+    patches = graph.math("ADD", patches, graph.math("MULTIPLY", graph.object_random(), 0.22))
+    tint = graph.ramp(
+        patches,
+        [
+            (0.50, (0.85, 0.80, 0.72)),
+            (0.56, (0.90, 0.22, 0.03)),
+            (0.72, (0.80, 0.10, 0.02)),
+            (0.76, (0.03, 0.03, 0.03)),
+        ],
+    )
+    finish(made, graph, graph.principled(Base_Color=tint, Roughness=0.3))
+    t = np.linspace(0, 1, recipe.steps(28, 8))
+    meshes = []
+    for i, bend in enumerate((0.35, -0.3, 0.1)):
+        radius = 0.062 * np.sin(np.pi * t**0.6) ** 0.8 * (1 - 0.35 * t) + 0.004
+        spine = np.stack(
+            [0.09 * np.sin(TAU * 0.7 * t + i) * bend * (t + 0.3), 0.25 - 0.46 * t, 0 * t], axis=-1
+        )
+        body = tube(spine, radius, recipe.steps(16, 6))
+        tail = spine[-1]
+        fins = [
+            [tail, tail + (0.03, -0.14, 0.06), tail + (0, -0.09, 0), tail + (0.03, -0.14, -0.06)]
+        ]
+        fins += [
+            [
+                (s * 0.05, 0.12, -0.02),
+                (s * 0.14, 0.05, -0.03),
+                (s * 0.12, 0.01, -0.03),
+                (s * 0.05, 0.07, -0.02),
+            ]
+            for s in (-1, 1)
+        ]
+        fins += [
+            [
+                spine[9 * len(t) // 28] + (0, 0.02, 0.04),
+                spine[len(t) // 2] + (0, 0, 0.085),
+                spine[2 * len(t) // 3] + (0, 0, 0.06),
+                spine[2 * len(t) // 3] + (0, 0, 0.03),
+            ]
+        ]
+        fin = [Shape(np.array(f, float), np.array([[0, 1, 2, 3]], dtype=np.int32)) for f in fins]
+        meshes.append(mesh(f"Koi.{i}", join([body, *fin]), made))
+    at = (
+        (-4.1, 0.75, 0.4),
+        (-4.55, 0.35, 1.2),
+        (-4.35, -0.3, 2.6),
+        (-5.1, 1.5, 4.0),
+        (-5.4, -0.2, 5.2),
+        (-4.9, 0.95, 2.0),
+    )
+    scatter(
+        "Koi", meshes, [transform((x, y, WATER_LEVEL - 0.13), (0, 0, a), 0.9) for x, y, a in at]
+    )
+
+
+def blade(width: float, rows: int, bow: float) -> Shape:
+    """A blade of grass, 1 long, rising along +Z and bowing towards +Y."""
+    t = np.linspace(0, 1, rows)
+    half = width * (1 - t**1.6) + 0.0004
+    spine = np.stack([0 * t, bow * t**2, t * (1 - 0.25 * bow * t)], axis=-1)
+    return sheet(
+        np.stack([spine - half[:, None] * (1, 0, 0), spine + half[:, None] * (1, 0, 0)], axis=1)
+    )
+
+
+def tuft(
+    random: np.random.Generator,
+    count: int,
+    radius: float,
+    lengths: tuple[float, float],
+    width: float,
+    rows: int,
+    bow: float,
+) -> Shape:
+    """Blades of grass that stand within a disc."""
+    angle, reach = random.uniform(0, TAU, count), radius * np.sqrt(random.random(count))
+    turn = random.uniform(0, TAU, count)
+    forward = np.stack([np.cos(turn), np.sin(turn), random.normal(0, 0.25, count)], axis=-1)
+    up = np.stack([*random.normal(0, 0.22, (2, count)), np.ones(count)], axis=-1)
+    length = random.uniform(*lengths, count)
+    sizes = length[:, None, None] * np.ones((1, 3, 3))
+    roots = np.stack([reach * np.cos(angle), reach * np.sin(angle), np.full(count, -0.03)], axis=-1)
+    return copies(blade(width, rows, bow), frames(forward, up) * sizes, roots)
+
+
+def iris(recipe: Recipe) -> None:
+    """Sheaves of sword-like leaves along the far shore."""
+    random = recipe.random("iris")
+    green = leaf_material("Iris leaves", (0.04, 0.09, 0.02), (0.13, 0.20, 0.05), 0.3)
+    sheaf = [
+        mesh(
+            f"Iris.{i}",
+            tuft(random, recipe.copies(46, 8), 0.15, (0.35, 0.8), 0.018, 6, 0.35),
+            green,
+        )
+        for i in range(2)
+    ]
+    angle = np.concatenate([random.uniform(1.2, 5.2, 20), random.uniform(-0.9, 0.9, 3)])
+    shore = POND_CENTER + (pond_shore(angle) - POND_CENTER) * 1.06
+    scatter("Iris", sheaf, standing(random, shore, (0.8, 1.2)))
+
+
+# --- The torii ------------------------------------------------------------------------------------
+
+
+def torii(recipe: Recipe) -> None:
+    """A vermilion gate over the path."""
+    made, graph = material("Vermilion")
+    worn = graph.noise(graph.coordinates("Object", (3.0, 3.0, 0.6)), 2.0, 5.0, 0.7)
+    tint = graph.ramp(
+        worn,
+        [(0.35, (0.20, 0.028, 0.010)), (0.6, (0.46, 0.060, 0.018)), (0.75, (0.52, 0.10, 0.04))],
+    )
+    finish(
+        made,
+        graph,
+        graph.principled(Base_Color=tint, Roughness=0.45, Normal=graph.bump(worn, 0.004)),
+    )
+    black = plain("Black lacquer", (0.015, 0.014, 0.013), Roughness=0.35)
+    n = recipe.steps(32, 8)
+    x = np.linspace(-1, 1, recipe.steps(24, 6))
+
+    def lintel(half: float, low: float, high: float, depth: float, rise: float) -> Shape:
+        lift = rise * np.abs(x) ** 2.4
+        ring = [
+            np.stack(
+                [
+                    half * x * (1 + 0.03 * up),
+                    0 * x + side * depth * (1 + 0.15 * up),
+                    lift + (high if up else low),
+                ],
+                axis=-1,
+            )
+            for side, up in ((-1, 0), (1, 0), (1, 1), (-1, 1))
+        ]
+        body = sheet(np.stack(ring, axis=1)[::-1], closed=True)
+        last = len(body.vertices)
+        ends = np.array([[0, 1, 2, 3], [last - 1, last - 2, last - 3, last - 4]], dtype=np.int32)
+        return Shape(body.vertices, np.concatenate([body.quads, ends]))
+
+    red, dark = [], []
+    for side in (-1, 1):
+        foot, head = np.array([side * 1.5, 0, -0.2]), np.array([side * 1.36, 0, 3.2])
+        t = np.linspace(0, 1, 9)[:, None]
+        red.append(tube(foot + t * (head - foot), np.linspace(0.15, 0.125, 9), n))
+        dark.append(tube(foot + np.array([[0.0], [0.08], [0.16]]) * (head - foot), 0.18, n))
+    red += [lintel(1.95, 3.17, 3.36, 0.12, 0.14), box((3.4, 0.12, 0.2), 0.01).moved(0, 0, 2.6)]
+    red.append(box((0.22, 0.1, 0.4), 0.01).moved(0, 0, 2.9))
+    dark.append(lintel(2.2, 3.36, 3.46, 0.17, 0.2))
+    z = float(ground_height(np.array(TORII[0]), np.array(TORII[1])))
+    spot = transform((*TORII, z))
+    add("Torii", join([*red, join(dark).painted(1)]), made, black, matrix=spot, smooth=0.6)
+
+
 # --- Plants ---------------------------------------------------------------------------------------
 
 
@@ -864,3 +1410,388 @@ def bamboo(recipe: Recipe) -> None:
         )
         places += standing(random, spots, (0.75, 1.1), 0.05, 0.03)
     scatter("Bamboo", meshes, places)
+
+
+def bark_material(name: str, tint: Color) -> bpy.types.Material:
+    made, graph = material(name)
+    cracks = graph.noise(graph.coordinates("Object", (7.0, 7.0, 1.6)), 3.0, 5.0, 0.7, 0.6)
+    dark = tuple(0.3 * c for c in tint)
+    color = graph.ramp(cracks, [(0.35, dark), (0.6, tint), (0.75, (0.09, 0.11, 0.06))])
+    surface = graph.add(
+        "ShaderNodeBsdfDiffuse", {"Color": color, "Normal": graph.bump(cracks, 0.03)}
+    )
+    return finish(made, graph, surface)
+
+
+@dataclass
+class Growth:
+    """How a tree grows. Each list has one entry a generation of branches, the trunk first."""
+
+    lengths: Sequence[float]  # metres
+    children: Sequence[int]  # side branches of each branch; the last generation bears the leaves
+    angles: Sequence[float]  # radians between a branch and its parent
+    upward: Sequence[float]  # how strongly a branch turns up (down where negative)
+    radius: float  # of the trunk's foot, metres
+    wander: float = 0.16  # how crooked the branches are
+    bare: float = 0.4  # share of a branch before its first side branch
+
+
+def branches(
+    random: np.random.Generator, growth: Growth, detail: float
+) -> tuple[Shape, Array, Array]:
+    """A tree's wood, and its twigs' points (n, k, 3) with the direction of each (n, 3)."""
+    parts: list[Shape] = []
+    twigs: list[Array] = []
+
+    def grow(start: Array, direction: Array, length: float, radius: float, level: int) -> None:
+        count = 9 if level == 0 else 6
+        path, heading = [start], direction
+        for _ in range(count - 1):
+            heading = heading + random.normal(0, growth.wander, 3) + (0, 0, growth.upward[level])
+            heading = heading / np.linalg.norm(heading)
+            path.append(path[-1] + heading * length / (count - 1))
+        points = np.array(path)
+        tip = 0.5 if level == 0 else 0.3
+        sides = steps((12, 7, 5, 3, 3)[level], min(1.0, detail) ** 0.5, 3)
+        parts.append(tube(points, radius * np.linspace(1, tip, count), sides, capped=False))
+        if level == len(growth.lengths) - 1:
+            twigs.append(points)
+            return
+        azimuth = random.uniform(0, TAU)
+        for t in np.linspace(growth.bare if level == 0 else 0.3, 1.0, growth.children[level]):
+            azimuth += 2.4
+            at = t * (count - 1)
+            low = min(int(at), count - 2)
+            along = points[low + 1] - points[low]
+            spot = points[low] + (at - low) * along
+            along = along / np.linalg.norm(along)
+            side = np.cross(along, (np.cos(azimuth), np.sin(azimuth), 0.3))
+            side /= np.linalg.norm(side)
+            angle = growth.angles[level] * random.uniform(0.75, 1.2) * (1.0 if t < 0.99 else 0.4)
+            out = np.cos(angle) * along + np.sin(angle) * side
+            size = growth.lengths[level + 1] * random.uniform(0.75, 1.15) * (1.15 - 0.4 * t)
+            thick = radius * (1 - (1 - tip) * t) * 0.62
+            grow(spot, out, size, thick, level + 1)
+
+    grow(np.array([0.0, 0.0, -0.2]), np.array([0.0, 0.0, 1.0]), growth.lengths[0], growth.radius, 0)
+    ends = np.array(twigs)
+    return join(parts), ends, ends[:, -1] - ends[:, 0]
+
+
+def leaves_on(
+    random: np.random.Generator,
+    twigs: Array,
+    directions: Array,
+    leaf: Shape,
+    count: int,
+    size: tuple[float, float],
+    droop: float,
+    scatter_by: float,
+) -> Shape:
+    """`count` leaves on each twig, flat side up, their stalks near the twig."""
+    number = len(twigs) * count
+    which = np.repeat(np.arange(len(twigs)), count)
+    at = random.uniform(0.15, 1.0, number) * (twigs.shape[1] - 1)
+    low = np.minimum(at.astype(int), twigs.shape[1] - 2)
+    share = (at - low)[:, None]
+    spots = twigs[which, low] * (1 - share) + twigs[which, low + 1] * share
+    spots = spots + random.normal(0, scatter_by, (number, 3))
+    away = directions[which] / np.linalg.norm(directions[which], axis=1, keepdims=True)
+    forward = away + random.normal(0, 0.6, (number, 3)) - (0, 0, droop)
+    up = random.normal((0, 0, 1), 0.45, (number, 3))
+    sizes = random.uniform(*size, (number, 1, 1))
+    return copies(leaf, frames(forward, up) * sizes, spots)
+
+
+def maple_leaf() -> Shape:
+    """A leaf of five pointed lobes, 1 long along +Y, as a fan of triangles."""
+    tips = [
+        (-0.55, 0.12, 0.75),
+        (-0.5, 0.6, 0.8),
+        (0.0, 1.0, 1.0),
+        (0.5, 0.6, 0.8),
+        (0.55, 0.12, 0.75),
+    ]
+    rim: list[tuple[float, float, float]] = [(0.0, 0.0, 0.0)]
+    for i, (x, y, _) in enumerate(tips):
+        rim.append((x, y, -0.10 * (abs(x) + y)))
+        if i < 4:
+            notch = 0.42 * (np.array(tips[i][:2]) + np.array(tips[i + 1][:2])) / 2
+            rim.append((notch[0], notch[1] + 0.12, 0.02))
+    n = len(rim)
+    center = (0.0, 0.25, 0.03)
+    triangles = [(n, (i + 1) % n, i) for i in range(n)]
+    return Shape(np.array([*rim, center]), triangles=np.array(triangles, dtype=np.int32))
+
+
+def oval_leaf() -> Shape:
+    points = [(0, 0, 0), (0.3, 0.4, 0.06), (0, 1, -0.06), (-0.3, 0.4, 0.06), (0, 0.42, 0)]
+    return Shape(
+        np.array(points, float),
+        triangles=np.array([(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)], dtype=np.int32),
+    )
+
+
+def maple(recipe: Recipe) -> None:
+    """A red maple whose crown reaches over the viewer, high enough to leave the rigs clear."""
+    random = recipe.random("maple")
+    growth = Growth(
+        (2.7, 2.9, 1.35, 0.62),
+        (9, 6, 4),
+        (1.0, 0.8, 0.7),
+        (0.05, 0.055, 0.0, -0.02),
+        0.17,
+        0.13,
+        0.62,
+    )
+    wood, twigs, directions = branches(random, growth, recipe.detail)
+    leaf = leaves_on(
+        random, twigs, directions, maple_leaf(), recipe.copies(40, 3), (0.055, 0.10), 0.35, 0.07
+    )
+    red = leaf_material("Maple leaves", (0.30, 0.018, 0.010), (0.62, 0.13, 0.02), 0.5)
+    bark = bark_material("Maple bark", (0.16, 0.13, 0.11))
+    shape = join([wood, leaf.painted(1)])
+    z = float(ground_height(*map(np.array, MAPLE)))
+    tree = mesh("Maple", shape, bark, red)
+    place("Maple", tree, transform((*MAPLE, z), (0.0, 0.14, np.arctan2(-MAPLE[1], -MAPLE[0]))))
+    place("Maple far", tree, transform((6.8, -2.6, 0.1), (0, 0, 2.5), 1.05))
+    place("Maple farther", tree, transform((-8.3, 5.6, 0.1), (0, 0, 4.5), 1.1))
+
+
+def pines(recipe: Recipe) -> None:
+    """Cloud-pruned pines: crooked stems with pads of needles."""
+    random = recipe.random("pines")
+    needle = [(0.004, 0.0), (0.0035, 0.5), (0.0003, 1.0)]
+    n = 9
+    out = random.normal((0, 0, 0.7), 0.6, (n, 3))
+    strip = sheet(np.array([[(-w, y, 0), (w, y, 0)] for w, y in needle]) * (1.6, 1, 1))
+    brush = copies(strip, frames(out, random.normal(0, 1, (n, 3))) * 0.11, np.zeros((n, 3)))
+    needles = leaf_material("Pine needles", (0.012, 0.045, 0.016), (0.045, 0.095, 0.026), 0.15)
+    bark = bark_material("Pine bark", (0.20, 0.13, 0.09))
+    meshes = []
+    for i in range(2):
+        t = np.linspace(0, 1, 14)
+        turn = random.uniform(0, TAU)
+        sway = 0.42 * np.sin(t * 6.0 + i) * t
+        stem = np.stack([sway * np.cos(turn), sway * np.sin(turn), 3.1 * t - 0.2], axis=-1)
+        parts, tufts = [tube(stem, np.linspace(0.15, 0.04, 14), recipe.steps(12, 4))], []
+        for k, at in enumerate((4, 6, 7, 9, 10, 11, 13)):
+            angle, reach = turn + 2.2 * k, (0.0 if at == 13 else 1.35 - 0.075 * at)
+            tip = stem[at] + (reach * np.cos(angle), reach * np.sin(angle), 0.12)
+            bow = np.linspace(0, 1, 6)[:, None]
+            limb_path = stem[at] + bow * (tip - stem[at]) - (0, 0, 0.12) * np.sin(np.pi * bow)
+            if reach:
+                parts.append(tube(limb_path, np.linspace(0.05, 0.02, 6), recipe.steps(8, 3)))
+            size = 0.75 - 0.022 * at
+            count = recipe.copies(520 * size, 12)
+            spin, radius = random.uniform(0, TAU, count), np.sqrt(random.random(count))
+            dome = (1 - radius**2) * 0.45 * random.uniform(0.2, 1.0, count)
+            spots = np.stack([radius * np.cos(spin), radius * np.sin(spin), dome], axis=-1) * size
+            tilt = frames(
+                random.normal(0, 1, (count, 3)) * (1, 1, 0.1), spots * (1.2, 1.2, 0.4) + (0, 0, 0.6)
+            )
+            tufts.append(
+                copies(brush, tilt * random.uniform(0.8, 1.25, (count, 1, 1)), spots + tip)
+            )
+        meshes.append(mesh(f"Pine.{i}", join([*parts, join(tufts).painted(1)]), bark, needles))
+    spots = np.array(
+        [(5.9, 0.2), (3.1, 6.3), (-7.6, -2.6), (-3.3, 5.6), (6.4, 5.4), (-5.8, -5.6), (9.5, 2.4)]
+    )
+    scatter("Pine", meshes, standing(random, spots, (0.85, 1.3)))
+
+
+def woods(recipe: Recipe) -> None:
+    """Broad-leaved trees around the garden, thinning out towards the hills."""
+    random = recipe.random("woods")
+    growth = Growth(
+        (4.2, 2.6, 1.5, 0.7), (9, 6, 4), (0.95, 0.8, 0.7), (0.03, 0.07, 0.04, 0.0), 0.2, 0.14, 0.35
+    )
+    bark = bark_material("Bark", (0.15, 0.12, 0.09))
+    tints = (
+        ((0.03, 0.075, 0.014), (0.10, 0.17, 0.03)),
+        ((0.07, 0.10, 0.015), (0.22, 0.22, 0.035)),
+        ((0.22, 0.09, 0.015), (0.40, 0.22, 0.03)),
+    )
+    meshes = []
+    for i, (dark, light) in enumerate(tints):
+        wood, twigs, directions = branches(random, growth, 0.3 * recipe.detail)
+        leaf = leaves_on(
+            random, twigs, directions, oval_leaf(), recipe.copies(26, 2), (0.14, 0.24), 0.2, 0.16
+        )
+        foliage = leaf_material(f"Leaves.{i}", dark, light)
+        meshes.append(mesh(f"Tree.{i}", join([wood, leaf.painted(1)]), bark, foliage))
+
+    def allowed(x: Array, y: Array) -> Array:
+        r = np.hypot(x, y)
+        gap = np.cos(np.arctan2(y, x) - SUN_AZIMUTH) < 0.93  # let the sun in
+        return (
+            (r > 11.5)
+            & (r < 75)
+            & (path_distance(x, y) > 3)
+            & (gap | (r > 30))
+            & (noise(np.stack([x, y, 0 * x], axis=-1) / 16.0, 95) > -0.05 - 0.1 * (r < 25))
+        )
+
+    near = spread(random, 40, (-26, -26, 26, 26), 3.4, allowed)
+    far = spread(random, 170, (-75, -75, 75, 75), 4.5, allowed)
+    order = [0, 1, 0, 1, 0, 2, 0, 1]
+    places = standing(random, np.vstack([near, far]), (0.75, 1.35), 0.1, 0.03)
+    scatter("Tree", [meshes[k] for k in order], places)
+
+
+def shrubs(recipe: Recipe) -> None:
+    """Azaleas clipped into cushions, some in flower."""
+    random = recipe.random("shrubs")
+    green = leaf_material("Azalea leaves", (0.02, 0.055, 0.012), (0.07, 0.13, 0.025), 0.2)
+    pink = leaf_material("Azalea flowers", (0.55, 0.06, 0.20), (0.80, 0.30, 0.45), 0.3)
+    core = plain("Shrub core", (0.012, 0.02, 0.006), Roughness=1.0)
+    meshes = []
+    for i in range(3):
+        count = recipe.copies(3600, 60)
+        z = random.uniform(-0.1, 1.0, count)
+        angle = random.uniform(0, TAU, count)
+        flat = np.sqrt(np.maximum(1 - z * z, 0))
+        unit = np.stack([flat * np.cos(angle), flat * np.sin(angle), z], axis=-1)
+        swell = (
+            0.5 * (1 + 0.16 * noise(unit * 1.6 + 7.0 * i, 96, 2)) * random.uniform(0.9, 1.03, count)
+        )
+        spots = unit * swell[:, None] * (1, 1, 0.85)
+        turn = frames(random.normal(0, 1, (count, 3)), unit + random.normal(0, 0.45, (count, 3)))
+        slots = np.where(random.random(count) < (0.0, 0.12, 0.3)[i], 2, 1)
+        foliage = copies(oval_leaf(), turn * random.uniform(0.035, 0.06, (count, 1, 1)), spots)
+        foliage.slots = np.repeat(slots, len(oval_leaf().triangles)).astype(np.int32)
+        ball = icosphere(recipe.steps(3, 2))
+        inner = 0.42 * (1 + 0.16 * noise(ball.vertices * 1.6 + 7.0 * i, 96, 2))
+        ball = Shape(ball.vertices * inner[:, None] * (1, 1, 0.85), triangles=ball.triangles)
+        meshes.append(mesh(f"Shrub.{i}", join([ball, foliage]), core, green, pink))
+
+    def allowed(x: Array, y: Array) -> Array:
+        away = (court_distance(x, y) > 0.75) & (pond_distance(x, y) > 0.9)
+        return (
+            away & (path_distance(x, y) > 1.3) & (np.hypot(x, y) < 14) & clear_of_things(x, y, 0.6)
+        )
+
+    spots = spread(random, 56, (-14, -14, 14, 14), 1.15, allowed)
+    scatter("Shrub", meshes, standing(random, spots, (0.8, 1.9)))
+
+
+def clear_of_things(x: Array, y: Array, margin: float) -> Array:
+    """Whether points keep away from what stands in the moss: lanterns, maple, torii's posts."""
+    things = [(lx, ly) for lx, ly, _ in STONE_LANTERNS]
+    things += [MAPLE, (TORII[0] - 1.5, TORII[1]), (TORII[0] + 1.5, TORII[1])]
+    return np.min([np.hypot(x - tx, y - ty) for tx, ty in things], axis=0) > margin
+
+
+def grass(recipe: Recipe) -> None:
+    """Grass in the moss around the court, taller towards the woods."""
+    random = recipe.random("grass")
+    green = leaf_material("Grass", (0.028, 0.062, 0.010), (0.125, 0.17, 0.032), 0.35)
+    meshes = [
+        mesh(
+            f"Grass.{i}",
+            tuft(random, recipe.copies(430, 20), 0.42, (0.05, 0.15), 0.035, 4, 0.5),
+            green,
+        )
+        for i in range(4)
+    ]
+
+    def allowed(x: Array, y: Array) -> Array:
+        patch = noise(np.stack([x, y, 0 * x], axis=-1) / 2.2, 97, 2) > -0.12
+        return (
+            patch
+            & (court_distance(x, y) > 0.5)
+            & (pond_distance(x, y) > 0.25)
+            & (path_distance(x, y) > 0.95)
+        )
+
+    near = spread(random, recipe.copies(620, 40), (-9.5, -9.5, 9.5, 9.5), 0.46, allowed)
+    far = spread(
+        random,
+        recipe.copies(420, 40),
+        (-26, -26, 26, 26),
+        1.05,
+        lambda x, y: allowed(x, y) & (np.hypot(x, y) > 9.5),
+    )
+    scatter("Grass", meshes, lying(random, near, (0.8, 1.25)) + lying(random, far, (1.8, 3.2)))
+
+
+def fallen_leaves(recipe: Recipe, stones: Sequence[tuple[Array, float]]) -> None:
+    """Maple leaves on the gravel and the flagstones, thickest under the crown."""
+    random = recipe.random("fallen leaves")
+    count = recipe.copies(420, 20)
+    spots = np.vstack(
+        [
+            random.normal((-1.2, -2.0), 1.3, (count, 2)),
+            random.uniform(COURT[:2], COURT[2:], (count // 3, 2)),
+        ]
+    )
+    spots = spots[court_distance(*spots.T) < -0.2]
+    heights = raked_height(*spots.T, stones) + 0.012
+    kept = np.ones(len(spots), dtype=bool)
+    for outline, height in stones:
+        middle = outline.mean(0)
+        reach = np.hypot(*(spots - middle).T)
+        radius = np.hypot(*(outline - middle).T)
+        heights[reach < 0.72 * radius.min()] = height + 0.008
+        kept &= (reach < 0.72 * radius.min()) | (reach > radius.max() + 0.04)
+    spots, heights = spots[kept], heights[kept]
+    turn = random.uniform(0, TAU, len(spots))
+    forward = np.stack([np.cos(turn), np.sin(turn), random.normal(0, 0.05, len(spots))], axis=-1)
+    up = random.normal((0, 0, 1), (0.12, 0.12, 0.0), (len(spots), 3))
+    shape = copies(
+        maple_leaf(),
+        frames(forward, up) * random.uniform(0.05, 0.085, (len(spots), 1, 1)),
+        np.column_stack([spots, heights]),
+    )
+    add(
+        "Fallen leaves",
+        shape,
+        leaf_material("Fallen maple leaves", (0.26, 0.02, 0.012), (0.55, 0.17, 0.04), 0.2),
+    )
+
+
+# --- The distance ---------------------------------------------------------------------------------
+
+
+def mountains(recipe: Recipe) -> None:
+    """Ridges all round the horizon, lower where the sun rises."""
+    angles = np.linspace(0, TAU, recipe.steps(540), endpoint=False)
+    radii = np.linspace(170, 520, recipe.steps(60))
+    r, a = np.meshgrid(radii, angles, indexing="ij")
+    x, y = r * np.cos(a), r * np.sin(a)
+    flat = np.stack([x, y, 0 * x], axis=-1)
+    ridge = 1 - np.abs(noise(flat / 150.0, 98, 1)) * 2.2
+    detail = noise(flat / 60.0, 99, 5)
+    sunward = 0.5 + 0.5 * np.cos(a - SUN_AZIMUTH)
+    tall = (95 - 45 * sunward**2) * smoothstep(175, 400, r)
+    height = 2.0 + tall * (0.38 + 0.62 * ridge + 0.30 * detail)
+    made, graph = material("Mountain")
+    where = graph.coordinates()
+    forest = graph.noise(where, 0.16, 6.0, 0.75)
+    normal = graph.add("ShaderNodeNewGeometry").outputs["Normal"]
+    steep = graph.math("ADD", graph.xyz(normal)["Z"], graph.math("MULTIPLY", forest, 0.5))
+    wood = graph.ramp(
+        forest,
+        [(0.35, (0.020, 0.045, 0.026)), (0.52, (0.045, 0.075, 0.030)), (0.68, (0.12, 0.10, 0.04))],
+    )
+    color = graph.mix(graph.span(steep, 0.0, 1.0, 0.75, 1.0), (0.16, 0.16, 0.17), wood)
+    high = graph.math("ADD", graph.xyz(where)["Z"], graph.math("MULTIPLY", forest, 30.0))
+    color = graph.mix(graph.span(high, 0.0, 1.0, 92.0, 104.0), color, (0.75, 0.78, 0.82))
+    finish(made, graph, graph.add("ShaderNodeBsdfDiffuse", {"Color": color}))
+    add("Mountains", sheet(np.stack([x, y, height], axis=-1)[::-1], closed=True), made)
+
+
+def fog(recipe: Recipe) -> None:
+    """A ring of morning fog before the mountains.
+
+    It glows with the light that it would scatter towards the viewer: no noise, hardly any cost.
+    """
+    made, graph = material("Fog")
+    veil = graph.add(
+        "ShaderNodeVolumeAbsorption", {"Color": (0.0, 0.0, 0.0), "Density": FOG_DENSITY}
+    )
+    glow = graph.add("ShaderNodeEmission", {"Color": FOG_COLOR, "Strength": FOG_DENSITY})
+    finish(made, graph, volume=graph.add("ShaderNodeAddShader", {0: veil, 1: glow}))
+    profile = [(85.0, -2.0), (165.0, -2.0), (165.0, 21.0), (85.0, 17.0), (85.0, -2.0)]
+    ring = add("Fog", lathe(profile, recipe.steps(96, 24), capped=False), made, smooth=False)
+    ring.visible_diffuse = ring.visible_shadow = False

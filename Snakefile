@@ -1,0 +1,31 @@
+# Plenoforge: scene YAMLs in configs/scenes/ become light-field datasets in results/.
+
+
+configfile: "config.yaml"
+
+
+include: "rules/common.smk"
+include: "rules/scene.smk"
+include: "rules/rig.smk"
+include: "rules/render.smk"
+include: "rules/reproject.smk"
+include: "rules/export.smk"
+include: "rules/validate.smk"
+include: "rules/report.smk"
+include: "rules/package.smk"
+
+
+rule all:
+    default_target: True
+    input:
+        [dataset_files(dataset) for dataset in CHOSEN],
+
+
+rule smoke:
+    input:
+        [dataset_files(dataset) for dataset in SMOKE],
+
+
+rule package_all:
+    input:
+        [package_file(dataset) for dataset in CHOSEN],

@@ -1,0 +1,3 @@
+# Snakemake runs this in the workflow's folder once it has made the environment.
+set -e
+python -m pip install --require-hashes -r envs/requirements.txt

@@ -1,0 +1,265 @@
+# The configuration, and where everything lies. Every path of the workflow comes from here.
+import json
+import math
+import shlex
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(workflow.basedir) / "scripts"))
+# The rules call `python`: let that be the one that runs Snakemake.
+shell.prefix(f"export PATH={shlex.quote(str(Path(sys.executable).parent))}:$PATH; ")
+
+from lightfield.config import VIEWS, load_config, load_datasets, scene_datasets
+from lightfield.errors import UserError
+from lightfield.keys import scene_fingerprint
+
+try:
+    SETTINGS = load_config(config)
+    CHOSEN = load_datasets(SETTINGS)
+    SMOKE = scene_datasets("smoke", "full", {})
+except UserError as error:
+    sys.exit(f"error: {error}")
+
+RESULTS = SETTINGS["results"]
+WORK = SETTINGS["work"]
+LIMITS = {"smoke": {}} | {
+    dataset.scene: SETTINGS["presets"][SETTINGS["preset"]] for dataset in CHOSEN
+}
+DATASETS = {(dataset.scene, dataset.rig): dataset for dataset in [*SMOKE, *CHOSEN]}
+
+# For planning only, measured on one core of a 2-core x86-64 machine: path tracing of one sample of
+# one pixel, and start-up (bpy, the scene, and Cycles' acceleration structures).
+SECONDS_PER_SAMPLE = 2e-6
+START_UP_SECONDS = 3.0
+# Start-up is kept under this share of a shard's time.
+START_UP_SHARE = 0.05
+
+# Snakemake sets this up by itself if it is run with --software-deployment-method conda.
+ENVIRONMENT = "../envs/environment.yaml"
+
+DATASET = f"{RESULTS}/{{scene}}/{{rig}}"
+MADE = f"{WORK}/{{scene}}/{{rig}}"
+PANORAMA = f"{MADE}/panorama"
+REPROJECTED = f"{DATASET}/{{reprojection}}"
+
+
+wildcard_constraints:
+    name="[A-Za-z0-9_-]+",
+    scene="[A-Za-z0-9_-]+",
+    rig="[A-Za-z0-9_.-]+",
+    reprojection="[A-Za-z0-9_.-]+",
+    first=r"\d+",
+    end=r"\d+",
+
+
+def dataset_of(wildcards):
+    """Return the dataset that a job's wildcards mean."""
+    return DATASETS[wildcards.scene, wildcards.rig]
+
+
+def view_seconds(dataset):
+    """Estimate how long one core path-traces one view."""
+    width, height = dataset.cameras["camera"]["resolution"]
+    return width * height * dataset.render["samples"] * SECONDS_PER_SAMPLE
+
+
+def shards(dataset):
+    """Split a dataset's views into runs (first, end) of nearly equal length.
+
+    Automatically, a run is as short as it can be without start-up taking more than its share: the
+    shorter, the more processes can work at once.
+    """
+    wanted = SETTINGS["views_per_shard"]
+    if wanted == "auto":
+        wanted = math.ceil(START_UP_SECONDS / START_UP_SHARE / view_seconds(dataset))
+    count = math.ceil(dataset.view_count / wanted)
+    bounds = [dataset.view_count * number // count for number in range(count + 1)]
+    return list(zip(bounds, bounds[1:]))
+
+
+def shard_threads(wildcards, *others):
+    """Give each shard one core, or more where there are fewer shards than cores."""
+    total = sum(len(shards(dataset)) for dataset in CHOSEN)
+    return max(1, workflow.cores // total) if workflow.cores else 1
+
+
+def scene_file(wildcards):
+    """Return the .blend of a dataset: what a builder makes, or what the user brought."""
+    dataset = dataset_of(wildcards)
+    if "builder" in dataset.source:
+        return f"{WORK}/{dataset.name}/scene.blend"
+    return dataset.source["blend"]
+
+
+def scene_check(wildcards):
+    """Return the proof that the user's own .blend is the one meant; a built one needs none."""
+    dataset = dataset_of(wildcards)
+    return f"{WORK}/{dataset.name}/blend.sha256" if "blend" in dataset.source else []
+
+
+def records(dataset, stage):
+    """Return the records of a dataset's shards at a stage: `render`, or a reprojection's name."""
+    return [
+        f"{WORK}/{dataset.scene}/{dataset.rig}/{stage}/{first}-{end}.json"
+        for first, end in shards(dataset)
+    ]
+
+
+def all_records(dataset):
+    """Return the records of every stage that makes a dataset's images."""
+    return [
+        record
+        for stage in ["render", *dataset.reprojections]
+        for record in records(dataset, stage)
+    ]
+
+
+def transforms(dataset):
+    """Return the files that a dataset exports for instant-ngp."""
+    folder = f"{RESULTS}/{dataset.scene}/{dataset.rig}"
+    return [
+        (
+            f"{folder}/transforms.json"
+            if source == VIEWS
+            else f"{folder}/{source}/transforms.json"
+        )
+        for source in dataset.exports.get("instant_ngp", {}).get("sources", [])
+    ]
+
+
+def lightfields(dataset):
+    """Return the lightfield.json of a dataset and of each of its reprojections."""
+    folder = f"{RESULTS}/{dataset.scene}/{dataset.rig}"
+    return [
+        f"{folder}/lightfield.json",
+        *(f"{folder}/{name}/lightfield.json" for name in dataset.reprojections),
+    ]
+
+
+def published(dataset):
+    """Return the files of a dataset that a job makes one by one, its views aside."""
+    return [*lightfields(dataset), *transforms(dataset)]
+
+
+def pictures(dataset):
+    """Return the pictures of a dataset's report."""
+    folder = f"{RESULTS}/{dataset.scene}/{dataset.rig}/report"
+    return [f"{folder}/contact_sheet.png", f"{folder}/panorama.png"]
+
+
+def dataset_files(dataset):
+    """Return all that a finished dataset consists of, as a target rule asks for it.
+
+    The records are named although later files follow from them, because Snakemake makes a missing
+    file anew only if a target rule names it.
+    """
+    folder = f"{RESULTS}/{dataset.scene}/{dataset.rig}"
+    return [
+        f"{folder}/validation.json",
+        f"{folder}/sha256sums.txt",
+        *published(dataset),
+        *pictures(dataset),
+        *all_records(dataset),
+    ]
+
+
+def package_file(dataset):
+    """Return the dataset as one archive, named as SILVR's are."""
+    return f"{RESULTS}/{dataset.scene}/{dataset.scene}_{dataset.rig}.tar"
+
+
+def source_of(name):
+    """Return the `scene` block of a scene YAML that is being built."""
+    return next(d.source for d in DATASETS.values() if d.name == name)
+
+
+def shard_minutes(wildcards):
+    """Allow a shard several times its estimated time, and never less than half an hour."""
+    count = int(wildcards.end) - int(wildcards.first)
+    return 30 + math.ceil(5 * count * view_seconds(dataset_of(wildcards)) / 60)
+
+
+def reprojection_of(wildcards):
+    """Return a reprojection's settings, defaults filled in."""
+    return dataset_of(wildcards).reprojections[wildcards.reprojection]
+
+
+def optics(wildcards):
+    """Return the words that tell scripts/reproject.py where each pixel comes from."""
+    settings = reprojection_of(wildcards)
+    words = ["--camera", json.dumps(settings["camera"]), "--filter", settings["filter"]]
+    if settings["samples"] > 1:
+        words += ["--samples", str(settings["samples"])]
+    if any(settings["rotation"]):
+        words += ["--rotation", ",".join(map(str, settings["rotation"]))]
+    return shlex.join(words)
+
+
+def development(wildcards):
+    """Return the words that tell scripts/reproject.py what to write."""
+    settings = reprojection_of(wildcards)
+    words = [f"--{settings['format']}", "--exposure", str(settings["exposure"])]
+    if "reinhard" in settings:
+        words += ["--reinhard", str(settings["reinhard"])]
+    return shlex.join(words)
+
+
+def placement(wildcards):
+    """Return the words that place a dataset in instant-ngp's unit cube."""
+    export = dataset_of(wildcards).exports["instant_ngp"]
+    words = []
+    if "scale" in export:
+        words += [
+            "--scale",
+            str(export["scale"]),
+            "--offset",
+            *map(str, export["offset"]),
+        ]
+    if "aabb_scale" in export:
+        words += ["--aabb-scale", str(export["aabb_scale"])]
+    if "evaluation_split" in dataset_of(wildcards).cameras:
+        words.append("--split")
+    return shlex.join(words)
+
+
+def suffix(wildcards):
+    """Return the suffix of a reprojection's images."""
+    return f".{dataset_of(wildcards).reprojections[wildcards.reprojection]['format']}"
+
+
+def reprojection_words(wildcards):
+    """Return the words that name a dataset's reprojections."""
+    words = [f"--reprojection {name}" for name in dataset_of(wildcards).reprojections]
+    return " ".join(words)
+
+
+def panorama_width(wildcards):
+    """Give the panorama, 360 degrees wide, the angular resolution of a 180 degree fisheye view."""
+    return 2 * dataset_of(wildcards).cameras["camera"]["resolution"][0]
+
+
+def drop_false_records():
+    """Remove the record of every shard whose files are no longer those that it describes.
+
+    Snakemake sees only whether a record is there. A view that was deleted or cut short shows in
+    its size; its shard then runs again and makes what is missing.
+    """
+    for dataset in DATASETS.values():
+        folder = Path(RESULTS, dataset.scene, dataset.rig)
+        for record in map(Path, all_records(dataset)):
+            try:
+                files = json.loads(record.read_text())["files"]
+                whole = all(
+                    (folder / name).stat().st_size == file["bytes"]
+                    for name, file in files.items()
+                )
+            except FileNotFoundError:
+                whole = not record.exists()
+            except (ValueError, KeyError):
+                whole = False
+            if not whole:
+                record.unlink()
+
+
+if workflow.is_main_process:
+    drop_false_records()

@@ -1,0 +1,21 @@
+# A dataset as one archive, as SILVR publishes its own.
+
+
+rule package:
+    input:
+        f"{DATASET}/sha256sums.txt",
+    output:
+        f"{RESULTS}/{{scene}}/{{scene}}_{{rig}}.tar",
+    log:
+        f"{WORK}/logs/{{scene}}/{{rig}}/package.log",
+    conda:
+        ENVIRONMENT
+    params:
+        folder=lambda wildcards, output: str(Path(output[0]).parent),
+    message:
+        "Packing {output}"
+    shell:
+        # The same files give the same archive, whoever packs them and when.
+        "tar --create --file {output} --directory {params.folder} --sort=name --mtime=@0"
+        " --owner=0 --group=0 --numeric-owner --mode=u=rwX,go=rX"
+        " {wildcards.rig} 2>&1 | tee {log}"

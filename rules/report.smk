@@ -1,0 +1,93 @@
+# What a dataset looks like.
+
+
+rule panorama_lightfield:
+    output:
+        f"{PANORAMA}/lightfield.json",
+    log:
+        f"{WORK}/logs/{{scene}}/{{rig}}/panorama/lightfield.log",
+    conda:
+        ENVIRONMENT
+    params:
+        name=lambda wildcards: dataset_of(wildcards).name,
+        limits=lambda wildcards: json.dumps(LIMITS[wildcards.scene]),
+        width=panorama_width,
+        render=lambda wildcards: dataset_of(wildcards).render,
+        center=lambda wildcards: dataset_of(wildcards).cameras["center"],
+        fingerprint=lambda wildcards: scene_fingerprint(dataset_of(wildcards).source),
+    message:
+        "Placing the panorama of {wildcards.scene}/{wildcards.rig}"
+    shell:
+        "python scripts/make_lightfield.py --scene {params.name} --rig {wildcards.rig}"
+        " --limits {params.limits:q} --panorama {params.width} --output {output} 2>&1 | tee {log}"
+
+
+rule render_panorama:
+    input:
+        check=scene_check,
+        blend=scene_file,
+        lightfield=f"{PANORAMA}/lightfield.json",
+    output:
+        f"{PANORAMA}/exr/view_0000f.exr",
+    log:
+        f"{WORK}/logs/{{scene}}/{{rig}}/panorama/render.log",
+    benchmark:
+        f"{WORK}/benchmarks/{{scene}}/{{rig}}/panorama/render.tsv"
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=6000,
+        runtime=120,
+        gpu=0 if SETTINGS["device"] in ("auto", "cpu") else 1,
+    params:
+        folder=f"{PANORAMA}/exr",
+        device=SETTINGS["device"],
+    message:
+        "Rendering the panorama of {wildcards.scene}/{wildcards.rig}"
+    shell:
+        "python scripts/render_shard.py --blend {input.blend:q} --lightfield {input.lightfield}"
+        " --device {params.device} --threads {threads} --output {params.folder} 2>&1 | tee {log}"
+
+
+rule panorama:
+    input:
+        f"{PANORAMA}/exr/view_0000f.exr",
+    output:
+        report(
+            f"{DATASET}/report/panorama.png",
+            category="{scene}",
+            subcategory="{rig}",
+            caption="../report/panorama.rst",
+        ),
+    log:
+        f"{WORK}/logs/{{scene}}/{{rig}}/panorama/develop.log",
+    conda:
+        ENVIRONMENT
+    message:
+        "Developing the panorama of {wildcards.scene}/{wildcards.rig}"
+    shell:
+        "python scripts/develop.py --input {input} --output {output} 2>&1 | tee {log}"
+
+
+rule contact_sheet:
+    input:
+        records=lambda wildcards: records(dataset_of(wildcards), "render"),
+        lightfield=f"{DATASET}/lightfield.json",
+    output:
+        report(
+            f"{DATASET}/report/contact_sheet.png",
+            category="{scene}",
+            subcategory="{rig}",
+            caption="../report/contact_sheet.rst",
+        ),
+    log:
+        f"{WORK}/logs/{{scene}}/{{rig}}/contact_sheet.log",
+    conda:
+        ENVIRONMENT
+    params:
+        views=f"{DATASET}/exr",
+    message:
+        "Making the contact sheet of {wildcards.scene}/{wildcards.rig}"
+    shell:
+        "python scripts/contact_sheet.py --lightfield {input.lightfield} --views {params.views}"
+        " --output {output} 2>&1 | tee {log}"

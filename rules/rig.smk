@@ -1,0 +1,43 @@
+# Where the cameras are and through which lens they look.
+
+
+rule lightfield:
+    output:
+        f"{DATASET}/lightfield.json",
+    log:
+        f"{WORK}/logs/{{scene}}/{{rig}}/lightfield.log",
+    conda:
+        ENVIRONMENT
+    params:
+        name=lambda wildcards: dataset_of(wildcards).name,
+        limits=lambda wildcards: json.dumps(LIMITS[wildcards.scene]),
+        # Not in the command: when what the YAML says of this dataset changes, so does the file.
+        cameras=lambda wildcards: dataset_of(wildcards).cameras,
+        render=lambda wildcards: dataset_of(wildcards).render,
+        fingerprint=lambda wildcards: scene_fingerprint(dataset_of(wildcards).source),
+    message:
+        "Placing the cameras of {wildcards.scene}/{wildcards.rig}"
+    shell:
+        "python scripts/make_lightfield.py --scene {params.name} --rig {wildcards.rig}"
+        " --limits {params.limits:q} --output {output} 2>&1 | tee {log}"
+
+
+rule check_cameras:
+    input:
+        check=scene_check,
+        blend=scene_file,
+        lightfield=f"{DATASET}/lightfield.json",
+    output:
+        f"{MADE}/cameras.json",
+    log:
+        f"{WORK}/logs/{{scene}}/{{rig}}/check_cameras.log",
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=8000,
+        runtime=60,
+    message:
+        "Looking for cameras of {wildcards.scene}/{wildcards.rig} inside geometry"
+    shell:
+        "python scripts/check_cameras.py --blend {input.blend:q} --lightfield {input.lightfield}"
+        " --output {output} 2>&1 | tee {log}"

@@ -1,0 +1,37 @@
+"""Build a scene with one of the builders in scripts/scenes/ and save it as a .blend."""
+
+import argparse
+import importlib
+import json
+from pathlib import Path
+
+from lightfield import blender, config
+from lightfield.cli import run
+from lightfield.errors import UserError
+from lightfield.files import atomic_path
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--builder", required=True, choices=config.builders())
+    parser.add_argument(
+        "--parameters",
+        default='{"seed": 0, "detail": 1.0}',
+        help="JSON: seed, detail (1 is full) and the builder's own (default: %(default)s)",
+    )
+    parser.add_argument("--output", required=True, type=Path, help=".blend to write")
+    arguments = parser.parse_args()
+    try:
+        parameters = json.loads(arguments.parameters)
+    except json.JSONDecodeError as error:
+        raise UserError(f"--parameters: is not JSON: {error}") from None
+
+    builder = importlib.import_module(f"scenes.{arguments.builder}")
+    blender.new_scene()
+    builder.build(parameters)
+    with atomic_path(arguments.output) as temporary:
+        blender.save_scene(temporary)
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,234 @@
+"""Blender, headless: the one module of the library that imports bpy.
+
+Opens a scene with its scripts disabled, sets Cycles up once, and renders view after view with the
+scene kept in memory.
+"""
+
+import math
+import os
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+import mathutils
+import numpy as np
+
+from lightfield import images
+from lightfield.errors import UserError
+
+Array = np.ndarray[Any, Any]
+
+# In the order in which `auto` tries them.
+GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
+
+# Cycles gives this depth to a ray that hits nothing.
+CYCLES_MISS = 1e10
+
+CAMERA_NAME = "plenoforge_camera"
+
+
+@dataclass(frozen=True)
+class Raw:
+    """One view as Cycles made it, in float32.
+
+    ``colour`` is (height, width, 3), scene-linear; ``depth`` is (height, width) in metres, inf
+    where nothing was hit: Z-depth for a perspective camera and distance for any other, or None if
+    it was not asked for. ``render_seconds`` and ``synchronization_seconds`` are Cycles' own.
+    """
+
+    colour: Array
+    depth: Array | None
+    render_seconds: float
+    synchronization_seconds: float
+
+
+def new_scene() -> None:
+    """Start from an empty scene with one empty world-less view layer."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
+def save_scene(path: Path) -> None:
+    """Save the current scene as a compressed .blend without backup copies."""
+    bpy.context.preferences.filepaths.save_version = 0
+    with _quiet():
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True, copy=True)
+
+
+def open_scene(path: Path) -> None:
+    """Open a .blend with its scripts disabled; raises `UserError` if Blender cannot read it."""
+    try:
+        with _quiet():
+            bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
+    except RuntimeError as error:
+        raise UserError(f"{path}: Blender cannot open it: {str(error).strip()}") from None
+
+
+def set_up_render(
+    settings: Mapping[str, Any],
+    lightfield: Mapping[str, Any],
+    device: str,
+    threads: int,
+) -> None:
+    """Set Cycles up for every view that follows.
+
+    ``settings`` is a scene YAML's ``render`` block, ``lightfield`` a lightfield.json's content.
+    Raises `UserError` if the ``device`` is not there.
+    """
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    cycles = scene.cycles
+    cycles.samples = settings["samples"]
+    cycles.use_adaptive_sampling = settings["adaptive_threshold"] > 0
+    cycles.adaptive_threshold = settings["adaptive_threshold"]
+    cycles.use_denoising = settings["denoise"]
+    cycles.denoiser = "OPENIMAGEDENOISE"
+    cycles.use_animated_seed = False
+    cycles.time_limit = 0
+    if "max_bounces" in settings:
+        cycles.max_bounces = settings["max_bounces"]
+    if "clamp_indirect" in settings:
+        cycles.sample_clamp_indirect = settings["clamp_indirect"]
+    if "filter_width" in settings:
+        cycles.filter_width = settings["filter_width"]
+
+    render = scene.render
+    render.use_persistent_data = True
+    render.threads_mode = "FIXED"
+    render.threads = threads
+    render.resolution_x, render.resolution_y = lightfield["resolution"]
+    render.resolution_percentage = 100
+    render.pixel_aspect_x = render.pixel_aspect_y = 1
+    render.use_border = False
+    render.use_multiview = False
+    render.use_compositing = False
+    render.use_sequencer = False
+    render.use_overwrite = True
+    output = render.image_settings
+    output.media_type = "MULTI_LAYER_IMAGE"
+    output.file_format = "OPEN_EXR_MULTILAYER"
+    output.color_depth = "32"
+    output.exr_codec = "NONE"
+
+    layer = _first_layer(scene)
+    for name in dir(layer):
+        if name.startswith("use_pass_"):
+            setattr(layer, name, False)
+    layer.use_pass_combined = True
+    layer.use_pass_z = lightfield["depth"] is not None
+    layer.cycles.denoising_store_passes = False
+
+    _use_device(scene, device)
+    _set_camera(scene, lightfield)
+    scene.frame_set(lightfield["frame"])
+
+
+def render_view(world_matrix: Array, seed: int) -> Raw:
+    """Render the view of a camera at ``world_matrix``, (4, 4) camera-to-world."""
+    scene = bpy.context.scene
+    scene.camera.matrix_world = mathutils.Matrix(np.asarray(world_matrix).tolist())
+    scene.cycles.seed = seed
+    with tempfile.TemporaryDirectory(prefix="plenoforge-", dir=_fast_folder()) as folder:
+        path = Path(folder) / "view.exr"
+        scene.render.filepath = str(path)
+        with _quiet():
+            bpy.ops.render.render(write_still=True)
+        image = images.read_image(path)
+    layer = _first_layer(scene).name
+    depth = image.channels.get(f"{layer}.Depth.Z")
+    if depth is not None:
+        depth = np.where(depth >= CYCLES_MISS, np.float32(np.inf), depth)
+    colour = np.stack([image.channels[f"{layer}.Combined.{c}"] for c in "RGB"], axis=-1)
+    return Raw(
+        colour=colour,
+        depth=depth,
+        render_seconds=_seconds(image.attributes[f"cycles.{layer}.render_time"]),
+        synchronization_seconds=_seconds(image.attributes[f"cycles.{layer}.synchronization_time"]),
+    )
+
+
+def _first_layer(scene: Any) -> Any:
+    """Return the one view layer that is rendered: the first that the .blend has in use."""
+    layer = next((layer for layer in scene.view_layers if layer.use), scene.view_layers[0])
+    for other in scene.view_layers:
+        other.use = other == layer
+    return layer
+
+
+def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
+    """Make the camera of a lightfield.json's ``camera``, ``resolution`` and ``sensor_size``."""
+    intrinsics = lightfield["camera"]
+    camera = bpy.data.cameras.new(CAMERA_NAME)
+    camera.type = intrinsics["type"]
+    width, height = lightfield["sensor_size"]
+    camera.sensor_fit = "HORIZONTAL" if width >= height else "VERTICAL"
+    camera.sensor_width, camera.sensor_height = width, height
+    # Cycles clips a perspective view between these; nothing of a scene shall be cut away.
+    camera.clip_start, camera.clip_end = 1e-4, 1e9
+    if intrinsics["type"] == "PERSP":
+        camera.lens_unit = "MILLIMETERS"
+        camera.lens = intrinsics["focal_length"]
+    else:
+        for name, value in intrinsics.items():
+            if hasattr(camera, name) and name not in ("type", "lens"):
+                setattr(camera, name, value)
+    camera_object = bpy.data.objects.new(CAMERA_NAME, camera)
+    camera_object.rotation_mode = "XYZ"
+    scene.collection.objects.link(camera_object)
+    scene.camera = camera_object
+
+
+def _use_device(scene: Any, device: str) -> None:
+    """Choose what Cycles renders on; a device that is asked for by name must be there."""
+    if device == "cpu":
+        scene.cycles.device = "CPU"
+        return
+    preferences = bpy.context.preferences.addons["cycles"].preferences
+    for name in GPU_DEVICES if device == "auto" else (device,):
+        try:
+            found = list(preferences.get_devices_for_type(name.upper()) or ())
+        except (TypeError, ValueError):
+            found = []
+        gpus = [entry for entry in found if entry.type == name.upper()]
+        if gpus:
+            preferences.compute_device_type = name.upper()
+            for entry in preferences.devices:
+                entry.use = entry.type == name.upper()
+            scene.cycles.device = "GPU"
+            return
+    if device != "auto":
+        raise UserError(
+            f"device: this machine has no {device} device that Cycles can use; "
+            "use device=cpu, or device=auto to take what there is"
+        )
+    scene.cycles.device = "CPU"
+
+
+def _fast_folder() -> str | None:
+    """Return a folder in memory for Cycles' own output, where the system has one."""
+    return "/dev/shm" if Path("/dev/shm").is_dir() else None
+
+
+def _seconds(text: images.Attribute) -> float:
+    """Read a time of the form [hours:]minutes:seconds, as Cycles' header has it."""
+    return math.fsum(
+        float(part) * 60**power for power, part in enumerate(reversed(str(text).split(":")))
+    )
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep what Blender itself prints to standard output out of ours."""
+    sys.stdout.flush()
+    saved = os.dup(1)
+    with Path(os.devnull).open("w") as nothing:
+        os.dup2(nothing.fileno(), 1)
+        try:
+            yield
+        finally:
+            os.dup2(saved, 1)
+            os.close(saved)

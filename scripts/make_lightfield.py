@@ -1,0 +1,75 @@
+"""Write a dataset's lightfield.json: its lens once, one pose a view, and how it is rendered."""
+
+import argparse
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from lightfield import config, keys, lenses, rigs
+from lightfield.cli import run
+from lightfield.errors import UserError
+from lightfield.files import write_json
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scene", required=True, help="name of a file in configs/scenes/")
+    parser.add_argument("--rig", required=True, help="name of a rig in the scene YAML")
+    parser.add_argument(
+        "--limits",
+        type=json.loads,
+        default={},
+        help="JSON of a preset's limits, as in config.yaml (default: none, the full size)",
+    )
+    parser.add_argument(
+        "--panorama",
+        type=int,
+        metavar="WIDTH",
+        help="instead of the rig, one equirectangular view from its centre, WIDTH pixels wide",
+    )
+    parser.add_argument("--output", required=True, type=Path, help="lightfield.json to write")
+    arguments = parser.parse_args()
+
+    datasets = config.scene_datasets(arguments.scene, "full", arguments.limits)
+    dataset = next((d for d in datasets if d.rig == arguments.rig), None)
+    if dataset is None:
+        known = ", ".join(d.rig for d in datasets)
+        raise UserError(f"--rig: is {arguments.rig!r}; must be one of {known}")
+    cameras = dataset.cameras
+    if arguments.panorama:
+        cameras = panorama_rig(cameras, arguments.panorama)
+    write_json(arguments.output, content(arguments.scene, dataset, cameras))
+
+
+def content(scene: str, dataset: config.Dataset, cameras: Mapping[str, Any]) -> dict[str, Any]:
+    """Return lightfield.json's content: SILVR's keys, and ours that say how it is rendered."""
+    lens = lenses.from_camera(cameras["camera"])
+    lightfield = rigs.lightfield(cameras, lens.to_lightfield())
+    frames = lightfield.pop("frames")
+    return {
+        **lightfield,
+        "depth": config.depth_meaning(dataset.render["depth"], cameras["camera"]),
+        "frame": dataset.source["frame"],
+        "scene": {
+            "name": scene,
+            **dataset.source,
+            "fingerprint": keys.scene_fingerprint(dataset.source),
+        },
+        "render": dict(dataset.render),
+        "frames": frames,
+    }
+
+
+def panorama_rig(cameras: Mapping[str, Any], width: int) -> dict[str, Any]:
+    """Return a rig of one full equirectangular view, level, at the centre of ``cameras``."""
+    return {
+        "type": "lattice",
+        "cameras": [1, 1, 1],
+        "center": cameras["center"],
+        "camera": {"lens": "equirectangular", "resolution": [width, width // 2]},
+    }
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,188 @@
+"""Render a run of a dataset's views in one process, keeping every view that is already right.
+
+Each view is written the moment it is done. A view whose file is whole and carries the render key
+that its settings give is left as it is, so that this program, killed and started again, renders
+only what is missing. Its journal, one JSON line a rendered view, tells what was done and how fast.
+"""
+
+import argparse
+import json
+import os
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightfield import depth, images, keys, lenses
+from lightfield.cli import run
+from lightfield.errors import UserError
+from lightfield.files import read_json, sha256, write_json
+from lightfield.progress import Progress
+
+
+def main() -> None:
+    started = time.perf_counter()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--blend", required=True, type=Path, help="the scene")
+    parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
+    parser.add_argument(
+        "--views",
+        metavar="FIRST:END",
+        default=":",
+        help="a slice of lightfield.json's frames (default: all of them)",
+    )
+    parser.add_argument("--output", required=True, type=Path, help="folder of the views")
+    parser.add_argument("--record", type=Path, help="JSON of the views' sizes and checksums")
+    parser.add_argument("--journal", type=Path, help="JSON lines of what was rendered and how fast")
+    parser.add_argument(
+        "--device",
+        default="auto",
+        choices=["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"],
+        help="what Cycles renders on (default: auto)",
+    )
+    parser.add_argument("--threads", type=int, default=0, help="CPU threads (default: all cores)")
+    arguments = parser.parse_args()
+
+    lightfield = read_json(arguments.lightfield)
+    frames = lightfield["frames"][parse_slice(arguments.views)]
+    missing = [
+        frame
+        for frame in frames
+        if not is_finished(view_path(arguments.output, frame), lightfield, frame)
+    ]
+    if missing:
+        render_views(missing, lightfield, arguments, started)
+    if arguments.record:
+        write_json(arguments.record, record([view_path(arguments.output, f) for f in frames]))
+
+
+def parse_slice(text: str) -> slice:
+    """Read FIRST:END, either of which may be left out, as a slice."""
+    first, colon, end = text.partition(":")
+    if not colon or not (first + end or "0").isdecimal():
+        raise UserError(f"--views: is {text!r}; must be FIRST:END, as in 0:32")
+    return slice(int(first) if first else None, int(end) if end else None)
+
+
+def view_path(folder: Path, frame: Mapping[str, Any]) -> Path:
+    """Return the path of a view's EXR in the folder of the views."""
+    return folder / f"{frame['name']}.exr"
+
+
+def is_finished(path: Path, lightfield: Mapping[str, Any], frame: Mapping[str, Any]) -> bool:
+    """Tell whether a view's file is whole and has the pixels that its settings give."""
+    if not path.exists():
+        return False
+    try:
+        image = images.read_image(path)
+    except UserError:
+        return False
+    return image.attributes.get(images.KEY_ATTRIBUTE) == keys.render_key(lightfield, frame)
+
+
+def render_views(
+    frames: list[Mapping[str, Any]],
+    lightfield: Mapping[str, Any],
+    arguments: argparse.Namespace,
+    started: float,
+) -> None:
+    """Open the scene once and render ``frames`` one after the other."""
+    # Only now, because it takes a second and a shard that is finished does not need it.
+    from lightfield import blender
+
+    blender.open_scene(arguments.blend)
+    threads = arguments.threads or len(os.sched_getaffinity(0))
+    blender.set_up_render(lightfield["render"], lightfield, arguments.device, threads)
+    to_depth = depth_factors(lightfield)
+    append(arguments.journal, {"start_up_seconds": time.perf_counter() - started})
+
+    progress = Progress(len(frames), f"render {arguments.output.parent.name} {arguments.views}")
+    for frame in frames:
+        began, began_cpu = time.perf_counter(), time.process_time()
+        seed = keys.view_seed(lightfield["render"]["seed"], frame["name"])
+        raw = blender.render_view(np.array(frame["world_matrix"]), seed)
+        channels, attributes = view_channels(raw, lightfield, to_depth)
+        attributes[images.KEY_ATTRIBUTE] = keys.render_key(lightfield, frame)
+        images.write_exr(view_path(arguments.output, frame), channels, attributes)
+        append(
+            arguments.journal,
+            {
+                "view": frame["name"],
+                "wall_seconds": round(time.perf_counter() - began, 4),
+                "cpu_seconds": round(time.process_time() - began_cpu, 4),
+                "render_seconds": raw.render_seconds,
+                "synchronization_seconds": raw.synchronization_seconds,
+            },
+        )
+        progress.done()
+
+
+def depth_factors(lightfield: Mapping[str, Any]) -> np.ndarray | None:
+    """Return the unit rays that turn Cycles' depth into the dataset's, or None if it is that.
+
+    Cycles gives Z-depth for a perspective camera and distance for a panoramic one.
+    """
+    cycles_gives = "z" if lightfield["camera"]["type"] == "PERSP" else "distance"
+    if lightfield["depth"] in (None, cycles_gives):
+        return None
+    lens = lenses.from_lightfield(lightfield)
+    rows, columns = np.mgrid[: lens.height, : lens.width]
+    return lens.rays(columns + 0.5, rows + 0.5)
+
+
+def view_channels(
+    raw, lightfield: Mapping[str, Any], rays: np.ndarray | None
+) -> tuple[dict[str, np.ndarray], dict[str, images.Attribute]]:
+    """Turn what Cycles made into the channels and attributes of a view's EXR.
+
+    Colour beyond the half range is clamped and counted; what is not a number is counted and kept,
+    so that validation finds it.
+    """
+    nan = int(np.isnan(raw.colour).sum())
+    clamped = int((np.abs(raw.colour) > images.HALF_MAX).sum())
+    colour = np.clip(raw.colour, -images.HALF_MAX, images.HALF_MAX).astype(np.float16)
+    channels = {name: colour[:, :, index] for index, name in enumerate("RGB")}
+    attributes: dict[str, images.Attribute] = {
+        images.CLAMPED_ATTRIBUTE: clamped,
+        images.NAN_ATTRIBUTE: nan,
+    }
+    if lightfield["depth"] is not None:
+        z = raw.depth
+        if rays is not None and lightfield["depth"] == "z":
+            z = depth.z_from_distance(z, rays)
+        elif rays is not None:
+            z = depth.distance_from_z(z, rays)
+        # Outside the image circle there is no ray; nothing was hit there.
+        z = np.where(np.isnan(z), np.inf, z)
+        half = lightfield["render"]["depth_precision"] == "half"
+        with np.errstate(over="ignore"):
+            channels["Z"] = z.astype(np.float16 if half else np.float32)
+        attributes[images.DEPTH_ATTRIBUTE] = lightfield["depth"]
+    return channels, attributes
+
+
+def append(journal: Path | None, entry: Mapping[str, Any]) -> None:
+    """Add one line to the journal, at once."""
+    if journal:
+        journal.parent.mkdir(parents=True, exist_ok=True)
+        with journal.open("a") as file:
+            file.write(json.dumps(entry) + "\n")
+
+
+def record(paths: list[Path]) -> dict[str, Any]:
+    """Return sizes and checksums of a shard's views, by their paths in the dataset."""
+    return {
+        "files": {
+            f"{path.parent.name}/{path.name}": {
+                "bytes": path.stat().st_size,
+                "sha256": sha256(path),
+            }
+            for path in paths
+        }
+    }
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,218 @@
+"""The configuration: what is right is resolved, what is wrong is told in one line."""
+
+import copy
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from lightfield import config
+from lightfield.errors import UserError
+
+RIGHT = {
+    "scene": {"builder": "test_room"},
+    "render": {"samples": 64},
+    "rigs": {
+        "LFSphere": {
+            "type": "sphere",
+            "subdivisions": 4,
+            "camera": {"lens": "equidistant", "fov": 180, "resolution": [2048, 2048]},
+        },
+        "LFCuboid": {
+            "type": "cuboid",
+            "cameras": [10, 30, 10],
+            "camera": {"lens": "equirectangular", "resolution": [4096, 2048]},
+        },
+    },
+    "reprojections": {
+        "perspective": {
+            "rigs": ["LFSphere"],
+            "camera": {"lens": "rectilinear", "focal_length": 18, "resolution": [256, 256]},
+        }
+    },
+    "exports": {"instant_ngp": {"sources": ["perspective"]}},
+}
+
+REMOVE = object()
+
+
+def changed(path, value):
+    """Return the right YAML's content with the value at a dotted path replaced or removed."""
+    content = copy.deepcopy(RIGHT)
+    *parents, last = path.split(".")
+    part = content
+    for key in parents:
+        part = part.setdefault(key, {})
+    if value is REMOVE:
+        del part[last]
+    else:
+        part[last] = value
+    return content
+
+
+BROKEN = {
+    # key path: (value, what the message must hold beside the key path)
+    "no samples": ("render.samples", REMOVE, "render: is missing the key samples"),
+    "text for number": ("render.samples", "many", 'render.samples: is "many"; must be a whole'),
+    "fraction": ("render.samples", 1.5, "render.samples: is 1.5; must be a whole number"),
+    "zero samples": (
+        "render.samples",
+        0,
+        "render.samples: is 0; must be a whole number at least 1",
+    ),
+    "misspelt key": ("render.sample", 4, "render.sample: unknown key; did you mean samples?"),
+    "unknown key": ("render.xyzzy", 4, "render.xyzzy: unknown key; allowed here: samples, "),
+    "unknown builder": ("scene.builder", "nowhere", "'nowhere'; must be one of"),
+    "two sources": ("scene.blend", "a.blend", "scene: must have one of builder and blend"),
+    "blend without sum": ("scene", {"blend": "a.blend"}, "scene: is missing the key sha256"),
+    "bad sum": (
+        "scene",
+        {"blend": "a.blend", "sha256": "123"},
+        'scene.sha256: is "123"; must be a text of the form',
+    ),
+    "unknown rig type": (
+        "rigs.LFSphere.type",
+        "ball",
+        'rigs.LFSphere.type: is "ball"; must be one of plane, cuboid,',
+    ),
+    "too many subdivisions": (
+        "rigs.LFSphere.subdivisions",
+        12,
+        "rigs.LFSphere.subdivisions: is 12; must be a whole number at least 1 and at most 7",
+    ),
+    "wrong placement": ("rigs.LFSphere.cameras", [3, 3], "does not go with a rig of type sphere"),
+    "cameras of a cuboid": (
+        "rigs.LFCuboid.cameras",
+        [3, 3],
+        "rigs.LFCuboid.cameras: is [3, 3]; must be 3 whole numbers",
+    ),
+    "negative size": ("rigs.LFCuboid.size", -1, "rigs.LFCuboid.size: is -1; must be a number at"),
+    "centre of two": ("rigs.LFCuboid.center", [0, 1], "rigs.LFCuboid.center: is [0, 1]; must be a"),
+    "no rigs": ("rigs", {}, "rigs: is {}; must be a mapping with at least one key"),
+    "rig name": ("rigs", {"../out": RIGHT["rigs"]["LFSphere"]}, "rigs: '../out' is no name"),
+    "fov beyond the lens": (
+        "reprojections.perspective.camera",
+        {"lens": "rectilinear", "fov": 180, "resolution": [9, 9]},
+        "reprojections.perspective.camera.fov: is 180; must be below 180 degrees",
+    ),
+    "fisheye without fov": (
+        "rigs.LFSphere.camera",
+        {"lens": "equidistant", "resolution": [9, 9]},
+        "rigs.LFSphere.camera: is missing the key fov",
+    ),
+    "lens that Cycles lacks": (
+        "rigs.LFSphere.camera",
+        {"lens": "stereographic", "fov": 180, "resolution": [9, 9]},
+        "rigs.LFSphere.camera.lens: is 'stereographic', which Cycles does not have",
+    ),
+    "Z-depth of a panorama": (
+        "render.depth",
+        "z",
+        "render.depth: is 'z', but rigs.LFCuboid.camera",
+    ),
+    "reprojection of no rig": (
+        "reprojections.perspective.rigs",
+        ["LFSpher"],
+        "reprojections.perspective.rigs: there is no rig 'LFSpher'; did you mean LFSphere?",
+    ),
+    "reserved name": (
+        "reprojections.exr",
+        RIGHT["reprojections"]["perspective"],
+        "reprojections.exr: the name exr is taken",
+    ),
+    "export of nothing": (
+        "exports.instant_ngp.sources",
+        ["fisheye"],
+        "exports.instant_ngp.sources: is 'fisheye'; must be of views, perspective",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_every_mistake_names_file_key_value_and_what_is_right(name, tmp_path):
+    path, value, expected = BROKEN[name]
+    file = tmp_path / "broken.yaml"
+    file.write_text(yaml.safe_dump(changed(path, value)))
+    with pytest.raises(UserError) as caught:
+        config.read_scene(file)
+    message = str(caught.value)
+    assert message.startswith(str(file))
+    assert expected in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("render: {samples: 4\n", "line 2, column 1"),
+        ("render: {samples: 4}\nrender: {samples: 5}\n", "the key 'render' is given twice"),
+        ("1: 2\n", "the key 1 is not a text"),
+        ("- a\n- b\n", 'is ["a", "b"]; must be a mapping'),
+        ("scene: !!python/object/apply:os.getcwd []\n", "could not determine a constructor"),
+    ],
+)
+def test_text_that_is_no_scene_is_told_so(text, expected, tmp_path):
+    file = tmp_path / "broken.yaml"
+    file.write_text(text)
+    with pytest.raises(UserError, match=f"^{file}: ") as caught:
+        config.read_scene(file)
+    assert expected in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_defaults_and_limits_are_applied(tmp_path, monkeypatch):
+    (tmp_path / "right.yaml").write_text(yaml.safe_dump(RIGHT, sort_keys=False))
+    monkeypatch.setattr(config, "SCENES", tmp_path)
+    full = config.scene_datasets("right", "full", {})
+    assert [(d.scene, d.rig, d.view_count) for d in full] == [
+        ("right", "LFSphere", 642),
+        ("right", "LFCuboid", 1400),
+    ]
+    assert full[0].render["seed"] == 0
+    assert full[0].depth == "z"
+    assert full[1].depth == "distance"
+    assert list(full[0].reprojections) == ["perspective"]
+    assert list(full[1].reprojections) == []
+    small = config.scene_datasets(
+        "right", "small", {"resolution": 100, "samples": 8, "views": 50, "denoise": True}
+    )
+    assert [(d.scene, d.view_count) for d in small] == [("right_small", 42), ("right_small", 48)]
+    assert small[0].cameras["camera"]["resolution"] == [100, 100]
+    assert small[1].cameras["camera"]["resolution"] == [100, 50]
+    assert small[0].reprojections["perspective"]["camera"]["resolution"] == [100, 100]
+    assert small[0].render["samples"] == 8
+    assert small[0].render["denoise"] is True
+
+
+def test_every_scene_of_the_repository_is_right():
+    for path in config.SCENES.glob("*.yaml"):
+        config.read_scene(path)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["preset=best"], "preset: is 'best'; must be one of tiny, preview, full"),
+        (["scenes=[gardn]"], "there is no scene 'gardn'"),
+        (["rigs=[LFSpher]"], "rigs: 'LFSpher' is in none of the scenes garden"),
+        (["device=quantum"], 'device: is "quantum"; must be one of auto, cpu, optix,'),
+        (["views_per_shard=0"], "views_per_shard: is 0; must be auto or a whole number"),
+        (["results=."], "results: is '.'; must be a folder of its own"),
+    ],
+)
+def test_snakemake_ends_with_one_line_and_no_job(arguments, expected, tmp_path):
+    result = subprocess.run(
+        [Path(sys.executable).with_name("snakemake"), "--cores", "1", "--config", *arguments],
+        cwd=config.ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode != 0
+    told = [line for line in result.stderr.splitlines() if "error" in line.lower()]
+    assert len(told) == 1
+    assert expected in told[0]
+    assert "Traceback" not in result.stderr
+    assert "rule " not in result.stdout + result.stderr
