@@ -1,0 +1,825 @@
+"""Is a finished dataset whole and right? Every file is read, and every claim about it is tried.
+
+A dataset is a folder with lightfield.json, exr/<view>.exr, and reprojections, each a folder with
+its own lightfield.json and images. `validate` reads every image once, in as many processes as it
+is given, for what one file can tell; the views with depth are read once more for what only several
+views together can tell (`lightfield.consistency`). Memory holds a few hundred points a view.
+
+The result is a list of checks, each passed, failed, or not applicable and why: what could not be
+checked is said, never counted as right.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field, replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion
+
+from lightfield import consistency, images, lenses, rigs
+from lightfield.consistency import Answer, Camera, Patches
+from lightfield.errors import UserError
+from lightfield.files import read_json, sha256
+from lightfield.lenses import Lens
+from lightfield.progress import Progress
+
+Array = NDArray[Any]
+Bools = NDArray[np.bool_]
+
+IMAGES = "exr"
+"""The folder of a dataset's own views."""
+
+OUTPUTS = ("validation.json", "sha256sums.txt")
+"""The files in a dataset that say what came out of its validation."""
+
+REPORT = "report"
+"""The folder in a dataset that is not published with it."""
+
+RAYS_A_VIEW = 400
+
+# A view fails when over half of its pairs exceed one of these: the part of contradictions among
+# the points that are not occluded, and the displacement in pixels that a pair's residuals ask for.
+CONTRADICTIONS_LIMIT = 0.05
+DISPLACEMENT_LIMIT = 0.2
+# A set fails when its pairs together ask for such a change of all angles or of all depths;
+# residuals that determine it no better than this deviation do not count as a check of it.
+SCALE_LIMIT = 0.007
+SCALE_DEVIATION_LIMIT = 0.0015
+
+# Pixels this near to the rim of what a lens sees may hold light from both sides of it.
+RIM_PIXELS = 2
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check's outcome: ``passed`` is None where it does not apply, which ``detail`` explains.
+
+    ``views`` are those that failed; ``problems`` are whole lines, each naming a file;
+    ``warnings`` what is allowed but worth a look; ``figures`` what was measured.
+    """
+
+    name: str
+    passed: bool | None
+    detail: str
+    views: list[str] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    figures: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Result:
+    """A dataset's checks, and the SHA-256 of every file that it publishes by relative path."""
+
+    dataset: str
+    views: int
+    checks: list[Check]
+    checksums: dict[str, str]
+
+    @property
+    def valid(self) -> bool:
+        return all(check.passed is not False for check in self.checks)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of validation.json."""
+        return {
+            "dataset": self.dataset,
+            "valid": self.valid,
+            "summary": self.summary(),
+            "checks": [asdict(check) for check in self.checks],
+        }
+
+    def summary(self) -> str:
+        """Return one line for a person."""
+        parts = [f"{self.views} views"]
+        parts += [
+            check.name.removesuffix("geometry").replace("/", " ") + check.detail
+            for check in self.checks
+            if check.name.endswith("geometry") and check.figures
+        ]
+        for title, passed in (("failed", False), ("not applicable", None)):
+            names = [check.name for check in self.checks if check.passed is passed]
+            parts += [f"{title}: {', '.join(names)}"] if names else []
+        warnings = [warning for check in self.checks for warning in check.warnings]
+        parts += [f"warning: {'; '.join(warnings)}"] if warnings else []
+        return f"{self.dataset}: {'valid' if self.valid else 'INVALID'}: {'; '.join(parts)}"
+
+
+@dataclass(frozen=True)
+class ImageSet:
+    """The views of one lightfield.json: the dataset's own (``name`` "") or a reprojection's.
+
+    ``folder`` holds the images, relative to the dataset; ``depth`` is what channel Z means, or
+    None; ``matrices`` (n, 4, 4) are camera-to-world.
+    """
+
+    name: str
+    folder: str
+    lens: Lens
+    depth: str | None
+    views: list[str]
+    matrices: NDArray[np.float64]
+
+    @property
+    def prefix(self) -> str:
+        """What its files' paths and its checks' names begin with."""
+        return f"{self.name}/" if self.name else ""
+
+    def camera(self, view: int) -> Camera:
+        assert self.depth is not None
+        return Camera(self.lens, self.matrices[view], self.depth)
+
+
+@dataclass(frozen=True)
+class File:
+    """An image file: ``path`` relative to the dataset, and the set and view that it is of.
+
+    What is no view (a mask, a depth map, a picture for a trainer) has ``view`` −1, and has only to
+    be readable and of its set's size.
+    """
+
+    path: str
+    set: int
+    view: int = -1
+
+
+@dataclass
+class Facts:
+    """What one file tells by itself; ``problems`` by the check to which they belong.
+
+    ``clamped`` and ``nan`` are the renderer's counts, ``marked`` whether the pixels without a
+    source could be compared, ``patches`` what geometry needs of a view with depth.
+    """
+
+    checksum: str
+    bytes: int
+    problems: dict[str, str] = field(default_factory=dict)
+    clamped: int | None = None
+    nan: int | None = None
+    marked: bool = False
+    patches: Patches | None = None
+
+
+def validate(
+    dataset: Path,
+    reprojections: Sequence[str] = (),
+    records: Sequence[Path] = (),
+    clearance: Path | None = None,
+    processes: int = 1,
+) -> Result:
+    """Check a dataset's files, and what its pixels must satisfy.
+
+    ``reprojections`` are folders in the dataset; ``records`` JSON files of what was rendered
+    (``files``: relative path: ``bytes``, ``sha256``); ``clearance`` a JSON file of what surrounds
+    each camera (``views``: name: ``distance`` in metres, ``inside``). Raises `UserError` where
+    one of these cannot be read; whatever is wrong with the dataset is in the result.
+    """
+    dataset = dataset.resolve()
+    checks: list[Check] = []
+    sets: list[ImageSet] = []
+    for name in ("", *reprojections):
+        image_set, check = _read_set(dataset, name)
+        checks.append(check)
+        sets += [image_set] if image_set else []
+    files, missing = _view_files(dataset, sets)
+    extras, lists, exports = _exports(dataset, sets, {file.path for file in files})
+    facts: dict[File, Facts] = {}
+    with _workers(Examiner(dataset, sets), processes) as mapped:
+        progress = Progress(len(files + extras), f"validate {dataset.name}", "files")
+        for file, fact in mapped(_examine, files + extras):
+            facts[file] = fact
+            progress.done()
+        for number, image_set in enumerate(sets):
+            own = {file: facts[file] for file in files if file.set == number}
+            checks.append(_presence(image_set, own, missing[number]))
+            checks += _file_checks(image_set, own)
+            checks.append(_geometry(image_set, own, mapped))
+    checks.append(_with_extras(exports, {file: facts[file] for file in extras}))
+    published, listing = _listing(dataset, sets, {*lists, *(file.path for file in facts)})
+    checks.append(listing)
+    checks.append(_checksums(records, {file.path: fact for file, fact in facts.items()}, sets))
+    checks.append(_clearance(clearance, sets))
+    known = {file.path: fact.checksum for file, fact in facts.items()}
+    return Result(
+        f"{dataset.parent.name}/{dataset.name}",
+        len(sets[0].views) if sets and not sets[0].name else 0,
+        checks,
+        {path: known.get(path) or sha256(dataset / path) for path in published},
+    )
+
+
+Mapped = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
+
+
+@contextmanager
+def _workers(examiner: "Examiner", processes: int) -> Iterator[Mapped]:
+    """Yield a `map` over worker processes that hold the examiner; one process is this one."""
+    if processes == 1:
+        _start_worker(examiner)
+        yield map
+        return
+    # Spawned, because OpenImageIO has threads, which do not survive a fork.
+    with ProcessPoolExecutor(
+        processes, get_context("spawn"), initializer=_start_worker, initargs=(examiner,)
+    ) as pool:
+        yield pool.map
+
+
+_examiner: "Examiner"
+
+
+def _start_worker(examiner: "Examiner") -> None:
+    global _examiner
+    _examiner = examiner
+    oiio.attribute("threads", 1)
+    oiio.attribute("exr_threads", 1)
+
+
+def _examine(file: File) -> tuple[File, Facts]:
+    return file, _examiner.examine(file)
+
+
+def _answer(question: tuple[File, list[tuple[int, Patches]]]) -> list[Answer]:
+    return _examiner.answer(*question)
+
+
+# ---- what is there --------------------------------------------------------------------------
+
+
+def _read_set(dataset: Path, name: str) -> tuple[ImageSet | None, Check]:
+    """Read and check the lightfield.json of the dataset (name "") or of a reprojection."""
+    prefix = f"{name}/" if name else ""
+    path = f"{prefix}lightfield.json"
+    try:
+        content = read_json(dataset / path)
+        lens = lenses.from_lightfield(content)
+        frames = content["frames"]
+        views = [str(frame["name"]) for frame in frames]
+        matrices, eulers, positions = (
+            np.array([frame[key] for frame in frames], np.float64).reshape(len(frames), *shape)
+            for key, shape in (("world_matrix", (4, 4)), ("rotation", (3,)), ("position", (3,)))
+        )
+        depth = content.get("depth", "z" if lens.has_z_depth else "distance")
+        if not views:
+            raise ValueError("frames: is empty")
+        if depth not in (None, "distance", "z") or (depth == "z" and not lens.has_z_depth):
+            raise ValueError(f"depth: is {depth!r}, which this lens cannot have")
+    except KeyError as error:
+        problem = f"{path}: {error.args[0]}: is missing"
+    except (UserError, TypeError, ValueError) as error:
+        text = str(error).replace(f"{dataset}/", "")
+        problem = text if text.startswith(path) else f"{path}: {text}"
+    else:
+        return (
+            ImageSet(name, name or IMAGES, lens, depth, views, matrices),
+            _poses_check(path, views, matrices, eulers, positions),
+        )
+    return None, Check(f"{prefix}lightfield", False, "cannot be understood", problems=[problem])
+
+
+def _poses_check(path: str, views: list[str], matrices: Array, eulers: Array, at: Array) -> Check:
+    """Check that names differ, and that each pose is a rigid one and the same in both forms."""
+    turns = matrices[:, :3, :3]
+    faults = {view: "is the name of two frames" for view in views if views.count(view) > 1}
+    for view, difference in zip(
+        views,
+        np.abs(rigs.euler_to_matrix(eulers) - turns).max(axis=(1, 2))
+        + np.abs(at - matrices[:, :3, 3]).max(axis=1)
+        + np.abs(matrices[:, 3] - (0, 0, 0, 1)).max(axis=1),
+        strict=True,
+    ):
+        # Blender keeps poses in float32.
+        if not difference < 1e-5 * (1 + np.abs(at).max()):
+            faults[view] = "world_matrix: is not that of its position and rotation"
+    return Check(
+        path.removesuffix(".json"),
+        not faults,
+        f"{len(views)} views",
+        list(faults),
+        [f"{path}: frames: {view}: {fault}" for view, fault in faults.items()],
+    )
+
+
+def _view_files(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[list[str]]]:
+    """Return the views' files that are there, and for each set the paths of those that are not.
+
+    A reprojection is EXR, PNG or both: a format of which it has one view, it must have whole.
+    """
+    files: list[File] = []
+    missing: list[list[str]] = []
+    for number, image_set in enumerate(sets):
+        present = {path.name for path in (dataset / image_set.folder).glob("*")}
+        formats = [
+            suffix
+            for suffix in ((".exr", ".png") if image_set.name else (".exr",))
+            if any(view + suffix in present for view in image_set.views)
+        ]
+        missing.append([])
+        for suffix in formats or [".exr"]:
+            for view, name in enumerate(image_set.views):
+                path = f"{image_set.folder}/{name}{suffix}"
+                if name + suffix in present:
+                    files.append(File(path, number, view))
+                else:
+                    missing[-1].append(path)
+    return files, missing
+
+
+def _exports(
+    dataset: Path, sets: Sequence[ImageSet], views: set[str]
+) -> tuple[list[File], list[str], Check]:
+    """Return the pictures made for trainers, the lists (transforms*.json) of them, and a check.
+
+    Beside what a list names (file_path, depth_path), each view may have a dynamic_mask_<view>.png
+    and a <view>_depth.png.
+    """
+    found: dict[str, File] = {}
+    lists: list[str] = []
+    problems: list[str] = []
+    for number, image_set in enumerate(sets):
+        folders = {image_set.folder}
+        for path in sorted((dataset / image_set.name).glob("transforms*.json")):
+            lists.append(path.relative_to(dataset).as_posix())
+            try:
+                frames = read_json(path)["frames"]
+                named = [frame["file_path"] for frame in frames]
+                named += [frame["depth_path"] for frame in frames if "depth_path" in frame]
+                targets = [(path.parent / name).resolve() for name in named]
+            except (UserError, LookupError, TypeError):
+                problems.append(f"{lists[-1]}: is no JSON with frames, each with a file_path")
+                continue
+            for name, target in zip(named, targets, strict=True):
+                if target.is_file() and target.is_relative_to(dataset):
+                    relative = target.relative_to(dataset)
+                    found[relative.as_posix()] = File(relative.as_posix(), number)
+                    folders.add(relative.parent.as_posix())
+                else:
+                    problems.append(f"{lists[-1]}: frames: {name} is no file of the dataset")
+        for folder in sorted(folders):
+            present = {path.name for path in (dataset / folder).glob("*.png")}
+            for view in image_set.views:
+                for name in (f"dynamic_mask_{view}.png", f"{view}_depth.png"):
+                    if name in present:
+                        found[f"{folder}/{name}"] = File(f"{folder}/{name}", number)
+    files = [file for path, file in sorted(found.items()) if path not in views]
+    passed = not problems if lists or files else None
+    detail = f"{len(lists)} lists of frames, {len(files)} pictures beside the views"
+    return files, lists, Check("exports", passed, detail, problems=problems)
+
+
+def _listing(dataset: Path, sets: Sequence[ImageSet], known: set[str]) -> tuple[list[str], Check]:
+    """Return every file that the dataset publishes, and fail on those that are not its own."""
+    own = known | {f"{image_set.prefix}lightfield.json" for image_set in sets}
+    paths = [path.relative_to(dataset) for path in dataset.rglob("*") if path.is_file()]
+    present = sorted(path.as_posix() for path in paths if path.parts[0] != REPORT)
+    strays = [path for path in present if path not in own and path not in OUTPUTS]
+    published = [path for path in present if path in own]
+    problems = [f"{path}: is no file of this dataset" for path in strays]
+    return published, Check("files", not strays, f"{len(published)} files", problems=problems)
+
+
+# ---- what each file tells -------------------------------------------------------------------
+
+
+class Examiner:
+    """Reads a dataset's images; what all views of a set share is computed once."""
+
+    def __init__(self, dataset: Path, sets: Sequence[ImageSet]) -> None:
+        self.dataset = dataset
+        self.sets = sets
+        self.regions: dict[Any, tuple[Bools, Bools]] = {}
+
+    def examine(self, file: File) -> Facts:
+        """Read an image file whole and tell everything that it tells by itself."""
+        path = self.dataset / file.path
+        facts = Facts(sha256(path), path.stat().st_size)
+        image_set = self.sets[file.set]
+        try:
+            image = images.read_image(path)
+        except UserError as error:
+            facts.problems["images"] = " ".join(str(error).split()).replace(f"{path}: ", "")
+            return facts
+        height, width = next(iter(image.channels.values())).shape
+        if (width, height) != (image_set.lens.width, image_set.lens.height):
+            facts.problems["images"] = (
+                f"is {width} × {height}; must be {image_set.lens.width} × {image_set.lens.height}"
+            )
+        elif file.view >= 0:
+            problem = _format_problem(file, image_set, image)
+            if problem:
+                facts.problems["images"] = problem
+            else:
+                self._examine_view(file, image, facts)
+        return facts
+
+    def answer(self, file: File, questions: list[tuple[int, Patches]]) -> list[Answer]:
+        """Look up in one view what others saw; ``questions`` are their numbers and patches."""
+        image_set = self.sets[file.set]
+        depth = images.read_image(self.dataset / file.path, ["Z"]).channels["Z"]
+        camera = image_set.camera(file.view)
+        return [
+            consistency.ask(patches, image_set.camera(asking), camera, depth)
+            for asking, patches in questions
+        ]
+
+    def _examine_view(self, file: File, image: images.Image, facts: Facts) -> None:
+        image_set = self.sets[file.set]
+        rendered = not image_set.name
+        seen, outside = self._of_lens(image_set.lens)
+        depth = image.channels.get("Z")
+        empty = depth is not None and bool(np.isposinf(depth).all())
+        facts.problems |= _colour_problems(
+            [image.channels[name] for name in "RGB"], seen, outside if rendered else None, empty
+        )
+        if depth is not None:
+            problems = []
+            meaning = image.attributes.get(images.DEPTH_ATTRIBUTE, image_set.depth)
+            if meaning != image_set.depth:
+                problems.append(f"is {meaning!r} by its header, {image_set.depth!r} by its list")
+            unknown = int(np.isnan(depth).sum())
+            if rendered and unknown:
+                problems.append(f"{unknown} depths are not a number")
+            if rendered and not np.isposinf(depth[outside]).all():
+                problems.append("has depth where the lens sees nothing")
+            wrong = int((depth <= 0).sum())
+            problems += [f"{wrong} depths are not positive"] if wrong else []
+            if problems:
+                facts.problems["depth"] = ", ".join(problems)
+            camera = image_set.camera(file.view)
+            facts.patches = consistency.sample(camera, depth, RAYS_A_VIEW)
+        if not rendered:
+            self._compare_marks(file, image, facts)
+        elif images.NAN_ATTRIBUTE in image.attributes:
+            facts.nan = int(image.attributes[images.NAN_ATTRIBUTE])
+            facts.clamped = int(image.attributes.get(images.CLAMPED_ATTRIBUTE, 0))
+            if facts.nan:
+                facts.problems["counts"] = f"{facts.nan} rendered values were not a number"
+
+    def _compare_marks(self, file: File, image: images.Image, facts: Facts) -> None:
+        """Compare the pixels that are marked as without source with what the two lenses say."""
+        regions = self._of_source(file)
+        if regions is None:
+            return
+        with_source, without = regions
+        if "Z" in image.channels:
+            marked = np.isnan(image.channels["Z"])
+        elif "A" in image.channels:
+            marked = image.channels["A"] == 0
+        else:
+            marked = np.zeros(without.shape, bool)
+        facts.marked = True
+        problems = []
+        for region, text in (
+            (without & ~marked, "pixels without a source are not marked"),
+            (with_source & marked, "pixels with a source are marked as without"),
+        ):
+            count = int(region.sum())
+            problems += [f"{count} {text}"] if count else []
+        if any(image.channels[name][without].any() for name in "RGB"):
+            problems.append("has colour in pixels without a source")
+        if problems:
+            facts.problems["marks"] = ", ".join(problems)
+
+    def _of_lens(self, lens: Lens) -> tuple[Bools, Bools]:
+        """Return where the lens has a ray, and where it has none, less the rim."""
+        if lens not in self.regions:
+            seen = np.isfinite(_rays(lens)[..., 0])
+            self.regions[lens] = seen, _inner(~seen)
+        return self.regions[lens]
+
+    def _of_source(self, file: File) -> tuple[Bools, Bools] | None:
+        """Return where a reprojected view's source sees something, and where not, less the rim.
+
+        None: the dataset has no view of the same name at the same place.
+        """
+        target, source = self.sets[file.set], self.sets[0]
+        name = target.views[file.view]
+        if name not in source.views:  # a face of a cube map is named for its view, and itself
+            name = name.rpartition("_")[0]
+        if source.name or name not in source.views:
+            return None
+        to_world, from_world = target.matrices[file.view], source.matrices[source.views.index(name)]
+        if np.abs(to_world[:3, 3] - from_world[:3, 3]).max() > 1e-5:
+            return None
+        # Rounded, and free of −0, so that views turned alike share one answer.
+        turn = np.round(from_world[:3, :3].T @ to_world[:3, :3], 5).astype(np.float32) + 0
+        key = (target.lens, turn.tobytes())
+        if key not in self.regions:
+            pixels = source.lens.pixels(_rays(target.lens) @ turn.T)
+            frame = np.array([source.lens.width, source.lens.height], np.float32)
+            with np.errstate(invalid="ignore"):
+                seen = ((pixels >= 0) & (pixels <= frame)).all(axis=-1)
+            self.regions[key] = _inner(seen), _inner(~seen)
+        return self.regions[key]
+
+
+def _rays(lens: Lens) -> Array:
+    """Return the rays (height, width, 3), float32, of all pixel centres."""
+    x = np.arange(lens.width, dtype=np.float32) + np.float32(0.5)
+    y = np.arange(lens.height, dtype=np.float32) + np.float32(0.5)
+    return lens.rays(x[np.newaxis, :], y[:, np.newaxis])
+
+
+def _inner(region: Bools) -> Bools:
+    """Return a region without its rim; the image's edge is no rim."""
+    inner: Bools = binary_erosion(region, np.ones((3, 3)), RIM_PIXELS, border_value=1)
+    return inner
+
+
+def _format_problem(file: File, image_set: ImageSet, image: images.Image) -> str | None:
+    """Say which channels a view has and should have, if they differ in name or type."""
+    found = {name: str(pixels.dtype) for name, pixels in image.channels.items()}
+    colour = [*"RGB", *(["A"] if "A" in found and image_set.name else [])]
+    if file.path.endswith(".png"):
+        wanted = dict.fromkeys(colour, "uint16" if found.get("R") == "uint16" else "uint8")
+    else:
+        wanted = dict.fromkeys(colour, "float16")
+        if image_set.depth:
+            wanted["Z"] = "float16" if found.get("Z") == "float16" else "float32"
+    if found == wanted:
+        return None
+    texts = [
+        " ".join(f"{name}:{kind}" for name, kind in sorted(channels.items()))
+        for channels in (found, wanted)
+    ]
+    return f"has the channels {texts[0]}; must have {texts[1]}"
+
+
+def _colour_problems(
+    channels: list[Array], seen: Bools, outside: Bools | None, empty: bool
+) -> dict[str, str]:
+    """Say what is wrong with the colours; a view that is ``empty`` (only sky) may be of one."""
+    problems = []
+    finite = [np.isfinite(channel) for channel in channels]
+    if not all(part.all() for part in finite):
+        bad = [channel[~part] for channel, part in zip(channels, finite, strict=True)]
+        nan = sum(int(np.isnan(values).sum()) for values in bad)
+        infinite = sum(len(values) for values in bad) - nan
+        problems += [f"{nan} values are not a number"] if nan else []
+        problems += [f"{infinite} values are infinite"] if infinite else []
+    if not any(channel.any() for channel in channels):
+        problems.append("is black")
+    elif not empty:
+        first = np.unravel_index(seen.argmax(), seen.shape)
+        if not any(((channel != channel[first]) & seen).any() for channel in channels):
+            problems.append("has one colour everywhere")
+    if outside is not None and any(channel[outside].any() for channel in channels):
+        problems.append("has colour where the lens sees nothing")
+    return {"colour": ", ".join(problems)} if problems else {}
+
+
+def _presence(image_set: ImageSet, own: Mapping[File, Facts], missing: Sequence[str]) -> Check:
+    return Check(
+        f"{image_set.prefix}views",
+        not missing,
+        f"{len(own)} of {len(own) + len(missing)} images are there",
+        sorted({Path(path).stem for path in missing}),
+        [f"{path}: is missing" for path in missing],
+    )
+
+
+def _file_checks(image_set: ImageSet, own: Mapping[File, Facts]) -> list[Check]:
+    """Return the checks that each image of a set passes or fails by itself."""
+    readable = {file: fact for file, fact in own.items() if "images" not in fact.problems}
+    checks = [
+        _outcome(image_set, "images", own, "are whole, of the right size and channels"),
+        _outcome(image_set, "colour", readable, "have finite colours, not black, not constant"),
+    ]
+    deep = {file: fact for file, fact in readable.items() if fact.patches is not None}
+    checks.append(_outcome(image_set, "depth", deep, "have positive depths, misses +inf"))
+    if image_set.name:
+        marked = {file: fact for file, fact in readable.items() if fact.marked}
+        text = "mark the pixels that their source cannot see"
+        return [*checks, _outcome(image_set, "marks", marked, text)]
+    counted = {file: fact for file, fact in readable.items() if fact.nan is not None}
+    check = _outcome(image_set, "counts", counted, "have their renderer's counts, without NaN")
+    clamped = [fact.clamped for fact in counted.values() if fact.clamped]
+    if clamped:
+        text = f"{sum(clamped)} values in {len(clamped)} views were clamped to the half range"
+        check.warnings.append(text)
+    check.figures["clamped"] = sum(clamped)
+    return [*checks, check]
+
+
+def _outcome(image_set: ImageSet, name: str, own: Mapping[File, Facts], claim: str) -> Check:
+    """Return a check of what the facts say about ``name``."""
+    bad = [file for file, fact in own.items() if name in fact.problems]
+    return Check(
+        f"{image_set.prefix}{name}",
+        not bad if own else None,
+        f"{len(own) - len(bad)} of {len(own)} {claim}"
+        if own
+        else f"no image to see if they {claim}",
+        sorted({image_set.views[file.view] for file in bad}),
+        [f"{file.path}: {own[file].problems[name]}" for file in bad],
+    )
+
+
+def _with_extras(exports: Check, extras: Mapping[File, Facts]) -> Check:
+    """Return the check of what was made for trainers, with the pictures that cannot be read."""
+    problems = [
+        f"{file.path}: {text}" for file, fact in extras.items() for text in fact.problems.values()
+    ]
+    passed = False if problems else exports.passed
+    return replace(exports, passed=passed, problems=exports.problems + problems)
+
+
+def _checksums(
+    records: Sequence[Path], facts: Mapping[str, Facts], sets: Sequence[ImageSet]
+) -> Check:
+    """Compare the images with the records of those who wrote them."""
+    if not records:
+        return Check("checksums", None, "no record was given")
+    recorded: dict[str, Any] = {}
+    for record in records:
+        content = read_json(record)
+        try:
+            recorded |= {
+                path: (entry["bytes"], entry["sha256"]) for path, entry in content["files"].items()
+            }
+        except (LookupError, TypeError, AttributeError):
+            raise UserError(f"{record}: files: must map paths to bytes and sha256") from None
+    problems = []
+    for path, (size, digest) in sorted(recorded.items()):
+        fact = facts.get(path)
+        if fact is None:
+            problems.append(f"{path}: is recorded but is no image of this dataset")
+        elif size != fact.bytes:
+            problems.append(f"{path}: has {fact.bytes} bytes, but its record says {size}")
+        elif digest != fact.checksum:
+            problems.append(f"{path}: has the sha256 {fact.checksum}, but its record says {digest}")
+    rendered = sorted(path for path in facts if path.startswith(f"{IMAGES}/"))
+    # Masks and pictures for trainers are not the renderer's.
+    views = {f"{IMAGES}/{view}.exr" for image_set in sets[:1] for view in image_set.views}
+    problems += [
+        f"{path}: has no record" for path in rendered if path in views and path not in recorded
+    ]
+    return Check(
+        "checksums",
+        not problems,
+        f"{len(recorded)} of {len(facts)} images have a record",
+        sorted({Path(problem.split(":")[0]).stem for problem in problems}),
+        problems,
+    )
+
+
+def _clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:
+    """Check that no camera of the dataset is inside geometry."""
+    if path is None:
+        return Check("cameras", None, "no clearance was given")
+    content = read_json(path)
+    try:
+        around = {
+            str(name): (float(entry["distance"] or math.inf), bool(entry["inside"]))
+            for name, entry in content["views"].items()
+        }
+    except (LookupError, TypeError, ValueError, AttributeError):
+        raise UserError(f"{path}: views: must map names to distance and inside") from None
+    views = sets[0].views if sets and not sets[0].name else []
+    problems = {view: "its clearance was not measured" for view in views if view not in around}
+    problems |= {
+        view: "its camera is inside geometry" for view in views if around.get(view, (0, 0))[1]
+    }
+    distances = [around[view][0] for view in views if view in around]
+    nearest = min(distances, default=math.inf)
+    known = math.isfinite(nearest)
+    return Check(
+        "cameras",
+        not problems,
+        f"nothing is nearer to a camera than {nearest:.3g} m"
+        if known
+        else "nothing is near a camera",
+        list(problems),
+        [f"{IMAGES}/{view}.exr: {text}" for view, text in problems.items()],
+        figures={"nearest_metres": round(nearest, 4)} if known else {},
+    )
+
+
+# ---- what the views say of each other -------------------------------------------------------
+
+
+def _geometry(image_set: ImageSet, own: Mapping[File, Facts], mapped: Mapped) -> Check:
+    """Check that the views of a set see the same world."""
+    name = f"{image_set.prefix}geometry"
+    files = [file for file, fact in own.items() if fact.patches is not None]
+    if image_set.depth is None:
+        return Check(name, None, "the views have no depth")
+    if len(files) < 2:
+        return Check(name, None, f"{len(files)} views with depth have no neighbours")
+    patches = [fact.patches for fact in own.values() if fact.patches is not None]
+    cameras = [image_set.camera(file.view) for file in files]
+    pairs = consistency.neighbours(cameras, patches)
+    if not pairs:
+        return Check(name, None, "no two views see enough of the same smooth surfaces")
+    asking: dict[int, list[int]] = {}
+    for one, other in pairs:
+        asking.setdefault(one, []).append(other)
+        asking.setdefault(other, []).append(one)
+    questions = [
+        (files[view], [(files[other].view, patches[other]) for other in others])
+        for view, others in sorted(asking.items())
+    ]
+    answers: dict[tuple[int, int], Answer] = {}
+    progress = Progress(len(questions), f"validate {name}")
+    for (view, others), found in zip(
+        sorted(asking.items()), mapped(_answer, questions), strict=True
+    ):
+        answers |= {(other, view): answer for other, answer in zip(others, found, strict=True)}
+        progress.done()
+    return _judged(name, image_set, files, pairs, answers)
+
+
+def _judged(
+    name: str,
+    image_set: ImageSet,
+    files: Sequence[File],
+    pairs: Sequence[tuple[int, int]],
+    answers: Mapping[tuple[int, int], Answer],
+) -> Check:
+    """Turn what the views say of each other into a check that names the wrong ones."""
+    both = {pair: answers[pair] + answers[pair[::-1]] for pair in pairs}
+    of_view: list[list[Answer]] = [[] for _ in files]
+    for pair, answer in both.items():
+        for view in pair:
+            of_view[view].append(answer)
+    contradictions = [_low_median(a.contradiction for a in of) for of in of_view]
+    displacements = [_low_median(a.displacement for a in of) for of in of_view]
+    tested = [view for view, value in enumerate(contradictions) if value is not None]
+    if not tested:
+        return Check(name, None, "no two views see enough of the same smooth surfaces")
+    worst = max(contradictions[view] or 0.0 for view in tested)
+    farthest = max(displacements[view] or 0.0 for view in tested)
+    bad = {
+        view: f"{_percent(contradictions[view] or 0.0)} of its points contradict its neighbours "
+        f"(at most {_percent(CONTRADICTIONS_LIMIT)}), and it seems displaced by "
+        f"{displacements[view] or 0.0:.2f} pixels (at most {DISPLACEMENT_LIMIT})"
+        for view in tested
+        if (contradictions[view] or 0.0) > CONTRADICTIONS_LIMIT
+        or (displacements[view] or 0.0) > DISPLACEMENT_LIMIT
+    }
+    problems = [f"{files[view].path}: {text}" for view, text in bad.items()]
+    if 2 * len(bad) > len(tested):
+        problems.insert(
+            0,
+            f"{image_set.prefix}lightfield.json: most views contradict each other: lens, axes or "
+            "the meaning of depth are not those of the images",
+        )
+
+    total = sum(both.values(), start=consistency.NOTHING)
+    good = [answer for pair, answer in both.items() if not bad.keys() & set(pair)]
+    scale, deviation = consistency.scales(sum(good, start=consistency.NOTHING).terms)
+    for what, value, sure in zip(("angles", "depths"), scale, deviation, strict=True):
+        if sure < SCALE_DEVIATION_LIMIT and abs(value) > SCALE_LIMIT + 3 * sure:
+            problems.append(
+                f"{image_set.prefix}lightfield.json: the views agree better if all {what} are "
+                f"scaled by {1 + value:.3f} (at most {_percent(SCALE_LIMIT)} is allowed)"
+            )
+    points = total.agree + total.occluded + total.contradict
+    warnings = []
+    untested = len(image_set.views) - len(tested)
+    if untested:
+        warnings.append(
+            f"{untested} views in {image_set.folder} see too little that others see too"
+        )
+    return Check(
+        name,
+        not problems,
+        f"{len(tested)} views × {2 * len(pairs) / len(tested):.1f} neighbours agree "
+        f"{_percent(total.agree / points)} ({_percent(total.contradict / points)} contradict, "
+        f"{_percent(total.occluded / points)} occluded)",
+        [image_set.views[files[view].view] for view in bad],
+        problems,
+        warnings,
+        {
+            "pairs": len(pairs),
+            "points": points,
+            "agree": round(total.agree / points, 4),
+            "contradict": round(total.contradict / points, 4),
+            "occluded": round(total.occluded / points, 4),
+            "worst_contradiction": round(worst, 4),
+            "worst_displacement_pixels": round(farthest, 3),
+            **{
+                f"{what}_scale_{key}": round(float(number), 4)
+                for what, *numbers in zip(("angle", "depth"), scale, deviation, strict=True)
+                for key, number in zip(("error", "deviation"), numbers, strict=True)
+                if math.isfinite(numbers[1])
+            },
+        },
+    )
+
+
+def _low_median(values: Iterable[float | None]) -> float | None:
+    """Return the lower median of what is known: one bad neighbour of two is not one's own fault."""
+    known = sorted(value for value in values if value is not None)
+    return known[(len(known) - 1) // 2] if known else None
+
+
+def _percent(part: float) -> str:
+    return f"{100 * part:.2g} %" if part < 0.1 else f"{100 * part:.1f} %"
