@@ -13,7 +13,7 @@ from pathlib import Path
 from lightfield.cli import run
 from lightfield.errors import UserError
 from lightfield.files import atomic_path, sha256, write_json
-from lightfield.validation import validate
+from lightfield.validation import REPORT, validate
 
 # A check that fails in more places than this is told by its first ones; validation.json has all.
 _LINES_A_CHECK = 20
@@ -34,7 +34,8 @@ def main() -> None:
     parser.add_argument("--clearance", type=Path, help="JSON of what surrounds each camera")
     parser.add_argument(
         "--reprojection",
-        nargs="*",
+        action="extend",
+        nargs="+",
         default=[],
         metavar="NAME",
         help="folders of the dataset that hold a reprojection",
@@ -44,7 +45,8 @@ def main() -> None:
 
     dataset: Path = arguments.dataset
     for leftover in dataset.rglob(".*.tmp.*"):
-        leftover.unlink()
+        if leftover.relative_to(dataset).parts[0] != REPORT:
+            leftover.unlink()
     arguments.sums.unlink(missing_ok=True)
     result = validate(
         dataset,
