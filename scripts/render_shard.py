@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 
 from lightfield import depth, images, keys, lenses
 from lightfield.cli import run
@@ -98,6 +99,7 @@ def render_views(
     to_depth = depth_factors(lightfield)
     append(arguments.journal, {"start_up_seconds": time.perf_counter() - started})
 
+    process = psutil.Process()
     progress = Progress(len(frames), f"render {arguments.output.parent.name} {arguments.views}")
     for frame in frames:
         began, began_cpu = time.perf_counter(), time.process_time()
@@ -114,6 +116,7 @@ def render_views(
                 "cpu_seconds": round(time.process_time() - began_cpu, 4),
                 "render_seconds": raw.render_seconds,
                 "synchronization_seconds": raw.synchronization_seconds,
+                "memory_bytes": process.memory_info().rss,
             },
         )
         progress.done()

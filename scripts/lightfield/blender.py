@@ -164,9 +164,15 @@ def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
     intrinsics = lightfield["camera"]
     camera = bpy.data.cameras.new(CAMERA_NAME)
     camera.type = intrinsics["type"]
-    width, height = lightfield["sensor_size"]
-    camera.sensor_fit = "HORIZONTAL" if width >= height else "VERTICAL"
-    camera.sensor_width, camera.sensor_height = width, height
+    sensor_width, sensor_height = lightfield["sensor_size"]
+    camera.sensor_fit = "HORIZONTAL" if sensor_width >= sensor_height else "VERTICAL"
+    camera.sensor_width, camera.sensor_height = sensor_width, sensor_height
+    if "principal_point" in intrinsics:
+        # Blender counts the shift in sides of the image that sensor_fit names.
+        width, height = lightfield["resolution"]
+        side = width if sensor_width >= sensor_height else height
+        x, y = intrinsics["principal_point"]
+        camera.shift_x, camera.shift_y = (width / 2 - x) / side, (y - height / 2) / side
     # Cycles clips a perspective view between these; nothing of a scene shall be cut away.
     camera.clip_start, camera.clip_end = 1e-4, 1e9
     if intrinsics["type"] == "PERSP":

@@ -234,6 +234,11 @@ def _check_rig(key: str, rig: Mapping[str, Any], depth: str, fail: _Fail) -> Non
             f"is {camera['lens']!r}, which Cycles does not have; must be one of "
             f"{', '.join(_RENDERED)} (reproject for the others)",
         )
+    if "principal_point" in camera and camera["lens"] != "rectilinear":
+        fail(
+            f"{key}.camera.principal_point",
+            f"is {camera['principal_point']}; Cycles shifts only the rectilinear lens",
+        )
     if depth == "z" and _sees_behind(camera):
         fail(
             "render.depth",

@@ -1,0 +1,40 @@
+"""What several tests share: the programs in scripts/, run as a user runs them."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+SCRIPTS = ROOT / "scripts"
+
+
+@pytest.fixture(scope="session")
+def run_program():
+    """Run one of the programs in scripts/ (or a path); return its CompletedProcess."""
+
+    def run(name, *arguments, check=True, **options):
+        program = name if isinstance(name, Path) else SCRIPTS / name
+        result = subprocess.run(
+            [sys.executable, program, *map(str, arguments)],
+            capture_output=True,
+            text=True,
+            check=False,
+            env=os.environ | {"PYTHONPATH": str(SCRIPTS)},
+            **options,
+        )
+        if check:
+            assert result.returncode == 0, result.stderr
+        return result
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def room(tmp_path_factory, run_program):
+    """The small closed room of scripts/scenes/test_room.py, as a .blend."""
+    path = tmp_path_factory.mktemp("room") / "room.blend"
+    run_program("build_scene.py", "--builder", "test_room", "--output", path)
+    return path

@@ -1,0 +1,204 @@
+"""Rendered views: where each pixel looks, what its depth is, and what is kept and made anew."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lightfield import images, lenses, rigs
+from lightfield.files import sha256
+
+RENDER = {
+    "samples": 1,
+    "adaptive_threshold": 0,
+    "denoise": False,
+    "seed": 0,
+    "max_bounces": 0,
+    "depth_precision": "float",
+}
+CAMERAS = {
+    "perspective": {"lens": "rectilinear", "focal_length": 18, "resolution": [96, 96]},
+    "perspective_wide_shifted": {
+        "lens": "rectilinear",
+        "fov": 80,
+        "resolution": [96, 64],
+        "principal_point": [40, 35],
+    },
+    "perspective_tall": {"lens": "rectilinear", "focal_length": 24, "resolution": [48, 96]},
+    "equidistant": {"lens": "equidistant", "fov": 180, "resolution": [96, 96]},
+    "equidistant_220": {"lens": "equidistant", "fov": 220, "resolution": [96, 96]},
+    "equisolid": {
+        "lens": "equisolid",
+        "fov": 180,
+        "focal_length": 10.5,
+        "sensor_size": 36,
+        "resolution": [96, 96],
+    },
+    "polynomial": {
+        "lens": "polynomial",
+        "fov": 170,
+        "coefficients": [0, -0.09, 0.0005, 0, 0],
+        "sensor_size": 36,
+        "resolution": [96, 96],
+    },
+    "equirectangular": {"lens": "equirectangular", "resolution": [128, 64]},
+}
+# One camera, off the centre of the room and turned about every axis.
+RIG = {
+    "type": "lattice",
+    "cameras": [1, 1, 1],
+    "center": [0.4, -0.3, 1.3],
+    "rotation": [20, -35, 50],
+}
+
+
+def lightfield(camera, render, rig=RIG):
+    lens = lenses.from_camera(camera)
+    depth = "z" if lens.has_z_depth else "distance"
+    content = rigs.lightfield(rig, lens.to_lightfield())
+    return content | {"depth": depth, "frame": 1, "render": render, "scene": {}}
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory, run_program, room):
+    folder = tmp_path_factory.mktemp("positions")
+    cases = folder / "cases.json"
+    narrow = RENDER | {"filter_width": 0.01}
+    cases.write_text(
+        json.dumps({name: lightfield(camera, narrow) for name, camera in CAMERAS.items()})
+    )
+    program = Path(__file__).with_name("render_positions.py")
+    run_program(program, room, folder / "out.npz", cases)
+    return dict(np.load(folder / "out.npz"))
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_pixels_look_where_cycles_looked(name, rendered):
+    """Our pose and lens against the points that Cycles itself says it hit."""
+    lens = lenses.from_camera(CAMERAS[name])
+    content = lightfield(CAMERAS[name], RENDER)
+    world = np.array(content["frames"][0]["world_matrix"])
+    x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
+    rays = lens.rays(x, y)
+    offset = rendered[f"{name}.points"] - world[:3, 3]
+    distance = np.linalg.norm(offset, axis=-1)
+    hit = (offset / distance[..., None]) @ world[:3, :3]
+    seen = np.isfinite(rays).all(axis=-1)
+    np.testing.assert_array_equal(seen, np.isfinite(distance))
+
+    angle = 2 * np.arcsin(np.linalg.norm(rays - hit, axis=-1) / 2)
+    assert np.median(angle[seen]) < 1e-4
+    # The rim of a 180 degree lens aside, where Z-depth has no digits left.
+    usable = seen & (-hit[..., 2] > 0.01) if content["depth"] == "z" else seen
+    truth = -hit[..., 2] * distance if content["depth"] == "z" else distance
+    error = np.abs(rendered[f"{name}.z"] / truth - 1)[usable]
+    assert np.median(error) < 1e-6
+    assert np.quantile(error, 0.99) < 1e-4
+    assert np.all(np.isposinf(rendered[f"{name}.z"][~seen]))
+
+
+@pytest.fixture
+def shard(tmp_path, run_program, room):
+    """A rig of four views and what renders it."""
+    camera = {"lens": "equidistant", "fov": 180, "resolution": [32, 32]}
+    rig = RIG | {"type": "plane", "cameras": [2, 2], "size": 0.5}
+    content = lightfield(camera, RENDER | {"samples": 2}, rig)
+    file = tmp_path / "lightfield.json"
+    file.write_text(json.dumps(content))
+    views, journal, record = tmp_path / "exr", tmp_path / "journal", tmp_path / "record.json"
+
+    def render(*extra, **options):
+        return run_program(
+            "render_shard.py",
+            *("--blend", room, "--lightfield", file, "--output", views, "--device", "cpu"),
+            *("--threads", "1", "--journal", journal, "--record", record, *extra),
+            **options,
+        )
+
+    def journalled():
+        lines = [json.loads(line) for line in journal.read_text().splitlines()]
+        return [line["view"] for line in lines if "view" in line]
+
+    render.content, render.file, render.views = content, file, views
+    render.journalled, render.record = journalled, record
+    return render
+
+
+def test_a_view_is_rendered_once_and_again_only_if_it_must(shard):
+    names = [frame["name"] for frame in shard.content["frames"]]
+    shard()
+    first = {path.name: sha256(path) for path in shard.views.iterdir()}
+    assert sorted(first) == [f"{name}.exr" for name in names]
+    assert shard.journalled() == names
+
+    shard()
+    assert shard.journalled() == names
+
+    (shard.views / f"{names[1]}.exr").unlink()
+    half = shard.views / f"{names[2]}.exr"
+    half.write_bytes(half.read_bytes()[: half.stat().st_size // 2])
+    shard()
+    assert shard.journalled() == [*names, names[1], names[2]]
+    assert {path.name: sha256(path) for path in shard.views.iterdir()} == first
+
+    # Another sample count is another dataset.
+    shard.content["render"]["samples"] = 3
+    shard.file.write_text(json.dumps(shard.content))
+    shard("--views", "0:1")
+    assert shard.journalled()[-1] == names[0]
+    assert sha256(shard.views / f"{names[0]}.exr") != first[f"{names[0]}.exr"]
+    assert list(json.loads(shard.record.read_text())["files"]) == [f"exr/{names[0]}.exr"]
+
+
+def test_bytes_do_not_depend_on_order_threads_or_neighbours(shard):
+    shard()
+    together = {path.name: sha256(path) for path in shard.views.iterdir()}
+    for path in shard.views.iterdir():
+        path.unlink()
+    for views in ("3:4", "1:3", "0:1"):
+        shard("--views", views, "--threads", "2")
+    assert {path.name: sha256(path) for path in shard.views.iterdir()} == together
+
+
+def test_views_hold_what_design_asks_for(shard):
+    shard("--views", "0:1")
+    image = images.read_image(next(shard.views.iterdir()))
+    kinds = {name: str(channel.dtype) for name, channel in image.channels.items()}
+    assert kinds == {"R": "float16", "G": "float16", "B": "float16", "Z": "float32"}
+    assert image.attributes[images.DEPTH_ATTRIBUTE] == "z"
+    assert image.attributes[images.NAN_ATTRIBUTE] == 0
+    assert image.attributes[images.CLAMPED_ATTRIBUTE] == 0
+    assert len(str(image.attributes[images.KEY_ATTRIBUTE])) == 64
+    assert not image.attributes.get("DateTime")
+
+
+def test_colour_beyond_half_is_clamped_and_counted():
+    import render_shard
+
+    class Raw:
+        colour = np.array([[[1e6, 2.0, -1e6], [np.nan, np.inf, 0.5]]], dtype=np.float32)
+        depth = np.array([[3.0, np.inf]], dtype=np.float32)
+
+    content = {"depth": "distance", "render": {"depth_precision": "half"}}
+    channels, attributes = render_shard.view_channels(Raw, content, None)
+    assert attributes[images.CLAMPED_ATTRIBUTE] == 3
+    assert attributes[images.NAN_ATTRIBUTE] == 1
+    assert channels["R"][0, 0] == 65504
+    assert channels["B"][0, 0] == -65504
+    assert np.isnan(channels["R"][0, 1])
+    assert channels["Z"].dtype == np.float16
+    assert np.isposinf(channels["Z"][0, 1])
+
+
+def test_a_device_that_is_not_there_is_an_error(shard):
+    # No machine has both Metal, which is Apple's, and the Debian libraries that the tests need.
+    device = "metal"
+    result = shard("--device", device, check=False)
+    assert result.returncode == 1
+    told = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
+    assert told == [
+        f"error: device: this machine has no {device} device that Cycles can use; "
+        "use device=cpu, or device=auto to take what there is"
+    ]
+    assert not shard.views.exists()
