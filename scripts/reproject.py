@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
+
 from lightfield import cli, lens_map
 from lightfield.errors import UserError
 from lightfield.files import sha256, write_json
@@ -477,9 +478,13 @@ def _write(
 
 
 def _record(job: Job, views: list[View], made: list[Path]) -> dict[str, Any]:
-    folder = job.arguments.output_dir
+    # A record's paths start at the dataset, the folder that the output folder lies in.
+    dataset = job.arguments.output_dir.resolve().parent
     files = {
-        path.relative_to(folder).as_posix(): {"bytes": path.stat().st_size, "sha256": sha256(path)}
+        path.resolve().relative_to(dataset).as_posix(): {
+            "bytes": path.stat().st_size,
+            "sha256": sha256(path),
+        }
         for path in sorted(made)
     }
     return {"files": files, "counts": {"views": len(views), "files": len(files)}}

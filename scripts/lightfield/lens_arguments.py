@@ -4,6 +4,7 @@ Lengths are in mm, the angles of lenses in radians; only a rotation is in degree
 """
 
 import argparse
+import json
 import math
 import re
 from collections.abc import Callable, Sequence
@@ -30,6 +31,7 @@ from lightfield.lenses import (
     Rectilinear,
     Stereographic,
     cube_face_rotation,
+    from_camera,
     from_lightfield,
 )
 from lightfield.resample import DEFAULT_FILTER, FILTERS
@@ -171,6 +173,11 @@ def _add_lens_flags(parser: argparse.ArgumentParser, prefix: str, title: str) ->
         )
     else:
         choice.add_argument(
+            "--camera",
+            metavar="JSON",
+            help="a scene YAML's camera: lens, resolution and the lens's own keys, in degrees",
+        )
+        choice.add_argument(
             "--cubemap", type=int, metavar="SIZE", help="six perspective faces of 90°, SIZE² pixels"
         )
 
@@ -268,6 +275,11 @@ def _targets(arguments: argparse.Namespace, source: Lens) -> list[Target]:
             Target(f"_{name}", face, rotation @ cube_face_rotation(name)) for name in CUBE_FACES
         ]
     lens = _lens(arguments, "", width, height)
+    if arguments.camera:
+        try:
+            lens = from_camera(json.loads(arguments.camera))
+        except (ValueError, KeyError, UserError) as error:
+            raise UserError(f"--camera {arguments.camera}: {error}") from None
     if arguments.no_reproject:
         if lens is not None:
             raise UserError("--no-reproject: excludes an output lens")

@@ -17,7 +17,7 @@ from scipy.ndimage import distance_transform_cdt
 
 from lightfield.errors import UserError
 from lightfield.files import atomic_path
-from lightfield.lenses import Array, Lens
+from lightfield.lenses import Array, CubeMap, Lens
 from lightfield.resample import ADAPTIVE, DEFAULT_FILTER, FILTERS, SUPPORT
 
 # What a target pixel (or one of its samples) finds in the source.
@@ -26,6 +26,7 @@ INSIDE = 1  # every source pixel that the filter reads exists
 CAREFUL = 2  # some may not: the image's edge, its seam or pole, the rim of the image circle
 
 _STRIP = 64  # rows computed at a time, so that the temporary arrays stay in the caches
+_MOST_SAMPLES = 256  # each way, of a footprint that meets a pole
 _HEADER = 65536  # bytes kept for the description in a file
 
 
@@ -52,13 +53,14 @@ def rotation_matrix(pan: float, pitch: float, roll: float) -> Array:
 class LensMap:
     """What it takes to resample a view; (H, W) is the target's size, (h, w) the window's.
 
-    ``settings`` describes what the map is for, ``magnification`` what it does. ``window`` is the
+    ``settings`` describes what the map is for; ``summary`` has the magnification's min, median and
+    max, and the fraction of the image that has a source (covered). ``window`` is the
     part of the source (row, end row, column, end column) that the map reads at all, and every
     coordinate counts in pixels from that window's corner.
     """
 
     settings: dict[str, Any]
-    magnification: dict[str, float]
+    summary: dict[str, float]
     window: tuple[int, int, int, int]
     # (H, W, 2) float32 (x, y) of the pixels' centres; NaN where the source does not see the ray.
     centers: Array
@@ -66,37 +68,38 @@ class LensMap:
     samples: Array
     # (H·n, W·n) uint8: NOTHING, INSIDE or CAREFUL for each sample.
     flags: Array
-    # (H, W, 2, 2) float32: d(x, y)/d(column, row) at the pixels' centres.
-    jacobian: Array
     # (h, w) and (H, W) float32: cos θ at each pixel's centre; NaN where it has no ray.
     source_cos: Array
     target_cos: Array
+    # (H, W) float32: target pixels to one of the source, along a line; NaN where it has no source.
+    magnification: Array
+    # Of the adaptive filter where anything is minified: (H, W, 2, 2) float32, the d(x, y) that its
+    # samples cover along a column and a row, and (H, W, 2) uint16, how many there are each way.
+    footprints: Array | None = None
+    counts: Array | None = None
 
     @property
-    def wraps(self) -> bool:
-        """Whether the source's last column is the neighbour of its first."""
-        return bool(self.settings["wraps"])
+    def topology(self) -> tuple[bool, bool, bool, int]:
+        """How the source continues beyond its frame.
 
-    @property
-    def poles(self) -> tuple[bool, bool]:
-        """Whether the source's first and last row are the surroundings of a pole."""
-        top, bottom = self.settings["poles"]
-        return bool(top), bool(bottom)
+        Whether the last column is the neighbour of the first; whether the first and the last row
+        surround a pole; how many panels stand side by side without being neighbours in space.
+        """
+        wraps, top, bottom, panels = self.settings["topology"]
+        return wraps, top, bottom, panels
 
 
 def settings(
     source: Lens, target: Lens, rotation: Array, filter_name: str, samples: int
 ) -> dict[str, Any]:
     """Return all that a lens map depends on, as JSON can hold it."""
-    wraps, poles = _topology(source)
     return {
         "source": source.to_lightfield(),
         "target": target.to_lightfield(),
         "rotation": np.asarray(rotation, np.float64).tolist(),
         "filter": filter_name,
         "samples": samples,
-        "wraps": wraps,
-        "poles": list(poles),
+        "topology": list(_topology(source)),
     }
 
 
@@ -117,54 +120,55 @@ def compute(
         raise UserError(f"filter: {filter_name!r} is not one of {', '.join(FILTERS)}")
     if samples > 1 and filter_name == ADAPTIVE:
         raise UserError("samples: the adaptive filter covers the whole pixel already; leave 1")
-    wraps, _ = _topology(source)
-    period = source.width if wraps else 0
+    wraps, _, _, panels = _topology(source)
     # One pixel more on every side, for central differences at the border too.
     padded = _coordinates(
-        source, target, rotation, np.arange(-1, target.width + 1) + 0.5,
-        np.arange(-1, target.height + 1) + 0.5, wraps,
-    )  # fmt: skip
-    jacobian = _jacobian(padded, period)
+        source,
+        target,
+        rotation,
+        np.arange(-1, target.width + 1) + 0.5,
+        np.arange(-1, target.height + 1) + 0.5,
+    )
+    jacobian = _jacobian(padded, source.width if wraps else 0)
     centers = _framed(padded[1:-1, 1:-1], source)
+    points = centers
     if samples > 1:
         points = _framed(
             _coordinates(
-                source, target, rotation, (np.arange(target.width * samples) + 0.5) / samples,
-                (np.arange(target.height * samples) + 0.5) / samples, wraps,
+                source,
+                target,
+                rotation,
+                (np.arange(target.width * samples) + 0.5) / samples,
+                (np.arange(target.height * samples) + 0.5) / samples,
             ),
             source,
-        )  # fmt: skip
-    else:
-        points = centers
-    columns = np.arange(source.width) + 0.5
-    source_cos = np.concatenate(
-        [
-            -source.rays(columns[None, :], rows[:, None])[..., 2]
-            for rows in _strips(np.arange(source.height) + 0.5)
-        ]
-    ).astype(np.float32)
-    target_cos = np.concatenate(
-        [
-            -target.rays((np.arange(target.width) + 0.5)[None, :], rows[:, None])[..., 2]
-            for rows in _strips(np.arange(target.height) + 0.5)
-        ]
-    ).astype(np.float32)
-
-    reach = _reach(filter_name, jacobian, samples)
-    window = _window(points, source, reach, wraps)
-    flags = _flags(points, ~np.isnan(source_cos), reach)
+        )
+    source_cos = _cosines(source)
+    reach = np.asarray(SUPPORT[filter_name])
+    footprints, counts = None, None
+    if filter_name == ADAPTIVE:
+        footprints, counts = _footprints(jacobian)
+        if counts.max() == 1:
+            footprints, counts = None, None
+        else:
+            reach = reach + np.ceil(np.abs(footprints).sum(axis=-1).max(axis=-1) / 2)
+    window = _window(points, source, reach, wraps or panels > 1)
     corner = np.array([window[2], window[0]])
-    points32 = (points - corner).astype(np.float32)
+    centers32 = (centers - corner).astype(np.float32)
+    nothing = np.isnan(centers[..., 0])
+    scale = np.where(nothing, np.nan, magnification(jacobian))
     return LensMap(
         settings=settings(source, target, rotation, filter_name, samples),
-        magnification=_magnification(jacobian, np.isnan(centers[..., 0])),
+        summary=_summary(scale),
         window=window,
-        centers=points32 if samples == 1 else (centers - corner).astype(np.float32),
-        samples=points32,
-        flags=flags,
-        jacobian=jacobian.astype(np.float32),
+        centers=centers32,
+        samples=centers32 if samples == 1 else (points - corner).astype(np.float32),
+        flags=_flags(points, ~np.isnan(source_cos), reach, panels),
         source_cos=np.ascontiguousarray(source_cos[window[0] : window[1], window[2] : window[3]]),
-        target_cos=target_cos,
+        target_cos=_cosines(target),
+        magnification=scale.astype(np.float32),
+        footprints=footprints,
+        counts=counts,
     )
 
 
@@ -173,14 +177,14 @@ def save(path: Path | str, lens_map: LensMap) -> None:
     description = json.dumps(
         {
             "settings": lens_map.settings,
-            "magnification": lens_map.magnification,
+            "summary": lens_map.summary,
             "window": lens_map.window,
         }
     ).encode()
     fields = {
-        name: getattr(lens_map, name)
-        for name in ("centers", "samples", "jacobian", "source_cos", "target_cos", "flags")
-        if name != "samples" or lens_map.samples is not lens_map.centers
+        name: array
+        for name, array in vars(lens_map).items()
+        if isinstance(array, np.ndarray) and not (name == "samples" and array is lens_map.centers)
     }
     dtype = np.dtype(
         [("description", f"S{_HEADER}")]
@@ -202,7 +206,7 @@ def load(path: Path | str) -> LensMap:
         arrays = {name: record[name][0] for name in record.dtype.names if name != "description"}
         return LensMap(
             settings=description["settings"],
-            magnification=description["magnification"],
+            summary=description["summary"],
             window=tuple(description["window"]),
             **({"samples": arrays["centers"]} | arrays),
         )
@@ -212,14 +216,14 @@ def load(path: Path | str) -> LensMap:
 
 def warnings(lens_map: LensMap) -> list[str]:
     """Return what a person should know of the map's magnification: upsampling and aliasing."""
-    if not lens_map.magnification["covered"]:
+    if not lens_map.summary["covered"]:
         return ["the source sees nothing of the target image"]
     found = []
-    largest, smallest = lens_map.magnification["max"], lens_map.magnification["min"]
+    largest, smallest = lens_map.summary["max"], lens_map.summary["min"]
     if largest > 1.5:
         found.append(
             f"upsampling: up to {largest:.3g} target pixels to one of the source (median "
-            f"{lens_map.magnification['median']:.3g}); a smaller --scale or field of view helps"
+            f"{lens_map.summary['median']:.3g}); a smaller --scale or field of view helps"
         )
     steps = math.ceil(1 / smallest)
     samples = lens_map.settings["samples"]
@@ -233,7 +237,7 @@ def warnings(lens_map: LensMap) -> list[str]:
 
 def report(lens_map: LensMap) -> None:
     """Print the magnification and the warnings to standard error."""
-    found = lens_map.magnification
+    found = lens_map.summary
     print(
         f"magnification: {found['min']:.3g} to {found['max']:.3g}, median {found['median']:.3g} "
         f"target pixels to one of the source; {found['covered']:.1%} of the image has a source",
@@ -254,47 +258,51 @@ def magnification(jacobian: npt.ArrayLike) -> Array:
         return np.asarray(1 / np.sqrt(area))
 
 
-def _magnification(jacobian: Array, nothing: Array) -> dict[str, float]:
-    seen = magnification(jacobian)[~nothing]
-    seen = seen[np.isfinite(seen)]
+def _summary(scale: Array) -> dict[str, float]:
+    seen = scale[np.isfinite(scale)]
     if not seen.size:
         return {"min": 0.0, "median": 0.0, "max": 0.0, "covered": 0.0}
-    low, middle, high = np.quantile(seen, [0.0, 0.5, 1.0])
     return {
-        "min": float(low),
-        "median": float(middle),
-        "max": float(high),
-        "covered": float(1 - nothing.mean()),
+        "min": float(seen.min()),
+        "median": float(np.median(seen)),
+        "max": float(seen.max()),
+        "covered": float(1 - np.isnan(scale).mean()),
     }
 
 
-def _topology(source: Lens) -> tuple[bool, tuple[bool, bool]]:
-    """Find from its rays whether a source's sides meet, and whether its ends are poles."""
+def _topology(source: Lens) -> tuple[bool, bool, bool, int]:
+    """Find from its rays how a source continues; see `LensMap.topology`."""
+    if isinstance(source, CubeMap):
+        return False, False, False, 6
     height = np.array([0.25, 0.5, 0.75]) * source.height
     width = np.array([0.0, 0.4, 0.8]) * source.width
     left, right = source.rays(np.zeros(3), height), source.rays(np.full(3, source.width), height)
     wraps = bool(np.allclose(left, right, atol=1e-5))
-    ends = (source.rays(width, np.full(3, y)) for y in (0.0, float(source.height)))
+    ends = [source.rays(width, np.full(3, y)) for y in (0.0, float(source.height))]
     top, bottom = (wraps and bool(np.allclose(rays, rays[0], atol=1e-5)) for rays in ends)
-    return wraps, (top, bottom)
+    return wraps, top, bottom, 1
+
+
+def _cosines(lens: Lens) -> Array:
+    """Return cos θ (height, width) float32 at the pixels' centres; NaN where there is no ray."""
+    x = np.arange(lens.width) + 0.5
+    strips = _strips(np.arange(lens.height) + 0.5)
+    return np.concatenate(
+        [-lens.rays(x[None, :], y[:, None])[..., 2].astype(np.float32) for y in strips]
+    )
 
 
 def _strips(values: Array) -> list[Array]:
     return np.array_split(values, max(1, len(values) // _STRIP))
 
 
-def _coordinates(
-    source: Lens, target: Lens, matrix: Array, x: Array, y: Array, wraps: bool
-) -> Array:
+def _coordinates(source: Lens, target: Lens, rotation: Array, x: Array, y: Array) -> Array:
     """Return the (len(y), len(x), 2) source coordinates of a grid of target coordinates."""
     parts = []
     for rows in _strips(y):
         rays = target.rays(x[None, :], rows[:, None])
-        parts.append(source.pixels(rays @ matrix.T))
-    coordinates = np.concatenate(parts)
-    if wraps:
-        coordinates[..., 0] %= source.width
-    return coordinates
+        parts.append(source.pixels(rays @ rotation.T))
+    return np.concatenate(parts)
 
 
 def _framed(coordinates: Array, source: Lens) -> Array:
@@ -324,31 +332,50 @@ def _jacobian(padded: Array, period: int) -> Array:
     return out
 
 
-def _reach(filter_name: str, jacobian: Array, samples: int) -> Array:
-    """Return how many source pixels (H·n, W·n) or () around its own a sample may read."""
-    return np.asarray(SUPPORT[filter_name])
+def _footprints(jacobian: Array) -> tuple[Array, Array]:
+    """Return what the adaptive filter's samples cover, and how many there are each way.
+
+    A pixel is a mean over its area, in the source too, so samples spread over √(s² − 1) source
+    pixels make a target pixel that spans s; they lie a source pixel apart, which is as dense as
+    the bicubic kernel needs. Where s ≤ 1 one sample is all: magnifying does not blur.
+    """
+    span = np.hypot(jacobian[..., 0, :], jacobian[..., 1, :])
+    covered = np.sqrt(np.maximum(span * span - 1, 0))
+    counts = np.clip(np.ceil(covered), 1, _MOST_SAMPLES)
+    with np.errstate(invalid="ignore"):
+        scale = np.where(span > 1, covered / span, 0)
+    return (jacobian * scale[..., None, :]).astype(np.float32), counts.astype(np.uint16)
 
 
-def _flags(points: Array, valid: Array, reach: Array) -> Array:
+def _flags(points: Array, valid: Array, reach: Array, panels: int) -> Array:
     """Return NOTHING, INSIDE or CAREFUL for each of the ``points``."""
-    depth = distance_transform_cdt(np.pad(valid, 1), metric="chessboard")[1:-1, 1:-1]
+    depth = np.hstack(
+        [
+            distance_transform_cdt(np.pad(panel, 1), metric="chessboard")[1:-1, 1:-1]
+            for panel in np.hsplit(valid, panels)
+        ]
+    )
     nothing = np.isnan(points[..., 0])
-    index = np.where(nothing[..., None], 0, points).astype(np.int64)
-    row = np.minimum(index[..., 1], valid.shape[0] - 1)
-    column = np.minimum(index[..., 0], valid.shape[1] - 1)
-    flags = np.where(depth[row, column] > reach, INSIDE, CAREFUL)
+    row, column = (
+        np.minimum(np.where(nothing, 0, points[..., axis]).astype(np.int32), limit - 1)
+        for axis, limit in ((1, valid.shape[0]), (0, valid.shape[1]))
+    )
+    flags = np.where(depth[row, column] > reach, np.uint8(INSIDE), np.uint8(CAREFUL))
     flags[nothing] = NOTHING
-    return flags.astype(np.uint8)
+    return flags
 
 
-def _window(points: Array, source: Lens, reach: Array, wraps: bool) -> tuple[int, int, int, int]:
-    """Return the rows and columns [row, end) × [column, end) that the filter may read."""
+def _window(points: Array, source: Lens, reach: Array, whole: bool) -> tuple[int, int, int, int]:
+    """Return the rows and columns [row, end) × [column, end) that the filter may read.
+
+    All columns if ``whole``, for a source whose columns are not in a row from left to right.
+    """
     if np.isnan(points[..., 0]).all():
         return 0, 1, 0, 1
-    margin = int(np.max(reach)) + 1
-    low = np.nanmin(points, axis=(0, 1)).astype(int) - margin
-    high = np.nanmax(points, axis=(0, 1)).astype(int) + margin + 1
-    first_row, last_row = max(0, low[1]), min(source.height, high[1])
-    if wraps:
-        return int(first_row), int(last_row), 0, source.width
-    return int(first_row), int(last_row), int(max(0, low[0])), int(min(source.width, high[0]))
+    margin = reach + 1
+    low = np.floor(np.nanmin(points - margin[..., None], axis=(0, 1))).astype(int)
+    high = np.ceil(np.nanmax(points + margin[..., None], axis=(0, 1))).astype(int)
+    (left, top), (right, bottom) = np.maximum(low, 0), high
+    if whole:
+        left, right = 0, source.width
+    return int(top), int(min(bottom, source.height)), int(left), int(min(right, source.width))

@@ -4,6 +4,7 @@ Sources are held as (h, w, 4) float32 windows of the image; what is not finite i
 left out and the other weights are scaled up, and where nothing is left the result is NaN.
 """
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
@@ -15,6 +16,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from lightfield.errors import UserError
+from lightfield.images import HALF_MAX
 from lightfield.lenses import Array
 
 if TYPE_CHECKING:
@@ -25,10 +27,10 @@ ADAPTIVE = "adaptive"
 ST_WARP = "st_warp"
 
 # Source pixels that a filter reads on each side of the one that a sample falls in.
-SUPPORT = {NEAREST: 0, "bilinear": 1, "bicubic": 2, "lanczos": 3, ST_WARP: 2}
-_TAPS = {NEAREST: 1, "bilinear": 2, "bicubic": 4, "lanczos": 6}
+SUPPORT = {NEAREST: 0, "bilinear": 1, "bicubic": 2, "lanczos": 3, ADAPTIVE: 2, ST_WARP: 2}
+_TAPS = {"bilinear": 2, "bicubic": 4, "lanczos": 6, ADAPTIVE: 4}
 FILTERS = tuple(SUPPORT)
-DEFAULT_FILTER = "bicubic"
+DEFAULT_FILTER = ADAPTIVE
 
 # Depth is interpolated where its third differences are below this fraction of it; a step twice
 # as large as what remains unseen, 1e-4, is the accuracy that depth is promised to have.
@@ -74,7 +76,9 @@ def _narrow_to_half(values: Array, out: Array) -> None:
     for i in range(values.shape[0]):
         for j in range(values.shape[1]):
             for c in range(out.shape[2]):
-                out[i, j, c] = _float_to_half(values[i, j, c])
+                # A kernel may overshoot; beyond the half range lies infinity.
+                value = min(max(values[i, j, c], -np.float32(HALF_MAX)), np.float32(HALF_MAX))
+                out[i, j, c] = _float_to_half(value)
 
 
 def widen(pixels: Array) -> Array:
@@ -97,34 +101,104 @@ def narrow(pixels: Array, count: int) -> Array:
 
 
 @kernel
-def _fill_weights(taps: int, t: float, weights: Array) -> None:
-    """Weights of ``taps`` pixels for a point at ``t`` in [0, 1) past the middle-left one."""
+def _weights(taps: int, t: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
+    """Weights of the ``taps`` pixels around a point at ``t`` in [0, 1) past the middle-left one."""
+    zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
     if taps == 2:
-        weights[0] = 1 - t
-        weights[1] = t
-    elif taps == 4:
+        return one - t, t, zero, zero, zero, zero
+    if taps == 4:
         # Catmull and Rom 1974: the cubic convolution of third order (Keys 1981, a = −1/2).
-        weights[0] = t * (-0.5 + t * (1.0 - 0.5 * t))
-        weights[1] = 1.0 + t * t * (1.5 * t - 2.5)
-        weights[2] = t * (0.5 + t * (2.0 - 1.5 * t))
-        weights[3] = t * t * (0.5 * t - 0.5)
-    else:
-        # Lanczos with three lobes, sinc(u) sinc(u / 3), made to sum to one.
-        total = 0.0
-        for k in range(6):
-            u = np.pi * (t + 2.0 - k)
-            weight = 1.0 if abs(u) < 1e-6 else 3.0 * np.sin(u) * np.sin(u / 3.0) / (u * u)
-            weights[k] = weight
-            total += weight
-        for k in range(6):
-            weights[k] /= total
+        return (
+            t * (t * (one - half * t) - half),
+            one + t * t * (np.float32(1.5) * t - np.float32(2.5)),
+            t * (half + t * (np.float32(2) - np.float32(1.5) * t)),
+            t * t * (half * t - half),
+            zero,
+            zero,
+        )
+    # sinc(u) sinc(u / 3) for |u| < 3 (Turkowski 1990), made to sum to one.
+    if t < np.float32(1e-5):
+        return zero, zero, one, zero, zero, zero
+    sine = np.sin(np.float32(np.pi) * t)
+    third = np.float32(np.pi / 3) * t
+    sin, cos = np.sin(third), np.cos(third)
+    # sin(π u / 3) at u = t + 2, t + 1, t, …, t − 3, by the addition theorem.
+    root = np.float32(math.sqrt(0.75))
+    a, b = half * sin, root * cos
+    w0 = sine * (b - a) / ((t + 2) * (t + 2))
+    w1 = -sine * (b + a) / ((t + 1) * (t + 1))
+    w2 = sine * sin / (t * t)
+    w3 = -sine * (a - b) / ((t - 1) * (t - 1))
+    w4 = sine * (-a - b) / ((t - 2) * (t - 2))
+    w5 = -sine * -sin / ((t - 3) * (t - 3))
+    scale = one / (w0 + w1 + w2 + w3 + w4 + w5)
+    return w0 * scale, w1 * scale, w2 * scale, w3 * scale, w4 * scale, w5 * scale
+
+
+@kernel
+def _darkest(source: Array, row: int, column: int, taps: int, channel: int) -> Any:
+    low = source[row, column, channel]
+    for a in range(taps):
+        for b in range(taps):
+            low = min(low, source[row + a, column + b, channel])
+    return low
+
+
+def _sampler(taps: int) -> Callable[..., tuple[Any, Any, Any, Any]]:
+    """Make the function that samples at (x, y) where all ``taps`` × ``taps`` pixels exist.
+
+    A negative lobe does not make light negative: what comes out below zero is raised to the
+    darkest of the pixels.
+    """
+    reach = taps // 2 - 1
+
+    def sample(source: Array, x: Any, y: Any) -> tuple[Any, Any, Any, Any]:
+        x -= np.float32(0.5)
+        y -= np.float32(0.5)
+        column, row = int(x), int(y)
+        wx = _weights(taps, x - np.float32(column))
+        wy = _weights(taps, y - np.float32(row))
+        column -= reach
+        row -= reach
+        s0 = s1 = s2 = s3 = np.float32(0)
+        for a in range(taps):
+            r0 = r1 = r2 = r3 = np.float32(0)
+            for b in range(taps):
+                r0 += wx[b] * source[row + a, column + b, 0]
+                r1 += wx[b] * source[row + a, column + b, 1]
+                r2 += wx[b] * source[row + a, column + b, 2]
+                r3 += wx[b] * source[row + a, column + b, 3]
+            s0 += wy[a] * r0
+            s1 += wy[a] * r1
+            s2 += wy[a] * r2
+            s3 += wy[a] * r3
+        if taps > 2 and min(min(s0, s1), min(s2, s3)) < 0:
+            s0 = max(s0, min(np.float32(0), _darkest(source, row, column, taps, 0)))
+            s1 = max(s1, min(np.float32(0), _darkest(source, row, column, taps, 1)))
+            s2 = max(s2, min(np.float32(0), _darkest(source, row, column, taps, 2)))
+            s3 = max(s3, min(np.float32(0), _darkest(source, row, column, taps, 3)))
+        return s0, s1, s2, s3
+
+    return kernel(sample)
+
+
+_sample_2, _sample_4, _sample_6 = _sampler(2), _sampler(4), _sampler(6)
 
 
 @kernel
 def _source_index(
-    row: int, column: int, height: int, width: int, wraps: bool, top: bool, bottom: bool
+    row: int,
+    column: int,
+    home: int,
+    height: int,
+    width: int,
+    topology: tuple[bool, bool, bool, int],
 ) -> tuple[int, int]:
-    """The pixel that continues the image at (row, column), or row −1 if none does."""
+    """The pixel that continues the image at (row, column), or row −1 if none does.
+
+    ``home`` is a column of the panel that must not be left.
+    """
+    wraps, top, bottom, panels = topology
     if wraps:
         # Beyond a pole lies the same row, half a turn away.
         if row < 0 and top:
@@ -134,6 +208,8 @@ def _source_index(
         column %= width
     if row < 0 or row >= height or column < 0 or column >= width:
         return -1, 0
+    if panels > 1 and column // (width // panels) != home // (width // panels):
+        return -1, 0
     return row, column
 
 
@@ -141,140 +217,193 @@ def _source_index(
 def _careful(
     source: Array,
     valid: Array,
-    row: int,
-    column: int,
+    x: Any,
+    y: Any,
     taps: int,
-    fx: float,
-    fy: float,
-    topology: tuple[bool, bool, bool],
-    wx: Array,
-    wy: Array,
-    result: Array,
-) -> bool:
-    """Interpolate where pixels may be missing; False if all are.
+    topology: tuple[bool, bool, bool, int],
+) -> tuple[bool, Any, Any, Any, Any]:
+    """Sample at (x, y) where pixels may be missing; first whether any is there.
 
-    Where any is, the answer is bilinear among those of the four nearest that are there: a kernel
-    with negative lobes does not survive the loss of a part of it.
+    Where one is missing, the answer is bilinear among those of the four nearest that are there:
+    a kernel with negative lobes does not survive the loss of a part of it.
     """
+    zero = np.float32(0)
     height, width = source.shape[0], source.shape[1]
-    wraps, top, bottom = topology
-    while taps > 0:
-        _fill_weights(taps, fx, wx)
-        _fill_weights(taps, fy, wy)
-        total = 0.0
+    column, row = int(np.floor(x - np.float32(0.5))), int(np.floor(y - np.float32(0.5)))
+    fx, fy = x - np.float32(0.5) - np.float32(column), y - np.float32(0.5) - np.float32(row)
+    while True:
+        wx, wy = _weights(taps, fx), _weights(taps, fy)
         complete = True
-        result[:] = 0
+        total = s0 = s1 = s2 = s3 = zero
         for a in range(taps):
             for b in range(taps):
-                weight = wy[a] * wx[b]
                 i, j = _source_index(
                     row + a - taps // 2 + 1,
                     column + b - taps // 2 + 1,
-                    height, width, wraps, top, bottom,
+                    int(x), height, width, topology,
                 )  # fmt: skip
                 if i >= 0 and valid[i, j] == valid[i, j]:
-                    pixel = source[i, j]
-                    if np.isfinite(pixel[0] + pixel[1] + pixel[2] + pixel[3]):
+                    p0, p1, p2, p3 = (
+                        source[i, j, 0],
+                        source[i, j, 1],
+                        source[i, j, 2],
+                        source[i, j, 3],
+                    )
+                    if np.isfinite(p0 + p1 + p2 + p3):
+                        weight = wy[a] * wx[b]
                         total += weight
-                        for c in range(4):
-                            result[c] += np.float32(weight) * pixel[c]
+                        s0 += weight * p0
+                        s1 += weight * p1
+                        s2 += weight * p2
+                        s3 += weight * p3
                         continue
                 complete = False
         if complete or taps == 2:
-            if total <= 1e-6:
-                return False
-            for c in range(4):
-                result[c] /= np.float32(total)
-            return True
+            break
         taps = 2
-    return False
+    # Bilinear weights may be zero for all that is there: then the point lies on what is not.
+    if total < np.float32(1e-4):
+        return False, zero, zero, zero, zero
+    scale = np.float32(1) / total
+    return True, s0 * scale, s1 * scale, s2 * scale, s3 * scale
 
 
 @kernel
-def _interpolate(
-    source: Array,
-    valid: Array,
-    points: Array,
-    flags: Array,
-    taps: int,
-    samples: int,
-    topology: tuple[bool, bool, bool],
-    out: Array,
-) -> None:
-    wx = np.empty(6, np.float32)
-    wy = np.empty(6, np.float32)
-    result = np.empty(4, np.float32)
-    reach = taps // 2 - 1
+def _nearest(source: Array, valid: Array, points: Array, flags: Array, out: Array) -> None:
     height, width = source.shape[0], source.shape[1]
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
+            out[i, j] = np.nan
+            if flags[i, j] > 0:
+                row = min(int(points[i, j, 1]), height - 1)
+                column = min(int(points[i, j, 0]), width - 1)
+                p = source[row, column]
+                if valid[row, column] == valid[row, column] and np.isfinite(
+                    p[0] + p[1] + p[2] + p[3]
+                ):
+                    out[i, j] = p
+
+
+def _interpolator(taps: int) -> Callable[..., None]:
+    """Make the function that samples ``taps`` × ``taps`` pixels at every point."""
+
+    def interpolate(
+        source: Array,
+        valid: Array,
+        points: Array,
+        flags: Array,
+        topology: tuple[bool, bool, bool, int],
+        out: Array,
+    ) -> None:
+        for i in range(out.shape[0]):
+            for j in range(out.shape[1]):
+                s0 = s1 = s2 = s3 = np.float32(np.nan)
+                if flags[i, j] == 1:
+                    if taps == 2:
+                        s0, s1, s2, s3 = _sample_2(source, points[i, j, 0], points[i, j, 1])
+                    elif taps == 4:
+                        s0, s1, s2, s3 = _sample_4(source, points[i, j, 0], points[i, j, 1])
+                    else:
+                        s0, s1, s2, s3 = _sample_6(source, points[i, j, 0], points[i, j, 1])
+                if flags[i, j] > 0 and not np.isfinite(s0 + s1 + s2 + s3):
+                    found, s0, s1, s2, s3 = _careful(
+                        source, valid, points[i, j, 0], points[i, j, 1], taps, topology
+                    )
+                    if not found:
+                        s0 = s1 = s2 = s3 = np.float32(np.nan)
+                out[i, j, 0] = s0
+                out[i, j, 1] = s1
+                out[i, j, 2] = s2
+                out[i, j, 3] = s3
+
+    return kernel(interpolate)
+
+
+_interpolate = {2: _interpolator(2), 4: _interpolator(4), 6: _interpolator(6)}
+
+
+@kernel
+def _adaptive(
+    source: Array,
+    valid: Array,
+    centers: Array,
+    footprints: Array,
+    counts: Array,
+    flags: Array,
+    topology: tuple[bool, bool, bool, int],
+    out: Array,
+) -> None:
+    """Average bicubic samples that cover each pixel's footprint in the source."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = np.nan
+            flag = flags[i, j]
+            if flag == 0:
+                continue
+            across, down = counts[i, j, 0], counts[i, j, 1]
+            x, y = centers[i, j, 0], centers[i, j, 1]
+            ux, uy = footprints[i, j, 0, 0] / across, footprints[i, j, 1, 0] / across
+            vx, vy = footprints[i, j, 0, 1] / down, footprints[i, j, 1, 1] / down
             a0 = a1 = a2 = a3 = np.float32(0)
-            count = 0
+            found = 0
+            for q in range(down):
+                v = np.float32(q) - np.float32(0.5) * np.float32(down - 1)
+                for p in range(across):
+                    u = np.float32(p) - np.float32(0.5) * np.float32(across - 1)
+                    px = x + u * ux + v * vx
+                    py = y + u * uy + v * vy
+                    s0 = s1 = s2 = s3 = np.float32(np.nan)
+                    if flag == 1:
+                        s0, s1, s2, s3 = _sample_4(source, px, py)
+                    if not np.isfinite(s0 + s1 + s2 + s3):
+                        some, s0, s1, s2, s3 = _careful(source, valid, px, py, 4, topology)
+                        if not some:
+                            continue
+                    found += 1
+                    a0 += s0
+                    a1 += s1
+                    a2 += s2
+                    a3 += s3
+            if found:
+                scale = np.float32(1) / np.float32(found)
+                out[i, j, 0] = a0 * scale
+                out[i, j, 1] = a1 * scale
+                out[i, j, 2] = a2 * scale
+                out[i, j, 3] = a3 * scale
+
+
+@kernel
+def _block_mean(fine: Array, samples: int, out: Array) -> None:
+    """Average blocks of ``samples`` × ``samples`` pixels, of those that are numbers."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            a0 = a1 = a2 = a3 = np.float32(0)
+            found = 0
             for p in range(i * samples, (i + 1) * samples):
                 for q in range(j * samples, (j + 1) * samples):
-                    flag = flags[p, q]
-                    if flag == 0:
-                        continue
-                    if taps == 1:
-                        row = min(int(points[p, q, 1]), height - 1)
-                        column = min(int(points[p, q, 0]), width - 1)
-                        pixel = source[row, column]
-                        whole = np.isfinite(pixel[0] + pixel[1] + pixel[2] + pixel[3])
-                        if whole and valid[row, column] == valid[row, column]:
-                            a0 += pixel[0]
-                            a1 += pixel[1]
-                            a2 += pixel[2]
-                            a3 += pixel[3]
-                            count += 1
-                        continue
-                    x = points[p, q, 0] - np.float32(0.5)
-                    y = points[p, q, 1] - np.float32(0.5)
-                    column = int(np.floor(x))
-                    row = int(np.floor(y))
-                    fx = x - np.float32(column)
-                    fy = y - np.float32(row)
-                    if flag == 1:
-                        _fill_weights(taps, fx, wx)
-                        _fill_weights(taps, fy, wy)
-                        s0 = s1 = s2 = s3 = np.float32(0)
-                        for a in range(taps):
-                            r0 = r1 = r2 = r3 = np.float32(0)
-                            for b in range(taps):
-                                weight = wx[b]
-                                r0 += weight * source[row - reach + a, column - reach + b, 0]
-                                r1 += weight * source[row - reach + a, column - reach + b, 1]
-                                r2 += weight * source[row - reach + a, column - reach + b, 2]
-                                r3 += weight * source[row - reach + a, column - reach + b, 3]
-                            weight = wy[a]
-                            s0 += weight * r0
-                            s1 += weight * r1
-                            s2 += weight * r2
-                            s3 += weight * r3
-                        if np.isfinite(s0 + s1 + s2 + s3):
-                            a0 += s0
-                            a1 += s1
-                            a2 += s2
-                            a3 += s3
-                            count += 1
-                            continue
-                    if _careful(source, valid, row, column, taps, fx, fy, topology, wx, wy, result):
-                        a0 += result[0]
-                        a1 += result[1]
-                        a2 += result[2]
-                        a3 += result[3]
-                        count += 1
-            if count == 0:
-                a0 = a1 = a2 = a3 = np.float32(np.nan)
-            else:
-                scale = np.float32(1.0 / count)
-                a0 *= scale
-                a1 *= scale
-                a2 *= scale
-                a3 *= scale
-            out[i, j, 0] = a0
-            out[i, j, 1] = a1
-            out[i, j, 2] = a2
-            out[i, j, 3] = a3
+                    if fine[p, q, 0] == fine[p, q, 0]:
+                        found += 1
+                        a0 += fine[p, q, 0]
+                        a1 += fine[p, q, 1]
+                        a2 += fine[p, q, 2]
+                        a3 += fine[p, q, 3]
+            scale = np.float32(1) / np.float32(found) if found else np.float32(np.nan)
+            out[i, j, 0] = a0 * scale
+            out[i, j, 1] = a1 * scale
+            out[i, j, 2] = a2 * scale
+            out[i, j, 3] = a3 * scale
+
+
+def _resample(source: Array, lens_map: "LensMap", rows: slice, out: Array) -> None:
+    """Fill ``out`` with the samples of the map's sample rows ``rows``, one pixel a sample."""
+    points, flags = lens_map.samples[rows], lens_map.flags[rows]
+    name = lens_map.settings["filter"]
+    if name == NEAREST:
+        _nearest(source, lens_map.source_cos, points, flags, out)
+    else:
+        _interpolate[_TAPS[name]](
+            source, lens_map.source_cos, points, flags, lens_map.topology, out
+        )
 
 
 def resample_color(source: Array, lens_map: "LensMap") -> Array:
@@ -285,20 +414,31 @@ def resample_color(source: Array, lens_map: "LensMap") -> Array:
             f"the source window has {source.shape[1]} × {source.shape[0]} pixels and the lens map "
             f"expects {lens_map.source_cos.shape[1]} × {lens_map.source_cos.shape[0]}"
         )
-    name = lens_map.settings["filter"]
-    if name == ST_WARP:
+    if lens_map.settings["filter"] == ST_WARP:
         return _st_warp(source, lens_map)
     out = np.empty((height, width, 4), np.float32)
-    _interpolate(
-        source,
-        lens_map.source_cos,
-        lens_map.samples,
-        lens_map.flags,
-        _TAPS[name],
-        lens_map.settings["samples"],
-        (lens_map.wraps, *lens_map.poles),
-        out,
-    )
+    samples = lens_map.settings["samples"]
+    if lens_map.footprints is not None and lens_map.counts is not None:
+        _adaptive(
+            source,
+            lens_map.source_cos,
+            lens_map.centers,
+            lens_map.footprints,
+            lens_map.counts,
+            lens_map.flags,
+            lens_map.topology,
+            out,
+        )
+    elif samples == 1:
+        _resample(source, lens_map, slice(None), out)
+    else:
+        # A few rows at a time: the samples of a whole image could fill the memory.
+        for first in range(0, height, 16):
+            rows = out[first : first + 16]
+            fine = np.empty((len(rows) * samples, width * samples, 4), np.float32)
+            start = first * samples
+            _resample(source, lens_map, slice(start, start + len(fine)), fine)
+            _block_mean(fine, samples, rows)
     return out
 
 
@@ -310,14 +450,15 @@ def _st_warp(source: Array, lens_map: "LensMap") -> Array:
     channels = np.dstack([np.where(valid[..., None], source, 0), valid]).astype(np.float32)
     scale = np.array([source.shape[1], source.shape[0]], np.float32)
     st = np.where((lens_map.flags == 0)[..., None], -1, lens_map.samples / scale)
-    result = oiio.ImageBufAlgo.st_warp(
-        _image_buffer(channels), _image_buffer(st.astype(np.float32)), "catmull-rom", nthreads=1
-    )
-    if result.has_error:
-        raise UserError(f"filter: st_warp failed: {result.geterror()}")
-    warped = np.asarray(result.get_pixels(oiio.FLOAT))
+    warped = _image_buffer(np.zeros((*st.shape[:2], 5), np.float32))
+    if not oiio.ImageBufAlgo.st_warp(
+        warped, _image_buffer(channels), _image_buffer(st.astype(np.float32)), "catmull-rom",
+        nthreads=1,
+    ):  # fmt: skip
+        raise UserError(f"filter: st_warp failed: {warped.geterror()}")
     samples = lens_map.settings["samples"]
-    blocks = warped.reshape(height, samples, width, samples, 5).mean(axis=(1, 3))
+    pixels = np.asarray(warped.get_pixels(oiio.FLOAT))
+    blocks = pixels.reshape(height, samples, width, samples, 5).mean(axis=(1, 3))
     weight = blocks[..., 4:]
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(np.where(weight > 1e-3, blocks[..., :4] / weight, np.nan))
@@ -362,10 +503,12 @@ def _pick(
     cos: Array,
     as_z: bool,
     tolerance: np.float32,
-    wraps: bool,
+    topology: tuple[bool, bool, bool, int],
     out: Array,
 ) -> None:
     height, width = inverse.shape
+    wraps = topology[0]
+    panel = width // topology[3]
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             px = centers[i, j, 0]
@@ -380,8 +523,9 @@ def _pick(
             y = py - np.float32(0.5)
             c = int(np.floor(x))
             r = int(np.floor(y))
-            if 1 <= r < height - 2 and ((1 <= c < width - 2) or wraps):
-                if 1 <= c < width - 2:
+            within = c >= 1 and c < width - 2 and (c - 1) // panel == (c + 2) // panel
+            if r >= 1 and r < height - 2 and (within or wraps):
+                if within:
                     c0, c1, c2, c3 = c - 1, c, c + 1, c + 2
                 else:
                     c0, c1 = (c - 1) % width, c % width
@@ -431,7 +575,7 @@ def resample_depth(
         lens_map.target_cos,
         target_is_z,
         _SMOOTH[depth.dtype],
-        lens_map.wraps,
+        lens_map.topology,
         out,
     )
     return out
