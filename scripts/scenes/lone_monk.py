@@ -2,7 +2,7 @@
 
 After the scene of that name by Carlo Bergonzini that SILVR used; every stone here is made by code.
 
-The camera rigs stand round the world's origin, on the south-western lawn: a cuboid of 4 × 4 × 3 m
+The camera rigs stand round the world's origin, on the south-eastern lawn: a cuboid of 4 × 4 × 3 m
 and a sphere of 4 m, both centred 2.2 m above the ground. Nothing but grass is in them. The court's
 centre, with the well, is at `CENTER`; the four sides are built alike in a frame of their own, in
 which the court's centre is the origin, x runs along the side, and y points out of the court.
@@ -18,6 +18,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 from numpy.random import Generator
+
 from scenes.common import (
     Array,
     Color,
@@ -44,7 +45,7 @@ from scenes.common import (
 )
 
 # Plan, in metres from the court's centre.
-CENTER = (1.2, 3.6)  # in the world, so that the rigs at the origin stand beside the well
+CENTER = (-1.2, 3.6)  # in the world, so that the rigs at the origin stand beside the well
 BAY = 2.2  # from column to column
 BAYS = 7  # of each arcade; the middle one is the gate to the garden
 ARCADE = BAY * BAYS / 2  # axis of the arcade's wall
@@ -81,8 +82,8 @@ TILE_THICK = 0.014
 
 SUN_AZIMUTH = radians(204)
 SUN_ELEVATION = radians(30)
-SUN_STRENGTH = 15.0
-SKY_STRENGTH = 0.22
+SUN_STRENGTH = 16.0
+SKY_STRENGTH = 0.34
 
 SHARP = radians(35)
 
@@ -135,6 +136,7 @@ def build(parameters: Mapping[str, Any]) -> None:
     ivy(site)
     potted_plants(site)
     fallen_leaves(site)
+    birds(site)
     monk(site)
 
 
@@ -231,10 +233,12 @@ def panel(width: float, bottom: float, top: float, opening: Array, thickness: fl
     along = inner[:, 1] / (np.where(inner[:, 1] > 0, top, bottom) - middle[1])
     outer = inner / np.maximum(across, along)[:, None]
     rings = [_wall_points(ring + middle, y) for y in (0, thickness) for ring in (inner, outer)]
-    front = sheet(np.stack([rings[0], rings[1]]), closed=True)
-    back = sheet(np.stack([rings[3], rings[2]]), closed=True)
-    reveal = sheet(np.stack([rings[2], rings[0]]), closed=True)
-    return join([front, back, reveal])
+    faces = [
+        sheet(np.stack([rings[a], rings[b]]), closed=True) for a, b in ((0, 1), (3, 2), (2, 0))
+    ]
+    on_edge = np.isclose(np.maximum(across, along), 1)
+    walled = ~(on_edge & np.roll(on_edge, -1))  # where the opening runs along the panel's edge
+    return join(Shape(face.vertices, face.quads[walled]) for face in faces)
 
 
 def _ray_meets(outline: Array, direction: Array) -> Array:
@@ -416,7 +420,7 @@ def make_materials() -> dict[str, bpy.types.Material]:
         matte("Iron", (0.02, 0.02, 0.02), (0.07, 0.05, 0.04), 20.0, 0.002),
         matte("Lead", (0.16, 0.15, 0.14), (0.26, 0.25, 0.24), 4.0, 0.002),
         matte("Rope", (0.30, 0.22, 0.12), (0.45, 0.35, 0.20), 40.0, 0.003),
-        matte("Robe", (0.075, 0.042, 0.022), (0.115, 0.066, 0.036), 6.0, 0.003, 120.0, 0.0),
+        matte("Robe", (0.075, 0.042, 0.022), (0.115, 0.066, 0.036), 6.0, 0.0008, 150.0, 0.0),
         matte("Skin", (0.45, 0.25, 0.16), (0.50, 0.29, 0.19), 10.0, 0.0005, 60.0, 0.0),
         masonry(
             "Brick", (0.33, 0.14, 0.08), (0.50, 0.27, 0.16), (0.42, 0.36, 0.28), (0.30, 0.075), 0.01
@@ -514,7 +518,7 @@ def paving(site: Site) -> None:
     """The paths along the arcades and to the well, its plaza, and the floors of the walks."""
     rng = site.random("paving")
     length = 0.52 / sqrt(min(1.0, site.detail))
-    outer = ARCADE - 0.35
+    outer = ARCADE - 0.25
     stones = []
     for number in range(4):
         rim = slab_rows(rng, (-outer, LAWN), (LAWN, outer), 0.4, length)
@@ -523,19 +527,19 @@ def paving(site: Site) -> None:
         parts = [slabs(rng, *rim, 0.015, 0.006)]
         parts.append(slabs(rng, spoke[0][outside], spoke[1][outside], 0.015, 0.006))
         stones.append(join(parts).transformed(transform(rotation=(0, 0, number * pi / 2))))
-    for radius in np.arange(1.0, PLAZA, 0.31):
+    for radius in np.linspace(1.0, PLAZA - 0.145, 5):
         count = max(8, round(2 * pi * radius / length))
-        ring = ring_of_stones(count, radius, 0.29, -0.045, 0.12)
+        ring = ring_of_stones(count, radius, 0.28, -0.045, 0.12)
         stones.append(ring.transformed(transform(rotation=(0, 0, rng.uniform(0, 1)))))
     add("Court paving", join(stones), *site.of("Paving"), matrix=side(NORTH), smooth=False)
 
-    near, far = ARCADE - 0.35, BACK + 0.1
+    near, far = ARCADE - 0.25, BACK + 0.1
     tiles = []
     for number in range(4):
         floor = slab_rows(rng, (-far, near), (near, far), 0.3, 0.3 / sqrt(min(1, site.detail)))
         turn = transform(rotation=(0, 0, number * pi / 2))
         tiles.append(slabs(rng, *floor, WALK_FLOOR, 0.003).transformed(turn))
-        steps_ = blocks((0, near - 0.14, 0.03), (1.75, 0.3, 0.1), 0.015)
+        steps_ = blocks((0, near - 0.15, 0.03), (1.75, 0.34, 0.1), 0.015)
         tiles.append(steps_.painted(1).transformed(turn))
     add("Walk floors", join(tiles), *site.of("Terracotta floor", "Paving"), matrix=side(NORTH))
 
@@ -544,28 +548,28 @@ def lawns(site: Site) -> None:
     """Four lawns of turf and grass within kerbs; the corner next to the well is cut round."""
     rng = site.random("lawns")
     inner = CROSS_PATH
-    cells = 10
+    cells = 16
     cell = (LAWN - inner) / cells
-    patches = [grass_patch(site, rng, cell) for _ in range(4)]
+    patches = [grass_patch(site, rng, cell) for _ in range(6)]
     turf, kerbs = [], []
     along = np.linspace(inner, LAWN, 25)
     for number in range(4):
         turn = transform(rotation=(0, 0, number * pi / 2))
         gx, gy = np.meshgrid(along, along)
-        bumps = 0.012 * noise(np.stack([gx, gy, gx * 0 + number], -1) * 1.5, site.seed)
-        sunk = np.where(np.hypot(gx, gy) < PLAZA + 0.12, -0.1, bumps)
+        bumps = -0.01 + 0.012 * noise(np.stack([gx, gy, gx * 0 + number], -1) * 1.5, site.seed)
+        sunk = np.where(np.hypot(gx, gy) < PLAZA - 0.2, -0.1, bumps)
         turf.append(grid(along, along, sunk).transformed(turn))
         kerbs.append(lawn_kerb(inner).transformed(turn))
         for i, j in np.ndindex(cells, cells):
             x, y = inner + (i + 0.5) * cell, inner + (j + 0.5) * cell
-            if hypot(x, y) < PLAZA + 0.45:
+            if hypot(x, y) < PLAZA + 0.3:
                 continue
             stand = side(number) @ transform(
                 (x, y, 0.0),
                 (0, 0, int(rng.integers(4)) * pi / 2),
                 (1, 1, float(rng.uniform(0.75, 1.15))),
             )
-            place(f"Grass.{number}{i}{j}", patches[int(rng.integers(len(patches)))], stand)
+            place(f"Grass.{number}.{i}.{j}", patches[int(rng.integers(len(patches)))], stand)
     add("Turf", join(turf), *site.of("Turf"), matrix=side(NORTH))
     add("Kerbs", join(kerbs), *site.of("Limestone"), matrix=side(NORTH), smooth=False)
 
@@ -595,7 +599,7 @@ def lawn_kerb(inner: float) -> Shape:
 
 def grass_patch(site: Site, rng: Generator, cell: float) -> bpy.types.Mesh:
     """A square of grass blades, with a daisy here and there."""
-    n = site.count(330)
+    n = site.count(150)
     foot = np.column_stack([rng.uniform(-cell / 2, cell / 2, (n, 2)), np.full(n, -0.01)])
     lean = rng.normal(0, 0.35, (n, 2))
     height = rng.uniform(0.035, 0.085, n)
@@ -610,7 +614,7 @@ def grass_patch(site: Site, rng: Generator, cell: float) -> bpy.types.Mesh:
     blades = Shape(points, first + np.array([[0, 1, 2, 3]]), first + np.array([[3, 2, 4]]))
 
     parts = [blades]
-    for _ in range(int(rng.integers(0, 3))):
+    for _ in range(int(rng.integers(0, 2))):
         x, y = rng.uniform(-cell / 2, cell / 2, 2)
         angle = np.arange(8) * pi / 4
         around = np.column_stack([np.cos(angle), np.sin(angle), np.full(8, 0.25)])
@@ -929,7 +933,7 @@ def door(outline: Array, y: float) -> Shape:
     low, high = outline.min(0), outline.max(0)
     edges = np.linspace(low[0], high[0], 8)
     right = outline[outline[:, 0].argsort()]
-    planks = []
+    planks = [filled(outline, y + 0.03)]
     for left_x, right_x in pairwise(edges):
         tops = np.interp([left_x + 0.004, right_x - 0.004], right[:, 0], right[:, 1])
         tops = np.maximum(tops, low[1] + 1.7)
@@ -1460,8 +1464,8 @@ def walk_furniture(site: Site) -> None:
 
 
 def court_furniture(site: Site) -> None:
-    """In the court: a chair with a book by the well, a bench, a broom against a column."""
-    at = side(NORTH) @ transform((2.55, -2.05, 0.015), (0, 0, -2.3))
+    """In the court: a chair with a book on the lawn, a bench, a broom against a column."""
+    at = side(NORTH) @ transform((4.5, -2.2, 0.0), (0, 0, -1.1))
     add("Chair", chair(), *site.of("Wood"), matrix=at, smooth=SHARP)
     book = join(
         [
@@ -1519,8 +1523,6 @@ def shrubs(site: Site) -> None:
             (2.75, CROSS_PATH + 0.5),
         ]
         for i, (x, y) in enumerate(spots):
-            if number == SOUTH and i >= 3:
-                continue
             turn = transform((x, y, 0.3), (0, 0, rng.uniform(0, 6)), float(rng.uniform(0.85, 1.15)))
             at = side(number) @ turn
             if hypot(at.translation.x, at.translation.y) < 3.2:
@@ -1718,6 +1720,34 @@ def fallen_leaves(site: Site) -> None:
     add("Fallen leaves", shape, *site.of("Dead leaf"), matrix=side(NORTH), smooth=False)
 
 
+def birds(site: Site) -> None:
+    """Swallows over the court: what there is to see straight above."""
+    rng = site.random("birds")
+    body = lathe([(0.0, -0.09), (0.018, -0.04), (0.02, 0.02), (0.012, 0.07), (0.0, 0.09)], 8)
+    body = body.transformed(transform(rotation=(0, pi / 2, 0)))
+    right = [
+        (0.05, 0.0, 0),
+        (-0.01, 0.0, 0),
+        (-0.03, -0.10, 0.03),
+        (-0.11, -0.22, 0.01),
+        (0.04, -0.10, 0.035),
+    ]
+    wing = Shape(np.array(right), np.array([[0, 1, 2, 4]]), np.array([[4, 2, 3]]))
+    left = Shape(wing.vertices * [1, -1, 1], wing.quads, wing.triangles)
+    tail = np.array([(-0.07, 0, 0), (-0.19, 0.05, 0), (-0.11, 0, 0), (-0.19, -0.05, 0)])
+    fork = Shape(tail, triangles=np.array([[0, 1, 2], [0, 2, 3]]))
+    swallow = mesh("Swallow", join([body, wing, left, fork]), *site.of("Iron"), smooth=False)
+    for i in range(14):
+        x, y = rng.uniform(-9, 9, 2)
+        turn = (
+            float(rng.uniform(-0.7, 0.7)),
+            float(rng.uniform(-0.3, 0.3)),
+            float(rng.uniform(0, 6)),
+        )
+        at = transform((x, y, float(rng.uniform(9, 19))), turn, 1.3)
+        place(f"Swallow.{i}", swallow, side(NORTH) @ at)
+
+
 # --- The monk -------------------------------------------------------------------------------------
 
 
@@ -1752,32 +1782,58 @@ def cape(site: Site) -> Shape:
 def hood(site: Site) -> Shape:
     """A deep hood, open towards +X, that runs out into a point behind; with its rolled rim."""
     n = site.segments(28, 8)
+    edge = radians(50)
     around = (np.arange(n) * 2 * pi / n)[None, :]
-    back = np.linspace(radians(62), pi, 10)[:, None]
+    back = np.linspace(edge, pi, 12)[:, None]
     pointed = np.clip((back - 2.2) / (pi - 2.2), 0, 1) ** 2
-    x = 0.15 * np.cos(back) - 0.09 * pointed + 0 * around
-    y = 0.125 * np.sin(back) * np.cos(around)
-    z = 0.165 * np.sin(back) * np.sin(around) - 0.06 * pointed
+    x = 0.19 * np.cos(back) - 0.09 * pointed + 0 * around
+    y = 0.14 * np.sin(back) * np.cos(around)
+    z = 0.175 * np.sin(back) * np.sin(around) - 0.06 * pointed
     shell = sheet(np.stack([x, y, z], axis=-1), closed=True)
     rim_angle = np.linspace(0, 2 * pi, n + 1)
-    edge = radians(62)
     rim = np.column_stack(
         [
-            0 * rim_angle + 0.15 * cos(edge),
-            0.125 * sin(edge) * np.cos(rim_angle),
-            0.165 * sin(edge) * np.sin(rim_angle),
+            0 * rim_angle + 0.19 * cos(edge),
+            0.14 * sin(edge) * np.cos(rim_angle),
+            0.175 * sin(edge) * np.sin(rim_angle),
         ]
     )
-    return join([shell, tube(rim, 0.014, 8)]).moved(0.0, 0, 1.61)
+    return join([shell, tube(rim, 0.014, 8)])
+
+
+def head(site: Site) -> Shape:
+    """Hood (slot 0), face (2) and white beard and brows (3) about the head's middle; faces +X."""
+    rng = site.random("head")
+    ball = icosphere(4)
+    face = ball.vertices * [0.085, 0.075, 0.115]
+    for y in (-0.03, 0.03):  # the eyes' hollows
+        from_eye = np.linalg.norm(face - [0.078, y, 0.022], axis=1)
+        face[:, 0] -= 0.018 * np.exp(-((from_eye / 0.02) ** 2))
+    nose = tube([(0.073, 0, 0.035), (0.10, 0, -0.005), (0.08, 0, -0.02)], [0.008, 0.014, 0.013], 8)
+    skin = [Shape(face, triangles=ball.triangles), nose]
+    tufts = [((0.06, 0, -0.065), (0.03, 0.05, 0.045), 500, 0.09, (0.35, 0, -1))]
+    tufts += [
+        ((0.078, y, 0.04), (0.006, 0.02, 0.005), 60, 0.025, (0.4, y * 20, 0)) for y in (-0.03, 0.03)
+    ]
+    hair = []
+    for middle, radii, count, length, way in tufts:
+        n = site.count(count)
+        root = unit_vectors(rng, n) * radii + middle
+        hair.append(leaves(root, rng.normal(way, 0.25, (n, 3)), unit_vectors(rng, n), length, 0.12))
+    parts = [hood(site), *(each.painted(2) for each in skin), *(each.painted(3) for each in hair)]
+    return join(parts)
 
 
 def monk(site: Site) -> None:
     """The monk, hooded, hands in his sleeves, on his way from the eastern walk to the well."""
-    cloth = [robe(site), cape(site), hood(site)]
+    cloth = [robe(site), cape(site)]
     for sign in (-1, 1):
-        arm = [(0, 0.2, 1.36), (-0.01, 0.27, 1.2), (0.06, 0.28, 1.08), (0.19, 0.16, 1.07)]
-        path = np.array([*arm, (0.235, 0.03, 1.09)]) * [1, sign, 1]
-        cloth.append(tube(path, [0.06, 0.085, 0.09, 0.095, 0.10], site.segments(16)))
+        t = np.linspace(0, 1, 9)[:, None]
+        shoulder, elbow, hand = np.array(
+            [(0, 0.18, 1.37), (-0.05, 0.40, 0.98), (0.235, 0.03, 1.09)]
+        )
+        path = (1 - t) ** 2 * shoulder + 2 * t * (1 - t) * elbow + t**2 * hand
+        cloth.append(tube(path * [1, sign, 1], 0.065 + 0.035 * t[:, 0], site.segments(20)))
     n = site.segments(20)
     angle = np.linspace(0, 2 * pi, n + 1)
     belt = np.column_stack([0.165 * np.cos(angle), 0.21 * np.sin(angle), 1.03 + 0 * angle])
@@ -1786,21 +1842,13 @@ def monk(site: Site) -> None:
         drop = [(0.165, y, 1.03), (0.19, y, 0.9), (0.215, y + 0.01, 0.7), (0.245, y, low)]
         cord.append(tube(drop, 0.010, 6))
         cord.append(icosphere(1, 0.022).moved(0.245, y, low))
-    face = icosphere(3, 1.0).vertices * [0.085, 0.075, 0.11] + [0.025, 0, 1.6]
-    head = [Shape(face, triangles=icosphere(3).triangles)]
-    head.append(
-        tube([(0.1, 0, 1.63), (0.125, 0, 1.6), (0.108, 0, 1.585)], [0.008, 0.015, 0.012], 6)
-    )
-    beard_rng = site.random("beard")
-    m = site.count(500)
-    chin = unit_vectors(beard_rng, m) * [0.03, 0.055, 0.05] + [0.085, 0, 1.53]
-    down = beard_rng.normal((0.35, 0, -1), 0.25, (m, 3))
-    beard = leaves(chin, down, unit_vectors(beard_rng, m), 0.085, 0.12)
     feet = [
         blocks((x, y, 0.03), (0.24, 0.09, 0.06), 0.025) for x, y in ((0.2, 0.11), (0.13, -0.11))
     ]
-    parts = [(cloth, 0), (cord, 1), (head, 2), ([beard], 3), (feet, 4)]
-    shape = join([piece.painted(slot) for pieces, slot in parts for piece in pieces])
+    bowed = head(site).transformed(transform((0.02, 0, 1.59), (0, 0.28, 0)))
+    parts = [(cloth, 0), (cord, 1), (feet, 4)]
+    pieces = [piece.painted(slot) for some, slot in parts for piece in some]
+    shape = join([*pieces, bowed])
     used = site.of("Robe", "Rope", "Skin", "Daisy", "Wood")
     at = side(NORTH) @ transform((4.35, -0.25, 0.015), (0, 0, pi - 0.05), 1.06)
     add("Monk", shape, *used, matrix=at, smooth=radians(50))
