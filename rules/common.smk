@@ -33,6 +33,8 @@ SECONDS_PER_SAMPLE = 2e-6
 START_UP_SECONDS = 3.0
 # Start-up is kept under this share of a shard's time.
 START_UP_SHARE = 0.05
+# More shards of one dataset than this only make the plan long: no machine renders them all at once.
+MOST_SHARDS = 64
 
 # Snakemake sets this up by itself if it is run with --software-deployment-method conda.
 ENVIRONMENT = "../envs/environment.yaml"
@@ -46,8 +48,9 @@ REPROJECTED = f"{DATASET}/{{reprojection}}"
 wildcard_constraints:
     name="[A-Za-z0-9_-]+",
     scene="[A-Za-z0-9_-]+",
-    rig="[A-Za-z0-9_.-]+",
-    reprojection="[A-Za-z0-9_.-]+",
+    # A sequence's datasets lie a folder deeper, one for each frame.
+    rig=r"[A-Za-z0-9_.-]+(/f\d{5,})?",
+    reprojection=r"(?!f\d{5,}/)[A-Za-z0-9_.-]+",
     first=r"\d+",
     end=r"\d+",
 
@@ -72,6 +75,7 @@ def shards(dataset):
     wanted = SETTINGS["views_per_shard"]
     if wanted == "auto":
         wanted = math.ceil(START_UP_SECONDS / START_UP_SHARE / view_seconds(dataset))
+        wanted = max(wanted, math.ceil(dataset.view_count / MOST_SHARDS))
     count = math.ceil(dataset.view_count / wanted)
     bounds = [dataset.view_count * number // count for number in range(count + 1)]
     return list(zip(bounds, bounds[1:]))
@@ -164,8 +168,17 @@ def dataset_files(dataset):
 
 
 def package_file(dataset):
-    """Return the dataset as one archive, named as SILVR's are."""
-    return f"{RESULTS}/{dataset.scene}/{dataset.scene}_{dataset.rig}.tar"
+    """Return a rig's dataset as one archive, all frames of a sequence in it, named as SILVR's are."""
+    return f"{RESULTS}/{dataset.scene}/{dataset.scene}_{dataset.rig_name}.tar"
+
+
+def packed_sums(wildcards):
+    """Return the checksums that say that everything in an archive is finished."""
+    return [
+        f"{RESULTS}/{dataset.scene}/{dataset.rig}/sha256sums.txt"
+        for dataset in DATASETS.values()
+        if (dataset.scene, dataset.rig_name) == (wildcards.scene, wildcards.rig)
+    ]
 
 
 def source_of(name):

@@ -3,7 +3,7 @@
 
 rule package:
     input:
-        f"{DATASET}/sha256sums.txt",
+        packed_sums,
     output:
         f"{RESULTS}/{{scene}}/{{scene}}_{{rig}}.tar",
     log:
@@ -11,7 +11,7 @@ rule package:
     conda:
         ENVIRONMENT
     params:
-        folder=lambda wildcards, output: str(Path(output[0]).parent),
+        folder=f"{RESULTS}/{{scene}}",
     message:
         "Packing {output}"
     shell:

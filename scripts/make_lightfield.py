@@ -15,7 +15,11 @@ from lightfield.files import write_json
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scene", required=True, help="name of a file in configs/scenes/")
-    parser.add_argument("--rig", required=True, help="name of a rig in the scene YAML")
+    parser.add_argument(
+        "--rig",
+        required=True,
+        help="name of a rig in the scene YAML, with /f00001 behind it for one of its frames",
+    )
     parser.add_argument(
         "--limits",
         type=json.loads,

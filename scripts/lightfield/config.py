@@ -7,6 +7,7 @@ say (which key goes with which) is checked here. Nothing else in the project rea
 import copy
 import difflib
 import json
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -26,6 +27,8 @@ SCHEMAS = ROOT / "configs" / "schema"
 
 # Folders of a dataset that a reprojection may not take.
 RESERVED_NAMES = ("exr", "report")
+# Folders of a sequence's frames.
+FRAME_FOLDER = re.compile(r"f\d{5,}")
 # In `exports: … sources:`, the rendered views themselves.
 VIEWS = "views"
 
@@ -35,7 +38,8 @@ class Dataset:
     """One scene seen by one rig, with every default filled in and the preset applied.
 
     ``scene`` names the folder in the results: the scene YAML's name, followed by the preset's
-    unless that is ``full``, so that presets never overwrite each other.
+    unless that is ``full``, so that presets never overwrite each other. ``rig`` names the folder
+    in it: the rig's name, followed in a sequence by the frame's folder, as in LFSphere/f00001.
     """
 
     name: str
@@ -46,6 +50,11 @@ class Dataset:
     cameras: Mapping[str, Any]
     reprojections: Mapping[str, Mapping[str, Any]]
     exports: Mapping[str, Mapping[str, Any]]
+
+    @property
+    def rig_name(self) -> str:
+        """The rig's name in the scene YAML."""
+        return self.rig.partition("/")[0]
 
     @property
     def view_count(self) -> int:
@@ -89,14 +98,14 @@ def load_datasets(config: Mapping[str, Any]) -> list[Dataset]:
         found += scene_datasets(scene, config["preset"], config["presets"][config["preset"]])
     if config["rigs"] == "all":
         return found
-    known = {dataset.rig for dataset in found}
+    known = {dataset.rig_name for dataset in found}
     for rig in config["rigs"]:
         if rig not in known:
             raise UserError(
                 f"config.yaml: rigs: {rig!r} is in none of the scenes {', '.join(config['scenes'])}"
                 f"; must be all or some of {', '.join(sorted(known))}"
             )
-    return [dataset for dataset in found if dataset.rig in config["rigs"]]
+    return [dataset for dataset in found if dataset.rig_name in config["rigs"]]
 
 
 def scene_datasets(scene: str, preset: str, limits: Mapping[str, Any]) -> list[Dataset]:
@@ -119,19 +128,32 @@ def scene_datasets(scene: str, preset: str, limits: Mapping[str, Any]) -> list[D
         for key, export in settings["exports"].items():
             sources = [s for s in export["sources"] if s == VIEWS or s in reprojections]
             exports[key] = {**export, "sources": sources}
-        found.append(
-            Dataset(
-                name=scene,
-                scene=label,
-                rig=name,
-                source=settings["scene"],
-                render=render,
-                cameras=cameras,
-                reprojections=reprojections,
-                exports=exports,
+        for folder, frame in _frames(name, rig, settings["scene"]):
+            found.append(
+                Dataset(
+                    name=scene,
+                    scene=label,
+                    rig=folder,
+                    source={**settings["scene"], "frame": frame},
+                    render=render,
+                    cameras=cameras,
+                    reprojections=reprojections,
+                    exports=exports,
+                )
             )
-        )
     return found
+
+
+def _frames(
+    name: str, rig: Mapping[str, Any], source: Mapping[str, Any]
+) -> Iterator[tuple[str, int]]:
+    """Yield the folder and the frame number of each dataset of a rig."""
+    if "frames" not in rig:
+        yield name, source["frame"]
+        return
+    frames = rig["frames"]
+    for frame in range(frames["first"], frames["last"] + 1, frames["step"]):
+        yield f"{name}/f{frame:05d}", frame
 
 
 def load_scene(scene: str) -> dict[str, Any]:
@@ -156,7 +178,7 @@ def read_scene(path: Path) -> dict[str, Any]:
         _check_rig(f"rigs.{name}", rig, settings["render"]["depth"], fail)
     for name, reprojection in settings["reprojections"].items():
         key = f"reprojections.{name}"
-        if name in RESERVED_NAMES:
+        if name in RESERVED_NAMES or FRAME_FOLDER.fullmatch(name):
             fail(key, f"the name {name} is taken; choose another")
         _check_camera(f"{key}.camera", reprojection["camera"], fail)
         for rig in reprojection.get("rigs", []):
@@ -224,6 +246,8 @@ def _check_rig(key: str, rig: Mapping[str, Any], depth: str, fail: _Fail) -> Non
             f"{key}.cameras",
             f"is {rig['cameras']}; must be {count} whole numbers for a rig of type {rig['type']}",
         )
+    if "frames" in rig and rig["frames"]["first"] > rig["frames"]["last"]:
+        fail(f"{key}.frames", f"first is {rig['frames']['first']}; must be at most last")
     if rig["type"] == "poses" and not (ROOT / rig["file"]).is_file():
         fail(f"{key}.file", f"is {rig['file']!r}; there is no such file")
     camera = rig["camera"]
