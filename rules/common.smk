@@ -49,8 +49,8 @@ wildcard_constraints:
     name="[A-Za-z0-9_-]+",
     scene="[A-Za-z0-9_-]+",
     # A sequence's datasets lie a folder deeper, one for each frame.
-    rig=r"[A-Za-z0-9_.-]+(/f\d{5,})?",
-    reprojection=r"(?!f\d{5,}/)[A-Za-z0-9_.-]+",
+    rig=r"[A-Za-z0-9_.-]+(/f\d{5,7})?",
+    reprojection=r"(?!f\d{5,7}/)[A-Za-z0-9_.-]+",
     first=r"\d+",
     end=r"\d+",
 

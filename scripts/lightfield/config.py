@@ -28,7 +28,7 @@ SCHEMAS = ROOT / "configs" / "schema"
 # Folders of a dataset that a reprojection may not take.
 RESERVED_NAMES = ("exr", "report")
 # Folders of a sequence's frames.
-FRAME_FOLDER = re.compile(r"f\d{5,}")
+FRAME_FOLDER = re.compile(r"f\d{5,7}")
 # In `exports: … sources:`, the rendered views themselves.
 VIEWS = "views"
 
