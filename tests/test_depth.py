@@ -5,6 +5,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
+
 from lightfield.depth import distance_from_z, z_from_distance
 from lightfield.lenses import Equidistant
 

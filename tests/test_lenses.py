@@ -11,6 +11,8 @@ import cv2
 import mpmath
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+
 from lightfield.depth import z_from_distance
 from lightfield.errors import UserError
 from lightfield.lenses import (
@@ -29,7 +31,6 @@ from lightfield.lenses import (
     from_camera,
     from_lightfield,
 )
-from scipy.spatial.transform import Rotation
 
 BLENDER_POLYNOMIAL = (-1.17e-05, -0.0199887, -3.3525e-06, 3.09927e-06, -2.60646e-08)
 OPENCV = (-0.01, 0.03, -0.02, 0.003)
@@ -410,6 +411,20 @@ def test_near_the_rim_of_wide_lenses_nothing_cancels() -> None:
     x = lens.pixels(ray)[0] - 1000
     ratio = math.tan(math.radians(359.9999) / 4) / math.tan(fov / 4)
     assert math.isclose(x * ratio, expected - 1000, rel_tol=1e-6)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_backward_axis_is_on_the_rim_of_a_lens_of_360_degrees(dtype: type) -> None:
+    size = {"width": 200, "height": 100}
+    for lens, radius in (
+        (Equidistant(**size, fov=2 * math.pi), 50),
+        (Equisolid(**size, focal_length=4.5, fov=2 * math.pi), 50),
+        (KannalaBrandt(**size, focal_length=4, coefficients=(0, 0, 0, 0)), 4 * math.pi / 36 * 200),
+    ):
+        pixel = lens.pixels(np.array([0, 0, 1], dtype))
+        # Any azimuth is right, the lens's centre is not.
+        np.testing.assert_allclose(pixel, [100, 50 - radius], atol=1e-4)
+        np.testing.assert_allclose(lens.rays(*pixel), [0, 0, 1], atol=1e-6)
 
 
 def test_equirectangular_poles_and_seam() -> None:

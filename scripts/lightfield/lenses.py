@@ -47,7 +47,7 @@ def _slack(dtype: np.dtype[Any]) -> float:
     return 1.0 + 8.0 * float(np.finfo(dtype).eps)
 
 
-def _as_float(*arrays: Array) -> list[Array]:
+def _as_float(*arrays: npt.ArrayLike) -> list[Array]:
     """Return the arrays in float32 if all are, else in float64."""
     same = all(np.asarray(array).dtype == np.float32 for array in arrays)
     return [np.asarray(array, np.float32 if same else np.float64) for array in arrays]
@@ -84,19 +84,33 @@ class Lens(ABC):
         """The principal point in pixels."""
         return self.principal_point or (self.width / 2, self.height / 2)
 
-    @abstractmethod
-    def rays(self, x: Array, y: Array) -> Array:
+    def rays(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Array:
         """Return unit rays (..., 3) of the pixel coordinates ``x``, ``y`` (...).
 
         NaN where the lens has no ray.
         """
+        x, y = np.broadcast_arrays(*_as_float(x, y))
+        # One dimension at least, for numpy computes with scalars in float64.
+        rays = self._rays(np.atleast_1d(x), np.atleast_1d(y))
+        return rays.astype(x.dtype, copy=False).reshape(*x.shape, 3)
 
-    @abstractmethod
-    def pixels(self, rays: Array) -> Array:
+    def pixels(self, rays: npt.ArrayLike) -> Array:
         """Return the pixel coordinates (..., 2) of ``rays`` (..., 3) of any length above zero.
 
         NaN where the lens does not see the ray; what it sees may lie outside the frame.
         """
+        (array,) = _as_float(rays)
+        pixels = self._pixels(np.atleast_2d(array)).astype(array.dtype, copy=False)
+        pixels[~np.isfinite(pixels).all(axis=-1)] = np.nan
+        return pixels.reshape(*array.shape[:-1], 2)
+
+    @abstractmethod
+    def _rays(self, x: Array, y: Array) -> Array:
+        """Return `rays` of arrays of one shape and dtype."""
+
+    @abstractmethod
+    def _pixels(self, rays: Array) -> Array:
+        """Return `pixels` of an array; NaN or inf in either coordinate marks a miss."""
 
     @property
     @abstractmethod
@@ -150,8 +164,7 @@ class RadialLens(Lens):
     def _radius(self, sin: Array, cos: Array) -> Array:
         """Return r of θ, in which ``sin`` ≥ 0; NaN where there is none."""
 
-    def rays(self, x: Array, y: Array) -> Array:
-        x, y = np.broadcast_arrays(*_as_float(x, y))
+    def _rays(self, x: Array, y: Array) -> Array:
         u = (x - self.center[0]) * self._unit[0]
         v = (self.center[1] - y) * self._unit[1]
         r = np.hypot(u, v)
@@ -162,10 +175,9 @@ class RadialLens(Lens):
                 [sin * np.where(r > 0, u / r, 0), sin * np.where(r > 0, v / r, 1), -cos], axis=-1
             )
             ray[~((r <= self._limit * _slack(x.dtype)) & np.isfinite(r))] = np.nan
-        return np.asarray(ray, x.dtype)
+        return np.asarray(ray)
 
-    def pixels(self, rays: Array) -> Array:
-        (rays,) = _as_float(rays)
+    def _pixels(self, rays: Array) -> Array:
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             # Scaled by the largest component: no overflow, and NaN for a ray of zero or inf.
             rays = rays / np.abs(rays).max(axis=-1, keepdims=True)
@@ -173,12 +185,12 @@ class RadialLens(Lens):
             length = np.hypot(side, rays[..., 2])
             r = self._radius(side / length, -rays[..., 2] / length)
             r = np.where(np.abs(r) <= self._limit * _slack(rays.dtype), r, np.nan)
-            scale = np.where(side > 0, r / side, 0 * r)
-            x = self.center[0] + scale * rays[..., 0] / self._unit[0]
-            y = self.center[1] - scale * rays[..., 1] / self._unit[1]
-        out = np.asarray(np.stack([x, y], axis=-1), rays.dtype)
-        out[~np.isfinite(out).all(axis=-1)] = np.nan
-        return out
+            # The azimuth of the axis itself matters only backwards: "up" there, too.
+            u = r * np.where(side > 0, rays[..., 0] / side, 0)
+            v = r * np.where(side > 0, rays[..., 1] / side, 1)
+            x = self.center[0] + u / self._unit[0]
+            y = self.center[1] - v / self._unit[1]
+        return np.stack([x, y], axis=-1)
 
     @property
     def has_z_depth(self) -> bool:
@@ -412,10 +424,9 @@ class IncreasingPolynomial:
 
         Newton's method, held by bisection inside a bracket that always contains the solution.
         """
-        values = np.asarray(values)
         last = self._values[-1]
-        rounded = (values > last) & (values <= last * _slack(values.dtype))
-        goal = np.where(rounded, last, values).astype(np.float64).ravel()
+        goal = values.astype(np.float64).ravel()
+        goal[(goal > last) & (goal <= last * _slack(values.dtype))] = last
         t = np.full(goal.shape, np.nan)
         active = np.flatnonzero((goal >= self._values[0]) & (goal <= last))
         goal = goal[active]
@@ -586,8 +597,7 @@ class Equirectangular(Lens):
         if self.longitude[1] - self.longitude[0] > 2 * math.pi + 2 * ANGLE_SLACK:
             raise UserError("longitude: the range is more than 360 degrees")
 
-    def rays(self, x: Array, y: Array) -> Array:
-        x, y = np.broadcast_arrays(*_as_float(x, y))
+    def _rays(self, x: Array, y: Array) -> Array:
         (west, east), (south, north) = self.longitude, self.latitude
         longitude = west + (east - west) * (x / self.width)
         latitude = north - (north - south) * (y / self.height)
@@ -598,10 +608,9 @@ class Equirectangular(Lens):
                 axis=-1,
             )
             ray[~((np.abs(latitude) <= math.pi / 2 + ANGLE_SLACK) & np.isfinite(x))] = np.nan
-        return np.asarray(ray, x.dtype)
+        return np.asarray(ray)
 
-    def pixels(self, rays: Array) -> Array:
-        (rays,) = _as_float(rays)
+    def _pixels(self, rays: Array) -> Array:
         (west, east), (south, north) = self.longitude, self.latitude
         with np.errstate(invalid="ignore", divide="ignore"):
             rays = rays / np.abs(rays).max(axis=-1, keepdims=True)
@@ -612,9 +621,7 @@ class Equirectangular(Lens):
         longitude = longitude - 2 * math.pi * turns
         x = (longitude - west) / (east - west) * self.width
         y = (north - latitude) / (north - south) * self.height
-        out = np.asarray(np.stack([x, y], axis=-1), rays.dtype)
-        out[~np.isfinite(out).all(axis=-1)] = np.nan
-        return out
+        return np.stack([x, y], axis=-1)
 
     @property
     def has_z_depth(self) -> bool:
@@ -673,8 +680,7 @@ class CubeMap(Lens):
         """The lens of one face."""
         return Rectilinear(width=self.height, height=self.height, focal_length=SENSOR_WIDTH / 2)
 
-    def rays(self, x: Array, y: Array) -> Array:
-        x, y = np.broadcast_arrays(*_as_float(x, y))
+    def _rays(self, x: Array, y: Array) -> Array:
         size = self.height
         with np.errstate(invalid="ignore"):
             inside = (x >= 0) & (x <= self.width) & (y >= 0) & (y <= size)
@@ -685,8 +691,7 @@ class CubeMap(Lens):
         ray[~inside] = np.nan
         return np.asarray(ray)
 
-    def pixels(self, rays: Array) -> Array:
-        (rays,) = _as_float(rays)
+    def _pixels(self, rays: Array) -> Array:
         rotations = [cube_face_rotation(face).astype(rays.dtype) for face in CUBE_FACES]
         out = np.full((*rays.shape[:-1], 2), np.nan, rays.dtype)
         with np.errstate(invalid="ignore"):

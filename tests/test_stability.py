@@ -1,0 +1,140 @@
+"""The stability measurement: its reference, its bounds, and the verdicts it comes to."""
+
+import csv
+import math
+import sys
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+from mpmath import mpf
+
+import stability
+from lightfield.errors import UserError
+from lightfield.lenses import Equidistant, Lens, Rectilinear
+from lightfield.progress import Progress
+
+ALL = stability.extreme_lenses()
+
+
+@pytest.fixture(autouse=True)
+def digits() -> None:
+    mpmath.mp.dps = stability.DIGITS
+
+
+def test_reference_undoes_itself_to_all_its_digits() -> None:
+    for name, lens in ALL.items():
+        x, y = (mpf(float(c)) for c in stability.probes(lens)[6])
+        ray, excess = stability.reference_ray(lens, x, y)
+        if ray is None or excess > 0:  # beyond the image circle of this lens
+            continue
+        pixel, _ = stability.reference_pixel(lens, ray)
+        assert pixel is not None, name
+        assert abs(pixel[0] - x) + abs(pixel[1] - y) < mpf(10) ** -30, name
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        ["rectilinear 0.01°", "stereographic 359.9999°", "cube map"],
+        ["rectilinear 1e-6 mm", "equidistant 360°", "polynomial turning"],
+        ["equisolid 360°", "kannala_brandt turning", "equirectangular 0.01°"],
+        ["orthographic 180°", "polynomial turned 220°", "equirectangular odd"],
+    ],
+)
+def test_lens_pairs_are_within_their_bounds(chosen: list[str]) -> None:
+    lenses = {name: ALL[name] for name in chosen}
+    rows = list(stability.lens_cases(lenses, Progress(9, "test", "lens pairs")))
+    assert len(rows) == 2 * len(chosen) ** 2
+    assert [row.case for row in rows if row.verdict == "FAIL"] == []
+    own = [row for row in rows if len(set(row.case.split(" → "))) == 1]
+    for row in own:
+        assert row.round_trip_error < (0.01 if row.dtype == "float32" else 1e-9), row.case
+
+
+@pytest.mark.parametrize(
+    "cases",
+    [
+        stability.depth_cases,
+        stability.special_depth_cases,
+        stability.gimbal_cases,
+        lambda: stability.far_cases(ALL),
+        stability.resampling_cases,
+    ],
+)
+def test_other_cases_are_within_their_bounds(cases) -> None:
+    rows = list(cases())
+    assert rows
+    assert [row.case for row in rows if row.verdict != "ok"] == []
+
+
+class Careless(Equidistant):
+    """An equidistant lens that finds θ by acos, which loses half the digits near the axis."""
+
+    def pixels(self, rays: np.ndarray) -> np.ndarray:
+        theta = np.arccos(np.clip(-rays[..., 2], -1, 1))
+        r = theta / (self.fov / 2)
+        side = np.hypot(rays[..., 0], rays[..., 1])
+        with np.errstate(invalid="ignore"):
+            u, v = r * rays[..., 0] / side, r * rays[..., 1] / side
+        return np.stack([(1 + u) * self.width / 2, (1 - v) * self.height / 2], axis=-1)
+
+
+class Silent(Rectilinear):
+    """A rectilinear lens that sees behind the camera as if it were before it."""
+
+    def pixels(self, rays: np.ndarray) -> np.ndarray:
+        return super().pixels(rays * [1, 1, -1] if np.ndim(rays) else rays)
+
+
+@pytest.mark.parametrize(
+    "lens",
+    [
+        Careless(width=2048, height=2048, fov=math.radians(180)),
+        Silent(width=64, height=64, focal_length=18),
+    ],
+)
+def test_a_lens_that_loses_digits_or_invents_pixels_fails(lens: Lens) -> None:
+    lenses = {"good": Equidistant(width=65, height=33, fov=math.radians(220)), "bad": lens}
+    rows = stability.lens_cases(lenses, Progress(4, "test", "lens pairs"))
+    failed = {row.case for row in rows if row.verdict == "FAIL"}
+    assert "good → bad" in failed or "bad → bad" in failed
+    assert "good → good" not in failed
+
+
+def test_program_writes_a_row_a_case_a_summary_and_a_plot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few = {name: ALL[name] for name in ("rectilinear 90° odd", "equidistant 360°")}
+    monkeypatch.setattr(stability, "extreme_lenses", lambda: few)
+    monkeypatch.setattr(
+        stability, "measure", lambda lenses: list(stability.lens_cases(lenses, Progress(4, "test")))
+    )
+    monkeypatch.setattr(sys, "argv", ["stability.py", "--output", str(tmp_path)])
+    stability.main()
+    with (tmp_path / "stability.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 2 * len(few) ** 2
+    for row in rows:
+        assert row["verdict"].startswith("ok")
+        assert float(row["error"]) <= float(row["error_bound"])
+        assert float(row["round_trip_error"]) <= float(row["round_trip_bound"])
+    assert "8 cases, 0 outside their bounds" in (tmp_path / "stability.md").read_text()
+    assert (tmp_path / "stability.svg").read_text().lstrip().startswith("<?xml")
+    assert (tmp_path / "stability.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_program_fails_where_a_case_is_outside_its_bound(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row = stability.simple_row(
+        "depth", "made up", np.float64, 1, condition=1, error=mpf(1), round_trip=mpf(0),
+        unit="relative", eps=mpf(1e-16),
+    )  # fmt: skip
+    good = list(stability.lens_cases({"a": ALL["rectilinear 90° odd"]}, Progress(1, "test")))
+    monkeypatch.setattr(stability, "measure", lambda lenses: [*good, row])
+    monkeypatch.setattr(sys, "argv", ["stability.py", "--output", str(tmp_path)])
+    with pytest.raises(UserError, match=r"1 of 3 cases.*made up"):
+        stability.main()
+    assert "Outside its bound: made up" in (tmp_path / "stability.md").read_text()
