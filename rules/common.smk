@@ -55,6 +55,19 @@ wildcard_constraints:
     end=r"\d+",
 
 
+# Jobs of seconds: too short to queue for on a cluster, they run where Snakemake does.
+localrules:
+    check_blend,
+    contact_sheet,
+    export_reprojection_to_instant_ngp,
+    export_views_to_instant_ngp,
+    lens_map,
+    lightfield,
+    panorama,
+    panorama_lightfield,
+    reprojected_lightfield,
+
+
 def dataset_of(wildcards):
     """Return the dataset that a job's wildcards mean."""
     return DATASETS[wildcards.scene, wildcards.rig]
