@@ -18,9 +18,10 @@ from typing import Any
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
+from scipy.interpolate import CubicSpline
+
 from scenes import common
 from scenes.common import Array, Color, Shape
-from scipy.interpolate import CubicSpline
 
 ROOM = (5.0, 7.5, 3.0)  # metres in x, y, z
 HALF_X, HALF_Y, HEIGHT = ROOM[0] / 2, ROOM[1] / 2, ROOM[2]
@@ -28,8 +29,10 @@ WALL_THICKNESS = 0.15
 SHARP_EDGE = np.radians(35)
 PRINT_LAYER = 0.0005  # metres between the inks of a poster, so that no two faces coincide
 FLOOR_TILE = 0.3125
+MEDALLION_RADIUS = 0.8
 CEILING_TILE = 0.5
 WAINSCOT_HEIGHT = 1.0
+FRIEZE_HEIGHT = 2.765
 COUNTER_TOP, COUNTER_DEPTH = 0.86, 0.44
 STATIONS = (-2.0, 0.0, 2.0)  # y of the barbers' stations
 WINDOW_X, WINDOW_Z = (-2.05, 0.55), (1.0, 2.45)
@@ -257,14 +260,15 @@ def pane(name: str, reflection: float) -> bpy.types.Material:
     )
 
 
-def wood(name: str, dark: Color, light: Color, roughness: float = 0.3) -> bpy.types.Material:
-    """Grain along the object's z, different in each piece of a mesh."""
+def wood(
+    name: str, dark: Color, light: Color, roughness: float = 0.3, along: str = "Z"
+) -> bpy.types.Material:
+    """Grain along one of the object's axes, different in each piece of a mesh."""
     made, graph = common.material(name)
     shift = graph.math("MULTIPLY", graph.island_random(), 50.0)
-    place = graph.add(
-        "ShaderNodeVectorMath", {0: graph.coordinates(scale=(1.0, 1.0, 0.06)), 1: shift}
-    )
-    grain = graph.noise(place, 24.0, detail=2.0, distortion=0.6)
+    stretch = tuple(0.06 if axis == along else 1.0 for axis in "XYZ")
+    place = graph.add("ShaderNodeVectorMath", {0: graph.coordinates(scale=stretch), 1: shift})
+    grain = graph.noise(place, 24.0, detail=1.0)
     color = graph.ramp(grain, [(0.3, dark), (0.7, light)])
     shader = graph.principled(Base_Color=color, Roughness=roughness)
     return common.finish(made, graph, shader)
@@ -275,7 +279,7 @@ def speckled(name: str, stops: Any, scale: float, roughness: float) -> bpy.types
     made, graph = common.material(name)
     shift = graph.math("MULTIPLY", graph.island_random(), 50.0)
     place = graph.add("ShaderNodeVectorMath", {0: graph.coordinates(), 1: shift})
-    color = graph.ramp(graph.noise(place, scale, detail=3.0, distortion=1.0), stops)
+    color = graph.ramp(graph.noise(place, scale, detail=2.0), stops)
     return common.finish(made, graph, graph.principled(Base_Color=color, Roughness=roughness))
 
 
@@ -309,7 +313,9 @@ def metal(name: str, color: Color, roughness: float) -> bpy.types.Material:
 def materials() -> SimpleNamespace:
     """Every material of the shop; colours are linear."""
     m = SimpleNamespace()
-    m.mahogany = wood("Mahogany", (0.045, 0.013, 0.006), (0.16, 0.05, 0.02))
+    reddish = (0.045, 0.013, 0.006), (0.16, 0.05, 0.02)
+    m.mahogany = wood("Mahogany", *reddish)
+    m.mahogany_along_x = wood("Mahogany along x", *reddish, along="X")
     m.oak = wood("Oak", (0.22, 0.11, 0.045), (0.42, 0.24, 0.11), 0.45)
     m.ebony = wood("Ebony", (0.012, 0.009, 0.007), (0.04, 0.028, 0.02))
     m.leather = paint("Oxblood leather", (0.19, 0.016, 0.013), 0.36)
@@ -416,6 +422,7 @@ def materials() -> SimpleNamespace:
     m.globe = emissive("Opal globe", WARM, 3.0)
     m.tube = emissive("Lamp tube", (1.0, 0.88, 0.72), 5.0)
     m.bulb = emissive("Bulb", WARM, 5.0)
+    m.dark_glass = paint("Dark glass", (0.012, 0.018, 0.024), 0.03)
     m.brick = speckled("Brick", [(0.3, (0.26, 0.09, 0.05)), (0.7, (0.40, 0.17, 0.10))], 3.0, 0.9)
     m.stone = speckled(
         "Street stone", [(0.3, (0.22, 0.21, 0.20)), (0.7, (0.34, 0.33, 0.31))], 2.0, 0.9
@@ -436,6 +443,42 @@ def floor(shop: Shop) -> None:
         material = (m.floor_light, m.floor_dark)[(i + j) % 2]
         model.box((size, size, 0.02), material, at, bevel=0.003)
     put(model.mesh("Floor"), Matrix())
+
+
+def medallion(shop: Shop) -> None:
+    """An inlaid mosaic in the middle of the floor: rings of stones, a star, and the shop's name."""
+    m, model = shop.m, Model()
+    height = 0.0015
+    model.add(common.prism(circle(MEDALLION_RADIUS, shop.n(96, 16)), 0.0005), m.grout)
+    colours = [m.green_tiles, m.cream_tiles, m.cream_tiles, m.green_tiles, [m.red, m.ochre]]
+    edges = [(0.74, 0.79), (0.68, 0.735), (0.47, 0.515), (0.42, 0.465), (0.36, 0.415)]
+    for (inner, outer), shades in zip(edges, colours, strict=True):
+        count = shop.n(round(2 * np.pi * outer / 0.05), 12)
+        half = 180 / count * 0.93
+        for k in range(count):
+            arc = circle(1.0, 3, 360 * k / count - half, 360 * k / count + half)
+            stone = np.concatenate([arc * outer, arc[::-1] * inner])
+            model.add(common.prism(stone, height), shades[shop.rng.integers(len(shades))])
+    band = common.prism(
+        np.concatenate([circle(0.675, 97, 0, 359.9), circle(0.52, 97, 0, 359.9)[::-1]]), height
+    )
+    model.add(band, m.floor_dark)
+    words = "BARBER SHOP  ·  EST. 1927  ·  "
+    for k, letter in enumerate(words):
+        angle = -360 * k / len(words) + 90
+        if letter != " ":
+            at = (*circle(0.595, 1, angle, angle + 1)[0], height + 0.0004)
+            model.add(lettering(letter), m.brass, at, (0, 0, angle - 90), (0.13, 0.13, 1))
+    model.add(common.prism(circle(0.355, shop.n(72, 12)), height), m.cream)
+    for k in range(16):
+        long, turn = (0.34, 0.24)[k % 2], 22.5 * k
+        for side, shade in ((1, m.navy), (-1, m.ochre)):
+            ray = [(0, 0), (long, 0), (long * 0.28, 0.05 * side)]
+            lifted = height + (0.0016 if k % 2 == 0 else 0.0008)
+            model.add(common.prism(ray[::side], lifted), shade, turn=(0, 0, turn))
+    model.add(common.prism(circle(0.07, shop.n(40, 8)), height + 0.0024), m.brass)
+    model.add(lettering("B"), m.floor_dark, (0, 0, height + 0.0028), scale=(0.12, 0.12, 1))
+    put(model.mesh("Floor medallion"), Matrix())
 
 
 def walls(shop: Shop) -> None:
@@ -481,8 +524,8 @@ def metro_tiles(shop: Shop) -> None:
     put(model.mesh("Metro tiles"), wall("left", 0))
     sign = Model()
     words = lettering("HAIRCUTS  ·  HOT TOWELS  ·  SHAVES", 0.1)
-    sign.add(words, m.gold, scale=(0.2, 0.2, 0.2))
-    hang(sign.mesh("Wall lettering"), wall("left", 0), 0, 2.56, 0.01)
+    sign.add(words, m.gold, scale=(0.18, 0.18, 0.18))
+    hang(sign.mesh("Wall lettering"), wall("left", 0), 0, 2.545, 0.01)
 
 
 def wainscot(shop: Shop) -> None:
@@ -524,10 +567,10 @@ def ceiling(shop: Shop) -> None:
     square, r = np.maximum(np.abs(u), np.abs(v)), np.hypot(u, v)
     petals = 0.5 + 0.5 * np.cos(8 * np.arctan2(v, u))
     relief = (
-        0.014 * np.exp(-(((square - 0.92) / 0.06) ** 2))
-        + 0.008 * np.exp(-(((square - 0.74) / 0.05) ** 2))
-        + 0.012 * np.exp(-(((r - 0.42) / 0.16) ** 2)) * petals
-        + 0.018 * np.exp(-((r / 0.14) ** 2))
+        0.020 * np.exp(-(((square - 0.92) / 0.05) ** 2))
+        + 0.012 * np.exp(-(((square - 0.74) / 0.04) ** 2))
+        + 0.022 * np.exp(-(((r - 0.42) / 0.14) ** 2)) * petals
+        + 0.030 * np.exp(-((r / 0.13) ** 2))
     )
     side = CEILING_TILE / 2
     tile = common.mesh("Tin tile", common.grid(u[0] * side, v[:, 0] * side, relief), m.tin)
@@ -539,10 +582,12 @@ def ceiling(shop: Shop) -> None:
     put(slab.mesh("Ceiling slab"), Matrix())
     beam = Model()
     width, height = BEAM_SIZE
-    beam.add(rounded_box((height, width, ROOM[0]), 0.012, 2), m.mahogany, turn=(0, 90, 0))
+    beam.add(rounded_box((height, width, ROOM[0]), 0.012, 2), m.mahogany_along_x, turn=(0, 90, 0))
     for x in np.arange(-2.25, 2.3, 0.5):  # dentils under the beam's edge
         for y in (-width / 2 - 0.008, width / 2 + 0.008):
-            beam.box((0.12, 0.016, 0.05), m.mahogany, (x, y, height / 2 - 0.03), bevel=0.005)
+            beam.box(
+                (0.12, 0.016, 0.05), m.mahogany_along_x, (x, y, height / 2 - 0.03), bevel=0.005
+            )
     data = beam.mesh("Beam")
     for y in BEAMS:
         put(data, Matrix(), (0, y, HEIGHT - height / 2))
@@ -552,6 +597,37 @@ def ceiling(shop: Shop) -> None:
     cornice = Model()
     cornice.add(frame(ROOM[0], ROOM[1], profile), m.cream)
     put(cornice.mesh("Cornice"), Matrix(), (0, 0, HEIGHT), (180, 0, 0))
+
+
+def frieze(shop: Shop) -> None:
+    """A picture rail round the room and a stencilled row of palmettes above it."""
+    m, rail, n = shop.m, Model(), shop.n(16, 5)
+    rail.add(
+        frame(ROOM[0], ROOM[1], [(-0.03, 0.0), (-0.038, 0.012), (-0.03, 0.035), (0, 0.045)]),
+        m.mahogany,
+    )
+    rail.add(frame(ROOM[0], ROOM[1], [(0, 0.0), (-0.03, 0.0)][::-1]), m.mahogany)
+    put(rail.mesh("Picture rail"), Matrix(), (0, 0, FRIEZE_HEIGHT - 0.09))
+    motif = Model()
+    petal = common.prism(circle(0.5, n) * (0.022, 0.06) + (0, 0.035), PRINT_LAYER)
+    for k in range(5):
+        motif.add(petal, (m.green, m.red)[k % 2], (0, -0.03, 0), (0, 0, 35 * (k - 2)))
+    motif.add(common.prism(circle(0.012, n), 2 * PRINT_LAYER), m.ochre, (0, -0.03, 0))
+    for sign in (-1, 1):
+        scroll = [(0, -0.045, 0), (sign * 0.05, -0.055, 0), (sign * 0.085, -0.03, 0)]
+        curl = [(sign * 0.075, 0.0, 0), (sign * 0.055, -0.005, 0), (sign * 0.06, -0.022, 0)]
+        motif.add(shop.bend([*scroll, *curl], 0.003, 16), m.ochre)
+    data = motif.mesh("Frieze palmette")
+    for side, length in (
+        ("left", ROOM[1]),
+        ("right", ROOM[1]),
+        ("front", ROOM[0]),
+        ("back", ROOM[0]),
+    ):
+        count = round(length / 0.208)
+        for i in range(count):
+            along = (i + 0.5) * length / count - length / 2
+            hang(data, wall(side, along), 0, FRIEZE_HEIGHT, 0.0008)
 
 
 def casing(shop: Shop, width: float, height: float) -> Model:
@@ -579,7 +655,7 @@ def shop_window(shop: Shop) -> None:
     sheet.add(common.grid([-width / 2, width / 2], [-height / 2, height / 2]), m.pane)
     hang(sheet.mesh("Window pane"), where, 0, z, -0.075)
     sill = Model()
-    sill.box((width + 0.3, 0.26, 0.035), m.mahogany, (0, 0.06, 0), bevel=0.012, segments=2)
+    sill.box((width + 0.3, 0.26, 0.035), m.mahogany_along_x, (0, 0.06, 0), bevel=0.012, segments=2)
     put(sill.mesh("Window sill"), where, (0, 0, WINDOW_Z[0] - 0.0175))
     letters = Model()
     for text, up, size in (("BARBER SHOP", 0.02, 0.34), ("EST. 1927", -0.3, 0.15)):
@@ -705,12 +781,17 @@ def street(shop: Shop) -> None:
     for i, x in enumerate(np.arange(-10.5, 11, 1.75)):
         for z in (4.2, 7.0):
             model.box((1.0, 0.12, 1.5), m.white, (x, 13.05, z), bevel=0.02)
-            model.box((0.84, 0.14, 1.34), m.navy, (x, 13.03, z))
+            model.box((0.84, 0.14, 1.34), m.dark_glass, (x, 13.03, z))
             model.box((0.04, 0.16, 1.34), m.white, (x, 13.02, z))
             model.box((0.84, 0.16, 0.04), m.white, (x, 13.02, z + 0.1))
             model.box((1.2, 0.3, 0.1), m.stone, (x, 12.98, z - 0.8))
         model.box((1.6, 0.1, 2.2), (m.teal, m.ochre, m.green)[i // 2 % 3], (x, 13.04, 1.2))
-        model.box((1.35, 0.14, 1.5), m.navy, (x, 13.02, 1.35))
+        model.box((1.35, 0.14, 1.5), m.dark_glass, (x, 13.02, 1.35))
+        model.box((0.05, 0.16, 1.5), m.white, (x + 0.3 * (-1) ** i, 13.01, 1.35))
+        model.box((1.5, 0.16, 0.05), m.white, (x, 13.01, 1.75))
+        model.box((1.5, 0.2, 0.28), m.mahogany, (x, 13.0, 2.75))
+        trade = lettering(("BAKER", "TAILOR", "BOOKS", "HATS", "SHOES", "TEA")[i % 6], 0.02)
+        model.add(trade, m.gold, (x, 12.88, 2.75), (90, 0, 0), (0.24, 0.24, 1))
         for k in range(7):
             stripe = (m.red, m.white)[k % 2] if i // 2 % 2 else (m.green, m.white)[k % 2]
             model.box((0.25, 1.0, 0.02), stripe, (x + (k - 3) * 0.25, 12.6, 2.55), (25, 0, 0))
@@ -743,17 +824,21 @@ def hidden_area(
 
 
 def lights(shop: Shop) -> None:
-    """Daylight and a low sun through the window, and a soft light that fills the ceiling."""
+    """A few large lights, which converge soon: daylight, a low sun, and the lamps' own light."""
     window = common.transform(
         (sum(WINDOW_X) / 2, HALF_Y - 0.16, sum(WINDOW_Z) / 2), (-np.pi / 2, 0, 0)
     )
     hidden_area("Daylight", window, (2.4, 1.3), 45, DAYLIGHT)
-    door = common.transform((sum(DOOR_X) / 2, HALF_Y - 0.16, 1.55), (-np.pi / 2, 0, 0))
-    hidden_area("Door daylight", door, (0.7, 1.0), 14, DAYLIGHT)
-    sun = common.transform((0.9, 8.5, 4.9), np.radians((-60, 0, -12)))
-    hidden_area("Sun", sun, (3.6, 2.2), 260, (1.0, 0.86, 0.66), spread=6)
+    place, aim = Vector((0.9, 8.5, 4.9)), Vector((-0.1, 2.2, 0.0))
+    sun = Matrix.Translation(place) @ (aim - place).to_track_quat("-Z", "Y").to_matrix().to_4x4()
+    hidden_area("Sun", sun, (4.2, 2.2), 260, (1.0, 0.86, 0.66), spread=2.5)
     fill = common.transform((0, 0, 2.05), (np.pi, 0, 0))
-    hidden_area("Ceiling fill", fill, (3.6, 6.0), 30, WARM)
+    hidden_area("Ceiling fill", fill, (3.6, 6.0), 48, WARM)
+    for y in (BEAMS[1], BEAMS[3]):
+        pair = common.transform((0, y, 2.03))
+        hidden_area("Pendant light", pair, (2.8, 0.6), 84, WARM)
+    tubes = wall("left", 0) @ common.transform((0, 0.16, 2.36), np.radians((35, 0, 0)))
+    hidden_area("Mirror light", tubes, (5.2, 0.14), 56, (1.0, 0.9, 0.76))
 
 
 def sky(strength: float = 1.6) -> None:
@@ -769,7 +854,7 @@ def sky(strength: float = 1.6) -> None:
 
 
 def pendant_lamps(shop: Shop) -> None:
-    """Four opal globes on brass rods, with a soft disc of light below each."""
+    """Four opal globes on brass rods."""
     m, model = shop.m, Model()
     model.add(shop.lathe([(0.07, 0.62), (0.07, 0.6), (0.045, 0.57), (0.02, 0.555)]), m.brass)
     model.add(shop.tube([(0, 0, 0.14), (0, 0, 0.58)], 0.009), m.brass)
@@ -784,8 +869,6 @@ def pendant_lamps(shop: Shop) -> None:
     for x in (-1.15, 1.15):
         for y in (BEAMS[1], BEAMS[3]):
             put(data, Matrix(), (x, y, 2.25))
-            disc = common.transform((x, y, 2.03))
-            hidden_area("Pendant light", disc, (0.55, 0.55), 26, WARM)
 
 
 def ceiling_fan(shop: Shop) -> None:
@@ -831,7 +914,7 @@ def ceiling_fan(shop: Shop) -> None:
         (0.3, 0.06),
         (0.2, 0.045),
     ]
-    blade.add(common.prism(outline, 0.008), m.mahogany, turn=(12, 0, 0))
+    blade.add(common.prism(outline, 0.008), m.mahogany_along_x, turn=(12, 0, 0))
     blade.box((0.14, 0.035, 0.006), m.brass, (0.2, 0, -0.006), (12, 0, 0), bevel=0.002)
     data = blade.mesh("Fan blade")
     for i in range(5):
@@ -931,6 +1014,22 @@ def barber_chairs(shop: Shop) -> None:
         m.cream,
         back @ Vector((0, 0, 0.27)) - back.translation,
     )
+    trim = [(-0.012, 0.0), (-0.012, 0.006), (0.0, 0.01), (0.012, 0.006), (0.012, 0.0)]
+    behind = back @ Vector((0, -0.036, 0.28))
+    model.add(frame(0.36, 0.42, trim), m.chrome, behind, (90 + 14, 0, 0))
+    model.add(
+        common.prism(circle(0.5, shop.n(40, 8)), 0.004),
+        m.brass,
+        behind,
+        (104, 0, 0),
+        (0.2, 0.13, 1),
+    )
+    plate = back @ Vector((0, -0.0405, 0.28))
+    model.add(lettering("FINEST"), m.black, plate, (104, 0, 0), (0.045, 0.05, 1))
+    for x in (-0.165, 0.165):
+        for z in (-0.195, 0.195):
+            stud = back @ Vector((x, -0.036, 0.28 + z))
+            model.add(shop.ball(0.012, 12), m.brass, stud)
     tufted(
         model,
         shop,
@@ -938,7 +1037,7 @@ def barber_chairs(shop: Shop) -> None:
         (4, 4),
         m.leather,
         back @ Vector((0, 0.03, 0.28)),
-        (-90 + 14, 0, 180),
+        (90 - 14, 0, 180),
     )
     for x in (-0.09, 0.09):
         model.add(
@@ -1114,8 +1213,6 @@ def mirrors(shop: Shop) -> None:
         for x in (-0.625, 0.625):
             hang(bulbs, where, x, z, 0.012)
         hang(tube, where, 0, 2.41, 0.0)
-        light = where @ common.transform((0, 0.16, 2.36), np.radians((35, 0, 0)))
-        hidden_area("Mirror light", light, (0.95, 0.12), 16, (1.0, 0.9, 0.76))
 
 
 def basins(shop: Shop) -> None:
@@ -1171,7 +1268,7 @@ def waiting_bench(shop: Shop) -> None:
         (12, 3),
         m.leather,
         (0, 0.175, 0.60),
-        (-80, 0, 180),
+        (80, 0, 180),
     )
     model.add(
         shop.tube([(-length / 2 + 0.02, 0.06, 0.82), (length / 2 - 0.02, 0.06, 0.82)], 0.07, 20),
@@ -1933,7 +2030,7 @@ def draped_towel(shop: Shop, material: bpy.types.Material) -> bpy.types.Mesh:
     x = np.linspace(-0.16, 0.16, shop.n(28, 6))
     s = np.linspace(-0.36, 0.46, shop.n(48, 10))[:, None]
     bow = np.clip(s / 0.022, -np.pi / 2, np.pi / 2)
-    y = 0.022 * np.sin(bow) + 0.006 * np.sin(38 * x + 2) * np.abs(s) / 0.4
+    y = 0.022 * np.sin(bow) + 0.016 * np.sin(38 * x + 2) * np.abs(s) / 0.4
     z = 0.022 * np.cos(bow) - np.maximum(np.abs(s) - 0.0345, 0)
     points = np.stack([np.broadcast_to(x, y.shape), y, np.broadcast_to(z, y.shape)], -1)
     model = Model()
@@ -1944,7 +2041,7 @@ def draped_towel(shop: Shop, material: bpy.types.Material) -> bpy.types.Mesh:
 def shelf(shop: Shop, width: float, depth: float) -> bpy.types.Mesh:
     """A wooden board on two brass brackets, its top at z = 0, back at y = 0."""
     m, model = shop.m, Model()
-    model.box((width, depth, 0.02), m.mahogany, (0, depth / 2, -0.01), bevel=0.005)
+    model.box((width, depth, 0.02), m.mahogany_along_x, (0, depth / 2, -0.01), bevel=0.005)
     for x in (-width / 2 + 0.08, width / 2 - 0.08):
         model.add(
             shop.bend(
@@ -2010,7 +2107,7 @@ def station_goods(
     board = shelf(shop, 0.56, 0.14)
     folded = [folded_towel(shop, towel) for towel in m.towels]
     rolled = [rolled_towel(shop, towel) for towel in m.towels[:2]]
-    draped = [draped_towel(shop, towel) for towel in m.towels]
+    draped = [draped_towel(shop, towel) for towel in m.towels[1:3]]
     for y in (-3.0, -1.0, 1.0, 3.0):
         where = wall("left", y)
         for k, z in enumerate((1.24, 1.58, 1.92, 2.26)):
@@ -2059,7 +2156,7 @@ def station_goods(
         )
         where = wall("left", y) @ common.transform((0, COUNTER_DEPTH - 0.01, 0.72))
         put(rail.mesh("Towel rail"), where)
-        put(draped[1 if y > 0 else 2], where, (0, 0.07, -0.014))
+        put(draped[int(y > 0)], where, (0, 0.07, -0.014))
 
 
 # --- On the walls ---------------------------------------------------------------------------------
@@ -2937,14 +3034,8 @@ def small_fittings(shop: Shop) -> None:
     for y in np.linspace(-0.065, 0.065, 7):
         vent.box((0.36, 0.014, 0.003), m.gold, (0, y, 0.007), (35, 0, 0))
     grille = vent.mesh("Vent")
-    for side, along in (
-        ("right", -0.45),
-        ("right", 2.9),
-        ("left", -3.3),
-        ("left", 3.3),
-        ("back", 1.68),
-    ):
-        hang(grille, wall(side, along), 0, 2.7, 0.0)
+    for side, along in (("right", 2.9), ("left", -3.52), ("left", 3.52)):
+        hang(grille, wall(side, along), 0, 2.46, 0.0)
     mat.box((0.9, 0.55, 0.014), m.bristle, (0, 0, 0.007), bevel=0.005)
     mat.box((0.84, 0.49, 0.004), m.rug[1], (0, 0, 0.0145), bevel=0.001)
     mat.add(lettering("WELCOME"), m.rug[2], (0, 0, 0.0168), (0, 0, 180), (0.17, 0.17, 1))
@@ -2966,10 +3057,12 @@ def build(parameters: Mapping[str, Any]) -> None:
     shop = Shop(np.random.default_rng(int(parameters["seed"])), detail, materials())
     elements = (
         floor,
+        medallion,
         walls,
         metro_tiles,
         wainscot,
         ceiling,
+        frieze,
         shop_window,
         shop_door,
         back_door,
