@@ -40,6 +40,8 @@ from lightfield.rigs import matrix_to_euler
 from lightfield.tonemap import decode_srgb, to_8_bit, tone_map
 
 VERSION = 1  # of the pixels: part of every key, raised when the same settings give other pixels
+# Three times as fast as zlib's own choice, and the files are 2 % larger.
+PNG_OPTIONS = {"png:compressionLevel": 4}
 SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
 
 
@@ -120,7 +122,7 @@ class Job:
 
     @cached_property
     def copies(self) -> bool:
-        """Whether nothing is resampled at all."""
+        """Whether the target is the source itself, so that nothing is resampled."""
         target = self.targets[0]
         return target.lens == self.source and np.array_equal(target.rotation, np.eye(3))
 
@@ -329,9 +331,6 @@ class _Source:
         self.color = np.concatenate([face[0] for face in faces], axis=1)
         depths = [face[1] for face in faces if face[1] is not None]
         self.depth = np.concatenate(depths, axis=1) if len(depths) == len(faces) else None
-        self.color = self.color[:, self.columns[0] : self.columns[1]]
-        if self.depth is not None:
-            self.depth = self.depth[:, self.columns[0] : self.columns[1]]
         self.has_alpha = faces[0][2]
         default = _depth_name(job.source)
         self.is_z = str(job.config.get("depth") or faces[0][3] or default) == "z"
@@ -351,28 +350,33 @@ class _Source:
                 colors = [name for name in ("Y", "A") if name in names]
             if not colors or colors == ["A"]:
                 raise UserError(f"{path}: has no colour: its channels are {', '.join(names)}")
-            pixels = np.dstack([self._channels(path, file, names, colors)])
-            color = _linear(pixels, colors)
-            depth = None
-            if job.depth_wanted and "Z" in names:
-                depth = self._channels(path, file, names, ["Z"])[:, :, 0]
+            wanted = colors + ["Z"] * (job.depth_wanted and "Z" in names)
+            pixels = self._channels(path, file, wanted)
             meaning = spec.get_string_attribute(DEPTH_ATTRIBUTE) or None
-        return color, depth, "A" in colors, meaning
+            depth = None
+            if wanted[-1] == "Z":
+                kind = str(spec.channelformat(names.index("Z")))
+                depth = pixels[:, :, -1].astype("f2" if kind == "half" else "f4")
+                pixels = pixels[:, :, :-1]
+        return _linear(pixels, colors), depth, "A" in colors, meaning
 
-    def _channels(self, path: Path, file: Any, names: list[str], wanted: list[str]) -> Array:
-        """Read rows of channels, in one call where they lie side by side."""
-        indices = [names.index(name) for name in wanted]
+    def _channels(self, path: Path, file: Any, wanted: list[str]) -> Array:
+        """Read the window's rows of channels in one call: a file is not decoded twice."""
+        spec = file.spec()
+        indices = [list(spec.channelnames).index(name) for name in wanted]
         first, end = min(indices), max(indices) + 1
-        kind = str(file.spec().channelformat(first))
+        kinds = {str(spec.channelformat(index)) for index in indices}
+        kind = kinds.pop() if len(kinds) == 1 else "float"
         row, end_row = self.rows
-        if file.spec().tile_width:
+        if spec.tile_width:
             pixels = file.read_image(0, 0, first, end, kind)
             pixels = None if pixels is None else pixels[row:end_row]
         else:
             pixels = file.read_scanlines(0, 0, row, end_row, 0, first, end, kind)
         if pixels is None:
             raise UserError(f"{path}: cannot be read whole: {file.geterror()}")
-        pixels = np.asarray(pixels).reshape(end_row - row, file.spec().width, end - first)
+        pixels = np.asarray(pixels).reshape(end_row - row, spec.width, end - first)
+        pixels = pixels[:, self.columns[0] : self.columns[1]]
         order = [index - first for index in indices]
         return pixels if order == list(range(end - first)) else pixels[:, :, order]
 
@@ -428,18 +432,19 @@ def _write(
     row, end_row, column, end_column = made.window
     rows = slice(row - source.rows[0], end_row - source.rows[0])
     columns = slice(column - source.columns[0], end_column - source.columns[0])
-    color, depth = source.color, source.depth
+    color = source.color[rows, columns]
+    depth = None if source.depth is None else source.depth[rows, columns]
     as_z = target.lens.has_z_depth
-    if job.copies:
-        color, as_z = color.copy(), source.is_z
-        color[np.isnan(made.source_cos)] = np.nan
+    if job.copies and source.is_z == as_z:
+        color = np.where(np.isnan(made.source_cos)[:, :, None], np.float32(np.nan), color)
+        color = _in_frame(color, made)
+        depth = None if depth is None else _in_frame(depth, made)
     else:
-        color = resample_color(color[rows, columns], made)
+        color = resample_color(color, made)
         if depth is not None:
             kind = depth.dtype
-            depth = resample_depth(depth[rows, columns], source.is_z, as_z, made)
             with np.errstate(over="ignore"):
-                depth = depth.astype(kind, copy=False)
+                depth = resample_depth(depth, source.is_z, as_z, made).astype(kind, copy=False)
     empty = np.isnan(color[:, :, 0])
     if source.has_alpha:
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -465,7 +470,7 @@ def _write(
                 pixels = to_8_bit(color)
                 if marked:
                     pixels = np.dstack([pixels, np.where(empty, 0, 255).astype(np.uint8)])
-                write_png(path, pixels, {KEY_ATTRIBUTE: key})
+                write_png(path, pixels, {KEY_ATTRIBUTE: key, **PNG_OPTIONS})
             case "depth":
                 if depth is None:
                     raise UserError("--depth-png: the image has no channel Z")
@@ -475,6 +480,14 @@ def _write(
                 write_png(path, np.where(known, scaled, 0).astype(np.uint16), {KEY_ATTRIBUTE: key})
             case "mask":
                 write_png(path, np.where(empty, 255, 0).astype(np.uint8), {KEY_ATTRIBUTE: key})
+
+
+def _in_frame(window: Array, made: LensMap) -> Array:
+    """Return the window's pixels in their place in the whole image, NaN around them."""
+    out = np.full((*made.target_cos.shape, *window.shape[2:]), np.nan, window.dtype)
+    row, end_row, column, end_column = made.window
+    out[row:end_row, column:end_column] = window
+    return out
 
 
 def _record(job: Job, views: list[View], made: list[Path]) -> dict[str, Any]:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import distance_transform_cdt
 
 from lightfield.errors import UserError
 from lightfield.files import atomic_path
@@ -73,8 +72,9 @@ class LensMap:
     target_cos: Array
     # (H, W) float32: target pixels to one of the source, along a line; NaN where it has no source.
     magnification: Array
-    # Of the adaptive filter where anything is minified: (H, W, 2, 2) float32, the d(x, y) that its
-    # samples cover along a column and a row, and (H, W, 2) uint16, how many there are each way.
+    # Of the adaptive filter where anything is minified: (H, W, 2) uint16, how many samples a pixel
+    # takes along its row and its column, and (H, W, 2, 2) float32, the (x, y) step from one to the
+    # next, the first index being x or y and the second the way.
     footprints: Array | None = None
     counts: Array | None = None
 
@@ -151,7 +151,8 @@ def compute(
         if counts.max() == 1:
             footprints, counts = None, None
         else:
-            reach = reach + np.ceil(np.abs(footprints).sum(axis=-1).max(axis=-1) / 2)
+            extent = np.abs(footprints * (counts[..., None, :] - 1)).sum(axis=-1) / 2
+            reach = reach + np.ceil(extent.max(axis=-1))
     window = _window(points, source, reach, wraps or panels > 1)
     corner = np.array([window[2], window[0]])
     centers32 = (centers - corner).astype(np.float32)
@@ -333,22 +334,27 @@ def _jacobian(padded: Array, period: int) -> Array:
 
 
 def _footprints(jacobian: Array) -> tuple[Array, Array]:
-    """Return what the adaptive filter's samples cover, and how many there are each way.
+    """Return the adaptive filter's steps from sample to sample, and how many samples each way.
 
-    A pixel is a mean over its area, in the source too, so samples spread over √(s² − 1) source
-    pixels make a target pixel that spans s; they lie a source pixel apart, which is as dense as
-    the bicubic kernel needs. Where s ≤ 1 one sample is all: magnifying does not blur.
+    A pixel is a mean over its area, in the source too, so what is missing to a target pixel that
+    spans s source pixels is a box of width √(s² − 1), by the variances. n samples at distance d
+    have the variance of a box of width d √(n² − 1), so that gives d; n is as small as the bicubic
+    kernel, under which d may exceed a pixel, allows. Where s is little above 1 or below it, one
+    sample is all: magnifying does not blur.
     """
     span = np.hypot(jacobian[..., 0, :], jacobian[..., 1, :])
-    covered = np.sqrt(np.maximum(span * span - 1, 0))
-    counts = np.clip(np.ceil(covered), 1, _MOST_SAMPLES)
-    with np.errstate(invalid="ignore"):
-        scale = np.where(span > 1, covered / span, 0)
+    box = np.sqrt(np.maximum(span * span - 1, 0))
+    counts = np.where(box > 0.5, np.clip(np.ceil(0.75 * box), 2, _MOST_SAMPLES), 1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scale = np.where(counts > 1, box / span / np.sqrt(counts * counts - 1), 0)
     return (jacobian * scale[..., None, :]).astype(np.float32), counts.astype(np.uint16)
 
 
 def _flags(points: Array, valid: Array, reach: Array, panels: int) -> Array:
     """Return NOTHING, INSIDE or CAREFUL for each of the ``points``."""
+    # Imported here because applying a map, which is most of the work, does without.
+    from scipy.ndimage import distance_transform_cdt
+
     depth = np.hstack(
         [
             distance_transform_cdt(np.pad(panel, 1), metric="chessboard")[1:-1, 1:-1]

@@ -39,10 +39,18 @@ _SMOOTH = {np.dtype(np.float32): np.float32(2e-4), np.dtype(np.float16): np.floa
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
+# Infinities and NaNs keep their meaning: only contraction and the sign of zero are relaxed.
+_OPTIONS = {"nogil": True, "fastmath": {"contract", "nsz"}}
+
+
 def kernel(function: _F) -> _F:
-    # Infinities and NaNs keep their meaning: only contraction and the sign of zero are relaxed.
-    fast = {"contract", "nsz"}
-    return cast(_F, numba.njit(cache=True, nogil=True, fastmath=fast)(function))
+    """Compile a function, and keep the machine code for the next process."""
+    return cast(_F, numba.njit(cache=True, **_OPTIONS)(function))
+
+
+def _inline(function: _F) -> _F:
+    """Compile a function into each of its callers."""
+    return cast(_F, numba.njit(inline="always", **_OPTIONS)(function))
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -101,69 +109,72 @@ def narrow(pixels: Array, count: int) -> Array:
 
 
 @kernel
-def _weights(taps: int, t: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
-    """Weights of the ``taps`` pixels around a point at ``t`` in [0, 1) past the middle-left one."""
+def _linear_weights(t: Any) -> tuple[Any, Any]:
+    """Weights of the two pixels around a point at ``t`` in [0, 1) past the left one."""
+    return np.float32(1) - t, t
+
+
+@kernel
+def _cubic_weights(t: Any) -> tuple[Any, Any, Any, Any]:
+    """Weights of four pixels, for a point at ``t`` in [0, 1) past the second.
+
+    Source: Catmull and Rom 1974; the cubic convolution of third order of Keys 1981 (a = −1/2).
+    """
+    half, one = np.float32(0.5), np.float32(1)
+    return (
+        t * (t * (one - half * t) - half),
+        one + t * t * (np.float32(1.5) * t - np.float32(2.5)),
+        t * (half + t * (np.float32(2) - np.float32(1.5) * t)),
+        t * t * (half * t - half),
+    )
+
+
+@kernel
+def _lanczos_weights(t: Any) -> tuple[Any, Any, Any, Any, Any, Any]:
+    """Weights of six pixels, for a point at ``t`` in [0, 1) past the third.
+
+    sinc(u) sinc(u / 3) (Turkowski 1990), made to sum to one.
+    """
     zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
-    if taps == 2:
-        return one - t, t, zero, zero, zero, zero
-    if taps == 4:
-        # Catmull and Rom 1974: the cubic convolution of third order (Keys 1981, a = −1/2).
-        return (
-            t * (t * (one - half * t) - half),
-            one + t * t * (np.float32(1.5) * t - np.float32(2.5)),
-            t * (half + t * (np.float32(2) - np.float32(1.5) * t)),
-            t * t * (half * t - half),
-            zero,
-            zero,
-        )
-    # sinc(u) sinc(u / 3) for |u| < 3 (Turkowski 1990), made to sum to one.
     if t < np.float32(1e-5):
         return zero, zero, one, zero, zero, zero
-    sine = np.sin(np.float32(np.pi) * t)
+    # sin(π u / 3) at u = t + 2, t + 1, …, t − 3, by the addition theorem.
     third = np.float32(np.pi / 3) * t
-    sin, cos = np.sin(third), np.cos(third)
-    # sin(π u / 3) at u = t + 2, t + 1, t, …, t − 3, by the addition theorem.
-    root = np.float32(math.sqrt(0.75))
-    a, b = half * sin, root * cos
-    w0 = sine * (b - a) / ((t + 2) * (t + 2))
-    w1 = -sine * (b + a) / ((t + 1) * (t + 1))
-    w2 = sine * sin / (t * t)
-    w3 = -sine * (a - b) / ((t - 1) * (t - 1))
-    w4 = sine * (-a - b) / ((t - 2) * (t - 2))
-    w5 = -sine * -sin / ((t - 3) * (t - 3))
+    a, b = half * np.sin(third), np.float32(math.sqrt(0.75)) * np.cos(third)
+    w0 = (b - a) / ((t + 2) * (t + 2))
+    w1 = -(b + a) / ((t + 1) * (t + 1))
+    w2 = 2 * a / (t * t)
+    w3 = (b - a) / ((t - 1) * (t - 1))
+    w4 = -(b + a) / ((t - 2) * (t - 2))
+    w5 = 2 * a / ((t - 3) * (t - 3))
+    # sin(π u) is the same in all but for the sign, which is in them, and drops out.
     scale = one / (w0 + w1 + w2 + w3 + w4 + w5)
     return w0 * scale, w1 * scale, w2 * scale, w3 * scale, w4 * scale, w5 * scale
 
 
-@kernel
-def _darkest(source: Array, row: int, column: int, taps: int, channel: int) -> Any:
-    low = source[row, column, channel]
-    for a in range(taps):
-        for b in range(taps):
-            low = min(low, source[row + a, column + b, channel])
-    return low
-
-
 def _sampler(taps: int) -> Callable[..., tuple[Any, Any, Any, Any]]:
-    """Make the function that samples at (x, y) where all ``taps`` × ``taps`` pixels exist.
-
-    A negative lobe does not make light negative: what comes out below zero is raised to the
-    darkest of the pixels.
-    """
+    """Make the function that samples at (x, y) where all ``taps`` × ``taps`` pixels exist."""
     reach = taps // 2 - 1
 
     def sample(source: Array, x: Any, y: Any) -> tuple[Any, Any, Any, Any]:
         x -= np.float32(0.5)
         y -= np.float32(0.5)
-        column, row = int(x), int(y)
-        wx = _weights(taps, x - np.float32(column))
-        wy = _weights(taps, y - np.float32(row))
-        column -= reach
-        row -= reach
+        wx: Any
+        wy: Any
+        # The branches of the other kernels are gone before types are found.
+        if taps == 2:
+            wx, wy = _linear_weights(x - np.floor(x)), _linear_weights(y - np.floor(y))
+        elif taps == 4:
+            wx, wy = _cubic_weights(x - np.floor(x)), _cubic_weights(y - np.floor(y))
+        else:
+            wx, wy = _lanczos_weights(x - np.floor(x)), _lanczos_weights(y - np.floor(y))
+        # Unsigned, so that no index is checked for counting from the end.
+        column = np.uint64(int(x) - reach)
+        row = np.uint64(int(y) - reach)
         s0 = s1 = s2 = s3 = np.float32(0)
-        for a in range(taps):
+        for a in range(np.uint64(taps)):
             r0 = r1 = r2 = r3 = np.float32(0)
-            for b in range(taps):
+            for b in range(np.uint64(taps)):
                 r0 += wx[b] * source[row + a, column + b, 0]
                 r1 += wx[b] * source[row + a, column + b, 1]
                 r2 += wx[b] * source[row + a, column + b, 2]
@@ -172,17 +183,18 @@ def _sampler(taps: int) -> Callable[..., tuple[Any, Any, Any, Any]]:
             s1 += wy[a] * r1
             s2 += wy[a] * r2
             s3 += wy[a] * r3
-        if taps > 2 and min(min(s0, s1), min(s2, s3)) < 0:
-            s0 = max(s0, min(np.float32(0), _darkest(source, row, column, taps, 0)))
-            s1 = max(s1, min(np.float32(0), _darkest(source, row, column, taps, 1)))
-            s2 = max(s2, min(np.float32(0), _darkest(source, row, column, taps, 2)))
-            s3 = max(s3, min(np.float32(0), _darkest(source, row, column, taps, 3)))
         return s0, s1, s2, s3
 
-    return kernel(sample)
+    return _inline(sample)
 
 
 _sample_2, _sample_4, _sample_6 = _sampler(2), _sampler(4), _sampler(6)
+
+
+@kernel
+def _is_light(s0: Any, s1: Any, s2: Any, s3: Any) -> bool:
+    """Whether all are finite and none is negative."""
+    return bool(s0 + s1 + s2 + s3 < np.inf and min(min(s0, s1), min(s2, s3)) >= 0)
 
 
 @kernel
@@ -214,6 +226,16 @@ def _source_index(
 
 
 @kernel
+def _fill_weights(taps: int, t: Any, out: Array) -> None:
+    if taps == 2:
+        out[0], out[1] = _linear_weights(t)
+    elif taps == 4:
+        out[0], out[1], out[2], out[3] = _cubic_weights(t)
+    else:
+        out[0], out[1], out[2], out[3], out[4], out[5] = _lanczos_weights(t)
+
+
+@kernel
 def _careful(
     source: Array,
     valid: Array,
@@ -221,51 +243,53 @@ def _careful(
     y: Any,
     taps: int,
     topology: tuple[bool, bool, bool, int],
-) -> tuple[bool, Any, Any, Any, Any]:
-    """Sample at (x, y) where pixels may be missing; first whether any is there.
+    result: Array,
+) -> bool:
+    """Sample at (x, y) where pixels may be missing or negative; whether any is there.
 
     Where one is missing, the answer is bilinear among those of the four nearest that are there:
-    a kernel with negative lobes does not survive the loss of a part of it.
+    a kernel with negative lobes does not survive the loss of a part of it. Nor do such lobes make
+    light negative: what comes out below zero is raised to the darkest of the pixels.
     """
-    zero = np.float32(0)
     height, width = source.shape[0], source.shape[1]
     column, row = int(np.floor(x - np.float32(0.5))), int(np.floor(y - np.float32(0.5)))
     fx, fy = x - np.float32(0.5) - np.float32(column), y - np.float32(0.5) - np.float32(row)
+    wx, wy = np.empty(6, np.float32), np.empty(6, np.float32)
+    darkest = np.empty(4, np.float32)
     while True:
-        wx, wy = _weights(taps, fx), _weights(taps, fy)
+        _fill_weights(taps, fx, wx)
+        _fill_weights(taps, fy, wy)
         complete = True
-        total = s0 = s1 = s2 = s3 = zero
+        total = np.float32(0)
+        result[:] = 0
+        darkest[:] = 0
         for a in range(taps):
             for b in range(taps):
                 i, j = _source_index(
                     row + a - taps // 2 + 1,
                     column + b - taps // 2 + 1,
-                    int(x), height, width, topology,
-                )  # fmt: skip
-                if i >= 0 and valid[i, j] == valid[i, j]:
-                    p0, p1, p2, p3 = (
-                        source[i, j, 0],
-                        source[i, j, 1],
-                        source[i, j, 2],
-                        source[i, j, 3],
-                    )
-                    if np.isfinite(p0 + p1 + p2 + p3):
-                        weight = wy[a] * wx[b]
-                        total += weight
-                        s0 += weight * p0
-                        s1 += weight * p1
-                        s2 += weight * p2
-                        s3 += weight * p3
-                        continue
-                complete = False
+                    int(x),
+                    height,
+                    width,
+                    topology,
+                )
+                if i >= 0 and valid[i, j] == valid[i, j] and np.isfinite(np.sum(source[i, j])):
+                    weight = wy[a] * wx[b]
+                    total += weight
+                    for c in range(4):
+                        result[c] += weight * source[i, j, c]
+                        darkest[c] = min(darkest[c], source[i, j, c])
+                else:
+                    complete = False
         if complete or taps == 2:
             break
         taps = 2
-    # Bilinear weights may be zero for all that is there: then the point lies on what is not.
+    # The bilinear weights of all that is there may be zero: the point lies on what is not.
     if total < np.float32(1e-4):
-        return False, zero, zero, zero, zero
-    scale = np.float32(1) / total
-    return True, s0 * scale, s1 * scale, s2 * scale, s3 * scale
+        return False
+    for c in range(4):
+        result[c] = max(result[c] / total, darkest[c])
+    return True
 
 
 @kernel
@@ -295,26 +319,27 @@ def _interpolator(taps: int) -> Callable[..., None]:
         topology: tuple[bool, bool, bool, int],
         out: Array,
     ) -> None:
+        result = np.empty(4, np.float32)
         for i in range(out.shape[0]):
             for j in range(out.shape[1]):
-                s0 = s1 = s2 = s3 = np.float32(np.nan)
-                if flags[i, j] == 1:
+                flag, x, y = flags[i, j], points[i, j, 0], points[i, j, 1]
+                if flag == 1:
                     if taps == 2:
-                        s0, s1, s2, s3 = _sample_2(source, points[i, j, 0], points[i, j, 1])
+                        s0, s1, s2, s3 = _sample_2(source, x, y)
                     elif taps == 4:
-                        s0, s1, s2, s3 = _sample_4(source, points[i, j, 0], points[i, j, 1])
+                        s0, s1, s2, s3 = _sample_4(source, x, y)
                     else:
-                        s0, s1, s2, s3 = _sample_6(source, points[i, j, 0], points[i, j, 1])
-                if flags[i, j] > 0 and not np.isfinite(s0 + s1 + s2 + s3):
-                    found, s0, s1, s2, s3 = _careful(
-                        source, valid, points[i, j, 0], points[i, j, 1], taps, topology
-                    )
-                    if not found:
-                        s0 = s1 = s2 = s3 = np.float32(np.nan)
-                out[i, j, 0] = s0
-                out[i, j, 1] = s1
-                out[i, j, 2] = s2
-                out[i, j, 3] = s3
+                        s0, s1, s2, s3 = _sample_6(source, x, y)
+                    if _is_light(s0, s1, s2, s3):
+                        out[i, j, 0] = s0
+                        out[i, j, 1] = s1
+                        out[i, j, 2] = s2
+                        out[i, j, 3] = s3
+                        continue
+                if flag > 0 and _careful(source, valid, x, y, taps, topology, result):
+                    out[i, j] = result
+                else:
+                    out[i, j] = np.nan
 
     return kernel(interpolate)
 
@@ -334,6 +359,7 @@ def _adaptive(
     out: Array,
 ) -> None:
     """Average bicubic samples that cover each pixel's footprint in the source."""
+    result = np.empty(4, np.float32)
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             out[i, j] = np.nan
@@ -342,8 +368,8 @@ def _adaptive(
                 continue
             across, down = counts[i, j, 0], counts[i, j, 1]
             x, y = centers[i, j, 0], centers[i, j, 1]
-            ux, uy = footprints[i, j, 0, 0] / across, footprints[i, j, 1, 0] / across
-            vx, vy = footprints[i, j, 0, 1] / down, footprints[i, j, 1, 1] / down
+            ux, uy = footprints[i, j, 0, 0], footprints[i, j, 1, 0]
+            vx, vy = footprints[i, j, 0, 1], footprints[i, j, 1, 1]
             a0 = a1 = a2 = a3 = np.float32(0)
             found = 0
             for q in range(down):
@@ -355,10 +381,10 @@ def _adaptive(
                     s0 = s1 = s2 = s3 = np.float32(np.nan)
                     if flag == 1:
                         s0, s1, s2, s3 = _sample_4(source, px, py)
-                    if not np.isfinite(s0 + s1 + s2 + s3):
-                        some, s0, s1, s2, s3 = _careful(source, valid, px, py, 4, topology)
-                        if not some:
+                    if not _is_light(s0, s1, s2, s3):
+                        if not _careful(source, valid, px, py, 4, topology, result):
                             continue
+                        s0, s1, s2, s3 = result[0], result[1], result[2], result[3]
                     found += 1
                     a0 += s0
                     a1 += s1
