@@ -266,10 +266,6 @@ def arch_stones(radius: float, depth: float, count: int, width: float = 0.2) -> 
     return upright(ring_of_stones(count, radius + width / 2, width, 0.0, depth, pi))
 
 
-def molding(path: Any, radius: float, sides: int) -> Shape:
-    return tube(path, radius, sides)
-
-
 def leaves(
     base: Array, direction: Array, face: Array, length: Array | float, width: float
 ) -> Shape:
@@ -432,7 +428,7 @@ def make_materials() -> dict[str, bpy.types.Material]:
         plaster("Whitewash", (0.70, 0.65, 0.56), (0.55, 0.47, 0.37)),
         foliage("Grass", (0.055, 0.10, 0.018), (0.15, 0.19, 0.045)),
         foliage("Olive leaf", (0.075, 0.10, 0.045), (0.21, 0.24, 0.14)),
-        foliage("Box leaf", (0.025, 0.065, 0.014), (0.085, 0.15, 0.03)),
+        foliage("Box leaf", (0.03, 0.075, 0.016), (0.10, 0.17, 0.035), 0.15),
         foliage("Cypress leaf", (0.018, 0.045, 0.016), (0.055, 0.10, 0.032), 0.15),
         foliage("Ivy leaf", (0.02, 0.06, 0.014), (0.10, 0.17, 0.04)),
         foliage("Lavender", (0.14, 0.07, 0.30), (0.30, 0.17, 0.50)),
@@ -539,8 +535,8 @@ def paving(site: Site) -> None:
         floor = slab_rows(rng, (-far, near), (near, far), 0.3, 0.3 / sqrt(min(1, site.detail)))
         turn = transform(rotation=(0, 0, number * pi / 2))
         tiles.append(slabs(rng, *floor, WALK_FLOOR, 0.003).transformed(turn))
-        steps_ = blocks((0, near - 0.15, 0.03), (1.75, 0.34, 0.1), 0.015)
-        tiles.append(steps_.painted(1).transformed(turn))
+        doorstep = blocks((0, near - 0.15, 0.03), (1.75, 0.34, 0.1), 0.015)
+        tiles.append(doorstep.painted(1).transformed(turn))
     add("Walk floors", join(tiles), *site.of("Terracotta floor", "Paving"), matrix=side(NORTH))
 
 
@@ -1017,9 +1013,8 @@ def upper_buildings(site: Site) -> None:
             place(f"Upper wall.{number}{i}", wall, at)
             place(f"Upper pane.{number}{i}", pane, at)
             for sign in (-1, 1):
-                opened = (sign * 0.53, -0.05, 6.36)
                 swing = sign * (0.12 + 0.25 * ((i * 5 + number) % 4 == 0))
-                turn = transform((*opened[:2], opened[2]), (0, 0, swing))
+                turn = transform((sign * 0.53, -0.05, 6.36), (0, 0, swing))
                 at_hinge = at @ turn @ transform((sign * 0.22, 0, 0))
                 place(f"Shutter.{number}{i}{sign}", wing, at_hinge)
         ends = (-BACK - 0.5, BACK) if number == NORTH else (-BACK, BACK + 0.5)
@@ -1511,10 +1506,10 @@ def shrubs(site: Site) -> None:
     """Clipped box balls at the lawns' corners, and lavender along the sunny kerbs."""
     rng = site.random("shrubs")
     balls = [
-        mesh("Box ball", leaf_cloud(rng, site.count(4500), (0.33,) * 3, 0.032, 0.6), leaf)
+        mesh("Box ball", leaf_cloud(rng, site.count(3000), (0.33,) * 3, 0.038, 0.65), leaf)
         for leaf in site.of("Box leaf") * 2
     ]
-    core = mesh("Box core", icosphere(2, 0.27), *site.of("Box leaf"))
+    core = mesh("Box core", icosphere(2, 0.27), *site.of("Turf"))
     for number in range(4):
         spots = [(LAWN - 0.45, LAWN - 0.45), (CROSS_PATH + 0.5, LAWN - 0.45)]
         spots += [
@@ -1541,20 +1536,20 @@ def shrubs(site: Site) -> None:
 
 def lavender(site: Site, rng: Generator) -> Shape:
     """A cushion of grey leaves with flower spikes on thin stalks."""
-    n = site.count(700)
+    n = site.count(350)
     way = unit_vectors(rng, n)
     way[:, 2] = np.abs(way[:, 2]) + 0.3
-    green = leaves(way * [0.06, 0.06, 0.02], way, unit_vectors(rng, n), 0.26, 0.05)
-    stalks = site.count(130)
+    green = leaves(way * [0.06, 0.06, 0.02], way, unit_vectors(rng, n), 0.26, 0.07)
+    stalks = site.count(100)
     lean = np.column_stack([rng.normal(0, 0.33, (stalks, 2)), np.ones(stalks)])
     lean /= np.linalg.norm(lean, axis=1, keepdims=True)
     tall = rng.uniform(0.33, 0.46, (stalks, 1))
     stem = leaves(lean * 0.05, lean, unit_vectors(rng, stalks), tall[:, 0], 0.012)
     spikes = []
-    for k in range(7):
-        spot = lean * (tall - 0.09 + 0.014 * k)
+    for k in range(5):
+        spot = lean * (tall - 0.09 + 0.02 * k)
         out = unit_vectors(rng, stalks) + lean
-        spikes.append(leaves(spot, out, unit_vectors(rng, stalks), 0.026, 0.7).painted(1))
+        spikes.append(leaves(spot, out, unit_vectors(rng, stalks), 0.032, 0.7).painted(1))
     return join([green, stem, *spikes])
 
 
