@@ -28,6 +28,12 @@ CAMERAS = {
     "perspective_tall": {"lens": "rectilinear", "focal_length": 24, "resolution": [48, 96]},
     "equidistant": {"lens": "equidistant", "fov": 180, "resolution": [96, 96]},
     "equidistant_220": {"lens": "equidistant", "fov": 220, "resolution": [96, 96]},
+    "equidistant_shifted": {
+        "lens": "equidistant",
+        "fov": 160,
+        "resolution": [96, 64],
+        "principal_point": [52, 30],
+    },
     "equisolid": {
         "lens": "equisolid",
         "fov": 180,

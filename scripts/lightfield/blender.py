@@ -168,11 +168,13 @@ def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
     camera.sensor_fit = "HORIZONTAL" if sensor_width >= sensor_height else "VERTICAL"
     camera.sensor_width, camera.sensor_height = sensor_width, sensor_height
     if "principal_point" in intrinsics:
-        # Blender counts the shift in sides of the image that sensor_fit names.
         width, height = lightfield["resolution"]
+        # Blender counts a perspective camera's shift in sides of the image that sensor_fit names,
+        # and a panoramic one's in widths and heights.
         side = width if sensor_width >= sensor_height else height
+        across, up = (side, side) if intrinsics["type"] == "PERSP" else (width, height)
         x, y = intrinsics["principal_point"]
-        camera.shift_x, camera.shift_y = (width / 2 - x) / side, (y - height / 2) / side
+        camera.shift_x, camera.shift_y = (width / 2 - x) / across, (y - height / 2) / up
     # Cycles clips a perspective view between these; nothing of a scene shall be cut away.
     camera.clip_start, camera.clip_end = 1e-4, 1e9
     if intrinsics["type"] == "PERSP":

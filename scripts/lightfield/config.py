@@ -19,6 +19,7 @@ import yaml
 
 from lightfield import rigs
 from lightfield.errors import UserError
+from lightfield.files import read_json
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = ROOT / "configs" / "scenes"
@@ -96,6 +97,7 @@ def load_datasets(config: Mapping[str, Any]) -> list[Dataset]:
     found: list[Dataset] = []
     for scene in config["scenes"]:
         found += scene_datasets(scene, config["preset"], config["presets"][config["preset"]])
+        _check_presence(scene, found[-1].source)
     if config["rigs"] == "all":
         return found
     known = {dataset.rig_name for dataset in found}
@@ -112,6 +114,10 @@ def scene_datasets(scene: str, preset: str, limits: Mapping[str, Any]) -> list[D
     """Resolve every dataset of one scene YAML under a preset's upper ``limits``."""
     settings = load_scene(scene)
     label = scene if preset == "full" else f"{scene}_{preset}"
+    source = settings["scene"]
+    if "blend" in source:
+        checksum = blend_sha256(scene)[0]
+        source = {**source, **({"sha256": checksum} if checksum else {})}
     render = dict(settings["render"])
     render["samples"] = min(render["samples"], limits.get("samples", render["samples"]))
     render["denoise"] = limits.get("denoise", render["denoise"])
@@ -128,13 +134,13 @@ def scene_datasets(scene: str, preset: str, limits: Mapping[str, Any]) -> list[D
         for key, export in settings["exports"].items():
             sources = [s for s in export["sources"] if s == VIEWS or s in reprojections]
             exports[key] = {**export, "sources": sources}
-        for folder, frame in _frames(name, rig, settings["scene"]):
+        for folder, frame in _frames(name, rig, source):
             found.append(
                 Dataset(
                     name=scene,
                     scene=label,
                     rig=folder,
-                    source={**settings["scene"], "frame": frame},
+                    source={**source, "frame": frame},
                     render=render,
                     cameras=cameras,
                     reprojections=reprojections,
@@ -142,6 +148,28 @@ def scene_datasets(scene: str, preset: str, limits: Mapping[str, Any]) -> list[D
                 )
             )
     return found
+
+
+def blend_sha256(scene: str) -> tuple[str | None, Path]:
+    """Return the SHA-256 that a scene's .blend must have, or None if no one knows it yet.
+
+    The second value is the file that says so, or that shall: the scene YAML or its lock file.
+    """
+    source = load_scene(scene)["scene"]
+    if "sha256" in source:
+        return source["sha256"], SCENES / f"{scene}.yaml"
+    lock = SCENES / f"{scene}.lock.json"
+    return (str(read_json(lock)["sha256"]) if lock.exists() else None), lock
+
+
+def _check_presence(scene: str, source: Mapping[str, Any]) -> None:
+    """Check that the user's .blend is where the scene YAML says, or can be downloaded."""
+    if "blend" in source and "url" not in source and not (ROOT / source["blend"]).is_file():
+        page = f"get it from {source['page']} and " if "page" in source else ""
+        raise UserError(
+            f"configs/scenes/{scene}.yaml: scene.blend: there is no file {source['blend']}; "
+            f"{page}put it there"
+        )
 
 
 def _frames(
@@ -227,10 +255,9 @@ def _check_source(source: Mapping[str, Any], fail: _Fail) -> None:
         known = builders()
         if source["builder"] not in known:
             fail("scene.builder", f"is {source['builder']!r}; must be one of {', '.join(known)}")
-        if "sha256" in source:
-            fail("scene.sha256", "goes with blend, not with builder")
-    elif "sha256" not in source:
-        fail("scene", "is missing the key sha256, which goes with blend")
+        for name in ("sha256", "url", "page"):
+            if name in source:
+                fail(f"scene.{name}", "goes with blend, not with builder")
 
 
 def _check_rig(key: str, rig: Mapping[str, Any], depth: str, fail: _Fail) -> None:
@@ -257,11 +284,6 @@ def _check_rig(key: str, rig: Mapping[str, Any], depth: str, fail: _Fail) -> Non
             f"{key}.camera.lens",
             f"is {camera['lens']!r}, which Cycles does not have; must be one of "
             f"{', '.join(_RENDERED)} (reproject for the others)",
-        )
-    if "principal_point" in camera and camera["lens"] != "rectilinear":
-        fail(
-            f"{key}.camera.principal_point",
-            f"is {camera['principal_point']}; Cycles shifts only the rectilinear lens",
         )
     if depth == "z" and _sees_behind(camera):
         fail(

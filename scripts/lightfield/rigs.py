@@ -197,33 +197,26 @@ def matrix_to_euler(matrix: Floats) -> Floats:
     # A fresh zero is positive: rounding noise and -0 must not decide between +π and −π.
     m = np.where(np.abs(matrix) < 1e-15, 0.0, matrix)
     cosine = np.hypot(m[..., 0, 0], m[..., 1, 0])
-    first = np.stack(
-        [
-            np.arctan2(m[..., 2, 1], m[..., 2, 2]),
-            np.arctan2(-m[..., 2, 0], cosine),
-            np.arctan2(m[..., 1, 0], m[..., 0, 0]),
-        ],
-        axis=-1,
-    )
-    second = np.stack(
-        [
-            np.arctan2(-m[..., 2, 1], -m[..., 2, 2]),
-            np.arctan2(-m[..., 2, 0], -cosine),
-            np.arctan2(-m[..., 1, 0], -m[..., 0, 0]),
-        ],
-        axis=-1,
-    )
-    locked = np.stack(
-        [
+    locked = cosine < 1e-12
+
+    def angles(sign: float) -> Floats:
+        x = np.where(
+            locked,
             np.arctan2(-m[..., 1, 2], m[..., 1, 1]),
-            np.arctan2(-m[..., 2, 0], cosine),
-            np.zeros_like(cosine),
-        ],
-        axis=-1,
-    )
+            np.arctan2(sign * m[..., 2, 1], sign * m[..., 2, 2]),
+        )
+        # Z from what is left when the turn about X is undone, so that the two agree however
+        # near gimbal lock is (Day, "Extracting Euler angles from a rotation matrix").
+        sine, cos = np.sin(x), np.cos(x)
+        z = np.arctan2(
+            sine * m[..., 0, 2] - cos * m[..., 0, 1], cos * m[..., 1, 1] - sine * m[..., 1, 2]
+        )
+        y = np.arctan2(-m[..., 2, 0], sign * cosine)
+        return np.stack([x, y, np.where(locked, 0.0, z)], axis=-1)
+
+    first, second = angles(1.0), angles(-1.0)
     smaller = np.abs(second).sum(-1) < np.abs(first).sum(-1) - 1e-12
-    angles = np.where(smaller[..., None], second, first)
-    return np.where((cosine < 1e-9)[..., None], locked, angles)
+    return np.where((smaller & ~locked)[..., None], second, first)
 
 
 def icosphere(subdivisions: int) -> Floats:

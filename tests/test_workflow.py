@@ -1,0 +1,149 @@
+"""The whole workflow through real bpy: a tiny dataset, every stage, and what can go wrong."""
+
+import filecmp
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+SNAKEMAKE = Path(sys.executable).with_name("snakemake")
+NOT_PART = shutil.ignore_patterns(
+    ".git", ".venv", ".snakemake", "results", "work", "__pycache__", ".*_cache"
+)
+CUBOID = Path("results/smoke/LFCuboid_1x1x1")
+
+
+@pytest.fixture(scope="session")
+def checkout(tmp_path_factory):
+    """Return a function that makes a fresh copy of the repository."""
+
+    def make(name):
+        folder = tmp_path_factory.mktemp(name) / "plenoforge"
+        shutil.copytree(ROOT, folder, ignore=NOT_PART)
+        return folder
+
+    return make
+
+
+def snakemake(folder, *arguments):
+    result = subprocess.run(
+        [SNAKEMAKE, *arguments], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout + result.stderr
+
+
+@pytest.fixture(scope="session")
+def smoke(checkout):
+    """A checkout in which the smoke dataset has been built."""
+    folder = checkout("smoke")
+    snakemake(folder, "--cores", "2", "smoke")
+    return folder
+
+
+def published(folder):
+    """Return the files of all datasets but for their reports, by relative path."""
+    results = folder / "results"
+    return {
+        path.relative_to(results): path
+        for path in sorted(results.rglob("*"))
+        if path.is_file()
+        and "report" not in path.relative_to(results).parts
+        # The index of all reports.
+        and path.parent != results
+    }
+
+
+def assert_same_bytes(one, other):
+    first, second = published(one), published(other)
+    assert list(first) == list(second)
+    different = [n for n in first if not filecmp.cmp(first[n], second[n], shallow=False)]
+    assert not different
+
+
+def rendered(folder):
+    """Return how often each view has been rendered, by journal and name."""
+    counts = Counter()
+    for journal in folder.glob("work/**/*.journal.jsonl"):
+        lines = [json.loads(line) for line in journal.read_text().splitlines()]
+        # Shards of other sizes have journals of their own for the same views.
+        counts.update((journal.parent, line["view"]) for line in lines if "view" in line)
+    return counts
+
+
+def test_every_dataset_is_valid_and_its_checksums_hold(smoke):
+    datasets = [path.parent for path in smoke.glob("results/smoke/*/validation.json")]
+    assert len(datasets) >= 3
+    for dataset in datasets:
+        assert json.loads((dataset / "validation.json").read_text())["valid"] is True
+        subprocess.run(
+            ["sha256sum", "--check", "--strict", "--quiet", "sha256sums.txt"],
+            cwd=dataset,
+            check=True,
+        )
+    assert len(list((smoke / CUBOID / "exr").glob("*.exr"))) == 6
+    assert len(list((smoke / CUBOID / "perspective").glob("view_*.png"))) == 6
+    transforms = json.loads((smoke / CUBOID / "perspective/transforms.json").read_text())
+    for frame in transforms["frames"]:
+        assert (smoke / CUBOID / "perspective" / frame["file_path"]).is_file()
+
+
+def test_a_second_run_does_nothing(smoke):
+    assert "Nothing to be done" in snakemake(smoke, "--cores", "2", "smoke")
+
+
+def test_shards_and_cores_do_not_change_a_byte(smoke, checkout):
+    other = checkout("other")
+    snakemake(other, "--cores", "1", "--config", "views_per_shard=2", "--", "smoke")
+    assert_same_bytes(smoke, other)
+
+
+def test_a_deleted_and_a_truncated_view_are_made_again_alone(smoke, checkout, tmp_path):
+    folder = tmp_path / "copy"
+    shutil.copytree(smoke, folder)
+    before = rendered(folder)
+    (folder / CUBOID / "exr/view_b0000f.exr").unlink()
+    half = folder / CUBOID / "exr/view_u0000f.exr"
+    os.truncate(half, half.stat().st_size // 2)
+    image = folder / CUBOID / "perspective/view_l0000f.png"
+    os.truncate(image, image.stat().st_size // 2)
+    snakemake(folder, "--cores", "2", "smoke")
+    again = rendered(folder) - before
+    assert sorted(name for _, name in again.elements()) == ["view_b0000f", "view_u0000f"]
+    assert_same_bytes(smoke, folder)
+
+
+def test_killed_at_any_moment_the_next_run_goes_on(smoke, checkout):
+    folder = checkout("killed")
+    moments = random.Random(7)
+    for _ in range(4):
+        run = subprocess.Popen(
+            [SNAKEMAKE, "--cores", "2", "--config", "views_per_shard=3", "--", "smoke"],
+            cwd=folder,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        time.sleep(moments.uniform(2, 12))
+        os.killpg(run.pid, signal.SIGKILL)
+        run.wait()
+        snakemake(folder, "--unlock", "smoke")
+    snakemake(folder, "--cores", "2", "--config", "views_per_shard=3", "--", "smoke")
+    assert max(rendered(folder).values()) == 1
+    assert_same_bytes(smoke, folder)
+
+
+@pytest.mark.parametrize("preset", ["tiny", "full"])
+def test_the_default_scene_plans_its_stages(preset, checkout, smoke):
+    plan = snakemake(smoke, "-n", "--cores", "1", "--config", f"preset={preset}")
+    assert "build_scene" in plan
+    assert "check_blend" not in plan
