@@ -245,8 +245,9 @@ def emissive(name: str, color: Color, strength: float) -> bpy.types.Material:
     return made
 
 
-def glass(name: str, color: Color, roughness: float = 0.0) -> bpy.types.Material:
-    return common.plain(name, color, Roughness=roughness, Transmission_Weight=1.0, IOR=1.45)
+def glass(name: str, color: Color, clear: float = 1.0) -> bpy.types.Material:
+    """Glass; `clear` below 1 is the glass of a bottle with cloudy lotion in it."""
+    return common.plain(name, color, Roughness=0.0, Transmission_Weight=clear, IOR=1.45)
 
 
 def pane(name: str, reflection: float) -> bpy.types.Material:
@@ -355,9 +356,8 @@ def materials() -> SimpleNamespace:
     m.grout = paint("Grout", (0.30, 0.27, 0.22), 0.9)
     m.porcelain = common.plain("Porcelain", (0.82, 0.80, 0.76), Roughness=0.08, Coat_Weight=0.3)
     m.pane = pane("Window pane", 0.12)
-    m.clear = glass("Clear glass", (0.97, 0.98, 0.97))
     m.bottles = [
-        glass(f"Bottle glass {i}", c)
+        glass(f"Bottle glass {i}", c, clear=0.65)
         for i, c in enumerate(
             [
                 (0.95, 0.96, 0.93),
@@ -370,7 +370,6 @@ def materials() -> SimpleNamespace:
         )
     ]
     m.barbicide = glass("Disinfectant", (0.05, 0.35, 0.85))
-    m.frosted = glass("Frosted glass", (0.90, 0.94, 0.92), 0.35)
     m.paper = paint("Paper", (0.78, 0.72, 0.58), 0.8)
     m.white = paint("White ink", (0.80, 0.79, 0.75), 0.5)
     m.black = paint("Black", (0.012, 0.012, 0.013), 0.35)
@@ -834,9 +833,9 @@ def lights(shop: Shop) -> None:
     hidden_area("Sun", sun, (4.2, 2.2), 260, (1.0, 0.86, 0.66), spread=2.5)
     fill = common.transform((0, 0, 2.05), (np.pi, 0, 0))
     hidden_area("Ceiling fill", fill, (3.6, 6.0), 48, WARM)
-    for y in (BEAMS[1], BEAMS[3]):
+    for y, watts in ((BEAMS[1], 125), (BEAMS[3], 80)):  # the back has no daylight
         pair = common.transform((0, y, 2.03))
-        hidden_area("Pendant light", pair, (2.8, 0.6), 84, WARM)
+        hidden_area("Pendant light", pair, (2.8, 0.6), watts, WARM)
     tubes = wall("left", 0) @ common.transform((0, 0.16, 2.36), np.radians((35, 0, 0)))
     hidden_area("Mirror light", tubes, (5.2, 0.14), 56, (1.0, 0.9, 0.76))
 
@@ -2817,10 +2816,10 @@ def towel_tower(shop: Shop) -> None:
     for k in range(9):
         basket.add(shop.ring(0.13 + 0.004 * k, 0.011, 40, 6), m.bristle, (0, 0, 0.011 + 0.02 * k))
     basket.add(shop.lathe([(0.12, 0.004), (0.12, 0.01)], 28), m.bristle)
-    put(basket.mesh("Basket"), where, (0, 0.16, height))
+    put(basket.mesh("Basket"), where, (0, 0.16, height - 0.02))
     for k in range(5):
         x, y = circle(0.07, 5)[k]
-        put(rolled[k % 4], where, (x, 0.16 + y, height + 0.02), (78, 0, 72 * k))
+        put(rolled[k % 4], where, (x, 0.16 + y, height + 0.12), (78, 0, 72 * k))
 
 
 def trolley(shop: Shop, pots: Sequence[bpy.types.Mesh]) -> None:
@@ -2960,7 +2959,7 @@ def hair_clippings(shop: Shop) -> None:
     for i, y in enumerate(STATIONS):
         for _ in range(shop.copies(26, 2)):
             angle, r = shop.rng.uniform(0, 2 * np.pi), shop.rng.uniform(0.62, 0.85)
-            at = (-1.40 + r * np.cos(angle), y + r * np.sin(angle), 0)
+            at = (-1.40 + r * np.cos(angle), y + r * np.sin(angle), 0.001)
             put(
                 tufts[i], Matrix(), at, (0, 0, shop.rng.uniform(0, 360)), shop.rng.uniform(0.7, 1.3)
             )
