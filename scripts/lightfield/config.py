@@ -318,6 +318,8 @@ def _check_camera(key: str, camera: Mapping[str, Any], fail: _Fail) -> None:
     if fov > limit or (lens == "rectilinear" and fov == limit):
         bound = "below" if lens == "rectilinear" else "at most"
         fail(f"{key}.fov", f"is {fov}; must be {bound} {limit:g} degrees for the {lens} lens")
+    if lens == "equirectangular" and "principal_point" in camera:
+        fail(f"{key}.principal_point", "does not go with the equirectangular lens; use its ranges")
     for name in ("longitude", "latitude"):
         if name in camera and camera[name][0] >= camera[name][1]:
             fail(f"{key}.{name}", f"is {camera[name]}; the smaller value must come first")
