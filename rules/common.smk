@@ -111,7 +111,7 @@ def scene_file(wildcards):
 def scene_check(wildcards):
     """Return the proof that the user's own .blend is the one meant; a built one needs none."""
     dataset = dataset_of(wildcards)
-    return f"{WORK}/{dataset.name}/blend.sha256" if "blend" in dataset.source else []
+    return f"{WORK}/{dataset.name}/blend.json" if "blend" in dataset.source else []
 
 
 def records(dataset, stage):
@@ -197,6 +197,12 @@ def packed_sums(wildcards):
 def source_of(name):
     """Return the `scene` block of a scene YAML that is being built."""
     return next(d.source for d in DATASETS.values() if d.name == name)
+
+
+def fingerprint(wildcards):
+    """Return what changes when a builder does; a user's .blend is an input, which is checked."""
+    source = dataset_of(wildcards).source
+    return scene_fingerprint(source) if "builder" in source else None
 
 
 def shard_minutes(wildcards):
@@ -287,5 +293,21 @@ def drop_false_records():
                 record.unlink()
 
 
+def drop_false_checks():
+    """Remove the proof of every .blend that is no longer the file that was checked."""
+    for dataset in DATASETS.values():
+        proof = Path(WORK, dataset.name, "blend.json")
+        if "blend" not in dataset.source or not proof.exists():
+            continue
+        checked = json.loads(proof.read_text())
+        try:
+            found = Path(dataset.source["blend"]).stat()
+        except FileNotFoundError:
+            continue
+        if (found.st_size, found.st_mtime_ns) != (checked["bytes"], checked["mtime_ns"]):
+            proof.unlink()
+
+
 if workflow.is_main_process:
     drop_false_records()
+    drop_false_checks()

@@ -2,6 +2,8 @@
 
 
 rule panorama_lightfield:
+    input:
+        check=scene_check,
     output:
         f"{PANORAMA}/lightfield.json",
     log:
@@ -14,7 +16,7 @@ rule panorama_lightfield:
         width=panorama_width,
         render=lambda wildcards: dataset_of(wildcards).render,
         center=lambda wildcards: dataset_of(wildcards).cameras["center"],
-        fingerprint=lambda wildcards: scene_fingerprint(dataset_of(wildcards).source),
+        fingerprint=fingerprint,
     message:
         "Placing the panorama of {wildcards.scene}/{wildcards.rig}"
     shell:

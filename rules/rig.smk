@@ -2,6 +2,8 @@
 
 
 rule lightfield:
+    input:
+        check=scene_check,
     output:
         f"{DATASET}/lightfield.json",
     log:
@@ -14,7 +16,7 @@ rule lightfield:
         # Not in the command: when what the YAML says of this dataset changes, so does the file.
         cameras=lambda wildcards: dataset_of(wildcards).cameras,
         render=lambda wildcards: dataset_of(wildcards).render,
-        fingerprint=lambda wildcards: scene_fingerprint(dataset_of(wildcards).source),
+        fingerprint=fingerprint,
     message:
         "Placing the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:

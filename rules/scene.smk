@@ -29,15 +29,38 @@ rule check_blend:
     input:
         lambda wildcards: source_of(wildcards.name)["blend"],
     output:
-        f"{WORK}/{{name}}/blend.sha256",
+        f"{WORK}/{{name}}/blend.json",
     log:
         f"{WORK}/logs/{{name}}/check_blend.log",
     conda:
         ENVIRONMENT
-    params:
-        sha256=lambda wildcards: source_of(wildcards.name)["sha256"],
     message:
         "Checking {input}"
     shell:
-        "python scripts/check_blend.py --blend {input:q} --sha256 {params.sha256}"
+        "python scripts/check_blend.py --scene {wildcards.name} --blend {input:q}"
         " --output {output} 2>&1 | tee {log}"
+
+
+# Only where a scene YAML says from where, and the user has not brought the file.
+for name, source in {
+    dataset.name: dataset.source
+    for dataset in DATASETS.values()
+    if "url" in dataset.source
+}.items():
+
+    rule:
+        name:
+            f"fetch_{name}"
+        output:
+            source["blend"],
+        log:
+            f"{WORK}/logs/{name}/fetch_blend.log",
+        conda:
+            ENVIRONMENT
+        params:
+            name=name,
+        message:
+            "Downloading {output}"
+        shell:
+            "python scripts/fetch_blend.py --scene {params.name} --output {output:q}"
+            " 2>&1 | tee {log}"

@@ -1,26 +1,38 @@
-"""Check that a .blend is the one that a scene YAML means, by its SHA-256."""
+"""Check that a .blend is the one that a scene YAML means, by its SHA-256.
+
+Where the scene YAML gives no SHA-256, the first file used is recorded beside it in a lock file,
+configs/scenes/<scene>.lock.json, and every later one must be the same.
+"""
 
 import argparse
 from pathlib import Path
 
+from lightfield import config
 from lightfield.cli import run
 from lightfield.errors import UserError
-from lightfield.files import atomic_path, sha256
+from lightfield.files import sha256, write_json
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--scene", required=True, help="name of a file in configs/scenes/")
     parser.add_argument("--blend", required=True, type=Path, help="file to check")
-    parser.add_argument("--sha256", required=True, help="what the scene YAML says")
-    parser.add_argument("--output", required=True, type=Path, help="written if it is right")
+    parser.add_argument("--output", required=True, type=Path, help="JSON, written if it is right")
     arguments = parser.parse_args()
+    status = arguments.blend.stat()
     found = sha256(arguments.blend)
-    if found != arguments.sha256:
-        raise UserError(
-            f"{arguments.blend}: its sha256 is {found}, but the scene YAML says {arguments.sha256}"
-        )
-    with atomic_path(arguments.output) as temporary:
-        temporary.write_text(f"{found}  {arguments.blend}\n")
+    expected, origin = config.blend_sha256(arguments.scene)
+    if expected is None:
+        write_json(origin, {"blend": arguments.blend.name, "sha256": found})
+        print(f"{arguments.blend}: its sha256 {found} is now recorded in {origin}")
+    elif found != expected:
+        raise UserError(f"{arguments.blend}: its sha256 is {found}, but {origin} says {expected}")
+    write_json(
+        arguments.output,
+        {"sha256": found, "bytes": status.st_size, "mtime_ns": status.st_mtime_ns},
+    )
 
 
 if __name__ == "__main__":

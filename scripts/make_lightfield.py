@@ -11,6 +11,9 @@ from lightfield.cli import run
 from lightfield.errors import UserError
 from lightfield.files import write_json
 
+# What of a scene YAML's `scene` block is written down: not where a file came from, nor where it is.
+SOURCE_KEYS = ("builder", "parameters", "frame")
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
@@ -57,7 +60,7 @@ def content(scene: str, dataset: config.Dataset, cameras: Mapping[str, Any]) -> 
         "frame": dataset.source["frame"],
         "scene": {
             "name": scene,
-            **dataset.source,
+            **{key: dataset.source[key] for key in SOURCE_KEYS if key in dataset.source},
             "fingerprint": keys.scene_fingerprint(dataset.source),
         },
         "render": dict(dataset.render),

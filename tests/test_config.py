@@ -66,7 +66,11 @@ BROKEN = {
     "unknown key": ("render.xyzzy", 4, "render.xyzzy: unknown key; allowed here: samples, "),
     "unknown builder": ("scene.builder", "nowhere", "'nowhere'; must be one of"),
     "two sources": ("scene.blend", "a.blend", "scene: must have one of builder and blend"),
-    "blend without sum": ("scene", {"blend": "a.blend"}, "scene: is missing the key sha256"),
+    "address of a builder": (
+        "scene.url",
+        "https://example.org/a.blend",
+        "scene.url: goes with blend, not with builder",
+    ),
     "bad sum": (
         "scene",
         {"blend": "a.blend", "sha256": "123"},

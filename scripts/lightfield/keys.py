@@ -19,8 +19,9 @@ RENDER_VERSION = 1
 def scene_fingerprint(source: Mapping[str, Any]) -> str:
     """Return what identifies a scene YAML's ``scene`` block: 64 hexadecimal digits.
 
-    A .blend is identified by its bytes. A built one differs from build to build (it holds
-    memory addresses), so it is identified by the builder's text, its parameters, and bpy's version.
+    A .blend is identified by its bytes; raises KeyError while their SHA-256 is not known. A built
+    one differs from build to build (it holds memory addresses), so it is identified by the
+    builder's text, its parameters, and bpy's version.
     """
     if "blend" in source:
         return str(source["sha256"])

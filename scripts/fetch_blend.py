@@ -1,0 +1,28 @@
+"""Download the .blend of a scene YAML, going on where an earlier download was cut off.
+
+Until it is whole and its SHA-256 is the one that the scene YAML or its lock file says, the file
+has the suffix .part.
+"""
+
+import argparse
+from pathlib import Path
+
+from lightfield import config, download
+from lightfield.cli import run
+from lightfield.errors import UserError
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scene", required=True, help="name of a file in configs/scenes/")
+    parser.add_argument("--output", required=True, type=Path, help=".blend to write")
+    arguments = parser.parse_args()
+    source = config.load_scene(arguments.scene)["scene"]
+    if "url" not in source:
+        raise UserError(f"configs/scenes/{arguments.scene}.yaml: scene: is missing the key url")
+    expected, origin = config.blend_sha256(arguments.scene)
+    download.fetch(source["url"], arguments.output, expected, str(origin))
+
+
+if __name__ == "__main__":
+    run(main)

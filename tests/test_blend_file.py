@@ -1,0 +1,290 @@
+"""Scenes that the user brings: downloaded, checked, and opened without running anything in them."""
+
+import hashlib
+import json
+import sys
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+from checkouts import checkout, planned, snakemake
+
+from lightfield import config, download
+from lightfield.errors import UserError
+from lightfield.files import sha256
+
+CONTENT = bytes(range(256)) * 12345
+SUM = hashlib.sha256(CONTENT).hexdigest()
+
+BLEND_SCENE = """
+scene: {{blend: {blend}{more}}}
+render: {{samples: 1}}
+rigs:
+  LFPlane:
+    type: plane
+    cameras: [2, 1]
+    camera: {{lens: rectilinear, fov: 90, resolution: [16, 16]}}
+"""
+
+
+class Server:
+    """A web server on this machine whose faults a test chooses."""
+
+    def __init__(self):
+        self.content = CONTENT
+        self.ranges = True
+        self.cut_after = []  # bytes after which each of the next transfers breaks off
+        self.asked = []  # the Range of each request
+        owner = self
+
+        class Handler(BaseHTTPRequestHandler):
+            def do_GET(self):
+                owner.answer(self)
+
+            def log_message(self, *arguments):
+                pass
+
+        self.http = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+        self.url = f"http://127.0.0.1:{self.http.server_port}/scene.blend"
+        threading.Thread(target=self.http.serve_forever, daemon=True).start()
+
+    def answer(self, request):
+        tag = f'"{hashlib.md5(self.content).hexdigest()}"'
+        wanted = request.headers.get("Range")
+        self.asked.append(wanted)
+        start = 0
+        if wanted and self.ranges and request.headers.get("If-Range", tag) == tag:
+            start = int(wanted.removeprefix("bytes=").rstrip("-"))
+            if start >= len(self.content):
+                request.send_response(416)
+                request.send_header("Content-Range", f"bytes */{len(self.content)}")
+                request.end_headers()
+                return
+            request.send_response(206)
+            last = len(self.content) - 1
+            request.send_header("Content-Range", f"bytes {start}-{last}/{len(self.content)}")
+        else:
+            request.send_response(200)
+        request.send_header("ETag", tag)
+        request.send_header("Content-Length", str(len(self.content) - start))
+        request.end_headers()
+        cut = self.cut_after.pop(0) if self.cut_after else len(self.content)
+        request.wfile.write(self.content[start : start + cut])
+        request.close_connection = True
+
+
+@pytest.fixture
+def server():
+    server = Server()
+    yield server
+    server.http.shutdown()
+    server.http.server_close()
+
+
+def test_a_transfer_that_breaks_off_goes_on_where_it_stopped(server, tmp_path):
+    target = tmp_path / "blends" / "scene.blend"
+    server.cut_after = [1_000_000, 500_000]
+    download.fetch(server.url, target, SUM, "the test")
+    assert target.read_bytes() == CONTENT
+    assert server.asked == [None, "bytes=1000000-", "bytes=1500000-"]
+    assert list(target.parent.iterdir()) == [target]
+
+
+def test_a_later_run_goes_on_with_what_an_earlier_one_has_left(server, tmp_path):
+    target = tmp_path / "scene.blend"
+    server.cut_after = [1_000_000, 0]
+    with pytest.raises(UserError, match=r"1000000 bytes are kept in .*scene\.blend\.part"):
+        download.fetch(server.url, target, SUM, "the test")
+    assert not target.exists()
+    server.asked.clear()
+    download.fetch(server.url, target, SUM, "the test")
+    assert target.read_bytes() == CONTENT
+    assert server.asked == ["bytes=1000000-"]
+
+
+def test_a_whole_part_is_not_asked_for_again(server, tmp_path):
+    target = tmp_path / "scene.blend"
+    download.fetch(server.url, target, SUM, "the test")
+    part = target.rename(tmp_path / "scene.blend.part")
+    tag = f'"{hashlib.md5(CONTENT).hexdigest()}"'
+    (tmp_path / "scene.blend.part.json").write_text(json.dumps({"version": tag}))
+    server.asked.clear()
+    download.fetch(server.url, target, SUM, "the test")
+    assert server.asked == [f"bytes={len(CONTENT)}-"]
+    assert target.read_bytes() == CONTENT
+    assert not part.exists()
+
+
+def test_a_server_without_ranges_sends_the_file_from_the_start(server, tmp_path):
+    target = tmp_path / "scene.blend"
+    server.ranges = False
+    server.cut_after = [1_000_000]
+    download.fetch(server.url, target, SUM, "the test")
+    assert target.read_bytes() == CONTENT
+
+
+def test_a_file_that_changed_meanwhile_is_fetched_anew(server, tmp_path):
+    target = tmp_path / "scene.blend"
+    server.cut_after = [1_000_000, 0]
+    with pytest.raises(UserError):
+        download.fetch(server.url, target, None, "the test")
+    server.content = CONTENT[::-1]
+    download.fetch(server.url, target, None, "the test")
+    assert target.read_bytes() == CONTENT[::-1]
+
+
+def test_a_wrong_file_is_refused_with_both_sums(server, tmp_path):
+    target = tmp_path / "scene.blend"
+    other = "0" * 64
+    with pytest.raises(UserError, match=f"its sha256 is {SUM}, but the test says {other}"):
+        download.fetch(server.url, target, other, "the test")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_server_that_is_not_there_is_told(tmp_path):
+    with pytest.raises(UserError, match="refused"):
+        download.fetch("http://127.0.0.1:9/scene.blend", tmp_path / "a.blend", SUM, "the test")
+
+
+@pytest.fixture
+def scene(tmp_path, monkeypatch):
+    """Return a function that writes a scene YAML with a .blend where the library looks for it."""
+    monkeypatch.setattr(config, "ROOT", tmp_path)
+    monkeypatch.setattr(config, "SCENES", tmp_path)
+
+    def write(more="", blend="brought.blend"):
+        (tmp_path / "own.yaml").write_text(BLEND_SCENE.format(blend=blend, more=more))
+        return tmp_path / blend
+
+    return write
+
+
+def check(monkeypatch, blend):
+    import check_blend
+
+    output = blend.with_suffix(".json")
+    output.unlink(missing_ok=True)
+    arguments = ["check_blend.py", "--scene", "own", "--blend", blend, "--output", output]
+    monkeypatch.setattr(sys, "argv", list(map(str, arguments)))
+    check_blend.main()
+    return json.loads(output.read_text())
+
+
+def test_the_first_file_used_is_recorded_and_every_later_one_checked(scene, monkeypatch):
+    blend = scene()
+    blend.write_bytes(CONTENT)
+    assert config.scene_datasets("own", "full", {})[0].source.get("sha256") is None
+    assert check(monkeypatch, blend)["sha256"] == SUM
+    lock = blend.with_name("own.lock.json")
+    assert json.loads(lock.read_text())["sha256"] == SUM
+    assert config.scene_datasets("own", "full", {})[0].source["sha256"] == SUM
+    check(monkeypatch, blend)
+    blend.write_bytes(CONTENT[1:])
+    with pytest.raises(UserError) as caught:
+        check(monkeypatch, blend)
+    for part in (str(blend), sha256(blend), SUM, str(lock)):
+        assert part in str(caught.value)
+    assert json.loads(lock.read_text())["sha256"] == SUM
+
+
+def test_the_sum_of_the_yaml_is_checked_and_needs_no_lock(scene, monkeypatch):
+    blend = scene(more=f", sha256: {SUM}")
+    blend.write_bytes(CONTENT)
+    check(monkeypatch, blend)
+    assert not blend.with_name("own.lock.json").exists()
+    blend.write_bytes(b"another")
+    with pytest.raises(UserError, match=rf"{sha256(blend)}, but .*own\.yaml says {SUM}"):
+        check(monkeypatch, blend)
+
+
+def test_a_missing_file_gives_the_page_and_the_place(scene):
+    scene(more=", page: 'https://example.org/scenes'", blend="blends/mine.blend")
+    content = {"scenes": ["own"], "preset": "full", "presets": {"full": {}}}
+    settings = config.load_config(content)
+    with pytest.raises(UserError) as caught:
+        config.load_datasets(settings)
+    assert "there is no file blends/mine.blend" in str(caught.value)
+    assert "get it from https://example.org/scenes and put it there" in str(caught.value)
+    # What can be downloaded may be missing.
+    scene(more=", url: 'https://example.org/mine.blend'", blend="blends/mine.blend")
+    assert len(config.load_datasets(settings)) == 1
+
+
+@pytest.mark.parametrize("name", ["garden", "lone_monk", "barbershop"])
+def test_an_original_has_the_rigs_of_the_scene_that_stands_in_for_it(name):
+    built, original = (config.load_scene(scene) for scene in (name, f"{name}_original"))
+    assert original["scene"]["page"].startswith("https://")
+    for key in ("render", "rigs", "reprojections", "exports"):
+        assert original[key] == built[key]
+
+
+TRAPS = """
+import bpy, sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[2])
+from scenes import test_room
+
+folder = sys.argv[1]
+bpy.ops.wm.read_factory_settings(use_empty=True)
+test_room.build({})
+text = bpy.data.texts.new("autorun.py")
+text.write(f"open({folder + '/script'!r}, 'w').close()")
+text.use_module = True
+driver = bpy.data.objects["cone"].driver_add("location", 2).driver
+driver.type = "SCRIPTED"
+driver.expression = f"open({folder + '/driver'!r}, 'w').close() or 0.5"
+bpy.ops.wm.save_as_mainfile(filepath=folder + "/trap.blend")
+for name in ("script", "driver"):
+    Path(folder, name).unlink(missing_ok=True)
+"""
+
+OPENED = """
+import sys
+from pathlib import Path
+folder = Path(sys.argv[1])
+sys.path.insert(0, sys.argv[2])
+import bpy
+bpy.ops.wm.open_mainfile(filepath=str(folder / "trap.blend"), use_scripts=True)
+bpy.context.scene.frame_set(3)
+print("trusted:", *sorted(path.name for path in folder.iterdir()))
+for name in ("script", "driver"):
+    (folder / name).unlink(missing_ok=True)
+from lightfield import blender
+blender.open_scene(folder / "trap.blend")
+bpy.context.scene.frame_set(2)
+bpy.context.scene.frame_set(3)
+print("ours:", *sorted(path.name for path in folder.iterdir()))
+"""
+
+
+def test_scripts_and_drivers_in_a_blend_do_not_run(run_program, tmp_path):
+    for name, text in (("make.py", TRAPS), ("open.py", OPENED)):
+        (tmp_path / name).write_text(text)
+    folder = tmp_path / "scene"
+    folder.mkdir()
+    scripts = config.BUILDERS.parent
+    run_program(tmp_path / "make.py", folder, scripts)
+    told = run_program(tmp_path / "open.py", folder, scripts).stdout.splitlines()
+    # The traps do work where Blender is told to trust the file.
+    assert "trusted: driver script trap.blend" in told
+    assert "ours: trap.blend" in told
+
+
+def test_a_blend_needs_no_builder_and_a_builder_no_blend(server, tmp_path):
+    folder = checkout(
+        tmp_path,
+        brought=BLEND_SCENE.format(blend="mine.blend", more=""),
+        fetched=BLEND_SCENE.format(blend="blends/fetched.blend", more=f", url: {server.url}"),
+        built=BLEND_SCENE.replace("blend: {blend}{more}", "builder: test_room").format(),
+    )
+    (folder / "mine.blend").write_bytes(CONTENT)
+    chosen = ("--config", "scenes=[brought,fetched,built]", "rigs=all", "preset=full")
+    jobs = planned(folder, *chosen)
+    assert jobs["render"] == 3
+    assert jobs["check_blend"] == 2
+    assert jobs["fetch_fetched"] == jobs["build_scene"] == 1
+    assert not any(name.startswith("fetch_") for name in jobs if name != "fetch_fetched")
+
+    result = snakemake(folder, "blends/fetched.blend", *chosen)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert (folder / "blends" / "fetched.blend").read_bytes() == CONTENT
