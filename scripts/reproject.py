@@ -432,7 +432,7 @@ def _write(
     row, end_row, column, end_column = made.window
     rows = slice(row - source.rows[0], end_row - source.rows[0])
     columns = slice(column - source.columns[0], end_column - source.columns[0])
-    color = source.color[rows, columns]
+    color = np.ascontiguousarray(source.color[rows, columns])
     depth = None if source.depth is None else source.depth[rows, columns]
     as_z = target.lens.has_z_depth
     if job.copies and source.is_z == as_z:
@@ -442,9 +442,9 @@ def _write(
     else:
         color = resample_color(color, made)
         if depth is not None:
-            kind = depth.dtype
+            found = resample_depth(depth, source.is_z, as_z, made)
             with np.errstate(over="ignore"):
-                depth = resample_depth(depth, source.is_z, as_z, made).astype(kind, copy=False)
+                depth = found.astype(depth.dtype, copy=False)
     empty = np.isnan(color[:, :, 0])
     if source.has_alpha:
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -158,7 +158,7 @@ def compute(
     centers32 = (centers - corner).astype(np.float32)
     nothing = np.isnan(centers[..., 0])
     scale = np.where(nothing, np.nan, magnification(jacobian))
-    return LensMap(
+    lens_map = LensMap(
         settings=settings(source, target, rotation, filter_name, samples),
         summary=_summary(scale),
         window=window,
@@ -171,6 +171,10 @@ def compute(
         footprints=footprints,
         counts=counts,
     )
+    # Read-only, as `load` gives them, so that both use the same compiled kernels.
+    for array in _arrays(lens_map).values():
+        array.flags.writeable = False
+    return lens_map
 
 
 def save(path: Path | str, lens_map: LensMap) -> None:
@@ -182,11 +186,9 @@ def save(path: Path | str, lens_map: LensMap) -> None:
             "window": lens_map.window,
         }
     ).encode()
-    fields = {
-        name: array
-        for name, array in vars(lens_map).items()
-        if isinstance(array, np.ndarray) and not (name == "samples" and array is lens_map.centers)
-    }
+    fields = _arrays(lens_map)
+    if lens_map.samples is lens_map.centers:
+        del fields["samples"]
     dtype = np.dtype(
         [("description", f"S{_HEADER}")]
         + [(name, array.dtype, array.shape) for name, array in fields.items()]
@@ -213,6 +215,14 @@ def load(path: Path | str) -> LensMap:
         )
     except (OSError, ValueError, KeyError, IndexError, TypeError) as error:
         raise UserError(f"{path}: is not a lens map that can be read: {error}") from None
+
+
+def _arrays(lens_map: LensMap) -> dict[str, Array]:
+    """Return the arrays by name, those of the largest items first, so that all are aligned."""
+    arrays = {
+        name: array for name, array in vars(lens_map).items() if isinstance(array, np.ndarray)
+    }
+    return dict(sorted(arrays.items(), key=lambda item: -item[1].itemsize))
 
 
 def warnings(lens_map: LensMap) -> list[str]:

@@ -32,8 +32,8 @@ _TAPS = {"bilinear": 2, "bicubic": 4, "lanczos": 6, ADAPTIVE: 4}
 FILTERS = tuple(SUPPORT)
 DEFAULT_FILTER = ADAPTIVE
 
-# Depth is interpolated where its third differences are below this fraction of it; a step twice
-# as large as what remains unseen, 1e-4, is the accuracy that depth is promised to have.
+# Depth is interpolated where its third differences are below this fraction of it, so a step of
+# half as much may remain unseen: 1e-4, or for halves what their own steps are.
 _SMOOTH = {np.dtype(np.float32): np.float32(2e-4), np.dtype(np.float16): np.float32(4e-3)}
 
 _F = TypeVar("_F", bound=Callable[..., Any])
@@ -515,11 +515,84 @@ def _inverse_distance_half(bits: Array, cos: Array, is_z: bool, out: Array) -> N
 
 
 @kernel
-def _bent(a: float, b: float, c: float, d: float, tolerance: np.float32) -> bool:
-    """Whether four neighbours are not of one smooth surface: true for NaN, too."""
-    largest = max(max(abs(a), abs(b)), max(abs(c), abs(d)))
-    smallest = min(min(a, b), min(c, d))
-    return not (abs(d - a + 3 * (b - c)) <= tolerance * largest and smallest > 0)
+def _bend(a: Any, b: Any, c: Any, d: Any, f: Any, tolerance: Any) -> Any:
+    """What a cubic through four neighbours adds to the line from b to c, at fraction ``f``.
+
+    NaN unless the four are of one smooth surface: where their third difference is small against
+    them, or where they curve one way, evenly, and not by much. A step between two surfaces curves
+    both ways. Source: Everett's interpolation formula.
+    """
+    before, after = a - 2 * b + c, b - 2 * c + d
+    third = abs(after - before)
+    if not third <= tolerance * b:
+        even = third <= np.float32(0.5) * max(abs(before), abs(after))
+        if not (even and before * after > 0 and abs(c - b) <= np.float32(0.05) * b):
+            return np.float32(np.nan)
+    g = np.float32(1) - f
+    one = np.float32(1)
+    return (g * (g * g - one) * before + f * (f * f - one) * after) * np.float32(1 / 6)
+
+
+@_inline
+def _smooth(
+    inverse: Array, x: Any, y: Any, tolerance: Any, topology: tuple[bool, bool, bool, int]
+) -> Any:
+    """Interpolate at (x, y), which counts from the first pixel's centre; NaN across an edge."""
+    height, width = inverse.shape
+    column, row = int(np.floor(x)), int(np.floor(y))
+    fx, fy = x - np.float32(column), y - np.float32(row)
+    within = row >= 1 and row < height - 2 and column >= 1 and column < width - 2
+    if within and topology[3] > 1:
+        panel = width // topology[3]
+        within = (column - 1) // panel == (column + 2) // panel
+    if within:
+        # Unsigned, so that no index is checked for counting from the end.
+        one, two, i, j = np.uint64(1), np.uint64(2), np.uint64(row), np.uint64(column)
+        a0, a1, a2, a3 = (
+            inverse[i, j - one],
+            inverse[i, j],
+            inverse[i, j + one],
+            inverse[i, j + two],
+        )
+        b0, b1, b2, b3 = (
+            inverse[i + one, j - one],
+            inverse[i + one, j],
+            inverse[i + one, j + one],
+            inverse[i + one, j + two],
+        )
+        c1, c2 = inverse[i - one, j], inverse[i - one, j + one]
+        d1, d2 = inverse[i + two, j], inverse[i + two, j + one]
+    else:
+        home = int(x + np.float32(0.5))
+        a0 = _value(inverse, row, column - 1, home, topology)
+        a1 = _value(inverse, row, column, home, topology)
+        a2 = _value(inverse, row, column + 1, home, topology)
+        a3 = _value(inverse, row, column + 2, home, topology)
+        b0 = _value(inverse, row + 1, column - 1, home, topology)
+        b1 = _value(inverse, row + 1, column, home, topology)
+        b2 = _value(inverse, row + 1, column + 1, home, topology)
+        b3 = _value(inverse, row + 1, column + 2, home, topology)
+        c1 = _value(inverse, row - 1, column, home, topology)
+        c2 = _value(inverse, row - 1, column + 1, home, topology)
+        d1 = _value(inverse, row + 2, column, home, topology)
+        d2 = _value(inverse, row + 2, column + 1, home, topology)
+    upper = a1 + fx * (a2 - a1) + _bend(a0, a1, a2, a3, fx, tolerance)
+    lower = b1 + fx * (b2 - b1) + _bend(b0, b1, b2, b3, fx, tolerance)
+    before = _bend(c1, a1, b1, d1, fy, tolerance)
+    after = _bend(c2, a2, b2, d2, fy, tolerance)
+    smooth = upper + fy * (lower - upper) + before + fx * (after - before)
+    if not smooth > 0:
+        return np.float32(np.nan)
+    low, high = min(min(a1, a2), min(b1, b2)), max(max(a1, a2), max(b1, b2))
+    return min(max(smooth, low), high)
+
+
+@kernel
+def _value(
+    inverse: Array, row: int, column: int, home: int, topology: tuple[bool, bool, bool, int]
+) -> Any:
+    row, column = _source_index(row, column, home, inverse.shape[0], inverse.shape[1], topology)
+    return inverse[row, column] if row >= 0 else np.float32(np.nan)
 
 
 @kernel
@@ -533,48 +606,20 @@ def _pick(
     out: Array,
 ) -> None:
     height, width = inverse.shape
-    wraps = topology[0]
-    panel = width // topology[3]
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
-            px = centers[i, j, 0]
-            if px != px:
+            x, y = centers[i, j, 0], centers[i, j, 1]
+            if x != x:
                 out[i, j] = np.nan
                 continue
-            py = centers[i, j, 1]
-            row = min(int(py), height - 1)
-            column = min(int(px), width - 1)
-            w = inverse[row, column]
-            x = px - np.float32(0.5)
-            y = py - np.float32(0.5)
-            c = int(np.floor(x))
-            r = int(np.floor(y))
-            within = c >= 1 and c < width - 2 and (c - 1) // panel == (c + 2) // panel
-            if r >= 1 and r < height - 2 and (within or wraps):
-                if within:
-                    c0, c1, c2, c3 = c - 1, c, c + 1, c + 2
-                else:
-                    c0, c1 = (c - 1) % width, c % width
-                    c2, c3 = (c + 1) % width, (c + 2) % width
-                a = inverse[r, c1]
-                b = inverse[r, c2]
-                d = inverse[r + 1, c1]
-                e = inverse[r + 1, c2]
-                if not (
-                    _bent(inverse[r, c0], a, b, inverse[r, c3], tolerance)
-                    or _bent(inverse[r + 1, c0], d, e, inverse[r + 1, c3], tolerance)
-                    or _bent(inverse[r - 1, c1], a, d, inverse[r + 2, c1], tolerance)
-                    or _bent(inverse[r - 1, c2], b, e, inverse[r + 2, c2], tolerance)
-                ):
-                    fx = x - np.float32(c)
-                    fy = y - np.float32(r)
-                    upper = a + fx * (b - a)
-                    lower = d + fx * (e - d)
-                    w = upper + fy * (lower - upper)
-            if w == 0:
+            half = np.float32(0.5)
+            found = _smooth(inverse, x - half, y - half, tolerance, topology)
+            if found != found:
+                found = inverse[min(int(y), height - 1), min(int(x), width - 1)]
+            if found == 0:
                 out[i, j] = np.inf
             else:
-                out[i, j] = (cos[i, j] if as_z else np.float32(1)) / w
+                out[i, j] = (cos[i, j] if as_z else np.float32(1)) / found
 
 
 def resample_depth(
@@ -583,8 +628,8 @@ def resample_depth(
     """Resample a depth window (h, w), half or float, at the target pixels' centres.
 
     ``source_is_z`` and ``target_is_z`` say which of Z-depth and distance the two images hold. On a
-    smooth surface 1 / distance is interpolated bilinearly, which is exact for a plane up to the
-    second order of the pixel's angle and never leaves the range of the four pixels; elsewhere the
+    smooth surface 1 / distance is interpolated, which is nearly linear for a plane, within the
+    range of the four pixels around; elsewhere the
     pixel that the ray falls in is taken, so no depth lies between two surfaces. Returns (H, W)
     float32; a miss (inf) stays inf, NaN marks a pixel without a source.
     """

@@ -1,0 +1,370 @@
+"""Resampling against analytic truth, OpenCV and OpenImageIO."""
+
+import math
+
+import cv2
+import numpy as np
+import OpenImageIO as oiio
+import pytest
+
+from lightfield import lens_map, resample
+from lightfield.lenses import Equidistant, Equirectangular, Lens, Rectilinear
+
+FILTERS = ["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp"]
+IDENTITY = np.eye(3)
+
+
+def rays_of(lens: Lens, offset=(0.0, 0.0)):
+    x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
+    return lens.rays(x + offset[0], y + offset[1])
+
+
+class Waves:
+    """A band-limited function on the sphere: a sum of plane waves, between 0 and 2."""
+
+    def __init__(self, most: float, count: int = 24, seed: int = 0) -> None:
+        rng = np.random.default_rng(seed)
+        length = np.exp(rng.uniform(math.log(most / 20), math.log(most), count))
+        direction = rng.standard_normal((count, 3))
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        self.vectors = direction * length[:, None]
+        self.phases = rng.uniform(0, 2 * math.pi, count)
+
+    def __call__(self, rays):
+        waves = np.cos(rays @ self.vectors.T + self.phases)
+        return 1 + waves.mean(axis=-1)
+
+    def pixels(self, lens: Lens, rotation=IDENTITY, nodes: int = 3):
+        """The mean over each pixel's area, by Gauss–Legendre quadrature."""
+        places, weights = np.polynomial.legendre.leggauss(nodes)
+        total = 0
+        for y, v in zip(places / 2, weights / 2, strict=True):
+            for x, u in zip(places / 2, weights / 2, strict=True):
+                total = total + u * v * self(rays_of(lens, (x, y)) @ rotation.T)
+        return total
+
+
+def as_source(gray):
+    return np.ascontiguousarray(np.repeat(gray[..., None], 4, axis=2), np.float32)
+
+
+def apply(source, made):
+    """Resample a whole image (h, w, 4), of which the map reads a window."""
+    row, end_row, column, end_column = made.window
+    return resample.resample_color(
+        np.ascontiguousarray(source[row:end_row, column:end_column]), made
+    )
+
+
+def apply_depth(depth, made, source_is_z=True, target_is_z=True):
+    row, end_row, column, end_column = made.window
+    return resample.resample_depth(
+        np.ascontiguousarray(depth[row:end_row, column:end_column]), source_is_z, target_is_z, made
+    )
+
+
+FISHEYE = Equidistant(width=256, height=256, fov=math.pi)
+PANORAMA = Equirectangular(width=512, height=256)
+
+
+def narrow_lens(size: int, focal_length: float = 18) -> Rectilinear:
+    return Rectilinear(width=size, height=size, focal_length=focal_length, sensor_size=(36, 36))
+
+
+# Colour
+
+
+def test_every_half_is_widened_as_numpy_does():
+    bits = np.arange(65536, dtype=np.uint16).reshape(256, 64, 4)
+    wide = resample.widen(bits.view(np.float16))
+    expected = bits.view(np.float16).astype(np.float32)
+    assert np.array_equal(wide, expected, equal_nan=True)
+
+
+def test_floats_are_narrowed_as_numpy_does_and_held_in_range():
+    rng = np.random.default_rng(0)
+    values = (rng.standard_normal((64, 64, 4)) * 10.0 ** rng.uniform(-9, 4, (64, 64, 4))).astype(
+        "f4"
+    )
+    assert np.array_equal(resample.narrow(values, 3), values.astype(np.float16)[:, :, :3])
+    extreme = np.full((1, 1, 4), [1e9, -1e9, 65519.9, 0], np.float32)
+    assert resample.narrow(extreme, 3).tolist() == [[[65504, -65504, 65504]]]
+
+
+def test_bilinear_equals_opencv_on_the_same_coordinates():
+    # Shifted by multiples of 1/32 pixel, to which OpenCV rounds its coordinates.
+    source = narrow_lens(64)
+    target = Rectilinear(
+        width=32,
+        height=32,
+        focal_length=18,
+        sensor_size=(36, 36),
+        principal_point=(16 + 5 / 64, 16 - 11 / 64),
+    )
+    made = lens_map.compute(source, target, IDENTITY, "bilinear")
+    image = np.random.default_rng(1).random((64, 64, 4), np.float32)
+    row, _, column, _ = made.window
+    x, y = made.centers[..., 0] + column - 0.5, made.centers[..., 1] + row - 0.5
+    assert np.allclose(x * 32, np.round(x * 32), atol=1e-3)
+    expected = cv2.remap(image, x.astype("f4"), y.astype("f4"), cv2.INTER_LINEAR)
+    assert np.abs(apply(image, made) - expected)[made.flags == lens_map.INSIDE].max() < 1e-5
+    assert (made.flags == lens_map.INSIDE).mean() > 0.9
+
+
+def test_bicubic_equals_openimageio():
+    made = {
+        name: lens_map.compute(FISHEYE, narrow_lens(200), IDENTITY, name)
+        for name in ("bicubic", "st_warp")
+    }
+    image = as_source(Waves(60).pixels(FISHEYE, nodes=1))
+    image[~np.isfinite(image)] = 0
+    difference = apply(image, made["bicubic"]) - apply(image, made["st_warp"])
+    assert np.abs(difference).max() < 1e-4
+
+
+def test_lanczos_weights_are_the_windowed_sinc():
+    for t in (0.0, 1e-6, 0.1, 0.5, 0.77, 0.999):
+        distance = t + 2 - np.arange(6)
+        expected = np.sinc(distance) * np.sinc(distance / 3)
+        found = resample._lanczos_weights(np.float32(t))
+        assert np.abs(np.array(found) - expected / expected.sum()).max() < 1e-6
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+@pytest.mark.parametrize(
+    ("size", "focal_length", "bounds"),
+    [
+        # Minified by 2.5 to 5: what does not cover the pixel aliases.
+        (32, 18, {"bicubic": (2e-2, 1), "adaptive": (0, 8e-4)}),
+        # About unity.
+        (160, 18, {"bilinear": (5e-3, 1), "bicubic": (0, 2e-3), "adaptive": (0, 2e-3)}),
+        # Magnified by 3: an adaptive filter must not blur.
+        (128, 67, {"bilinear": (7e-3, 1), "bicubic": (0, 3.5e-3), "adaptive": (0, 3.5e-3)}),
+    ],
+)
+def test_error_against_the_mean_of_an_analytic_function_over_each_pixel(size, focal_length, bounds):
+    # Up to half the source's Nyquist frequency.
+    function = Waves(math.pi / 2 * FISHEYE.width / math.pi)
+    source = as_source(function.pixels(FISHEYE, nodes=3))
+    rotation = lens_map.rotation_matrix(20, 10, 25)
+    target = narrow_lens(size, focal_length)
+    truth = function.pixels(target, rotation, nodes=10 if size < 100 else 3)
+    for name, (low, high) in bounds.items():
+        made = lens_map.compute(FISHEYE, target, rotation, name)
+        error = rms(apply(source, made)[..., 0] - truth)
+        assert low < error < high, name
+
+
+def test_samples_cover_the_whole_pixel():
+    # A source pixel column is brighter the further right it is, and so is its reprojection: the
+    # mean of n × n samples of a straight ramp is the ramp at the pixel's centre.
+    source, target = narrow_lens(64), narrow_lens(8)
+    ramp = as_source(np.tile(np.arange(64) + 0.5, (64, 1)))
+    for samples in (1, 2, 3, 8):
+        made = lens_map.compute(source, target, IDENTITY, "bilinear", samples)
+        assert np.allclose(apply(ramp, made)[..., 0], np.arange(8) * 8 + 4, atol=1e-4)
+    # Stripes as wide as a source pixel average out only if no sample is missing at the rim.
+    stripes = as_source(np.tile(np.arange(64) % 2 == 0, (64, 1)).astype(float))
+    made = lens_map.compute(source, target, IDENTITY, "nearest", 8)
+    assert np.array_equal(apply(stripes, made)[..., 0], np.full((8, 8), 0.5))
+
+
+@pytest.mark.parametrize("name", FILTERS)
+def test_what_lies_outside_the_image_circle_is_marked_and_nothing_is_smeared(name):
+    source = np.full((256, 256, 4), 0.5, np.float32)
+    source[np.isnan(rays_of(FISHEYE)[..., 0])] = 1e4
+    target = narrow_lens(64)
+    rotation = lens_map.rotation_matrix(70, 0, 0)
+    made = lens_map.compute(FISHEYE, target, rotation, name)
+    seen = (rays_of(target) @ rotation.T)[..., 2] <= 0
+    out = apply(source, made)
+    assert np.isnan(out[~seen]).all()
+    assert np.isfinite(out[seen]).mean() > 0.97
+    assert np.nanmax(np.abs(out - 0.5)) < 1e-5
+
+
+@pytest.mark.parametrize("name", FILTERS)
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_what_is_no_number_does_not_spread(name, bad):
+    function = Waves(20)
+    clean = as_source(function.pixels(FISHEYE, nodes=1))
+    clean[~np.isfinite(clean)] = 0
+    dirty = clean.copy()
+    dirty[100, 120, 1] = bad
+    dirty[130:142, 120:132] = bad
+    made = lens_map.compute(FISHEYE, narrow_lens(128), IDENTITY, name)
+    before, after = apply(clean, made), apply(dirty, made)
+    assert not np.isinf(after).any()
+    x, y = made.centers[..., 0] + made.window[2], made.centers[..., 1] + made.window[0]
+    deep = (x > 121) & (x < 131) & (y > 131) & (y < 141)
+    assert deep.any() and np.isnan(after[deep]).all()
+    block = (x >= 120) & (x <= 132) & (y >= 130) & (y <= 142)
+    pixel = (np.abs(x - 120.5) <= 0.5) & (np.abs(y - 100.5) <= 0.5)
+    lost = np.isnan(after[..., 0])
+    assert not lost[~(block | pixel)].any()
+    far = (np.abs(x - 126) > 11) | (np.abs(y - 136) > 11)
+    far &= (np.abs(x - 120.5) > 5) | (np.abs(y - 100.5) > 5)
+    assert np.array_equal(before[far], after[far])
+    assert np.nanmax(np.abs(before - after)) < 0.2
+
+
+@pytest.mark.parametrize("name", ["bicubic", "lanczos", "adaptive"])
+def test_a_bright_pixel_makes_no_light_negative(name):
+    source = np.full((256, 256, 4), 0.1, np.float32)
+    source[128, 128] = 60000
+    made = lens_map.compute(FISHEYE, narrow_lens(256), IDENTITY, name)
+    assert apply(source, made).min() >= 0
+
+
+@pytest.mark.parametrize("name", FILTERS[:5])
+def test_a_panorama_has_no_seam(name):
+    image = np.random.default_rng(2).random((256, 512, 4), np.float32)
+    target = narrow_lens(96)
+    behind = lens_map.compute(PANORAMA, target, lens_map.rotation_matrix(180, 0, 0), name)
+    ahead = lens_map.compute(PANORAMA, target, IDENTITY, name)
+    turned = np.roll(image, 256, axis=1)
+    assert np.abs(apply(image, behind) - apply(turned, ahead)).max() < 2e-3
+
+
+@pytest.mark.parametrize("pitch", [-90, 90])
+@pytest.mark.parametrize("size", [24, 256])
+def test_a_panorama_is_whole_at_its_poles(pitch, size):
+    function = Waves(25)
+    source = as_source(function.pixels(PANORAMA, nodes=3))
+    rotation = lens_map.rotation_matrix(17, pitch, 0)
+    target = narrow_lens(size)
+    truth = function.pixels(target, rotation, nodes=6)
+    made = lens_map.compute(PANORAMA, target, rotation, "adaptive")
+    error = np.abs(apply(source, made)[..., 0] - truth)
+    assert error.max() < 0.02
+    assert rms(error) < 2e-3
+
+
+def test_openimageio_agrees_about_a_rotated_view():
+    # The same rotation through OpenImageIO's own affine warp, about the image's centre.
+    lens = narrow_lens(128)
+    image = as_source(Waves(15).pixels(lens, nodes=1))
+    made = lens_map.compute(lens, lens, lens_map.rotation_matrix(0, 0, 30), "bicubic")
+    buffer = oiio.ImageBuf(oiio.ImageSpec(128, 128, 4, "float"))
+    buffer.set_pixels(oiio.ROI(0, 128, 0, 128, 0, 1, 0, 4), image)
+    # A camera that turns clockwise sees the image turn counterclockwise.
+    turned = oiio.ImageBufAlgo.rotate(buffer, math.radians(-30), 64.0, 64.0, "cubic", 0.0)
+    inner = np.s_[40:88, 40:88, 0]
+    difference = apply(image, made)[inner] - np.asarray(turned.get_pixels(oiio.FLOAT))[inner]
+    assert np.abs(difference).max() < 0.02
+
+
+# Depth
+
+
+def plane_distance(rays, normal, offset):
+    """The distance along each ray to the plane normal · p = offset; inf where it is missed."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = offset / (rays @ normal)
+    return np.where(distance > 0, distance, np.inf)
+
+
+def sphere_distance(rays, center, radius):
+    """The distance along each ray to a sphere in front of the camera; inf where it is missed."""
+    along = rays @ center
+    with np.errstate(invalid="ignore"):
+        distance = along - np.sqrt(along**2 - center @ center + radius**2)
+    return np.where(distance > 0, distance, np.inf)
+
+
+def as_depth(distance, lens, dtype=np.float32):
+    rays = rays_of(lens)
+    if lens.has_z_depth:
+        distance = np.where(np.isinf(distance), np.inf, distance * -rays[..., 2])
+    return distance.astype(dtype)
+
+
+SOURCES = [
+    Equidistant(width=384, height=384, fov=math.pi),
+    Equidistant(width=512, height=512, fov=math.radians(270)),
+    Equirectangular(width=768, height=384),
+]
+TARGETS = [narrow_lens(100), Equidistant(width=96, height=96, fov=math.radians(240))]
+
+
+@pytest.mark.parametrize("source", SOURCES)
+@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("turn", [-20, 85])
+def test_the_depth_of_planes_and_a_sphere_is_exact_away_from_edges(source, target, turn):
+    rotation = lens_map.rotation_matrix(35, turn, 15)
+    made = lens_map.compute(source, target, rotation, "adaptive")
+    rays = rays_of(target)
+    covered = 0
+    for surface in (
+        lambda rays: plane_distance(rays, np.array([0.2, 0.1, -1.0]), 3.0),
+        lambda rays: plane_distance(rays, np.array([0.0, -1.0, 0.0]), 1.7),
+        lambda rays: sphere_distance(rays, np.array([-0.7, 0.4, -2.5]), 1.5),
+    ):
+        distance = surface(rays_of(source))
+        found = apply_depth(
+            as_depth(distance, source), made, source.has_z_depth, target.has_z_depth
+        )
+        expected = surface(rays @ rotation.T)
+        seen = ~np.isnan(made.centers[..., 0])
+        assert np.isnan(found[~seen]).all()
+        if target.has_z_depth:
+            expected = expected * -rays[..., 2]
+        # Three source pixels from where the surface ends.
+        hit = np.isfinite(distance) & (distance < 100)
+        # A panorama ends nowhere, neither at its seam nor at its poles.
+        beyond = 1 if isinstance(source, Equirectangular) else 0
+        inside = cv2.erode(hit.astype(np.uint8), np.ones((7, 7)), borderValue=beyond) > 0
+        row, column = (
+            np.clip(np.nan_to_num(made.centers[..., i]).astype(int) + made.window[2 * j], 0, limit)
+            for i, j, limit in ((1, 0, source.height - 1), (0, 1, source.width - 1))
+        )
+        tested = seen & inside[row, column]
+        covered += tested.sum()
+        assert np.abs(found[tested] / expected[tested] - 1).max(initial=0) < 1e-4
+    assert covered > 2000
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float16])
+def test_no_depth_lies_between_two_surfaces(dtype):
+    source = Equidistant(width=384, height=384, fov=math.pi)
+    rays = rays_of(source)
+    # A comb of bars at z = 2 before a wall at z = 6, and nothing above.
+    near, far = (plane_distance(rays, np.array([0, 0, -1.0]), z) for z in (2.0, 6.0))
+    slope = rays[..., 0] / -rays[..., 2]
+    distance = np.where(np.floor(slope * 7) % 2 == 0, near, far)
+    distance = np.where(rays[..., 1] > 0.4, np.inf, distance)
+    made = lens_map.compute(source, narrow_lens(300), IDENTITY, "adaptive")
+    depth = apply_depth(as_depth(distance, source, dtype), made)
+    assert set(np.round(depth[np.isfinite(depth)], 1)) == {2.0, 6.0}
+    assert np.isinf(depth).mean() > 0.1
+    assert not np.isnan(depth).any()
+
+
+def test_depth_stays_within_its_neighbourhood_and_missing_values_stay_where_they_are():
+    source = Equidistant(width=256, height=256, fov=math.pi)
+    rng = np.random.default_rng(3)
+    distance = rng.uniform(1, 9, (256, 256))
+    distance[60:90, 60:90] = np.inf
+    distance[120:150, 60:90] = np.nan
+    made = lens_map.compute(source, narrow_lens(200), IDENTITY, "adaptive")
+    found = apply_depth(distance.astype("f4"), made, False, False)
+    low, high = (morphology(distance, np.ones((3, 3))) for morphology in (cv2.erode, cv2.dilate))
+    row, column = (
+        np.floor(made.centers[..., i] + made.window[2 * j]).astype(int) for i, j in ((1, 0), (0, 1))
+    )
+    finite = np.isfinite(low[row, column]) & np.isfinite(high[row, column])
+    assert finite.mean() > 0.8
+    assert (found >= low[row, column] * (1 - 1e-6))[finite].all()
+    assert (found <= high[row, column] * (1 + 1e-6))[finite].all()
+    assert np.array_equal(np.isinf(found), np.isinf(distance[row, column]))
+    assert np.array_equal(np.isnan(found), np.isnan(distance[row, column]))
+
+
+def test_depth_is_taken_at_the_pixel_centre_whatever_the_samples():
+    source = Equidistant(width=256, height=256, fov=math.pi)
+    depth = as_depth(plane_distance(rays_of(source), np.array([0.3, 0, -1.0]), 2.0), source)
+    one, many = (lens_map.compute(source, narrow_lens(64), IDENTITY, "bicubic", n) for n in (1, 4))
+    assert np.allclose(apply_depth(depth, one), apply_depth(depth, many), rtol=1e-6)
