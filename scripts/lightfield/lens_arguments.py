@@ -157,7 +157,9 @@ def add_geometry_flags(parser: argparse.ArgumentParser) -> None:
     kind.add_argument("--nn", action="store_const", dest="filter", const="nearest")
     kind.add_argument("--bl", action="store_const", dest="filter", const="bilinear")
     kind.add_argument("--bc", action="store_const", dest="filter", const="bicubic")
-    kind.add_argument("--filter", choices=FILTERS, help=f"default {DEFAULT_FILTER}")
+    kind.add_argument(
+        "--filter", choices=FILTERS, help=f"default {DEFAULT_FILTER}, or bicubic with --samples"
+    )
 
 
 def _add_lens_flags(parser: argparse.ArgumentParser, prefix: str, title: str) -> None:
@@ -226,7 +228,8 @@ def geometry(arguments: argparse.Namespace) -> Geometry:
         config=config,
         source=source,
         targets=_targets(arguments, source),
-        filter=arguments.filter or DEFAULT_FILTER,
+        # The adaptive filter covers the pixel by itself; samples are those of SILVR's default.
+        filter=arguments.filter or (DEFAULT_FILTER if arguments.samples == 1 else "bicubic"),
         samples=arguments.samples,
     )
 

@@ -213,7 +213,7 @@ def load(path: Path | str) -> LensMap:
             window=tuple(description["window"]),
             **({"samples": arrays["centers"]} | arrays),
         )
-    except (OSError, ValueError, KeyError, IndexError, TypeError) as error:
+    except (OSError, EOFError, ValueError, KeyError, IndexError, TypeError) as error:
         raise UserError(f"{path}: is not a lens map that can be read: {error}") from None
 
 

@@ -1,0 +1,166 @@
+"""Lens maps: geometry against closed forms, and the file."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from lightfield import lens_map
+from lightfield.errors import UserError
+from lightfield.lenses import CubeMap, Equidistant, Equirectangular, Rectilinear
+
+FISHEYE = Equidistant(width=101, height=101, fov=math.pi)
+IDENTITY = np.eye(3)
+
+
+def rectilinear(size: int, focal_length: float = 18) -> Rectilinear:
+    return Rectilinear(width=size, height=size, focal_length=focal_length, sensor_size=(36, 36))
+
+
+def full_centers(made):
+    return made.centers + np.array([made.window[2], made.window[0]])
+
+
+@pytest.mark.parametrize(
+    ("angles", "forward", "up"),
+    [
+        ((90, 0, 0), (-1, 0, 0), (0, 1, 0)),  # left
+        ((0, 90, 0), (0, -1, 0), (0, 0, -1)),  # down
+        ((0, 0, 90), (0, 0, -1), (1, 0, 0)),  # clockwise: the camera's up points right
+    ],
+)
+def test_rotations_turn_left_down_and_clockwise(angles, forward, up):
+    matrix = lens_map.rotation_matrix(*angles)
+    assert np.allclose(matrix @ [0, 0, -1], forward, atol=1e-12)
+    assert np.allclose(matrix @ [0, 1, 0], up, atol=1e-12)
+
+
+def test_rotation_is_the_published_tools():
+    # R_y(pan) R_x(pitch) R_z(roll) in a frame whose y points down.
+    pan, pitch, roll = 31.0, -17.0, 58.0
+    published = Rotation.from_euler("YXZ", [pan, pitch, roll], degrees=True).as_matrix()
+    flip = np.diag([1, -1, 1])
+    assert np.allclose(lens_map.rotation_matrix(pan, pitch, roll), flip @ published @ flip)
+
+
+def test_a_pixel_of_a_perspective_view_finds_its_place_in_the_fisheye():
+    made = lens_map.compute(FISHEYE, rectilinear(64), IDENTITY)
+    centers = full_centers(made)
+    for column, row in ((0, 0), (40, 7), (63, 32)):
+        x, y = (column + 0.5 - 32) / 32, (row + 0.5 - 32) / 32  # f = half the width
+        angle = math.atan(math.hypot(x, y))
+        radius = angle / (math.pi / 2) * 50.5 / math.hypot(x, y)
+        assert np.allclose(centers[row, column], [50.5 + radius * x, 50.5 + radius * y], atol=1e-4)
+    assert np.allclose(made.target_cos[7, 40], math.cos(math.atan(math.hypot(8.5, 24.5) / 32)))
+
+
+def test_a_lens_maps_onto_itself():
+    made = lens_map.compute(FISHEYE, FISHEYE, IDENTITY)
+    x, y = np.meshgrid(np.arange(101) + 0.5, np.arange(101) + 0.5)
+    inside = np.hypot(x - 50.5, y - 50.5) <= 50.5
+    seen = ~np.isnan(made.centers[..., 0])
+    assert np.array_equal(seen, inside)
+    assert np.abs(full_centers(made) - np.stack([x, y], axis=-1))[seen].max() < 1e-4
+    assert np.nanmax(np.abs(made.magnification[2:-2, 2:-2] - 1)) < 1e-3
+
+
+@pytest.mark.parametrize(("size", "expected"), [(200, 2.0), (50, 0.5)])
+def test_magnification_of_a_plain_change_of_size(size, expected):
+    made = lens_map.compute(rectilinear(100), rectilinear(size), IDENTITY, "bicubic")
+    assert np.allclose(made.magnification, expected, rtol=1e-5)
+    assert made.summary == pytest.approx(
+        {"min": expected, "median": expected, "max": expected, "covered": 1.0}, rel=1e-5
+    )
+    told = " ".join(lens_map.warnings(made))
+    assert ("upsampling" in told) == (size == 200)
+    assert ("aliasing" in told) == (size == 50)
+
+
+def test_a_filter_that_covers_the_pixel_is_not_warned_of_aliasing():
+    for name, samples in (("adaptive", 1), ("bicubic", 4)):
+        made = lens_map.compute(rectilinear(128), rectilinear(32), IDENTITY, name, samples)
+        assert lens_map.warnings(made) == []
+
+
+def test_how_sources_continue():
+    def topology(lens):
+        return lens_map.compute(lens, rectilinear(4), IDENTITY).topology
+
+    low = Equirectangular(width=64, height=16, latitude=(-math.pi / 2, 0))
+    slice_ = Equirectangular(width=64, height=32, longitude=(-1, 1))
+    assert topology(Equirectangular(width=64, height=32)) == (True, True, True, 1)
+    assert topology(low) == (True, False, True, 1)
+    assert topology(slice_) == (False, False, False, 1)
+    assert topology(FISHEYE) == (False, False, False, 1)
+    assert topology(CubeMap(width=96, height=16)) == (False, False, False, 6)
+
+
+def test_the_window_holds_all_that_is_read_and_little_more():
+    made = lens_map.compute(
+        Equidistant(width=400, height=400, fov=math.pi), rectilinear(50), IDENTITY, "bicubic"
+    )
+    # 90 degrees of 180, and the kernel's reach.
+    assert made.window == pytest.approx((100, 300, 100, 300), abs=6)
+    assert made.source_cos.shape == (
+        made.window[1] - made.window[0],
+        made.window[3] - made.window[2],
+    )
+
+
+def test_what_the_source_does_not_see_is_marked():
+    away = lens_map.rotation_matrix(180, 0, 0)
+    made = lens_map.compute(FISHEYE, rectilinear(16), away)
+    assert not made.flags.any() and np.isnan(made.centers).all()
+    assert made.summary["covered"] == 0
+    assert "sees nothing" in lens_map.warnings(made)[0]
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 7])
+@pytest.mark.parametrize("name", ["bicubic", "adaptive"])
+def test_the_smallest_images(size, name):
+    made = lens_map.compute(FISHEYE, rectilinear(size), IDENTITY, name)
+    assert made.summary["covered"] == 1
+    assert np.isfinite(made.magnification).all()
+    tiny = lens_map.compute(Equidistant(width=size, height=size, fov=2), rectilinear(9), IDENTITY)
+    assert tiny.centers.shape == (9, 9, 2)
+
+
+@pytest.mark.parametrize(("name", "samples"), [("adaptive", 1), ("bicubic", 3), ("nearest", 1)])
+def test_a_file_gives_back_what_was_saved(tmp_path, name, samples):
+    path = tmp_path / "map.npy"
+    made = lens_map.compute(
+        FISHEYE, rectilinear(20), lens_map.rotation_matrix(10, 0, 0), name, samples
+    )
+    lens_map.save(path, made)
+    loaded = lens_map.load(path)
+    assert loaded.settings == made.settings and loaded.summary == made.summary
+    assert loaded.window == made.window
+    for key, value in vars(made).items():
+        if isinstance(value, np.ndarray):
+            found = getattr(loaded, key)
+            assert np.array_equal(found, value, equal_nan=True), key
+            assert isinstance(found, np.memmap) and found.flags.aligned, key
+    first = path.read_bytes()
+    lens_map.save(path, made)
+    assert path.read_bytes() == first
+
+
+def test_any_other_file_is_refused(tmp_path):
+    path = tmp_path / "map.npy"
+    for content in (b"", b"no map", np.arange(3).tobytes()):
+        path.write_bytes(content)
+        with pytest.raises(UserError, match=r"map\.npy: is not a lens map"):
+            lens_map.load(path)
+    np.save(path, np.arange(3))
+    with pytest.raises(UserError, match="is not a lens map"):
+        lens_map.load(path)
+
+
+def test_settings_that_make_no_sense_are_refused():
+    with pytest.raises(UserError, match="samples"):
+        lens_map.compute(FISHEYE, rectilinear(4), IDENTITY, "bicubic", 0)
+    with pytest.raises(UserError, match="covers the whole pixel"):
+        lens_map.compute(FISHEYE, rectilinear(4), IDENTITY, "adaptive", 2)
+    with pytest.raises(UserError, match="'cubic' is not one of"):
+        lens_map.compute(FISHEYE, rectilinear(4), IDENTITY, "cubic")

@@ -1,0 +1,58 @@
+"""Tone mapping against published values and scikit-image's sRGB."""
+
+import numpy as np
+import pytest
+from skimage.color import xyz2rgb
+
+from lightfield.tonemap import decode_srgb, encode_srgb, to_8_bit, tone_map
+
+
+def test_reinhard_makes_its_maximum_white_and_keeps_order():
+    values = np.array([0.0, 0.5, 1.0, 2.0, 5.0], np.float32)
+    # v (1 + v / 25) / (1 + v), worked out by hand.
+    expected = [0.0, 0.34, 0.52, 0.72, 1.0]
+    assert np.allclose(tone_map(values, 0.0, 5.0), expected, atol=1e-6)
+
+
+def test_exposure_counts_in_stops_and_a_maximum_of_one_changes_nothing():
+    values = np.array([[0.25, 3.0, 60000.0]], np.float32)
+    assert np.allclose(tone_map(values, -1.0, 1.0), values / 2, rtol=1e-6)
+    assert np.allclose(tone_map(values, 3.0, 1.0), values * 8, rtol=1e-6)
+    assert tone_map(values, 0.0, 1.0) is values
+
+
+def test_no_negative_value_passes_the_pole_of_the_curve():
+    values = np.array([-0.5, -1.0, -2.0, np.nan], np.float32)
+    out = tone_map(values, 0.0, 5.0)
+    assert out[:3].tolist() == [0, 0, 0] and np.isnan(out[3])
+
+
+def reference_srgb(linear):
+    """Encode grey with scikit-image, from the XYZ of the same grey."""
+    white = np.array([0.412453 + 0.357580 + 0.180423, 1.0, 0.019334 + 0.119193 + 0.950227])
+    return xyz2rgb(np.asarray(linear)[:, None] * white)[:, 1]
+
+
+def test_srgb_is_that_of_scikit_image():
+    linear = np.concatenate([np.linspace(0, 1, 5001), np.geomspace(1e-6, 1, 500)])
+    assert np.abs(encode_srgb(linear) - reference_srgb(linear)).max() < 1e-5
+    assert np.abs(decode_srgb(encode_srgb(linear)) - linear).max() < 1e-12
+
+
+def test_8_bit_codes_are_the_nearest_ones():
+    linear = np.random.default_rng(0).random((400, 400, 3), np.float32) ** 2
+    codes = to_8_bit(linear).astype(int)
+    exact = 255 * reference_srgb(linear.ravel()).reshape(linear.shape)
+    assert np.abs(codes - exact).max() < 0.5 + 1e-3
+
+
+@pytest.mark.parametrize("step", [-1, 0, 1])
+def test_every_8_bit_code_survives_the_way_there_and_back(step):
+    codes = np.arange(256)
+    linear = np.nextafter(decode_srgb(codes / 255).astype(np.float32), np.float32(step))
+    assert np.array_equal(to_8_bit(linear), codes)
+
+
+def test_what_is_out_of_range_is_clipped():
+    values = np.array([-1.0, -0.0, 1.0, 7.0, np.inf, -np.inf, np.nan], np.float32)
+    assert to_8_bit(values).tolist() == [0, 0, 255, 255, 255, 0, 0]
