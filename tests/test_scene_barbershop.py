@@ -111,18 +111,20 @@ def test_cameras_keep_clear(scene):
 
 
 def test_closed_and_rich_on_every_side(scene):
-    """From the middle every ray meets the room or its window, and many different objects."""
-    met = {}
+    """From the middle every ray meets the room or its window, and many surfaces on each side."""
+    met, objects = {}, set()
     for ray in np.random.default_rng(7).normal(size=(3000, 3)):
-        hit, place, _, _, thing, _ = bpy.context.scene.ray_cast(
+        hit, place, _, face, thing, _ = bpy.context.scene.ray_cast(
             scene, Vector((0, 0, 1.05)), Vector(ray)
         )
         assert hit, ray
         assert (np.abs(place) <= (2.501, 3.85, 3.001)).all() and place.z > -0.03, (place, thing)
         axis = int(np.abs(ray).argmax())
-        met.setdefault((axis, bool(ray[axis] > 0)), set()).add(thing.name)
-    assert len(set.union(*met.values())) >= 200
-    assert len(met) == 6 and min(len(names) for names in met.values()) >= 5, met
+        surface = thing.name, thing.data.polygons[face].material_index
+        met.setdefault((axis, bool(ray[axis] > 0)), set()).add(surface)
+        objects.add(thing.name)
+    assert len(objects) >= 200
+    assert len(met) == 6 and min(len(surfaces) for surfaces in met.values()) >= 12, met
 
 
 def test_file_is_small_and_self_contained(scene, tmp_path):
