@@ -50,7 +50,7 @@ NEIGHBOURS = 6
 # Among so many of the nearest views are the farther neighbours.
 NEIGHBOURHOOD = 48
 
-UNSEEN, AGREE, OCCLUDED, CONTRADICT = 0, 1, 2, 3
+UNKNOWN, AGREE, OCCLUDED, CONTRADICT = 0, 1, 2, 3
 
 
 @dataclass(frozen=True)
@@ -58,11 +58,14 @@ class Camera:
     """Where a view is and what it sees: its lens, camera-to-world (4, 4), and what its depth means.
 
     ``depth`` is ``"z"`` (along the optical axis) or ``"distance"`` (along the ray), in metres.
+    ``grain`` is the angle in radians, if any, within which a depth may come from beside its
+    pixel's centre: a pixel of the view from which this one was reprojected.
     """
 
     lens: Lens
     world_matrix: Array
     depth: str
+    grain: float = 0.0
 
     @property
     def position(self) -> Array:
@@ -88,15 +91,16 @@ class Patches:
     """Surface patches of one view, in world coordinates and metres; n of them.
 
     points (n, 3): the centres; normals (n, 3): unit, towards the camera; spread (n,): standard
-    deviation of the nine points from their plane; footprint (n,): the width of a pixel at that
-    distance, across the ray; precision (n,): what the file's number format resolves.
+    deviation of the nine points from their plane; footprint (n,): the width of a pixel, or of the
+    grain if that is coarser, at that distance, across the ray; error (n,): how far the plane may
+    lie off the surface by the grain and by what the file's number format resolves.
     """
 
     points: Array
     normals: Array
     spread: Array
     footprint: Array
-    precision: Array
+    error: Array
 
     def __len__(self) -> int:
         return len(self.points)
@@ -128,16 +132,19 @@ def _patches(
         widths = [
             np.linalg.norm(directions[:, a] - directions[:, b], axis=1) for a, b in ((3, 5), (1, 7))
         ]
-        footprint = distance * np.sqrt(widths[0] * widths[1]) / 2
+        footprint = distance * np.maximum(np.sqrt(widths[0] * widths[1]) / 2, camera.grain)
         # Nine points less the three unknowns of a plane.
         spread = np.sqrt(np.maximum(variances[:, 0], 0.0) / 6)
         precision = distance * float(np.finfo(depth.dtype).eps)
+        # Half a grain along both sides of a pixel, on a surface that the ray meets at an angle.
+        sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+        error = precision + distance * camera.grain * sine / np.sqrt(2.0)
         smooth = (
             finite
             & (spread < SMOOTH_SPREAD * footprint + precision)
             & (np.abs(cosine) > GRAZING_COSINE)
         )
-    return Patches(centres, normals, spread, footprint, precision), smooth
+    return Patches(centres, normals, spread, footprint, error), smooth
 
 
 def sample(camera: Camera, depth: NDArray[Any], rays: int) -> Patches:
@@ -166,12 +173,13 @@ def sample(camera: Camera, depth: NDArray[Any], rays: int) -> Patches:
 class Comparison:
     """What one view says of another's n patches.
 
-    verdict (n,): UNSEEN, AGREE, OCCLUDED or CONTRADICT. Where the answer is a smooth patch too,
-    ``fine`` is true, ``asked`` and ``found`` are the patches, and ``residual`` (n,) is the distance
-    of the one's centre in front of the other's plane, in units of ``footprint`` (n,), metres.
+    verdict (n,): AGREE, OCCLUDED or CONTRADICT, or UNKNOWN beside pixels without a source. Where
+    the answer is a smooth patch too, ``fine`` is true, ``asked`` and ``found`` are the patches, and
+    ``residual`` (n,) is how far the one's centre lies in front of the other's plane, in units of
+    ``footprint`` (n,), metres.
     """
 
-    verdict: NDArray[np.uint8]
+    verdict: NDArray[np.int64]
     fine: NDArray[np.bool_]
     asked: Patches
     found: Patches
@@ -192,10 +200,13 @@ def _looks_for(asked: Patches, camera: Camera) -> tuple[NDArray[np.bool_], Array
 
 
 def compare(asked: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison:
-    """Look for the patches of another view in the view that ``camera`` took with ``depth``."""
-    distance = np.linalg.norm(asked.points - camera.position, axis=1)
-    seen, where = _looks_for(asked, camera)
-    columns, rows = np.floor(np.where(seen[:, np.newaxis], where, 1.0)).astype(np.int64).T
+    """Look for the patches of another view in the view that ``camera`` took with ``depth``.
+
+    Patches that the view cannot see, or sees from behind, are not in the answer.
+    """
+    looked_for, where = _looks_for(asked, camera)
+    asked = asked[looked_for]
+    columns, rows = np.floor(where[looked_for]).astype(np.int64).T
     found, smooth = _patches(camera, depth, columns, rows)
     residual = np.einsum("ij,ij->i", found.normals, asked.points - found.points)
     # The centre of nine jittered points, and the plane of nine a pixel's half diagonal off centre.
@@ -204,29 +215,36 @@ def compare(asked: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison:
     tolerance = (
         TOLERANCE_DEVIATIONS * deviation
         + TOLERANCE_FOOTPRINTS * footprint
-        + asked.precision
-        + found.precision
+        + asked.error
+        + found.error
     )
+    verdict = np.full(len(asked), AGREE)
+    verdict[residual < -tolerance] = OCCLUDED
+    verdict[residual > tolerance] = CONTRADICT
+    rough = np.flatnonzero(~smooth)
+    nearest, farthest = _recorded_range(camera, depth, columns[rough], rows[rough])
+    expected = np.linalg.norm(asked.points[rough] - camera.position, axis=1)
+    slack = tolerance[rough] + footprint[rough]
+    verdict[rough] = AGREE
+    verdict[rough[farthest < expected - slack]] = OCCLUDED
+    verdict[rough[nearest > expected + slack]] = CONTRADICT
+    verdict[rough[np.isnan(nearest)]] = UNKNOWN
+    scaled = residual / np.maximum(footprint, np.finfo(np.float64).tiny)
+    return Comparison(verdict, smooth, asked, found, scaled, footprint)
 
-    # Where the answer is rough, the recorded points only bound it.
-    nine = depth[rows[:, np.newaxis] + _ROWS, columns[:, np.newaxis] + _COLUMNS].astype(np.float64)
-    points = camera.lift(nine, columns[:, np.newaxis] + _COLUMNS, rows[:, np.newaxis] + _ROWS)
+
+def _recorded_range(
+    camera: Camera, depth: NDArray[Any], columns: NDArray[np.int64], rows: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """Return the least and largest distance in 3 × 3 pixels; NaN where one has no source."""
+    columns, rows = columns[:, np.newaxis] + _COLUMNS, rows[:, np.newaxis] + _ROWS
+    nine = depth[rows, columns].astype(np.float64)
+    points = camera.lift(nine, columns, rows)
     with np.errstate(invalid="ignore"):
-        recorded = np.linalg.norm(points - camera.position, axis=2)
-    recorded = np.where(np.isnan(recorded) & np.isposinf(nine), np.inf, recorded)
-    slack = tolerance + footprint
-    seen &= ~np.isnan(recorded).any(axis=1)
-    nearer = np.where(smooth, residual < -tolerance, recorded.max(axis=1) < distance - slack)
-    farther = np.where(smooth, residual > tolerance, recorded.min(axis=1) > distance + slack)
-    verdict = np.where(nearer, OCCLUDED, np.where(farther, CONTRADICT, AGREE))
-    return Comparison(
-        np.where(seen, verdict, UNSEEN).astype(np.uint8),
-        seen & smooth,
-        asked,
-        found,
-        residual / np.maximum(footprint, np.finfo(np.float64).tiny),
-        footprint,
-    )
+        distance = np.linalg.norm(points - camera.position, axis=2)
+    # A miss has no point: its coordinates are inf, or NaN where the ray's are 0.
+    distance[np.isposinf(nine)] = np.inf
+    return distance.min(axis=1), distance.max(axis=1)
 
 
 # Residuals beyond this many footprints are another surface, not a slightly wrong view.

@@ -21,6 +21,12 @@ RAYS_A_VIEW = 400
 
 # Pixels this near to the rim of what a lens sees may hold light from both sides of it.
 RIM_PIXELS = 2
+# An image has one colour if no larger part of it than this has another.
+FEW = 0.001
+# So much of what lies outside the image circle may be lighter than that.
+MOST_LIT_OUTSIDE, FAINT = 0.05, 0.001
+# Of more differently turned views than this, the regions are computed again.
+MOST_REGIONS = 16
 
 
 @dataclass(frozen=True)
@@ -28,7 +34,8 @@ class ImageSet:
     """The views of one lightfield.json: the dataset's own (``name`` "") or a reprojection's.
 
     ``folder`` holds the images, relative to the dataset; ``depth`` is what channel Z means, or
-    None; ``matrices`` (n, 4, 4) are camera-to-world.
+    None; ``matrices`` (n, 4, 4) are camera-to-world; ``grain`` is the angle in radians between the
+    pixels at the centre of the views from which these were reprojected, 0 for rendered views.
     """
 
     name: str
@@ -37,6 +44,7 @@ class ImageSet:
     depth: str | None
     views: list[str]
     matrices: NDArray[np.float64]
+    grain: float = 0.0
 
     @property
     def prefix(self) -> str:
@@ -45,7 +53,7 @@ class ImageSet:
 
     def camera(self, view: int) -> Camera:
         assert self.depth is not None
-        return Camera(self.lens, self.matrices[view], self.depth)
+        return Camera(self.lens, self.matrices[view], self.depth, self.grain)
 
 
 @dataclass(frozen=True)
@@ -66,7 +74,8 @@ class Facts:
     """What one file tells by itself; ``problems`` by the check to which they belong.
 
     ``clamped`` and ``nan`` are the renderer's counts, ``marked`` whether the pixels without a
-    source could be compared, ``patches`` what geometry needs of a view with depth.
+    source could be compared, ``constant`` whether a reprojected view has one colour (as a piece of
+    sky or a wall may), ``patches`` what geometry needs of a view with depth.
     """
 
     checksum: str
@@ -75,6 +84,7 @@ class Facts:
     clamped: int | None = None
     nan: int | None = None
     marked: bool = False
+    constant: bool = False
     patches: Patches | None = None
 
 
@@ -94,7 +104,8 @@ class Examiner:
         try:
             image = images.read_image(path)
         except UserError as error:
-            facts.problems["images"] = " ".join(str(error).split()).replace(f"{path}: ", "")
+            text = " ".join(str(error).split()).replace(f"{path}: ", "")
+            facts.problems["images"] = text.replace(str(path), file.path)
             return facts
         height, width = next(iter(image.channels.values())).shape
         if (width, height) != (image_set.lens.width, image_set.lens.height):
@@ -125,9 +136,21 @@ class Examiner:
         seen, outside = self._of_lens(image_set.lens)
         depth = image.channels.get("Z")
         empty = depth is not None and bool(np.isposinf(depth).all())
-        facts.problems |= _colour_problems(
-            [image.channels[name] for name in "RGB"], seen, outside if rendered else None, empty
-        )
+        colour = [image.channels[name] for name in "RGB"]
+        middle = (image_set.lens.height // 2, image_set.lens.width // 2)
+        others = sum(int(((channel != channel[middle]) & seen).sum()) for channel in colour)
+        constant = others <= FEW * int(seen.sum())
+        facts.constant = constant and not rendered
+        problems = _colour_problems(colour)
+        if constant and rendered and not empty:
+            problems.append("has one colour everywhere")
+        # Cycles leaves a few values of 1e-6 there, and its denoiser a little more.
+        if rendered and outside.any():
+            lit = np.mean([channel[outside] > FAINT for channel in colour])
+            if lit > MOST_LIT_OUTSIDE:
+                problems.append("has colour where the lens sees nothing")
+        if problems:
+            facts.problems["colour"] = ", ".join(problems)
         if depth is not None:
             problems = []
             meaning = image.attributes.get(images.DEPTH_ATTRIBUTE, image_set.depth)
@@ -181,7 +204,7 @@ class Examiner:
         """Return where the lens has a ray, and where it has none, less the rim."""
         if lens not in self.regions:
             seen = np.isfinite(_rays(lens)[..., 0])
-            self.regions[lens] = seen, _inner(~seen)
+            self.regions[lens] = _inner(seen), _inner(~seen)
         return self.regions[lens]
 
     def _of_source(self, file: File) -> tuple[Bools, Bools] | None:
@@ -206,6 +229,8 @@ class Examiner:
             frame = np.array([source.lens.width, source.lens.height], np.float32)
             with np.errstate(invalid="ignore"):
                 seen = ((pixels >= 0) & (pixels <= frame)).all(axis=-1)
+            if len(self.regions) > MOST_REGIONS:
+                self.regions.clear()
             self.regions[key] = _inner(seen), _inner(~seen)
         return self.regions[key]
 
@@ -242,10 +267,8 @@ def _format_problem(file: File, image_set: ImageSet, image: images.Image) -> str
     return f"has the channels {texts[0]}; must have {texts[1]}"
 
 
-def _colour_problems(
-    channels: list[Array], seen: Bools, outside: Bools | None, empty: bool
-) -> dict[str, str]:
-    """Say what is wrong with the colours; a view that is ``empty`` (only sky) may be of one."""
+def _colour_problems(channels: list[Array]) -> list[str]:
+    """Say which colours are no finite numbers, or that all are black."""
     problems = []
     finite = [np.isfinite(channel) for channel in channels]
     if not all(part.all() for part in finite):
@@ -256,10 +279,4 @@ def _colour_problems(
         problems += [f"{infinite} values are infinite"] if infinite else []
     if not any(channel.any() for channel in channels):
         problems.append("is black")
-    elif not empty:
-        first = np.unravel_index(seen.argmax(), seen.shape)
-        if not any(((channel != channel[first]) & seen).any() for channel in channels):
-            problems.append("has one colour everywhere")
-    if outside is not None and any(channel[outside].any() for channel in channels):
-        problems.append("has colour where the lens sees nothing")
-    return {"colour": ", ".join(problems)} if problems else {}
+    return problems

@@ -26,7 +26,7 @@ from lightfield.consistency import Answer, Patches
 from lightfield.errors import UserError
 from lightfield.examination import Examiner, Facts, File, ImageSet
 from lightfield.files import read_json, sha256
-from lightfield.lenses import Array
+from lightfield.lenses import Array, Lens
 from lightfield.progress import Progress
 
 IMAGES = "exr"
@@ -40,11 +40,12 @@ REPORT = "report"
 
 # A view fails when over half of its pairs exceed one of these: the part of contradictions among
 # the points that are not occluded, and the displacement in pixels that a pair's residuals ask for.
+# A set fails when its pairs together ask for such a change of all angles or of all depths. A
+# reprojection takes each depth from a pixel of its source, which may lie half a pixel away.
 CONTRADICTIONS_LIMIT = 0.05
-DISPLACEMENT_LIMIT = 0.2
-# A set fails when its pairs together ask for such a change of all angles or of all depths;
-# residuals that determine it no better than this deviation do not count as a check of it.
-SCALE_LIMIT = 0.007
+DISPLACEMENT_LIMIT, REPROJECTED_DISPLACEMENT_LIMIT = 0.2, 0.4
+SCALE_LIMIT, REPROJECTED_SCALE_LIMIT = 0.007, 0.015
+# Residuals that determine a scale no better than this do not count as a check of it.
 SCALE_DEVIATION_LIMIT = 0.0015
 
 
@@ -123,6 +124,8 @@ def validate(
     for name in ("", *reprojections):
         image_set, check = _read_set(dataset, name)
         checks.append(check)
+        if image_set and name and sets and not sets[0].name:
+            image_set = replace(image_set, grain=_central_angle(sets[0].lens))
         sets += [image_set] if image_set else []
     files, missing = _view_files(dataset, sets)
     extras, lists, exports = _exports(dataset, sets, {file.path for file in files})
@@ -139,6 +142,8 @@ def validate(
             checks.append(_geometry(image_set, own, mapped))
     checks.append(_with_extras(exports, {file: facts[file] for file in extras}))
     published, listing = _listing(dataset, sets, {*lists, *(file.path for file in facts)})
+    if len(sets) <= len(reprojections):
+        listing = Check("files", None, "a lightfield.json that cannot be understood lists no files")
     checks.append(listing)
     checks.append(_checksums(records, {file.path: fact for file, fact in facts.items()}, sets))
     checks.append(_clearance(clearance, sets))
@@ -243,6 +248,13 @@ def _poses_check(path: str, views: list[str], matrices: Array, eulers: Array, at
     )
 
 
+def _central_angle(lens: Lens) -> float:
+    """Return the angle in radians between two pixels in the middle of the image."""
+    x = np.array([lens.width - 1, lens.width + 1]) / 2
+    one, other = lens.rays(x, np.full(2, lens.height / 2))
+    return float(np.arccos(np.clip(one @ other, -1.0, 1.0)))
+
+
 def _view_files(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[list[str]]]:
     """Return the views' files that are there, and for each set the paths of those that are not.
 
@@ -336,10 +348,13 @@ def _file_checks(image_set: ImageSet, own: Mapping[File, Facts]) -> list[Check]:
     readable = {file: fact for file, fact in own.items() if "images" not in fact.problems}
     checks = [
         _outcome(image_set, "images", own, "are whole, of the right size and channels"),
-        _outcome(image_set, "colour", readable, "have finite colours, not black, not constant"),
+        _outcome(image_set, "colour", readable, "have finite colours, and are not black"),
     ]
     deep = {file: fact for file, fact in readable.items() if fact.patches is not None}
     checks.append(_outcome(image_set, "depth", deep, "have positive depths, misses +inf"))
+    constant = sum(fact.constant for fact in readable.values())
+    if constant:
+        checks[1].warnings.append(f"{constant} images in {image_set.folder} have one colour")
     if image_set.name:
         marked = {file: fact for file, fact in readable.items() if fact.marked}
         text = "mark the pixels that their source cannot see"
@@ -502,13 +517,16 @@ def _judged(
         return Check(name, None, "no two views see enough of the same smooth surfaces")
     worst = max(contradictions[view] or 0.0 for view in tested)
     farthest = max(displacements[view] or 0.0 for view in tested)
+    limit, scale_limit = DISPLACEMENT_LIMIT, SCALE_LIMIT
+    if image_set.grain:
+        limit, scale_limit = REPROJECTED_DISPLACEMENT_LIMIT, REPROJECTED_SCALE_LIMIT
     bad = {
         view: f"{_percent(contradictions[view] or 0.0)} of its points contradict its neighbours "
         f"(at most {_percent(CONTRADICTIONS_LIMIT)}), and it seems displaced by "
-        f"{displacements[view] or 0.0:.2f} pixels (at most {DISPLACEMENT_LIMIT})"
+        f"{displacements[view] or 0.0:.2f} pixels (at most {limit})"
         for view in tested
         if (contradictions[view] or 0.0) > CONTRADICTIONS_LIMIT
-        or (displacements[view] or 0.0) > DISPLACEMENT_LIMIT
+        or (displacements[view] or 0.0) > limit
     }
     problems = [f"{files[view].path}: {text}" for view, text in bad.items()]
     if 2 * len(bad) > len(tested):
@@ -522,10 +540,10 @@ def _judged(
     good = [answer for pair, answer in both.items() if not bad.keys() & set(pair)]
     scale, deviation = consistency.scales(sum(good, start=consistency.NOTHING).terms)
     for what, value, sure in zip(("angles", "depths"), scale, deviation, strict=True):
-        if sure < SCALE_DEVIATION_LIMIT and abs(value) > SCALE_LIMIT + 3 * sure:
+        if sure < SCALE_DEVIATION_LIMIT and abs(value) > scale_limit + 3 * sure:
             problems.append(
                 f"{image_set.prefix}lightfield.json: the views agree better if all {what} are "
-                f"scaled by {1 + value:.3f} (at most {_percent(SCALE_LIMIT)} is allowed)"
+                f"scaled by {1 + value:.3f} (at most {_percent(scale_limit)} is allowed)"
             )
     points = total.agree + total.occluded + total.contradict
     warnings = []

@@ -1,0 +1,794 @@
+"""Validation against datasets whose truth is analytic: a room of planes, spheres and thin rods.
+
+Each dataset is right, and then spoilt in one way: validation has to say so and to name the view.
+Depth is traced under jittered sub-pixel positions, as Cycles samples it.
+"""
+
+import json
+import math
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightfield import images, lenses, rigs, validation
+from lightfield.files import sha256, write_json
+
+SCRIPTS = Path(__file__).parents[1] / "scripts"
+CYCLES_ROOM = Path(__file__).parent / "cycles_room.py"
+
+SPHERE = {"type": "sphere", "subdivisions": 1, "size": 1.7}
+FISHEYE = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
+BAD = 5  # the view that is spoilt where one is
+
+
+def trace(origin: np.ndarray, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return distance (...) and albedo (...) of what unit rays (..., 3) hit in the room."""
+    low, high = np.array([-3, -2.5, -1.4]), np.array([3, 2.5, 1.8])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        away = np.where(rays > 0, (high - origin) / rays, (low - origin) / rays)
+        nearest = np.where(rays == 0, np.inf, away).min(axis=-1)
+        for center, radius in (
+            ((1.6, 1.2, -0.7), 0.6),
+            ((-1.5, 1.5, 0.2), 0.45),
+            ((-1.2, -1.4, -0.8), 0.55),
+            ((2.0, -1.2, 0.8), 0.35),
+            ((0.2, 2.0, -1.0), 0.4),
+        ):
+            offset = origin - np.array(center)
+            half = (offset * rays).sum(axis=-1)
+            distance = -half - np.sqrt(half**2 - (offset @ offset - radius**2))
+            nearest = np.where((distance > 0) & (distance < nearest), distance, nearest)
+        for x, y, radius in ((1.5, -0.3, 0.02), (-1.4, 0.2, 0.03), (0.3, -1.6, 0.015)):
+            offset = (origin - np.array([x, y, 0.0]))[:2]
+            across = (rays[..., :2] ** 2).sum(axis=-1)
+            half = (offset * rays[..., :2]).sum(axis=-1)
+            root = np.sqrt(half**2 - across * (offset @ offset - radius**2))
+            distance = (-half - root) / across
+            nearest = np.where((distance > 0) & (distance < nearest), distance, nearest)
+        hit = origin + rays * nearest[..., None]
+        albedo = np.where(np.floor(hit * 2.5).sum(axis=-1) % 2 == 0, 0.2, 0.7)
+    return nearest, np.where(np.isfinite(nearest), albedo, 0.0)
+
+
+def blackman_harris(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
+    """Draw positions in pixels under Cycles' default filter, 1.5 pixels wide."""
+    x = np.linspace(-0.5, 0.5, 2001)
+    terms = zip((0.35875, 0.48829, 0.14128, 0.01168), range(4), strict=True)
+    cumulative = np.cumsum(sum(a * np.cos(2 * np.pi * k * x) for a, k in terms))
+    cumulative = (cumulative - cumulative[0]) / (cumulative[-1] - cumulative[0])
+    return np.interp(rng.random(shape), cumulative, 1.5 * x)
+
+
+def render(
+    lens: lenses.Lens, matrix: np.ndarray, depth: str | None, rng: np.random.Generator
+) -> dict[str, np.ndarray]:
+    """Return the channels of one view of the room."""
+    y, x = np.mgrid[: lens.height, : lens.width] + 0.5
+    centre_rays = lens.rays(x, y)
+    rays = lens.rays(x + blackman_harris(rng, x.shape), y + blackman_harris(rng, x.shape))
+    rays = np.where(np.isnan(centre_rays), np.nan, rays)
+    distance, albedo = trace(matrix[:3, 3], rays @ matrix[:3, :3].T)
+    channels = {
+        name: (albedo * gain).astype(np.float16)
+        for name, gain in zip("RGB", (1.0, 0.8, 0.6), strict=True)
+    }
+    if depth:
+        # The renderer knows the ray of the pixel's centre only.
+        value = distance * -centre_rays[..., 2] if depth == "z" else distance
+        channels["Z"] = np.where(np.isnan(value), np.inf, value).astype(np.float32)
+    return channels
+
+
+def make_dataset(
+    folder: Path, rig: Mapping[str, Any], camera: Mapping[str, Any], depth: str | None = "z"
+) -> Path:
+    lens = lenses.from_camera(camera)
+    content = rigs.lightfield(rig, lens.to_lightfield()) | {"depth": depth}
+    rng = np.random.default_rng(1)
+    for frame in content["frames"]:
+        attributes = {images.NAN_ATTRIBUTE: 0, images.CLAMPED_ATTRIBUTE: 0}
+        if depth:
+            attributes[images.DEPTH_ATTRIBUTE] = depth
+        channels = render(lens, np.array(frame["world_matrix"]), depth, rng)
+        images.write_exr(folder / "exr" / f"{frame['name']}.exr", channels, attributes)
+    write_json(folder / "lightfield.json", content)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def right_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_dataset(tmp_path_factory.mktemp("room") / "room" / "sphere", SPHERE, FISHEYE)
+
+
+@pytest.fixture
+def dataset(right_dataset: Path, tmp_path: Path) -> Path:
+    """A copy of the right dataset, to spoil: 12 views."""
+    return Path(shutil.copytree(right_dataset, tmp_path / "room" / "sphere"))
+
+
+@pytest.fixture(scope="session")
+def right_small_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    rig = {"type": "plane", "cameras": [3, 2], "size": 0.4}
+    return make_dataset(tmp_path_factory.mktemp("room") / "room" / "plane", rig, FISHEYE)
+
+
+@pytest.fixture
+def small_dataset(right_small_dataset: Path, tmp_path: Path) -> Path:
+    """A copy of a right dataset of 6 views, for what one file tells."""
+    return Path(shutil.copytree(right_small_dataset, tmp_path / "room" / "plane"))
+
+
+def check(result: validation.Result, name: str) -> validation.Check:
+    return next(check for check in result.checks if check.name == name)
+
+
+def failed(result: validation.Result) -> list[str]:
+    return [check.name for check in result.checks if check.passed is False]
+
+
+def names(dataset: Path) -> list[str]:
+    content = json.loads((dataset / "lightfield.json").read_text())
+    return [frame["name"] for frame in content["frames"]]
+
+
+def relist(dataset: Path, change: Callable[[dict[str, Any]], None]) -> None:
+    """Change lightfield.json; positions and rotations then follow the matrices."""
+    content = json.loads((dataset / "lightfield.json").read_text())
+    change(content)
+    for frame in content["frames"]:
+        matrix = np.array(frame["world_matrix"])
+        frame["position"] = matrix[:3, 3].tolist()
+        frame["rotation"] = rigs.matrix_to_euler(matrix[:3, :3]).tolist()
+    write_json(dataset / "lightfield.json", content)
+
+
+def repaint(
+    dataset: Path, name: str, change: Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
+) -> None:
+    """Change the channels of one view, keeping its header."""
+    path = dataset / "exr" / f"{name}.exr"
+    image = images.read_image(path)
+    kept = {key: value for key, value in image.attributes.items() if key.startswith("plenoforge:")}
+    images.write_exr(path, change(dict(image.channels)), kept)
+
+
+def recamera(camera: Mapping[str, Any]) -> Callable[[dict[str, Any]], None]:
+    lens = lenses.from_camera({**FISHEYE, **camera}).to_lightfield()
+    return lambda content: content.update(lens)
+
+
+def move(view: int, offset: Any) -> Callable[[dict[str, Any]], None]:
+    def change(content: dict[str, Any]) -> None:
+        matrix = np.array(content["frames"][view]["world_matrix"])
+        matrix[:3, 3] += offset
+        content["frames"][view]["world_matrix"] = matrix.tolist()
+
+    return change
+
+
+def turn(views: list[int], turned: np.ndarray, local: bool = True) -> Callable[[Any], None]:
+    def change(content: dict[str, Any]) -> None:
+        for view in views:
+            matrix = np.array(content["frames"][view]["world_matrix"])
+            rotation = matrix[:3, :3]
+            matrix[:3, :3] = rotation @ turned if local else turned @ rotation
+            content["frames"][view]["world_matrix"] = matrix.tolist()
+
+    return change
+
+
+def degrees(axis: int, angle: float) -> np.ndarray:
+    euler = np.zeros(3)
+    euler[axis] = math.radians(angle)
+    return rigs.euler_to_matrix(euler)
+
+
+def swap(one: int, other: int) -> Callable[[dict[str, Any]], None]:
+    def change(content: dict[str, Any]) -> None:
+        first, second = content["frames"][one], content["frames"][other]
+        first["name"], second["name"] = second["name"], first["name"]
+
+    return change
+
+
+# ---- right datasets pass, with margin -------------------------------------------------------
+
+WIDE = {"lens": "equidistant", "fov": 220, "resolution": [64, 64]}
+RIGHT = {
+    "sphere of fisheyes": (SPHERE, FISHEYE, "z"),
+    "sphere with distances": (SPHERE, FISHEYE, "distance"),
+    "sphere of 220 degrees": (SPHERE, WIDE, "distance"),
+    "sphere of equisolids": (
+        SPHERE,
+        {"lens": "equisolid", "fov": 180, "focal_length": 12, "resolution": [64, 64]},
+        "z",
+    ),
+    "sphere of perspectives": (
+        {"type": "sphere", "subdivisions": 1, "size": 0.5},
+        {"lens": "rectilinear", "focal_length": 15, "resolution": [48, 48]},
+        "z",
+    ),
+    "plane": ({"type": "plane", "cameras": [3, 3]}, FISHEYE, "z"),
+    "cuboid": ({"type": "cuboid", "cameras": [2, 2, 1], "size": [1.6, 1, 0.8]}, FISHEYE, "z"),
+    "panoramas": (
+        {"type": "lattice", "cameras": [2, 2, 2], "size": 1},
+        {"lens": "equirectangular", "resolution": [96, 48]},
+        "distance",
+    ),
+    "cube maps": (
+        {"type": "lattice", "cameras": [2, 1, 1], "size": 1, "cube_map": True},
+        {"lens": "rectilinear", "fov": 90, "resolution": [32, 32]},
+        "z",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", RIGHT)
+def test_right_dataset_is_valid_with_margin(case: str, tmp_path: Path) -> None:
+    result = validation.validate(make_dataset(tmp_path / "room" / "rig", *RIGHT[case]))
+    assert failed(result) == []
+    geometry = check(result, "geometry")
+    assert geometry.passed
+    assert not geometry.warnings
+    figures = geometry.figures
+    assert figures["worst_contradiction"] < validation.CONTRADICTIONS_LIMIT / 3
+    assert figures["worst_displacement_pixels"] < validation.DISPLACEMENT_LIMIT / 1.5
+    for what in ("angle", "depth"):
+        if figures.get(f"{what}_scale_deviation", 1) < validation.SCALE_DEVIATION_LIMIT:
+            assert abs(figures[f"{what}_scale_error"]) < validation.SCALE_LIMIT / 2
+
+
+# ---- wrong geometry fails -------------------------------------------------------------------
+
+Spoil = Callable[[Path], None]
+
+
+def listed(*changes: Callable[[dict[str, Any]], None]) -> Spoil:
+    return lambda dataset: [relist(dataset, change) for change in changes] and None
+
+
+def painted(
+    change: Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]], views: slice = slice(None)
+) -> Spoil:
+    return lambda dataset: (
+        [repaint(dataset, name, change) for name in names(dataset)[views]] and None
+    )
+
+
+def scaled(factor: float) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
+    return lambda channels: {**channels, "Z": channels["Z"] * np.float32(factor)}
+
+
+def each(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Any], dict[str, np.ndarray]]:
+    return lambda channels: {name: change(pixels) for name, pixels in channels.items()}
+
+
+def distance_in_z(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    y, x = np.mgrid[:64, :64] + 0.5
+    sine = np.minimum(np.hypot(x - 32, y - 32) / 32, 1) * np.pi / 2
+    return {**channels, "Z": (channels["Z"] / np.cos(sine).clip(1e-3)).astype(np.float32)}
+
+
+def depth_of(other: int, view: int) -> Spoil:
+    def spoil(dataset: Path) -> None:
+        z = images.read_image(dataset / "exr" / f"{names(dataset)[other]}.exr").channels["Z"]
+        repaint(dataset, names(dataset)[view], lambda channels: {**channels, "Z": z})
+
+    return spoil
+
+
+ALL = list(range(12))
+ONE = slice(BAD, BAD + 1)
+
+WRONG_SETS: dict[str, Spoil] = {
+    "field of view 3 % too small": listed(recamera({"fov": 174.6})),
+    "equisolid for equidistant": listed(
+        recamera({"lens": "equisolid", "focal_length": 9 / math.sin(math.pi / 4)})
+    ),
+    "stereographic for equidistant": listed(recamera({"lens": "stereographic"})),
+    "distance in Z": painted(distance_in_z),
+    "depth 3 % too large": painted(scaled(1.03)),
+    "depth 3 % too small": painted(scaled(0.97)),
+    "cameras look backwards": listed(turn(ALL, degrees(1, 180))),
+    "cameras upside down": listed(turn(ALL, degrees(2, 180))),
+    "rotations for Y up": listed(turn(ALL, degrees(0, 90), local=False)),
+    "images mirrored": painted(each(np.fliplr)),
+    "images upside down": painted(each(np.flipud)),
+    "images transposed": painted(each(np.transpose)),
+}
+
+WRONG_VIEWS: dict[str, Spoil] = {
+    **{f"5 cm off along {'xyz'[i]}": listed(move(BAD, 0.05 * np.eye(3)[i])) for i in range(3)},
+    **{f"1 degree off about {'xyz'[i]}": listed(turn([BAD], degrees(i, 1))) for i in range(3)},
+    "upside down": listed(turn([BAD], degrees(2, 180))),
+    "quarter turn": listed(turn([BAD], degrees(2, 90))),
+    "distance in Z": painted(distance_in_z, ONE),
+    "depth 3 % too large": painted(scaled(1.03), ONE),
+    "depth 3 % too small": painted(scaled(0.97), ONE),
+    "depth of another view": depth_of(9, BAD),
+    "depth of a neighbour": depth_of(BAD - 1, BAD),
+    "mirrored": painted(each(np.fliplr), ONE),
+    "flipped": painted(each(np.flipud), ONE),
+    "transposed": painted(each(np.transpose), ONE),
+    "nothing but sky": painted(scaled(np.inf), ONE),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_SETS)
+def test_wrong_set_fails_its_geometry(case: str, dataset: Path) -> None:
+    WRONG_SETS[case](dataset)
+    result = validation.validate(dataset)
+    assert failed(result) == ["geometry"]
+    assert len(check(result, "geometry").views) > len(ALL) / 2
+
+
+@pytest.mark.parametrize("case", WRONG_VIEWS)
+def test_wrong_view_is_named_and_no_other(case: str, dataset: Path) -> None:
+    WRONG_VIEWS[case](dataset)
+    result = validation.validate(dataset)
+    assert failed(result) == ["geometry"]
+    geometry = check(result, "geometry")
+    assert geometry.views == [names(dataset)[BAD]]
+    assert [problem.split(": ")[0] for problem in geometry.problems] == [
+        f"exr/{names(dataset)[BAD]}.exr"
+    ]
+
+
+def test_swapped_views_are_both_named(dataset: Path) -> None:
+    right_names = names(dataset)
+    relist(dataset, swap(2, 7))
+    result = validation.validate(dataset)
+    assert failed(result) == ["geometry"]
+    assert sorted(check(result, "geometry").views) == [right_names[2], right_names[7]]
+
+
+@pytest.mark.parametrize("fov", [185.4, 174.6])
+def test_small_error_of_the_lens_shows_in_all_pairs_together(fov: float, tmp_path: Path) -> None:
+    # Parallel views near each other hardly disagree under a lens 3 % wrong: only the mean tells.
+    rig = {"type": "plane", "cameras": [3, 3], "size": 0.5}
+    dataset = make_dataset(tmp_path / "room" / "plane", rig, FISHEYE, "distance")
+    relist(dataset, recamera({"fov": fov}))
+    geometry = check(validation.validate(dataset), "geometry")
+    assert geometry.passed is False
+    assert geometry.views == []
+    assert len(geometry.problems) == 1
+    assert "all angles" in geometry.problems[0]
+
+
+def test_two_views_that_disagree_are_both_named(tmp_path: Path) -> None:
+    rig = {"type": "plane", "cameras": [2, 1], "size": 0.5}
+    dataset = make_dataset(tmp_path / "room" / "pair", rig, FISHEYE)
+    assert validation.validate(dataset).valid
+    relist(dataset, move(0, (0, 0.1, 0)))
+    assert check(validation.validate(dataset), "geometry").views == names(dataset)
+
+
+# ---- what cannot be checked is said ---------------------------------------------------------
+
+UNCHECKED = {
+    "no depth": (SPHERE, FISHEYE, None, "no depth"),
+    "one view": ({"type": "plane", "cameras": [1, 1]}, FISHEYE, "z", "no neighbours"),
+    "nothing seen twice": (
+        {"type": "plane", "cameras": [1, 1], "cube_map": True},
+        {"lens": "rectilinear", "fov": 90, "resolution": [32, 32]},
+        "z",
+        "no two views see enough",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", UNCHECKED)
+def test_what_cannot_be_checked_is_no_pass(case: str, tmp_path: Path) -> None:
+    *made, reason = UNCHECKED[case]
+    result = validation.validate(make_dataset(tmp_path / "room" / "rig", *made))
+    assert result.valid
+    geometry = check(result, "geometry")
+    assert geometry.passed is None
+    assert reason in geometry.detail
+    assert re.search("not applicable: .*geometry", result.summary())
+
+
+# ---- files ----------------------------------------------------------------------------------
+
+
+def pixel(channel: str, value: float) -> Spoil:
+    def change(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        channels[channel] = channels[channel].copy()
+        channels[channel][30, 31] = value
+        return channels
+
+    return painted(change, ONE)
+
+
+def headed(key: str, value: Any) -> Spoil:
+    def spoil(dataset: Path) -> None:
+        path = dataset / "exr" / f"{names(dataset)[BAD]}.exr"
+        image = images.read_image(path)
+        kept = {k: v for k, v in image.attributes.items() if k.startswith("plenoforge:")}
+        images.write_exr(path, image.channels, kept | {key: value})
+
+    return spoil
+
+
+def on_file(change: Callable[[Path], Any]) -> Spoil:
+    return lambda dataset: change(dataset / "exr" / f"{names(dataset)[BAD]}.exr")
+
+
+def truncate(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def cut_tail(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-40])
+
+
+def flip_byte(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    path.write_bytes(content)
+
+
+def outside(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {**channels, "R": np.where(channels["R"] == 0, np.float16(1), channels["R"])}
+
+
+def wide_circle(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {**channels, "Z": np.where(np.isinf(channels["Z"]), np.float32(2), channels["Z"])}
+
+
+def small(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {name: pixels[:32] for name, pixels in channels.items()}
+
+
+def bad_frame(key: str, value: Any) -> Spoil:
+    def spoil(dataset: Path) -> None:
+        content = json.loads((dataset / "lightfield.json").read_text())
+        content["frames"][BAD][key] = value
+        write_json(dataset / "lightfield.json", content)
+
+    return spoil
+
+
+BROKEN_VIEWS: dict[str, tuple[Spoil, str, str]] = {
+    "missing": (on_file(Path.unlink), "views", "is missing"),
+    "truncated": (on_file(truncate), "images", "cannot be read"),
+    "end cut off": (on_file(cut_tail), "images", "cannot be read"),
+    "no image": (on_file(lambda path: path.write_bytes(b"no image")), "images", "no image"),
+    "empty file": (on_file(lambda path: path.write_bytes(b"")), "images", "no image"),
+    "wrong size": (painted(small, ONE), "images", "is 64 × 32; must be 64 × 64"),
+    "no blue": (
+        painted(lambda c: {name: c[name] for name in "RGZ"}, ONE),
+        "images",
+        "must have B:float16 G:float16 R:float16 Z:float32",
+    ),
+    "no depth": (painted(lambda c: {name: c[name] for name in "RGB"}, ONE), "images", "channels"),
+    "one channel more": (painted(lambda c: {**c, "A": c["R"]}, ONE), "images", "channels"),
+    "full floats": (painted(each(lambda x: x.astype(np.float32)), ONE), "images", "R:float32"),
+    "colour not a number": (pixel("G", np.nan), "colour", "1 values are not a number"),
+    "infinite colour": (pixel("B", -np.inf), "colour", "1 values are infinite"),
+    "black": (painted(lambda c: {**c, **{n: c[n] * 0 for n in "RGB"}}, ONE), "colour", "is black"),
+    "one colour": (
+        painted(lambda c: {**c, **{n: (c[n] > 0) * np.float16(0.3) for n in "RGB"}}, ONE),
+        "colour",
+        "one colour",
+    ),
+    "colour outside the circle": (painted(outside, ONE), "colour", "sees nothing"),
+    "depth outside the circle": (painted(wide_circle, ONE), "depth", "sees nothing"),
+    "depth not a number": (pixel("Z", np.nan), "depth", "1 depths are not a number"),
+    "depth zero": (pixel("Z", 0), "depth", "1 depths are not positive"),
+    "depth negative": (pixel("Z", -2), "depth", "1 depths are not positive"),
+    "depth minus infinity": (pixel("Z", -np.inf), "depth", "1 depths are not positive"),
+    "another meaning of depth": (
+        headed(images.DEPTH_ATTRIBUTE, "distance"),
+        "depth",
+        "is 'distance' by its header",
+    ),
+    "rendered NaN": (headed(images.NAN_ATTRIBUTE, 7), "counts", "7 rendered values"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN_VIEWS)
+def test_broken_view_is_named(case: str, small_dataset: Path) -> None:
+    spoil, name, text = BROKEN_VIEWS[case]
+    spoil(small_dataset)
+    result = validation.validate(small_dataset)
+    assert failed(result) == [name]
+    found = check(result, name)
+    assert found.views == [names(small_dataset)[BAD]]
+    assert len(found.problems) == 1
+    assert found.problems[0].startswith(f"exr/{names(small_dataset)[BAD]}.exr: ")
+    assert text in found.problems[0]
+    assert str(small_dataset) not in json.dumps(result.to_json())
+
+
+def test_clamped_values_are_a_warning(small_dataset: Path) -> None:
+    headed(images.CLAMPED_ATTRIBUTE, 9)(small_dataset)
+    result = validation.validate(small_dataset)
+    assert result.valid
+    assert "9 values in 1 views were clamped" in result.summary()
+
+
+BROKEN_LISTS: dict[str, tuple[Spoil, str]] = {
+    "no file": (
+        lambda small_dataset: (small_dataset / "lightfield.json").unlink(),
+        "cannot be read",
+    ),
+    "no JSON": (
+        lambda small_dataset: (small_dataset / "lightfield.json").write_text("{"),
+        "is not JSON",
+    ),
+    "no frames": (listed(lambda content: content["frames"].clear()), "frames: is empty"),
+    "no camera": (
+        lambda small_dataset: write_json(small_dataset / "lightfield.json", {"frames": []}),
+        "camera: is missing",
+    ),
+    "a name twice": (bad_frame("name", "view_0000f"), "view_0000f: is the name of two frames"),
+    "rotation of another": (bad_frame("rotation", [0, 0, 0]), "world_matrix"),
+    "mirrored axis": (
+        listed(turn([BAD], np.diag([-1.0, 1.0, 1.0]))),
+        "view_0005f: world_matrix: is not that of its position and rotation",
+    ),
+    "Z-depth beyond 180 degrees": (listed(recamera({"fov": 190})), "depth: is 'z'"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN_LISTS)
+def test_broken_lightfield_json_fails(case: str, small_dataset: Path) -> None:
+    spoil, text = BROKEN_LISTS[case]
+    spoil(small_dataset)
+    result = validation.validate(small_dataset)
+    assert "lightfield" in failed(result)
+    problems = check(result, "lightfield").problems
+    assert problems[0].startswith("lightfield.json: ")
+    assert text in problems[0]
+    assert str(small_dataset) not in problems[0]
+
+
+def test_stray_files_fail(small_dataset: Path) -> None:
+    (small_dataset / "exr" / "view_9999f.exr").write_bytes(b"")
+    (small_dataset / "old").mkdir()
+    (small_dataset / "old" / "notes.txt").write_text("?")
+    (small_dataset / "report").mkdir()
+    (small_dataset / "report" / "index.html").write_text("not published")
+    result = validation.validate(small_dataset)
+    assert failed(result) == ["files"]
+    assert check(result, "files").problems == [
+        "exr/view_9999f.exr: is no file of this dataset",
+        "old/notes.txt: is no file of this dataset",
+    ]
+
+
+# ---- records, clearance, exports ------------------------------------------------------------
+
+
+def record_of(dataset: Path) -> dict[str, Any]:
+    return {
+        "files": {
+            f"exr/{path.name}": {"bytes": path.stat().st_size, "sha256": sha256(path)}
+            for path in sorted((dataset / "exr").iterdir())
+        }
+    }
+
+
+def test_records_must_agree(small_dataset: Path, tmp_path: Path) -> None:
+    record = record_of(small_dataset)
+    write_json(tmp_path / "record.json", record)
+    on_file(flip_byte)(small_dataset)
+    del record["files"]["exr/view_0002f.exr"]
+    record["files"]["exr/view_0003f.exr"]["bytes"] += 1
+    record["files"]["exr/gone.exr"] = record["files"]["exr/view_0003f.exr"]
+    write_json(tmp_path / "changed.json", record)
+    first = validation.validate(small_dataset, records=[tmp_path / "record.json"])
+    assert check(first, "checksums").views == [names(small_dataset)[BAD]]
+    second = check(
+        validation.validate(small_dataset, records=[tmp_path / "changed.json"]), "checksums"
+    )
+    assert second.passed is False
+    assert second.views == ["gone", "view_0002f", "view_0003f", names(small_dataset)[BAD]]
+
+
+def test_camera_inside_geometry_fails(small_dataset: Path, tmp_path: Path) -> None:
+    around = {name: {"distance": None, "inside": False} for name in names(small_dataset)}
+    around["view_0001f"] = {"distance": 0.25, "inside": False}
+    write_json(tmp_path / "clearance.json", {"views": around})
+    right = validation.validate(small_dataset, clearance=tmp_path / "clearance.json")
+    assert check(right, "cameras").passed
+    assert check(right, "cameras").figures == {"nearest_metres": 0.25}
+    around[names(small_dataset)[BAD]] = {"distance": 0.0, "inside": True}
+    del around["view_0004f"]
+    write_json(tmp_path / "clearance.json", {"views": around})
+    wrong = validation.validate(small_dataset, clearance=tmp_path / "clearance.json")
+    assert failed(wrong) == ["cameras"]
+    assert sorted(check(wrong, "cameras").views) == ["view_0004f", names(small_dataset)[BAD]]
+
+
+def test_exports_own_what_they_list(small_dataset: Path) -> None:
+    picture = np.zeros((64, 64, 3), np.uint8)
+    images.write_png(small_dataset / "exr" / "dynamic_mask_view_0001f.png", picture[..., 0])
+    images.write_png(small_dataset / "pictures" / "one.png", picture)
+    frames = [{"file_path": "pictures/one.png"}, {"file_path": "exr/view_0000f.exr"}]
+    write_json(small_dataset / "transforms.json", {"frames": frames})
+    result = validation.validate(small_dataset)
+    assert result.valid
+    assert check(result, "exports").passed
+    assert {"pictures/one.png", "transforms.json"} <= result.checksums.keys()
+    write_json(
+        small_dataset / "transforms_test.json", {"frames": [{"file_path": "pictures/two.png"}]}
+    )
+    images.write_png(small_dataset / "pictures" / "one.png", picture[:10])
+    problems = check(validation.validate(small_dataset), "exports").problems
+    assert problems == [
+        "transforms_test.json: frames: pictures/two.png is no file of the dataset",
+        "pictures/one.png: is 64 × 10; must be 64 × 64",
+    ]
+
+
+# ---- reprojections --------------------------------------------------------------------------
+
+
+def add_panoramas(dataset: Path, spoil: Callable[[dict[str, np.ndarray]], Any] = dict) -> None:
+    """Add what the fisheyes see as equirectangular panoramas: all that lies before the camera."""
+    folder = dataset / "panorama"
+    lens = lenses.from_camera({"lens": "equirectangular", "resolution": [96, 48]})
+    content = json.loads((dataset / "lightfield.json").read_text())
+    content |= lens.to_lightfield() | {"depth": "distance"}
+    behind = np.abs(np.mgrid[:48, :96][1] + 0.5 - 48) > 24
+    for frame in content["frames"]:
+        channels = render(
+            lens, np.array(frame["world_matrix"]), "distance", np.random.default_rng(2)
+        )
+        channels = {name: np.where(behind, 0, pixels) for name, pixels in channels.items()}
+        channels["Z"] = np.where(behind, np.float32(np.nan), channels["Z"])
+        channels = spoil(channels)
+        images.write_exr(folder / f"{frame['name']}.exr", channels)
+        eight_bit = [(channels[name] * np.float16(255)).astype(np.uint8) for name in "RGB"]
+        alpha = np.where(np.isnan(channels["Z"]), 0, 255).astype(np.uint8)
+        images.write_png(folder / f"{frame['name']}.png", np.dstack([*eight_bit, alpha]))
+        images.write_png(folder / f"dynamic_mask_{frame['name']}.png", 255 - alpha)
+    write_json(folder / "lightfield.json", content)
+
+
+def test_right_reprojection_is_valid(small_dataset: Path) -> None:
+    add_panoramas(small_dataset)
+    result = validation.validate(small_dataset, ["panorama"])
+    assert failed(result) == []
+    assert check(result, "panorama/geometry").passed
+    assert check(result, "panorama/marks").passed
+    assert check(result, "panorama/views").detail == "12 of 12 images are there"
+    assert "panorama/dynamic_mask_view_0003f.png" in result.checksums
+    assert failed(validation.validate(small_dataset)) == ["files"]
+
+
+WRONG_REPROJECTIONS: dict[str, tuple[Callable[[dict[str, np.ndarray]], Any], str]] = {
+    "unmarked": (lambda c: {**c, "Z": np.nan_to_num(c["Z"], nan=3.0)}, "marks"),
+    "smeared": (lambda c: {**c, "R": np.where(c["R"] == 0, np.float16(0.1), c["R"])}, "marks"),
+    "marked too much": (
+        lambda c: {**c, "Z": np.where(np.arange(96) < 60, c["Z"], np.float32(np.nan))},
+        "marks",
+    ),
+    "mirrored": (lambda c: {name: np.fliplr(pixels) for name, pixels in c.items()}, "geometry"),
+    "depth not converted": (
+        lambda c: {
+            **c,
+            "Z": c["Z"] * np.cos((np.mgrid[:48, :96][1] - 47.5) / 48 * np.pi).astype(np.float32),
+        },
+        "geometry",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_REPROJECTIONS)
+def test_wrong_reprojection_fails(case: str, small_dataset: Path) -> None:
+    spoil, name = WRONG_REPROJECTIONS[case]
+    add_panoramas(small_dataset, spoil)
+    result = validation.validate(small_dataset, ["panorama"])
+    assert f"panorama/{name}" in failed(result)
+    assert all(check.startswith("panorama/") for check in failed(result))
+
+
+def test_missing_picture_of_a_reprojection_is_named(small_dataset: Path) -> None:
+    add_panoramas(small_dataset)
+    (small_dataset / "panorama" / "view_0004f.png").unlink()
+    result = validation.validate(small_dataset, ["panorama"])
+    assert failed(result) == ["panorama/views"]
+    assert check(result, "panorama/views").problems == ["panorama/view_0004f.png: is missing"]
+
+
+# ---- the program ----------------------------------------------------------------------------
+
+
+def run(dataset: Path, *more: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [
+            sys.executable,
+            str(SCRIPTS / "validate.py"),
+            *("--dataset", str(dataset)),
+            *("--output", str(dataset / "validation.json")),
+            *("--sums", str(dataset / "sha256sums.txt")),
+            *more,
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_program_writes_the_same_bytes_each_time_and_sums_that_hold(
+    dataset: Path, tmp_path: Path
+) -> None:
+    write_json(tmp_path / "record.json", record_of(dataset))
+    leftover = dataset / "exr" / ".view_0000f.123.tmp.exr"
+    leftover.write_bytes(b"half a view")
+    other = Path(shutil.copytree(dataset, tmp_path / "elsewhere" / "room" / "sphere"))
+    first = run(dataset, "--records", str(tmp_path / "record.json"))
+    second = run(other, "--records", str(tmp_path / "record.json"), "--processes", "2")
+    assert (first.returncode, second.returncode) == (0, 0), first.stderr + second.stderr
+    assert first.stdout == second.stdout
+    assert re.fullmatch(
+        r"room/sphere: valid: 12 views; 12 views × [\d.]+ neighbours agree 9\d.\d % .*\n",
+        first.stdout,
+    )
+    assert not leftover.exists()
+    for name in ("validation.json", "sha256sums.txt"):
+        assert (dataset / name).read_bytes() == (other / name).read_bytes()
+    sums = (dataset / "sha256sums.txt").read_text().splitlines()
+    listed_paths = [line.split("  ")[1] for line in sums]
+    assert listed_paths == sorted(listed_paths)
+    assert len(listed_paths) == 12 + 2
+    subprocess.run(["sha256sum", "-c", "--strict", "sha256sums.txt"], cwd=dataset, check=True)
+
+
+def test_program_names_what_is_wrong_and_publishes_no_sums(dataset: Path) -> None:
+    (dataset / "sha256sums.txt").write_text("of an earlier validation")
+    on_file(truncate)(dataset)
+    (dataset / "exr" / "view_0009f.exr").unlink()
+    result = run(dataset)
+    assert result.returncode == 1
+    assert not (dataset / "sha256sums.txt").exists()
+    content = json.loads((dataset / "validation.json").read_text())
+    assert content["valid"] is False
+    assert "Traceback" not in result.stderr
+    assert re.search(r"^room/sphere: images: exr/view_0005f.exr: .+$", result.stderr, re.M)
+    assert "room/sphere: views: exr/view_0009f.exr: is missing\n" in result.stderr
+    assert result.stderr.splitlines()[-1].startswith("error: room/sphere is not valid")
+    assert result.stdout.startswith("room/sphere: INVALID: ")
+
+
+# ---- Cycles ---------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="session")
+def cycles_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A dataset that Cycles renders: thin stalks and leaves, a fence, spheres, a wall, open sky."""
+    dataset = tmp_path_factory.mktemp("cycles") / "yard" / "sphere"
+    lens = lenses.from_camera({**FISHEYE, "resolution": [96, 96]})
+    rig = {**SPHERE, "center": [0, 0, 1.2]}
+    content = rigs.lightfield(rig, lens.to_lightfield()) | {"depth": "z"}
+    write_json(dataset / "lightfield.json", content)
+    subprocess.run([sys.executable, str(CYCLES_ROOM), str(dataset)], check=True)
+    return dataset
+
+
+def test_cycles_dataset_is_valid_with_margin(cycles_dataset: Path) -> None:
+    result = validation.validate(cycles_dataset)
+    assert failed(result) == []
+    figures = check(result, "geometry").figures
+    assert figures["points"] > 3000
+    assert figures["worst_contradiction"] < validation.CONTRADICTIONS_LIMIT / 3
+    assert figures["worst_displacement_pixels"] < validation.DISPLACEMENT_LIMIT / 2
+
+
+@pytest.mark.parametrize("change", [move(BAD, (0, 0.05, 0)), turn([BAD], degrees(0, 1))])
+def test_cycles_view_off_its_pose_is_named(
+    change: Callable[[dict[str, Any]], None], cycles_dataset: Path, tmp_path: Path
+) -> None:
+    dataset = Path(shutil.copytree(cycles_dataset, tmp_path / "yard" / "sphere"))
+    relist(dataset, change)
+    assert check(validation.validate(dataset), "geometry").views == [names(dataset)[BAD]]
