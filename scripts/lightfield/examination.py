@@ -22,7 +22,7 @@ RAYS_A_VIEW = 400
 # Pixels this near to the rim of what a lens sees may hold light from both sides of it.
 RIM_PIXELS = 2
 # An image has one colour if no larger part of it than this has another.
-FEW = 0.001
+FEW = 0.002
 # So much of what lies outside the image circle may be lighter than that.
 MOST_LIT_OUTSIDE, FAINT = 0.05, 0.001
 # Of more differently turned views than this, the regions are computed again.
@@ -138,7 +138,7 @@ class Examiner:
         empty = depth is not None and bool(np.isposinf(depth).all())
         colour = [image.channels[name] for name in "RGB"]
         middle = (image_set.lens.height // 2, image_set.lens.width // 2)
-        others = sum(int(((channel != channel[middle]) & seen).sum()) for channel in colour)
+        others = max(int(((channel != channel[middle]) & seen).sum()) for channel in colour)
         constant = others <= FEW * int(seen.sum())
         facts.constant = constant and not rendered
         problems = _colour_problems(colour)
