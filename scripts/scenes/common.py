@@ -535,6 +535,16 @@ class Graph:
         named = {name.replace("_", " "): value for name, value in inputs.items()}
         return self.add("ShaderNodeBsdfPrincipled", named)
 
+    def plain_when_diffuse(self, surface: Any, color: Color) -> bpy.types.Node:
+        """A shader that is a flat diffuse `color` to rays that come from a diffuse surface.
+
+        Cycles then skips the textures wherever light has been blurred already: give it the
+        surface's mean colour.
+        """
+        blurred = self.add("ShaderNodeLightPath").outputs["Is Diffuse Ray"]
+        flat = self.add("ShaderNodeBsdfDiffuse", {"Color": color})
+        return self.add("ShaderNodeMixShader", {0: blurred, 1: surface, 2: flat})
+
 
 def material(name: str) -> tuple[bpy.types.Material, Graph]:
     """An empty material and its graph; finish it with `finish`."""

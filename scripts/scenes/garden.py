@@ -11,6 +11,7 @@ from typing import Any
 import bpy
 import numpy as np
 from mathutils import Matrix
+
 from scenes.common import (
     Array,
     Color,
@@ -51,18 +52,24 @@ STATUE = (0.0, 3.75)
 MIRROR = (1.75, 3.25)
 FIRE = (3.1, 1.1)
 TORII = (0.2, -8.5)
-MAPLE = (-2.35, -3.35)
+MAPLE = (-2.05, -3.0)
 ROCK_ISLANDS = ((2.75, -2.05, 0.75), (-1.85, 2.55, 0.5))  # x, y, radius
 FLOOR_LANTERNS = ((-0.72, -3.25), (0.85, -3.3))
 STONE_LANTERNS = ((4.95, 3.1, 1.0), (-1.3, -5.2, 1.1), (-4.6, 4.2, 0.9))  # x, y, scale
 GROVES = ((-5.5, 6.4, 6.5, 9.5), (2.2, -8.5, 9.0, -5.2))  # of bamboo: rectangles x0, y0, x1, y1
 
-SUN_AZIMUTH, SUN_ELEVATION = np.radians(-128.0), np.radians(27.0)
+SUN_AZIMUTH, SUN_ELEVATION = np.radians(-158.0), np.radians(29.0)
 # Where the sun stands in sunrise.exr: the sky is turned so that it stands where ours does.
 SKY_SUN_AZIMUTH = np.radians(-35.5)
 
 FLAME_COLOR: Color = (1.0, 0.42, 0.12)
-FLAME_HEIGHT, FLAME_GLOW = 1.15, 34.0  # metres; radiance a metre
+FLAME_HEIGHT, FLAME_TONGUES = 1.0, 6
+# Shells of a flame: size, colour, radiance a metre.
+FLAME_SHELLS: tuple[tuple[float, Color, float], ...] = (
+    (1.0, (1.0, 0.20, 0.025), 9.0),
+    (0.78, (1.0, 0.36, 0.06), 14.0),
+    (0.5, (1.0, 0.62, 0.22), 26.0),
+)
 FOG_COLOR: Color = (0.62, 0.60, 0.62)  # radiance
 FOG_DENSITY = 0.016  # share of the light lost a metre
 CANDLE_COLOR: Color = (1.0, 0.55, 0.22)
@@ -218,8 +225,8 @@ def lying(random: np.random.Generator, points: Array, scale: tuple[float, float]
 
 def sky() -> None:
     """The sunrise that ships with bpy; a sun lamp, higher up, takes the place of its sun."""
-    hdri_world("sunrise.exr", 1.5, SUN_AZIMUTH - SKY_SUN_AZIMUTH, brightest=8.0)
-    sun_light("Sun", SUN_AZIMUTH, SUN_ELEVATION, 4.2, (1.0, 0.80, 0.58), np.radians(1.5))
+    hdri_world("sunrise.exr", 2.0, SUN_AZIMUTH - SKY_SUN_AZIMUTH, brightest=8.0)
+    sun_light("Sun", SUN_AZIMUTH, SUN_ELEVATION, 5.5, (1.0, 0.80, 0.58), np.radians(1.5))
 
 
 def moss_material() -> bpy.types.Material:
@@ -237,7 +244,7 @@ def moss_material() -> bpy.types.Material:
         ],
     )
     surface = graph.add("ShaderNodeBsdfDiffuse", {"Color": tint, "Normal": graph.bump(fine, 0.03)})
-    return finish(made, graph, surface)
+    return finish(made, graph, graph.plain_when_diffuse(surface, (0.065, 0.085, 0.018)))
 
 
 def terrain(recipe: Recipe) -> None:
@@ -253,14 +260,19 @@ def terrain(recipe: Recipe) -> None:
 def flagstone_layout(recipe: Recipe) -> list[tuple[Array, float]]:
     """The flagstones as outlines (n, 2) with a height: a path to the statue, one to the fire."""
     random = recipe.random("flagstones")
-    middles = [(-0.1, -0.05, 0.62), (0.62, -0.55, 0.36), (-0.72, 0.50, 0.40), (0.66, 0.42, 0.42)]
+    middles = [(-0.1, -0.05, 0.58), (0.66, -0.62, 0.38), (-0.72, 0.50, 0.40), (0.66, 0.42, 0.42)]
     middles += [(-0.62, -0.66, 0.38), (0.15, 0.98, 0.45), (-0.05, 1.85, 0.42), (0.08, 2.62, 0.40)]
     middles += [(0.05, -1.12, 0.44), (-0.12, -1.98, 0.42), (0.12, -2.80, 0.43), (0.0, -3.5, 0.38)]
     middles += [(1.38, 0.10, 0.38), (1.32, 0.92, 0.33), (2.05, 0.52, 0.36), (-1.45, 0.10, 0.36)]
     middles += [(-2.15, 0.35, 0.38), (0.85, -4.5, 0.3), (0.1, -4.35, 0.42), (0.3, -5.2, 0.44)]
     middles += [(0.1, -6.05, 0.42), (0.35, -6.9, 0.46), (0.1, -7.75, 0.42), (1.0, 2.35, 0.34)]
+    layout = np.array(middles)
+    apart = np.hypot(*(layout[:, None, :2] - layout[:, :2]).transpose(2, 0, 1))
+    np.fill_diagonal(apart, np.inf)
+    shares = layout[:, 2, None] / (layout[:, 2, None] + layout[:, 2])
+    fitting = ((apart - 0.04) * shares).min(axis=1) / 1.14  # what keeps them from touching
     stones = []
-    for x, y, radius in middles:
+    for x, y, radius in zip(*layout[:, :2].T, np.minimum(layout[:, 2], fitting), strict=True):
         angles = np.linspace(0, TAU, recipe.steps(48, 8), endpoint=False)
         wave = random.uniform(0, TAU, 4)
         stretch = random.uniform(0.86, 1.1)
@@ -321,26 +333,26 @@ def gravel(recipe: Recipe, stones: Sequence[tuple[Array, float]]) -> None:
     surface = graph.add(
         "ShaderNodeBsdfDiffuse", {"Color": tint, "Normal": graph.bump(height, 0.006)}
     )
-    add("Gravel", grid(x, y, raked_height(gx, gy, stones)), finish(made, graph, surface))
+    finish(made, graph, graph.plain_when_diffuse(surface, (0.36, 0.34, 0.31)))
+    add("Gravel", grid(x, y, raked_height(gx, gy, stones)), made)
 
 
 def flagstones(recipe: Recipe, stones: Sequence[tuple[Array, float]]) -> None:
     """Dark polished stones, still wet in places: sharp and blurred reflections side by side."""
     made, graph = material("Wet stone")
     where = graph.coordinates()
-    grain = graph.noise(where, 55.0, 5.0, 0.65)
-    veins = graph.noise(where, 3.2, 6.0, 0.6, 1.2)
-    wet = graph.span(graph.noise(where, 2.1, 3.0), 0.0, 1.0, 0.44, 0.56)
+    grain = graph.noise(where, 60.0, 2.0, 0.7)
+    veins = graph.noise(where, 3.2, 5.0, 0.65, 0.8)
+    wet = graph.span(graph.noise(where, 2.1, 2.0), 0.0, 1.0, 0.44, 0.56)
     dry_tint = graph.ramp(
         veins, [(0.3, (0.075, 0.08, 0.085)), (0.52, (0.13, 0.13, 0.125)), (0.6, (0.2, 0.19, 0.17))]
     )
     tint = graph.mix(wet, dry_tint, graph.mix(1.0, dry_tint, (0.42, 0.42, 0.45), "MULTIPLY"))
     roughness = graph.math("ADD", graph.span(wet, 0.34, 0.07), graph.math("MULTIPLY", grain, 0.12))
-    relief = graph.math("ADD", veins, graph.math("MULTIPLY", grain, 0.25))
     surface = graph.principled(
-        Base_Color=tint, Roughness=roughness, IOR=1.6, Normal=graph.bump(relief, 0.004)
+        Base_Color=tint, Roughness=roughness, IOR=1.6, Normal=graph.bump(grain, 0.0012)
     )
-    finish(made, graph, surface)
+    finish(made, graph, graph.plain_when_diffuse(surface, (0.09, 0.09, 0.09)))
     for i, (outline, height) in enumerate(stones):
         middle = outline.mean(0)
         shape = cushion(outline - middle, height + 0.1, 0.03, recipe.steps(10, 2), i)
@@ -389,13 +401,12 @@ def granite_material(name: str, tint: Color, moss: float) -> bpy.types.Material:
     upwards = graph.math("ADD", graph.xyz(normal)["Z"], graph.math("MULTIPLY", broad, 1.6))
     cover = graph.span(upwards, 0.0, 1.0, 2.05 - moss, 2.25 - moss)
     green = graph.ramp(speckle, [(0.3, (0.03, 0.05, 0.008)), (0.7, (0.10, 0.13, 0.025))])
-    relief = graph.math("ADD", broad, graph.math("MULTIPLY", speckle, 0.12))
     surface = graph.principled(
         Base_Color=graph.mix(cover, stone, green),
         Roughness=graph.span(cover, 0.62, 0.95),
-        Normal=graph.bump(relief, 0.02),
+        Normal=graph.bump(speckle, 0.003),
     )
-    return finish(made, graph, surface)
+    return finish(made, graph, graph.plain_when_diffuse(surface, tint))
 
 
 def kerb(recipe: Recipe) -> None:
@@ -857,32 +868,44 @@ def globe(recipe: Recipe) -> Shape:
 # --- Fire and candles -----------------------------------------------------------------------------
 
 
-def flame_material() -> bpy.types.Material:
-    """The fire's volume: glowing gas that rises and licks; heights from 0 to FLAME_HEIGHT."""
-    made, graph = material("Flames")
-    where = graph.add("ShaderNodeTexCoord").outputs["Object"]
-    rising = graph.add("ShaderNodeMapping", {"Vector": where, "Scale": (1.0, 1.0, 0.55)})
-    animate(rising.inputs["Location"], "default_value", -0.045, 2)
-    tongues = graph.noise(rising, 4.0, 2.0, 0.6, 0.0, 0.0)
-    animate(tongues.node.inputs["W"], "default_value", 0.035)
-    x, y, z = graph.xyz(where)
-    height = graph.math("DIVIDE", z, FLAME_HEIGHT)
-    radius = graph.math(
-        "SQRT", graph.math("ADD", graph.math("MULTIPLY", x, x), graph.math("MULTIPLY", y, y))
-    )
-    swing = graph.math("MULTIPLY", graph.math("SUBTRACT", tongues, 0.5), 0.85)
-    swing = graph.math("MULTIPLY", swing, graph.math("ADD", height, 0.25))
-    reach = graph.math("MULTIPLY", graph.math("SUBTRACT", 1.0, height), 0.27)
-    inside = graph.math("SUBTRACT", graph.math("SUBTRACT", reach, radius), swing)
-    heat = graph.span(inside, 0.0, 1.0, 0.0, 0.16)
-    heat = graph.math("MULTIPLY", heat, graph.span(height, 0.0, 1.0, -0.02, 0.12))
-    tint = graph.ramp(
-        heat, [(0.0, (0.9, 0.08, 0.01)), (0.5, (1.0, 0.30, 0.05)), (1.0, (1.0, 0.62, 0.22))]
-    )
-    glow = graph.math("MULTIPLY", graph.math("POWER", heat, 1.7), FLAME_GLOW)
-    return finish(
-        made, graph, volume=graph.add("ShaderNodeEmission", {"Color": tint, "Strength": glow})
-    )
+def flames(recipe: Recipe, x: float, y: float, z: float) -> None:
+    """Tongues of glowing gas, each a few nested shells, bent by noise that rises with the frames.
+
+    The gas glows evenly within a shell, which Cycles integrates exactly: a flame of procedural
+    density would need a grid of it made anew for each view.
+    """
+    random = recipe.random("flames")
+    noises = []
+    for axis in "XY":
+        noise_texture = bpy.data.textures.new(f"Flame noise {axis}", "CLOUDS")
+        noise_texture.noise_scale, noise_texture.noise_depth = 0.22, 1
+        carrier = place(f"Flame carrier {axis}", None, transform((x, y + ord(axis), z)))
+        animate(carrier, "location", 0.05, 2)
+        noises.append((axis, noise_texture, carrier))
+    t = np.linspace(0, 1, recipe.steps(40, 8))
+    body = np.sin(np.pi * t**0.55) * (1 - 0.45 * t) + 0.002
+    for k in range(FLAME_TONGUES):
+        angle, reach = 2.4 * k, 0.0 if k == 0 else random.uniform(0.09, 0.17)
+        height = FLAME_HEIGHT * (1.0 if k == 0 else random.uniform(0.45, 0.8))
+        width = 0.15 if k == 0 else random.uniform(0.07, 0.11)
+        spot = transform((x + reach * np.cos(angle), y + reach * np.sin(angle), z), (0, 0, angle))
+        for shell, (share, color, glow) in enumerate(FLAME_SHELLS):
+            made, graph = material(f"Flame.{k}.{shell}")
+            gas = graph.add("ShaderNodeEmission", {"Color": color, "Strength": glow})
+            finish(made, graph, volume=gas)
+            profile = np.column_stack([width * share**1.3 * body, height * share * t])
+            tongue = add(
+                f"Flame.{k}.{shell}", lathe(profile, recipe.steps(28, 8)), made, matrix=spot
+            )
+            tongue.visible_diffuse = tongue.visible_shadow = False
+            higher = tongue.vertex_groups.new(name="Height")
+            for vertex in tongue.data.vertices:
+                higher.add([vertex.index], min(1.0, vertex.co.z / FLAME_HEIGHT + 0.1), "REPLACE")
+            for axis, noise_texture, carrier in noises:
+                bend = tongue.modifiers.new(f"Lick {axis}", "DISPLACE")
+                bend.texture, bend.vertex_group = noise_texture, higher.name
+                bend.direction, bend.space, bend.strength = axis, "GLOBAL", 0.9
+                bend.texture_coords, bend.texture_coords_object = "OBJECT", carrier
 
 
 def fire(recipe: Recipe) -> None:
@@ -940,9 +963,7 @@ def fire(recipe: Recipe) -> None:
         )
     )
     add("Logs", join(logs), embers, matrix=transform((x, y, 0)))
-    domain = box((0.74, 0.74, FLAME_HEIGHT)).moved(0, 0, FLAME_HEIGHT / 2)
-    flames = add("Flames", domain, flame_material(), matrix=transform((x, y, 0.46)))
-    flames.visible_diffuse = flames.visible_shadow = False
+    flames(recipe, x, y, 0.48)
     point_light("Fire light", (x, y, 0.95), 90.0, FLAME_COLOR, 0.16)
 
 
@@ -1179,7 +1200,7 @@ def carp(recipe: Recipe) -> None:
         body = tube(spine, radius, recipe.steps(16, 6))
         tail = spine[-1]
         fins = [
-            [tail, tail + (0.03, -0.14, 0.06), tail + (0, -0.09, 0), tail + (0.03, -0.14, -0.06)]
+            tail + np.array([(0, 0, 0), (0.03, -0.14, 0.06), (0, -0.09, 0), (0.03, -0.14, -0.06)])
         ]
         fins += [
             [
@@ -1536,7 +1557,7 @@ def maple(recipe: Recipe) -> None:
     """A red maple whose crown reaches over the viewer, high enough to leave the rigs clear."""
     random = recipe.random("maple")
     growth = Growth(
-        (2.7, 2.9, 1.35, 0.62),
+        (2.9, 3.5, 1.5, 0.65),
         (9, 6, 4),
         (1.0, 0.8, 0.7),
         (0.05, 0.055, 0.0, -0.02),
@@ -1616,7 +1637,7 @@ def woods(recipe: Recipe) -> None:
     for i, (dark, light) in enumerate(tints):
         wood, twigs, directions = branches(random, growth, 0.3 * recipe.detail)
         leaf = leaves_on(
-            random, twigs, directions, oval_leaf(), recipe.copies(26, 2), (0.14, 0.24), 0.2, 0.16
+            random, twigs, directions, oval_leaf(), recipe.copies(20, 2), (0.2, 0.34), 0.2, 0.14
         )
         foliage = leaf_material(f"Leaves.{i}", dark, light)
         meshes.append(mesh(f"Tree.{i}", join([wood, leaf.painted(1)]), bark, foliage))
@@ -1633,7 +1654,7 @@ def woods(recipe: Recipe) -> None:
         )
 
     near = spread(random, 40, (-26, -26, 26, 26), 3.4, allowed)
-    far = spread(random, 170, (-75, -75, 75, 75), 4.5, allowed)
+    far = spread(random, 110, (-75, -75, 75, 75), 4.5, allowed)
     order = [0, 1, 0, 1, 0, 2, 0, 1]
     places = standing(random, np.vstack([near, far]), (0.75, 1.35), 0.1, 0.03)
     scatter("Tree", [meshes[k] for k in order], places)
@@ -1689,7 +1710,7 @@ def grass(recipe: Recipe) -> None:
     meshes = [
         mesh(
             f"Grass.{i}",
-            tuft(random, recipe.copies(430, 20), 0.42, (0.05, 0.15), 0.035, 4, 0.5),
+            tuft(random, recipe.copies(760, 30), 0.6, (0.05, 0.15), 0.04, 3, 0.5),
             green,
         )
         for i in range(4)
@@ -1704,15 +1725,15 @@ def grass(recipe: Recipe) -> None:
             & (path_distance(x, y) > 0.95)
         )
 
-    near = spread(random, recipe.copies(620, 40), (-9.5, -9.5, 9.5, 9.5), 0.46, allowed)
+    near = spread(random, recipe.copies(330, 40), (-9.5, -9.5, 9.5, 9.5), 0.66, allowed)
     far = spread(
         random,
-        recipe.copies(420, 40),
-        (-26, -26, 26, 26),
-        1.05,
+        recipe.copies(190, 40),
+        (-22, -22, 22, 22),
+        1.55,
         lambda x, y: allowed(x, y) & (np.hypot(x, y) > 9.5),
     )
-    scatter("Grass", meshes, lying(random, near, (0.8, 1.25)) + lying(random, far, (1.8, 3.2)))
+    scatter("Grass", meshes, lying(random, near, (0.8, 1.25)) + lying(random, far, (1.8, 2.8)))
 
 
 def fallen_leaves(recipe: Recipe, stones: Sequence[tuple[Array, float]]) -> None:
