@@ -1,0 +1,24 @@
+"""A logger plugin for Snakemake: one line of JSON on stderr for each job that is planned."""
+
+import json
+import sys
+from logging import LogRecord
+
+from snakemake_interface_logger_plugins.base import LogHandlerBase
+from snakemake_interface_logger_plugins.common import LogEvent
+
+
+class LogHandler(LogHandlerBase):
+    writes_to_stream = True
+    writes_to_file = False
+    has_filter = False
+    has_formatter = False
+    needs_rulegraph = False
+
+    def emit(self, record: LogRecord) -> None:
+        if getattr(record, "event", None) != LogEvent.JOB_INFO:
+            return
+        job = {"rule": record.rule_name, "cpus": record.threads}
+        for name in ("mem_mb", "runtime", "gpu"):
+            job[name] = record.resources.get(name)
+        print(json.dumps(job), file=sys.stderr)

@@ -1,0 +1,128 @@
+"""The cluster profiles: what each job asks a cluster for, planned by Snakemake itself."""
+
+import json
+import os
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[1]
+STATUS = ROOT / "profiles/cluster-generic/status.sh"
+PROFILES = ["slurm", "cluster-generic"]
+# The rules whose jobs go to the cluster; all others are a matter of seconds.
+SUBMITTED = {
+    "build_scene",
+    "check_cameras",
+    "render",
+    "render_panorama",
+    "reproject",
+    "validate",
+    "package",
+}
+
+
+@cache
+def settings(profile):
+    return yaml.safe_load((ROOT / "profiles" / profile / "config.yaml").read_text())
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory):
+    """Return a function that plans the smoke build and returns its jobs, by profile and device."""
+
+    @cache
+    def plan(profile, device):
+        folder = tmp_path_factory.mktemp("planned")
+        results = folder / "results"
+        run = subprocess.run(
+            [
+                *(sys.executable, "-m", "snakemake", "--dry-run", "--logger", "jobs"),
+                *("--profile", f"profiles/{profile}"),
+                *("--config", f"results={results}", f"work={folder / 'work'}", f"device={device}"),
+                *("--", "smoke", f"{results}/smoke/smoke_LFCuboid_1x1x1.tar"),
+            ],
+            cwd=ROOT,
+            # Where Snakemake finds the logger plugin.
+            env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
+            capture_output=True,
+            text=True,
+        )
+        assert run.returncode == 0, run.stderr
+        return [json.loads(line) for line in run.stderr.splitlines() if line.startswith("{")]
+
+    return plan
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_every_job_says_what_it_needs(planned, profile):
+    jobs = planned(profile, "cpu")
+    assert {job["rule"] for job in jobs} >= SUBMITTED
+    for job in jobs:
+        assert 1 <= job["cpus"] <= settings(profile)["cores"], job
+        assert job["mem_mb"] >= 1000, job
+        assert job["runtime"] >= 10, job
+        assert job["gpu"] == 0, job
+
+
+def test_renders_take_every_cpu_that_a_job_may_have(planned):
+    for job in planned("slurm", "cpu"):
+        if job["rule"] in ("render", "render_panorama"):
+            assert job["cpus"] == settings("slurm")["cores"]
+
+
+def test_renders_alone_ask_for_a_gpu_where_the_device_is_one(planned):
+    gpus = {(job["rule"], job["gpu"]) for job in planned("slurm", "optix")}
+    assert {rule for rule, count in gpus if count} == {"render", "render_panorama"}
+    assert max(count for _, count in gpus) == 1
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_a_profile_names_rules_that_exist(planned, profile):
+    rules = {job["rule"] for job in planned("slurm", "cpu")}
+    assert {*settings(profile)["groups"], *settings(profile)["set-threads"]} <= rules
+
+
+def test_the_profiles_differ_in_their_executor_alone():
+    slurm, generic = (settings(profile) for profile in PROFILES)
+    shared = slurm.keys() & generic.keys() - {"executor"}
+    assert {"jobs", "cores", "retries", "default-resources", "groups"} <= shared
+    assert {key: slurm[key] for key in shared} == {key: generic[key] for key in shared}
+
+
+def test_the_submit_command_asks_for_all_four_resources():
+    command = settings("cluster-generic")["cluster-generic-submit-cmd"]
+    for part in ("{threads}", "{resources.mem_mb}M", "{resources.runtime}", "{resources.gpu}"):
+        assert part in command
+
+
+@pytest.mark.parametrize(
+    ("squeue", "answer"),
+    [
+        ("echo COMPLETED", "success"),
+        ("echo PENDING", "running"),
+        ("echo RUNNING", "running"),
+        ("echo COMPLETING", "running"),
+        ("echo CANCELLED", "failed"),
+        ("echo NODE_FAIL", "failed"),
+        ("echo OUT_OF_MEMORY", "failed"),
+        ("echo TIMEOUT", "failed"),
+        ("echo 'slurm_load_jobs error: Invalid job id specified' >&2; exit 1", "failed"),
+        ("echo 'slurm_load_jobs error: Unable to contact slurm controller' >&2; exit 1", "running"),
+    ],
+)
+def test_status_of_a_slurm_job(tmp_path, squeue, answer):
+    program = tmp_path / "squeue"
+    program.write_text(f"#!/bin/sh\n{squeue}\n")
+    program.chmod(0o755)
+    run = subprocess.run(
+        [STATUS, "17"],
+        env={"PATH": f"{tmp_path}:{os.environ['PATH']}"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert run.stdout == f"{answer}\n"
