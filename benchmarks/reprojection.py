@@ -1,0 +1,497 @@
+"""Measure reprojection: its error against its run time, and what whole batches of views cost.
+
+Error: a band-limited function on the sphere is the scene. Source and truth are its means over each
+pixel of an equidistant fisheye and of a perspective view, so a method's error is known without any
+method's help. Every method resamples the same source to the same views: minified by 8, at unity,
+magnified by 3. CPU time a view is reading, resampling and writing, EXR to EXR.
+
+Batches (--batch N): N views of 2048 x 2048 pixels, half R G B and Z, to EXR with depth at the same
+size and to PNG at an eighth, by scripts/reproject.py with its default filter and with st_warp, by a
+bare read and write of the same files, and by --peer. All of a process's CPU time counts, divided
+by its views.
+
+--peer PATH adds a program that takes the flags of SILVR's reprojection tool. Writes
+reprojection.csv, reprojection_batches.csv and reprojection.svg and .png into the output folder.
+"""
+
+import argparse
+import csv
+import json
+import math
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
+sys.path.insert(0, str(SCRIPTS))
+
+from lightfield import images, lens_map  # noqa: E402
+from lightfield.errors import UserError  # noqa: E402
+from lightfield.lenses import Array, Equidistant, Lens, Rectilinear  # noqa: E402
+from lightfield.resample import (  # noqa: E402
+    DEFAULT_FILTER,
+    kernel,
+    narrow,
+    resample_color,
+    widen,
+)
+
+try:
+    import cv2
+except ImportError:
+    cv2 = None
+
+SENSOR = 36.0
+# Times that differ by less are equal: repeats differ by as much.
+SAME_TIME = 0.03
+CAMERA = ["--rectilinear", "18,36"]
+# Okabe and Ito's colours, which the colour-blind tell apart, and a marker each.
+STYLES = {
+    "nearest": ("#999999", "s"),
+    "bilinear": ("#56B4E9", "o"),
+    "bicubic": ("#0072B2", "^"),
+    "lanczos": ("#009E73", "v"),
+    "adaptive": ("#D55E00", "*"),
+    "st_warp": ("#CC79A7", "D"),
+    "OpenCV": ("#E69F00", "P"),
+    "peer": ("#000000", "x"),
+}
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A view to make: its name, and the lens."""
+
+    name: str
+    target: Rectilinear
+
+
+@dataclass(frozen=True)
+class Result:
+    """One method's row of the table; the CPU times are in seconds a view."""
+
+    scenario: str
+    method: str
+    samples: int
+    width: int
+    height: int
+    rms_error: float
+    largest_error: float
+    resample_cpu_s: float | None
+    view_cpu_s: float
+
+    @property
+    def label(self) -> str:
+        """The method with its samples, as the plot names it."""
+        return self.method if self.samples == 1 else f"{self.method} {self.samples}×{self.samples}"
+
+
+def main() -> None:
+    """Run the program on the command line's arguments."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("output", type=Path, help="folder to write to")
+    parser.add_argument("--size", type=int, default=1024, help="of the source (default: 1024)")
+    parser.add_argument("--repeats", type=int, default=5, help="timings each (default: 5)")
+    parser.add_argument("--peer", type=Path, metavar="PATH", help="external reproject program")
+    parser.add_argument("--batch", type=int, default=0, metavar="N", help="views a batch")
+    parser.add_argument("--batch-size", type=int, default=2048, help="of its views")
+    arguments = parser.parse_args()
+    if arguments.size < 64:
+        sys.exit(f"error: --size {arguments.size}: must be at least 64")
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        results = measure_errors(arguments, Path(folder))
+    front = pareto_front(results)
+    write_table(arguments.output / "reprojection.csv", results, front)
+    plot(arguments.output / "reprojection", results, front)
+    default = [row for row in results if row.method == DEFAULT_FILTER]
+    on_front = all(row in front for row in default)
+    print(f"default filter {DEFAULT_FILTER}: {'on' if on_front else 'NOT on'} the Pareto front")
+    if arguments.batch:
+        with tempfile.TemporaryDirectory() as folder:
+            batches = measure_batches(arguments, Path(folder))
+        path = arguments.output / "reprojection_batches.csv"
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(["job", "program", "views", "cpu_s_a_view"])
+            writer.writerows(batches)
+
+
+# The scene
+
+
+class Waves:
+    """A sum of plane waves on the sphere, amplitude 1 / frequency, between 0 and 2."""
+
+    def __init__(self, most: float, count: int = 48) -> None:
+        rng = np.random.default_rng(0)
+        length = np.exp(rng.uniform(math.log(most / 50), math.log(most), count))
+        direction = rng.standard_normal((count, 3))
+        self.vectors = direction / np.linalg.norm(direction, axis=1)[:, None] * length[:, None]
+        self.amplitudes = 1 / length / (1 / length).sum()
+        self.phases = rng.uniform(0, 2 * math.pi, count)
+
+    def means(self, lens: Lens, nodes: int) -> Array:
+        """Return the (height, width) means over each pixel, by nodes × nodes quadrature."""
+        places, weights = np.polynomial.legendre.leggauss(nodes)
+        x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
+        total = np.ones((lens.height, lens.width))
+        for v, down in zip(places / 2, weights / 2, strict=True):
+            for u, across in zip(places / 2, weights / 2, strict=True):
+                rays = lens.rays(x + u, y + v)
+                _add_waves(rays, self.vectors, self.amplitudes * across * down, self.phases, total)
+        return total
+
+
+@kernel
+def _add_waves(rays: Array, vectors: Array, amplitudes: Array, phases: Array, total: Array) -> None:
+    for i in range(rays.shape[0]):
+        for j in range(rays.shape[1]):
+            for k in range(len(phases)):
+                phase = phases[k]
+                for c in range(3):
+                    phase += vectors[k, c] * rays[i, j, c]
+                total[i, j] += amplitudes[k] * math.cos(phase)
+
+
+# Error against run time
+
+
+def scenarios(size: int) -> list[Scenario]:
+    """Return the views: source pixels a target pixel at the centre are 8, 1 and 1/3."""
+    unity = size / math.pi  # the source's pixels a radian
+    views = []
+    for name, scale, width in (
+        ("minify by 8", 1 / 8, round(unity / 4)),
+        ("unity", 1.0, round(unity * 2)),
+        ("magnify by 3", 3.0, size // 2),
+    ):
+        focal_length = unity * scale / width * SENSOR
+        lens = Rectilinear(
+            width=width, height=width, focal_length=focal_length, sensor_size=(SENSOR, SENSOR)
+        )
+        views.append(Scenario(name, lens))
+    return views
+
+
+def measure_errors(arguments: argparse.Namespace, folder: Path) -> list[Result]:
+    """Return a row for every method and scenario."""
+    size = arguments.size
+    source = Equidistant(width=size, height=size, fov=math.pi)
+    # Up to half of the source's Nyquist frequency.
+    scene = Waves(math.pi / 2 * size / math.pi)
+    gray = scene.means(source, 3).astype(np.float32)
+    gray = np.where(np.isnan(gray), np.float32(0), gray)
+    pixels = np.repeat(gray[:, :, None], 4, axis=2)
+    view = folder / "views" / "view.exr"
+    # The file holds floats, so that no method's error is that of halves; its reading is timed on
+    # halves, as views have.
+    images.write_exr(view, dict.fromkeys("RGB", gray))
+    half = folder / "half.exr"
+    images.write_exr(half, dict.fromkeys("RGB", gray.astype(np.float16)))
+    (folder / "lightfield.json").write_text(json.dumps(source.to_lightfield()))
+    results = []
+    for scenario in scenarios(size):
+        print(f"{scenario.name}: {scenario.target.width} × {scenario.target.height}", flush=True)
+        spans = source.width / math.pi / scenario.target.focal_length
+        spans *= SENSOR / scenario.target.width
+        truth = scene.means(scenario.target, max(3, math.ceil(1.2 * spans) + 4))
+        io = best_cpu(lambda s=scenario: read_and_write(half, folder / "out.exr", s), arguments)
+        for method, samples, resample in methods(source, scenario.target, pixels):
+            out = resample()
+            error = out - truth
+            cpu = best_cpu(resample, arguments)
+            results.append(row(scenario, method, samples, error, cpu, cpu + io))
+        if arguments.peer:
+            results += peer_rows(arguments, folder, scenario, truth)
+    return results
+
+
+def row(
+    scenario: Scenario, method: str, samples: int, error: Array, resample: float | None, all_: float
+) -> Result:
+    """Return a result, and print it."""
+    result = Result(
+        scenario.name,
+        method,
+        samples,
+        scenario.target.width,
+        scenario.target.height,
+        float(np.sqrt(np.mean(error**2))),
+        float(np.abs(error).max()),
+        resample,
+        all_,
+    )
+    print(f"  {result.label:16s} rms error {result.rms_error:.2e}, {all_:.4f} CPU-s a view")
+    return result
+
+
+def methods(
+    source: Lens, target: Lens, pixels: Array
+) -> list[tuple[str, int, Callable[[], Array]]]:
+    """Return (name, samples, function) of every method that resamples in this process."""
+    chosen = [(name, 1) for name in STYLES if name not in ("OpenCV", "peer")]
+    chosen += [(name, n) for name in ("bilinear", "bicubic") for n in (2, 4, 8)]
+    found: list[tuple[str, int, Callable[[], Array]]] = []
+    for name, samples in chosen:
+        made = lens_map.compute(source, target, np.eye(3), name, samples)
+        row, end_row, column, end_column = made.window
+        window = np.ascontiguousarray(pixels[row:end_row, column:end_column])
+
+        def ours(window: Array = window, made: lens_map.LensMap = made) -> Array:
+            return np.asarray(resample_color(window, made)[:, :, 0])
+
+        found.append((name, samples, ours))
+    if cv2 is not None:
+        cv2.setNumThreads(1)
+        made = lens_map.compute(source, target, np.eye(3), "bicubic")
+        x = made.centers[..., 0] + np.float32(made.window[2] - 0.5)
+        y = made.centers[..., 1] + np.float32(made.window[0] - 0.5)
+        for flag in (cv2.INTER_LINEAR, cv2.INTER_CUBIC, cv2.INTER_LANCZOS4):
+
+            def theirs(flag: int = flag) -> Array:
+                return np.asarray(cv2.remap(pixels, x, y, flag)[:, :, 0])
+
+            found.append(("OpenCV", 1, theirs))
+    return found
+
+
+def read_and_write(source: Path, target: Path, scenario: Scenario) -> None:
+    """Do what every method does but for resampling: read a view, write one of the target's size."""
+    read = images.read_image(source, ["R", "G", "B"]).channels
+    wide = widen(np.dstack([read[name] for name in "RGB"]))
+    rows = np.arange(scenario.target.height) % len(wide)
+    columns = np.arange(scenario.target.width) % wide.shape[1]
+    half = narrow(np.ascontiguousarray(wide[rows][:, columns]), 3)
+    images.write_exr(target, {name: half[:, :, i] for i, name in enumerate("RGB")})
+
+
+def best_cpu(function: Callable[[], Any], arguments: argparse.Namespace) -> float:
+    """Return the least CPU time of ``function`` among the repeats, after one that warms up."""
+    function()
+    times = []
+    for _ in range(arguments.repeats):
+        start = time.process_time()
+        function()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def peer_rows(
+    arguments: argparse.Namespace, folder: Path, scenario: Scenario, truth: Array
+) -> list[Result]:
+    """Return the external program's rows; the least CPU time of its process."""
+    lens = scenario.target
+    rows = []
+    for flag, samples in (("nn", 1), ("bl", 1), ("bc", 1), ("bc", 2), ("bc", 4), ("bc", 8)):
+        command = [
+            str(arguments.peer), "--rectilinear", f"{lens.focal_length},{SENSOR}",
+            "--output-resolution", f"{lens.width},{lens.height}", f"--{flag}",
+            "--samples", str(samples), "--exr", "--input-dir", str(folder / "views"),
+            "--input-cfg", str(folder / "lightfield.json"),
+            "--output-dir", str(folder / "peer"), "--output-cfg", str(folder / "peer.json"),
+        ]  # fmt: skip
+        cpu = min(cpu_of(command) for _ in range(arguments.repeats))
+        out = images.read_image(folder / "peer" / "view.exr", ["R"]).channels["R"]
+        rows.append(row(scenario, "peer", samples, out.astype(np.float64) - truth, None, cpu))
+    return rows
+
+
+def cpu_of(command: Sequence[str]) -> float:
+    """Return the CPU time, user and system, of a command that succeeds."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if done.returncode:
+        raise UserError(f"{command[0]}: failed: {done.stderr or done.stdout}")
+    return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+
+
+def pareto_front(results: Sequence[Result]) -> list[Result]:
+    """Return the rows that no other of their scenario beats in error without costing more time."""
+    return [
+        result
+        for result in results
+        if not any(
+            (
+                other.rms_error < result.rms_error * (1 - 1e-6)
+                and other.view_cpu_s <= result.view_cpu_s * (1 + SAME_TIME)
+            )
+            or (
+                other.rms_error <= result.rms_error * (1 + 1e-6)
+                and other.view_cpu_s < result.view_cpu_s * (1 - SAME_TIME)
+            )
+            for other in results
+            if other.scenario == result.scenario
+        )
+    ]
+
+
+def write_table(path: Path, results: Sequence[Result], front: Sequence[Result]) -> None:
+    """Write the results as CSV, those on the front marked."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([*Result.__dataclass_fields__, "on_front"])
+        for result in results:
+            writer.writerow([*vars(result).values(), result in front])
+
+
+def plot(path: Path, results: Sequence[Result], front: Sequence[Result]) -> None:
+    """Draw error over time, a panel for each scenario, as SVG and PNG."""
+    import matplotlib
+
+    matplotlib.use("agg")
+    # The same figures give the same file.
+    matplotlib.rcParams["svg.hashsalt"] = "reprojection"
+    from matplotlib import pyplot
+
+    names = list(dict.fromkeys(result.scenario for result in results))
+    figure, panels = pyplot.subplots(1, len(names), figsize=(15, 5.5), layout="constrained")
+    for panel, name in zip(panels, names, strict=True):
+        rows = [result for result in results if result.scenario == name]
+        best = sorted((r for r in front if r.scenario == name), key=lambda r: r.view_cpu_s)
+        panel.plot(
+            [r.view_cpu_s for r in best],
+            [r.rms_error for r in best],
+            color="#000000",
+            linewidth=1,
+            linestyle=":",
+            label="Pareto front",
+        )
+        for method, (color, marker) in STYLES.items():
+            points = [r for r in rows if r.method == method]
+            if not points:
+                continue
+            panel.scatter(
+                [r.view_cpu_s for r in points],
+                [r.rms_error for r in points],
+                color=color,
+                marker=marker,
+                s=150 if method == DEFAULT_FILTER else 45,
+                zorder=3,
+                label=f"{method} (default)" if method == DEFAULT_FILTER else method,
+            )
+            for r in points:
+                if r.samples > 1:
+                    panel.annotate(
+                        f"{r.samples}²",
+                        (r.view_cpu_s, r.rms_error),
+                        xytext=(5, 4),
+                        textcoords="offset points",
+                        fontsize=8,
+                        color=color,
+                    )
+        panel.set_xscale("log")
+        panel.set_yscale("log")
+        panel.set_title(f"{name} ({rows[0].width} × {rows[0].height} pixels)")
+        panel.set_xlabel("CPU time a view, EXR to EXR (s)")
+        panel.grid(which="major", color="#dddddd", linewidth=0.6)
+        panel.set_axisbelow(True)
+    panels[0].set_ylabel("root mean square error (scene mean is 1)")
+    panels[-1].legend(fontsize=9, loc="upper right")
+    figure.savefig(path.with_suffix(".svg"), metadata={"Date": None})
+    figure.savefig(path.with_suffix(".png"), dpi=110)
+    pyplot.close(figure)
+
+
+# Batches
+
+
+def measure_batches(arguments: argparse.Namespace, folder: Path) -> list[list[Any]]:
+    """Return rows (job, program, views, CPU seconds a view)."""
+    size, count = arguments.batch_size, arguments.batch
+    write_batch(folder, size, count)
+    config = folder / "lightfield.json"
+    jobs = {
+        "EXR with depth, same size": [*CAMERA, "--exr"],
+        "PNG, an eighth": [*CAMERA, "--scale", "0.125", "--png", "--exposure", "-1",
+                           "--reinhard", "5"],
+    }  # fmt: skip
+    rows: list[list[Any]] = []
+    for job, flags in jobs.items():
+        size_flags = [flag for flag in flags if flag in ("--scale", "0.125")]
+
+        def ours(
+            filter_name: str, flags: list[str] = flags, size: Any = tuple(size_flags)
+        ) -> float:
+            made = folder / f"{filter_name}.npy"
+            start = [sys.executable, str(SCRIPTS / "lens_map.py"), str(made), *CAMERA, *size]
+            cpu_of([*start, "--input-cfg", str(config), "--filter", filter_name])
+            program = [sys.executable, str(SCRIPTS / "reproject.py"), "--lens-map", str(made)]
+            return run_batch([*program, "--filter", filter_name], folder, flags)
+
+        programs = {
+            f"ours, {DEFAULT_FILTER}": lambda run=ours: run(DEFAULT_FILTER),
+            "ours, st_warp": lambda run=ours: run("st_warp"),
+            "bare read and write": lambda small="0.125" in flags: bare(folder, small),
+        }
+        if arguments.peer:
+            programs["peer"] = lambda flags=flags: run_batch([str(arguments.peer)], folder, flags)
+        for program, run in programs.items():
+            cpu = min(run() for _ in range(2)) / count
+            rows.append([job, program, count, round(cpu, 4)])
+            print(f"{job}: {program}: {cpu:.3f} CPU-s a view", flush=True)
+    return rows
+
+
+def write_batch(folder: Path, size: int, count: int) -> None:
+    """Write ``count`` views, half R G B and Z, with a scene's detail and a render's noise."""
+    lens = Equidistant(width=size, height=size, fov=math.pi)
+    rng = np.random.default_rng(0)
+    gray = Waves(size / 4).means(lens, 1)
+    x, y = np.meshgrid(np.arange(size) + 0.5, np.arange(size) + 0.5)
+    rays = lens.rays(x, y)
+    outside = np.isnan(rays[..., 0])
+    # A room of 4 × 3 × 6 m.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = (np.array([2, 1.5, 3]) / np.abs(rays)).min(axis=-1)
+    z = np.where(outside, np.inf, distance * -rays[..., 2]).astype(np.float16)
+    (folder / "lightfield.json").write_text(json.dumps(lens.to_lightfield() | {"depth": "z"}))
+    for index in range(count):
+        channels = {}
+        for name, tint in zip("RGB", (0.9, 0.7, 0.5), strict=True):
+            noisy = tint * gray * (1 + 0.02 * rng.standard_normal(gray.shape))
+            channels[name] = np.where(outside, 0, noisy).astype(np.float16)
+        images.write_exr(folder / "exr" / f"view_{index:04d}f.exr", channels | {"Z": z})
+
+
+def run_batch(program: list[str], folder: Path, flags: list[str]) -> float:
+    """Return the CPU time of a program on the whole batch, into an empty folder."""
+    with tempfile.TemporaryDirectory(dir=folder) as out:
+        return cpu_of(
+            [
+                *program, *flags, "--input-dir", str(folder / "exr"),
+                "--input-cfg", str(folder / "lightfield.json"),
+                "--output-dir", out, "--output-cfg", str(Path(out) / "lightfield.json"),
+            ]
+        )  # fmt: skip
+
+
+def bare(folder: Path, small: bool) -> float:
+    """Return the CPU time of reading the batch and writing as many pixels as the job does."""
+    start = time.process_time()
+    for path in sorted((folder / "exr").iterdir()):
+        channels = images.read_image(path, None if not small else ["R", "G", "B"]).channels
+        if small:
+            side = len(channels["R"]) // 8
+            pixels = np.dstack([array[:side, :side] for array in channels.values()])
+            images.write_png(folder / "bare.png", (pixels * 100).astype(np.uint8))
+        else:
+            images.write_exr(folder / "bare.exr", channels)
+    return time.process_time() - start
+
+
+if __name__ == "__main__":
+    from lightfield import cli
+
+    cli.run(main)
