@@ -102,16 +102,27 @@ def shard_threads(wildcards, *others):
 
 def scene_file(wildcards):
     """Return the .blend of a dataset: what a builder makes, or what the user brought."""
-    dataset = dataset_of(wildcards)
-    if "builder" in dataset.source:
-        return f"{WORK}/{dataset.name}/scene.blend"
-    return dataset.source["blend"]
+    return blend_of(dataset_of(wildcards).name)
+
+
+def blend_of(name):
+    """Return the .blend of a scene YAML, as `scene_file` does."""
+    return source_of(name).get("blend", f"{WORK}/{name}/scene.blend")
 
 
 def scene_check(wildcards):
     """Return the proof that the user's own .blend is the one meant; a built one needs none."""
-    dataset = dataset_of(wildcards)
-    return f"{WORK}/{dataset.name}/blend.json" if "blend" in dataset.source else []
+    return check_of(dataset_of(wildcards).name)
+
+
+def check_of(name):
+    """Return the proof of a scene YAML's .blend, as `scene_check` does."""
+    return f"{WORK}/{name}/blend.json" if "blend" in source_of(name) else []
+
+
+def scene_inventory(wildcards):
+    """Return the list of what a dataset's scene contains."""
+    return f"{WORK}/{dataset_of(wildcards).name}/inventory.json"
 
 
 def records(dataset, stage):
@@ -304,7 +315,10 @@ def drop_false_checks():
             found = Path(dataset.source["blend"]).stat()
         except FileNotFoundError:
             continue
-        if (found.st_size, found.st_mtime_ns) != (checked["bytes"], checked["mtime_ns"]):
+        if (found.st_size, found.st_mtime_ns) != (
+            checked["bytes"],
+            checked["mtime_ns"],
+        ):
             proof.unlink()
 
 

@@ -5,6 +5,7 @@ rule render:
     input:
         check=scene_check,
         blend=scene_file,
+        inventory=scene_inventory,
         lightfield=f"{DATASET}/lightfield.json",
         cameras=f"{MADE}/cameras.json",
     output:
@@ -28,6 +29,7 @@ rule render:
         "Rendering views {wildcards.first} to {wildcards.end} of {wildcards.scene}/{wildcards.rig}"
     shell:
         "python scripts/render_shard.py --blend {input.blend:q} --lightfield {input.lightfield}"
+        " --inventory {input.inventory}"
         " --views {wildcards.first}:{wildcards.end} --device {params.device} --threads {threads}"
         " --output {params.folder} --journal {params.journal} --record {output}"
         " 2>&1 | tee {log}"

@@ -28,6 +28,7 @@ rule render_panorama:
     input:
         check=scene_check,
         blend=scene_file,
+        inventory=scene_inventory,
         lightfield=f"{PANORAMA}/lightfield.json",
     output:
         f"{PANORAMA}/exr/view_0000f.exr",
@@ -48,6 +49,7 @@ rule render_panorama:
         "Rendering the panorama of {wildcards.scene}/{wildcards.rig}"
     shell:
         "python scripts/render_shard.py --blend {input.blend:q} --lightfield {input.lightfield}"
+        " --inventory {input.inventory}"
         " --device {params.device} --threads {threads} --output {params.folder} 2>&1 | tee {log}"
 
 

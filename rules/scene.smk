@@ -41,6 +41,25 @@ rule check_blend:
         " --output {output} 2>&1 | tee {log}"
 
 
+rule inventory:
+    input:
+        check=lambda wildcards: check_of(wildcards.name),
+        blend=lambda wildcards: blend_of(wildcards.name),
+    output:
+        f"{WORK}/{{name}}/inventory.json",
+    log:
+        f"{WORK}/logs/{{name}}/inventory.log",
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=8000,
+        runtime=30,
+    message:
+        "Listing what the scene {wildcards.name} contains"
+    shell:
+        "python scripts/inventory.py --blend {input.blend:q} --output {output} 2>&1 | tee {log}"
+
+
 # Only where a scene YAML says from where, and the user has not brought the file.
 for name, source in {
     dataset.name: dataset.source

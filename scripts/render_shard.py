@@ -29,6 +29,11 @@ def main() -> None:
     parser.add_argument("--blend", required=True, type=Path, help="the scene")
     parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
     parser.add_argument(
+        "--inventory",
+        type=Path,
+        help="JSON of what the scene contains: leaves out what its pixels do not depend on",
+    )
+    parser.add_argument(
         "--views",
         metavar="FIRST:END",
         default=":",
@@ -93,9 +98,13 @@ def render_views(
     # Only now, because it takes a second and a shard that is finished does not need it.
     from lightfield import blender
 
+    inventory = read_json(arguments.inventory) if arguments.inventory else {"left_out": []}
     blender.open_scene(arguments.blend)
+    if "hidden_objects" in inventory["left_out"]:
+        blender.remove_objects(inventory["hidden"])
     threads = arguments.threads or len(os.sched_getaffinity(0))
     blender.set_up_render(lightfield["render"], lightfield, arguments.device, threads)
+    blender.leave_out(inventory["left_out"])
     to_depth = depth_factors(lightfield)
     append(arguments.journal, {"start_up_seconds": time.perf_counter() - started})
 

@@ -1,7 +1,8 @@
 """What a view's pixels follow from: the scene's fingerprint, the render key, and the seed.
 
 Two views with equal keys have equal pixels, so a finished view is recognised by its key and
-never rendered twice, and a change of settings is never mistaken for a finished view.
+never rendered twice, and a change of settings is never mistaken for a finished view. What pruning
+leaves out changes no byte (see `lightfield.pruning`) and is therefore not in the key.
 """
 
 import hashlib

@@ -1,0 +1,175 @@
+"""Make scenes with and without what pruning decides by, and render each whole and pruned.
+
+Run by test_inventory.py in a process of its own, because bpy has one scene at a time:
+pruned_renders.py FOLDER writes FOLDER/results.json.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+import inventory
+from lightfield import blender, lenses, pruning, rigs
+from scenes import test_room
+
+RENDER = {"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0}
+FRAME = 7
+
+
+def add(kind, **settings):
+    getattr(bpy.ops.mesh, f"primitive_{kind}_add")(**settings)
+    return bpy.context.object
+
+
+def keyed(owner, path, values, index=-1):
+    for frame, value in zip((1, 20), values, strict=True):
+        if index < 0:
+            setattr(owner, path, value)
+        else:
+            getattr(owner, path)[index] = value
+        owner.keyframe_insert(path, index=index, frame=frame)
+
+
+def shader(name, material_name="Principled BSDF"):
+    return bpy.data.materials[name].node_tree.nodes[material_name]
+
+
+def plain():
+    """Nothing to leave out."""
+
+
+def left_behind():
+    """What artists leave in a file: hidden objects, motion blur, passes, materials of no object."""
+    scene = bpy.context.scene
+    scene.render.use_motion_blur = True
+    layer = scene.view_layers[0]
+    layer.use_pass_normal = layer.use_pass_cryptomatte_object = True
+    layer.aovs.add().name = "own"
+    add("uv_sphere", location=(0, 2, 1), segments=256, ring_count=128).hide_render = True
+    bpy.context.object.name = "hidden"
+    bpy.data.objects["hidden"].data.materials.append(bpy.data.materials.new("only hidden"))
+    for name, hide in (("excluded", False), ("off", True)):
+        collection = bpy.data.collections.new(name)
+        scene.collection.children.link(collection)
+        thing = add("cube", location=(1, 2, 1))
+        thing.name = f"in {name}"
+        collection.objects.link(thing)
+        scene.collection.objects.unlink(thing)
+        collection.hide_render = hide
+    layer.layer_collection.children["excluded"].exclude = True
+    unseen = add("cube", location=(0, -2, 1), size=0.5)
+    unseen.name = "unseen"
+    for kind in ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow"):
+        setattr(unseen, f"visible_{kind}", False)
+    # These are hidden and needed all the same.
+    cutter = add("cube", size=0.8, location=(2, 0.8, 0.6))
+    cutter.name = "cutter"
+    cutter.hide_render = True
+    modifier = bpy.data.objects["sphere"].modifiers.new("cut", "BOOLEAN")
+    modifier.object = cutter
+    instanced = bpy.data.collections.new("instanced")
+    scene.collection.children.link(instanced)
+    thing = add("cube", size=0.3, location=(0, 1, 0))
+    thing.name = "instanced"
+    instanced.objects.link(thing)
+    scene.collection.objects.unlink(thing)
+    layer.layer_collection.children["instanced"].exclude = True
+    empty = bpy.data.objects.new("instancer", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", instanced
+    empty.location = (0.5, 1, 1)
+    scene.collection.objects.link(empty)
+
+
+def animated():
+    """An object, a material and a shape that change with time, and one that a driver moves."""
+    keyed(bpy.data.objects["cone"], "location", (0.0, 1.5), 2)
+    keyed(shader("sphere").inputs["Roughness"], "default_value", (0.1, 0.9))
+    box = bpy.data.objects["box"]
+    box.shape_key_add(name="Basis")
+    key = box.shape_key_add(name="taller")
+    for point in key.data:
+        point.co.z *= 2
+    keyed(key, "value", (0.0, 1.0))
+    driver = bpy.data.objects["pillar"].driver_add("location", 0).driver
+    driver.expression = "-2 + frame / 10"
+    # Rendered, though the artist has hidden it in the viewport.
+    torus = bpy.data.objects["torus"]
+    keyed(torus, "location", (1.0, 2.5), 2)
+    torus.hide_viewport = True
+
+
+def blurred():
+    """Something moves while the shutter is open."""
+    keyed(bpy.data.objects["cone"], "location", (0.0, 4.0), 2)
+    bpy.context.scene.render.use_motion_blur = True
+
+
+def features():
+    """Every kind of light transport that the inventory tells apart."""
+    shader("sphere").inputs["Transmission Weight"].default_value = 1
+    shader("cone").inputs["Subsurface Weight"].default_value = 0.5
+    shader("box").inputs["Alpha"].default_value = 0.5
+    torus = bpy.data.materials["torus"].node_tree
+    volume = torus.nodes.new("ShaderNodeVolumePrincipled")
+    torus.links.new(volume.outputs[0], torus.nodes["Material Output"].inputs["Volume"])
+    pillar = bpy.data.materials["pillar"].node_tree
+    height = pillar.nodes.new("ShaderNodeDisplacement")
+    pillar.links.new(height.outputs[0], pillar.nodes["Material Output"].inputs["Displacement"])
+    walls = bpy.data.materials["walls"].node_tree
+    group = bpy.data.node_groups.new("glow", "ShaderNodeTree")
+    group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
+    end = group.nodes.new("NodeGroupOutput")
+    group.links.new(group.nodes.new("ShaderNodeEmission").outputs[0], end.inputs[0])
+    node = walls.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    mix = walls.nodes.new("ShaderNodeMixShader")
+    walls.links.new(node.outputs[0], mix.inputs[1])
+    walls.links.new(mix.outputs[0], walls.nodes["Material Output"].inputs["Surface"])
+
+
+def rendered(path, found=None):
+    """Return the colours and depths of a view of a scene, pruned if its inventory is given."""
+    lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
+    rig = {"type": "lattice", "cameras": [1, 1, 1], "center": [0.2, 0.1, 1.4]}
+    lightfield = rigs.lightfield(rig, lens.to_lightfield())
+    lightfield |= {"depth": "distance", "frame": FRAME}
+    names = pruning.left_out(found) if found else []
+    blender.open_scene(path)
+    if "hidden_objects" in names:
+        blender.remove_objects(found["hidden"])
+    blender.set_up_render(RENDER, lightfield, "cpu", 1)
+    blender.leave_out(names)
+    pose = np.array(lightfield["frames"][0]["world_matrix"])
+    # The second view shows what the first may have changed.
+    views = [blender.render_view(pose, seed) for seed in (1, 2)]
+    return np.stack([np.dstack([view.colour, view.depth]) for view in views])
+
+
+def main():
+    folder = Path(sys.argv[1])
+    results = {}
+    for make in (plain, left_behind, animated, blurred, features):
+        path = folder / f"{make.__name__}.blend"
+        blender.new_scene()
+        test_room.build({})
+        make()
+        blender.save_scene(path)
+        blender.open_scene(path)
+        found = inventory.inventory()
+        whole, pruned = rendered(path), rendered(path, found)
+        results[make.__name__] = {
+            "inventory": found,
+            "left_out": pruning.left_out(found),
+            "same": bool(np.array_equal(whole, pruned, equal_nan=True)),
+            "objects": len(bpy.data.objects),
+            "materials": [material.name for material in bpy.data.materials],
+            "animated": [owner.name for owner, _ in blender.animated()],
+        }
+    (folder / "results.json").write_text(json.dumps(results))
+
+
+if __name__ == "__main__":
+    main()

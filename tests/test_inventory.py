@@ -1,0 +1,155 @@
+"""What a scene contains, what follows from that, and that no pixel tells the difference."""
+
+import json
+from pathlib import Path
+
+import pytest
+from checkouts import checkout, planned
+
+from lightfield import pruning
+
+NOTHING = {"hidden": [], "animated": [], "moving": [], "motion_blur": False}
+
+
+@pytest.mark.parametrize(
+    ("contains", "expected"),
+    [
+        ({}, ["viewport"]),
+        ({"hidden": ["cutter"]}, ["viewport", "hidden_objects"]),
+        ({"motion_blur": True}, ["viewport", "motion_blur"]),
+        ({"animated": ["Water"]}, ["viewport", "animation"]),
+        ({"animated": ["Water"], "motion_blur": True}, ["viewport", "motion_blur", "animation"]),
+        ({"animated": ["Fire"], "moving": ["Fire"]}, ["viewport", "animation"]),
+        ({"animated": ["Fire"], "moving": ["Fire"], "motion_blur": True}, ["viewport"]),
+        ({"moving": ["Cloth"], "motion_blur": True}, ["viewport"]),
+    ],
+)
+def test_what_is_left_out_follows_from_what_is_there(contains, expected):
+    assert pruning.left_out(NOTHING | contains) == expected
+
+
+@pytest.fixture(scope="module")
+def scenes(run_program, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pruned")
+    run_program(Path(__file__).with_name("pruned_renders.py"), folder)
+    return json.loads((folder / "results.json").read_text())
+
+
+@pytest.mark.parametrize("name", ["plain", "left_behind", "animated", "blurred", "features"])
+def test_a_pruned_render_is_the_whole_one_byte_for_byte(name, scenes):
+    assert scenes[name]["same"]
+
+
+def test_what_artists_leave_behind_is_found_and_left_out(scenes):
+    found = scenes["left_behind"]
+    assert found["left_out"] == ["viewport", "hidden_objects", "motion_blur"]
+    # What a modifier or an instancer needs stays, though no ray meets it as it stands.
+    assert found["inventory"]["hidden"] == ["hidden", "in excluded", "in off", "unseen"]
+    assert "only hidden" not in found["materials"]
+    # The room's seven, the cutter by its modifier, the instanced, its instancer, and our camera.
+    assert found["objects"] == 11
+
+
+def test_an_animation_is_frozen_at_the_frame_of_the_dataset(scenes):
+    found = scenes["animated"]
+    assert found["left_out"] == ["viewport", "animation"]
+    assert set(found["inventory"]["animated"]) == {"cone", "sphere", "Key", "pillar", "torus"}
+    assert set(found["inventory"]["moving"]) == {"cone", "Key", "pillar", "torus"}
+    # What the viewport does not show is not evaluated there: its value is not known, so it stays.
+    assert found["animated"] == ["torus"]
+
+
+def test_what_moves_under_motion_blur_is_not_frozen(scenes):
+    found = scenes["blurred"]
+    assert found["left_out"] == ["viewport"]
+    assert found["animated"] == ["cone"]
+
+
+def test_features_are_told_by_the_materials_that_have_them(scenes):
+    found = scenes["features"]["inventory"]
+    assert {name: found[name] for name in ("transmission", "subsurface", "transparency")} == {
+        "transmission": ["sphere"],
+        "subsurface": ["cone"],
+        "transparency": ["box"],
+    }
+    assert found["volumes"] == ["torus"]
+    assert found["displacement"] == ["pillar"]
+    assert found["emission"] == ["walls"]
+    plain = scenes["plain"]["inventory"]
+    names = ("transmission", "subsurface", "transparency", "volumes", "displacement", "emission")
+    assert not any(plain[name] for name in names)
+    assert plain["objects"] == 6
+    assert plain["lights"] == 1
+
+
+MISSING = """
+import sys
+sys.path.insert(0, sys.argv[2])
+import bpy
+from scenes import test_room
+
+folder = sys.argv[1]
+bpy.ops.wm.read_factory_settings(use_empty=True)
+test_room.build({})
+image = bpy.data.images.new("bark", 4, 4)
+image.filepath_raw, image.file_format = folder + "/bark.png", "PNG"
+image.save()
+image.source = "FILE"
+tree = bpy.data.materials["cone"].node_tree
+texture = tree.nodes.new("ShaderNodeTexImage")
+texture.image = image
+tree.links.new(texture.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
+unused = image.copy()
+unused.name, unused.filepath_raw, unused.use_fake_user = "unused", folder + "/never.png", True
+bpy.ops.wm.save_as_mainfile(filepath=folder + "/textured.blend", relative_remap=False)
+
+bpy.ops.wm.read_factory_settings(use_empty=True)
+test_room.build({})
+bpy.data.libraries.write(folder + "/library.blend", {bpy.data.objects["cone"]})
+bpy.ops.wm.read_factory_settings(use_empty=True)
+with bpy.data.libraries.load(folder + "/library.blend", link=True) as (_, wanted):
+    wanted.objects = ["cone"]
+bpy.context.scene.collection.objects.link(wanted.objects[0])
+bpy.ops.wm.save_as_mainfile(filepath=folder + "/linked.blend", relative_remap=False)
+"""
+
+
+def test_missing_textures_and_libraries_are_errors(run_program, tmp_path):
+    (tmp_path / "make.py").write_text(MISSING)
+    scripts = Path(pruning.__file__).parents[1]
+    run_program(tmp_path / "make.py", tmp_path, scripts)
+    output = tmp_path / "inventory.json"
+    for name, file, told in (
+        ("textured", "bark.png", "the texture bark"),
+        ("linked", "library.blend", "the library library.blend"),
+    ):
+        arguments = ("--blend", tmp_path / f"{name}.blend", "--output", output)
+        result = run_program("inventory.py", *arguments)
+        assert "reads 1 other files" in result.stderr if name == "linked" else True
+        output.unlink()
+        (tmp_path / file).unlink()
+        result = run_program("inventory.py", *arguments, check=False)
+        assert result.returncode == 1
+        assert result.stderr.splitlines()[-1].startswith(f"error: {tmp_path / name}.blend: 1 files")
+        assert f"{told} at {tmp_path / file}" in result.stderr
+        assert not output.exists()
+
+
+MINIMAL = """
+scene: {builder: test_room}
+render: {samples: 1, depth: none}
+rigs:
+  LFPlane:
+    type: plane
+    cameras: [2, 1]
+    camera: {lens: equidistant, fov: 180, resolution: [16, 16]}
+exports: {instant_ngp: {sources: [views]}}
+"""
+
+
+def test_a_minimal_scene_plans_its_own_stages_only(tmp_path):
+    folder = checkout(tmp_path, minimal=MINIMAL)
+    jobs = planned(folder, "--config", "scenes=[minimal]", "rigs=all", "preset=full")
+    assert {"build_scene", "render", "export_views_to_instant_ngp", "validate"} <= jobs.keys()
+    absent = ("lens_map", "reproject", "reprojected_lightfield", "check_blend")
+    assert not any(name in jobs for name in (*absent, "export_reprojection_to_instant_ngp"))
