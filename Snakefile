@@ -13,6 +13,7 @@ include: "rules/export.smk"
 include: "rules/validate.smk"
 include: "rules/report.smk"
 include: "rules/package.smk"
+include: "rules/plan.smk"
 
 
 rule all:

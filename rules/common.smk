@@ -191,6 +191,17 @@ def dataset_files(dataset):
     ]
 
 
+def probes():
+    """Return name, number of frames, and probe of each chosen rig: a sequence's first frame's."""
+    frames = {}
+    for dataset in CHOSEN:
+        frames.setdefault((dataset.scene, dataset.rig_name), []).append(dataset.rig)
+    return [
+        (f"{scene}/{rig}", len(folders), f"{WORK}/{scene}/{folders[0]}/probe.json")
+        for (scene, rig), folders in frames.items()
+    ]
+
+
 def package_file(dataset):
     """Return a rig's dataset as one archive, all frames of a sequence in it, named as SILVR's are."""
     return f"{RESULTS}/{dataset.scene}/{dataset.scene}_{dataset.rig_name}.tar"

@@ -103,10 +103,13 @@ def render_views(
     if "hidden_objects" in inventory["left_out"]:
         blender.remove_objects(inventory["hidden"])
     threads = arguments.threads or len(os.sched_getaffinity(0))
-    blender.set_up_render(lightfield["render"], lightfield, arguments.device, threads)
+    device = blender.set_up_render(lightfield["render"], lightfield, arguments.device, threads)
     blender.leave_out(inventory["left_out"])
     to_depth = depth_factors(lightfield)
-    append(arguments.journal, {"start_up_seconds": time.perf_counter() - started})
+    append(
+        arguments.journal,
+        {"start_up_seconds": time.perf_counter() - started, "device": device},
+    )
 
     process = psutil.Process()
     progress = Progress(len(frames), f"render {arguments.output.parent.name} {arguments.views}")

@@ -73,8 +73,8 @@ def set_up_render(
     lightfield: Mapping[str, Any],
     device: str,
     threads: int,
-) -> None:
-    """Set Cycles up for every view that follows.
+) -> str:
+    """Set Cycles up for every view that follows; returns what it renders on, CPU or GPU.
 
     ``settings`` is a scene YAML's ``render`` block, ``lightfield`` a lightfield.json's content.
     Raises `UserError` if the ``device`` is not there.
@@ -129,6 +129,7 @@ def set_up_render(
     _use_device(scene, device)
     _set_camera(scene, lightfield)
     scene.frame_set(lightfield["frame"])
+    return str(cycles.device)
 
 
 def removable_objects() -> list[str]:
