@@ -36,7 +36,7 @@ def snakemake(folder, *arguments):
 
 def planned(folder, *arguments):
     """Return how many jobs of each rule a dry run plans."""
-    result = snakemake(folder, "--dry-run", "--quiet", "rules", *arguments)
+    result = snakemake(folder, *arguments, "--dry-run", "--quiet", "rules")
     assert result.returncode == 0, result.stdout + result.stderr
     table = (result.stdout + result.stderr).split("Job stats:")[1].split("total")[0]
     return {name: int(count) for name, count in re.findall(r"^(\w+)\s+(\d+)$", table, re.M)}

@@ -1,0 +1,272 @@
+"""Measure what each thing that pruning leaves out of a scene saves, at equal pixels.
+
+Each scene is measured as its builder makes it, and as artists leave theirs: with a hidden dense
+object, motion blur, and passes that nobody reads. In each, every pruning that applies is taken
+alone and together; so are those that were tried and are not kept. A measurement is a process of
+its own with one thread. Times are CPU seconds, each the least of several runs, because other work
+on the machine only ever adds to them.
+
+Writes pruning.csv and pruning.md to the output folder.
+"""
+
+import argparse
+import csv
+import hashlib
+import resource
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
+
+from lightfield import config, lenses, pruning, rigs
+from lightfield.cli import run
+from lightfield.files import atomic_path
+
+# Tried, and not part of the workflow: a pruning must save something and keep every pixel.
+NOT_KEPT = {
+    "volume_bounces": "no bounces in volumes, where there are none",
+    "transmission_bounces": "no bounces through glass, where there is none",
+    "transparent_bounces": "no bounces through transparency, where there is none",
+    "light_tree": "no tree of lights",
+}
+# Done for every scene, whatever it contains.
+ALWAYS = {
+    "passes": "passes that the artist had on are not made",
+    "depth": "no depth, where the scene YAML says none",
+}
+
+
+@dataclass(frozen=True)
+class Task:
+    """One process: a scene, what is left out of it, and what is on that need not be."""
+
+    blend: Path
+    left_out: tuple[str, ...] = ()
+    passes: bool = False
+    depth: bool = True
+    tweak: str = ""
+    resolution: int = 96
+    samples: int = 4
+    views: int = 5
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What a process took: CPU seconds and MiB; ``bytes`` of a view's EXR; the pixels' digest.
+
+    ``start_up`` is all that comes before the second view, ``views`` are those from there on.
+    """
+
+    start_up: float
+    views: tuple[float, ...]
+    peak: float
+    bytes: float
+    pixels: str
+
+    @property
+    def view(self) -> float:
+        return statistics.mean(self.views)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--output-dir", required=True, type=Path, help="folder of the tables")
+    parser.add_argument("--scenes", nargs="+", default=["garden", "lone_monk", "barbershop"])
+    parser.add_argument("--detail", type=float, default=1.0, help="of the scenes (default: 1)")
+    parser.add_argument("--repeats", type=int, default=3, help="of each measurement (default: 3)")
+    arguments = parser.parse_args()
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for scene in arguments.scenes:
+            for variant in ("as built", "as artists leave it"):
+                blend = Path(folder, f"{scene} {variant}.blend")
+                found = in_process(make_scene, (scene, variant, arguments.detail, blend))
+                for row in measured(blend, found, arguments.repeats):
+                    rows.append({"scene": scene, "variant": variant, **row})
+                    print(rows[-1], flush=True)
+    write(arguments.output_dir, rows)
+
+
+def in_process(function: Any, argument: Any) -> Any:
+    """Run a function in a fresh process, so that bpy starts anew and memory is its own."""
+    with get_context("spawn").Pool(1) as pool:
+        return pool.apply(function, (argument,))
+
+
+def make_scene(task: tuple[str, str, float, Path]) -> dict[str, Any]:
+    """Build a scene, save it, and return its inventory."""
+    scene, variant, detail, path = task
+    import importlib
+
+    import bpy
+
+    import inventory
+    from lightfield import blender
+
+    source = config.load_scene(scene)["scene"]
+    blender.new_scene()
+    builder = importlib.import_module(f"scenes.{source['builder']}")
+    builder.build({**source["parameters"], "detail": detail})
+    if variant == "as artists leave it":
+        bpy.context.scene.render.use_motion_blur = True
+        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=9, location=(0, 0, -50))
+        bpy.context.object.hide_render = True
+    blender.save_scene(path)
+    blender.open_scene(path)
+    return inventory.inventory()
+
+
+def measured(blend: Path, found: dict[str, Any], repeats: int) -> Iterator[dict[str, Any]]:
+    """Yield a row for each thing that can be left out of a scene, alone, and for all together."""
+    names = tuple(pruning.left_out(found))
+    artists = blend.stem.endswith("as artists leave it")
+    whole = Task(blend, passes=artists)
+    kept = replace(whole, left_out=names, passes=False)
+    base = figures(whole, repeats)
+    yield row("nothing", "the scene as it is", base, base)
+    for name in names:
+        yield row(
+            name, pruning.REASONS[name], base, figures(replace(whole, left_out=(name,)), repeats)
+        )
+    if artists:
+        yield row("passes", ALWAYS["passes"], base, figures(replace(whole, passes=False), repeats))
+    pruned = figures(kept, repeats)
+    yield row("all of these", "what the workflow does", base, pruned)
+    yield row("depth", ALWAYS["depth"], pruned, figures(replace(kept, depth=False), repeats))
+    if not artists:
+        features = {
+            "volume_bounces": "volumes",
+            "transmission_bounces": "transmission",
+            "transparent_bounces": "transparency",
+        }
+        for name, reason in NOT_KEPT.items():
+            if not found.get(features.get(name, "")):
+                tried = figures(replace(kept, tweak=name), repeats)
+                yield row(f"({name})", f"not kept: {reason}", pruned, tried)
+
+
+def row(name: str, reason: str, base: Figures, without: Figures) -> dict[str, Any]:
+    return {
+        "left_out": name,
+        "reason": reason,
+        "start_up_seconds": round(without.start_up, 3),
+        "start_up_saved": round(base.start_up - without.start_up, 3),
+        "view_seconds": round(without.view, 4),
+        "view_saved": round(base.view - without.view, 4),
+        "peak_mib": round(without.peak, 1),
+        "peak_saved": round(base.peak - without.peak, 1),
+        "view_bytes": round(without.bytes),
+        "bytes_saved": round(base.bytes - without.bytes),
+        "same_pixels": base.pixels == without.pixels,
+    }
+
+
+def figures(task: Task, repeats: int) -> Figures:
+    """Return the least of each figure over several processes that do the same."""
+    runs = [in_process(measure, task) for _ in range(repeats)]
+    return replace(
+        runs[0],
+        start_up=min(run.start_up for run in runs),
+        views=tuple(map(min, zip(*(run.views for run in runs), strict=True))),
+        peak=min(run.peak for run in runs),
+    )
+
+
+def measure(task: Task) -> Figures:
+    """Render a few views as a shard does."""
+    import bpy
+    import numpy as np
+
+    import inventory  # noqa: F401  (as heavy as the renderer's own imports)
+    from lightfield import blender, images
+
+    lens = lenses.from_camera(
+        {"lens": "equidistant", "fov": 180, "resolution": [task.resolution] * 2}
+    )
+    rig = {"type": "lattice", "cameras": [task.views, 1, 1], "size": 0.3, "center": [0, 0, 1.1]}
+    settings = {"samples": task.samples, "adaptive_threshold": 0, "denoise": False}
+    content = rigs.lightfield(rig, lens.to_lightfield())
+    content |= {"depth": "z" if task.depth else None, "frame": 1}
+
+    began = time.process_time()
+    blender.open_scene(task.blend)
+    if "hidden_objects" in task.left_out:
+        blender.remove_objects(blender.removable_objects())
+    blender.set_up_render(settings, content, "cpu", 1)
+    blender.leave_out(task.left_out)
+    scene = bpy.context.scene
+    if task.passes:
+        layer = scene.view_layers[0]
+        for name in ("normal", "diffuse_color", "glossy_direct", "cryptomatte_object", "mist"):
+            setattr(layer, f"use_pass_{name}", True)
+    if task.tweak == "light_tree":
+        scene.cycles.use_light_tree = False
+    elif task.tweak == "transparent_bounces":
+        scene.cycles.transparent_max_bounces = 0
+    elif task.tweak:
+        setattr(scene.cycles, task.tweak, 0)
+    start_up = time.process_time() - began
+
+    digest = hashlib.sha256()
+    times, sizes = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for frame in content["frames"]:
+            began = time.process_time()
+            raw = blender.render_view(np.array(frame["world_matrix"]), 1)
+            times.append(time.process_time() - began)
+            digest.update(raw.colour.tobytes())
+            channels = {c: raw.colour[:, :, i].astype(np.float16) for i, c in enumerate("RGB")}
+            if raw.depth is not None:
+                channels["Z"] = raw.depth
+            images.write_exr(Path(folder, "view.exr"), channels)
+            sizes.append(Path(folder, "view.exr").stat().st_size)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return Figures(
+        start_up + times[0],
+        tuple(times[1:]),
+        peak,
+        statistics.mean(sizes),
+        digest.hexdigest(),
+    )
+
+
+def write(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
+    with (
+        atomic_path(folder / "pruning.csv") as temporary,
+        temporary.open("w", encoding="utf-8", newline="") as file,
+    ):
+        writer = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    lines = [
+        "# What pruning saves",
+        "",
+        "CPU seconds of one thread, MiB of peak memory, and KiB of a view's EXR, at 96² and 4 "
+        "samples a pixel; in brackets what is saved against the scene as it is (for depth and for "
+        "what is not kept: against all prunings). Start-up is everything before the second view.",
+        "",
+        "| scene | left out | start-up | a view | peak memory | a view's file | same pixels |",
+        "| --- | --- | ---: | ---: | ---: | ---: | --- |",
+    ]
+    for row in rows:
+        lines.append(
+            f"| {row['scene']}, {row['variant']} | {row['left_out']}: {row['reason']} "
+            f"| {row['start_up_seconds']:.2f} s ({row['start_up_saved']:+.2f}) "
+            f"| {row['view_seconds']:.3f} s ({row['view_saved']:+.3f}) "
+            f"| {row['peak_mib']:.0f} MiB ({row['peak_saved']:+.0f}) "
+            f"| {row['view_bytes'] / 1024:.0f} KiB ({row['bytes_saved'] / 1024:+.0f}) "
+            f"| {'yes' if row['same_pixels'] else 'no'} |"
+        )
+    with atomic_path(folder / "pruning.md") as temporary:
+        temporary.write_text("\n".join([*lines, ""]), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    run(main)

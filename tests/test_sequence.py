@@ -1,0 +1,121 @@
+"""Sequences: every frame of an animation is a dataset of its own in its rig's folder."""
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+from checkouts import checkout, planned
+
+from lightfield import config, images
+from lightfield.errors import UserError
+
+SCENE = """
+scene: {builder: garden, parameters: {detail: 0.02}, frame: 5}
+render: {samples: 16}
+rigs:
+  LFStill:
+    type: plane
+    cameras: [2, 1]
+    camera: {lens: equidistant, fov: 180, resolution: [16, 16]}
+  LFSequence:
+    type: lattice
+    cameras: [1, 1, 1]
+    center: [0, 0, 1]
+    frames: {first: 1, last: 17, step: 8}
+    camera: {lens: equirectangular, resolution: [144, 72]}
+reprojections:
+  perspective:
+    camera: {lens: rectilinear, fov: 90, resolution: [8, 8]}
+"""
+FRAMES = ["LFSequence/f00001", "LFSequence/f00009", "LFSequence/f00017"]
+
+
+@pytest.fixture
+def moving(tmp_path, monkeypatch):
+    (tmp_path / "moving.yaml").write_text(SCENE)
+    monkeypatch.setattr(config, "SCENES", tmp_path)
+    return tmp_path / "moving.yaml"
+
+
+def test_each_frame_is_a_dataset_in_the_rigs_folder(moving):
+    datasets = config.scene_datasets("moving", "full", {})
+    assert [(d.rig, d.source["frame"]) for d in datasets] == [
+        ("LFStill", 5),
+        *zip(FRAMES, (1, 9, 17), strict=True),
+    ]
+    assert {dataset.rig_name for dataset in datasets} == {"LFStill", "LFSequence"}
+    settings = {"scenes": ["moving"], "preset": "full", "presets": {"full": {}}}
+    chosen = config.load_datasets({**settings, "rigs": ["LFSequence"]})
+    assert [dataset.rig for dataset in chosen] == FRAMES
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"frames": {"first": 3, "last": 2}}, "LFSequence.frames: first is 3; must be at most"),
+        ({"frames": {"first": 1}}, "LFSequence.frames: is missing the key last"),
+        ({"frames": {"first": 1, "last": 2, "step": 0}}, "frames.step: is 0; must be a whole"),
+        ({"frames": 3}, "LFSequence.frames: is 3; must be a mapping"),
+    ],
+)
+def test_a_wrong_sequence_is_told(change, expected, moving):
+    content = yaml.safe_load(SCENE)
+    content["rigs"]["LFSequence"] |= change
+    moving.write_text(yaml.safe_dump(content))
+    with pytest.raises(UserError) as caught:
+        config.read_scene(moving)
+    assert expected in str(caught.value)
+
+
+def test_a_reprojection_cannot_take_a_frames_folder(moving):
+    moving.write_text(SCENE.replace("perspective:", "f00001:"))
+    with pytest.raises(UserError, match=r"reprojections\.f00001: the name f00001 is taken"):
+        config.read_scene(moving)
+
+
+def test_every_stage_is_planned_for_every_frame(tmp_path):
+    folder = checkout(tmp_path, moving=SCENE)
+    jobs = planned(folder, "package_all", "--config", "scenes=[moving]", "rigs=all", "preset=full")
+    assert jobs["build_scene"] == jobs["inventory"] == 1
+    for name in ("lightfield", "check_cameras", "render", "reproject", "validate"):
+        assert jobs[name] == 4
+    # All frames of a sequence in one archive.
+    assert jobs["package"] == 2
+
+
+def test_fire_and_water_move_and_the_rest_stands_still(run_program, tmp_path):
+    folder = checkout(tmp_path, moving=SCENE)
+    blend, inventory = tmp_path / "garden.blend", tmp_path / "inventory.json"
+    parameters = json.dumps({"seed": 0, "detail": 0.02})
+    run_program(
+        "build_scene.py", "--builder", "garden", "--parameters", parameters, "--output", blend
+    )
+    run_program("inventory.py", "--blend", blend, "--output", inventory)
+    colours, depths = [], []
+    for rig in (FRAMES[0], FRAMES[2]):
+        lightfield, output = tmp_path / rig / "lightfield.json", tmp_path / rig / "exr"
+        program = folder / "scripts" / "make_lightfield.py"
+        run_program(program, "--scene", "moving", "--rig", rig, "--output", lightfield)
+        assert json.loads(lightfield.read_text())["frame"] == int(rig[-5:])
+        arguments = ("--blend", blend, "--inventory", inventory, "--lightfield", lightfield)
+        run_program("render_shard.py", *arguments, "--output", output, "--threads", "1")
+        image = images.read_image(output / "view_0000f.exr")
+        colours.append(np.stack([image.channels[c] for c in "RGB"]).astype(np.float64).sum(axis=0))
+        depths.append(image.channels["Z"])
+    changed = np.abs(colours[0] - colours[1]) / (colours[0] + colours[1] + 1e-9)
+
+    def around(x, y, z):
+        """Return the mean change within 6 degrees of a point, as seen from the panorama."""
+        column = (0.5 + np.arctan2(x, y) / (2 * np.pi)) * 144
+        row = (0.5 - np.arctan2(z - 1, np.hypot(x, y)) / np.pi) * 72
+        rows, columns = np.ogrid[:72, :144]
+        near = np.maximum(abs(rows - row), abs((columns - column + 72) % 144 - 72)) < 2.5
+        return changed[near].mean()
+
+    from_scene = {"fire": (3.1, 1.1, 0.7), "water": (-5.5, 0.6, -0.07), "statue": (0, 3.75, 1.2)}
+    change = {name: around(*place) for name, place in from_scene.items()}
+    assert min(change["fire"], change["water"]) > 10 * change["statue"]
+    assert np.median(changed) < 0.01
+    # Nothing solid moves; only rays through the bent water differ.
+    assert np.mean(depths[0] != depths[1]) < 0.01
