@@ -129,7 +129,7 @@ def compute(
         np.arange(-1, target.width + 1) + 0.5,
         np.arange(-1, target.height + 1) + 0.5,
     )
-    jacobian = _jacobian(padded, source.width if wraps else 0)
+    jacobian = _jacobian(padded, source.width, wraps, panels)
     centers = _framed(padded[1:-1, 1:-1], source)
     points = centers
     if samples > 1:
@@ -322,20 +322,26 @@ def _framed(coordinates: Array, source: Lens) -> Array:
     return np.where(inside.all(axis=-1, keepdims=True), coordinates, np.nan)
 
 
-def _jacobian(padded: Array, period: int) -> Array:
-    """Return central differences (H, W, 2, 2) of (H + 2, W + 2, 2) coordinates.
+def _jacobian(padded: Array, width: int, wraps: bool, panels: int) -> Array:
+    """Return central differences (H, W, 2, 2) of (H + 2, W + 2, 2) source coordinates.
 
-    Where one neighbour has no coordinates the difference is one-sided, and 0 where neither has.
+    ``width`` is the source's. Where one neighbour has no coordinates, or lies on another panel,
+    the difference is one-sided, and 0 where neither will do.
     """
     out = np.empty((padded.shape[0] - 2, padded.shape[1] - 2, 2, 2))
     middle = padded[1:-1, 1:-1]
-    for axis, (before, after) in enumerate(
-        ((padded[1:-1, :-2], padded[1:-1, 2:]), (padded[:-2, 1:-1], padded[2:, 1:-1]))
-    ):
+    neighbours = (
+        (padded[1:-1, :-2], padded[1:-1, 2:]),
+        (padded[:-2, 1:-1], padded[2:, 1:-1]),
+    )
+    for axis, (before, after) in enumerate(neighbours):
         backward, forward = middle - before, after - middle
-        if period:
-            for difference in (backward, forward):
-                difference[..., 0] -= period * np.round(difference[..., 0] / period)
+        for difference, neighbour in ((backward, before), (forward, after)):
+            if wraps:
+                difference[..., 0] -= width * np.round(difference[..., 0] / width)
+            if panels > 1:
+                here, there = (np.floor(c[..., 0] * panels / width) for c in (middle, neighbour))
+                difference[here != there] = np.nan
         lacks = np.isnan(forward), np.isnan(backward)
         forward = np.where(lacks[0], backward, forward)
         backward = np.where(lacks[1], forward, backward)

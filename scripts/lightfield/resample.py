@@ -241,12 +241,14 @@ def _careful(
     valid: Array,
     x: Any,
     y: Any,
+    home: int,
     taps: int,
     topology: tuple[bool, bool, bool, int],
     result: Array,
 ) -> bool:
     """Sample at (x, y) where pixels may be missing or negative; whether any is there.
 
+    ``home`` is a column of the panel that the target pixel's centre lies on.
     Where one is missing, the answer is bilinear among those of the four nearest that are there:
     a kernel with negative lobes does not survive the loss of a part of it. Nor do such lobes make
     light negative: what comes out below zero is raised to the darkest of the pixels.
@@ -268,7 +270,7 @@ def _careful(
                 i, j = _source_index(
                     row + a - taps // 2 + 1,
                     column + b - taps // 2 + 1,
-                    int(x),
+                    home,
                     height,
                     width,
                     topology,
@@ -336,7 +338,7 @@ def _interpolator(taps: int) -> Callable[..., None]:
                         out[i, j, 2] = s2
                         out[i, j, 3] = s3
                         continue
-                if flag > 0 and _careful(source, valid, x, y, taps, topology, result):
+                if flag > 0 and _careful(source, valid, x, y, int(x), taps, topology, result):
                     out[i, j] = result
                 else:
                     out[i, j] = np.nan
@@ -382,7 +384,7 @@ def _adaptive(
                     if flag == 1:
                         s0, s1, s2, s3 = _sample_4(source, px, py)
                     if not _is_light(s0, s1, s2, s3):
-                        if not _careful(source, valid, px, py, 4, topology, result):
+                        if not _careful(source, valid, px, py, int(x), 4, topology, result):
                             continue
                         s0, s1, s2, s3 = result[0], result[1], result[2], result[3]
                     found += 1

@@ -1,0 +1,530 @@
+"""The reprojection program as a user runs it, and beside Cycles through the same lenses."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+import reproject
+from lightfield import lens_map, resample
+from lightfield.errors import UserError
+from lightfield.files import sha256
+from lightfield.images import read_attributes, read_image, write_exr, write_png
+from lightfield.lenses import CUBE_FACES, CubeMap, Equidistant, Equirectangular, Rectilinear
+
+SIZE = 48
+FISHEYE = Equidistant(width=SIZE, height=SIZE, fov=math.pi)
+
+
+def scene_color(rays):
+    return 0.5 + 0.4 * np.stack(
+        [np.sin(3 * rays[..., 0]), np.cos(4 * rays[..., 1]), rays[..., 2]], axis=-1
+    )
+
+
+def view_channels(lens, shift=0.0):
+    """Colour, and Z-depth (or distance) of a sphere of 2 m around the camera."""
+    x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
+    rays = lens.rays(x, y)
+    color = np.nan_to_num(scene_color(rays) + shift)
+    depth = np.where(np.isnan(rays[..., 2]), np.inf, 2 * -rays[..., 2] if lens.has_z_depth else 2)
+    channels = {name: color[..., i].astype("f2") for i, name in enumerate("RGB")}
+    return channels | {"Z": depth.astype("f4")}
+
+
+@pytest.fixture
+def dataset(tmp_path):
+    """Three fisheye views and their lightfield.json."""
+    frames = []
+    for index in range(3):
+        name = f"view_{index:04d}f"
+        write_exr(
+            tmp_path / "exr" / f"{name}.exr",
+            view_channels(FISHEYE, 0.1 * index),
+            {"plenoforge:depth": "z", "plenoforge:key": f"key {index}"},
+        )
+        matrix = np.eye(4)
+        matrix[:3, 3] = index, 0, 1
+        frames.append(
+            {
+                "name": name,
+                "position": [index, 0, 1],
+                "rotation": [0.0, 0.0, 0.0],
+                "world_matrix": matrix.tolist(),
+            }
+        )
+    config = FISHEYE.to_lightfield() | {"lf_type": "PLANE", "note": "kept", "frames": frames}
+    (tmp_path / "lightfield.json").write_text(json.dumps(config))
+    return tmp_path
+
+
+@pytest.fixture
+def run(dataset, monkeypatch):
+    """Run the program on the dataset; its output folder is `out`."""
+
+    def go(*flags, configs=True, source=True):
+        command = ["reproject.py", *flags, "--output-dir", str(dataset / "out")]
+        if source:
+            command += ["--input-dir", str(dataset / "exr")]
+        if configs:
+            command += ["--input-cfg", str(dataset / "lightfield.json")]
+            command += ["--output-cfg", str(dataset / "out" / "lightfield.json")]
+        monkeypatch.setattr(sys, "argv", command)
+        reproject.main()
+
+    return go
+
+
+PERSPECTIVE = ("--rectilinear", "18,36", "--scale", "0.5")
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_the_papers_command(dataset, run):
+    run("--parallel", "4", *PERSPECTIVE, "--png", "--exposure", "-1", "--reinhard", "5")
+    out = dataset / "out"
+    assert names(out) == ["lightfield.json", *(f"view_{i:04d}f.png" for i in range(3))]
+    pixels = read_image(out / "view_0000f.png").channels
+    assert pixels["R"].shape == (24, 24) and pixels["R"].dtype == np.uint8
+    # The centre looks ahead: what is there, made half as bright, compressed, and encoded.
+    light = scene_color(np.array([1 / 24, -1 / 24, -1.0])) / 2
+    light = light * (1 + light / 25) / (1 + light)
+    expected = 255 * (1.055 * light ** (1 / 2.4) - 0.055)
+    found = [int(pixels[name][12, 12]) for name in "RGB"]
+    assert np.abs(found - expected).max() < 2
+    config = json.loads((out / "lightfield.json").read_text())
+    assert config["resolution"] == [24, 24] and config["sensor_size"] == [36, 36]
+    assert config["camera"]["type"] == "PERSP" and config["camera"]["focal_length"] == 18
+    assert config["depth"] is None and config["note"] == "kept" and len(config["frames"]) == 3
+
+
+def test_exr_has_depth_along_its_own_axis(dataset, run):
+    run(*PERSPECTIVE, "--exr", "--rotation", "20,-10,30")
+    image = read_image(dataset / "out" / "view_0001f.exr")
+    assert image.attributes["plenoforge:depth"] == "z"
+    assert [image.channels[name].dtype.name for name in "RGBZ"] == ["float16"] * 3 + ["float32"]
+    x, y = np.meshgrid(np.arange(24) + 0.5, np.arange(24) + 0.5)
+    z = 2 / np.sqrt(1 + ((x - 12) ** 2 + (y - 12) ** 2) / 144)
+    assert np.abs(image.channels["Z"] / z - 1).max() < 1e-4
+    config = json.loads((dataset / "out" / "lightfield.json").read_text())
+    assert config["depth"] == "z"
+    matrix = np.array(config["frames"][1]["world_matrix"])
+    assert np.allclose(matrix[:3, :3], lens_map.rotation_matrix(20, -10, 30))
+    assert matrix[:3, 3].tolist() == [1, 0, 1]
+    # What the turned camera sees at its centre is what lies there in the world.
+    light = scene_color(matrix[:3, :3] @ [0, 0, -1]) + 0.1
+    found = np.mean([[image.channels[c][11:13, 11:13].mean()] for c in "RGB"], axis=1)
+    assert np.abs(found - light).max() < 0.02
+
+
+def test_rotation_is_in_the_frames_euler_angles_too(dataset, run):
+    mathutils_order = np.array(
+        json.loads((dataset / "lightfield.json").read_text())["frames"][0]["rotation"]
+    )
+    assert not mathutils_order.any()
+    run(*PERSPECTIVE, "--png", "--rotation", "-30,0,0", "--dry-run")
+    frame = json.loads((dataset / "out" / "lightfield.json").read_text())["frames"][0]
+    # A camera that looks along -Z and turns right by 30 degrees turns about Y by -30.
+    assert np.allclose(frame["rotation"], [0, -math.radians(30), 0])
+    assert names(dataset / "out") == ["lightfield.json"]
+
+
+def test_pixels_without_a_source_are_marked(dataset, run):
+    run(*PERSPECTIVE, "--exr", "--png", "--depth-png", "1000", "--mask", "--rotation", "80,0,0")
+    out = dataset / "out"
+    rgba, depth = read_image(out / "view_0000f.png").channels, read_image(out / "view_0000f.exr")
+    missing = rgba["A"] == 0
+    assert 0.3 < missing.mean() < 0.5
+    assert set(np.unique(rgba["A"])) == {0, 255}
+    assert not any(rgba[c][missing].any() for c in "RGB")
+    assert np.array_equal(np.isnan(depth.channels["Z"]), missing)
+    assert not depth.channels["G"][missing].any()
+    mask = read_image(out / "dynamic_mask_view_0000f.png").channels["Y"]
+    assert np.array_equal(mask, np.where(missing, 255, 0))
+    integers = read_image(out / "view_0000f_depth.png").channels["Y"]
+    assert integers.dtype == np.uint16 and not integers[missing].any()
+    z = depth.channels["Z"][~missing].astype(float)
+    assert np.abs(integers[~missing] - z * 1000).max() <= 0.5
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg"])
+def test_8_bit_images_are_read_as_srgb(dataset, run, suffix):
+    code = np.full((SIZE, SIZE, 3), 128, np.uint8)
+    code[:, : SIZE // 2] = 40
+    path = dataset / f"gray{suffix}"
+    assert cv2.imwrite(str(path), code)
+    run("--nn", "--png", *PERSPECTIVE, "--exr", "--single", str(path), source=False)
+    found = read_image(dataset / "out" / "gray.png").channels["G"]
+    assert np.abs(found[:, [2, -3]].astype(int) - [40, 128]).max() <= 1
+    linear = read_image(dataset / "out" / "gray.exr").channels
+    assert abs(float(linear["G"][12, 20]) - ((128 / 255 + 0.055) / 1.055) ** 2.4) < 5e-3
+    assert "Z" not in linear
+
+
+def test_a_png_with_alpha_gives_no_colour_where_it_is_transparent(dataset, run):
+    pixels = np.full((SIZE, SIZE, 4), 200, np.uint8)
+    pixels[:, : SIZE // 2, :3], pixels[:, : SIZE // 2, 3] = 90, 0
+    pixels[:, SIZE // 2 :, 3] = 255
+    write_png(dataset / "half.png", pixels)
+    run("--png", *PERSPECTIVE, "--single", str(dataset / "half.png"), source=False)
+    found = read_image(dataset / "out" / "half.png").channels
+    assert not found["A"][:, :11].any() and (found["A"][:, 13:] == 255).all()
+    assert (found["R"][:, 13:] == 200).all()
+
+
+def test_a_file_that_cannot_be_read_is_named_and_the_others_are_done(dataset, run, capsys):
+    (dataset / "exr" / "broken.exr").write_bytes(b"no image")
+    whole = (dataset / "exr" / "view_0001f.exr").read_bytes()
+    (dataset / "exr" / "view_0001f.exr").write_bytes(whole[: len(whole) // 2])
+    record = dataset / "record.json"
+    with pytest.raises(UserError, match="2 of 4 views could not be reprojected"):
+        run(*PERSPECTIVE, "--png", "--record", str(record))
+    told = capsys.readouterr().err
+    assert "broken.exr" in told and "view_0001f.exr" in told
+    out = dataset / "out"
+    assert names(out) == ["lightfield.json", "view_0000f.png", "view_0002f.png"]
+    assert not record.exists()
+
+
+def test_a_wrong_size_is_refused(dataset, run, capsys):
+    write_png(dataset / "exr" / "small.png", np.zeros((5, 7, 3), np.uint8))
+    with pytest.raises(UserError, match="1 of 4"):
+        run(*PERSPECTIVE, "--png")
+    assert "small.png: has 7 × 5 pixels; the lens expects 48 × 48" in capsys.readouterr().err
+
+
+def test_views_of_one_shard_and_their_record(dataset, run):
+    record = dataset / "record.json"
+    run(*PERSPECTIVE, "--png", "--exr", "--views", "1:3", "--record", str(record))
+    files = ["view_0001f.exr", "view_0001f.png", "view_0002f.exr", "view_0002f.png"]
+    out = dataset / "out"
+    assert names(out) == ["lightfield.json", *files]
+    content = json.loads(record.read_text())
+    assert content["counts"] == {"views": 2, "files": 4}
+    assert content["files"] == {
+        f"out/{name}": {
+            "bytes": (out / name).stat().st_size,
+            "sha256": sha256(out / name),
+        }
+        for name in files
+    }
+    first = record.read_bytes()
+    run(*PERSPECTIVE, "--png", "--exr", "--views", "1:3", "--record", str(record))
+    assert record.read_bytes() == first
+
+
+@pytest.mark.parametrize("views", ["3:4", "1:1", "x", "-1:2", "1"])
+def test_views_that_there_are_not(run, views):
+    with pytest.raises(UserError, match="--views"):
+        run(*PERSPECTIVE, "--png", "--views", views)
+
+
+def test_only_what_is_missing_or_out_of_date_is_made_again(dataset, run):
+    def stamps():
+        return {p.name: p.stat().st_mtime_ns for p in out.glob("view*")}
+
+    def changed(before):
+        return {name for name, stamp in stamps().items() if before.get(name) != stamp}
+
+    out = dataset / "out"
+    flags = (*PERSPECTIVE, "--png")
+    run(*flags)
+    whole = (out / "view_0001f.png").read_bytes()
+    before = stamps()
+    run(*flags)
+    assert changed(before) == set()
+    (out / "view_0000f.png").unlink()
+    (out / "view_0001f.png").write_bytes(whole[: len(whole) // 2])
+    run(*flags)
+    assert changed(before) == {"view_0000f.png", "view_0001f.png"}
+    assert (out / "view_0001f.png").read_bytes() == whole
+    before = stamps()
+    write_exr(
+        dataset / "exr" / "view_0002f.exr", view_channels(FISHEYE), {"plenoforge:key": "another"}
+    )
+    run(*flags)
+    assert changed(before) == {"view_0002f.png"}
+    before = stamps()
+    run(*flags, "--exposure", "1")
+    assert len(changed(before)) == 3
+    before = stamps()
+    run(*flags, "--skip-if-exists")
+    assert changed(before) == set()
+
+
+def test_a_saved_lens_map_gives_the_same_bytes(dataset, run, run_program):
+    run(*PERSPECTIVE, "--png", "--exr")
+    out = dataset / "out"
+    made = {path.name: path.read_bytes() for path in out.glob("view*")}
+    for path in out.glob("view*"):
+        path.unlink()
+    file = dataset / "map.npy"
+    config = dataset / "lightfield.json"
+    told = run_program("lens_map.py", file, *PERSPECTIVE, "--input-cfg", config).stderr
+    assert "magnification: 0.7" in told and "100.0% of the image" in told
+    run(*PERSPECTIVE, "--png", "--exr", "--lens-map", str(file))
+    assert {path.name: path.read_bytes() for path in out.glob("view*")} == made
+    with pytest.raises(UserError, match=r"is a lens map for filter \"adaptive\""):
+        run(*PERSPECTIVE, "--png", "--bl", "--lens-map", str(file))
+
+
+def test_prefix_suffix_and_no_configs(dataset, run):
+    write_png(dataset / "exr" / "other.png", np.zeros((SIZE, SIZE, 3), np.uint8))
+    run(
+        *("--no-configs", f"{SIZE},{SIZE}", "--i-equidistant", str(math.pi)),
+        *(*PERSPECTIVE, "--png", "--filter-prefix", "view", "--filter-suffix", "2f.exr"),
+        configs=False,
+    )
+    assert names(dataset / "out") == ["view_0002f.png"]
+    run(*PERSPECTIVE, "--png", "--filter-suffix", "1f")
+    config = json.loads((dataset / "out" / "lightfield.json").read_text())
+    assert [frame["name"] for frame in config["frames"]] == ["view_0001f"]
+
+
+def test_two_images_of_one_name_are_not_mixed_up(dataset, run):
+    write_png(dataset / "exr" / "view_0001f.png", np.zeros((SIZE, SIZE, 3), np.uint8))
+    with pytest.raises(UserError, match=r"view_0001f\.exr and .*view_0001f\.png"):
+        run(*PERSPECTIVE, "--png")
+
+
+def test_no_reproject_keeps_the_pixels(dataset, run):
+    run("--no-reproject", "--exr")
+    for index in range(3):
+        name = f"view_{index:04d}f.exr"
+        before = read_image(dataset / "exr" / name).channels
+        after = read_image(dataset / "out" / name).channels
+        inside = np.isfinite(before["Z"])
+        assert all(np.array_equal(before[c][inside], after[c][inside]) for c in "RGBZ")
+        assert np.isnan(after["Z"][~inside]).all()
+    run("--no-reproject", "--scale", "0.5", "--exr")
+    assert read_image(dataset / "out" / "view_0000f.exr").channels["R"].shape == (24, 24)
+
+
+def test_a_cube_map_and_back(dataset, run, monkeypatch):
+    run("--cubemap", "64", "--exr")
+    out = dataset / "out"
+    config = json.loads((out / "lightfield.json").read_text())
+    assert [frame["name"] for frame in config["frames"][:6]] == [
+        f"view_0000f_{face}" for face in CUBE_FACES
+    ]
+    assert config["resolution"] == [64, 64] and config["depth"] == "z"
+    # The face to the left looks along -X of a camera that looks along -Z.
+    assert np.allclose(np.array(config["frames"][2]["world_matrix"])[:3, 2], [1, 0, 0])
+    front = read_image(out / "view_0000f_f.exr").channels
+    assert np.isfinite(front["Z"]).all()
+    assert np.isnan(read_image(out / "view_0000f_b.exr").channels["Z"]).all()
+    cube = CubeMap(width=384, height=64)
+    (dataset / "cube.json").write_text(json.dumps(cube.to_lightfield()))
+    for path in out.glob("*_[blrud].exr"):
+        # Only the front half was seen: fill the rest, so that the cube is a whole one.
+        face = path.stem[-1]
+        x, y = np.meshgrid(np.arange(64) + 0.5 + 64 * CUBE_FACES.index(face), np.arange(64) + 0.5)
+        color = scene_color(cube.rays(x, y))
+        write_exr(path, {c: color[..., i].astype("f2") for i, c in enumerate("RGB")})
+    command = ["reproject.py", "--input-dir", str(out), "--input-cfg", str(dataset / "cube.json")]
+    command += ["--filter-prefix", "view_0000f", "--equirectangular", "full"]
+    command += ["--output-resolution", "64,32", "--png", "--output-dir", str(dataset / "pano")]
+    monkeypatch.setattr(sys, "argv", command)
+    reproject.main()
+    assert names(dataset / "pano") == ["view_0000f.png"]
+    channels = read_image(dataset / "pano" / "view_0000f.png").channels
+    assert "A" not in channels
+    x, y = np.meshgrid(np.arange(64) + 0.5, np.arange(32) + 0.5)
+    light = np.clip(scene_color(Equirectangular(width=64, height=32).rays(x, y)), 0, 1)
+    expected = 255 * np.where(light < 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    for i, name in enumerate("RGB"):
+        difference = np.abs(channels[name] - expected[..., i])
+        assert difference[light[..., i] > 0.05].max() < 5
+
+
+@pytest.mark.parametrize(
+    "flags",
+    [
+        ("--equisolid", "10,36,3.0"),
+        ("--equidistant", "4.5"),
+        ("--stereographic", "4"),
+        ("--orthographic", "3"),
+        ("--equirectangular", "full"),
+        ("--equirectangular", "-1,1,-0.5,0.5"),
+        ("--polynomial", "0,-0.07,0,0,0,36,3"),
+        ("--kannala-brandt", "9,36,0.01,0,0,0"),
+    ],
+)
+def test_every_lens_is_a_target_and_a_source(dataset, run, flags):
+    run(*flags, "--scale", "1.5", "--exr", "--views", "0:1")
+    out = dataset / "out"
+    config = json.loads((out / "lightfield.json").read_text())
+    first = read_image(out / "view_0000f.exr").channels
+    seen = np.isfinite(first["Z"])
+    assert seen.mean() > 0.2
+    # And back, from what the configuration says: the scene where it was seen twice.
+    (out / "exr").mkdir()
+    (out / "view_0000f.exr").rename(out / "exr" / "view_0000f.exr")
+    config["frames"] = config["frames"][:1]
+    (dataset / "lightfield.json").write_text(json.dumps(config))
+    sys.argv[1:] = [
+        *("--rectilinear", "40,36", "--output-resolution", "21,21", "--exr"),
+        *("--input-dir", str(out / "exr"), "--input-cfg", str(dataset / "lightfield.json")),
+        *("--output-dir", str(dataset / "back")),
+    ]
+    reproject.main()
+    back = read_image(dataset / "back" / "view_0000f.exr").channels
+    x, y = np.meshgrid(np.arange(21) + 0.5, np.arange(21) + 0.5)
+    lens = Rectilinear(width=21, height=21, focal_length=40, sensor_size=(36, 36))
+    rays = lens.rays(x, y)
+    assert np.abs(back["R"] - scene_color(rays)[..., 0]).max() < 0.01
+    assert np.abs(back["Z"] / (2 * -rays[..., 2]) - 1).max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("flags", "told"),
+    [
+        (("--rectilinear", "18", "--png"), "--rectilinear 18: must have the form FOCAL_LENGTH"),
+        (("--equidistant", "180", "--png"), "--equidistant 180: fov"),
+        (("--png",), "give the output lens"),
+        (PERSPECTIVE, "--exr, --png"),
+        ((*PERSPECTIVE, "--png", "--rotation", "5"), "--rotation 5: must have the form PAN"),
+        ((*PERSPECTIVE, "--png", "--samples", "0"), "--samples 0"),
+        (("--rectilinear", "18,36", "--png", "--scale", "0.001"), "leaves no pixel"),
+        ((*PERSPECTIVE, "--png", "--reinhard", "0"), "--reinhard 0"),
+        ((*PERSPECTIVE, "--png", "--no-reproject"), "--no-reproject: excludes"),
+        ((*PERSPECTIVE, "--png", "--i-equidistant", "3"), "the input lens comes from --input-cfg"),
+        ((*PERSPECTIVE, "--png", "--filter-prefix", "zebra"), "no image passes the filters"),
+        ((*PERSPECTIVE, "--png", "--lens-map", "none.npy"), "none.npy: is not a lens map"),
+    ],
+)
+def test_mistakes_are_named(run, flags, told):
+    with pytest.raises(UserError) as error:
+        run(*flags)
+    assert told in str(error.value)
+
+
+def test_an_error_is_one_line_and_an_exit_status(dataset, run_program):
+    result = run_program("reproject.py", "--png", "-i", dataset / "exr", "-o", "x", check=False)
+    assert result.returncode == 1
+    assert result.stderr == (
+        "error: --input-cfg: is missing; without one, give --no-configs and --i-…\n"
+    )
+
+
+def test_samples_have_the_published_tools_default_filter(dataset, run):
+    run(*PERSPECTIVE, "--png", "--samples", "2", "--views", "0:1")
+    key = read_attributes(dataset / "out" / "view_0000f.png")["plenoforge:key"]
+    run(*PERSPECTIVE, "--png", "--samples", "2", "--bc", "--views", "0:1")
+    assert read_attributes(dataset / "out" / "view_0000f.png")["plenoforge:key"] == key
+
+
+# Against Cycles
+
+
+PLACE, HALF = np.array([1.0, 2.0, -1.5]), 10.0
+AHEAD = np.array([[0.8, -0.36, 0.48], [0.6, 0.48, -0.64], [0.0, 0.8, 0.6]])
+LENSES = {
+    "fisheye": (
+        Equidistant(width=256, height=256, fov=math.pi),
+        {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT", "fisheye_fov": math.pi},
+        (0, 0, 0),
+    ),
+    "perspective": (
+        Rectilinear(width=96, height=96, focal_length=18, sensor_size=(36, 36)),
+        {"type": "PERSP", "lens": 18, "sensor_width": 36},
+        (12, -8, 20),
+    ),
+    "tall": (
+        Rectilinear(width=60, height=90, focal_length=30, sensor_size=(36, 54)),
+        {"type": "PERSP", "lens": 30, "sensor_width": 36, "sensor_fit": "HORIZONTAL"},
+        (-15, 20, 0),
+    ),
+    "narrow fisheye": (
+        Equidistant(width=96, height=96, fov=2.0),
+        {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT", "fisheye_fov": 2.0},
+        (0, 25, -40),
+    ),
+    "panorama": (
+        Equirectangular(width=160, height=80, longitude=(-1, 1), latitude=(-0.5, 0.5)),
+        {
+            "type": "PANO",
+            "panorama_type": "EQUIRECTANGULAR",
+            "longitude_min": -1,
+            "longitude_max": 1,
+            "latitude_min": -0.5,
+            "latitude_max": 0.5,
+        },
+        (5, 5, 5),
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def renders(tmp_path_factory):
+    """Cycles' views of one room from one place through every lens, twice with other seeds."""
+    path = tmp_path_factory.mktemp("lenses") / "renders.npz"
+    cases = [
+        {
+            "name": f"{name}.{seed}",
+            "resolution": [lens.width, lens.height],
+            "camera": camera,
+            "rotation": (AHEAD @ lens_map.rotation_matrix(*angles)).tolist(),
+            "seed": seed,
+            "samples": 16,
+        }
+        for name, (lens, camera, angles) in LENSES.items()
+        for seed in ((1,) if name == "fisheye" else (2, 3))
+    ]
+    program = Path(__file__).parent / "render_lenses.py"
+    result = subprocess.run(
+        [sys.executable, program, path],
+        input=json.dumps(cases),
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"PYTHONPATH": str(Path(reproject.__file__).parent)},
+    )
+    assert result.returncode == 0, result.stderr
+    return np.load(path)
+
+
+@pytest.mark.parametrize("name", [name for name in LENSES if name != "fisheye"])
+def test_a_reprojection_is_what_cycles_renders_through_that_lens(renders, name):
+    lens, _, angles = LENSES[name]
+    source = LENSES["fisheye"][0]
+    made = lens_map.compute(source, lens, lens_map.rotation_matrix(*angles), "adaptive")
+    # Not the pixels on the rim of an image circle, of which a part has no light.
+    known = (~np.isnan(made.target_cos)).astype(np.uint8)
+    whole = cv2.erode(known, np.ones((3, 3)), borderValue=0) > 0
+    seen = (made.flags == lens_map.INSIDE) & whole
+    assert seen.mean() > 0.7
+    row, end_row, column, end_column = made.window
+    window = np.s_[row:end_row, column:end_column]
+    color = renders["fisheye.1.color"][window]
+    found = resample.resample_color(resample.widen(color[:, :, None]), made)[..., 0]
+    one, other = renders[f"{name}.2.color"], renders[f"{name}.3.color"]
+    noise = np.sqrt(np.mean((one - other)[seen] ** 2) / 2)
+    error = (found - (one + other) / 2)[seen]
+    assert noise < 0.02
+    assert np.sqrt(np.mean(error**2)) < 1.5 * noise
+    assert abs(error.mean()) < noise / 5
+
+    depth = renders["fisheye.1.depth"][window]
+    direct = renders[f"{name}.2.depth"]
+    # Cycles' depth is along the axis for a perspective camera, else the distance.
+    is_z = isinstance(lens, Rectilinear)
+    ours = resample.resample_depth(depth, False, is_z, made)
+    # Away from the room's edges, where two walls meet.
+    x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
+    rays = lens.rays(x, y)
+    distance = direct / -rays[..., 2] if is_z else direct
+    rotation = AHEAD @ lens_map.rotation_matrix(*angles)
+    points = PLACE + distance[..., None] * (rays @ rotation.T)
+    walls = np.sort(np.abs(points), axis=-1)[..., 1]
+    flat = seen & (walls < HALF * 0.93)
+    assert flat.mean() > 0.4
+    assert np.abs(ours[flat] / direct[flat] - 1).max() < 1e-4
