@@ -31,10 +31,10 @@ from lightfield.files import atomic_path
 
 # Tried, and not part of the workflow: a pruning must save something and keep every pixel.
 NOT_KEPT = {
-    "volume_bounces": "no bounces in volumes, where there are none",
-    "transmission_bounces": "no bounces through glass, where there is none",
-    "transparent_bounces": "no bounces through transparency, where there is none",
-    "light_tree": "no tree of lights",
+    "volume_bounces": ("volumes", "no bounces in volumes, where there are none"),
+    "transmission_bounces": ("transmission", "no bounces through glass, where there is none"),
+    "transparent_bounces": ("transparency", "no bounces through transparency, where there is none"),
+    "light_tree": ("", "no tree of lights"),
 }
 # Done for every scene, whatever it contains.
 ALWAYS = {
@@ -129,27 +129,23 @@ def measured(blend: Path, found: dict[str, Any], repeats: int) -> Iterator[dict[
     artists = blend.stem.endswith("as artists leave it")
     whole = Task(blend, passes=artists)
     kept = replace(whole, left_out=names, passes=False)
-    base = figures(whole, repeats)
-    yield row("nothing", "the scene as it is", base, base)
+    # What is left out, why, from what and with what effect.
+    compared = [("nothing", "the scene as it is", whole, whole)]
     for name in names:
-        yield row(
-            name, pruning.REASONS[name], base, figures(replace(whole, left_out=(name,)), repeats)
-        )
+        compared.append((name, pruning.REASONS[name], whole, replace(whole, left_out=(name,))))
     if artists:
-        yield row("passes", ALWAYS["passes"], base, figures(replace(whole, passes=False), repeats))
-    pruned = figures(kept, repeats)
-    yield row("all of these", "what the workflow does", base, pruned)
-    yield row("depth", ALWAYS["depth"], pruned, figures(replace(kept, depth=False), repeats))
+        compared.append(("passes", ALWAYS["passes"], whole, replace(whole, passes=False)))
+    compared.append(("all of these", "what the workflow does", whole, kept))
+    compared.append(("depth", ALWAYS["depth"], kept, replace(kept, depth=False)))
     if not artists:
-        features = {
-            "volume_bounces": "volumes",
-            "transmission_bounces": "transmission",
-            "transparent_bounces": "transparency",
-        }
-        for name, reason in NOT_KEPT.items():
-            if not found.get(features.get(name, "")):
-                tried = figures(replace(kept, tweak=name), repeats)
-                yield row(f"({name})", f"not kept: {reason}", pruned, tried)
+        compared += [
+            (f"({name})", f"not kept: {reason}", kept, replace(kept, tweak=name))
+            for name, (feature, reason) in NOT_KEPT.items()
+            if not found.get(feature)
+        ]
+    figures = all_figures([without for *_, without in compared], repeats)
+    for name, reason, base, without in compared:
+        yield row(name, reason, figures[base], figures[without])
 
 
 def row(name: str, reason: str, base: Figures, without: Figures) -> dict[str, Any]:
@@ -168,15 +164,24 @@ def row(name: str, reason: str, base: Figures, without: Figures) -> dict[str, An
     }
 
 
-def figures(task: Task, repeats: int) -> Figures:
-    """Return the least of each figure over several processes that do the same."""
-    runs = [in_process(measure, task) for _ in range(repeats)]
-    return replace(
-        runs[0],
-        start_up=min(run.start_up for run in runs),
-        views=tuple(map(min, zip(*(run.views for run in runs), strict=True))),
-        peak=min(run.peak for run in runs),
-    )
+def all_figures(tasks: Sequence[Task], repeats: int) -> dict[Task, Figures]:
+    """Return the least of each figure over several processes that do the same.
+
+    The tasks take turns, so that a busy minute does not fall on one of them alone.
+    """
+    runs: dict[Task, list[Figures]] = {task: [] for task in tasks}
+    for _ in range(repeats):
+        for task, done in runs.items():
+            done.append(in_process(measure, task))
+    return {
+        task: replace(
+            done[0],
+            start_up=min(run.start_up for run in done),
+            views=tuple(map(min, zip(*(run.views for run in done), strict=True))),
+            peak=min(run.peak for run in done),
+        )
+        for task, done in runs.items()
+    }
 
 
 def measure(task: Task) -> Figures:

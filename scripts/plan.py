@@ -13,7 +13,6 @@ from typing import Any
 
 from lightfield.cli import run
 from lightfield.files import atomic_path, read_json
-from lightfield.progress import duration
 
 HEAD = "| dataset | views | resolution | samples | s a view | hours | GB |"
 
@@ -64,8 +63,8 @@ def table(datasets: list[tuple[str, int, dict[str, Any]]]) -> str:
     )
     cores = len(os.sched_getaffinity(0))
     if all(probe["device"] == "CPU" for _, _, probe in datasets):
-        elapsed = duration(3600 * total_hours / cores)
-        lines += ["", f"Hours of one processor core; this machine's {cores} take {elapsed}."]
+        days = total_hours / cores / 24
+        lines += ["", f"Hours of one processor core; this machine's {cores} take {days:.1f} days."]
     else:
         lines += ["", "Hours of the graphics card."]
     lines += [

@@ -1,0 +1,90 @@
+"""What is told before anything is rendered: the number of views, hours and gigabytes."""
+
+import json
+import re
+
+import pytest
+
+import plan
+from lightfield import config, lenses, rigs
+
+SILVR = ("garden", "lone_monk", "barbershop")
+
+
+def test_the_rigs_are_those_that_silvr_published():
+    counts = {
+        (dataset.scene, dataset.rig): (
+            dataset.view_count,
+            dataset.cameras["camera"]["lens"],
+            dataset.cameras["camera"]["resolution"],
+        )
+        for scene in SILVR
+        for dataset in config.scene_datasets(scene, "full", {})
+    }
+    fisheye = ("equidistant", [2048, 2048])
+    evaluation = (42, "rectilinear", [2048, 2048])
+    panoramas = (8, "equirectangular", [4096, 2048])
+    assert counts == {
+        ("garden", "LFCuboid_2x2x1"): (1806, *fisheye),
+        ("garden", "LFSphere_e100cm_d170cm"): (642, *fisheye),
+        ("garden", "LFSphere_e100cm_d50cm"): evaluation,
+        ("garden", "LFCuboid_8panos"): panoramas,
+        ("lone_monk", "LFCuboid_4mx4mx3m"): (2226, *fisheye),
+        ("lone_monk", "LFSphere_e220cm_d400cm"): (642, *fisheye),
+        ("lone_monk", "LFSphere_e160cm_d220cm"): evaluation,
+        ("lone_monk", "LFCuboid_8panos"): panoramas,
+        ("barbershop", "LFCuboid_1mx3mx1m"): (1400, *fisheye),
+        ("barbershop", "LFSphere_e105cm_d145cm"): (642, *fisheye),
+        ("barbershop", "LFSphere_e110cm_d100cm"): evaluation,
+        ("barbershop", "LFCuboid_8panos"): panoramas,
+    }
+    assert sum(views for views, lens, _ in counts.values() if lens == "equidistant") == 7358
+
+
+@pytest.mark.parametrize("scene", SILVR)
+def test_a_spheres_name_tells_its_elevation_and_diameter_in_centimetres(scene):
+    spheres = [d for d in config.scene_datasets(scene, "full", {}) if "LFSphere" in d.rig]
+    assert len(spheres) == 2
+    for dataset in spheres:
+        heights = [pose.position[2] for pose in rigs.poses(dataset.cameras)]
+        elevation, diameter = map(
+            int, re.fullmatch(r"LFSphere_e(\d+)cm_d(\d+)cm", dataset.rig).groups()
+        )
+        assert (max(heights) + min(heights)) / 2 == pytest.approx(elevation / 100)
+        assert max(heights) - min(heights) == pytest.approx(diameter / 100)
+
+
+def test_the_table_adds_up_what_the_probes_measured():
+    fisheye = {"resolution": [2048, 2048], "samples": 256, "device": "CPU"}
+    fisheye |= {"views": 100, "view_seconds": [30.0, 36.0, 42.0], "view_bytes": [1e7, 1.2e7]}
+    panoramas = fisheye | {"views": 8, "resolution": [4096, 2048], "view_seconds": [90.0]}
+    text = plan.table([("garden/LFSphere", 3, fisheye), ("garden/LFCuboid_8panos", 1, panoramas)])
+    # 300 views of 36 ± 12/√12 s are 3 h, and of 11 MB 3.3 GB.
+    assert "| garden/LFSphere | 300 | 2048 × 2048 | 256 | 36 ± 3 | 3 | 3.3 |" in text
+    assert "| garden/LFCuboid_8panos | 8 | 4096 × 2048 | 256 | 90 ± 0 | 0 | 0.1 |" in text
+    assert "| all | 308 | | | | 3 ± 0 | 3 |" in text
+    assert "Hours of one processor core" in text
+    assert "Hours of the graphics card." in plan.table([("a/b", 1, fisheye | {"device": "GPU"})])
+
+
+def test_a_probe_foretells_the_size_of_the_views(run_program, room, tmp_path):
+    lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [128, 128]})
+    rig = {"type": "sphere", "subdivisions": 1, "center": [0, 0, 1.5]}
+    render = {"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0}
+    render |= {"depth_precision": "float"}
+    content = rigs.lightfield(rig, lens.to_lightfield())
+    content |= {"depth": "z", "frame": 1, "render": render, "scene": {}}
+    lightfield, inventory = tmp_path / "lightfield.json", tmp_path / "inventory.json"
+    lightfield.write_text(json.dumps(content))
+    run_program("inventory.py", "--blend", room, "--output", inventory)
+    shared = ("--blend", room, "--inventory", inventory, "--lightfield", lightfield)
+    run_program("probe.py", *shared, "--size", "64", "--output", tmp_path / "probe.json")
+    probe = json.loads((tmp_path / "probe.json").read_text())
+    assert (probe["views"], probe["resolution"], probe["samples"]) == (12, [128, 128], 4)
+    assert len(probe["view_seconds"]) == len(probe["view_bytes"]) == 3
+    assert min(probe["view_seconds"]) > 0
+    run_program("render_shard.py", *shared, "--output", tmp_path / "exr", "--threads", "1")
+    sizes = [path.stat().st_size for path in (tmp_path / "exr").glob("*.exr")]
+    foretold = sum(probe["view_bytes"]) / 3
+    # An upper estimate: small views compress worse.
+    assert 1 <= foretold / (sum(sizes) / 12) < 1.4
