@@ -1,5 +1,6 @@
 """The reprojection program as a user runs it, and beside Cycles through the same lenses."""
 
+import csv
 import json
 import math
 import os
@@ -528,3 +529,29 @@ def test_a_reprojection_is_what_cycles_renders_through_that_lens(renders, name):
     flat = seen & (walls < HALF * 0.93)
     assert flat.mean() > 0.4
     assert np.abs(ours[flat] / direct[flat] - 1).max() < 1e-4
+
+
+# The benchmark
+
+
+def test_the_benchmark_measures_every_method(tmp_path, run_program):
+    program = Path(__file__).parents[1] / "benchmarks" / "reprojection.py"
+    told = run_program(program, tmp_path, "--size", 128, "--repeats", 1).stdout
+    assert "default filter adaptive: " in told
+    with (tmp_path / "reprojection.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["scenario"] for row in rows} == {"minify by 8", "unity", "magnify by 3"}
+    assert {row["method"] for row in rows} >= set(resample.FILTERS) | {"OpenCV"}
+    error = {(r["scenario"], r["method"], r["samples"]): float(r["rms_error"]) for r in rows}
+    # What is known of the methods without measuring them.
+    assert error["minify by 8", "adaptive", "1"] < error["minify by 8", "bicubic", "1"] / 5
+    assert error["minify by 8", "bicubic", "8"] < error["minify by 8", "bicubic", "2"] / 5
+    for scenario in ("unity", "magnify by 3"):
+        assert error[scenario, "bicubic", "1"] < error[scenario, "bilinear", "1"]
+        assert error[scenario, "bilinear", "1"] < error[scenario, "nearest", "1"]
+        assert error[scenario, "adaptive", "1"] <= error[scenario, "bicubic", "1"] * 1.001
+    assert all(float(row["view_cpu_s"]) > 0 for row in rows)
+    front = [row for row in rows if row["on_front"] == "True"]
+    assert {row["scenario"] for row in front} == {row["scenario"] for row in rows}
+    assert (tmp_path / "reprojection.svg").stat().st_size > 10000
+    assert cv2.imread(str(tmp_path / "reprojection.png")).shape[1] > 1000
