@@ -58,7 +58,7 @@ FLOOR_LANTERNS = ((-0.72, -3.25), (0.85, -3.3))
 STONE_LANTERNS = ((4.95, 3.1, 1.0), (-1.3, -5.2, 1.1), (-4.6, 4.2, 0.9))  # x, y, scale
 GROVES = ((-5.5, 6.4, 6.5, 9.5), (2.2, -8.5, 9.0, -5.2))  # of bamboo: rectangles x0, y0, x1, y1
 
-SUN_AZIMUTH, SUN_ELEVATION = np.radians(-158.0), np.radians(29.0)
+SUN_AZIMUTH, SUN_ELEVATION = np.radians(-174.0), np.radians(35.0)
 # Where the sun stands in sunrise.exr: the sky is turned so that it stands where ours does.
 SKY_SUN_AZIMUTH = np.radians(-35.5)
 
@@ -283,13 +283,13 @@ def flagstone_layout(recipe: Recipe) -> list[tuple[Array, float]]:
         reach = radius * (0.35 + 0.65 * polygon + 0.03 * np.sin(3 * angles + wave[0]))
         reach *= 1 + 0.05 * np.sin(2 * angles + wave[1])
         outline = np.stack([reach * np.cos(angles) * stretch, reach * np.sin(angles)], axis=-1)
-        stones.append((outline + np.array([x, y]), 0.045 + random.uniform(0, 0.02)))
+        stones.append((outline + np.array([x, y]), 0.035 + random.uniform(0, 0.015)))
     return stones
 
 
 def raked_height(x: Array, y: Array, stones: Sequence[tuple[Array, float]]) -> Array:
     """The gravel's relief: straight furrows, rings around the islands, smoothed by the stones."""
-    period, depth, rings = 0.095, 0.012, 0.62
+    period, depth, rings = 0.095, 0.015, 0.62
     islands = [*ROCK_ISLANDS, (*STATUE, 0.85), (*FIRE, 0.5)]
     reach = np.min([np.hypot(x - ix, y - iy) - r for ix, iy, r in islands], axis=0)
     wavy = y + 0.02 * np.sin(2.1 * x)
@@ -1571,21 +1571,27 @@ def maple(recipe: Recipe) -> None:
     )
     red = leaf_material("Maple leaves", (0.30, 0.018, 0.010), (0.62, 0.13, 0.02), 0.5)
     bark = bark_material("Maple bark", (0.16, 0.13, 0.11))
-    shape = join([wood, leaf.painted(1)])
     z = float(ground_height(*map(np.array, MAPLE)))
-    tree = mesh("Maple", shape, bark, red)
-    place("Maple", tree, transform((*MAPLE, z), (0.0, 0.14, np.arctan2(-MAPLE[1], -MAPLE[0]))))
-    place("Maple far", tree, transform((6.8, -2.6, 0.1), (0, 0, 2.5), 1.05))
+    spot = transform((*MAPLE, z), (0.0, 0.14, np.arctan2(-MAPLE[1], -MAPLE[0])))
+    shape = join([wood, leaf.painted(1)]).transformed(spot)
+    # Where the crown hangs over the rigs, what would be below 2.2 m is lifted to above it.
+    x, y, height = shape.vertices.T
+    over = smoothstep(2.9, 1.9, np.hypot(x, y))
+    raised = np.where(height < 3.2, 2.2 + np.maximum(height, 0.0) / 3.2, height)
+    shape.vertices[:, 2] += over * (raised - height)
+    tree = mesh("Maple", shape.transformed(spot.inverted()), bark, red)
+    place("Maple", tree, spot)
+    place("Maple far", tree, transform((5.5, -3.0, 0.1), (0, 0, 2.5), 1.05))
     place("Maple farther", tree, transform((-8.3, 5.6, 0.1), (0, 0, 4.5), 1.1))
 
 
 def pines(recipe: Recipe) -> None:
     """Cloud-pruned pines: crooked stems with pads of needles."""
     random = recipe.random("pines")
-    needle = [(0.004, 0.0), (0.0035, 0.5), (0.0003, 1.0)]
+    needle = [(0.045, 0.0), (0.04, 0.5), (0.004, 1.0)]
     n = 9
     out = random.normal((0, 0, 0.7), 0.6, (n, 3))
-    strip = sheet(np.array([[(-w, y, 0), (w, y, 0)] for w, y in needle]) * (1.6, 1, 1))
+    strip = sheet(np.array([[(-w, y, 0), (w, y, 0)] for w, y in needle]))
     brush = copies(strip, frames(out, random.normal(0, 1, (n, 3))) * 0.11, np.zeros((n, 3)))
     needles = leaf_material("Pine needles", (0.012, 0.045, 0.016), (0.045, 0.095, 0.026), 0.15)
     bark = bark_material("Pine bark", (0.20, 0.13, 0.09))
