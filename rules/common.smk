@@ -288,8 +288,8 @@ def reprojection_words(wildcards):
 
 
 def panorama_width(wildcards):
-    """Give the panorama, 360 degrees wide, the angular resolution of a 180 degree fisheye view."""
-    return 2 * dataset_of(wildcards).cameras["camera"]["resolution"][0]
+    """Give the panorama twice a 180 degree fisheye view's angular resolution, within 4096 pixels."""
+    return min(4 * dataset_of(wildcards).cameras["camera"]["resolution"][0], 4096)
 
 
 def drop_false_records():

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from lightfield import cli, config, lenses, rigs
 from lightfield.files import atomic_path
 from lightfield.interpolation_volume import (

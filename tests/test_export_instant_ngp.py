@@ -7,9 +7,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import export_instant_ngp
 import numpy as np
 import pytest
+
+import export_instant_ngp
 from lightfield import images, lenses, rigs
 from lightfield.errors import UserError
 

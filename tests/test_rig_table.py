@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 import rig_table
 from lightfield import lenses, rigs
 from lightfield.interpolation_volume import interpolation_volume, neighbour_spacing, spacing
