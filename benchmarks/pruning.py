@@ -3,8 +3,9 @@
 Each scene is measured as its builder makes it, and as artists leave theirs: with a hidden dense
 object, motion blur, and passes that nobody reads. In each, every pruning that applies is taken
 alone and together; so are those that were tried and are not kept. A measurement is a process of
-its own with one thread. Times are CPU seconds, each the least of several runs, because other work
-on the machine only ever adds to them.
+its own with one thread. Times are CPU seconds; the processes that are compared render each view one
+right after the other, and what is saved is the median of these pairs' differences, so that other
+work on the machine falls on both.
 
 Writes pruning.csv and pruning.md to the output folder.
 """
@@ -12,13 +13,15 @@ Writes pruning.csv and pruning.md to the output folder.
 import argparse
 import csv
 import hashlib
+import math
 import resource
 import statistics
 import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -43,6 +46,9 @@ ALWAYS = {
 }
 
 
+VIEWS = 6
+
+
 @dataclass(frozen=True)
 class Task:
     """One process: a scene, what is left out of it, and what is on that need not be."""
@@ -52,27 +58,21 @@ class Task:
     passes: bool = False
     depth: bool = True
     tweak: str = ""
-    resolution: int = 96
-    samples: int = 4
-    views: int = 5
 
 
-@dataclass(frozen=True)
+@dataclass
 class Figures:
-    """What a process took: CPU seconds and MiB; ``bytes`` of a view's EXR; the pixels' digest.
+    """What the processes of a task took: CPU seconds, MiB, and bytes of a view's EXR.
 
-    ``start_up`` is all that comes before the second view, ``views`` are those from there on.
+    ``start_ups`` has one entry a process, all that comes before its second view; ``views`` one for
+    each view from there on.
     """
 
-    start_up: float
-    views: tuple[float, ...]
-    peak: float
-    bytes: float
-    pixels: str
-
-    @property
-    def view(self) -> float:
-        return statistics.mean(self.views)
+    start_ups: list[float] = field(default_factory=list)
+    views: list[float] = field(default_factory=list)
+    peak: float = math.inf
+    bytes: float = 0.0
+    pixels: str = ""
 
 
 def main() -> None:
@@ -152,10 +152,10 @@ def row(name: str, reason: str, base: Figures, without: Figures) -> dict[str, An
     return {
         "left_out": name,
         "reason": reason,
-        "start_up_seconds": round(without.start_up, 3),
-        "start_up_saved": round(base.start_up - without.start_up, 3),
-        "view_seconds": round(without.view, 4),
-        "view_saved": round(base.view - without.view, 4),
+        "start_up_seconds": round(statistics.median(without.start_ups), 3),
+        "start_up_saved": round(saved(base.start_ups, without.start_ups), 3),
+        "view_seconds": round(statistics.median(without.views), 4),
+        "view_saved": round(saved(base.views, without.views), 4),
         "peak_mib": round(without.peak, 1),
         "peak_saved": round(base.peak - without.peak, 1),
         "view_bytes": round(without.bytes),
@@ -164,82 +164,102 @@ def row(name: str, reason: str, base: Figures, without: Figures) -> dict[str, An
     }
 
 
+def saved(base: Sequence[float], without: Sequence[float]) -> float:
+    """Return the median difference of times that were taken one right after the other."""
+    return statistics.median(one - other for one, other in zip(base, without, strict=True))
+
+
 def all_figures(tasks: Sequence[Task], repeats: int) -> dict[Task, Figures]:
-    """Return the least of each figure over several processes that do the same.
-
-    The tasks take turns, so that a busy minute does not fall on one of them alone.
-    """
-    runs: dict[Task, list[Figures]] = {task: [] for task in tasks}
+    """Measure tasks side by side, each ``repeats`` times in a process of its own."""
+    figures = {task: Figures() for task in tasks}
     for _ in range(repeats):
-        for task, done in runs.items():
-            done.append(in_process(measure, task))
-    return {
-        task: replace(
-            done[0],
-            start_up=min(run.start_up for run in done),
-            views=tuple(map(min, zip(*(run.views for run in done), strict=True))),
-            peak=min(run.peak for run in done),
-        )
-        for task, done in runs.items()
-    }
+        with ExitStack() as stack:
+            pools = {task: stack.enter_context(get_context("spawn").Pool(1)) for task in figures}
+            for task, pool in pools.items():
+                figures[task].start_ups.append(pool.apply(begin, (task,)))
+            for number in range(1, VIEWS):
+                for task, pool in pools.items():
+                    figures[task].views.append(pool.apply(render, (number,)))
+            for task, pool in pools.items():
+                done = figures[task]
+                peak, done.bytes, done.pixels = pool.apply(finish)
+                done.peak = min(done.peak, peak)
+    return figures
 
 
-def measure(task: Task) -> Figures:
-    """Render a few views as a shard does."""
-    import bpy
-    import numpy as np
+class Renderer:
+    """A scene set up in this process as its task says, and what its views amount to."""
 
-    import inventory  # noqa: F401  (as heavy as the renderer's own imports)
-    from lightfield import blender, images
+    def __init__(self, task: Task) -> None:
+        import bpy
 
-    lens = lenses.from_camera(
-        {"lens": "equidistant", "fov": 180, "resolution": [task.resolution] * 2}
-    )
-    rig = {"type": "lattice", "cameras": [task.views, 1, 1], "size": 0.3, "center": [0, 0, 1.1]}
-    settings = {"samples": task.samples, "adaptive_threshold": 0, "denoise": False}
-    content = rigs.lightfield(rig, lens.to_lightfield())
-    content |= {"depth": "z" if task.depth else None, "frame": 1}
+        from lightfield import blender
+
+        lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [96, 96]})
+        rig = {"type": "lattice", "cameras": [VIEWS, 1, 1], "size": 0.3, "center": [0, 0, 1.1]}
+        settings = {"samples": 4, "adaptive_threshold": 0, "denoise": False}
+        content = rigs.lightfield(rig, lens.to_lightfield())
+        content |= {"depth": "z" if task.depth else None, "frame": 1}
+        self.poses = [frame["world_matrix"] for frame in content["frames"]]
+        self.digest = hashlib.sha256()
+        self.sizes: list[int] = []
+        blender.open_scene(task.blend)
+        if "hidden_objects" in task.left_out:
+            blender.remove_objects(blender.removable_objects())
+        blender.set_up_render(settings, content, "cpu", 1)
+        blender.leave_out(task.left_out)
+        scene = bpy.context.scene
+        if task.passes:
+            layer = scene.view_layers[0]
+            for name in ("normal", "diffuse_color", "glossy_direct", "cryptomatte_object", "mist"):
+                setattr(layer, f"use_pass_{name}", True)
+        if task.tweak == "light_tree":
+            scene.cycles.use_light_tree = False
+        elif task.tweak == "transparent_bounces":
+            scene.cycles.transparent_max_bounces = 0
+        elif task.tweak:
+            setattr(scene.cycles, task.tweak, 0)
+
+    def render(self, number: int) -> float:
+        """Render a view; return the CPU seconds that it took."""
+        import numpy as np
+
+        from lightfield import blender, images
+
+        began = time.process_time()
+        raw = blender.render_view(np.array(self.poses[number]), 1)
+        seconds = time.process_time() - began
+        self.digest.update(raw.colour.tobytes())
+        channels = {c: raw.colour[:, :, i].astype(np.float16) for i, c in enumerate("RGB")}
+        if raw.depth is not None:
+            channels["Z"] = raw.depth
+        with tempfile.TemporaryDirectory() as folder:
+            images.write_exr(Path(folder, "view.exr"), channels)
+            self.sizes.append(Path(folder, "view.exr").stat().st_size)
+        return seconds
+
+
+renderer: Renderer
+
+
+def begin(task: Task) -> float:
+    """Set this process up and render its first view; return the CPU seconds that it took."""
+    global renderer
+    import inventory  # noqa: F401  (imports what the renderer does, before the clock starts)
 
     began = time.process_time()
-    blender.open_scene(task.blend)
-    if "hidden_objects" in task.left_out:
-        blender.remove_objects(blender.removable_objects())
-    blender.set_up_render(settings, content, "cpu", 1)
-    blender.leave_out(task.left_out)
-    scene = bpy.context.scene
-    if task.passes:
-        layer = scene.view_layers[0]
-        for name in ("normal", "diffuse_color", "glossy_direct", "cryptomatte_object", "mist"):
-            setattr(layer, f"use_pass_{name}", True)
-    if task.tweak == "light_tree":
-        scene.cycles.use_light_tree = False
-    elif task.tweak == "transparent_bounces":
-        scene.cycles.transparent_max_bounces = 0
-    elif task.tweak:
-        setattr(scene.cycles, task.tweak, 0)
-    start_up = time.process_time() - began
+    renderer = Renderer(task)
+    return time.process_time() - began + renderer.render(0)
 
-    digest = hashlib.sha256()
-    times, sizes = [], []
-    with tempfile.TemporaryDirectory() as folder:
-        for frame in content["frames"]:
-            began = time.process_time()
-            raw = blender.render_view(np.array(frame["world_matrix"]), 1)
-            times.append(time.process_time() - began)
-            digest.update(raw.colour.tobytes())
-            channels = {c: raw.colour[:, :, i].astype(np.float16) for i, c in enumerate("RGB")}
-            if raw.depth is not None:
-                channels["Z"] = raw.depth
-            images.write_exr(Path(folder, "view.exr"), channels)
-            sizes.append(Path(folder, "view.exr").stat().st_size)
+
+def render(number: int) -> float:
+    return renderer.render(number)
+
+
+def finish() -> tuple[float, float, str]:
+    """Return peak memory in MiB, the mean size of a view's file, and the digest of all pixels."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return Figures(
-        start_up + times[0],
-        tuple(times[1:]),
-        peak,
-        statistics.mean(sizes),
-        digest.hexdigest(),
-    )
+    return peak, statistics.mean(renderer.sizes), renderer.digest.hexdigest()
 
 
 def write(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
@@ -255,7 +275,8 @@ def write(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
         "",
         "CPU seconds of one thread, MiB of peak memory, and KiB of a view's EXR, at 96² and 4 "
         "samples a pixel; in brackets what is saved against the scene as it is (for depth and for "
-        "what is not kept: against all prunings). Start-up is everything before the second view.",
+        "what is not kept: against all prunings), times as the median of pairs that were measured "
+        "one right after the other. Start-up is everything before the second view.",
         "",
         "| scene | left out | start-up | a view | peak memory | a view's file | same pixels |",
         "| --- | --- | ---: | ---: | ---: | ---: | --- |",
