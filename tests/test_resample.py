@@ -1,5 +1,6 @@
 """Resampling against analytic truth, OpenCV and OpenImageIO."""
 
+import itertools
 import math
 
 import cv2
@@ -8,7 +9,15 @@ import OpenImageIO as oiio
 import pytest
 
 from lightfield import lens_map, resample
-from lightfield.lenses import Equidistant, Equirectangular, Lens, Rectilinear
+from lightfield.lenses import (
+    CubeMap,
+    Equidistant,
+    Equirectangular,
+    Equisolid,
+    Lens,
+    Rectilinear,
+    Stereographic,
+)
 
 FILTERS = ["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp"]
 IDENTITY = np.eye(3)
@@ -255,6 +264,40 @@ def test_openimageio_agrees_about_a_rotated_view():
     inner = np.s_[40:88, 40:88, 0]
     difference = apply(image, made)[inner] - np.asarray(turned.get_pixels(oiio.FLOAT))[inner]
     assert np.abs(difference).max() < 0.02
+
+
+@pytest.mark.parametrize("size", [(1, 1), (2, 3), (9, 7)])
+def test_no_pair_of_lenses_and_no_value_gives_what_is_no_answer(size):
+    width, height = size
+    rng = np.random.default_rng(width)
+    common = {"width": width, "height": height}
+    lenses = [
+        Rectilinear(**common, focal_length=18),
+        Rectilinear(**common, focal_length=1e-3),
+        Rectilinear(**common, focal_length=1e6),
+        Equidistant(**common, fov=math.pi),
+        Equidistant(**common, fov=2 * math.pi),
+        Equisolid(**common, focal_length=10, fov=2 * math.pi),
+        Stereographic(**common, fov=6),
+        Equirectangular(**common),
+        Equirectangular(**common, longitude=(-0.3, 0.4), latitude=(0.1, 1.5)),
+        CubeMap(width=6 * height, height=height),
+    ]
+    for source, target in itertools.product(lenses, lenses):
+        rotation = lens_map.rotation_matrix(*rng.choice([0, 90, -90, 180, 33], 3))
+        for name, samples in (("nearest", 1), ("bicubic", 3), ("lanczos", 1), ("adaptive", 1)):
+            made = lens_map.compute(source, target, rotation, name, samples)
+            image = rng.random((source.height, source.width, 4), np.float32)
+            image[rng.random(image.shape[:2]) < 0.1] = rng.choice([np.nan, np.inf, 65504, 1e-40])
+            out = apply(image, made)
+            blocks = made.flags.reshape(target.height, samples, target.width, samples)
+            assert np.isnan(out[blocks.max(axis=(1, 3)) == lens_map.NOTHING]).all()
+            assert not np.isinf(out).any() and not (out < 0).any()
+        depth = 10 ** rng.uniform(-6, 9, image.shape[:2])
+        depth[0, 0] = np.inf
+        found = apply_depth(depth.astype("f4"), made, False, False)
+        finite = found[np.isfinite(found)]
+        assert ((finite > 0.99e-6) & (finite < 1.01e9)).all()
 
 
 # Depth

@@ -133,15 +133,14 @@ def compute(
     centers = _framed(padded[1:-1, 1:-1], source)
     points = centers
     if samples > 1:
-        points = _framed(
-            _coordinates(
-                source,
-                target,
-                rotation,
-                (np.arange(target.width * samples) + 0.5) / samples,
-                (np.arange(target.height * samples) + 0.5) / samples,
-            ),
-            source,
+        x = (np.arange(target.width * samples) + 0.5) / samples
+        y = _strips((np.arange(target.height * samples) + 0.5) / samples)
+        # In float32 from the start: they are n² times as many as the pixels.
+        points = np.concatenate(
+            [
+                _framed(_coordinates(source, target, rotation, x, rows), source).astype(np.float32)
+                for rows in y
+            ]
         )
     source_cos = _cosines(source)
     reach = np.asarray(SUPPORT[filter_name])
@@ -154,7 +153,7 @@ def compute(
             extent = np.abs(footprints * (counts[..., None, :] - 1)).sum(axis=-1) / 2
             reach = reach + np.ceil(extent.max(axis=-1))
     window = _window(points, source, reach, wraps or panels > 1)
-    corner = np.array([window[2], window[0]])
+    corner = np.array([window[2], window[0]], points.dtype)
     centers32 = (centers - corner).astype(np.float32)
     nothing = np.isnan(centers[..., 0])
     scale = np.where(nothing, np.nan, magnification(jacobian))
@@ -377,13 +376,16 @@ def _flags(points: Array, valid: Array, reach: Array, panels: int) -> Array:
             for panel in np.hsplit(valid, panels)
         ]
     )
-    nothing = np.isnan(points[..., 0])
-    row, column = (
-        np.minimum(np.where(nothing, 0, points[..., axis]).astype(np.int32), limit - 1)
-        for axis, limit in ((1, valid.shape[0]), (0, valid.shape[1]))
-    )
-    flags = np.where(depth[row, column] > reach, np.uint8(INSIDE), np.uint8(CAREFUL))
-    flags[nothing] = NOTHING
+    flags = np.empty(points.shape[:2], np.uint8)
+    for rows in _strips(np.arange(len(points))):
+        strip = points[rows]
+        nothing = np.isnan(strip[..., 0])
+        row, column = (
+            np.minimum(np.where(nothing, 0, strip[..., axis]).astype(np.int32), limit - 1)
+            for axis, limit in ((1, valid.shape[0]), (0, valid.shape[1]))
+        )
+        inside = depth[row, column] > (reach[rows] if reach.ndim else reach)
+        flags[rows] = np.where(nothing, NOTHING, np.where(inside, INSIDE, CAREFUL))
     return flags
 
 
@@ -395,8 +397,13 @@ def _window(points: Array, source: Lens, reach: Array, whole: bool) -> tuple[int
     if np.isnan(points[..., 0]).all():
         return 0, 1, 0, 1
     margin = reach + 1
-    low = np.floor(np.nanmin(points - margin[..., None], axis=(0, 1))).astype(int)
-    high = np.ceil(np.nanmax(points + margin[..., None], axis=(0, 1))).astype(int)
+    if margin.ndim:
+        low = np.nanmin(points - margin[..., None], axis=(0, 1))
+        high = np.nanmax(points + margin[..., None], axis=(0, 1))
+    else:
+        low = np.fmin.reduce(points, axis=(0, 1)) - margin
+        high = np.fmax.reduce(points, axis=(0, 1)) + margin
+    low, high = np.floor(low).astype(int), np.ceil(high).astype(int)
     (left, top), (right, bottom) = np.maximum(low, 0), high
     if whole:
         left, right = 0, source.width
