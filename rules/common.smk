@@ -65,7 +65,9 @@ localrules:
     lightfield,
     panorama,
     panorama_lightfield,
+    plan,
     reprojected_lightfield,
+    rig_tables,
 
 
 def dataset_of(wildcards):

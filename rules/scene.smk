@@ -74,6 +74,8 @@ for name, source in {
             source["blend"],
         log:
             f"{WORK}/logs/{name}/fetch_blend.log",
+        # Where Snakemake runs: a cluster's nodes may not reach the Internet.
+        localrule: True
         conda:
             ENVIRONMENT
         params:
