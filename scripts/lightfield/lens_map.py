@@ -344,7 +344,8 @@ def _jacobian(padded: Array, width: int, wraps: bool, panels: int) -> Array:
         lacks = np.isnan(forward), np.isnan(backward)
         forward = np.where(lacks[0], backward, forward)
         backward = np.where(lacks[1], forward, backward)
-        out[..., axis] = np.nan_to_num((forward + backward) / 2)
+        # A grazing ray moves beyond all bounds: as good as beyond every image.
+        out[..., axis] = np.clip(np.nan_to_num((forward + backward) / 2), -1e9, 1e9)
     return out
 
 
@@ -403,8 +404,9 @@ def _window(points: Array, source: Lens, reach: Array, whole: bool) -> tuple[int
     else:
         low = np.fmin.reduce(points, axis=(0, 1)) - margin
         high = np.fmax.reduce(points, axis=(0, 1)) + margin
-    low, high = np.floor(low).astype(int), np.ceil(high).astype(int)
-    (left, top), (right, bottom) = np.maximum(low, 0), high
+    size = np.array([source.width, source.height])
+    left, top = (int(start) for start in np.clip(np.floor(low), 0, size - 1))
+    right, bottom = (int(end) for end in np.clip(np.ceil(high), 1, size))
     if whole:
         left, right = 0, source.width
-    return int(top), int(min(bottom, source.height)), int(left), int(min(right, source.width))
+    return top, bottom, left, right
