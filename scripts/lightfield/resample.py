@@ -517,32 +517,33 @@ def _inverse_distance_half(bits: Array, cos: Array, is_z: bool, out: Array) -> N
 
 
 @kernel
-def _bend(a: Any, b: Any, c: Any, d: Any, f: Any, tolerance: Any) -> Any:
-    """What a cubic through four neighbours adds to the line from b to c, at fraction ``f``.
+def _curvatures(a: Any, b: Any, c: Any, d: Any, tolerance: Any) -> tuple[Any, Any]:
+    """The second differences of four neighbours, about the second and the third.
 
     NaN unless the four are of one smooth surface: where their third difference is small against
     them, or where they curve one way, evenly, and not by much. A step between two surfaces curves
-    both ways. Source: Everett's interpolation formula.
+    both ways.
     """
     before, after = a - 2 * b + c, b - 2 * c + d
     third = abs(after - before)
     if not third <= tolerance * b:
         even = third <= np.float32(0.5) * max(abs(before), abs(after))
         if not (even and before * after > 0 and abs(c - b) <= np.float32(0.05) * b):
-            return np.float32(np.nan)
-    g = np.float32(1) - f
-    one = np.float32(1)
-    return (g * (g * g - one) * before + f * (f * f - one) * after) * np.float32(1 / 6)
+            return np.float32(np.nan), np.float32(np.nan)
+    return before, after
 
 
 @_inline
-def _smooth(
-    inverse: Array, x: Any, y: Any, tolerance: Any, topology: tuple[bool, bool, bool, int]
+def _cell(
+    inverse: Array,
+    row: int,
+    column: int,
+    home: int,
+    tolerance: Any,
+    topology: tuple[bool, bool, bool, int],
 ) -> Any:
-    """Interpolate at (x, y), which counts from the first pixel's centre; NaN across an edge."""
+    """The four pixels whose first is (row, column), and their curvatures along the four sides."""
     height, width = inverse.shape
-    column, row = int(np.floor(x)), int(np.floor(y))
-    fx, fy = x - np.float32(column), y - np.float32(row)
     within = row >= 1 and row < height - 2 and column >= 1 and column < width - 2
     if within and topology[3] > 1:
         panel = width // topology[3]
@@ -550,22 +551,13 @@ def _smooth(
     if within:
         # Unsigned, so that no index is checked for counting from the end.
         one, two, i, j = np.uint64(1), np.uint64(2), np.uint64(row), np.uint64(column)
-        a0, a1, a2, a3 = (
-            inverse[i, j - one],
-            inverse[i, j],
-            inverse[i, j + one],
-            inverse[i, j + two],
-        )
-        b0, b1, b2, b3 = (
-            inverse[i + one, j - one],
-            inverse[i + one, j],
-            inverse[i + one, j + one],
-            inverse[i + one, j + two],
-        )
+        a0, a1 = inverse[i, j - one], inverse[i, j]
+        a2, a3 = inverse[i, j + one], inverse[i, j + two]
+        b0, b1 = inverse[i + one, j - one], inverse[i + one, j]
+        b2, b3 = inverse[i + one, j + one], inverse[i + one, j + two]
         c1, c2 = inverse[i - one, j], inverse[i - one, j + one]
         d1, d2 = inverse[i + two, j], inverse[i + two, j + one]
     else:
-        home = int(x + np.float32(0.5))
         a0 = _value(inverse, row, column - 1, home, topology)
         a1 = _value(inverse, row, column, home, topology)
         a2 = _value(inverse, row, column + 1, home, topology)
@@ -578,15 +570,21 @@ def _smooth(
         c2 = _value(inverse, row - 1, column + 1, home, topology)
         d1 = _value(inverse, row + 2, column, home, topology)
         d2 = _value(inverse, row + 2, column + 1, home, topology)
-    upper = a1 + fx * (a2 - a1) + _bend(a0, a1, a2, a3, fx, tolerance)
-    lower = b1 + fx * (b2 - b1) + _bend(b0, b1, b2, b3, fx, tolerance)
-    before = _bend(c1, a1, b1, d1, fy, tolerance)
-    after = _bend(c2, a2, b2, d2, fy, tolerance)
-    smooth = upper + fy * (lower - upper) + before + fx * (after - before)
-    if not smooth > 0:
-        return np.float32(np.nan)
-    low, high = min(min(a1, a2), min(b1, b2)), max(max(a1, a2), max(b1, b2))
-    return min(max(smooth, low), high)
+    return (
+        (a1, a2, b1, b2),
+        _curvatures(a0, a1, a2, a3, tolerance),
+        _curvatures(b0, b1, b2, b3, tolerance),
+        _curvatures(c1, a1, b1, d1, tolerance),
+        _curvatures(c2, a2, b2, d2, tolerance),
+    )
+
+
+@_inline
+def _bend(before: Any, after: Any, f: Any) -> Any:
+    """What a cubic adds to a line at fraction ``f``, by Everett's interpolation formula."""
+    one = np.float32(1)
+    g = one - f
+    return (g * (g * g - one) * before + f * (f * f - one) * after) * np.float32(1 / 6)
 
 
 @kernel
@@ -608,15 +606,31 @@ def _pick(
     out: Array,
 ) -> None:
     height, width = inverse.shape
+    half = np.float32(0.5)
+    last_row, last_column = 0, 0
+    cell = _cell(inverse, 0, 0, 0, tolerance, topology)
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             x, y = centers[i, j, 0], centers[i, j, 1]
             if x != x:
                 out[i, j] = np.nan
                 continue
-            half = np.float32(0.5)
-            found = _smooth(inverse, x - half, y - half, tolerance, topology)
-            if found != found:
+            row, column = int(np.floor(y - half)), int(np.floor(x - half))
+            # Where pixels are magnified, neighbours share a cell.
+            if row != last_row or column != last_column:
+                cell = _cell(inverse, row, column, int(x), tolerance, topology)
+                last_row, last_column = row, column
+            (a, b, c, d), upper, lower, left, right = cell
+            fx, fy = x - half - np.float32(column), y - half - np.float32(row)
+            top = a + fx * (b - a) + _bend(upper[0], upper[1], fx)
+            bottom = c + fx * (d - c) + _bend(lower[0], lower[1], fx)
+            across = _bend(left[0], left[1], fy)
+            across += fx * (_bend(right[0], right[1], fy) - across)
+            smooth = top + fy * (bottom - top) + across
+            if smooth > 0:
+                low, high = min(min(a, b), min(c, d)), max(max(a, b), max(c, d))
+                found = min(max(smooth, low), high)
+            else:
                 found = inverse[min(int(y), height - 1), min(int(x), width - 1)]
             if found == 0:
                 out[i, j] = np.inf
