@@ -53,6 +53,15 @@ MIRROR = (1.75, 3.25)
 FIRE = (3.1, 1.1)
 TORII = (0.2, -8.5)
 MAPLE = (-2.05, -3.0)
+CANDLES = (  # on the gravel, the plinth's step, beside the rocks, afloat
+    *((-0.62, 2.82, 0.0), (-0.48, 2.9, 0.0), (-0.40, 2.73, 0.0)),
+    *((0.47, 2.88, 0.0), (0.60, 2.76, 0.0), (0.70, 2.9, 0.0)),
+    *((-0.28, 3.05, 0.14), (-0.12, 3.05, 0.14), (0.05, 3.05, 0.14), (0.3, 3.05, 0.14)),
+    *((-1.30, 2.13, 0.0), (-1.17, 2.27, 0.0), (-1.43, 1.97, 0.0)),
+    *((-3.95, 0.2, -0.08), (-4.3, 1.25, -0.08), (-4.75, -0.35, -0.08), (-5.2, 0.75, -0.08)),
+    (-5.9, 1.6, -0.08),
+)
+CANDLE_LIGHTS = ((-0.5, 2.8, 0.32), (0.58, 2.83, 0.32), (-1.3, 2.1, 0.3), (-4.6, 0.5, 0.12))
 ROCK_ISLANDS = ((2.75, -2.05, 0.75), (-1.85, 2.55, 0.5))  # x, y, radius
 FLOOR_LANTERNS = ((-0.72, -3.25), (0.85, -3.3))
 STONE_LANTERNS = ((4.95, 3.1, 1.0), (-1.3, -5.2, 1.1), (-4.6, 4.2, 0.9))  # x, y, scale
@@ -66,12 +75,13 @@ FLAME_COLOR: Color = (1.0, 0.42, 0.12)
 FLAME_HEIGHT, FLAME_TONGUES = 1.0, 6
 # Shells of a flame: size, colour, radiance a metre.
 FLAME_SHELLS: tuple[tuple[float, Color, float], ...] = (
-    (1.0, (1.0, 0.20, 0.025), 9.0),
-    (0.78, (1.0, 0.36, 0.06), 14.0),
-    (0.5, (1.0, 0.62, 0.22), 26.0),
+    (1.0, (1.0, 0.20, 0.025), 6.0),
+    (0.78, (1.0, 0.34, 0.05), 7.0),
+    (0.5, (1.0, 0.52, 0.14), 12.0),
 )
 FOG_COLOR: Color = (0.62, 0.60, 0.62)  # radiance
-FOG_DENSITY = 0.016  # share of the light lost a metre
+FOG_DENSITY = 0.012  # share of the light lost a metre
+FOG_ARCS = 10
 CANDLE_COLOR: Color = (1.0, 0.55, 0.22)
 
 
@@ -292,7 +302,7 @@ def raked_height(x: Array, y: Array, stones: Sequence[tuple[Array, float]]) -> A
     period, depth, rings = 0.095, 0.015, 0.62
     islands = [*ROCK_ISLANDS, (*STATUE, 0.85), (*FIRE, 0.5)]
     reach = np.min([np.hypot(x - ix, y - iy) - r for ix, iy, r in islands], axis=0)
-    wavy = y + 0.02 * np.sin(2.1 * x)
+    wavy = x + 0.02 * np.sin(2.1 * y)
     furrows = np.where(reach < rings, np.cos(TAU * reach / period), np.cos(TAU * wavy / period))
     seam = smoothstep(0.0, 0.05, np.abs(reach - rings))
     calm = np.ones_like(x)
@@ -878,7 +888,7 @@ def flames(recipe: Recipe, x: float, y: float, z: float) -> None:
     noises = []
     for axis in "XY":
         noise_texture = bpy.data.textures.new(f"Flame noise {axis}", "CLOUDS")
-        noise_texture.noise_scale, noise_texture.noise_depth = 0.22, 1
+        noise_texture.noise_scale, noise_texture.noise_depth = 0.3, 1
         carrier = place(f"Flame carrier {axis}", None, transform((x, y + ord(axis), z)))
         animate(carrier, "location", 0.05, 2)
         noises.append((axis, noise_texture, carrier))
@@ -904,7 +914,7 @@ def flames(recipe: Recipe, x: float, y: float, z: float) -> None:
             for axis, noise_texture, carrier in noises:
                 bend = tongue.modifiers.new(f"Lick {axis}", "DISPLACE")
                 bend.texture, bend.vertex_group = noise_texture, higher.name
-                bend.direction, bend.space, bend.strength = axis, "GLOBAL", 0.9
+                bend.direction, bend.space, bend.strength = axis, "GLOBAL", 0.6
                 bend.texture_coords, bend.texture_coords_object = "OBJECT", carrier
 
 
@@ -959,7 +969,7 @@ def fire(recipe: Recipe) -> None:
     lumps = 1 + 0.25 * noise(bed.vertices * 4, 71, 2)
     logs.append(
         Shape(
-            bed.vertices * (0.3, 0.3, 0.08) * lumps[:, None] + (0, 0, 0.42), triangles=bed.triangles
+            bed.vertices * (0.3, 0.3, 0.06) * lumps[:, None] + (0, 0, 0.47), triangles=bed.triangles
         )
     )
     add("Logs", join(logs), embers, matrix=transform((x, y, 0)))
@@ -984,10 +994,10 @@ def candle_parts(recipe: Recipe) -> tuple[Shape, Shape]:
     return join([wax, wick]), flame
 
 
-def candles(recipe: Recipe) -> None:
-    """Candles at the statue's feet, on the rocks' side, and afloat on the pond."""
+def wax_material() -> bpy.types.Material:
+    """Wax that glows faintly where the flame shines into it."""
     made, graph = material("Wax")
-    z = graph.xyz(graph.add("ShaderNodeTexCoord").outputs["Object"])["Z"]
+    z = graph.xyz(graph.coordinates())["Z"]
     warm = graph.span(z, 0.0, 0.9, 0.06, 0.2)
     surface = graph.principled(
         Base_Color=(0.82, 0.72, 0.55),
@@ -995,157 +1005,106 @@ def candles(recipe: Recipe) -> None:
         Emission_Color=(1.0, 0.36, 0.10),
         Emission_Strength=graph.math("MULTIPLY", warm, warm),
     )
-    wax = finish(made, graph, surface)
-    light, graph = material("Candle flame")
-    z = graph.xyz(graph.add("ShaderNodeTexCoord").outputs["Object"])["Z"]
-    tint = graph.ramp(
-        graph.span(z, 0.0, 1.0, 0.2, 0.252),
-        [
-            (0.0, (0.15, 0.2, 0.8)),
-            (0.2, (1.0, 0.45, 0.12)),
-            (0.6, (1.0, 0.72, 0.32)),
-            (1.0, (1.0, 0.4, 0.08)),
-        ],
+    made.cycles.emission_sampling = "NONE"
+    return finish(made, graph, surface)
+
+
+def candle_flame_material() -> bpy.types.Material:
+    """A flame, blue at its foot; the lamps beside the candles give its light."""
+    made, graph = material("Candle flame")
+    height = graph.span(graph.xyz(graph.coordinates())["Z"], 0.0, 1.0, 0.2, 0.252)
+    blue, orange, yellow, red = (
+        (0.15, 0.2, 0.8),
+        (1.0, 0.45, 0.12),
+        (1.0, 0.72, 0.32),
+        (1, 0.4, 0.08),
     )
-    finish(light, graph, graph.add("ShaderNodeEmission", {"Color": tint, "Strength": 9.0}))
-    wax.cycles.emission_sampling = light.cycles.emission_sampling = "NONE"
-    shape, flame = candle_parts(recipe)
-    wax_mesh = mesh("Candle", shape, wax, plain("Wick", (0.01, 0.01, 0.01)), smooth=0.7)
-    flame_mesh = mesh("Candle flame", flame, light)
+    tint = graph.ramp(height, [(0.0, blue), (0.2, orange), (0.6, yellow), (1.0, red)])
+    made.cycles.emission_sampling = "NONE"
+    return finish(made, graph, graph.add("ShaderNodeEmission", {"Color": tint, "Strength": 9.0}))
+
+
+def candles(recipe: Recipe) -> None:
+    """Candles at the statue's feet, by the rocks, and afloat on the pond."""
     random = recipe.random("candles")
-    sx, sy = STATUE
-    spots = [
-        (sx + dx, sy - 0.85 - dy, 0.0)
-        for dx, dy in (
-            (-0.62, 0.08),
-            (-0.48, 0.0),
-            (-0.40, 0.17),
-            (0.47, 0.02),
-            (0.60, 0.14),
-            (0.70, 0.0),
-        )
-    ]
-    spots += [(sx + dx, sy - 0.70, 0.14) for dx in (-0.28, -0.12, 0.05, 0.3)]
-    spots += [
-        (ROCK_ISLANDS[1][0] + dx, ROCK_ISLANDS[1][1] + dy, 0.0)
-        for dx, dy in ((0.55, -0.42), (0.68, -0.28), (0.42, -0.58))
-    ]
-    floating = [(-3.95, 0.2), (-4.3, 1.25), (-4.75, -0.35), (-5.2, 0.75), (-5.9, 1.6)]
-    spots += [(px, py, WATER_LEVEL - 0.01) for px, py in floating]
-    cup = plain("Candle cup", (0.10, 0.03, 0.02), Roughness=0.35)
-    cup_mesh = mesh(
-        "Candle cup",
-        lathe(
-            [
-                (0.03, -0.015),
-                (0.075, 0.0),
-                (0.095, 0.035),
-                (0.09, 0.035),
-                (0.07, 0.012),
-                (0.0, 0.01),
-            ],
-            recipe.steps(28, 8),
-        ),
-        cup,
-    )
-    for i, (x, y, base) in enumerate(spots):
+    wax, flame = candle_parts(recipe)
+    wick = plain("Wick", (0.01, 0.01, 0.01))
+    wax_mesh = mesh("Candle", wax, wax_material(), wick, smooth=0.7)
+    flame_mesh = mesh("Candle flame", flame, candle_flame_material())
+    rim = [(0.03, -0.015), (0.075, 0.0), (0.095, 0.035), (0.09, 0.035), (0.07, 0.012), (0.0, 0.01)]
+    lacquer = plain("Candle cup", (0.10, 0.03, 0.02), Roughness=0.35)
+    cup_mesh = mesh("Candle cup", lathe(rim, recipe.steps(28, 8)), lacquer)
+    for i, (x, y, base) in enumerate(CANDLES):
         on_water = base < 0
         size = random.uniform(0.8, 1.15)
-        tall = 0.35 if on_water else random.uniform(0.5, 1.3)
-        spot = transform((x, y, base), (0, 0, random.uniform(0, TAU)), (size, size, size * tall))
-        place(f"Candle.{i:02d}", wax_mesh, spot)
-        tip = base + 0.2 * size * tall
-        flame_object = place(f"Candle flame.{i:02d}", flame_mesh, transform((x, y, tip - 0.2)))
-        flame_object.visible_diffuse = flame_object.visible_shadow = False
+        tall = size * (0.35 if on_water else random.uniform(0.5, 1.3))
+        turn = (0, 0, random.uniform(0, TAU))
+        place(f"Candle.{i:02d}", wax_mesh, transform((x, y, base), turn, (size, size, tall)))
+        foot = base + 0.2 * (tall - 1.0)
+        burning = place(f"Candle flame.{i:02d}", flame_mesh, transform((x, y, foot)))
+        burning.visible_diffuse = burning.visible_shadow = False
         if on_water:
             place(f"Candle cup.{i:02d}", cup_mesh, transform((x, y, base)))
-    for i, (x, y, z) in enumerate(
-        (
-            (sx - 0.5, sy - 0.95, 0.32),
-            (sx + 0.58, sy - 0.92, 0.32),
-            (-1.3, 2.1, 0.3),
-            (-4.6, 0.5, 0.12),
-        )
-    ):
-        point_light(f"Candle light.{i}", (x, y, z), 3.0, CANDLE_COLOR, 0.03)
+    for i, spot in enumerate(CANDLE_LIGHTS):
+        point_light(f"Candle light.{i}", spot, 3.0, CANDLE_COLOR, 0.03)
 
 
 # --- Water ----------------------------------------------------------------------------------------
 
 
-def pond(recipe: Recipe) -> None:
-    """Clear water over a dark bed: ripples that run with the frames, lily pads, flowers, carp."""
-    random = recipe.random("pond")
+def water_material() -> bpy.types.Material:
+    """Clear water, whose ripples run on with the frames; light passes straight into it."""
     made, graph = material("Water")
-    where = graph.add("ShaderNodeTexCoord").outputs["Object"]
-    drift = graph.add("ShaderNodeMapping", {"Vector": where, "Scale": (1.0, 1.6, 1.0)})
+    drift = graph.add(
+        "ShaderNodeMapping",
+        {"Vector": graph.add("ShaderNodeTexCoord").outputs["Object"], "Scale": (1.0, 1.6, 1.0)},
+    )
     animate(drift.inputs["Location"], "default_value", 0.012, 0)
     ripples = graph.noise(drift, 5.0, 3.0, 0.55, 0.0, 0.0)
     animate(ripples.node.inputs["W"], "default_value", 0.04)
     normal = graph.bump(ripples, 0.045)
-    share = graph.add("ShaderNodeFresnel", {"IOR": 1.33, "Normal": normal})
+    reflected = graph.add("ShaderNodeFresnel", {"IOR": 1.33, "Normal": normal})
     clear = graph.add("ShaderNodeBsdfTransparent", {"Color": (0.62, 0.74, 0.66)})
     shine = graph.add(
         "ShaderNodeBsdfAnisotropic", {"Color": (1.0, 1.0, 1.0), "Roughness": 0.02, "Normal": normal}
     )
-    finish(made, graph, graph.add("ShaderNodeMixShader", {0: share, 1: clear, 2: shine}))
-    angle = np.linspace(0, TAU, recipe.steps(120, 16), endpoint=False)
-    shore = pond_shore(angle)
-    share_of = np.linspace(1.0, 0.02, recipe.steps(12, 3))[:, None, None]
-    rim = POND_CENTER + share_of * (shore - POND_CENTER)
-    add("Water", sheet(np.dstack([rim, np.full(rim.shape[:2], WATER_LEVEL)]), closed=True), made)
+    return finish(made, graph, graph.add("ShaderNodeMixShader", {0: reflected, 1: clear, 2: shine}))
 
-    pad = leaf_material("Lily pad", (0.035, 0.09, 0.02), (0.09, 0.17, 0.035), 0.1)
-    around = np.linspace(0.16, TAU - 0.16, recipe.steps(40, 8))
-    disc = np.array([0.05, 0.6, 0.97, 1.0])[:, None, None] * np.stack(
-        [np.cos(around), np.sin(around)], axis=-1
-    )
-    rows = np.dstack(
-        [disc, np.broadcast_to(np.array([0.0, 0.002, 0.006, 0.03])[:, None], disc.shape[:2])]
-    )
-    pads = mesh("Lily pad", sheet(rows[::-1]), pad)
-    corners = (*(POND_CENTER - 3.2), *(POND_CENTER + 3.2))
-    spots = spread(
-        random,
-        34,
-        corners,
-        0.30,
-        lambda x, y: (
-            (pond_distance(x, y) < -0.45)
-            & (noise(np.stack([x, y, 0 * x], axis=-1) / 1.3, 91) > 0.02)
-        ),
-    )
-    scatter(
-        "Lily pad",
-        [pads],
-        [
-            transform(
-                (x, y, WATER_LEVEL + 0.008),
-                (0, 0, random.uniform(0, TAU)),
-                random.uniform(0.10, 0.19),
-            )
-            for x, y in spots
-        ],
-    )
-    bloom = mesh(
-        "Water lily",
-        lily(recipe),
-        leaf_material("Lily petal", (0.72, 0.30, 0.42), (0.85, 0.62, 0.68), 0.3),
-    )
-    scatter(
-        "Water lily",
-        [bloom],
-        [
-            transform(
-                (x + 0.1, y, WATER_LEVEL + 0.015),
-                (0, 0, random.uniform(0, TAU)),
-                random.uniform(0.8, 1.2),
-            )
-            for x, y in spots[::6]
-        ],
-    )
+
+def pond(recipe: Recipe) -> None:
+    """Water over a dark bed, with lily pads, carp, and iris on its shore."""
+    angle = np.linspace(0, TAU, recipe.steps(120, 16), endpoint=False)
+    inwards = np.linspace(1.0, 0.02, recipe.steps(12, 3))[:, None, None]
+    rings = POND_CENTER + inwards * (pond_shore(angle) - POND_CENTER)
+    surface = np.dstack([rings, np.full(rings.shape[:2], WATER_LEVEL)])
+    add("Water", sheet(surface, closed=True), water_material())
+    water_lilies(recipe)
     carp(recipe)
     iris(recipe)
+
+
+def water_lilies(recipe: Recipe) -> None:
+    """Drifts of lily pads, some in flower."""
+    random = recipe.random("pond")
+    angle = np.linspace(0.16, TAU - 0.16, recipe.steps(40, 8))
+    reach, rise = np.array([(1.0, 0.03), (0.97, 0.006), (0.6, 0.002), (0.05, 0.0)]).T[:, :, None]
+    disc = np.dstack([reach * np.cos(angle), reach * np.sin(angle), rise + 0 * angle])
+    green = leaf_material("Lily pad", (0.035, 0.09, 0.02), (0.09, 0.17, 0.035), 0.1)
+    pink = leaf_material("Lily petal", (0.72, 0.30, 0.42), (0.85, 0.62, 0.68), 0.3)
+
+    def allowed(x: Array, y: Array) -> Array:
+        drifts = noise(np.stack([x, y, 0 * x], axis=-1) / 1.3, 91) > 0.02
+        return drifts & (pond_distance(x, y) < -0.45)
+
+    def afloat(x: float, y: float, scale: tuple[float, float]) -> Matrix:
+        turn = (0, 0, random.uniform(0, TAU))
+        return transform((x, y, WATER_LEVEL + 0.008), turn, random.uniform(*scale))
+
+    spots = spread(random, 34, (*(POND_CENTER - 3.2), *(POND_CENTER + 3.2)), 0.30, allowed)
+    pads = [afloat(x, y, (0.10, 0.19)) for x, y in spots]
+    blooms = [afloat(x + 0.1, y, (0.8, 1.2)) for x, y in spots[::6]]
+    scatter("Lily pad", [mesh("Lily pad", sheet(disc), green)], pads)
+    scatter("Water lily", [mesh("Water lily", lily(recipe), pink)], blooms)
 
 
 def pond_shore(angle: Array) -> Array:
@@ -1406,13 +1365,13 @@ def bamboo_culm(recipe: Recipe, number: int) -> Shape:
             t = np.linspace(0, 1, 5)[:, None]
             twig = middle(z) + length * (t * out - t**2 * (0, 0, 0.45))
             parts.append(tube(twig, np.linspace(0.005, 0.001, 5), 3, capped=False))
-            for _ in range(recipe.copies(9, 2)):
+            for _ in range(recipe.copies(7, 2)):
                 where = random.uniform(0.25, 1.0)
                 spot = middle(z) + length * (where * out - where**2 * np.array([0, 0, 0.45]))
                 leaf_at.append(spot)
                 leaf_to.append(out * 0.6 + random.normal(0, 0.55, 3) - (0, 0, 0.35))
     facing = frames(np.array(leaf_to), random.normal((0, 0, 1), 0.5, (len(leaf_to), 3)))
-    size = random.uniform(0.13, 0.24, (len(leaf_to), 1, 1))
+    size = random.uniform(0.15, 0.27, (len(leaf_to), 1, 1))
     return join([*parts, copies(bamboo_leaf(), facing * size, np.array(leaf_at)).painted(1)])
 
 
@@ -1421,7 +1380,7 @@ def bamboo(recipe: Recipe) -> None:
     random = recipe.random("bamboo")
     meshes = bamboo_meshes(recipe, 5)
     places = []
-    for corners, count in zip(GROVES, (60, 42), strict=True):
+    for corners, count in zip(GROVES, (44, 32), strict=True):
         spots = spread(
             random,
             count,
@@ -1567,7 +1526,7 @@ def maple(recipe: Recipe) -> None:
     )
     wood, twigs, directions = branches(random, growth, recipe.detail)
     leaf = leaves_on(
-        random, twigs, directions, maple_leaf(), recipe.copies(40, 3), (0.055, 0.10), 0.35, 0.07
+        random, twigs, directions, maple_leaf(), recipe.copies(28, 3), (0.065, 0.115), 0.35, 0.08
     )
     red = leaf_material("Maple leaves", (0.30, 0.018, 0.010), (0.62, 0.13, 0.02), 0.5)
     bark = bark_material("Maple bark", (0.16, 0.13, 0.11))
@@ -1660,7 +1619,7 @@ def woods(recipe: Recipe) -> None:
         )
 
     near = spread(random, 40, (-26, -26, 26, 26), 3.4, allowed)
-    far = spread(random, 110, (-75, -75, 75, 75), 4.5, allowed)
+    far = spread(random, 90, (-75, -75, 75, 75), 4.5, allowed)
     order = [0, 1, 0, 1, 0, 2, 0, 1]
     places = standing(random, np.vstack([near, far]), (0.75, 1.35), 0.1, 0.03)
     scatter("Tree", [meshes[k] for k in order], places)
@@ -1790,7 +1749,7 @@ def mountains(recipe: Recipe) -> None:
     ridge = 1 - np.abs(noise(flat / 150.0, 98, 1)) * 2.2
     detail = noise(flat / 60.0, 99, 5)
     sunward = 0.5 + 0.5 * np.cos(a - SUN_AZIMUTH)
-    tall = (95 - 45 * sunward**2) * smoothstep(175, 400, r)
+    tall = (150 - 70 * sunward**2) * smoothstep(175, 400, r)
     height = 2.0 + tall * (0.38 + 0.62 * ridge + 0.30 * detail)
     made, graph = material("Mountain")
     where = graph.coordinates()
@@ -1803,7 +1762,7 @@ def mountains(recipe: Recipe) -> None:
     )
     color = graph.mix(graph.span(steep, 0.0, 1.0, 0.75, 1.0), (0.16, 0.16, 0.17), wood)
     high = graph.math("ADD", graph.xyz(where)["Z"], graph.math("MULTIPLY", forest, 30.0))
-    color = graph.mix(graph.span(high, 0.0, 1.0, 92.0, 104.0), color, (0.75, 0.78, 0.82))
+    color = graph.mix(graph.span(high, 0.0, 1.0, 132.0, 146.0), color, (0.75, 0.78, 0.82))
     finish(made, graph, graph.add("ShaderNodeBsdfDiffuse", {"Color": color}))
     add("Mountains", sheet(np.stack([x, y, height], axis=-1)[::-1], closed=True), made)
 
@@ -1819,6 +1778,17 @@ def fog(recipe: Recipe) -> None:
     )
     glow = graph.add("ShaderNodeEmission", {"Color": FOG_COLOR, "Strength": FOG_DENSITY})
     finish(made, graph, volume=graph.add("ShaderNodeAddShader", {0: veil, 1: glow}))
-    profile = [(85.0, -2.0), (165.0, -2.0), (165.0, 21.0), (85.0, 17.0), (85.0, -2.0)]
-    ring = add("Fog", lathe(profile, recipe.steps(96, 24), capped=False), made, smooth=False)
-    ring.visible_diffuse = ring.visible_shadow = False
+    # Arcs, none of whose bounding boxes holds the viewer: in the box of a whole ring, each camera
+    # ray would first be asked whether it starts in the fog.
+    arc = np.linspace(0, TAU / FOG_ARCS, recipe.steps(12))
+    corners = np.array([(85.0, 17.0), (165.0, 21.0), (165.0, -2.0), (85.0, -2.0)])
+    rows = np.empty((len(arc), 4, 3))
+    rows[..., :2] = np.stack([np.cos(arc), np.sin(arc)], axis=-1)[:, None] * corners[:, :1]
+    rows[..., 2] = corners[:, 1]
+    body = sheet(rows, closed=True)
+    last = len(body.vertices)
+    ends = np.array([(3, 2, 1, 0), (last - 4, last - 3, last - 2, last - 1)], dtype=np.int32)
+    data = mesh("Fog", Shape(body.vertices, np.concatenate([body.quads, ends])), made, smooth=False)
+    for k in range(FOG_ARCS):
+        bank = place(f"Fog.{k}", data, transform(rotation=(0, 0, k * TAU / FOG_ARCS)))
+        bank.visible_diffuse = bank.visible_shadow = False
