@@ -14,6 +14,7 @@ include: "rules/validate.smk"
 include: "rules/report.smk"
 include: "rules/package.smk"
 include: "rules/plan.smk"
+include: "rules/benchmark.smk"
 
 
 rule all:

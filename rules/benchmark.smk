@@ -1,0 +1,49 @@
+# Measurements that anybody can repeat; asked for by name, no part of a dataset.
+
+MEASURED = f"{RESULTS}/benchmarks"
+
+
+rule reprojection_benchmark:
+    output:
+        multiext(f"{MEASURED}/reprojection", ".csv", ".svg", ".png"),
+    log:
+        f"{WORK}/logs/reprojection_benchmark.log",
+    conda:
+        ENVIRONMENT
+    # Alone on the machine, so that nothing else is in the figures.
+    threads: workflow.cores or 1
+    params:
+        folder=lambda wildcards, output: str(Path(output[0]).parent),
+    message:
+        "Measuring the error of reprojection against its run time"
+    shell:
+        "python benchmarks/reprojection.py {params.folder} --batch 8 2>&1 | tee {log}"
+
+
+rule stability:
+    output:
+        multiext(f"{MEASURED}/stability", ".csv", ".md", ".svg", ".png"),
+    log:
+        f"{WORK}/logs/stability.log",
+    conda:
+        ENVIRONMENT
+    params:
+        folder=lambda wildcards, output: str(Path(output[0]).parent),
+    message:
+        "Taking every pair of lenses to its extremes"
+    shell:
+        "python scripts/stability.py --output {params.folder} 2>&1 | tee {log}"
+
+
+rule render_overhead:
+    output:
+        f"{MEASURED}/render_overhead.md",
+    log:
+        f"{WORK}/logs/render_overhead.log",
+    conda:
+        ENVIRONMENT
+    threads: workflow.cores or 1
+    message:
+        "Measuring what the workflow adds to Cycles' own render time"
+    shell:
+        "python benchmarks/render_overhead.py 2> {log} | tee {output}"
