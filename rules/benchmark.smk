@@ -11,7 +11,7 @@ rule reprojection_benchmark:
     conda:
         ENVIRONMENT
     # Alone on the machine, so that nothing else is in the figures.
-    threads: workflow.cores or 1
+    threads: lambda wildcards: workflow.cores
     params:
         folder=lambda wildcards, output: str(Path(output[0]).parent),
     message:
@@ -42,7 +42,7 @@ rule render_overhead:
         f"{WORK}/logs/render_overhead.log",
     conda:
         ENVIRONMENT
-    threads: workflow.cores or 1
+    threads: lambda wildcards: workflow.cores
     message:
         "Measuring what the workflow adds to Cycles' own render time"
     shell:
