@@ -56,7 +56,9 @@ def main() -> None:
     missing = [
         frame
         for frame in frames
-        if not is_finished(view_path(arguments.output, frame), lightfield, frame)
+        if not images.is_finished(
+            view_path(arguments.output, frame), keys.render_key(lightfield, frame)
+        )
     ]
     if missing:
         render_views(missing, lightfield, arguments, started)
@@ -75,17 +77,6 @@ def parse_slice(text: str) -> slice:
 def view_path(folder: Path, frame: Mapping[str, Any]) -> Path:
     """Return the path of a view's EXR in the folder of the views."""
     return folder / f"{frame['name']}.exr"
-
-
-def is_finished(path: Path, lightfield: Mapping[str, Any], frame: Mapping[str, Any]) -> bool:
-    """Tell whether a view's file is whole and has the pixels that its settings give."""
-    if not path.exists():
-        return False
-    try:
-        image = images.read_image(path)
-    except UserError:
-        return False
-    return image.attributes.get(images.KEY_ATTRIBUTE) == keys.render_key(lightfield, frame)
 
 
 def render_views(

@@ -26,8 +26,8 @@ from lightfield.files import sha256, write_json
 from lightfield.images import (
     DEPTH_ATTRIBUTE,
     KEY_ATTRIBUTE,
+    is_finished,
     read_attributes,
-    read_image,
     write_exr,
     write_png,
 )
@@ -294,7 +294,7 @@ def reproject_view(job: Job, view: View) -> list[Path]:
             continue
         identity = identity or _identity(view)
         key = job.key(target, identity)
-        if not all(_up_to_date(path, key) for path in outputs.values()):
+        if not all(is_finished(path, key) for path in outputs.values()):
             todo.append((index, target, outputs, key))
     if todo:
         source = _Source(job, view, [job.maps[index].window for index, *_ in todo])
@@ -310,14 +310,6 @@ def _identity(view: View) -> str:
         key = read_attributes(path).get(KEY_ATTRIBUTE) if path.suffix.lower() == ".exr" else None
         parts.append(str(key or sha256(path)))
     return " ".join(parts)
-
-
-def _up_to_date(path: Path, key: str) -> bool:
-    """Whether a file is whole and was made from the same source with the same settings."""
-    try:
-        return path.exists() and read_image(path).attributes.get(KEY_ATTRIBUTE) == key
-    except UserError:
-        return False
 
 
 class _Source:

@@ -80,6 +80,14 @@ def read_image(path: Path | str, channels: Sequence[str] | None = None) -> Image
     return Image(found, attributes)
 
 
+def is_finished(path: Path, key: str) -> bool:
+    """Tell whether a file is there, whole, and made by the settings that ``key`` stands for."""
+    try:
+        return path.exists() and read_image(path).attributes.get(KEY_ATTRIBUTE) == key
+    except UserError:
+        return False
+
+
 def write_exr(
     path: Path | str,
     channels: Mapping[str, np.ndarray[Any, Any]],
