@@ -6,14 +6,13 @@ detail a pixel, and compress worse.
 """
 
 import argparse
-import json
 import math
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-from lightfield import lenses
+from lightfield import journal, lenses
 from lightfield.cli import run
 from lightfield.errors import UserError
 from lightfield.files import read_json, write_json
@@ -56,10 +55,11 @@ def main() -> None:
         )
         if result.returncode:
             raise UserError(f"{arguments.lightfield}: its probe could not be rendered")
-        started, _, *rendered = map(json.loads, (folder / "journal.jsonl").read_text().splitlines())
+        run = journal.read(folder / "journal.jsonl")[0]
+        rendered = run.views[1:]
         sizes = [(folder / "exr" / f"{view['view']}.exr").stat().st_size for view in rendered]
     # On a processor the time that it worked, whatever else it did meanwhile.
-    busy = "cpu_seconds" if started["device"] == "CPU" else "render_seconds"
+    busy = "cpu_seconds" if run.start["device"] == "CPU" else "render_seconds"
     factor = width * height / math.prod(small)
     write_json(
         arguments.output,
@@ -67,7 +67,7 @@ def main() -> None:
             "views": len(frames),
             "resolution": [width, height],
             "samples": lightfield["render"]["samples"],
-            "device": started["device"],
+            "device": run.start["device"],
             "view_seconds": [view[busy] * factor for view in rendered],
             "view_bytes": [size * factor for size in sizes],
         },

@@ -6,7 +6,6 @@ only what is missing. Its journal, one JSON line a rendered view, tells what was
 """
 
 import argparse
-import json
 import os
 import time
 from collections.abc import Mapping
@@ -20,11 +19,11 @@ from lightfield import depth, images, keys, lenses
 from lightfield.cli import run
 from lightfield.errors import UserError
 from lightfield.files import read_json, sha256, write_json
+from lightfield.journal import Journal
 from lightfield.progress import Progress
 
 
 def main() -> None:
-    started = time.perf_counter()
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--blend", required=True, type=Path, help="the scene")
     parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
@@ -51,6 +50,7 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=0, help="CPU threads (default: all cores)")
     arguments = parser.parse_args()
 
+    journal = Journal(arguments.journal)
     lightfield = read_json(arguments.lightfield)
     frames = lightfield["frames"][parse_slice(arguments.views)]
     missing = [
@@ -60,10 +60,14 @@ def main() -> None:
             view_path(arguments.output, frame), keys.render_key(lightfield, frame)
         )
     ]
+    # The dataset's folder says which scene and rig it is, and in a sequence which frame.
+    label = f"render {arguments.output.parent} {arguments.views}"
+    progress = Progress(len(missing), label, already=len(frames) - len(missing))
     if missing:
-        render_views(missing, lightfield, arguments, started)
+        render_views(missing, lightfield, arguments, journal, progress)
     if arguments.record:
         write_json(arguments.record, record([view_path(arguments.output, f) for f in frames]))
+    journal.end()
 
 
 def parse_slice(text: str) -> slice:
@@ -83,7 +87,8 @@ def render_views(
     frames: list[Mapping[str, Any]],
     lightfield: Mapping[str, Any],
     arguments: argparse.Namespace,
-    started: float,
+    journal: Journal,
+    progress: Progress,
 ) -> None:
     """Open the scene once and render ``frames`` one after the other."""
     # Only now, because it takes a second and a shard that is finished does not need it.
@@ -97,13 +102,17 @@ def render_views(
     device = blender.set_up_render(lightfield["render"], lightfield, arguments.device, threads)
     blender.leave_out(inventory["left_out"])
     to_depth = depth_factors(lightfield)
-    append(
-        arguments.journal,
-        {"start_up_seconds": time.perf_counter() - started, "device": device},
+    journal.append(
+        {
+            "start_up_seconds": round(time.time() - journal.started, 4),
+            "start_up_cpu_seconds": round(time.process_time(), 4),
+            "device": device,
+            "threads": threads,
+        }
     )
 
     process = psutil.Process()
-    progress = Progress(len(frames), f"render {arguments.output.parent.name} {arguments.views}")
+    progress.begin()
     for frame in frames:
         began, began_cpu = time.perf_counter(), time.process_time()
         seed = keys.view_seed(lightfield["render"]["seed"], frame["name"])
@@ -111,10 +120,10 @@ def render_views(
         channels, attributes = view_channels(raw, lightfield, to_depth)
         attributes[images.KEY_ATTRIBUTE] = keys.render_key(lightfield, frame)
         images.write_exr(view_path(arguments.output, frame), channels, attributes)
-        append(
-            arguments.journal,
+        journal.append(
             {
                 "view": frame["name"],
+                "finished": round(time.time(), 3),
                 "wall_seconds": round(time.perf_counter() - began, 4),
                 "cpu_seconds": round(time.process_time() - began_cpu, 4),
                 "render_seconds": raw.render_seconds,
@@ -167,14 +176,6 @@ def view_channels(
             channels["Z"] = z.astype(np.float16 if half else np.float32)
         attributes[images.DEPTH_ATTRIBUTE] = lightfield["depth"]
     return channels, attributes
-
-
-def append(journal: Path | None, entry: Mapping[str, Any]) -> None:
-    """Add one line to the journal, at once."""
-    if journal:
-        journal.parent.mkdir(parents=True, exist_ok=True)
-        with journal.open("a") as file:
-            file.write(json.dumps(entry) + "\n")
 
 
 def record(paths: list[Path]) -> dict[str, Any]:

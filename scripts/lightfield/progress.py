@@ -15,32 +15,47 @@ def duration(seconds: float) -> str:
 
 
 class Progress:
-    """Counts finished pieces of work and prints a line at most every ``interval`` seconds.
+    """Counts finished pieces of work and prints a line from time to time, the first at once.
 
-    Whole lines, never carriage returns, so that several shards can share one log.
+    Whole lines, never carriage returns, so that several shards can share one log. The lines come
+    every ``interval`` seconds, and more rarely, down to one a minute, the longer the work takes.
+    ``already`` pieces were finished before; ``total`` are to do.
     """
 
-    def __init__(self, total: int, label: str, unit: str = "views", interval: float = 5.0) -> None:
+    def __init__(
+        self,
+        total: int,
+        label: str,
+        unit: str = "views",
+        interval: float = 5.0,
+        already: int = 0,
+    ) -> None:
         self.total = total
         self.label = label
         self.unit = unit
         self.interval = interval
         self.count = 0
+        self._print(f"{total} {unit} to do" + (f", {already} already done" if already else ""))
+        self.begin()
+
+    def begin(self) -> None:
+        """Take the time from now on; called again after preparations that are no such work."""
         self.started = self.printed = time.monotonic()
 
     def done(self, count: int = 1) -> None:
         """Count ``count`` more pieces as finished."""
         self.count += count
         now = time.monotonic()
-        if now - self.printed < self.interval and self.count < self.total:
+        elapsed = now - self.started
+        interval = max(self.interval, min(elapsed / 20, 60))
+        if now - self.printed < interval and self.count < self.total:
             return
         self.printed = now
-        elapsed = now - self.started
         left = elapsed / self.count * (self.total - self.count)
-        print(
-            f"{self.label}: {self.count} of {self.total} {self.unit}, "
-            f"{elapsed / self.count:.3g} s each, "
-            + (f"{duration(left)} left" if left else f"done in {duration(elapsed)}"),
-            file=sys.stderr,
-            flush=True,
+        self._print(
+            f"{self.count} of {self.total} {self.unit}, {elapsed / self.count:.3g} s each, "
+            + (f"{duration(left)} left" if left else f"done in {duration(elapsed)}")
         )
+
+    def _print(self, text: str) -> None:
+        print(f"{self.label}: {text}", file=sys.stderr, flush=True)

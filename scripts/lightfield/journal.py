@@ -1,0 +1,129 @@
+"""Journals: what a shard's processes did and how fast, one JSON line each, kept through kills.
+
+Every process that works on a shard appends to the shard's journal, so that it tells all the time
+that was really spent. Times of day are seconds since 1970. A process's lines are in this order:
+
+- ``started``, ``host``, ``pid``: when and where it began;
+- ``start_up_seconds``, ``start_up_cpu_seconds``, ``device``, ``threads``: the scene is open;
+- for each image ``view``, ``finished``, ``wall_seconds``, ``cpu_seconds`` and, of a rendered view,
+  Cycles' own ``render_seconds`` and ``synchronization_seconds``, and ``memory_bytes``;
+- ``ended``, ``wall_seconds``, ``cpu_seconds``, ``peak_memory_bytes``: of the whole process. A
+  process that was killed lacks this line.
+"""
+
+import json
+import os
+import resource
+import socket
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+
+class Journal:
+    """Appends the lines of this process to a journal; with ``path`` None it writes nothing."""
+
+    def __init__(self, path: Path | None) -> None:
+        self.path = path
+        # Until here Python read its modules, which takes hardly longer than its processor time.
+        self.started = round(time.time() - time.process_time(), 3)
+        self.append({"started": self.started, "host": socket.gethostname(), "pid": os.getpid()})
+
+    def append(self, entry: Mapping[str, Any]) -> None:
+        """Add one line, at once."""
+        if self.path:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with self.path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(entry) + "\n")
+
+    def end(self) -> None:
+        """Add the line of a process that has done all its work."""
+        now = time.time()
+        # In KiB, but for macOS.
+        unit = 1 if sys.platform == "darwin" else 1024
+        self.append(
+            {
+                "ended": round(now, 3),
+                "wall_seconds": round(now - self.started, 4),
+                "cpu_seconds": round(time.process_time(), 4),
+                "peak_memory_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit,
+            }
+        )
+
+
+@dataclass
+class Run:
+    """One process's part of a journal: its first lines, its images, and whether it ended."""
+
+    start: dict[str, Any]
+    views: list[dict[str, Any]] = field(default_factory=list)
+    end: dict[str, Any] | None = None
+
+    @property
+    def last_heard(self) -> float:
+        """When it last wrote, in seconds since 1970."""
+        if self.end:
+            return float(self.end["ended"])
+        if self.views:
+            return float(self.views[-1]["finished"])
+        return float(self.start["started"]) + float(self.start.get("start_up_seconds", 0))
+
+    @property
+    def wall_seconds(self) -> float:
+        """How long it is known to have worked; what a killed one had begun last is not known."""
+        return self.last_heard - float(self.start["started"])
+
+    @property
+    def cpu_seconds(self) -> float:
+        """Processor time of the same."""
+        if self.end:
+            return float(self.end["cpu_seconds"])
+        begun = float(self.start.get("start_up_cpu_seconds", 0))
+        return begun + sum(float(view["cpu_seconds"]) for view in self.views)
+
+    @property
+    def peak_memory_bytes(self) -> int:
+        """Most memory that it is known to have had."""
+        if self.end:
+            return int(self.end["peak_memory_bytes"])
+        return max((view.get("memory_bytes", 0) for view in self.views), default=0)
+
+    def is_running(self) -> bool | None:
+        """Whether it is at work now; None if that cannot be seen, being on another machine."""
+        if self.end:
+            return False
+        if self.start["host"] != socket.gethostname():
+            return None
+        try:
+            # Another process may have got its number since; these times are good to 1 s or so.
+            begun = psutil.Process(self.start["pid"]).create_time()
+            return bool(begun < self.start["started"] + 2)
+        except psutil.NoSuchProcess:
+            return False
+
+
+def read(path: Path) -> list[Run]:
+    """Return the runs that a journal tells of, in their order.
+
+    A line that a kill cut short is left out.
+    """
+    runs: list[Run] = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        try:
+            entry = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        if "started" in entry:
+            runs.append(Run(entry))
+        elif "start_up_seconds" in entry:
+            runs[-1].start |= entry
+        elif "ended" in entry:
+            runs[-1].end = entry
+        else:
+            runs[-1].views.append(entry)
+    return runs
