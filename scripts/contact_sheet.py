@@ -12,8 +12,6 @@ from lightfield import images, pictures
 from lightfield.cli import run
 from lightfield.files import read_json
 
-# More views than this are thinned evenly, so that each can still be recognised.
-MOST_VIEWS = 120
 SHEET_WIDTH = 1600
 GAP = 4
 CAPTION = 14
@@ -32,7 +30,7 @@ def main() -> None:
 
     lightfield = read_json(arguments.lightfield)
     names = [frame["name"] for frame in lightfield["frames"]]
-    step = math.ceil(len(names) / MOST_VIEWS)
+    step = math.ceil(len(names) / pictures.MOST_VIEWS)
     images.write_png(
         arguments.output, sheet(arguments.views, names[::step], *lightfield["resolution"])
     )

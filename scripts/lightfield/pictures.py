@@ -15,6 +15,8 @@ Array = np.ndarray[Any, Any]
 MIDDLE_GREY = 0.18
 # The brightest value that still shows as less than white, in multiples of middle grey's exposure.
 WHITE = 5.0
+# More views than this are thinned evenly, so that each can still be recognised.
+MOST_VIEWS = 120
 
 
 def read_colour(path: Path) -> Array:

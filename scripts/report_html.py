@@ -1,0 +1,159 @@
+"""Make a dataset's page: one file that shows what it looks like, how good it is, what it cost.
+
+Everything is in the file, pictures too, so that it can be read without a network, kept and sent.
+What is not there (measurements that were not asked for, depth, costs) is told, and is no error.
+"""
+
+import argparse
+import json
+import math
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from lightfield import page, report_tables, report_views
+from lightfield.cli import run
+from lightfield.errors import UserError
+from lightfield.files import read_json
+from lightfield.validation import IMAGES, REPORT
+
+LENSES = {
+    "FISHEYE_EQUIDISTANT": "equidistant fisheye",
+    "FISHEYE_EQUISOLID": "equisolid fisheye",
+    "FISHEYE_LENS_POLYNOMIAL": "polynomial fisheye",
+    "EQUIRECTANGULAR": "equirectangular panorama",
+    "PERSP": "rectilinear",
+}
+PICTURES = ("panorama", "contact_sheet")
+PLOTS = ("rig", "depth_panorama", "noise")
+WIDEST = 1600
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--dataset", required=True, type=Path, help="folder of the dataset")
+    parser.add_argument("--name", required=True, help="how it is called: scene/rig")
+    parser.add_argument("--rig", required=True, type=json.loads, help="the scene YAML's rig, JSON")
+    parser.add_argument(
+        "--measurements",
+        type=Path,
+        nargs="*",
+        default=[],
+        help="files that the measurements wrote: .csv, .json, and plots .svg or .png",
+    )
+    parser.add_argument("--output", required=True, type=Path, help="HTML file to write")
+    arguments = parser.parse_args()
+
+    folder: Path = arguments.dataset
+    path = folder / "lightfield.json"
+    lightfield = read_json(path)
+    try:
+        camera, frames = lightfield["camera"], lightfield["frames"]
+        name = str(lightfield["scene"]["name"])
+    except (LookupError, TypeError) as error:
+        raise UserError(f"{path}: is not what scripts/make_lightfield.py writes: {error}") from None
+    looks = report_views.collect(folder / IMAGES, lightfield, arguments.rig)
+    report = folder / REPORT
+    measured = {
+        "reprojection": report_tables.reprojection(arguments.measurements),
+        "stability": report_tables.stability(arguments.measurements),
+        "error_vs_time": report_tables.error_vs_time(arguments.measurements, name),
+    }
+    page.write(
+        arguments.output,
+        "page.html.j2",
+        name=arguments.name,
+        home="../" * (arguments.name.count("/") + 2) + "index.html",
+        facts=facts(folder, lightfield, arguments.rig, lens_text(camera)),
+        views=len(frames),
+        pictures={stem: page.photo(report / f"{stem}.png", WIDEST) for stem in PICTURES},
+        plots={stem: page.plot(report / stem) for stem in PLOTS},
+        looks=looks,
+        render=lightfield.get("render", {}),
+        validation=report_tables.validation(folder / "validation.json"),
+        measured=measured,
+        costs=report_tables.costs(report / "costs.json"),
+        files=files(folder, lightfield),
+        transforms=sorted(
+            path.relative_to(folder).as_posix() for path in folder.glob("**/transforms.json")
+        ),
+        scene=name,
+    )
+
+
+def lens_text(camera: Mapping[str, Any]) -> str:
+    """Return a lens in words: its projection and field of view."""
+    kind = camera.get("panorama_type") if camera.get("type") == "PANO" else camera.get("type")
+    text = LENSES.get(str(kind), str(kind).replace("_", " ").lower())
+    if "fisheye_fov" in camera:
+        return f"{text}, {math.degrees(camera['fisheye_fov']):.4g}°"
+    if "focal_length" in camera:
+        return f"{text}, {camera['focal_length']:.4g} mm"
+    return text
+
+
+def facts(
+    folder: Path, lightfield: Mapping[str, Any], rig: Mapping[str, Any], lens: str
+) -> list[tuple[str, str]]:
+    """Return what one wants to know first of a dataset, each with its title."""
+    width, height = lightfield["resolution"]
+    render = lightfield.get("render", {})
+    samples = f"{render.get('samples', '–')} a pixel"
+    if render.get("adaptive_threshold"):
+        samples = f"up to {samples}, adaptive"
+    if render.get("denoise"):
+        samples += ", denoised"
+    depth = {"z": "Z-depth, metres", "distance": "distance, metres"}
+    size = sum(path.stat().st_size for path in (folder / IMAGES).glob("*.exr"))
+    return [
+        ("Views", str(len(lightfield["frames"]))),
+        ("Rig", rig_text(rig)),
+        ("Lens", lens),
+        ("Resolution", f"{width} × {height}"),
+        ("Samples", samples),
+        ("Depth", depth.get(lightfield.get("depth") or "", "none")),
+        ("Size of the views", page.bytes_(size)),
+        ("Rendered by", f"Cycles in bpy {version('bpy')}"),
+    ]
+
+
+def rig_text(rig: Mapping[str, Any]) -> str:
+    """Return a rig in words: its type, its cameras along each axis, and its size."""
+    kind = str(rig.get("type", "rig"))
+    if "cameras" in rig:
+        kind += " " + " × ".join(str(count) for count in rig["cameras"])
+    if "size" not in rig:
+        return kind
+    size = rig["size"]
+    if isinstance(size, int | float):
+        return f"{kind}, {'⌀ ' if rig.get('type') in ('sphere', 'cylinder') else ''}{size:g} m"
+    return f"{kind}, {' × '.join(f'{side:g}' for side in size)} m"
+
+
+def files(folder: Path, lightfield: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return the dataset's files and what each is."""
+    depth = {
+        "z": ", and Z: metres along the optical axis",
+        "distance": ", and Z: metres from the camera",
+    }.get(lightfield.get("depth") or "", "")
+    if depth:
+        depth += "; inf where a ray hit nothing"
+    first = lightfield["frames"][0]["name"] if lightfield["frames"] else "view"
+    found = [
+        (f"{IMAGES}/{first}.exr …", f"the views: scene-linear Rec. 709 R, G, B as half{depth}"),
+        ("lightfield.json", "the lens once; position, rotation, and world_matrix of each view"),
+    ]
+    for inner in sorted(folder.glob("*/lightfield.json")):
+        name = inner.parent.name
+        lens = lens_text(read_json(inner).get("camera", {}))
+        found.append((f"{name}/", f"the same views through another lens ({lens}), as SILVR's"))
+    return [
+        *found,
+        ("validation.json", "what was checked, and what came out"),
+        ("sha256sums.txt", "checksums of all of these: sha256sum -c sha256sums.txt"),
+    ]
+
+
+if __name__ == "__main__":
+    run(main)
