@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from lightfield import config, keys, lenses, rigs
+from lightfield.calibration import calibrated
 from lightfield.cli import run
 from lightfield.errors import UserError
-from lightfield.files import write_json
+from lightfield.files import read_json, write_json
 
 # What of a scene YAML's `scene` block is written down: not where a file came from, nor where it is.
 SOURCE_KEYS = ("builder", "parameters", "frame")
@@ -35,6 +36,11 @@ def main() -> None:
         metavar="WIDTH",
         help="instead of the rig, one equirectangular view from its centre, WIDTH pixels wide",
     )
+    parser.add_argument(
+        "--calibration",
+        type=Path,
+        help="what scripts/calibrate.py chose for the scene's target_error",
+    )
     parser.add_argument("--output", required=True, type=Path, help="lightfield.json to write")
     arguments = parser.parse_args()
 
@@ -46,7 +52,11 @@ def main() -> None:
     cameras = dataset.cameras
     if arguments.panorama:
         cameras = panorama_rig(cameras, arguments.panorama)
-    write_json(arguments.output, content(arguments.scene, dataset, cameras))
+    lightfield = content(arguments.scene, dataset, cameras)
+    if arguments.calibration:
+        record = read_json(arguments.calibration)
+        lightfield["render"] = calibrated(lightfield["render"], record)
+    write_json(arguments.output, lightfield)
 
 
 def content(scene: str, dataset: config.Dataset, cameras: Mapping[str, Any]) -> dict[str, Any]:

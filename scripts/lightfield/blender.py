@@ -6,6 +6,7 @@ scene kept in memory.
 
 import math
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Collection, Iterator, Mapping
@@ -38,11 +39,14 @@ class Raw:
 
     ``colour`` is (height, width, 3), scene-linear; ``depth`` is (height, width) in metres, inf
     where nothing was hit: Z-depth for a perspective camera and distance for any other, or None if
-    it was not asked for. ``render_seconds`` and ``synchronization_seconds`` are Cycles' own.
+    it was not asked for. ``samples`` is (height, width), how many each pixel took, or None unless
+    `count_samples` asked for it. ``render_seconds`` and ``synchronization_seconds`` are Cycles'
+    own.
     """
 
     colour: Array
     depth: Array | None
+    samples: Array | None
     render_seconds: float
     synchronization_seconds: float
 
@@ -82,11 +86,7 @@ def set_up_render(
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
-    cycles.samples = settings["samples"]
-    cycles.use_adaptive_sampling = settings["adaptive_threshold"] > 0
-    cycles.adaptive_threshold = settings["adaptive_threshold"]
-    cycles.use_denoising = settings["denoise"]
-    cycles.denoiser = "OPENIMAGEDENOISE"
+    set_sampling(settings)
     cycles.use_animated_seed = False
     cycles.time_limit = 0
     if "max_bounces" in settings:
@@ -121,6 +121,7 @@ def set_up_render(
     layer.use_pass_combined = True
     layer.use_pass_z = lightfield["depth"] is not None
     layer.cycles.denoising_store_passes = False
+    layer.cycles.pass_debug_sample_count = False
     # Passes of the artist's own, and those of light groups.
     for group in (layer.aovs, layer.lightgroups):
         for entry in list(group):
@@ -130,6 +131,42 @@ def set_up_render(
     _set_camera(scene, lightfield)
     scene.frame_set(lightfield["frame"])
     return str(cycles.device)
+
+
+def set_sampling(settings: Mapping[str, Any]) -> None:
+    """Set how many samples a pixel takes and what is made of them, as ``render`` blocks have it.
+
+    ``guiding`` turns path guiding on or off; without that key it stays as the .blend has it.
+    """
+    cycles = bpy.context.scene.cycles
+    cycles.samples = settings["samples"]
+    cycles.use_adaptive_sampling = settings["adaptive_threshold"] > 0
+    cycles.adaptive_threshold = settings["adaptive_threshold"]
+    cycles.use_denoising = settings["denoise"]
+    cycles.denoiser = "OPENIMAGEDENOISE"
+    # Guided by the surfaces' albedo and normals, which are denoised themselves first.
+    cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
+    cycles.denoising_prefilter = "ACCURATE"
+    cycles.denoising_quality = "HIGH"
+    if "guiding" in settings:
+        cycles.use_guiding = settings["guiding"]
+
+
+def count_samples() -> None:
+    """Let every view that follows say how many samples each of its pixels took."""
+    _first_layer(bpy.context.scene).cycles.pass_debug_sample_count = True
+    bpy.app.handlers.render_stats.append(_note_samples)
+
+
+# Of the view that is being rendered; the pass holds only each pixel's part of these.
+_samples_rendered = 0
+
+
+def _note_samples(text: str, _: Any) -> None:
+    """Keep the count that Cycles tells in its progress: ``… | Sample 80/256``."""
+    global _samples_rendered
+    if told := re.search(r"Sample (\d+)/", text):
+        _samples_rendered = max(_samples_rendered, int(told[1]))
 
 
 def removable_objects() -> list[str]:
@@ -272,6 +309,8 @@ def render_view(world_matrix: Array, seed: int) -> Raw:
     scene = bpy.context.scene
     scene.camera.matrix_world = mathutils.Matrix(np.asarray(world_matrix).tolist())
     scene.cycles.seed = seed
+    global _samples_rendered
+    _samples_rendered = 0
     with tempfile.TemporaryDirectory(prefix="plenoforge-", dir=_fast_folder()) as folder:
         path = Path(folder) / "view.exr"
         scene.render.filepath = str(path)
@@ -283,9 +322,11 @@ def render_view(world_matrix: Array, seed: int) -> Raw:
     if depth is not None:
         depth = np.where(depth >= CYCLES_MISS, np.float32(np.inf), depth)
     colour = np.stack([image.channels[f"{layer}.Combined.{c}"] for c in "RGB"], axis=-1)
+    counts = image.channels.get(f"{layer}.Debug Sample Count.X")
     return Raw(
         colour=colour,
         depth=depth,
+        samples=None if counts is None else np.rint(counts * _samples_rendered),
         render_seconds=_seconds(image.attributes[f"cycles.{layer}.render_time"]),
         synchronization_seconds=_seconds(image.attributes[f"cycles.{layer}.synchronization_time"]),
     )

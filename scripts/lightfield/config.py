@@ -118,9 +118,7 @@ def scene_datasets(scene: str, preset: str, limits: Mapping[str, Any]) -> list[D
     if "blend" in source:
         checksum = blend_sha256(scene)[0]
         source = {**source, **({"sha256": checksum} if checksum else {})}
-    render = dict(settings["render"])
-    render["samples"] = min(render["samples"], limits.get("samples", render["samples"]))
-    render["denoise"] = limits.get("denoise", render["denoise"])
+    render = _limited_render(settings["render"], limits)
     found = []
     for name, rig in settings["rigs"].items():
         cameras = rigs.thin(_located(rig), limits["views"]) if "views" in limits else _located(rig)
@@ -196,12 +194,14 @@ def load_scene(scene: str) -> dict[str, Any]:
 def read_scene(path: Path) -> dict[str, Any]:
     """Read and check the scene YAML at ``path``, as `load_scene` does by name."""
     file = str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else str(path)
-    settings = _validated(read_yaml(path, file), "scene", file)
+    content = read_yaml(path, file)
+    settings = _validated(content, "scene", file)
 
     def fail(key: str, problem: str) -> None:
         raise UserError(f"{file}: {key}: {problem}")
 
     _check_source(settings["scene"], fail)
+    _check_render(content["render"], fail)
     for name, rig in settings["rigs"].items():
         _check_rig(f"rigs.{name}", rig, settings["render"]["depth"], fail)
     for name, reprojection in settings["reprojections"].items():
@@ -258,6 +258,20 @@ def _check_source(source: Mapping[str, Any], fail: _Fail) -> None:
         for name in ("sha256", "url", "page"):
             if name in source:
                 fail(f"scene.{name}", "goes with blend, not with builder")
+
+
+# What a calibration chooses for a target error.
+_CHOSEN = ("samples", "adaptive_threshold", "denoise")
+
+
+def _check_render(render: Mapping[str, Any], fail: _Fail) -> None:
+    """Check a ``render`` block as it was written, before any default is filled in."""
+    if "target_error" in render:
+        for name in _CHOSEN:
+            if name in render:
+                fail(f"render.{name}", "goes without target_error, for which it is chosen")
+    elif "samples" not in render:
+        fail("render", "is missing the key samples (or target_error)")
 
 
 def _check_rig(key: str, rig: Mapping[str, Any], depth: str, fail: _Fail) -> None:
@@ -337,6 +351,23 @@ def _sees_behind(camera: Mapping[str, Any]) -> bool:
 def _located(rig: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return the rig with the path of its poses made independent of the current folder."""
     return {**rig, "file": str(ROOT / rig["file"])} if "file" in rig else rig
+
+
+def _limited_render(render: Mapping[str, Any], limits: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the ``render`` block under a preset's ``limits``.
+
+    With a ``target_error``, samples, threshold and denoising are not known before the calibration;
+    what the preset says of them limits its choice: at most ``most_samples``, and ``denoise``.
+    """
+    if "target_error" not in render:
+        samples = min(render["samples"], limits.get("samples", render["samples"]))
+        return {**render, "samples": samples, "denoise": limits.get("denoise", render["denoise"])}
+    kept = {key: render[key] for key in render if key not in _CHOSEN}
+    if "samples" in limits:
+        kept["most_samples"] = limits["samples"]
+    if "denoise" in limits:
+        kept["denoise"] = limits["denoise"]
+    return kept
 
 
 def _limited(camera: Mapping[str, Any], limits: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,0 +1,338 @@
+"""Measure the error of renders against their time: sampling plain, adaptive, guided, denoised.
+
+Small views of the dataset are rendered in every way and compared with references made of other
+seeds (`lightfield.metrics` says how). What is rendered is kept with its time: killed and started
+again, this goes on where it was. The time is Cycles' own for rendering, denoising included, of one
+render the median over its seeds; it is right only where nothing else runs on the same core.
+
+The slope of a method is that of its error over its time, both in logarithms. Plain path tracing's
+is −1 over samples, but for pixels that Cycles' Sobol sequence integrates faster and for rare bright
+paths, which a small number of samples may miss altogether; over time it is a little steeper, as
+every render also has a fixed cost. Adaptive sampling and denoising are biased: theirs are flatter.
+"""
+
+import argparse
+import csv
+import math
+import statistics
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from lightfield import metrics, plots, trials
+from lightfield.cli import run
+from lightfield.files import atomic_path, read_json, write_json
+from lightfield.progress import Progress
+
+PLAIN, ADAPTIVE, DENOISED = "plain", "adaptive", "denoised"
+BOTH, GUIDED, OWN = "adaptive + denoised", "path guiding", "this scene's settings"
+
+THRESHOLDS = (0.4, 0.2, 0.1, 0.05, 0.02)
+
+# A reference's samples are split among so many seeds, whose differences tell its own error.
+REFERENCE_SEEDS = 8
+
+
+@dataclass(frozen=True)
+class Point:
+    """One way to render, measured: means over views and seeds.
+
+    ``samples`` is the mean number that a pixel took; ``seconds`` are of one core, or of the GPU, a
+    megapixel; ``standard_error`` is that of ``relative_mse``, over views and seeds. ``resolved``
+    says whether the error is above the references' own, below which nothing is drawn or fitted.
+    """
+
+    method: str
+    settings: Mapping[str, Any]
+    samples: float
+    seconds: float
+    relative_mse: float
+    standard_error: float
+    resolved: bool
+    psnr: float
+    ssim: float
+    flip: float
+    depth_error: float | None
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
+    parser.add_argument("--blend", required=True, type=Path, help="the scene")
+    parser.add_argument("--inventory", required=True, type=Path, help="what the scene contains")
+    parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
+    parser.add_argument(
+        "--views",
+        type=int,
+        default=2,
+        help="views to render, and the nearest neighbour of the first (default: 2)",
+    )
+    parser.add_argument("--size", type=int, default=64, help="of their longer side (default: 64)")
+    parser.add_argument(
+        "--octaves", type=int, default=8, help="of sample counts, beginning at 1 (default: 8)"
+    )
+    parser.add_argument(
+        "--reference", type=int, default=2048, help="samples of a reference (default: 2048)"
+    )
+    parser.add_argument("--seeds", type=int, default=2, help="renders of each way (default: 2)")
+    parser.add_argument("--device", default="auto", help="what Cycles renders on (default: auto)")
+    parser.add_argument("--threads", type=int, default=1, help="CPU threads (default: 1)")
+    parser.add_argument("--cache", required=True, type=Path, help="folder of what was rendered")
+    parser.add_argument(
+        "--output", required=True, type=Path, help="stem of the .csv, .json, .svg and .png to write"
+    )
+    arguments = parser.parse_args()
+
+    lightfield = read_json(arguments.lightfield)
+    maker = trials.Trials(
+        arguments.blend,
+        arguments.inventory,
+        lightfield,
+        arguments.size,
+        arguments.device,
+        arguments.threads,
+        arguments.cache,
+    )
+    frames = trials.spread(lightfield["frames"], arguments.views, 0.5)
+    near = trials.neighbour(lightfield["frames"], frames[0])
+    if near:
+        frames = [frames[0], near, *(frame for frame in frames[1:] if frame != near)]
+    progress = Progress(len(frames), f"{arguments.output.name}: references")
+    references = []
+    for frame in frames:
+        references.append(
+            maker.reference(frame, REFERENCE_SEEDS, arguments.reference // REFERENCE_SEEDS)
+        )
+        progress.done()
+
+    seeds = range(1, arguments.seeds + 1)
+    on_cpu = maker.render(frames[0], seeds[0], {"samples": 1}).device == "CPU"
+    ways = all_ways(lightfield["render"], arguments.octaves, guiding=on_cpu)
+    progress = Progress(
+        len(ways) * len(frames) * len(seeds), f"{arguments.output.name}: trials", "renders"
+    )
+    points, pairs = [], []
+    for method, settings in ways:
+        renders = []
+        for frame in frames:
+            renders.append([maker.render(frame, seed, settings) for seed in seeds])
+            progress.done(len(seeds))
+        points.append(measured(method, settings, renders, references))
+        if near and references[0].depth is not None:
+            pairs.append(
+                {
+                    "method": method,
+                    "settings": settings,
+                    **neighbours(maker, frames, references, renders),
+                }
+            )
+
+    content = {
+        "measured_on": {
+            "views": [frame["name"] for frame in frames],
+            "resolution": [maker.lens.width, maker.lens.height],
+            "seeds": len(seeds),
+            "reference_samples": arguments.reference,
+            "device": "CPU" if on_cpu else "GPU",
+            "path_guiding": "measured" if on_cpu else "Cycles has it only on processors",
+        },
+        **evaluated(points, references),
+        "neighbouring_views": pairs,
+    }
+    write_table(arguments.output.with_name(arguments.output.name + ".csv"), points, content)
+    draw(arguments.output, points, content)
+    write_json(arguments.output.with_name(arguments.output.name + ".json"), content)
+
+
+def all_ways(
+    render: Mapping[str, Any], octaves: int, guiding: bool
+) -> list[tuple[str, dict[str, Any]]]:
+    """Return (method, settings) of all that is measured; the scene's own settings come last."""
+    counts = [2**octave for octave in range(octaves + 1)]
+    ways: list[tuple[str, dict[str, Any]]] = []
+    for denoise, by_count, by_threshold in ((False, PLAIN, ADAPTIVE), (True, DENOISED, BOTH)):
+        ways += [(by_count, {"samples": n, "denoise": denoise}) for n in counts]
+        ways += [
+            (by_threshold, {"samples": counts[-1], "adaptive_threshold": t, "denoise": denoise})
+            for t in THRESHOLDS
+        ]
+    # Elsewhere guiding stays as the .blend has it, off unless an artist turned it on.
+    if guiding:
+        ways += [(GUIDED, {"samples": n, "guiding": True}) for n in counts]
+    own = {key: render[key] for key in ("samples", "adaptive_threshold", "denoise")}
+    return [*ways, (OWN, own)]
+
+
+def measured(
+    method: str,
+    settings: Mapping[str, Any],
+    renders: Sequence[Sequence[trials.Trial]],
+    references: Sequence[metrics.Reference],
+) -> Point:
+    """Compare the ``renders`` of one way, by view and seed, with the views' references."""
+    errors = [
+        [metrics.compare(render.colour, render.depth, reference) for render in views]
+        for views, reference in zip(renders, references, strict=True)
+    ]
+    flat = [error for views in errors for error in views]
+    mean = {
+        name: statistics.fmean(getattr(error, name) for error in flat)
+        for name in ("relative_mse", "psnr", "ssim", "flip")
+    }
+    height, width = references[0].mask.shape
+    by_seed = [
+        statistics.fmean(views[seed].relative_mse for views in errors)
+        for seed in range(len(errors[0]))
+    ]
+    spread = statistics.stdev(by_seed) / math.sqrt(len(by_seed)) if len(by_seed) > 1 else 0.0
+    own = statistics.fmean(reference.own_error for reference in references)
+    depths = [error.depth for error in flat if error.depth is not None]
+    return Point(
+        method=method,
+        settings=settings,
+        samples=statistics.fmean(render.samples for views in renders for render in views),
+        seconds=statistics.fmean(
+            statistics.median(render.seconds for render in views) for views in renders
+        )
+        * 1e6
+        / (width * height),
+        **mean,
+        standard_error=spread,
+        resolved=mean["relative_mse"] > own,
+        depth_error=statistics.fmean(depths) if depths else None,
+    )
+
+
+def evaluated(points: Sequence[Point], references: Sequence[metrics.Reference]) -> dict[str, Any]:
+    """Return what follows from the points: slopes, the Pareto front, and what each way saves."""
+    seen = [point for point in points if point.resolved]
+    slopes: dict[str, Any] = {}
+    plain = None
+    for method in dict.fromkeys(point.method for point in points):
+        own = [point for point in seen if point.method == method]
+        error = [point.relative_mse for point in own]
+        by_time = metrics.fit([point.seconds for point in own], error)
+        by_samples = metrics.fit([point.samples for point in own], error)
+        if by_time and by_samples:
+            slopes[method] = {"over_time": asdict(by_time), "over_samples": asdict(by_samples)}
+        if method == PLAIN:
+            plain = by_time, by_samples
+    front = metrics.pareto([p.seconds for p in seen], [p.relative_mse for p in seen])
+    saved = []
+    if plain and plain[0] and plain[1]:
+        saved = [
+            {
+                "method": point.method,
+                "settings": point.settings,
+                "relative_mse": point.relative_mse,
+                "times_faster": plain[0].inverse(point.relative_mse) / point.seconds,
+                "times_fewer_samples": plain[1].inverse(point.relative_mse) / point.samples,
+            }
+            for point in seen
+            if point.method != PLAIN
+        ]
+    return {
+        "reference_error": statistics.fmean(reference.own_error for reference in references),
+        "slopes": slopes,
+        "pareto_front": [asdict(seen[index]) for index in front],
+        "against_plain_at_equal_error": saved,
+        "settings": [asdict(point) for point in points if point.method == OWN],
+        "points": [asdict(point) for point in points],
+    }
+
+
+def neighbours(
+    maker: trials.Trials,
+    frames: Sequence[trials.Frame],
+    references: Sequence[metrics.Reference],
+    renders: Sequence[Sequence[trials.Trial]],
+) -> dict[str, float]:
+    """Return how the first two views disagree, as `metrics.Disagreement`, the mean over seeds."""
+    pair = (references[0], references[1])
+    seen = trials.both_see((maker.camera(frames[0]), maker.camera(frames[1])), pair)
+    found = [
+        asdict(metrics.disagreement((first.colour, second.colour), pair, seen))
+        for first, second in zip(renders[0], renders[1], strict=True)
+    ]
+    return {name: statistics.fmean(entry[name] for entry in found) for name in found[0]}
+
+
+def write_table(path: Path, points: Sequence[Point], content: Mapping[str, Any]) -> None:
+    """Write the points as CSV, one row each."""
+    front = [(entry["method"], entry["settings"]) for entry in content["pareto_front"]]
+    with atomic_path(path) as temporary, temporary.open("w", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        names = [name for name in asdict(points[0]) if name not in ("method", "settings")]
+        table.writerow(
+            ["method", "most_samples", "adaptive_threshold", "denoise", *names, "pareto"]
+        )
+        for point in points:
+            settings = {**trials.PLAIN, **point.settings}
+            table.writerow(
+                [point.method, *(settings[k] for k in ("samples", "adaptive_threshold", "denoise"))]
+                + [getattr(point, name) for name in names]
+                + [(point.method, point.settings) in front]
+            )
+
+
+def draw(stem: Path, points: Sequence[Point], content: Mapping[str, Any]) -> None:
+    """Draw error over time, with slopes, the Pareto front, and where the scene's settings lie."""
+    seen = [point for point in points if point.resolved]
+    with plots.plot(stem, size=(8, 5.5)) as axes:
+        methods = [m for m in dict.fromkeys(point.method for point in points) if m != OWN]
+        for method, colour, marker in zip(methods, plots.COLOURS, plots.MARKERS, strict=False):
+            own = [point for point in seen if point.method == method]
+            line = content["slopes"].get(method)
+            told = ""
+            if line:
+                slope = line["over_time"]
+                told = f", slope {slope['slope']:.2f} ± {slope['slope_error']:.2f}".replace(
+                    "-", "−"
+                )
+            axes.errorbar(
+                [point.seconds for point in own],
+                [point.relative_mse for point in own],
+                [point.standard_error for point in own],
+                color=colour,
+                marker=marker,
+                linewidth=1,
+                label=method + told,
+            )
+        front = content["pareto_front"]
+        axes.plot(
+            [point["seconds"] for point in front],
+            [point["relative_mse"] for point in front],
+            color=plots.GREY,
+            linewidth=6,
+            alpha=0.3,
+            label="Pareto front",
+        )
+        for point in seen:
+            if point.method == OWN:
+                axes.plot(
+                    *(point.seconds, point.relative_mse),
+                    marker="*",
+                    markersize=15,
+                    linestyle="none",
+                    color="black",
+                    markerfacecolor="none",
+                    label=OWN,
+                )
+        axes.axhline(
+            content["reference_error"],
+            color="black",
+            linestyle=":",
+            linewidth=1,
+            label="the references' own error (subtracted)",
+        )
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_title(f"{stem.name}: error against render time")
+        unit = "core" if content["measured_on"]["device"] == "CPU" else "GPU"
+        axes.set_xlabel(f"render time, {unit} seconds per megapixel")
+        axes.set_ylabel("relative mean squared error")
+        axes.legend(fontsize=8)
+
+
+if __name__ == "__main__":
+    run(main)

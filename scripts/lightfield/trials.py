@@ -1,0 +1,199 @@
+"""Small views of a dataset, rendered in many ways to learn what each way costs and what it gives.
+
+Every render is kept in a folder, under a key of all that it follows from, with the time that it
+took, so that what is interrupted goes on where it was and what is repeated costs nothing.
+"""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lightfield import images, keys, lenses
+from lightfield.consistency import Camera
+from lightfield.files import read_json
+from lightfield.metrics import Mask, Reference, make_reference
+
+Frame = Mapping[str, Any]
+
+PLAIN = {"adaptive_threshold": 0, "denoise": False}
+
+# Seeds of references begin here, and those of trials at 1: no trial is part of its reference.
+REFERENCE_SEED = 1000
+
+SECONDS_ATTRIBUTE = "plenoforge:core_seconds"
+SAMPLES_ATTRIBUTE = "plenoforge:samples"
+DEVICE_ATTRIBUTE = "plenoforge:device"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One render: colour (h, w, 3) scene-linear; depth (h, w) metres as Cycles gives it, or None.
+
+    ``samples`` is the mean number that the pixels of the image circle took. ``seconds`` is Cycles'
+    own render time, synchronization not counted; on processors multiplied by the part of the wall
+    time in which they worked for it, so that other load is not in it and cores add up. ``device``
+    is what Cycles rendered on, CPU or GPU.
+    """
+
+    colour: NDArray[np.float32]
+    depth: NDArray[np.float32] | None
+    samples: float
+    seconds: float
+    device: str
+
+
+class Trials:
+    """Renders small views of the dataset of a lightfield.json, or takes them from ``cache``.
+
+    Blender starts only when something has to be rendered.
+    """
+
+    def __init__(
+        self,
+        blend: Path,
+        inventory: Path,
+        lightfield: Mapping[str, Any],
+        size: int,
+        device: str,
+        threads: int,
+        cache: Path,
+    ) -> None:
+        lens = lenses.from_lightfield(lightfield)
+        scale = min(1.0, size / max(lens.width, lens.height))
+        self.lens = lens.resized(*(max(1, round(x * scale)) for x in (lens.width, lens.height)))
+        self.lightfield = {**lightfield, **self.lens.to_lightfield()}
+        rows, columns = np.mgrid[: self.lens.height, : self.lens.width] + 0.5
+        self.mask: Mask = np.isfinite(self.lens.rays(columns, rows)).all(axis=-1)
+        self._blend, self._inventory = blend, inventory
+        self._device, self._threads, self._cache = device, threads, cache
+        self._started = False
+
+    def render(self, frame: Frame, seed: int, sampling: Mapping[str, Any]) -> Trial:
+        """Render one of the frames under the render settings that ``sampling`` changes."""
+        settings = {**self.lightfield["render"], **PLAIN, **sampling, "seed": seed}
+        content = {**self.lightfield, "render": settings, "device": self._device}
+        key = keys.render_key(content, frame)
+        path = self._cache / f"{key[:32]}.exr"
+        if not images.is_finished(path, key):
+            self._render(frame, settings, path, key)
+        image = images.read_image(path)
+        return Trial(
+            colour=np.stack([image.channels[c] for c in "RGB"], axis=-1),
+            depth=image.channels.get("Z"),
+            samples=float(image.attributes[SAMPLES_ATTRIBUTE]),
+            seconds=float(image.attributes[SECONDS_ATTRIBUTE]),
+            device=str(image.attributes[DEVICE_ATTRIBUTE]),
+        )
+
+    def reference(self, frame: Frame, seeds: int, samples: int) -> Reference:
+        """Render a frame with ``seeds`` seeds, ``samples`` samples each, and take their mean."""
+        renders = [
+            self.render(frame, REFERENCE_SEED + number, {"samples": samples})
+            for number in range(seeds)
+        ]
+        depths = [render.depth for render in renders if render.depth is not None]
+        return make_reference([render.colour for render in renders], depths or None, self.mask)
+
+    def camera(self, frame: Frame) -> Camera:
+        """Return where a frame looks from, as `lightfield.consistency` wants it."""
+        kind = "z" if self.lightfield["camera"]["type"] == "PERSP" else "distance"
+        return Camera(self.lens, np.array(frame["world_matrix"]), kind)
+
+    def _render(self, frame: Frame, settings: Mapping[str, Any], path: Path, key: str) -> None:
+        from lightfield import blender
+
+        if not self._started:
+            self._start(settings)
+        blender.set_sampling(settings)
+        pose = np.array(frame["world_matrix"])
+        began, began_cpu = time.perf_counter(), time.process_time()
+        raw = blender.render_view(pose, keys.view_seed(settings["seed"], frame["name"]))
+        worked = time.process_time() - began_cpu
+        seconds = raw.render_seconds
+        if self._on == "CPU":
+            seconds *= worked / (time.perf_counter() - began)
+        assert raw.samples is not None
+        channels = {name: raw.colour[:, :, index] for index, name in enumerate("RGB")}
+        if raw.depth is not None:
+            channels["Z"] = raw.depth
+        images.write_exr(
+            path,
+            channels,
+            {
+                images.KEY_ATTRIBUTE: key,
+                SAMPLES_ATTRIBUTE: float(raw.samples[self.mask].mean()),
+                SECONDS_ATTRIBUTE: seconds,
+                DEVICE_ATTRIBUTE: self._on,
+            },
+        )
+
+    def _start(self, settings: Mapping[str, Any]) -> None:
+        from lightfield import blender
+
+        left_out = read_json(self._inventory)
+        blender.open_scene(self._blend)
+        if "hidden_objects" in left_out["left_out"]:
+            blender.remove_objects(left_out["hidden"])
+        self._on = blender.set_up_render(settings, self.lightfield, self._device, self._threads)
+        blender.leave_out(left_out["left_out"])
+        blender.count_samples()
+        # The first render also loads what all others use; it is not timed.
+        blender.set_sampling({**settings, "samples": 1, "denoise": True})
+        blender.render_view(np.array(self.lightfield["frames"][0]["world_matrix"]), 0)
+        self._started = True
+
+
+def spread(frames: Sequence[Frame], count: int, phase: float) -> list[Frame]:
+    """Choose up to ``count`` frames evenly; ``phase``, 0 to 1, is where in its part each lies.
+
+    Two choices of the same count with phases ¼ and ¾ share no frame if there are enough.
+    """
+    count = min(count, len(frames))
+    return [frames[int((number + phase) * len(frames) / count)] for number in range(count)]
+
+
+def neighbour(frames: Sequence[Frame], frame: Frame) -> Frame | None:
+    """Return the nearest other frame that looks the same way to within 45 degrees, if any."""
+    own = np.array(frame["world_matrix"])
+    others = [
+        (round(float(np.linalg.norm(matrix[:3, 3] - own[:3, 3])), 6), index)
+        for index, other in enumerate(frames)
+        if other["name"] != frame["name"]
+        and (matrix := np.array(other["world_matrix"]))[:3, 2] @ own[:3, 2] > np.sqrt(0.5)
+    ]
+    return frames[min(others)[1]] if others else None
+
+
+# Two depths of one surface differ by less than this part: pixels are coarse, and depth is jittered.
+SAME_DEPTH = 0.03
+
+
+def both_see(
+    cameras: tuple[Camera, Camera], references: tuple[Reference, Reference]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Find surfaces that two views see: flat indices (n,) of pixels of the one and of the other.
+
+    The first view's pixels are lifted by depth and looked up in the second; those that its depth
+    says are hidden there are left out. Both references need depth.
+    """
+    first, second = cameras
+    depths = references[0].depth, references[1].depth
+    assert depths[0] is not None and depths[1] is not None
+    rows, columns = np.nonzero(references[0].mask & np.isfinite(depths[0]))
+    points = first.lift(depths[0][rows, columns], columns, rows)
+    x, y = second.pixels(points).T
+    height, width = depths[1].shape
+    with np.errstate(invalid="ignore"):
+        inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    across, down = (np.where(inside, value, 0).astype(np.int64) for value in (x, y))
+    inside &= references[1].mask[down, across]
+    there = second.lift(depths[1][down, across], across, down)
+    with np.errstate(invalid="ignore"):
+        expected, found = (np.linalg.norm(p - second.position, axis=1) for p in (points, there))
+        same = inside & (np.abs(found / expected - 1) < SAME_DEPTH)
+    return (rows * width + columns)[same], (down * width + across)[same]
