@@ -3,6 +3,7 @@ import json
 import math
 import shlex
 import sys
+from functools import cache
 from pathlib import Path
 
 sys.path.insert(0, str(Path(workflow.basedir) / "scripts"))
@@ -29,7 +30,7 @@ DATASETS = {(dataset.scene, dataset.rig): dataset for dataset in [*SMOKE, *CHOSE
 
 # For planning only, measured on one core of a 2-core x86-64 machine: path tracing of one sample of
 # one pixel, and start-up (bpy, the scene, and Cycles' acceleration structures).
-SECONDS_PER_SAMPLE = 2e-6
+SECONDS_PER_SAMPLE = 6e-6
 START_UP_SECONDS = 3.0
 # Start-up is kept under this share of a shard's time.
 START_UP_SHARE = 0.05
@@ -59,6 +60,7 @@ wildcard_constraints:
 localrules:
     check_blend,
     contact_sheet,
+    costs,
     export_reprojection_to_instant_ngp,
     export_views_to_instant_ngp,
     lens_map,
@@ -189,6 +191,7 @@ def dataset_files(dataset):
         f"{folder}/sha256sums.txt",
         *published(dataset),
         *pictures(dataset),
+        f"{folder}/report/costs.json",
         *all_records(dataset),
     ]
 
@@ -276,6 +279,27 @@ def placement(wildcards):
     if "evaluation_split" in dataset_of(wildcards).cameras:
         words.append("--split")
     return shlex.join(words)
+
+
+@cache
+def full_datasets(name):
+    """Return a scene YAML's datasets at full size, by rig."""
+    return {dataset.rig: dataset for dataset in scene_datasets(name, "full", {})}
+
+
+def full_size(wildcards):
+    """Return what the scene YAML says of a dataset's size, whatever the preset, as JSON.
+
+    Samples are null where the YAML has a target error instead.
+    """
+    full = full_datasets(dataset_of(wildcards).name)[wildcards.rig]
+    return json.dumps(
+        {
+            "views": full.view_count,
+            "resolution": full.cameras["camera"]["resolution"],
+            "samples": full.render.get("samples"),
+        }
+    )
 
 
 def suffix(wildcards):

@@ -9,6 +9,8 @@ rule export_views_to_instant_ngp:
         f"{DATASET}/transforms.json",
     log:
         f"{WORK}/logs/{{scene}}/{{rig}}/export_instant_ngp.log",
+    benchmark:
+        f"{WORK}/benchmarks/{{scene}}/{{rig}}/export/views.tsv"
     conda:
         ENVIRONMENT
     params:
@@ -30,6 +32,8 @@ rule export_reprojection_to_instant_ngp:
         f"{REPROJECTED}/transforms.json",
     log:
         f"{WORK}/logs/{{scene}}/{{rig}}/{{reprojection}}/export_instant_ngp.log",
+    benchmark:
+        f"{WORK}/benchmarks/{{scene}}/{{rig}}/export/{{reprojection}}.tsv"
     conda:
         ENVIRONMENT
     params:

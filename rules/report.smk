@@ -8,6 +8,8 @@ rule panorama_lightfield:
         f"{PANORAMA}/lightfield.json",
     log:
         f"{WORK}/logs/{{scene}}/{{rig}}/panorama/lightfield.log",
+    benchmark:
+        f"{WORK}/benchmarks/{{scene}}/{{rig}}/panorama/lightfield.tsv"
     conda:
         ENVIRONMENT
     params:
@@ -65,6 +67,8 @@ rule panorama:
         ),
     log:
         f"{WORK}/logs/{{scene}}/{{rig}}/panorama/develop.log",
+    benchmark:
+        f"{WORK}/benchmarks/{{scene}}/{{rig}}/panorama/develop.tsv"
     conda:
         ENVIRONMENT
     message:
@@ -86,6 +90,8 @@ rule contact_sheet:
         ),
     log:
         f"{WORK}/logs/{{scene}}/{{rig}}/contact_sheet.log",
+    benchmark:
+        f"{WORK}/benchmarks/{{scene}}/{{rig}}/report/contact_sheet.tsv"
     conda:
         ENVIRONMENT
     params:

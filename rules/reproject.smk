@@ -8,6 +8,8 @@ rule reprojected_lightfield:
         f"{REPROJECTED}/lightfield.json",
     log:
         f"{WORK}/logs/{{scene}}/{{rig}}/{{reprojection}}/lightfield.log",
+    benchmark:
+        f"{WORK}/benchmarks/{{scene}}/{{rig}}/{{reprojection}}/lightfield.tsv"
     conda:
         ENVIRONMENT
     params:
@@ -30,6 +32,8 @@ rule lens_map:
         f"{MADE}/{{reprojection}}/lens_map.npy",
     log:
         f"{WORK}/logs/{{scene}}/{{rig}}/{{reprojection}}/lens_map.log",
+    benchmark:
+        f"{WORK}/benchmarks/{{scene}}/{{rig}}/{{reprojection}}/lens_map.tsv"
     conda:
         ENVIRONMENT
     params:

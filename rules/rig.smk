@@ -8,6 +8,8 @@ rule lightfield:
         f"{DATASET}/lightfield.json",
     log:
         f"{WORK}/logs/{{scene}}/{{rig}}/lightfield.log",
+    benchmark:
+        f"{WORK}/benchmarks/{{scene}}/{{rig}}/cameras/lightfield.tsv"
     conda:
         ENVIRONMENT
     params:
@@ -33,6 +35,8 @@ rule check_cameras:
         f"{MADE}/cameras.json",
     log:
         f"{WORK}/logs/{{scene}}/{{rig}}/check_cameras.log",
+    benchmark:
+        f"{WORK}/benchmarks/{{scene}}/{{rig}}/cameras/check_cameras.tsv"
     conda:
         ENVIRONMENT
     resources:

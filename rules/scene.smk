@@ -32,6 +32,8 @@ rule check_blend:
         f"{WORK}/{{name}}/blend.json",
     log:
         f"{WORK}/logs/{{name}}/check_blend.log",
+    benchmark:
+        f"{WORK}/benchmarks/{{name}}/check_blend.tsv"
     conda:
         ENVIRONMENT
     message:
@@ -49,6 +51,8 @@ rule inventory:
         f"{WORK}/{{name}}/inventory.json",
     log:
         f"{WORK}/logs/{{name}}/inventory.log",
+    benchmark:
+        f"{WORK}/benchmarks/{{name}}/inventory.tsv"
     conda:
         ENVIRONMENT
     resources:

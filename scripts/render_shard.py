@@ -61,7 +61,9 @@ def main() -> None:
         )
     ]
     # The dataset's folder says which scene and rig it is, and in a sequence which frame.
-    label = f"render {arguments.output.parent} {arguments.views}"
+    label = f"render {arguments.output.parent}"
+    if arguments.views != ":":
+        label += f" {arguments.views}"
     progress = Progress(len(missing), label, already=len(frames) - len(missing))
     if missing:
         render_views(missing, lightfield, arguments, journal, progress)

@@ -76,7 +76,7 @@ class Run:
     @property
     def wall_seconds(self) -> float:
         """How long it is known to have worked; what a killed one had begun last is not known."""
-        return self.last_heard - float(self.start["started"])
+        return round(self.last_heard - float(self.start["started"]), 3)
 
     @property
     def cpu_seconds(self) -> float:
@@ -110,7 +110,7 @@ class Run:
 def read(path: Path) -> list[Run]:
     """Return the runs that a journal tells of, in their order.
 
-    A line that a kill cut short is left out.
+    A line that a kill cut short is left out, and so is what stands before the first start.
     """
     runs: list[Run] = []
     for line in path.read_text(encoding="utf-8").splitlines():
@@ -120,6 +120,8 @@ def read(path: Path) -> list[Run]:
             continue
         if "started" in entry:
             runs.append(Run(entry))
+        elif not runs:
+            continue
         elif "start_up_seconds" in entry:
             runs[-1].start |= entry
         elif "ended" in entry:

@@ -41,19 +41,25 @@ class Progress:
     def begin(self) -> None:
         """Take the time from now on; called again after preparations that are no such work."""
         self.started = self.printed = time.monotonic()
+        self.first: tuple[int, float] | None = None
 
     def done(self, count: int = 1) -> None:
         """Count ``count`` more pieces as finished."""
         self.count += count
         now = time.monotonic()
         elapsed = now - self.started
+        if self.first is None:
+            self.first = (self.count, elapsed)
         interval = max(self.interval, min(elapsed / 20, 60))
         if now - self.printed < interval and self.count < self.total:
             return
         self.printed = now
-        left = elapsed / self.count * (self.total - self.count)
+        # The first piece often pays for preparations that the others need not make.
+        counted, since = self.first if self.count > self.first[0] else (0, 0.0)
+        each = (elapsed - since) / (self.count - counted)
+        left = each * (self.total - self.count)
         self._print(
-            f"{self.count} of {self.total} {self.unit}, {elapsed / self.count:.3g} s each, "
+            f"{self.count} of {self.total} {self.unit}, {each:.3g} s each, "
             + (f"{duration(left)} left" if left else f"done in {duration(elapsed)}")
         )
 

@@ -1,0 +1,34 @@
+# What a dataset has cost, and how far a build has come.
+
+
+rule costs:
+    input:
+        validation=f"{DATASET}/validation.json",
+        records=lambda wildcards: all_records(dataset_of(wildcards)),
+        published=lambda wildcards: published(dataset_of(wildcards)),
+        pictures=lambda wildcards: pictures(dataset_of(wildcards)),
+        blend=scene_file,
+    output:
+        f"{DATASET}/report/costs.json",
+    log:
+        f"{WORK}/logs/{{scene}}/{{rig}}/costs.log",
+    conda:
+        ENVIRONMENT
+    params:
+        dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
+        # What the jobs above left there is read, as far as it goes back.
+        journals=f"{MADE}/render",
+        benchmarks=f"{WORK}/benchmarks/{{scene}}/{{rig}}",
+        scene_benchmarks=lambda wildcards: (
+            f"{WORK}/benchmarks/{dataset_of(wildcards).name}"
+        ),
+        energy=json.dumps(SETTINGS["energy"]),
+        full=full_size,
+        reprojections=reprojection_words,
+    message:
+        "Adding up what {wildcards.scene}/{wildcards.rig} has cost"
+    shell:
+        "python scripts/costs.py --dataset {params.dataset} --journals {params.journals}"
+        " --benchmarks {params.benchmarks} --scene-benchmarks {params.scene_benchmarks}"
+        " --blend {input.blend:q} --energy {params.energy:q} --full {params.full:q}"
+        " {params.reprojections} --output {output} 2>&1 | tee {log}"

@@ -1,0 +1,385 @@
+"""Add up what a dataset has cost, and what the full one would: report/costs.json.
+
+Times are seconds, memory and sizes bytes, energy kWh. Wall and processor time of the views come
+from the journals of their shards, which survive kills: all the time that was really spent, also on
+views that were lost or made again. Of any other job the time and memory of its last run count, as
+Snakemake measured them; it looks every half second and after a while every 30 s, so that the
+processor time may be short by as much. A job too short to be looked at counts as busy throughout.
+
+    {
+      "stages": [{"stage", "jobs", "wall_seconds", "cpu_seconds", "peak_memory_bytes", "bytes"}],
+      "shards": [{"shard", "views", "wall_seconds", "cpu_seconds", "peak_memory_bytes",
+                  "path_tracing_seconds",   Cycles' own render time of all its renderings
+                  "overhead_seconds",       the rest of wall_seconds
+                  "views_rendered",         renderings, repeated ones counted
+                  "runs",                   processes that worked on it; killed_runs of them
+                  "killed_runs",            did not end by themselves
+                  "repeated_seconds"}],     spent again: views made again and further start-ups
+      "path_tracing_seconds", "overhead_seconds", "repeated_seconds",   of all shards
+      "device", "cores", "watts", "price_per_kwh", "currency",
+      "energy_kwh", "price", "attribution",
+      "extrapolation": {"views", "resolution", "samples", "core_hours", "core_hours_uncertainty",
+                        "energy_kwh", "energy_kwh_uncertainty", "price", "price_uncertainty",
+                        "gigabytes", "basis"}
+    }
+
+Energy is the machine's wattage, times the wall time, times the share of its cores that was busy;
+that is the processor time divided by the number of cores. While it renders on a graphics card the
+whole machine counts. Waiting and idle time are nobody's.
+
+The extrapolation multiplies each view's path-tracing time by the ratio of pixels and of samples,
+and takes the mean. Its uncertainty is the standard error of that mean over the views, with the
+correction for a finite number of views, sqrt(1 - n / N); null if there is only one view. That the
+time follows pixels and samples in proportion is assumed. What else each view needs (writing,
+reprojection, validation) is taken in proportion to views and pixels, everything else as it was.
+The first view of each process, which prepares the scene for Cycles, tells of neither.
+Gigabytes are those of the rendered views, in proportion to their pixels: an upper estimate, because
+larger views compress better. "device" and "extrapolation" are null if no journal tells of a
+rendered view, as when the working folder was deleted and the views were kept.
+"""
+
+import argparse
+import csv
+import json
+import math
+import os
+import statistics
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lightfield import journal
+from lightfield.cli import run
+from lightfield.files import read_json, write_json
+
+# The stages that every dataset has, in the order of the work; others come between.
+FIRST_STAGES, LAST_STAGES = ("scene", "cameras", "render"), ("export", "validate", "report")
+# What a stage made, where that is not the folder of its name.
+MADE = {
+    "cameras": ("lightfield.json",),
+    "render": ("exr",),
+    "export": ("transforms.json",),
+    "validate": ("validation.json", "sha256sums.txt"),
+}
+# Of the report, what differs from build to build is not counted.
+NOT_COUNTED = ("costs.json", "index.html")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--dataset", required=True, type=Path, help="folder of the dataset")
+    parser.add_argument("--journals", required=True, type=Path, help="folder of its journals")
+    parser.add_argument("--benchmarks", required=True, type=Path, help="folder of its jobs' TSVs")
+    parser.add_argument(
+        "--scene-benchmarks", required=True, type=Path, help="folder of the scene's jobs' TSVs"
+    )
+    parser.add_argument("--blend", required=True, type=Path, help="the scene")
+    parser.add_argument(
+        "--energy",
+        required=True,
+        type=json.loads,
+        help="JSON: watts, price_per_kwh, currency, and cores (a number, or auto: this machine's)",
+    )
+    parser.add_argument(
+        "--full",
+        required=True,
+        type=json.loads,
+        help="JSON: views, resolution, and samples; null for those of this dataset",
+    )
+    parser.add_argument(
+        "--reprojection", action="append", default=[], help="name of one; given for each"
+    )
+    parser.add_argument("--output", required=True, type=Path, help="JSON to write")
+    arguments = parser.parse_args()
+
+    shards = {
+        path.name.removesuffix(".journal.jsonl"): journal.read(path)
+        for path in sorted(arguments.journals.glob("*.journal.jsonl"))
+    }
+    rendered = [shard_costs(name, runs) for name, runs in shards.items()]
+    stages = job_stages(arguments.benchmarks, arguments.scene_benchmarks)
+    stages["render"] = Stage(
+        jobs=len(rendered),
+        wall_seconds=sum(shard["wall_seconds"] for shard in rendered),
+        cpu_seconds=sum(shard["cpu_seconds"] for shard in rendered),
+        peak_memory_bytes=max((shard["peak_memory_bytes"] for shard in rendered), default=0),
+    )
+    order = [*FIRST_STAGES, *sorted(stages.keys() - {*FIRST_STAGES, *LAST_STAGES}), *LAST_STAGES]
+    stages = {name: stages[name] for name in order if name in stages}
+    write_json(
+        arguments.output,
+        costs(
+            runs=[part for runs in shards.values() for part in runs],
+            shards=sorted(rendered, key=lambda shard: [int(n) for n in shard["shard"].split("-")]),
+            stages=stages,
+            sizes={name: stage_bytes(name, arguments) for name in stages},
+            lightfield=read_json(arguments.dataset / "lightfield.json"),
+            tariff=Tariff.read(arguments.energy),
+            full=arguments.full,
+            reprojections=arguments.reprojection,
+        ),
+    )
+
+
+@dataclass
+class Stage:
+    """What the jobs of one stage took together; the peak is that of the largest."""
+
+    jobs: int = 0
+    wall_seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    peak_memory_bytes: int = 0
+
+
+@dataclass(frozen=True)
+class Tariff:
+    """The wattage of a machine with so many cores, and what a kWh costs."""
+
+    watts: float
+    price_per_kwh: float
+    currency: str
+    cores: int
+
+    @classmethod
+    def read(cls, settings: Mapping[str, Any]) -> "Tariff":
+        """Take config.yaml's `energy`."""
+        cores = settings["cores"]
+        return cls(
+            watts=settings["watts"],
+            price_per_kwh=settings["price_per_kwh"],
+            currency=settings["currency"],
+            cores=(os.cpu_count() or 1) if cores == "auto" else cores,
+        )
+
+    def kwh(self, machine_seconds: float) -> float:
+        """Return the energy of so many seconds of the whole machine."""
+        return self.watts * machine_seconds / 3.6e6
+
+    def price(self, kwh: float) -> float:
+        """Return what so much energy costs."""
+        return kwh * self.price_per_kwh
+
+
+def shard_costs(name: str, runs: list[journal.Run]) -> dict[str, Any]:
+    """Add up all processes that worked on one shard."""
+    first, end = map(int, name.split("-"))
+    latest = {view["view"]: view for part in runs for view in part.views}
+    wall = sum(part.wall_seconds for part in runs)
+    path_tracing = sum(view["render_seconds"] for part in runs for view in part.views)
+    views = sum(view["wall_seconds"] for part in runs for view in part.views)
+    start_ups = [part.start.get("start_up_seconds", 0.0) for part in runs]
+    return {
+        "shard": name,
+        "views": end - first,
+        "wall_seconds": round(wall, 3),
+        "cpu_seconds": round(sum(part.cpu_seconds for part in runs), 3),
+        "peak_memory_bytes": max(part.peak_memory_bytes for part in runs),
+        "path_tracing_seconds": round(path_tracing, 3),
+        "overhead_seconds": round(wall - path_tracing, 3),
+        "views_rendered": sum(len(part.views) for part in runs),
+        "runs": len(runs),
+        "killed_runs": sum(part.end is None for part in runs),
+        "repeated_seconds": round(
+            views - sum(view["wall_seconds"] for view in latest.values()) + sum(start_ups[1:]), 3
+        ),
+    }
+
+
+def job_stages(dataset: Path, scene: Path) -> dict[str, Stage]:
+    """Add up the jobs' TSVs by stage: the folder that a TSV lies in, or else its own name.
+
+    The views' own are left out: they tell only of a shard's last run.
+    """
+    stages: dict[str, Stage] = {}
+    found = [("scene", path) for path in scene.glob("*.tsv")]
+    found += [
+        (path.relative_to(dataset).parts[0].removesuffix(".tsv"), path)
+        for path in dataset.rglob("*.tsv")
+    ]
+    for name, path in found:
+        if name == "render":
+            continue
+        with path.open(encoding="utf-8", newline="") as file:
+            row = next(csv.DictReader(file, delimiter="\t"))
+        stage = stages.setdefault(name, Stage())
+        wall = float(row["s"])
+        stage.jobs += 1
+        stage.wall_seconds += wall
+        stage.cpu_seconds += wall if row["cpu_time"] == "NA" else float(row["cpu_time"])
+        if row["max_rss"] != "NA":
+            memory = round(float(row["max_rss"]) * 2**20)
+            stage.peak_memory_bytes = max(stage.peak_memory_bytes, memory)
+    return stages
+
+
+def stage_bytes(stage: str, arguments: argparse.Namespace) -> int:
+    """Return the size of what a stage left behind, 0 if that is no part of the dataset."""
+    if stage == "scene":
+        return arguments.blend.stat().st_size
+    paths = [arguments.dataset / name for name in MADE.get(stage, (stage,))]
+    files = [file for path in paths for file in ([path] if path.is_file() else path.rglob("*"))]
+    return sum(
+        file.stat().st_size for file in files if file.is_file() and file.name not in NOT_COUNTED
+    )
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """The time of one view: path tracing and the rest, and when it was finished.
+
+    In seconds of one core; of the whole machine where a graphics card renders.
+    """
+
+    view: str
+    finished: float
+    path_tracing: float
+    rest: float
+    # A process's first view pays for the scene's acceleration structures.
+    first: bool
+
+
+def renderings(part: journal.Run) -> Iterator[Rendering]:
+    """Split the time of each view that a process rendered.
+
+    While Cycles path-traces all the threads are busy, and one is for the rest. In these parts the
+    view's processor time is shared out, because wall time holds what other programs took.
+    """
+    for index, view in enumerate(part.views):
+        traced = view["render_seconds"]
+        rest = max(0.0, view["wall_seconds"] - traced)
+        if on_processor(part):
+            busy = part.start["threads"] * traced
+            traced = view["cpu_seconds"] * busy / (busy + rest)
+            rest = view["cpu_seconds"] - traced
+        yield Rendering(view["view"], view["finished"], traced, rest, first=index == 0)
+
+
+def on_processor(part: journal.Run) -> bool:
+    """Tell whether a process rendered on the processor's cores."""
+    return part.start["device"] == "CPU"
+
+
+def costs(
+    runs: list[journal.Run],
+    shards: list[dict[str, Any]],
+    stages: Mapping[str, Stage],
+    sizes: Mapping[str, int],
+    lightfield: Mapping[str, Any],
+    tariff: Tariff,
+    full: Mapping[str, Any],
+    reprojections: list[str],
+) -> dict[str, Any]:
+    """Return what costs.json says."""
+    device = next((part.start["device"] for part in reversed(runs) if part.views), None)
+    # A shard's share of the machine: its cores, or all of it while its graphics card works.
+    machine_seconds = sum(
+        stage.cpu_seconds / tariff.cores for name, stage in stages.items() if name != "render"
+    ) + sum(
+        part.wall_seconds
+        if part.views and not on_processor(part)
+        else part.cpu_seconds / tariff.cores
+        for part in runs
+    )
+    kwh = tariff.kwh(machine_seconds)
+    totals = ("path_tracing_seconds", "overhead_seconds", "repeated_seconds")
+    return {
+        "stages": [
+            {
+                "stage": name,
+                "jobs": stage.jobs,
+                "wall_seconds": round(stage.wall_seconds, 3),
+                "cpu_seconds": round(stage.cpu_seconds, 3),
+                "peak_memory_bytes": stage.peak_memory_bytes,
+                "bytes": sizes[name],
+            }
+            for name, stage in stages.items()
+        ],
+        "shards": shards,
+        **{name: round(sum(shard[name] for shard in shards), 3) for name in totals},
+        "device": device,
+        "cores": tariff.cores,
+        "watts": tariff.watts,
+        "price_per_kwh": tariff.price_per_kwh,
+        "currency": tariff.currency,
+        "energy_kwh": kwh,
+        "price": tariff.price(kwh),
+        "attribution": (
+            f"{tariff.watts:g} W, the whole machine's, times wall time, times the share of its "
+            f"{tariff.cores} cores that was busy"
+            + ("; all of it while a graphics card renders" if device not in (None, "CPU") else "")
+        ),
+        "extrapolation": extrapolation(
+            runs, stages, sizes["render"], lightfield, tariff, full, reprojections
+        ),
+    }
+
+
+def extrapolation(
+    runs: list[journal.Run],
+    stages: Mapping[str, Stage],
+    view_bytes: int,
+    lightfield: Mapping[str, Any],
+    tariff: Tariff,
+    full: Mapping[str, Any],
+    reprojections: list[str],
+) -> dict[str, Any] | None:
+    """Return what the full dataset would cost, from the views of this one."""
+    every = [rendering for part in runs for rendering in renderings(part)]
+    if not every:
+        return None
+    kept = {one.view: one for one in sorted(every, key=lambda one: one.finished)}.values()
+    # First views tell little of the others, and count only where there are none.
+    latest = [rendering for rendering in kept if not rendering.first] or list(kept)
+    here = len(lightfield["frames"])
+    samples = lightfield["render"]["samples"]
+    wanted = full["samples"] or samples
+    width, height = lightfield["resolution"]
+    pixels = math.prod(full["resolution"]) / (width * height)
+    count = full["views"]
+
+    times = [view.path_tracing * pixels * wanted / samples for view in latest]
+    error = None
+    if len(times) > 1:
+        unseen = max(0.0, 1 - len(times) / count)
+        error = count * statistics.stdev(times) / math.sqrt(len(times)) * math.sqrt(unseen)
+    # Processor time beside a graphics card's is a share of the machine.
+    processor = all(on_processor(part) for part in runs if part.views)
+    share = 1 if processor else 1 / tariff.cores
+    growing = {"validate", *reprojections}
+    each_view = statistics.mean(view.rest for view in latest) + share / here * sum(
+        stage.cpu_seconds for name, stage in stages.items() if name in growing
+    )
+    once = sum(rendering.rest for rendering in every if rendering.first) + share * (
+        sum(part.start.get("start_up_cpu_seconds", 0.0) for part in runs)
+        + sum(s.cpu_seconds for name, s in stages.items() if name not in {"render", *growing})
+    )
+    seconds = count * (statistics.mean(times) + each_view * pixels) + once
+    machine = seconds / tariff.cores if processor else seconds
+    uncertainty = None if error is None else tariff.kwh(error * machine / seconds)
+    return {
+        "views": count,
+        "resolution": full["resolution"],
+        "samples": wanted,
+        "core_hours": seconds / 3600,
+        "core_hours_uncertainty": None if error is None else error / 3600,
+        "energy_kwh": tariff.kwh(machine),
+        "energy_kwh_uncertainty": uncertainty,
+        "price": tariff.price(tariff.kwh(machine)),
+        "price_uncertainty": None if uncertainty is None else tariff.price(uncertainty),
+        "gigabytes": view_bytes / here * count * pixels / 1e9,
+        "basis": (
+            f"path tracing of {len(times)} views: {width} × {height} pixels, {samples} samples"
+            + (" and denoising" if lightfield["render"]["denoise"] else "")
+            + ", in proportion to pixels and samples, on "
+            + ("the processor" if processor else "a graphics card: hours are the machine's")
+            + "; ± is the standard error over these views; all else as measured, the part that "
+            "every view needs in proportion to views and pixels"
+        ),
+    }
+
+
+if __name__ == "__main__":
+    run(main)
