@@ -22,6 +22,13 @@ rule all:
     default_target: True
     input:
         [dataset_files(dataset) for dataset in CHOSEN],
+        f"{RESULTS}/index.html",
+
+
+rule report_html:
+    input:
+        [page_of(dataset) for dataset in CHOSEN],
+        f"{RESULTS}/index.html",
 
 
 rule smoke:

@@ -43,6 +43,8 @@ ENVIRONMENT = "../envs/environment.yaml"
 DATASET = f"{RESULTS}/{{scene}}/{{rig}}"
 MADE = f"{WORK}/{{scene}}/{{rig}}"
 PANORAMA = f"{MADE}/panorama"
+# Pictures of a report that are drawn together, each as .svg and .png.
+STILLS = ("rig", "depth_panorama", "noise")
 REPROJECTED = f"{DATASET}/{{reprojection}}"
 
 
@@ -63,8 +65,11 @@ localrules:
     costs,
     export_reprojection_to_instant_ngp,
     export_views_to_instant_ngp,
+    figures,
+    index,
     lens_map,
     lightfield,
+    page,
     panorama,
     panorama_lightfield,
     plan,
@@ -176,7 +181,33 @@ def published(dataset):
 def pictures(dataset):
     """Return the pictures of a dataset's report."""
     folder = f"{RESULTS}/{dataset.scene}/{dataset.rig}/report"
-    return [f"{folder}/contact_sheet.png", f"{folder}/panorama.png"]
+    stills = [f"{folder}/{name}{suffix}" for name in STILLS for suffix in (".svg", ".png")]
+    return [f"{folder}/contact_sheet.png", f"{folder}/panorama.png", *stills]
+
+
+def page_of(dataset):
+    """Return the page that shows a dataset."""
+    return f"{RESULTS}/{dataset.scene}/{dataset.rig}/report/index.html"
+
+
+def measurements(wildcards):
+    """Return the files of those measurements of interest to a dataset that have been made.
+
+    They are no input, for a page must never start a measurement: that takes an hour.
+    """
+    name = dataset_of(wildcards).name
+    stems = ["reprojection", "stability", f"error_vs_time/{name}"]
+    files = [
+        Path(RESULTS, "benchmarks", f"{stem}{suffix}")
+        for stem in stems
+        for suffix in (".csv", ".json", ".svg", ".png")
+    ]
+    return [file for file in files if file.exists()]
+
+
+def measurement_times(wildcards):
+    """Return when those files were made: a page is made anew when this changes."""
+    return [file.stat().st_mtime_ns for file in measurements(wildcards)]
 
 
 def dataset_files(dataset):
@@ -192,6 +223,7 @@ def dataset_files(dataset):
         *published(dataset),
         *pictures(dataset),
         f"{folder}/report/costs.json",
+        page_of(dataset),
         *all_records(dataset),
     ]
 

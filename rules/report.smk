@@ -101,3 +101,81 @@ rule contact_sheet:
     shell:
         "python scripts/contact_sheet.py --lightfield {input.lightfield} --views {params.views}"
         " --output {output} 2>&1 | tee {log}"
+
+
+rule figures:
+    input:
+        lightfield=f"{DATASET}/lightfield.json",
+        panorama=f"{PANORAMA}/exr/view_0000f.exr",
+    output:
+        [f"{DATASET}/report/{still}.svg" for still in STILLS],
+        [
+            report(
+                f"{DATASET}/report/{still}.png",
+                category="{scene}",
+                subcategory="{rig}",
+                caption=f"../report/{still}.rst",
+            )
+            for still in STILLS
+        ],
+    log:
+        f"{WORK}/logs/{{scene}}/{{rig}}/figures.log",
+    benchmark:
+        f"{WORK}/benchmarks/{{scene}}/{{rig}}/report/figures.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        rig=lambda wildcards: json.dumps(dataset_of(wildcards).cameras),
+        folder=f"{DATASET}/report",
+    message:
+        "Drawing the rig, depth and noise of {wildcards.scene}/{wildcards.rig}"
+    shell:
+        "python scripts/report_figures.py --lightfield {input.lightfield} --rig {params.rig:q}"
+        " --panorama {input.panorama} --output {params.folder} 2>&1 | tee {log}"
+
+
+rule page:
+    input:
+        records=lambda wildcards: all_records(dataset_of(wildcards)),
+        published=lambda wildcards: published(dataset_of(wildcards)),
+        pictures=lambda wildcards: pictures(dataset_of(wildcards)),
+        validation=f"{DATASET}/validation.json",
+        costs=f"{DATASET}/report/costs.json",
+    output:
+        f"{DATASET}/report/index.html",
+    log:
+        f"{WORK}/logs/{{scene}}/{{rig}}/page.log",
+    benchmark:
+        f"{WORK}/benchmarks/{{scene}}/{{rig}}/report/page.tsv"
+    conda:
+        ENVIRONMENT
+    params:
+        dataset=DATASET,
+        rig=lambda wildcards: json.dumps(dataset_of(wildcards).cameras),
+        measurements=measurements,
+        # Not in the command: when a measurement was made anew, so is the page.
+        measured=measurement_times,
+    message:
+        "Making the page of {wildcards.scene}/{wildcards.rig}"
+    shell:
+        "python scripts/report_html.py --dataset {params.dataset}"
+        " --name {wildcards.scene}/{wildcards.rig} --rig {params.rig:q}"
+        " --measurements {params.measurements} --output {output} 2>&1 | tee {log}"
+
+
+rule index:
+    input:
+        [page_of(dataset) for dataset in CHOSEN],
+    output:
+        f"{RESULTS}/index.html",
+    log:
+        f"{WORK}/logs/index.log",
+    conda:
+        ENVIRONMENT
+    params:
+        results=RESULTS,
+    message:
+        "Making the page of all datasets"
+    shell:
+        "python scripts/report_index.py --results {params.results} --output {output} 2>&1"
+        " | tee {log}"

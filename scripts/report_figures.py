@@ -14,7 +14,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.ticker import FuncFormatter
 
-from lightfield import images, noise, pictures
+from lightfield import images, noise
 from lightfield.cli import run
 from lightfield.files import read_json
 from lightfield.plots import BLUE, GREY, plot
@@ -38,9 +38,11 @@ def main() -> None:
     frames = read_json(arguments.lightfield)["frames"]
     poses = np.array([frame["world_matrix"] for frame in frames])
     draw_rig(arguments.output / "rig", arguments.rig, poses)
-    panorama = images.read_image(arguments.panorama, "RGBZ").channels
-    draw_depth(arguments.output / "depth_panorama", panorama["Z"].astype(np.float32))
+    panorama = images.read_image(arguments.panorama).channels
     colour = np.stack([panorama[name] for name in "RGB"], axis=-1, dtype=np.float32)
+    # Without depth the map is grey: the workflow's plan names the same pictures for every dataset.
+    depth = panorama.get("Z", np.full(colour.shape[:2], np.nan))
+    draw_depth(arguments.output / "depth_panorama", depth.astype(np.float32))
     draw_noise(arguments.output / "noise", colour)
 
 
@@ -87,9 +89,7 @@ def draw_axes(axes: Any, screen: np.ndarray, drawn: np.ndarray, extent: float) -
     corner = drawn.min(axis=0) - 0.12 * extent
     for name, axis in zip("XYZ", screen, strict=True):
         tip = corner + length * axis
-        axes.annotate(
-            "", tip, corner, arrowprops={"arrowstyle": "->", "color": GREY, "shrinkA": 0}
-        )
+        axes.annotate("", tip, corner, arrowprops={"arrowstyle": "->", "color": GREY, "shrinkA": 0})
         axes.annotate(
             name, corner + 1.22 * (tip - corner), ha="center", va="center", color="#333333"
         )
@@ -137,7 +137,9 @@ def draw_map(
         axes.set_xticks(range(-180, 181, 60))
         axes.set_yticks(range(-90, 91, 30))
         axes.grid(False)
-        bar = axes.figure.colorbar(picture, ax=axes, orientation="horizontal", shrink=0.73, aspect=40)
+        bar = axes.figure.colorbar(
+            picture, ax=axes, orientation="horizontal", shrink=0.73, aspect=40
+        )
         bar.set_label(f"{label} ({unit}); grey: nothing there")
         shown = FuncFormatter(lambda value, _: f"{value:g}")
         bar.ax.xaxis.set_major_formatter(shown)

@@ -6,7 +6,6 @@ What is not there (measurements that were not asked for, depth, costs) is told, 
 
 import argparse
 import json
-import math
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
@@ -18,13 +17,6 @@ from lightfield.errors import UserError
 from lightfield.files import read_json
 from lightfield.validation import IMAGES, REPORT
 
-LENSES = {
-    "FISHEYE_EQUIDISTANT": "equidistant fisheye",
-    "FISHEYE_EQUISOLID": "equisolid fisheye",
-    "FISHEYE_LENS_POLYNOMIAL": "polynomial fisheye",
-    "EQUIRECTANGULAR": "equirectangular panorama",
-    "PERSP": "rectilinear",
-}
 PICTURES = ("panorama", "contact_sheet")
 PLOTS = ("rig", "depth_panorama", "noise")
 WIDEST = 1600
@@ -65,7 +57,7 @@ def main() -> None:
         "page.html.j2",
         name=arguments.name,
         home="../" * (arguments.name.count("/") + 2) + "index.html",
-        facts=facts(folder, lightfield, arguments.rig, lens_text(camera)),
+        facts=facts(folder, lightfield, arguments.rig, page.lens_text(camera)),
         views=len(frames),
         pictures={stem: page.photo(report / f"{stem}.png", WIDEST) for stem in PICTURES},
         plots={stem: page.plot(report / stem) for stem in PLOTS},
@@ -80,17 +72,6 @@ def main() -> None:
         ),
         scene=name,
     )
-
-
-def lens_text(camera: Mapping[str, Any]) -> str:
-    """Return a lens in words: its projection and field of view."""
-    kind = camera.get("panorama_type") if camera.get("type") == "PANO" else camera.get("type")
-    text = LENSES.get(str(kind), str(kind).replace("_", " ").lower())
-    if "fisheye_fov" in camera:
-        return f"{text}, {math.degrees(camera['fisheye_fov']):.4g}°"
-    if "focal_length" in camera:
-        return f"{text}, {camera['focal_length']:.4g} mm"
-    return text
 
 
 def facts(
@@ -146,8 +127,8 @@ def files(folder: Path, lightfield: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
     for inner in sorted(folder.glob("*/lightfield.json")):
         name = inner.parent.name
-        lens = lens_text(read_json(inner).get("camera", {}))
-        found.append((f"{name}/", f"the same views through another lens ({lens}), as SILVR's"))
+        lens = page.lens_text(read_json(inner).get("camera", {}))
+        found.append((f"{name}/", f"the same views through another lens: {lens}"))
     return [
         *found,
         ("validation.json", "what was checked, and what came out"),

@@ -117,12 +117,12 @@ def directions(row: Row, tilt: float, columns: int) -> Array:
     lift = math.radians(tilt)
     if row.kind == "line":
         tangents = (2 * middle - 1) * math.tan(WIDEST)
-        plane: Array = math.cos(lift) * ahead + math.sin(lift) * up
-        return tangents[:, np.newaxis] * side + plane
+        rays: Array = tangents[:, np.newaxis] * side + math.cos(lift) * ahead + math.sin(lift) * up
+        return rays
     azimuth = (2 * middle - 1) * math.pi
     level = np.sin(azimuth)[:, np.newaxis] * side + np.cos(azimuth)[:, np.newaxis] * ahead
-    around: Array = math.cos(lift) * level + math.sin(lift) * up
-    return around
+    rays = math.cos(lift) * level + math.sin(lift) * up
+    return rays
 
 
 def sample(

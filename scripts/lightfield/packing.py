@@ -41,7 +41,8 @@ def pack_light(colour: Array, limits: tuple[float, float]) -> NDArray[np.uint8]:
     with np.errstate(divide="ignore", invalid="ignore"):
         steps = (np.log2(colour) - low) / (high - low) * 254
     codes = np.clip(np.round(np.nan_to_num(steps, nan=0.0)) + 1, 1, 255)
-    return np.where(colour > 0, codes, 0).astype(np.uint8)
+    packed: NDArray[np.uint8] = np.where(colour > 0, codes, 0).astype(np.uint8)
+    return packed
 
 
 def depth_range(depth: Array) -> tuple[float, float]:
@@ -67,8 +68,10 @@ def pack_depth(depth: Array, limits: tuple[float, float]) -> NDArray[np.uint8]:
     steps = np.nan_to_num(steps, nan=0.0, posinf=0.0, neginf=0.0)
     codes = np.clip(np.round(steps) + 1, 1, MISS - 1)
     codes = np.where(np.isposinf(depth), MISS, np.where(np.isnan(depth), NO_DEPTH, codes))
-    words = codes.astype(np.uint16) * 16
-    return np.stack([words >> 8, words & 255, np.zeros_like(words)], axis=-1).astype(np.uint8)
+    words = (codes * 16).astype(np.uint16)
+    packed = np.zeros((*words.shape, 3), np.uint8)
+    packed[..., 0], packed[..., 1] = words >> 8, words & 255
+    return packed
 
 
 def webp(pixels: NDArray[np.uint8], quality: int | None = None) -> str:

@@ -2,6 +2,7 @@
 
 import io
 import math
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,13 @@ from lightfield.packing import data_uri
 
 TEMPLATES = Path(__file__).resolve().parents[1] / "report"
 
+LENSES = {
+    "FISHEYE_EQUIDISTANT": "equidistant fisheye",
+    "FISHEYE_EQUISOLID": "equisolid fisheye",
+    "FISHEYE_LENS_POLYNOMIAL": "polynomial fisheye",
+    "EQUIRECTANGULAR": "equirectangular panorama",
+    "PERSP": "rectilinear",
+}
 # A plot stays sharp as SVG; one of thousands of points is smaller as PNG.
 LARGEST_SVG = 300_000
 PHOTO_QUALITY = 84
@@ -29,7 +37,7 @@ def write(output: Path, template: str, **content: Any) -> None:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": number, "cell": cell, "measure": measure}
+    environment.filters |= {"number": number, "cell": cell, "measure": measure, "named": title}
     # These are the project's own files, not somebody's text.
     css, js = (Markup((TEMPLATES / name).read_text("utf-8")) for name in ("page.css", "page.js"))
     text = environment.get_template(template).render(css=css, js=js, **content)
@@ -60,6 +68,17 @@ def plot(stem: Path) -> str | None:
     if svg.is_file() and (svg.stat().st_size <= LARGEST_SVG or not png.is_file()):
         return data_uri(svg.read_bytes(), "image/svg+xml")
     return data_uri(png.read_bytes(), "image/png") if png.is_file() else None
+
+
+def lens_text(camera: Mapping[str, Any]) -> str:
+    """Return a lens in words: its projection and field of view."""
+    kind = camera.get("panorama_type") if camera.get("type") == "PANO" else camera.get("type")
+    text = LENSES.get(str(kind), str(kind).replace("_", " ").lower())
+    if "fisheye_fov" in camera:
+        return f"{text}, {math.degrees(camera['fisheye_fov']):.4g}°"
+    if "focal_length" in camera:
+        return f"{text}, {camera['focal_length']:.4g} mm"
+    return text
 
 
 def bytes_(value: float) -> str:
@@ -111,17 +130,29 @@ def cell(value: Any) -> str:
         return str(value)
 
 
+UNITS: dict[str, Callable[[float], str]] = {
+    "seconds": seconds,
+    "bytes": bytes_,
+    "kwh": lambda value: f"{value:.3g} kWh",
+    "gigabytes": lambda value: bytes_(1e9 * value),
+    "hours": lambda value: f"{value:.3g} h",
+    "watts": lambda value: f"{value:g} W",
+}
+
+
 def measure(value: Any, name: str) -> str:
-    """Return a cell of what is called ``name`` in the unit that the name ends in."""
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        for ending, written in (
-            ("seconds", seconds),
-            ("bytes", bytes_),
-            ("kwh", lambda v: f"{v:.3g} kWh"),
-        ):
-            if name.endswith(ending):
-                return written(value)
-    return cell(value)
+    """Return a cell of what is called ``name``, in the unit that the name ends in."""
+    unit = UNITS.get(name.rpartition("_")[2])
+    plain = isinstance(value, int | float) and not isinstance(value, bool)
+    return unit(value) if unit and plain else cell(value)
+
+
+def title(name: str) -> str:
+    """Return a key as words, without the unit that `measure` writes with its value."""
+    words = name.split("_")
+    if len(words) > 1 and words[-1] in UNITS and words[-1] != "hours":
+        words.pop()
+    return {"bytes": "size", "gigabytes": "size", "watts": "power"}.get(name, " ".join(words))
 
 
 def _superscript(value: int) -> str:

@@ -30,7 +30,7 @@ class Measurement:
     plot: str | None
     tables: dict[str, Table] = field(default_factory=dict)
     whole: dict[str, Table] = field(default_factory=dict)
-    facts: dict[str, Any] = field(default_factory=dict)
+    facts: Sequence[tuple[str, str]] = ()
 
 
 def validation(path: Path) -> dict[str, Any] | None:
@@ -111,7 +111,7 @@ def stability(files: Sequence[Path]) -> Measurement | None:
             ),
         },
         {f"All {len(rows)} cases": Table(columns, [list(row.values()) for row in rows])},
-        {"cases": len(rows), "failed": failed},
+        [("cases", str(len(rows))), ("outside their bound", str(failed))],
     )
 
 
@@ -124,22 +124,60 @@ def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
     tables, facts = _tables(read_json(path)) if path else ({}, {})
     short = {name: table for name, table in tables.items() if len(table.rows) <= 16}
     whole = {name: table for name, table in tables.items() if name not in short}
-    return Measurement(page.plot(stem.with_suffix("")), short, whole, facts)
+    return Measurement(page.plot(stem.with_suffix("")), short, whole, _with_units(facts, ""))
 
 
 def costs(path: Path) -> dict[str, Any] | None:
-    """Return the content of costs.json, or None where no costs were counted."""
+    """Return what costs.json tells, or None where no costs were counted.
+
+    ``tables`` by title; ``facts`` and ``full`` (of the dataset at full size, extrapolated) as
+    pairs of title and text; ``notes`` and ``basis``, how they were counted.
+    """
     if not path.is_file():
         return None
     content = read_json(path)
     if not isinstance(content, Mapping):
         raise UserError(f"{path}: must be a mapping")
-    tables, facts = _tables(content)
-    return {"tables": tables, "facts": facts}
+    tables, facts = _tables(
+        {key: value for key, value in content.items() if key != "extrapolation"}
+    )
+    full = content.get("extrapolation") or {}
+    currency = str(content.get("currency") or "")
+    return {
+        "tables": tables,
+        "facts": _with_units(facts, currency),
+        "notes": _sentences(facts),
+        "full": _with_units(full, currency),
+        "basis": _sentences(full),
+    }
+
+
+def _with_units(facts: Mapping[str, Any], currency: str) -> list[tuple[str, str]]:
+    """Return titles and figures in the units that their names end in, each ± its uncertainty."""
+    told = []
+    for name, value in facts.items():
+        if name.endswith("_uncertainty") or name == "currency" or _is_sentence(value):
+            continue
+        text = page.measure(value, name)
+        uncertain = facts.get(f"{name}_uncertainty")
+        if uncertain is not None:
+            text = f"{text} ± {page.measure(uncertain, name)}"
+        if "price" in name:
+            text = f"{text} {currency}"
+        told.append((page.title(name), text))
+    return told
+
+
+def _sentences(facts: Mapping[str, Any]) -> list[str]:
+    return [value for value in facts.values() if _is_sentence(value)]
+
+
+def _is_sentence(value: Any) -> bool:
+    return isinstance(value, str) and len(value) > 40
 
 
 def _tables(content: Any) -> tuple[dict[str, Table], dict[str, Any]]:
-    """Split a JSON mapping into tables, its lists of mappings and mappings of them, and the rest."""
+    """Split a JSON mapping into tables (lists of mappings, mappings of mappings) and the rest."""
     if not isinstance(content, Mapping):
         return {}, {}
     tables, facts = {}, {}

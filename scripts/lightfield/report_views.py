@@ -75,7 +75,8 @@ def collect(folder: Path, lightfield: Mapping[str, Any], rig: Mapping[str, Any])
 
     loaded = [read(folder / f"{frames[i]['name']}.exr", small, meaning) for i in shown]
     light = np.stack([view.colour for view in loaded])
-    depths = np.stack([view.depth for view in loaded]) if meaning else None
+    found = [view.depth for view in loaded if view.depth is not None]
+    depths = np.stack(found) if found else None
     limits = light_range(light)
     packed_views = []
     outside = _outside(small)
@@ -110,6 +111,8 @@ def collect(folder: Path, lightfield: Mapping[str, Any], rig: Mapping[str, Any])
         "exposure": round(pictures.exposure_for(light), 2),
         "depth": _depth_scale(depths, reach, meaning),
         "embedded": packed_views,
+        # A view that looks level and ahead shows more of a scene than the first one may.
+        "first": int(np.argmin(np.round(matrices[shown, 1, 2], 6))),
         "row": None,
     }
     kept: list[int] = []

@@ -292,7 +292,7 @@ function startViewer() {
       step(keys[event.key]);
     });
   }
-  open(0);
+  open(DATA.first);
 }
 
 function startDepthScale() {
@@ -338,7 +338,7 @@ function projection(width, height) {
   const ahead = [-sine * level, cosine * level, -rise];
   const up = [-sine * rise, cosine * rise, level];
   const distance = (4 * rig.extent) / rig.zoom;
-  const scale = 1.7 * Math.min(width, height);
+  const scale = 2.2 * Math.min(width, height);
   return (point) => {
     const way = minus(point, rig.center);
     const depth = dot(way, ahead) + distance;
@@ -374,7 +374,7 @@ function drawAxes(context, project, height) {
     const unit = [0, 0, 0];
     unit[axis] = 0.01 * rig.extent;
     const tip = project(along(rig.center, unit, 1));
-    const length = 28 / ((0.01 * 1.7 * Math.min(rig.canvas.clientWidth, height)) / (4 / rig.zoom));
+    const length = 28 / ((0.01 * 2.2 * Math.min(rig.canvas.clientWidth, height)) / (4 / rig.zoom));
     const [x, y] = [(tip[0] - origin[0]) * length, (tip[1] - origin[1]) * length];
     context.strokeStyle = context.fillStyle = themed("--soft");
     context.beginPath();
@@ -554,7 +554,7 @@ const drawLines = onceAFrame(() => {
   const [width, height] = [lines.canvas.clientWidth, lines.canvas.clientHeight];
   context.imageSmoothingEnabled = false;
   context.drawImage(picture, 0, 0, width, height);
-  const track = lines.pointed ? trace(...lines.pointed) : null;
+  const track = lines.pointed && DATA.depth ? trace(...lines.pointed) : null;
   if (!track) return;
   for (const [colour, thickness] of [["#000000", 4], ["#ffffff", 1.5]]) {
     context.strokeStyle = colour;
@@ -597,7 +597,7 @@ function pointAtLines(event) {
   const frame = lines.canvas.getBoundingClientRect();
   const x = clamp(Math.floor(((event.clientX - frame.left) / frame.width) * columns), 0, columns - 1);
   const y = clamp(Math.floor(((event.clientY - frame.top) / frame.height) * count), 0, count - 1);
-  lines.pointed = DATA.depth ? [x, y] : null;
+  lines.pointed = [x, y];
   rig.hover = DATA.row.rows[y];
   const line = DATA.row.kind === "line";
   const degrees = line ? (Math.atan(angleAt(x) * DATA.row.widest) * 180) / Math.PI : angleAt(x) * 180;
@@ -642,7 +642,7 @@ async function startLines() {
   lines.canvas.addEventListener("pointermove", pointAtLines);
   lines.canvas.addEventListener("pointerdown", (event) => {
     pointAtLines(event);
-    openView(DATA.row.rows[lines.pointed ? lines.pointed[1] : 0]);
+    if (lines.pointed) openView(DATA.row.rows[lines.pointed[1]]);
   });
   lines.canvas.addEventListener("pointerleave", () => {
     lines.pointed = null;

@@ -1,0 +1,49 @@
+"""Make the page that leads to the pages of all datasets in a results folder.
+
+Like them it is one file, thumbnails and all. It holds every dataset whose page is there.
+"""
+
+import argparse
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from lightfield import page, report_tables
+from lightfield.cli import run
+from lightfield.files import read_json
+from lightfield.validation import REPORT
+
+THUMBNAIL = 480
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--results", required=True, type=Path, help="folder of the datasets")
+    parser.add_argument("--output", required=True, type=Path, help="HTML file to write in it")
+    arguments = parser.parse_args()
+    pages = sorted(arguments.results.glob(f"*/**/{REPORT}/index.html"))
+    datasets = [entry(arguments.results, path) for path in pages]
+    page.write(arguments.output, "index.html.j2", datasets=datasets)
+
+
+def entry(results: Path, path: Path) -> dict[str, Any]:
+    """Return what the index tells of the dataset that has its page at ``path``."""
+    folder = path.parents[1]
+    lightfield = read_json(folder / "lightfield.json")
+    scene, *rig = folder.relative_to(results).parts
+    validation = report_tables.validation(folder / "validation.json")
+    width, height = lightfield["resolution"]
+    return {
+        "scene": scene,
+        "rig": "/".join(rig),
+        "link": quote(path.relative_to(results).as_posix()),
+        "views": len(lightfield["frames"]),
+        "resolution": f"{width} × {height}",
+        "lens": page.lens_text(lightfield["camera"]),
+        "valid": validation["valid"] if validation else None,
+        "picture": page.photo(path.parent / "panorama.png", THUMBNAIL),
+    }
+
+
+if __name__ == "__main__":
+    run(main)
