@@ -126,13 +126,10 @@ def main() -> None:
     lightfield = read_json(arguments.lightfield)
     render = lightfield["render"]
     target = render["target_error"]
-    # Trials say all of this themselves.
-    plain = {"samples": 1, **trials.PLAIN}
-    kept = {key: value for key, value in render.items() if key not in ("most_samples", "denoise")}
     maker = trials.Trials(
         arguments.blend,
         arguments.inventory,
-        {**lightfield, "render": {**kept, **plain}},
+        lightfield,
         arguments.size,
         arguments.device,
         arguments.threads,

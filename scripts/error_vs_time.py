@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield import metrics, plots, trials
+from lightfield.calibration import calibrated
 from lightfield.cli import run
 from lightfield.files import atomic_path, read_json, write_json
 from lightfield.progress import Progress
@@ -62,6 +63,9 @@ def main() -> None:
     parser.add_argument("--inventory", required=True, type=Path, help="what the scene contains")
     parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
     parser.add_argument(
+        "--calibration", type=Path, help="what scripts/calibrate.py chose for a target error"
+    )
+    parser.add_argument(
         "--views",
         type=int,
         default=2,
@@ -84,6 +88,9 @@ def main() -> None:
     arguments = parser.parse_args()
 
     lightfield = read_json(arguments.lightfield)
+    if arguments.calibration:
+        render = calibrated(lightfield["render"], read_json(arguments.calibration))
+        lightfield["render"] = render
     maker = trials.Trials(
         arguments.blend,
         arguments.inventory,

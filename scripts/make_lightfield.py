@@ -21,8 +21,8 @@ def main() -> None:
     parser.add_argument("--scene", required=True, help="name of a file in configs/scenes/")
     parser.add_argument(
         "--rig",
-        required=True,
-        help="name of a rig in the scene YAML, with /f00001 behind it for one of its frames",
+        help="name of a rig in the scene YAML, with /f00001 behind it for one of its frames "
+        "(default: the first)",
     )
     parser.add_argument(
         "--limits",
@@ -45,7 +45,7 @@ def main() -> None:
     arguments = parser.parse_args()
 
     datasets = config.scene_datasets(arguments.scene, "full", arguments.limits)
-    dataset = next((d for d in datasets if d.rig == arguments.rig), None)
+    dataset = next((d for d in datasets if arguments.rig in (None, d.rig)), None)
     if dataset is None:
         known = ", ".join(d.rig for d in datasets)
         raise UserError(f"--rig: is {arguments.rig!r}; must be one of {known}")

@@ -9,6 +9,7 @@ import os
 import re
 import sys
 import tempfile
+import time
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -39,15 +40,16 @@ class Raw:
 
     ``colour`` is (height, width, 3), scene-linear; ``depth`` is (height, width) in metres, inf
     where nothing was hit: Z-depth for a perspective camera and distance for any other, or None if
-    it was not asked for. ``samples`` is (height, width), how many each pixel took, or None unless
-    `count_samples` asked for it. ``render_seconds`` and ``synchronization_seconds`` are Cycles'
-    own.
+    it was not asked for. ``render_seconds`` and ``synchronization_seconds`` are Cycles' own.
+    ``samples``, (height, width), is how many each pixel took, and ``worked_seconds`` the processor
+    time, of all threads, of those ``render_seconds``; None unless `watch_samples` asked for them.
     """
 
     colour: Array
     depth: Array | None
     samples: Array | None
     render_seconds: float
+    worked_seconds: float | None
     synchronization_seconds: float
 
 
@@ -152,21 +154,21 @@ def set_sampling(settings: Mapping[str, Any]) -> None:
         cycles.use_guiding = settings["guiding"]
 
 
-def count_samples() -> None:
-    """Let every view that follows say how many samples each of its pixels took."""
+def watch_samples() -> None:
+    """Let every view that follows say how many samples its pixels took, and the work they were."""
     _first_layer(bpy.context.scene).cycles.pass_debug_sample_count = True
-    bpy.app.handlers.render_stats.append(_note_samples)
+    bpy.app.handlers.render_stats.append(_watch)
 
 
-# Of the view that is being rendered; the pass holds only each pixel's part of these.
-_samples_rendered = 0
+# What Cycles tells in its progress about the view that is being rendered, as `… | Sample 80/256`
+# and at last `Finished`: when, in processor seconds, and how many samples.
+_told: list[tuple[float, int]] = []
 
 
-def _note_samples(text: str, _: Any) -> None:
-    """Keep the count that Cycles tells in its progress: ``… | Sample 80/256``."""
-    global _samples_rendered
-    if told := re.search(r"Sample (\d+)/", text):
-        _samples_rendered = max(_samples_rendered, int(told[1]))
+def _watch(text: str, _: Any) -> None:
+    sample = re.search(r"Sample (\d+)/", text)
+    if sample or text.endswith("Finished"):
+        _told.append((time.process_time(), int(sample[1]) if sample else 0))
 
 
 def removable_objects() -> list[str]:
@@ -309,8 +311,7 @@ def render_view(world_matrix: Array, seed: int) -> Raw:
     scene = bpy.context.scene
     scene.camera.matrix_world = mathutils.Matrix(np.asarray(world_matrix).tolist())
     scene.cycles.seed = seed
-    global _samples_rendered
-    _samples_rendered = 0
+    _told.clear()
     with tempfile.TemporaryDirectory(prefix="plenoforge-", dir=_fast_folder()) as folder:
         path = Path(folder) / "view.exr"
         scene.render.filepath = str(path)
@@ -326,7 +327,9 @@ def render_view(world_matrix: Array, seed: int) -> Raw:
     return Raw(
         colour=colour,
         depth=depth,
-        samples=None if counts is None else np.rint(counts * _samples_rendered),
+        # The pass holds each pixel's part of all samples.
+        samples=None if counts is None else np.rint(counts * max(count for _, count in _told)),
+        worked_seconds=_told[-1][0] - _told[0][0] if _told else None,
         render_seconds=_seconds(image.attributes[f"cycles.{layer}.render_time"]),
         synchronization_seconds=_seconds(image.attributes[f"cycles.{layer}.synchronization_time"]),
     )

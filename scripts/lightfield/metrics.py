@@ -3,16 +3,18 @@
 The truth is a reference: the mean of n renders that differ in nothing but their seeds. Every metric
 counts only pixels that the lens has a ray for.
 
-The one that is minimised is the relative mean squared error (Rousselle, Knaus and Zwicker 2011,
-section 5), a plain mean over pixels and channels of (x − r)² / (r² + ε), both images exposed so
-that the reference's geometric mean luminance is middle grey, ε = 0.01. It is not robust: a firefly
-counts in full. That is what makes its expectation exactly proportional to 1/N for N independent
-samples; what trims or bounds it does not decrease so.
+The one that is minimised is the relative mean squared error, (x − r)² / (r² + ε), the mean over
+channels and over all pixels but the worst thousandth (Rousselle, Knaus and Zwicker 2011, section
+5). Both images are exposed so that the reference's geometric mean luminance is middle grey, and ε
+is 0.01. The thousandth makes it robust: a few fireflies would otherwise decide it, so that it would
+take thousands of views to tell two ways to render apart. Its expectation then is only nearly
+proportional to 1/N for N samples, as the whole mean's is exactly if the samples are independent.
 
-An independent reference adds its own variance to that expectation and nothing else, so subtracting
-an estimate of it, from how its n renders differ, leaves the image's own error without bias.
+An independent reference adds its own variance to every expected square and nothing else, so
+subtracting an estimate of it, from how its n renders differ, leaves the image's own error.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -29,6 +31,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 EPSILON = 0.01
+# The part of the pixels that is left out, those with the largest errors.
+OUTLIERS = 0.001
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,8 @@ class Reference:
     @property
     def own_error(self) -> float:
         """Expected relative mean squared error of the reference itself."""
-        return float((self.variance[self.mask] * self.weights).mean())
+        own = (self.variance[self.mask] * self.weights).mean(axis=-1)
+        return float(own[_inliers(own)].mean())
 
 
 def make_reference(
@@ -126,7 +131,15 @@ def compare(
 def relative_mse(colour: NDArray[np.float32], reference: Reference) -> float:
     """Return the relative mean squared error, without what the reference itself adds to it."""
     squares = (colour.astype(np.float64) - reference.colour)[reference.mask] ** 2
-    return float((squares * reference.weights).mean()) - reference.own_error
+    found = (squares * reference.weights).mean(axis=-1)
+    own = (reference.variance[reference.mask] * reference.weights).mean(axis=-1)
+    kept = _inliers(found)
+    return float((found - own)[kept].mean())
+
+
+def _inliers(errors: Array) -> NDArray[np.int64]:
+    """Return the indices of all but the worst thousandth of some pixels, in rising order."""
+    return np.argsort(errors, kind="stable")[: errors.size - math.ceil(OUTLIERS * errors.size)]
 
 
 def developed(colour: NDArray[Any], reference: Reference) -> Array:
@@ -214,15 +227,25 @@ def disagreement(
     gain = 4.0 ** references[0].exposure
     weights = gain / (gain * truths[0] ** 2 + EPSILON)
     own = sum(
-        float((r.variance.reshape(-1, 3)[where] * weights).mean())
+        r.variance.reshape(-1, 3)[where] * weights
         for r, where in zip(references, seen, strict=True)
     )
+    both = (errors[0] ** 2 + errors[1] ** 2) * weights
+    # The same pixels are left out of every mean.
+    kept = _inliers(both.mean(axis=-1))
     apart, between = errors[0] - errors[1], truths[0] - truths[1]
-    added = float((apart**2 * weights).mean()) - own
-    both = float(((errors[0] ** 2 + errors[1] ** 2) * weights).mean()) - own
+    total, floor, added, sum_ = (
+        float(value[kept].mean())
+        for value in (
+            (apart + between) ** 2 * weights,
+            between**2 * weights - own,
+            apart**2 * weights - own,
+            both - own,
+        )
+    )
     return Disagreement(
-        total=float(np.sqrt(((apart + between) ** 2 * weights).mean())),
-        floor=float(np.sqrt(max(float((between**2 * weights).mean()) - own, 0.0))),
-        added=float(np.sqrt(max(added, 0.0))),
-        share=added / both,
+        total=math.sqrt(total),
+        floor=math.sqrt(max(floor, 0.0)),
+        added=math.sqrt(max(added, 0.0)),
+        share=added / sum_,
     )

@@ -4,7 +4,6 @@ Every render is kept in a folder, under a key of all that it follows from, with 
 took, so that what is interrupted goes on where it was and what is repeated costs nothing.
 """
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield import images, keys, lenses
+from lightfield.calibration import UNCALIBRATED
 from lightfield.consistency import Camera
 from lightfield.files import read_json
 from lightfield.metrics import Mask, Reference, make_reference
@@ -34,10 +34,10 @@ DEVICE_ATTRIBUTE = "plenoforge:device"
 class Trial:
     """One render: colour (h, w, 3) scene-linear; depth (h, w) metres as Cycles gives it, or None.
 
-    ``samples`` is the mean number that the pixels of the image circle took. ``seconds`` is Cycles'
-    own render time, synchronization not counted; on processors multiplied by the part of the wall
-    time in which they worked for it, so that other load is not in it and cores add up. ``device``
-    is what Cycles rendered on, CPU or GPU.
+    ``samples`` is the mean number that the pixels of the image circle took. ``seconds`` is the time
+    from Cycles' first sample to its being finished, denoising included and synchronization not: on
+    processors their working time, which other load is not in and in which cores add up, and on a
+    GPU Cycles' own render time. ``device`` is what Cycles rendered on, CPU or GPU.
     """
 
     colour: NDArray[np.float32]
@@ -66,7 +66,9 @@ class Trials:
         lens = lenses.from_lightfield(lightfield)
         scale = min(1.0, size / max(lens.width, lens.height))
         self.lens = lens.resized(*(max(1, round(x * scale)) for x in (lens.width, lens.height)))
-        self.lightfield = {**lightfield, **self.lens.to_lightfield()}
+        # How many samples are taken, and why, is for each trial to say.
+        render = {k: v for k, v in lightfield["render"].items() if k not in UNCALIBRATED}
+        self.lightfield = {**lightfield, **self.lens.to_lightfield(), "render": render}
         rows, columns = np.mgrid[: self.lens.height, : self.lens.width] + 0.5
         self.mask: Mask = np.isfinite(self.lens.rays(columns, rows)).all(axis=-1)
         self._blend, self._inventory = blend, inventory
@@ -111,13 +113,9 @@ class Trials:
             self._start(settings)
         blender.set_sampling(settings)
         pose = np.array(frame["world_matrix"])
-        began, began_cpu = time.perf_counter(), time.process_time()
         raw = blender.render_view(pose, keys.view_seed(settings["seed"], frame["name"]))
-        worked = time.process_time() - began_cpu
-        seconds = raw.render_seconds
-        if self._on == "CPU":
-            seconds *= worked / (time.perf_counter() - began)
-        assert raw.samples is not None
+        assert raw.samples is not None and raw.worked_seconds is not None
+        seconds = raw.worked_seconds if self._on == "CPU" else raw.render_seconds
         channels = {name: raw.colour[:, :, index] for index, name in enumerate("RGB")}
         if raw.depth is not None:
             channels["Z"] = raw.depth
@@ -141,7 +139,7 @@ class Trials:
             blender.remove_objects(left_out["hidden"])
         self._on = blender.set_up_render(settings, self.lightfield, self._device, self._threads)
         blender.leave_out(left_out["left_out"])
-        blender.count_samples()
+        blender.watch_samples()
         # The first render also loads what all others use; it is not timed.
         blender.set_sampling({**settings, "samples": 1, "denoise": True})
         blender.render_view(np.array(self.lightfield["frames"][0]["world_matrix"]), 0)
