@@ -75,6 +75,7 @@ localrules:
     plan,
     reprojected_lightfield,
     rig_tables,
+    status,
 
 
 def dataset_of(wildcards):
@@ -236,6 +237,20 @@ def probes():
     return [
         (f"{scene}/{rig}", len(folders), f"{WORK}/{scene}/{folders[0]}/probe.json")
         for (scene, rig), folders in frames.items()
+    ]
+
+
+def status_words():
+    """Return the words that tell scripts/status.py of each chosen dataset."""
+    return [
+        word
+        for dataset in CHOSEN
+        for word in (
+            "--dataset",
+            f"{dataset.scene}/{dataset.rig}",
+            str(dataset.view_count),
+            ",".join(dataset.reprojections),
+        )
     ]
 
 

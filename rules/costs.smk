@@ -32,3 +32,20 @@ rule costs:
         " --benchmarks {params.benchmarks} --scene-benchmarks {params.scene_benchmarks}"
         " --blend {input.blend:q} --energy {params.energy:q} --full {params.full:q}"
         " {params.reprojections} --output {output} 2>&1 | tee {log}"
+
+
+# Without input and output, so that it can be asked at any time; with --nolock while a build runs.
+rule status:
+    log:
+        f"{WORK}/logs/status.log",
+    conda:
+        ENVIRONMENT
+    params:
+        results=RESULTS,
+        work=WORK,
+        datasets=shlex.join(status_words()),
+    message:
+        "Looking how far the chosen datasets are"
+    shell:
+        "python scripts/status.py --results {params.results} --work {params.work}"
+        " {params.datasets} 2>&1 | tee {log}"
