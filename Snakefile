@@ -4,6 +4,9 @@
 configfile: "config.yaml"
 
 
+report: "report/workflow.rst"
+
+
 include: "rules/common.smk"
 include: "rules/scene.smk"
 include: "rules/rig.smk"
@@ -16,6 +19,7 @@ include: "rules/costs.smk"
 include: "rules/package.smk"
 include: "rules/plan.smk"
 include: "rules/benchmark.smk"
+include: "rules/error.smk"
 
 
 rule all:

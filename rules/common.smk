@@ -32,6 +32,8 @@ DATASETS = {(dataset.scene, dataset.rig): dataset for dataset in [*SMOKE, *CHOSE
 # one pixel, and start-up (bpy, the scene, and Cycles' acceleration structures).
 SECONDS_PER_SAMPLE = 6e-6
 START_UP_SECONDS = 3.0
+# A pixel's samples where a target error is given instead of them: an estimate for planning.
+GUESSED_SAMPLES = 256
 # Start-up is kept under this share of a shard's time.
 START_UP_SHARE = 0.05
 # More shards of one dataset than this only make the plan long: no machine renders them all at once.
@@ -73,6 +75,7 @@ localrules:
     panorama,
     panorama_lightfield,
     plan,
+    probe_cameras,
     reprojected_lightfield,
     rig_tables,
     status,
@@ -86,7 +89,24 @@ def dataset_of(wildcards):
 def view_seconds(dataset):
     """Estimate how long one core path-traces one view."""
     width, height = dataset.cameras["camera"]["resolution"]
-    return width * height * dataset.render["samples"] * SECONDS_PER_SAMPLE
+    return width * height * planned_samples(dataset) * SECONDS_PER_SAMPLE
+
+
+def planned_samples(dataset):
+    """Return a pixel's samples; with a target error a guess, the same before and after calibration.
+
+    Shards follow from it, whose bounds must follow from the configuration alone.
+    """
+    limit = dataset.render.get("most_samples", GUESSED_SAMPLES)
+    return dataset.render.get("samples", min(limit, GUESSED_SAMPLES))
+
+
+def expected_samples(dataset):
+    """Return a pixel's samples as well as they are known: as the calibration has it, if it is."""
+    record = Path(WORK, dataset.scene, "calibration.json")
+    if "target_error" in dataset.render and record.exists():
+        return json.loads(record.read_text())["cost_samples"]
+    return planned_samples(dataset)
 
 
 def shards(dataset):
@@ -182,7 +202,9 @@ def published(dataset):
 def pictures(dataset):
     """Return the pictures of a dataset's report."""
     folder = f"{RESULTS}/{dataset.scene}/{dataset.rig}/report"
-    stills = [f"{folder}/{name}{suffix}" for name in STILLS for suffix in (".svg", ".png")]
+    stills = [
+        f"{folder}/{name}{suffix}" for name in STILLS for suffix in (".svg", ".png")
+    ]
     return [f"{folder}/contact_sheet.png", f"{folder}/panorama.png", *stills]
 
 
@@ -275,14 +297,58 @@ def source_of(name):
 
 def fingerprint(wildcards):
     """Return what changes when a builder does; a user's .blend is an input, which is checked."""
-    source = dataset_of(wildcards).source
+    return fingerprint_of(dataset_of(wildcards))
+
+
+def fingerprint_of(dataset):
+    """Return the fingerprint of a dataset, as `fingerprint` does."""
+    source = dataset.source
     return scene_fingerprint(source) if "builder" in source else None
+
+
+def scene_name(wildcards):
+    """Return the scene YAML's name that `scene` means: it may have a preset's name behind it."""
+    known = {dataset.scene: dataset.name for dataset in DATASETS.values()}
+    return known.get(wildcards.scene, wildcards.scene)
+
+
+def scene_limits(wildcards):
+    """Return the limits of `scene`; without a preset's name it is at full size."""
+    return LIMITS.get(wildcards.scene, {})
+
+
+def first_dataset(wildcards):
+    """Return the dataset of a scene's first rig, whose views are its probes."""
+    name = scene_name(wildcards)
+    preset = "full" if wildcards.scene == name else SETTINGS["preset"]
+    return scene_datasets(name, preset, scene_limits(wildcards))[0]
+
+
+def calibration_of(dataset):
+    """Return the record of what was chosen for a scene's target error; none is needed without."""
+    if "target_error" not in dataset.render:
+        return []
+    return f"{WORK}/{dataset.scene}/calibration.json"
+
+
+def calibration(wildcards):
+    """Return the record of a dataset's calibration, as `calibration_of` does."""
+    return calibration_of(dataset_of(wildcards))
+
+
+def calibration_words(wildcards, input):
+    """Return the words that tell a program of a calibration, if there is one."""
+    return f"--calibration {input.calibration}" if input.calibration else ""
 
 
 def shard_minutes(wildcards):
     """Allow a shard several times its estimated time, and never less than half an hour."""
+    dataset = dataset_of(wildcards)
     count = int(wildcards.end) - int(wildcards.first)
-    return 30 + math.ceil(5 * count * view_seconds(dataset_of(wildcards)) / 60)
+    seconds = (
+        view_seconds(dataset) * expected_samples(dataset) / planned_samples(dataset)
+    )
+    return 30 + math.ceil(5 * count * seconds / 60)
 
 
 def reprojection_of(wildcards):

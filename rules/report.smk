@@ -4,6 +4,7 @@
 rule panorama_lightfield:
     input:
         check=scene_check,
+        calibration=calibration,
     output:
         f"{PANORAMA}/lightfield.json",
     log:
@@ -16,6 +17,7 @@ rule panorama_lightfield:
         name=lambda wildcards: dataset_of(wildcards).name,
         limits=lambda wildcards: json.dumps(LIMITS[wildcards.scene]),
         width=panorama_width,
+        calibration=calibration_words,
         render=lambda wildcards: dataset_of(wildcards).render,
         center=lambda wildcards: dataset_of(wildcards).cameras["center"],
         fingerprint=fingerprint,
@@ -23,7 +25,8 @@ rule panorama_lightfield:
         "Placing the panorama of {wildcards.scene}/{wildcards.rig}"
     shell:
         "python scripts/make_lightfield.py --scene {params.name} --rig {wildcards.rig}"
-        " --limits {params.limits:q} --panorama {params.width} --output {output} 2>&1 | tee {log}"
+        " --limits {params.limits:q} --panorama {params.width} {params.calibration}"
+        " --output {output} 2>&1 | tee {log}"
 
 
 rule render_panorama:

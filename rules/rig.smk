@@ -4,6 +4,7 @@
 rule lightfield:
     input:
         check=scene_check,
+        calibration=calibration,
     output:
         f"{DATASET}/lightfield.json",
     log:
@@ -15,6 +16,7 @@ rule lightfield:
     params:
         name=lambda wildcards: dataset_of(wildcards).name,
         limits=lambda wildcards: json.dumps(LIMITS[wildcards.scene]),
+        calibration=calibration_words,
         # Not in the command: when what the YAML says of this dataset changes, so does the file.
         cameras=lambda wildcards: dataset_of(wildcards).cameras,
         render=lambda wildcards: dataset_of(wildcards).render,
@@ -23,7 +25,7 @@ rule lightfield:
         "Placing the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
         "python scripts/make_lightfield.py --scene {params.name} --rig {wildcards.rig}"
-        " --limits {params.limits:q} --output {output} 2>&1 | tee {log}"
+        " --limits {params.limits:q} {params.calibration} --output {output} 2>&1 | tee {log}"
 
 
 rule check_cameras:
