@@ -5,7 +5,12 @@ MEASURED = f"{RESULTS}/benchmarks"
 
 rule reprojection_benchmark:
     output:
-        multiext(f"{MEASURED}/reprojection", ".csv", ".svg", ".png"),
+        multiext(f"{MEASURED}/reprojection", ".csv", ".svg"),
+        report(
+            f"{MEASURED}/reprojection.png",
+            category="Measurements",
+            caption="../report/reprojection_benchmark.rst",
+        ),
     log:
         f"{WORK}/logs/reprojection_benchmark.log",
     conda:
@@ -22,7 +27,12 @@ rule reprojection_benchmark:
 
 rule stability:
     output:
-        multiext(f"{MEASURED}/stability", ".csv", ".md", ".svg", ".png"),
+        multiext(f"{MEASURED}/stability", ".csv", ".md", ".svg"),
+        report(
+            f"{MEASURED}/stability.png",
+            category="Measurements",
+            caption="../report/stability.rst",
+        ),
     log:
         f"{WORK}/logs/stability.log",
     conda:

@@ -19,9 +19,11 @@ rule costs:
         # What the jobs above left there is read, as far as it goes back.
         journals=f"{MADE}/render",
         benchmarks=f"{WORK}/benchmarks/{{scene}}/{{rig}}",
-        scene_benchmarks=lambda wildcards: (
-            f"{WORK}/benchmarks/{dataset_of(wildcards).name}"
-        ),
+        # A calibration belongs to the preset, the scene itself to all of them.
+        scene_benchmarks=lambda wildcards: [
+            f"{WORK}/benchmarks/{folder}"
+            for folder in {dataset_of(wildcards).name: None, wildcards.scene: None}
+        ],
         energy=json.dumps(SETTINGS["energy"]),
         full=full_size,
         reprojections=reprojection_words,

@@ -16,6 +16,8 @@ rule package:
         "Packing {output}"
     shell:
         # The same files give the same archive, whoever packs them and when.
+        # A report tells of one build, and is no part of the dataset.
         "tar --create --file {output} --directory {params.folder} --sort=name --mtime=@0"
         " --owner=0 --group=0 --numeric-owner --mode=u=rwX,go=rX"
+        " --exclude='{wildcards.rig}/report' --exclude='{wildcards.rig}/f*/report'"
         " {wildcards.rig} 2>&1 | tee {log}"

@@ -44,7 +44,7 @@ import json
 import math
 import os
 import statistics
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -74,7 +74,11 @@ def main() -> None:
     parser.add_argument("--journals", required=True, type=Path, help="folder of its journals")
     parser.add_argument("--benchmarks", required=True, type=Path, help="folder of its jobs' TSVs")
     parser.add_argument(
-        "--scene-benchmarks", required=True, type=Path, help="folder of the scene's jobs' TSVs"
+        "--scene-benchmarks",
+        required=True,
+        nargs="+",
+        type=Path,
+        help="folders of the scene's jobs' TSVs",
     )
     parser.add_argument("--blend", required=True, type=Path, help="the scene")
     parser.add_argument(
@@ -188,13 +192,13 @@ def shard_costs(name: str, runs: list[journal.Run]) -> dict[str, Any]:
     }
 
 
-def job_stages(dataset: Path, scene: Path) -> dict[str, Stage]:
+def job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, Stage]:
     """Add up the jobs' TSVs by stage: the folder that a TSV lies in, or else its own name.
 
     The views' own are left out: they tell only of a shard's last run.
     """
     stages: dict[str, Stage] = {}
-    found = [("scene", path) for path in scene.glob("*.tsv")]
+    found = [("scene", path) for folder in scene for path in folder.glob("*.tsv")]
     found += [
         (path.relative_to(dataset).parts[0].removesuffix(".tsv"), path)
         for path in dataset.rglob("*.tsv")

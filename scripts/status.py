@@ -141,7 +141,9 @@ def view_file(dataset: Dataset, name: str) -> Path:
 def has_key(path: Path, key: str) -> bool:
     """Tell whether a file is there and was made by the settings of ``key``, from its header."""
     try:
-        return path.exists() and images.read_attributes(path).get(images.KEY_ATTRIBUTE) == key
+        return (
+            path.exists() and images.read_header(path).attributes.get(images.KEY_ATTRIBUTE) == key
+        )
     except UserError:
         return False
 
