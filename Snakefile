@@ -7,9 +7,6 @@ configfile: "config.yaml"
 report: "report/workflow.rst"
 
 
-report: "report/workflow.rst"
-
-
 include: "rules/common.smk"
 include: "rules/scene.smk"
 include: "rules/rig.smk"
