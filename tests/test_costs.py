@@ -1,0 +1,231 @@
+"""What a dataset has cost: added up from journals and TSVs, and extrapolated to the full one."""
+
+import json
+import math
+import statistics
+
+import pytest
+
+import costs
+from lightfield import config, journal
+from lightfield.errors import UserError
+
+TARIFF = {"watts": 100, "cores": 4, "price_per_kwh": 0.5, "currency": "EUR"}
+HEAD = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
+
+
+def start(at, start_up=2.0, device="CPU", threads=1):
+    return [
+        {"started": at, "host": "there", "pid": 1},
+        {
+            "start_up_seconds": start_up,
+            "start_up_cpu_seconds": start_up / 2,
+            "device": device,
+            "threads": threads,
+        },
+    ]
+
+
+def view(name, finished, wall, traced, cpu, memory=100):
+    return {
+        "view": name,
+        "finished": finished,
+        "wall_seconds": wall,
+        "cpu_seconds": cpu,
+        "render_seconds": traced,
+        "synchronization_seconds": 0.0,
+        "memory_bytes": memory,
+    }
+
+
+def end(at, wall, cpu, memory):
+    return {
+        "ended": at,
+        "wall_seconds": wall,
+        "cpu_seconds": cpu,
+        "peak_memory_bytes": memory,
+    }
+
+
+# Killed after two of three views, the second of which was then lost and made again.
+KILLED = [
+    *start(1000.0),
+    view("a", 1012.0, wall=10.0, traced=6.0, cpu=10.0),
+    view("b", 1022.0, wall=10.0, traced=8.0, cpu=10.0, memory=300),
+]
+RESUMED = [
+    *start(2000.0),
+    view("b", 2010.0, wall=8.0, traced=4.0, cpu=8.0),
+    view("c", 2020.0, wall=10.0, traced=9.0, cpu=10.0),
+    end(2021.0, wall=21.0, cpu=19.5, memory=700),
+]
+
+
+@pytest.fixture
+def dataset(tmp_path, run_program):
+    """A dataset of three views of 8 x 4 pixels with the journals and TSVs of its jobs."""
+    folder, work = tmp_path / "results", tmp_path / "work"
+    content = {
+        "resolution": [8, 4],
+        "frames": [{"name": name} for name in "abc"],
+        "render": {"samples": 2, "denoise": False},
+    }
+    for path, size in (("exr/a.exr", 100), ("exr/b.exr", 200), ("flat/a.png", 70)):
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_bytes(b"x" * size)
+    (folder / "lightfield.json").write_text(json.dumps(content))
+    (work / "scene.blend").parent.mkdir()
+    (work / "scene.blend").write_bytes(b"x" * 5000)
+    for path, row in {
+        "scene/build_scene.tsv": "4.0\t0:00:04\t200.0\t0\t0\t0\t0\t0\t50\t3.0",
+        # Too short for Snakemake to look at it.
+        "rig/flat/0-3.tsv": "0.4\t0:00:00\tNA\tNA\tNA\tNA\tNA\tNA\tNA\tNA",
+        "rig/flat/lens_map.tsv": "2.0\t0:00:02\t50.0\t0\t0\t0\t0\t0\t50\t1.0",
+        # Of the last run alone, and so not counted: the journal tells of both.
+        "rig/render/0-3.tsv": "21.0\t0:00:21\t700.0\t0\t0\t0\t0\t0\t50\t19.0",
+    }.items():
+        (work / path).parent.mkdir(parents=True, exist_ok=True)
+        (work / path).write_text(HEAD + row + "\n")
+
+    def count(*lines, full=None):
+        journals = work / "journals"
+        journals.mkdir(exist_ok=True)
+        (journals / "0-3.journal.jsonl").write_text("\n".join(map(json.dumps, lines)) + "\n")
+        run_program(
+            "costs.py",
+            *("--dataset", folder, "--journals", journals, "--benchmarks", work / "rig"),
+            *("--scene-benchmarks", work / "scene", "--blend", work / "scene.blend"),
+            *("--energy", json.dumps(TARIFF), "--reprojection", "flat"),
+            *("--full", json.dumps(full or {"views": 3, "resolution": [8, 4], "samples": 2})),
+            *("--output", tmp_path / "costs.json"),
+        )
+        return json.loads((tmp_path / "costs.json").read_text())
+
+    return count
+
+
+def test_the_papers_energy_and_price_follow_from_its_days_and_watts():
+    # SILVR, footnote on rendering: around 12 days at 500 W, 144 kWh, 46 euro.
+    tariff = costs.Tariff(watts=500, price_per_kwh=0.32, currency="EUR", cores=1)
+    kwh = tariff.kwh(12 * 24 * 3600)
+    assert kwh == pytest.approx(144)
+    assert round(tariff.price(kwh)) == 46
+
+
+def test_all_time_that_was_spent_counts_and_what_was_spent_again_is_told(dataset):
+    found = dataset(*KILLED, *RESUMED)
+    (shard,) = found["shards"]
+    assert shard["shard"] == "0-3"
+    assert (shard["views"], shard["views_rendered"]) == (3, 4)
+    assert (shard["runs"], shard["killed_runs"]) == (2, 1)
+    assert shard["wall_seconds"] == 22 + 21
+    assert shard["cpu_seconds"] == 1 + 20 + 19.5
+    assert shard["peak_memory_bytes"] == 700
+    assert shard["path_tracing_seconds"] == 6 + 8 + 4 + 9
+    assert shard["overhead_seconds"] == 43 - 27
+    # View b's first rendering, and the second start.
+    assert shard["repeated_seconds"] == 10 + 2
+    for key in ("path_tracing_seconds", "overhead_seconds", "repeated_seconds"):
+        assert found[key] == shard[key]
+
+
+def test_each_stage_has_its_jobs_times_and_bytes(dataset):
+    found = dataset(*KILLED, *RESUMED)
+    stages = {stage.pop("stage"): stage for stage in found["stages"]}
+    assert list(stages) == ["scene", "render", "flat"]
+    assert stages["scene"] == {
+        "jobs": 1,
+        "wall_seconds": 4.0,
+        "cpu_seconds": 3.0,
+        "peak_memory_bytes": 200 * 2**20,
+        "bytes": 5000,
+    }
+    assert stages["flat"] == {
+        "jobs": 2,
+        "wall_seconds": 2.4,
+        "cpu_seconds": 1.4,
+        "peak_memory_bytes": 50 * 2**20,
+        "bytes": 70,
+    }
+    assert (stages["render"]["wall_seconds"], stages["render"]["bytes"]) == (43, 300)
+    # 100 W times the part of four cores that was busy.
+    seconds = (3.0 + 40.5 + 1.4) / 4
+    assert found["energy_kwh"] == pytest.approx(100 * seconds / 3600 / 1000)
+    assert found["price"] == pytest.approx(0.5 * found["energy_kwh"])
+
+
+def test_a_graphics_card_takes_the_whole_machine(dataset):
+    lines = [
+        *start(0.0, device="GPU"),
+        view("a", 12.0, wall=10.0, traced=9.0, cpu=1.0),
+        end(12.0, wall=12.0, cpu=2.0, memory=1),
+    ]
+    found = dataset(*lines)
+    assert found["device"] == "GPU"
+    assert found["energy_kwh"] == pytest.approx(100 * (12 + 4.4 / 4) / 3.6e6)
+
+
+def test_the_full_dataset_is_extrapolated_from_the_path_tracing_of_the_views(dataset):
+    traced = [4.0, 5.0, 6.0, 5.0]
+    lines = start(0.0)
+    # The first prepares the scene, and tells nothing of the others.
+    for name, seconds in zip("zabcd", [50.0, *traced], strict=True):
+        lines.append(view(name, 10.0, wall=seconds + 1, traced=seconds, cpu=seconds + 1))
+    full = {"views": 40, "resolution": [16, 8], "samples": 20}
+    found = dataset(*lines, full=full)["extrapolation"]
+    assert (found["views"], found["resolution"], found["samples"]) == (40, [16, 8], 20)
+    # Four times the pixels, ten times the samples; beside it, once a pixel, the second that
+    # each view took more, and of the jobs those of the reprojection for three views.
+    path_tracing = 40 * statistics.mean(traced) * 40
+    each = 40 * (1.0 + 1.4 / 3) * 4
+    once = 1.0 + 1.0 + 3.0
+    assert found["core_hours"] == pytest.approx((path_tracing + each + once) / 3600)
+    # Of the mean of 4 out of 40.
+    error = statistics.stdev(traced) / 2 * math.sqrt(1 - 4 / 40)
+    assert found["core_hours_uncertainty"] == pytest.approx(error * 40 * 40 / 3600)
+    kwh = found["core_hours"] / 4 * 0.1
+    assert found["energy_kwh"] == pytest.approx(kwh)
+    assert found["price_uncertainty"] / found["price"] == pytest.approx(
+        found["core_hours_uncertainty"] / found["core_hours"]
+    )
+    assert found["gigabytes"] == pytest.approx(300 / 3 * 40 * 4 / 1e9)
+    assert "4 views: 8 × 4 pixels, 2 samples" in found["basis"]
+
+
+def test_what_other_programs_took_is_no_part_of_a_views_path_tracing():
+    # The machine was shared: of 20 s wall time the process had 10, on one thread.
+    lines = [*start(0.0), view("a", 20.0, wall=20.0, traced=16.0, cpu=10.0)]
+    part = journal.Run(lines[0] | lines[1], [lines[2]])
+    (rendering,) = costs.renderings(part)
+    assert rendering.path_tracing == pytest.approx(8.0)
+    assert rendering.rest == pytest.approx(2.0)
+
+
+def test_views_kept_without_their_journals_cost_nothing_that_is_known(dataset):
+    found = dataset({"started": 5.0, "host": "there", "pid": 1}, end(6.0, 1.0, 0.5, 9))
+    assert found["extrapolation"] is None
+    assert found["shards"][0]["views_rendered"] == 0
+
+
+def test_a_line_that_a_kill_cut_short_is_left_out(tmp_path):
+    file = tmp_path / "0-3.journal.jsonl"
+    file.write_text("\n".join(map(json.dumps, KILLED)) + '\n{"view": "c", "fin')
+    (part,) = journal.read(file)
+    assert [line["view"] for line in part.views] == ["a", "b"]
+    assert part.end is None
+
+
+@pytest.mark.parametrize(
+    "energy, expected",
+    [
+        ({"watts": -5}, "energy.watts: is -5; must be a number at least 0"),
+        ({"watt": 65}, "energy.watt: unknown key; did you mean watts?"),
+        ({"cores": 0}, "energy.cores: is 0; must be auto or a whole number at least 1"),
+        ({"currency": 3}, "energy.currency: is 3; must be a text"),
+    ],
+)
+def test_a_wrong_tariff_is_told(energy, expected):
+    content = config.read_yaml(config.ROOT / "config.yaml", "config.yaml")
+    with pytest.raises(UserError) as caught:
+        config.load_config(content | {"energy": energy})
+    assert str(caught.value) == f"config.yaml: {expected}"
