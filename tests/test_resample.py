@@ -84,10 +84,12 @@ def narrow_lens(size: int, focal_length: float = 18) -> Rectilinear:
 
 
 def test_every_half_is_widened_as_numpy_does():
-    bits = np.arange(65536, dtype=np.uint16).reshape(256, 64, 4)
-    wide = resample.widen(bits.view(np.float16))
-    expected = bits.view(np.float16).astype(np.float32)
-    assert np.array_equal(wide, expected, equal_nan=True)
+    halves = np.arange(65536, dtype=np.uint16).view(np.float16).reshape(4, 128, 128)
+    expected = np.moveaxis(halves.astype(np.float32), 0, -1)
+    assert np.array_equal(resample.widen(*halves), expected, equal_nan=True)
+    mixed = resample.widen(halves[0], halves[1].astype(np.float32), halves[2])
+    assert np.array_equal(mixed[..., :3], expected[..., :3], equal_nan=True)
+    assert not mixed[..., 3].any()
 
 
 def test_floats_are_narrowed_as_numpy_does_and_held_in_range():
@@ -95,9 +97,10 @@ def test_floats_are_narrowed_as_numpy_does_and_held_in_range():
     values = (rng.standard_normal((64, 64, 4)) * 10.0 ** rng.uniform(-9, 4, (64, 64, 4))).astype(
         "f4"
     )
-    assert np.array_equal(resample.narrow(values, 3), values.astype(np.float16)[:, :, :3])
+    expected = np.moveaxis(values.astype(np.float16), -1, 0)[:3]
+    assert np.array_equal(resample.narrow(values, 3), expected)
     extreme = np.full((1, 1, 4), [1e9, -1e9, 65519.9, 0], np.float32)
-    assert resample.narrow(extreme, 3).tolist() == [[[65504, -65504, 65504]]]
+    assert resample.narrow(extreme, 3).tolist() == [[[65504]], [[-65504]], [[65504]]]
 
 
 def test_bilinear_equals_opencv_on_the_same_coordinates():

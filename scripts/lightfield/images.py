@@ -1,4 +1,8 @@
-"""Images in and out, through OpenImageIO: always whole, and equal pixels give equal bytes."""
+"""Images in and out: always whole, and equal pixels give equal bytes.
+
+OpenImageIO reads and writes, but for the pixels of EXR files in scan lines, which the OpenEXR
+package reads twice as fast and writes in two thirds of the time.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -6,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import OpenEXR
 import OpenImageIO as oiio
 
 from lightfield.errors import UserError
@@ -22,12 +27,7 @@ NAN_ATTRIBUTE = "plenoforge:nan"
 
 HALF_MAX = 65504.0
 
-_TYPES = {
-    np.dtype(np.float16): "half",
-    np.dtype(np.float32): "float",
-    np.dtype(np.uint8): "uint8",
-    np.dtype(np.uint16): "uint16",
-}
+_EXR_TYPES = {"half": np.float16, "float": np.float32, "uint": np.uint32}
 
 
 @dataclass(frozen=True)
@@ -38,45 +38,61 @@ class Image:
     attributes: dict[str, Attribute]
 
 
-def read_attributes(path: Path | str) -> dict[str, Attribute]:
-    """Read the header's attributes alone; raises `UserError` for a file that is no image."""
+@dataclass(frozen=True)
+class Header:
+    """What a file says of its first subimage before any pixel is read; the size is in pixels."""
+
+    width: int
+    height: int
+    channels: list[str]
+    attributes: dict[str, Attribute]
+
+
+def read_header(path: Path | str) -> Header:
+    """Read the header alone; raises `UserError` for a file that is no image."""
     file = _open(path)
-    attributes = _attributes(file.spec())
+    spec = file.spec()
     file.close()
-    return attributes
+    return Header(spec.width, spec.height, list(spec.channelnames), _attributes(spec))
 
 
-def read_image(path: Path | str, channels: Sequence[str] | None = None) -> Image:
-    """Read an image whole: every subimage's channels by name, or only the ``channels`` named.
+def read_image(
+    path: Path | str,
+    channels: Sequence[str] | None = None,
+    rows: tuple[int, int] | None = None,
+) -> Image:
+    """Read every subimage's channels by name, or only the ``channels`` named, or only some rows.
 
-    A multi-part EXR's channels come together under their own names. An alpha channel stays
-    unassociated in files that store it so. Raises `UserError` for a file that is missing, no
-    image, cut short, or without one of the ``channels``.
+    ``rows`` are the first and the one after the last. A multi-part EXR's channels come together
+    under their own names. An alpha channel stays unassociated in files that store it so. The
+    arrays may be read-only. Raises `UserError` for a file that is missing, no image, cut short,
+    or without one of the ``channels``.
     """
     file = _open(path)
     found: dict[str, np.ndarray[Any, Any]] = {}
     attributes: dict[str, Attribute] = {}
+    names: list[str] = []
     subimage = 0
     while file.seek_subimage(subimage, 0):
         spec = file.spec()
         attributes = _attributes(spec) | attributes
+        names += spec.channelnames
         wanted = [
             index
             for index, name in enumerate(spec.channelnames)
             if channels is None or name in channels
         ]
-        for first, last, kind in _runs(spec, wanted):
-            pixels = file.read_image(subimage, 0, first, last, kind)
-            if pixels is None:
-                raise UserError(f"{path}: cannot be read whole: {file.geterror()}")
-            pixels = np.asarray(pixels).reshape(spec.height, spec.width, last - first)
-            for index in range(first, last):
-                found[spec.channelnames[index]] = pixels[:, :, index - first]
+        first, end = rows or (0, spec.height)
+        if _has_plain_scan_lines(file, spec):
+            found |= _scan_lines(path, spec, wanted, first, end)
+        else:
+            pixels = _pixels(path, file, subimage, wanted)
+            found |= {name: array[first:end] for name, array in pixels.items()}
         subimage += 1
     file.close()
     missing = [name for name in channels or () if name not in found]
     if missing:
-        raise UserError(f"{path}: has no channel {missing[0]}; it has {', '.join(found)}")
+        raise UserError(f"{path}: has no channel {missing[0]}; it has {', '.join(names)}")
     return Image(found, attributes)
 
 
@@ -98,16 +114,14 @@ def write_exr(
     Lossless (ZIP), atomic, and without time stamp or host name, so that equal input gives equal
     bytes. Raises `UserError` if the file cannot be written.
     """
-    kinds = [_TYPES[array.dtype] for array in channels.values()]
-    pixels = np.stack(
-        list(channels.values()), axis=-1, dtype=np.float32 if len(set(kinds)) > 1 else None
-    )
-    spec = _spec(pixels, list(channels), attributes)
-    spec.channelformats = tuple(oiio.TypeDesc(kind) for kind in kinds)
-    spec.attribute("compression", "zip")
-    # Left unset, OpenImageIO would write the time of day.
-    spec.attribute("DateTime", "")
-    _write(path, spec, pixels)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    # OpenEXR writes strided arrays as if they were contiguous.
+    planes = {name: np.ascontiguousarray(array) for name, array in channels.items()}
+    with atomic_path(path) as temporary:
+        try:
+            OpenEXR.File(header | dict(attributes or {}), planes).write(str(temporary))
+        except RuntimeError as error:
+            raise UserError(f"{path}: cannot be written: {error}") from None
 
 
 def write_png(
@@ -120,10 +134,17 @@ def write_png(
     The values are written as they are: alpha is unassociated and colour already encoded.
     """
     pixels = pixels if pixels.ndim == 3 else pixels[:, :, np.newaxis]
-    names = {1: ["Y"], 2: ["Y", "A"], 3: ["R", "G", "B"], 4: ["R", "G", "B", "A"]}
-    spec = _spec(pixels, names[pixels.shape[2]], attributes)
+    names = {1: ("Y",), 2: ("Y", "A"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
+    height, width, count = pixels.shape
+    spec = oiio.ImageSpec(width, height, count, pixels.dtype.name)
+    spec.channelnames = names[count]
     spec.attribute("oiio:UnassociatedAlpha", 1)
-    _write(path, spec, pixels)
+    for name, value in (attributes or {}).items():
+        spec.attribute(name, value)
+    with atomic_path(path) as temporary:
+        file = oiio.ImageOutput.create(str(temporary))
+        if not (file.open(str(temporary), spec) and file.write_image(pixels) and file.close()):
+            raise UserError(f"{path}: cannot be written: {file.geterror()}")
 
 
 def _open(path: Path | str) -> Any:
@@ -135,6 +156,49 @@ def _open(path: Path | str) -> Any:
     if file is None:
         raise UserError(f"{path}: is no image that can be read: {oiio.geterror()}")
     return file
+
+
+def _has_plain_scan_lines(file: Any, spec: Any) -> bool:
+    """Whether a file is an EXR of one part, without tiles or deep pixels."""
+    parts = spec.get_int_attribute("oiio:subimages", 1)
+    return bool(
+        file.format_name() == "openexr" and parts == 1 and not spec.tile_width and not spec.deep
+    )
+
+
+def _scan_lines(
+    path: Path | str, spec: Any, wanted: Sequence[int], first: int, end: int
+) -> dict[str, np.ndarray[Any, Any]]:
+    """Return channels of an EXR file, the rows from ``first`` to ``end``."""
+    names = [spec.channelnames[index] for index in wanted]
+    kinds = [np.dtype(_EXR_TYPES[str(spec.channelformat(index))]) for index in wanted]
+    try:
+        # OpenEXR.File, which is to replace InputFile, reads whole files only.
+        read = OpenEXR.InputFile(str(path)).channels(
+            names, scanLine1=spec.y + first, scanLine2=spec.y + end - 1
+        )
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read whole: {error}") from None
+    return {
+        name: np.frombuffer(values, kind).reshape(end - first, spec.width)
+        for name, kind, values in zip(names, kinds, read, strict=True)
+    }
+
+
+def _pixels(
+    path: Path | str, file: Any, subimage: int, wanted: Sequence[int]
+) -> dict[str, np.ndarray[Any, Any]]:
+    """Return channels of any file, all rows."""
+    spec = file.spec()
+    found: dict[str, np.ndarray[Any, Any]] = {}
+    for first, end, kind in _runs(spec, wanted):
+        pixels = file.read_image(subimage, 0, first, end, kind)
+        if pixels is None:
+            raise UserError(f"{path}: cannot be read whole: {file.geterror()}")
+        pixels = np.asarray(pixels).reshape(spec.height, spec.width, end - first)
+        for index in range(first, end):
+            found[spec.channelnames[index]] = pixels[:, :, index - first]
+    return found
 
 
 def _runs(spec: Any, wanted: Sequence[int]) -> list[tuple[int, int, str]]:
@@ -155,23 +219,3 @@ def _attributes(spec: Any) -> dict[str, Attribute]:
         for parameter in spec.extra_attribs
         if isinstance(parameter.value, str | int | float)
     }
-
-
-def _spec(
-    pixels: np.ndarray[Any, Any], names: list[str], attributes: Mapping[str, Attribute] | None
-) -> Any:
-    height, width, count = pixels.shape
-    spec = oiio.ImageSpec(width, height, count, _TYPES[pixels.dtype])
-    spec.channelnames = tuple(names)
-    for name, value in (attributes or {}).items():
-        spec.attribute(name, value)
-    return spec
-
-
-def _write(path: Path | str, spec: Any, pixels: np.ndarray[Any, Any]) -> None:
-    with atomic_path(path) as temporary:
-        file = oiio.ImageOutput.create(str(temporary))
-        if file is None:
-            raise UserError(f"{path}: no such image format: {oiio.geterror()}")
-        if not (file.open(str(temporary), spec) and file.write_image(pixels) and file.close()):
-            raise UserError(f"{path}: cannot be written: {file.geterror()}")

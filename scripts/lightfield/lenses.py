@@ -28,7 +28,6 @@ from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
 
 from lightfield.errors import UserError
 
@@ -407,6 +406,9 @@ class IncreasingPolynomial:
             while self.value(self.end) < last_value:
                 self.end *= 2
         if self.value(self.end) > last_value > self.value(0.0):
+            # Imported here because no other lens needs it, and it takes a quarter of a second.
+            from scipy.optimize import brentq
+
             self.end = float(brentq(lambda t: self.value(t) - last_value, 0, self.end, xtol=1e-300))
         # Nodes that bracket every solution, and start Newton's method close to it.
         self._nodes = np.linspace(0, self.end, 257)

@@ -72,38 +72,40 @@ def _float_to_half(typing: Any, value: Any) -> Any:
 
 
 @kernel
-def _widen_half(bits: Array, out: Array) -> None:
-    for i in range(bits.shape[0]):
-        for j in range(bits.shape[1]):
-            for c in range(bits.shape[2]):
-                out[i, j, c] = _half_to_float(bits[i, j, c])
+def _widen_half(red: Array, green: Array, blue: Array, out: Array) -> None:
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j, 0] = _half_to_float(red[i, j])
+            out[i, j, 1] = _half_to_float(green[i, j])
+            out[i, j, 2] = _half_to_float(blue[i, j])
+            out[i, j, 3] = 0
 
 
 @kernel
 def _narrow_to_half(values: Array, out: Array) -> None:
     for i in range(values.shape[0]):
         for j in range(values.shape[1]):
-            for c in range(out.shape[2]):
+            for c in range(out.shape[0]):
                 # A kernel may overshoot; beyond the half range lies infinity.
                 value = min(max(values[i, j, c], -np.float32(HALF_MAX)), np.float32(HALF_MAX))
-                out[i, j, c] = _float_to_half(value)
+                out[c, i, j] = _float_to_half(value)
 
 
-def widen(pixels: Array) -> Array:
-    """Return (h, w, 1 to 4) half or float pixels as (h, w, 4) float32; what they lack is 0."""
-    height, width, count = pixels.shape
-    out = np.empty((height, width, 4), np.float32)
-    out[:, :, count:] = 0
-    if pixels.dtype == np.float16:
-        _widen_half(pixels.view(np.uint16), out)
+def widen(red: Array, green: Array, blue: Array, alpha: Array | None = None) -> Array:
+    """Return (h, w) half or float channels as (h, w, 4) float32; without ``alpha`` it is 0."""
+    out = np.empty((*red.shape, 4), np.float32)
+    if red.dtype == green.dtype == blue.dtype == np.float16:
+        _widen_half(red.view(np.uint16), green.view(np.uint16), blue.view(np.uint16), out)
     else:
-        out[:, :, :count] = pixels
+        out[:, :, 0], out[:, :, 1], out[:, :, 2], out[:, :, 3] = red, green, blue, 0
+    if alpha is not None:
+        out[:, :, 3] = alpha
     return out
 
 
 def narrow(pixels: Array, count: int) -> Array:
-    """Return the first ``count`` channels of (h, w, 4) float32 pixels as half, (h, w, count)."""
-    out = np.empty((*pixels.shape[:2], count), np.float16)
+    """Return the first ``count`` channels of (h, w, 4) float32 pixels as half, (count, h, w)."""
+    out = np.empty((count, *pixels.shape[:2]), np.float16)
     _narrow_to_half(pixels, out.view(np.uint16))
     return out
 

@@ -1,0 +1,135 @@
+"""Images in and out, against OpenImageIO, Blender and the files' own bytes."""
+
+import bpy
+import numpy as np
+import OpenEXR
+import OpenImageIO as oiio
+import pytest
+
+from lightfield.errors import UserError
+from lightfield.images import read_header, read_image, write_exr, write_png
+
+ATTRIBUTES = {"plenoforge:depth": "z", "plenoforge:nan": 3, "plenoforge:scale": 0.5}
+
+
+@pytest.fixture
+def channels():
+    rng = np.random.default_rng(0)
+    halves = {name: rng.uniform(-2, 60000, (37, 53)).astype("f2") for name in "RGB"}
+    # What a kernel must not touch: infinities, NaN, denormals, and the largest half.
+    halves["R"][0, :6] = [np.inf, -np.inf, np.nan, 6e-8, 65504, -0.0]
+    depth = rng.uniform(0, 1e9, (37, 53)).astype("f4")
+    depth[1, :3] = [np.inf, np.nan, 1e-42]
+    return halves | {"Z": depth}
+
+
+def same(found, expected):
+    return found.dtype == expected.dtype and np.array_equal(
+        found.view(np.uint8), expected.view(np.uint8)
+    )
+
+
+def test_what_is_written_is_read(tmp_path, channels):
+    write_exr(tmp_path / "a.exr", channels, ATTRIBUTES)
+    image = read_image(tmp_path / "a.exr")
+    assert image.channels.keys() == channels.keys()
+    assert all(same(image.channels[name], channels[name]) for name in channels)
+    assert image.attributes.items() >= ATTRIBUTES.items()
+    header = read_header(tmp_path / "a.exr")
+    assert (header.width, header.height) == (53, 37)
+    assert set(header.channels) == set("RGBZ") and header.attributes == image.attributes
+
+
+def test_arrays_of_any_layout_are_written_as_they_are(tmp_path, channels):
+    turned = {name: np.asfortranarray(array) for name, array in channels.items()}
+    stacked = np.dstack([channels[name] for name in "RGB"])
+    sliced = {name: stacked[:, :, i] for i, name in enumerate("RGB")} | {"Z": channels["Z"]}
+    files = []
+    for index, layout in enumerate((channels, turned, sliced)):
+        write_exr(tmp_path / f"{index}.exr", layout)
+        files.append((tmp_path / f"{index}.exr").read_bytes())
+    # Equal input also gives equal bytes: no time, host or path in the file.
+    assert files[0] == files[1] == files[2]
+
+
+def test_other_libraries_read_what_is_written(tmp_path, channels):
+    path = tmp_path / "view.exr"
+    write_exr(path, channels, ATTRIBUTES)
+    theirs = oiio.ImageBuf(str(path))
+    spec = theirs.spec()
+    assert spec.channelnames == tuple("RGBZ")
+    assert [str(spec.channelformat(i)) for i in range(4)] == ["half"] * 3 + ["float"]
+    assert spec.get_string_attribute("compression") == "zip"
+    assert spec.get_int_attribute("plenoforge:nan") == 3 and not spec.tile_width
+    pixels = np.asarray(theirs.get_pixels(oiio.FLOAT))
+    assert np.array_equal(pixels[:, :, 3], channels["Z"], equal_nan=True)
+    image = bpy.data.images.load(str(path))
+    image.colorspace_settings.name = "Linear Rec.709"
+    assert tuple(image.size) == (53, 37)
+    rows = np.array(image.pixels, np.float32).reshape(37, 53, -1)[::-1]
+    assert np.array_equal(rows[2:, :, 1], channels["G"][2:].astype("f4"))
+
+
+def test_some_rows_of_some_channels(tmp_path, channels):
+    write_exr(tmp_path / "a.exr", channels)
+    found = read_image(tmp_path / "a.exr", ["Z", "G"], (17, 20)).channels
+    assert found.keys() == {"Z", "G"}
+    assert all(same(found[name], channels[name][17:20]) for name in found)
+    pixels = np.arange(37 * 53 * 3, dtype=np.uint8).reshape(37, 53, 3)
+    write_png(tmp_path / "a.png", pixels)
+    found = read_image(tmp_path / "a.png", ["B"], (17, 20)).channels
+    assert found.keys() == {"B"} and np.array_equal(found["B"], pixels[17:20, :, 2])
+
+
+@pytest.mark.parametrize("storage", ["parts", "tiles", "offset"])
+def test_exr_files_of_other_kinds(tmp_path, channels, storage):
+    path = str(tmp_path / "a.exr")
+    colors = {name: channels[name] for name in "RGB"}
+    kind = {"type": OpenEXR.scanlineimage}
+    match storage:
+        case "parts":
+            color = OpenEXR.Part(dict(kind), colors, name="color")
+            depth = OpenEXR.Part(dict(kind), {"Z": channels["Z"]}, name="depth")
+            OpenEXR.File([color, depth]).write(path)
+        case "tiles":
+            tiles = OpenEXR.TileDescription()
+            tiles.xSize = tiles.ySize = 16
+            OpenEXR.File({"type": OpenEXR.tiledimage, "tiles": tiles}, dict(channels)).write(path)
+        case "offset":
+            corners = np.array([7, -5], np.int32), np.array([59, 31], np.int32)
+            OpenEXR.File(kind | {"dataWindow": corners}, dict(channels)).write(path)
+    found = read_image(path).channels
+    assert found.keys() == channels.keys()
+    assert all(same(np.ascontiguousarray(found[name]), channels[name]) for name in found)
+    some = read_image(path, ["Z"], (3, 9)).channels["Z"]
+    assert np.array_equal(some, channels["Z"][3:9], equal_nan=True)
+
+
+@pytest.mark.parametrize("part", [0, 3, 100, 0.5, 0.99])
+def test_a_file_cut_short_is_named(tmp_path, channels, part):
+    path = tmp_path / "cut.exr"
+    write_exr(path, channels)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: part if isinstance(part, int) else int(part * len(whole))])
+    with pytest.raises(UserError, match=r"cut\.exr"):
+        read_image(path)
+
+
+def test_what_is_not_there_is_named(tmp_path, channels):
+    with pytest.raises(UserError, match=r"none\.exr: no such file"):
+        read_image(tmp_path / "none.exr")
+    write_exr(tmp_path / "a.exr", channels)
+    with pytest.raises(UserError, match=r"a\.exr: has no channel A; it has R, G, B, Z"):
+        read_image(tmp_path / "a.exr", ["R", "A"])
+    (tmp_path / "text.exr").write_text("no image")
+    with pytest.raises(UserError, match=r"text\.exr: is no image that can be read"):
+        read_header(tmp_path / "text.exr")
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path, channels):
+    path = tmp_path / "a.exr"
+    write_exr(path, channels)
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match="shapes differ"):
+        write_exr(path, channels | {"Z": channels["Z"][:5]})
+    assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["a.exr"]
