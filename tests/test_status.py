@@ -1,0 +1,168 @@
+"""How far a build is: never started, at work, killed and finished."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from checkouts import ROOT, snakemake
+
+from lightfield import images, keys, progress
+
+NAMES = ["a", "b", "c", "d"]
+IDENTITY = np.eye(4).tolist()
+
+
+@pytest.fixture
+def dataset(tmp_path, run_program):
+    """A dataset of four views of which the first ``count`` are rendered, and its status."""
+    folder, made = tmp_path / "results/scene/rig", tmp_path / "work/scene/rig"
+    content = {
+        "resolution": [2, 1],
+        "frames": [{"name": name, "world_matrix": IDENTITY} for name in NAMES],
+    }
+
+    def status(others=()):
+        words = ("--dataset", "scene/rig", 4, "flat", *others)
+        folders = ("--results", tmp_path / "results", "--work", tmp_path / "work")
+        return run_program("status.py", *folders, *words).stdout.splitlines()
+
+    def render(*names, settings=content):
+        (folder / "exr").mkdir(parents=True, exist_ok=True)
+        (folder / "lightfield.json").write_text(json.dumps(content))
+        for frame in settings["frames"]:
+            if frame["name"] in names:
+                key = {images.KEY_ATTRIBUTE: keys.render_key(settings, frame)}
+                colour = np.zeros((1, 2), np.float16)
+                images.write_exr(folder / f"exr/{frame['name']}.exr", {"R": colour}, key)
+
+    def journal(name, *lines):
+        (made / "render").mkdir(parents=True, exist_ok=True)
+        text = "".join(json.dumps(line) + "\n" for line in lines)
+        (made / f"render/{name}.journal.jsonl").write_text(text)
+
+    status.folder, status.content = folder, content
+    status.render, status.journal = render, journal
+    return status
+
+
+def started(ago, pid):
+    return {"started": time.time() - ago, "host": socket.gethostname(), "pid": pid}
+
+
+def finished(name, ago):
+    return {"view": name, "finished": time.time() - ago, "wall_seconds": 1, "cpu_seconds": 1}
+
+
+def test_a_build_that_was_never_started_is_told(dataset):
+    assert dataset() == [
+        "scene/rig",
+        "  rendered: 0 of 4, no rate yet",
+        "  flat: 0 of 4",
+        "  validated: no",
+        "all: 0 of 4 views rendered, no rate yet",
+    ]
+
+
+def test_views_of_other_settings_are_not_counted(dataset):
+    dataset.render("a", "b")
+    dataset.render("c", settings=dataset.content | {"resolution": [4, 1]})
+    (dataset.folder / "exr/d.exr").write_bytes(b"no image")
+    assert dataset()[1] == "  rendered: 2 of 4, no rate yet"
+
+
+def test_the_rate_of_the_shards_at_work_tells_the_time_left(dataset):
+    dataset.render("a", "b")
+    # The first process of the machine stands for the renderer's: it is there, and old enough.
+    dataset.journal("0-4", started(1000, pid=1), *(finished("a", ago) for ago in (900, 500, 1)))
+    lines = dataset()
+    # Two views within the last ten minutes, and two are left.
+    assert lines[1] == (
+        "  rendered: 2 of 4, 0.2 a minute, 10 min 00 s left at the rate of the last 10 min 00 s"
+    )
+    assert "  shards at work: 0:4" in lines
+    assert lines[-1] == lines[1].replace("  rendered: 2 of 4", "all: 2 of 4 views rendered")
+
+
+def test_a_killed_shard_is_told_until_its_views_are_there(dataset):
+    dataset.render("a")
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    dataset.journal("0-4", started(100, gone.pid), finished("a", 50))
+    lines = dataset()
+    assert lines[1] == "  rendered: 1 of 4, no rate yet"
+    assert "  shards killed, the next run goes on with them: 0:4" in lines
+    dataset.render(*NAMES)
+    assert "killed" not in "\n".join(dataset())
+
+
+def test_a_process_on_another_machine_is_at_work_while_it_is_heard_of(dataset):
+    dataset.render("a", "c")
+    there = started(5000, pid=1) | {"host": "another-node"}
+    dataset.journal("0-2", there, finished("a", 30))
+    dataset.journal("2-4", there, finished("c", 4000))
+    lines = dataset()
+    assert "  shards at work: 0:2 on another-node (heard of 30 s ago)" in lines
+    assert "  shards not heard of for an hour: 2:4" in lines
+
+
+def test_a_reprojected_view_older_than_its_source_is_not_counted(dataset):
+    dataset.render(*NAMES)
+    (dataset.folder / "flat").mkdir()
+    for name in "abc":
+        (dataset.folder / f"flat/{name}.png").touch()
+    os.utime(dataset.folder / "flat/c.png", (1, 1))
+    assert "  flat: 2 of 4" in dataset()
+
+
+def test_a_validation_counts_if_it_is_of_these_views(dataset):
+    dataset.render(*NAMES)
+    file = dataset.folder / "validation.json"
+    file.write_text('{"valid": true}')
+    assert "  validated: yes" in dataset()
+    os.utime(file, (1, 1))
+    assert "  validated: not since its views were made" in dataset()
+    file.write_text('{"valid": false}')
+    assert any(line.startswith("  validated: yes, and it is not valid") for line in dataset())
+
+
+def test_all_chosen_datasets_are_added_up(dataset):
+    dataset.render("a")
+    assert dataset(("--dataset", "scene/other", 6, ""))[-1] == (
+        "all: 1 of 10 views rendered, no rate yet"
+    )
+
+
+def test_snakemake_tells_it_without_a_lock(tmp_path):
+    folders = (f"results={tmp_path / 'results'}", f"work={tmp_path / 'work'}")
+    words = ("--quiet", "all", "--nolock", "status", "--config", *folders, "preset=tiny")
+    result = snakemake(ROOT, *words)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.splitlines()[0] == "garden_tiny/LFSphere_e100cm_d170cm"
+    assert result.stdout.splitlines()[-1] == "all: 0 of 12 views rendered, no rate yet"
+
+
+def test_progress_begins_at_once_and_reads_in_a_log(capsys, monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    told = progress.Progress(10, "render scene/rig 0:12", already=2)
+    assert capsys.readouterr().err == "render scene/rig 0:12: 10 views to do, 2 already done\n"
+    # The first view takes 100 s more than the others' 20 s.
+    for seconds in (120, 20, 20):
+        now[0] += seconds
+        told.done()
+    assert capsys.readouterr().err.splitlines() == [
+        "render scene/rig 0:12: 1 of 10 views, 120 s each, 18 min 00 s left",
+        "render scene/rig 0:12: 2 of 10 views, 20 s each, 2 min 40 s left",
+        "render scene/rig 0:12: 3 of 10 views, 20 s each, 2 min 20 s left",
+    ]
+    # Within the interval nothing is told, but the end is.
+    now[0] += 1
+    told.done()
+    assert capsys.readouterr().err == ""
+    told.done(6)
+    assert capsys.readouterr().err.endswith("done in 2 min 41 s\n")
