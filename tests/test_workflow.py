@@ -4,11 +4,13 @@ import filecmp
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
+import zipfile
 from collections import Counter
 from pathlib import Path
 
@@ -120,6 +122,29 @@ def test_a_deleted_and_a_truncated_view_are_made_again_alone(smoke, checkout, tm
     again = rendered(folder) - before
     assert sorted(name for _, name in again.elements()) == ["view_b0000f", "view_u0000f"]
     assert_same_bytes(smoke, folder)
+    # Both runs count, and what the second made again is told.
+    costs = json.loads((folder / CUBOID / "report/costs.json").read_text())
+    (shard,) = costs["shards"]
+    assert (shard["views"], shard["views_rendered"], shard["runs"]) == (6, 8, 2)
+    assert 0 < shard["repeated_seconds"] < shard["wall_seconds"]
+
+
+def test_snakemakes_own_report_holds_the_figures_and_their_captions(smoke, tmp_path):
+    snakemake(smoke, "--cores", "1", "smoke", "--report", str(tmp_path / "report.zip"))
+    with zipfile.ZipFile(tmp_path / "report.zip") as file:
+        html = file.read("report/report.html").decode()
+        pictures = Counter(Path(name).name for name in file.namelist())
+    for name, caption in (
+        ("panorama", "The scene from the centre of the rig"),
+        ("contact_sheet", "The views in their order"),
+        ("rig", "The cameras of the rig"),
+        ("depth_panorama", "Distance from the centre of the rig"),
+    ):
+        assert pictures[f"{name}.png"] == 3
+        assert html.count(caption) == 3
+    assert "Plenoforge makes light-field datasets" in html
+    # It is read without a network.
+    assert not re.findall(r"<(?:script|link|img)[^>]*(?:src|href)=.?(?:https?:)?//", html)
 
 
 def test_killed_at_any_moment_the_next_run_goes_on(smoke, checkout):
