@@ -22,6 +22,9 @@ from lightfield.lenses import Lens
 Array = NDArray[Any]
 
 FEWEST_CAMERAS = 3
+# Cameras of a sphere whose heights differ by less, as a part of its own, are in one ring: its
+# vertices follow from rounded ones.
+SAME_LEVEL = 1e-3
 TILTS = tuple(range(-40, 41, 10))
 """Degrees by which an image's plane, or cone round a ring, is raised above the level one."""
 COLUMNS = {"line": 512, "ring": 720}
@@ -81,13 +84,12 @@ def _numbers(rig: Mapping[str, Any], local: Array) -> list[int]:
     """Return the numbers of the positions in a row; ``local`` are positions in the rig's axes."""
     kind = rig["type"]
     if kind == "sphere":
-        levels = np.round(local[:, 2], 6)
-        found, counts = np.unique(levels, return_counts=True)
-        rings = found[counts >= FEWEST_CAMERAS]
-        if not rings.size:
-            return []
-        nearest = rings[np.argmin(np.abs(rings))]
-        return [int(number) for number in np.flatnonzero(levels == nearest)]
+        order = np.argsort(local[:, 2], kind="stable")
+        heights = local[order, 2]
+        gaps = np.flatnonzero(np.diff(heights) > SAME_LEVEL * np.ptp(heights)) + 1
+        rings = [ring for ring in np.split(order, gaps) if len(ring) >= FEWEST_CAMERAS]
+        nearest = min(rings, key=lambda ring: abs(local[ring, 2].mean()), default=order[:0])
+        return [int(number) for number in np.sort(nearest)]
     if kind == "poses":
         return []
     counts = list(rig["cameras"])

@@ -123,7 +123,9 @@ def cell(value: Any) -> str:
     if isinstance(value, list | tuple):
         return ", ".join(cell(part) for part in value)
     if isinstance(value, dict):
-        return ", ".join(f"{key} {cell(part)}" for key, part in value.items())
+        return ", ".join(
+            f"{str(key).replace('_', ' ')} {cell(part)}" for key, part in value.items()
+        )
     try:
         return number(float(value))
     except (TypeError, ValueError):

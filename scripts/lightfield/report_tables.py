@@ -14,6 +14,13 @@ from lightfield.files import read_json
 # Of the stability table, so many of the cases that use most of their bound are shown at once.
 WORST_CASES = 12
 
+# The tables of error_vs_time that are shown at once, in this order, by their names there.
+ERROR_TABLES = {
+    "slopes": "Slope of the error, both axes logarithmic; plain path tracing's is −1 in theory",
+    "settings": "This scene's settings",
+    "pareto front": "On the Pareto front: no other way is both faster and better",
+}
+
 
 @dataclass(frozen=True)
 class Table:
@@ -121,10 +128,39 @@ def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
     stem = path or next((file for file in files if file.stem == scene), None)
     if stem is None:
         return None
-    tables, facts = _tables(read_json(path)) if path else ({}, {})
-    short = {name: table for name, table in tables.items() if len(table.rows) <= 16}
-    whole = {name: table for name, table in tables.items() if name not in short}
-    return Measurement(page.plot(stem.with_suffix("")), short, whole, _with_units(facts, ""))
+    content = read_json(path) if path else {}
+    tables, _ = _tables(content)
+    known = {name: table for name, table in tables.items() if name in ERROR_TABLES}
+    whole = {name: table for name, table in tables.items() if name not in known}
+    whole.pop("measured on", None)
+    if "slopes" in known:
+        known["slopes"] = _slopes(content["slopes"])
+    measured_on = content.get("measured_on")
+    return Measurement(
+        page.plot(stem.with_suffix("")),
+        {ERROR_TABLES[name]: known[name] for name in ERROR_TABLES if name in known},
+        {name.capitalize(): table for name, table in whole.items()},
+        _with_units(measured_on, "") if isinstance(measured_on, Mapping) else [],
+    )
+
+
+def _slopes(slopes: Mapping[str, Any]) -> Table:
+    """Return each method's slope over time and over samples, ± its standard error."""
+    over = ("over_time", "over_samples")
+
+    def told(fit: Any) -> str | None:
+        if not isinstance(fit, Mapping) or "slope" not in fit:
+            return None
+        return f"{fit['slope']:.2f} ± {fit.get('slope_error', math.nan):.2f}".replace("-", "−")
+
+    return Table(
+        ["method", *(name.replace("_", " ") for name in over)],
+        [
+            [method, *(told(fits.get(name)) for name in over)]
+            for method, fits in slopes.items()
+            if isinstance(fits, Mapping)
+        ],
+    )
 
 
 def costs(path: Path) -> dict[str, Any] | None:

@@ -177,7 +177,7 @@ def _depth_scale(
     if depths is None or reach is None:
         return None
     hit = depths[np.isfinite(depths) & (depths > 0)]
-    near, far = np.log2(np.percentile(hit, [2, 98])).tolist() if hit.size else reach
+    near, far = np.log2(np.percentile(hit, [5, 98])).tolist() if hit.size else reach
     palette = matplotlib.colormaps["viridis_r"](np.arange(256), bytes=True)[:, :3]
     return {
         "range": reach,

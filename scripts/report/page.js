@@ -563,9 +563,14 @@ const drawLines = onceAFrame(() => {
     let before = null;
     track.forEach((column, place) => {
       const [x, y] = [(column / columns) * width, ((place + 0.5) / count) * height];
+      const pixel = Math.floor(column);
+      const inside = pixel >= 0 && pixel < columns;
+      if (!inside || depthCode(lines.pixels[1], 4 * epipolarPixel(pixel, place)) === 0) {
+        before = null;
+        return;
+      }
       // Round a ring, a curve leaves on one side and comes back on the other.
-      const jumps = before === null || Math.abs(column - before) > DATA.row.columns / 2;
-      if (jumps) context.moveTo(x, y);
+      if (before === null || Math.abs(column - before) > DATA.row.columns / 2) context.moveTo(x, y);
       else context.lineTo(x, y);
       before = column;
     });

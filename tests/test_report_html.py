@@ -1,0 +1,451 @@
+"""A dataset's page, in a real browser: it loads, shows what the files hold, and can be used."""
+
+import base64
+import io
+import json
+import shutil
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import sync_playwright
+
+from lightfield import epipolar, images, lenses, noise, packing, rigs
+from lightfield.files import write_json
+
+RADIUS = 5.0
+SPHERE = {
+    "type": "sphere",
+    "subdivisions": 1,
+    "size": 2.0,
+    "center": [0, 0, 0],
+    "camera": {"lens": "equidistant", "fov": 180, "resolution": [64, 64]},
+}
+LINE = {
+    "type": "plane",
+    "cameras": [5, 3],
+    "size": [2, 1, 1],
+    "camera": {"lens": "rectilinear", "fov": 90, "resolution": [64, 48]},
+}
+HOSTILE = "<img src=x onerror=\"document.title='broken'\"></script><script>document.title='broken'"
+
+
+def light_of(points):
+    """Return the colour (..., 3) of points on the inside of a sphere: smooth, over 8 stops."""
+    return 2.0 ** (4 * points / RADIUS)
+
+
+def view(lens, matrix):
+    """Return colour and Z-depth of the inside of a sphere about the origin, solved exactly."""
+    x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
+    rays = lens.rays(x, y)
+    world = rays @ matrix[:3, :3].T
+    place = matrix[:3, 3]
+    along = world @ place
+    distance = -along + np.sqrt(along**2 - place @ place + RADIUS**2)
+    outside = np.isnan(distance)
+    colour = light_of(place + distance[..., None] * world)
+    colour[outside] = 0
+    return colour, np.where(outside, np.inf, distance * -rays[..., 2])
+
+
+def write_dataset(folder, rig, depth="z", names=None):
+    """Write the views of a rig in a sphere, as the renderer writes them."""
+    lens = lenses.from_camera(rig["camera"])
+    lightfield = rigs.lightfield(rig, lens.to_lightfield()) | {
+        "depth": depth,
+        "scene": {"name": "ball"},
+        "render": {"samples": 4, "adaptive_threshold": 0, "denoise": False},
+    }
+    for number, frame in enumerate(lightfield["frames"]):
+        frame["name"] = names[number] if names else frame["name"]
+        colour, z = view(lens, np.array(frame["world_matrix"]))
+        channels = dict(zip("RGB", np.moveaxis(colour.astype(np.float16), -1, 0), strict=True))
+        if depth:
+            channels["Z"] = z.astype(np.float32)
+        images.write_exr(folder / "exr" / f"{frame['name']}.exr", channels)
+    write_json(folder / "lightfield.json", lightfield)
+    return lightfield
+
+
+def make_page(run_program, folder, rig, *arguments, name="ball/LFSphere"):
+    output = folder / "report" / "index.html"
+    words = ("--dataset", folder, "--name", name, "--rig", json.dumps(rig), "--output", output)
+    run_program("report_html.py", *words, *arguments)
+    return output
+
+
+@pytest.fixture(scope="module")
+def browser():
+    path = shutil.which("chromium")
+    if not path:
+        pytest.fail("these tests need Chromium: sudo apt-get install chromium")
+    words = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=words)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def show(browser):
+    """Open a page; when the test is over, nothing may have gone wrong on any."""
+    seen = SimpleNamespace(errors=[], requests=[])
+    contexts = []
+
+    def show(path, width=1280):
+        context = browser.new_context(viewport={"width": width, "height": 900})
+        contexts.append(context)
+        tab = context.new_page()
+        tab.on("console", lambda message: seen.errors.append(message.text))
+        tab.on("pageerror", lambda error: seen.errors.append(str(error)))
+        tab.on("request", lambda request: seen.requests.append(request.url))
+        tab.goto(path.as_uri())
+        return tab
+
+    yield show
+    for context in contexts:
+        context.close()
+    assert not seen.errors
+    assert seen.requests
+    assert all(url.startswith(("file:", "data:")) for url in seen.requests)
+
+
+@pytest.fixture(scope="module")
+def sphere(tmp_path_factory, run_program):
+    """The page of a sphere of cameras with all that a page can have; and its lightfield.json."""
+    folder = tmp_path_factory.mktemp("ball") / "LFSphere"
+    lightfield = write_dataset(folder, SPHERE)
+    panorama = lenses.from_camera({"lens": "equirectangular", "resolution": [128, 64]})
+    colour, _ = view(panorama, rigs.poses({"type": "lattice", "cameras": [1, 1, 1]})[0].matrix())
+    channels = dict(zip("RGB", np.moveaxis(colour.astype(np.float32), -1, 0), strict=True))
+    channels["Z"] = np.full((64, 128), RADIUS, np.float32)
+    images.write_exr(folder / "panorama.exr", channels)
+    run_program(
+        *("report_figures.py", "--lightfield", folder / "lightfield.json"),
+        *("--rig", json.dumps(SPHERE), "--panorama", folder / "panorama.exr"),
+        *("--output", folder / "report"),
+    )
+    picture = np.full((32, 64, 3), 90, np.uint8)
+    for name in ("panorama", "contact_sheet"):
+        images.write_png(folder / "report" / f"{name}.png", picture)
+    check = {"views": [], "problems": [], "warnings": [], "figures": {"nearest_metres": 0.25}}
+    checks = [
+        {"name": "views", "passed": True, "detail": "12 of 12 images are there", **check},
+        {"name": "perspective/depth", "passed": None, "detail": "no depth", **check},
+        {"name": "files", "passed": False, "detail": "1 file", **check, "problems": [HOSTILE]},
+    ]
+    write_json(folder / "validation.json", {"valid": False, "checks": checks})
+    write_json(
+        folder / "report" / "costs.json",
+        {
+            "stages": [{"stage": "render", "jobs": 1, "wall_seconds": 200.0, "bytes": 2_500_000}],
+            "energy_kwh": 0.25,
+            "price": 0.08,
+            "currency": "EUR",
+            "extrapolation": {"core_hours": 12.0, "core_hours_uncertainty": 1.5},
+        },
+    )
+    measured = folder.parent / "benchmarks"
+    measured.mkdir()
+    (measured / "stability.csv").write_text(
+        "group,case,dtype,condition,error,error_bound,verdict\n"
+        "lens pair,a to b,float32,5.0,1e-6,2e-6,ok\n"
+        "lens pair,b to a,float32,5.0,4e-6,2e-6,FAIL\n"
+    )
+    page = make_page(run_program, folder, SPHERE, "--measurements", *sorted(measured.glob("*.csv")))
+    return SimpleNamespace(page=page, lightfield=lightfield, folder=folder)
+
+
+# Of a copy, for the page's own canvases are drawn on and not read.
+COPY = """
+(name) => {
+  const canvas = document.getElementById(name);
+  const copy = document.createElement("canvas");
+  copy.width = canvas.width;
+  copy.height = canvas.height;
+  const context = copy.getContext("2d", { willReadFrequently: true });
+  context.drawImage(canvas, 0, 0);
+  const { data } = context.getImageData(0, 0, copy.width, copy.height);
+  return data.some((value) => value) ? copy.toDataURL() : null;
+}
+"""
+
+
+def pixels(tab, canvas):
+    """Return the pixels (height, width, 4) of a canvas, once it has been drawn."""
+    tab.wait_for_function(COPY, arg=canvas)
+    tab.evaluate("() => new Promise((done) => requestAnimationFrame(() => setTimeout(done, 50)))")
+    _, _, encoded = tab.evaluate(COPY, canvas).partition(",")
+    return np.array(Image.open(io.BytesIO(base64.b64decode(encoded))).convert("RGBA")).astype(int)
+
+
+def frame_of(tab, canvas):
+    """Return where a canvas is in the window, scrolled so that all of it is there."""
+    tab.evaluate(
+        "(name) => document.getElementById(name).scrollIntoView({block: 'center'})", canvas
+    )
+    return tab.locator(f"#{canvas}").bounding_box()
+
+
+def test_the_page_loads_whole_from_one_file(sphere, show):
+    tab = show(sphere.page)
+    pixels(tab, "viewer")
+    widths = tab.eval_on_selector_all("img", "all => all.map((image) => image.naturalWidth)")
+    assert len(widths) == 5
+    assert min(widths) > 0
+    text = tab.inner_text("main")
+    for part in ("not valid", "equidistant fisheye, 180°", "12 of 12 images", "snakemake"):
+        assert part in text
+    # What things cost, in words, and what it would at full size.
+    for part in ("3 min 20 s", "2.5 MB", "0.08 EUR", "12 h ± 1.5 h"):
+        assert part in text
+    # The case that is worst, as part of its bound, comes first.
+    assert text.index("200%") < text.index("50%")
+
+
+def test_the_page_is_the_same_each_time(sphere, run_program, tmp_path):
+    before = sphere.page.read_bytes()
+    assert make_page(run_program, sphere.folder, SPHERE).read_bytes() != before
+    measured = sorted((sphere.folder.parent / "benchmarks").glob("*.csv"))
+    again = make_page(run_program, sphere.folder, SPHERE, "--measurements", *measured)
+    assert again.read_bytes() == before
+
+
+def test_the_viewer_steps_exposes_and_shows_depth(sphere, show):
+    tab = show(sphere.page)
+    first = pixels(tab, "viewer")
+    name = tab.inner_text("#view-name")
+    tab.click("[data-step=right]")
+    assert tab.inner_text("#view-name") != name
+    assert (pixels(tab, "viewer") != first).any()
+    tab.focus("#viewer")
+    tab.keyboard.press("ArrowLeft")
+    assert tab.inner_text("#view-name") == name
+    assert (pixels(tab, "viewer") == first).all()
+
+    tab.evaluate(
+        "() => { const s = document.getElementById('exposure'); s.value = -3;"
+        " s.dispatchEvent(new Event('input')); }"
+    )
+    darker = pixels(tab, "viewer")
+    lit = first[..., :3].sum(axis=-1) > 60
+    assert (darker[lit][:, :3].sum(axis=-1) < first[lit][:, :3].sum(axis=-1)).all()
+    tab.click("#show-depth")
+    assert tab.is_visible("#depth-scale")
+    assert (pixels(tab, "viewer")[lit] != darker[lit]).any()
+
+
+def test_the_readout_tells_what_the_file_holds(sphere, show):
+    tab = show(sphere.page)
+    pixels(tab, "viewer")
+    frame = frame_of(tab, "viewer")
+    tab.mouse.move(
+        frame["x"] + frame["width"] * 40.5 / 64, frame["y"] + frame["height"] * 20.5 / 64
+    )
+    place, colour, depth = tab.locator("#readout b").all_inner_texts()
+    assert place == "40, 20"
+    stored = images.read_image(
+        sphere.folder / "exr" / f"{tab.inner_text('#view-name')}.exr"
+    ).channels
+    truth = [float(stored[name][20, 40]) for name in "RGBZ"]
+    # Lossy compression and 8 bits for light; three digits for depth.
+    np.testing.assert_allclose([float(word) for word in colour.split()], truth[:3], rtol=0.15)
+    assert float(depth.removesuffix(" m")) == pytest.approx(truth[3], rel=0.006)
+
+
+def test_the_rig_turns_and_its_cameras_open_their_views(sphere, show):
+    tab = show(sphere.page)
+    before = pixels(tab, "rig")
+    drawn = before[..., 3] > 0
+    assert 0.005 < drawn.mean() < 0.9
+    frame = frame_of(tab, "rig")
+    tab.mouse.move(frame["x"] + 200, frame["y"] + 200)
+    tab.mouse.down()
+    tab.mouse.move(frame["x"] + 300, frame["y"] + 230, steps=3)
+    tab.mouse.up()
+    turned = pixels(tab, "rig")
+    assert (turned != before).any(axis=-1).sum() > 0.1 * drawn.sum()
+
+    closed = tab.evaluate(
+        "() => rig.screen.map(([x, y, depth], number) => ({x, y, depth, number}))"
+        ".filter((camera) => camera.number !== DATA.embedded[viewer.current].view)"
+        ".sort((a, b) => a.depth - b.depth)[0]"
+    )
+    tab.mouse.move(frame["x"] + closed["x"], frame["y"] + closed["y"])
+    tab.wait_for_selector("#rig-name:visible")
+    name = sphere.lightfield["frames"][closed["number"]]["name"]
+    assert tab.inner_text("#rig-name") == name
+    tab.mouse.click(frame["x"] + closed["x"], frame["y"] + closed["y"])
+    assert tab.inner_text("#view-name") == name
+
+
+def test_the_epipolar_image_is_drawn_and_pointed_at(sphere, show):
+    tab = show(sphere.page)
+    level = pixels(tab, "epi")
+    tab.click("#epi-depth")
+    assert (pixels(tab, "epi") != level).any()
+    tab.hover("#epi", position={"x": 5, "y": 100})
+    assert "distance" in tab.inner_text("#epi-readout")
+
+
+@pytest.mark.parametrize("width", [320, 390])
+def test_a_phone_does_not_scroll_sideways(sphere, show, width):
+    tab = show(sphere.page, width)
+    pixels(tab, "viewer")
+    assert tab.evaluate("() => document.documentElement.scrollWidth") <= width
+
+
+def test_names_are_text_whatever_they_hold(run_program, show, tmp_path):
+    rig = {**LINE, "cameras": [2, 1]}
+    names = ["a\"<b>&'", "<i>"]
+    write_dataset(tmp_path, rig, depth=None, names=names)
+    page = make_page(run_program, tmp_path, rig, name=f"{HOSTILE}/{HOSTILE}")
+    tab = show(page)
+    pixels(tab, "viewer")
+    assert tab.title() != "broken"
+    assert tab.inner_text("#view-name") in names
+    # Without depth, validation, costs or measurements the page says so, and how to get them.
+    text = tab.inner_text("main")
+    for part in ("Not validated yet", "error_vs_time", "stability", "No costs", "no three cameras"):
+        assert part in text
+    assert tab.is_disabled("#show-depth")
+
+
+def test_an_index_leads_to_every_page(sphere, run_program, show):
+    results = sphere.folder.parents[1]
+    output = results / "index.html"
+    run_program("report_index.py", "--results", results, "--output", output)
+    tab = show(output)
+    tab.click(".cards a")
+    assert tab.inner_text("h1").replace(" ", "") == "ball/LFSphere"
+    tab.click(".home")
+    assert tab.url == output.as_uri()
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "expected"),
+    [
+        ("lightfield.json", "{}", "lightfield.json: is not what"),
+        ("lightfield.json", "[", "lightfield.json: is not JSON"),
+        ("validation.json", "{}", "validation.json: is not what"),
+        ("report/costs.json", "[]", "costs.json: must be a mapping"),
+        ("report/panorama.png", "no", "panorama.png: is no picture"),
+        ("exr/view_0001f.exr", "no", "view_0001f.exr: is no image"),
+    ],
+)
+def test_what_cannot_be_read_is_told_in_a_line(run_program, tmp_path, file, text, expected):
+    rig = {**LINE, "cameras": [2, 1]}
+    write_dataset(tmp_path, rig)
+    (tmp_path / file).parent.mkdir(exist_ok=True)
+    (tmp_path / file).write_text(text)
+    words = ("--dataset", tmp_path, "--name", "a/b", "--rig", json.dumps(rig))
+    result = run_program("report_html.py", *words, "--output", tmp_path / "x.html", check=False)
+    assert result.returncode == 1
+    assert expected in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+# What the page is made of.
+
+
+def test_stills_are_the_same_each_time(sphere, run_program, tmp_path):
+    run_program(
+        *("report_figures.py", "--lightfield", sphere.folder / "lightfield.json"),
+        *("--rig", json.dumps(SPHERE), "--panorama", sphere.folder / "panorama.exr"),
+        *("--output", tmp_path),
+    )
+    made = sorted(tmp_path.iterdir())
+    assert len(made) == 6
+    for path in made:
+        assert path.read_bytes() == (sphere.folder / "report" / path.name).read_bytes()
+
+
+@pytest.mark.parametrize("rig", [SPHERE, LINE])
+@pytest.mark.parametrize("tilt", [-30, 0, 20])
+def test_epipolar_images_hold_the_light_and_depth_of_the_scene(rig, tilt):
+    lens = lenses.from_camera({**rig["camera"], "resolution": [256, 192]})
+    poses = np.array([pose.matrix() for pose in rigs.poses(rig)])
+    row = epipolar.find_row(rig, poses)
+    rays = epipolar.directions(row, tilt, 90)
+    seen = 0
+    for number in row.views:
+        colour, z = view(lens, poses[number])
+        light, reach = epipolar.sample(lens, poses[number], colour, z, "z", rays)
+        points = poses[number, :3, 3] + reach[:, None] * rays
+        hit = np.isfinite(reach)
+        # At the rim of a fisheye, Z-depth is so short that half a pixel is much of it.
+        hit &= -(rays @ poses[number, :3, :3])[:, 2] > 0.2 * np.linalg.norm(rays, axis=-1)
+        seen += hit.sum()
+        np.testing.assert_allclose(np.linalg.norm(points[hit], axis=-1), RADIUS, rtol=0.06)
+        on_ball = points[hit] * (RADIUS / np.linalg.norm(points[hit], axis=-1))[:, None]
+        np.testing.assert_allclose(light[hit], light_of(on_ball), rtol=0.12)
+    assert seen > 40
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"type": "plane", "cameras": [5, 3]}, range(5, 10)),
+        ({"type": "cuboid", "cameras": [4, 3, 1]}, range(4)),
+        # The left side comes after front and back, each of 2 × 3.
+        ({"type": "cuboid", "cameras": [2, 5, 3]}, range(12 + 5, 12 + 10)),
+        ({"type": "lattice", "cameras": [3, 1, 1], "cube_map": True}, (0, 6, 12)),
+        ({"type": "cylinder", "cameras": [6, 2]}, range(6, 12)),
+        ({"type": "lattice", "cameras": [2, 2, 2]}, None),
+        ({"type": "poses", "file": "unused"}, None),
+    ],
+)
+def test_the_row_is_the_middle_one(change, expected):
+    rig = {"size": 1.0, "center": [1, 2, 3], "rotation": [0, 0, 30]} | change
+    unread = change["type"] == "poses"
+    poses = np.tile(np.eye(4), (9, 1, 1)) if unread else [p.matrix() for p in rigs.poses(rig)]
+    row = epipolar.find_row(rig, np.array(poses))
+    assert (sorted(row.views) if row else None) == (list(expected) if expected else None)
+
+
+def test_a_spheres_row_is_its_equator():
+    rig = {**SPHERE, "subdivisions": 3, "center": [0, 0, 1]}
+    poses = rigs.poses(rig)
+    row = epipolar.find_row(rig, np.array([pose.matrix() for pose in poses]))
+    assert len(row.views) == 20
+    assert all(poses[view].position[2] == pytest.approx(1, abs=1e-4) for view in row.views)
+    assert (np.diff(row.places) > 0).all()
+
+
+def test_light_and_depth_survive_packing():
+    random = np.random.default_rng(1)
+    light = np.exp2(random.uniform(-6, 6, (40, 3)))
+    light[3] = 0
+    low, high = packing.light_range(light)
+    codes = packing.pack_light(light, (low, high)).astype(float)
+    assert (codes[3] == 0).all()
+    back = np.where(codes > 0, 2 ** (low + (codes - 1) / 254 * (high - low)), 0)
+    inside = light >= 2**low
+    np.testing.assert_allclose(
+        back[inside], light[inside], rtol=2 ** ((high - low) / 508) - 1 + 1e-9
+    )
+
+    depth = np.exp2(random.uniform(-3, 9, 500))
+    depth[:2] = np.inf, np.nan
+    near, far = packing.depth_range(depth)
+    high_byte, low_byte, _ = np.moveaxis(packing.pack_depth(depth, (near, far)).astype(int), -1, 0)
+    codes = (high_byte * 256 + low_byte) / 16
+    assert codes[0] == packing.MISS
+    assert codes[1] == packing.NO_DEPTH
+    back = 2 ** (near + (codes[2:] - 1) / (packing.MISS - 2) * (far - near))
+    np.testing.assert_allclose(back, depth[2:], rtol=2e-3)
+
+
+def test_noise_is_measured_and_what_is_smooth_is_none():
+    random = np.random.default_rng(2)
+    y, x = np.mgrid[:256, :256]
+    smooth = 2.0 + 0.01 * x + 0.02 * y
+    assert np.nanmax(noise.relative_noise(smooth, 16)) < 1e-12
+    edge = smooth + 5.0 * (x > 100)
+    noisy = edge * (1 + random.normal(0, 0.03, smooth.shape))
+    measured = noise.relative_noise(noisy, 16)
+    assert np.median(measured) == pytest.approx(0.03, rel=0.04)
+    assert measured.max() < 0.045
+    assert np.isnan(noise.relative_noise(np.zeros((40, 40)), 8)).all()
