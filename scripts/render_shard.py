@@ -64,7 +64,10 @@ def main() -> None:
     label = f"render {arguments.output.parent}"
     if arguments.views != ":":
         label += f" {arguments.views}"
-    progress = Progress(len(missing), label, already=len(frames) - len(missing))
+    others = (
+        Others(lightfield, arguments.output) if len(frames) < len(lightfield["frames"]) else str
+    )
+    progress = Progress(len(missing), label, already=len(frames) - len(missing), note=others)
     if missing:
         render_views(missing, lightfield, arguments, journal, progress)
     if arguments.record:
@@ -83,6 +86,21 @@ def parse_slice(text: str) -> slice:
 def view_path(folder: Path, frame: Mapping[str, Any]) -> Path:
     """Return the path of a view's EXR in the folder of the views."""
     return folder / f"{frame['name']}.exr"
+
+
+class Others:
+    """Counts the finished views of the whole dataset, other shards' too; looks at each once."""
+
+    def __init__(self, lightfield: Mapping[str, Any], folder: Path) -> None:
+        self.total = len(lightfield["frames"])
+        self.missing = {
+            view_path(folder, frame): keys.render_key(lightfield, frame)
+            for frame in lightfield["frames"]
+        }
+
+    def __call__(self) -> str:
+        self.missing = {p: key for p, key in self.missing.items() if not images.has_key(p, key)}
+        return f"; of the whole dataset {self.total - len(self.missing)} of {self.total}"
 
 
 def render_views(

@@ -466,7 +466,8 @@ def main() -> None:
     oiio.attribute("threads", 1)
     for made in job.maps:
         lens_map.report(made)
-    progress = Progress(len(views), "reproject")
+    label = f"reproject to {arguments.output_dir} {arguments.views or ''}".rstrip()
+    progress = Progress(len(views), label)
     paths: list[Path] = []
     failed = 0
     for view, result in _run(job, views):

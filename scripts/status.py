@@ -15,7 +15,6 @@ from typing import Any
 
 from lightfield import images, journal, keys
 from lightfield.cli import run
-from lightfield.errors import UserError
 from lightfield.files import read_json
 from lightfield.progress import duration
 
@@ -88,7 +87,7 @@ def look(dataset: Dataset, now: float) -> Rendering:
     finished = {
         frame["name"]
         for frame in frames
-        if has_key(view_file(dataset, frame["name"]), keys.render_key(lightfield, frame))
+        if images.has_key(view_file(dataset, frame["name"]), keys.render_key(lightfield, frame))
     }
     recent, seconds = 0, 0.0
     running: list[str] = []
@@ -136,16 +135,6 @@ def shard_bounds(path: Path) -> tuple[int, int]:
 def view_file(dataset: Dataset, name: str) -> Path:
     """Return the path of a rendered view."""
     return dataset.folder / "exr" / f"{name}.exr"
-
-
-def has_key(path: Path, key: str) -> bool:
-    """Tell whether a file is there and was made by the settings of ``key``, from its header."""
-    try:
-        return (
-            path.exists() and images.read_header(path).attributes.get(images.KEY_ATTRIBUTE) == key
-        )
-    except UserError:
-        return False
 
 
 def reprojected(dataset: Dataset, reprojection: str, finished: set[str]) -> int:

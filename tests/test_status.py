@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from checkouts import ROOT, snakemake
 
+import render_shard
 from lightfield import images, keys, progress
 
 NAMES = ["a", "b", "c", "d"]
@@ -166,3 +167,11 @@ def test_progress_begins_at_once_and_reads_in_a_log(capsys, monkeypatch):
     assert capsys.readouterr().err == ""
     told.done(6)
     assert capsys.readouterr().err.endswith("done in 2 min 41 s\n")
+
+
+def test_a_shard_tells_of_the_views_that_others_finished(dataset):
+    dataset.render("a")
+    others = render_shard.Others(dataset.content, dataset.folder / "exr")
+    assert others() == "; of the whole dataset 1 of 4"
+    dataset.render("c", "d")
+    assert others() == "; of the whole dataset 3 of 4"

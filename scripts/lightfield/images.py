@@ -96,6 +96,14 @@ def read_image(
     return Image(found, attributes)
 
 
+def has_key(path: Path, key: str) -> bool:
+    """Tell by its header alone whether a file is there and made by the settings of ``key``."""
+    try:
+        return path.exists() and read_header(path).attributes.get(KEY_ATTRIBUTE) == key
+    except UserError:
+        return False
+
+
 def is_finished(path: Path, key: str) -> bool:
     """Tell whether a file is there, whole, and made by the settings that ``key`` stands for."""
     try:

@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections.abc import Callable
 
 
 def duration(seconds: float) -> str:
@@ -19,7 +20,8 @@ class Progress:
 
     Whole lines, never carriage returns, so that several shards can share one log. The lines come
     every ``interval`` seconds, and more rarely, down to one a minute, the longer the work takes.
-    ``already`` pieces were finished before; ``total`` are to do.
+    ``already`` pieces were finished before; ``total`` are to do. ``note`` ends each line but the
+    first.
     """
 
     def __init__(
@@ -29,11 +31,13 @@ class Progress:
         unit: str = "views",
         interval: float = 5.0,
         already: int = 0,
+        note: Callable[[], str] = str,
     ) -> None:
         self.total = total
         self.label = label
         self.unit = unit
         self.interval = interval
+        self.note = note
         self.count = 0
         self._print(f"{total} {unit} to do" + (f", {already} already done" if already else ""))
         self.begin()
@@ -61,6 +65,7 @@ class Progress:
         self._print(
             f"{self.count} of {self.total} {self.unit}, {each:.3g} s each, "
             + (f"{duration(left)} left" if left else f"done in {duration(elapsed)}")
+            + self.note()
         )
 
     def _print(self, text: str) -> None:
