@@ -41,7 +41,7 @@ from lightfield.resample import narrow, resample_color, resample_depth, widen
 from lightfield.rigs import matrix_to_euler
 from lightfield.tonemap import decode_srgb, to_8_bit, tone_map
 
-VERSION = 1  # of the pixels: part of every key, raised when the same settings give other pixels
+VERSION = 2  # of the pixels: part of every key, raised when the same settings give other pixels
 # A seventh of the time that zlib's own level and the choice of a filter for each row take, and
 # files as small: level 4, and libpng's PNG_FILTER_AVG for every row.
 PNG_OPTIONS = {"png:compressionLevel": 4, "png:filter": 64}
@@ -387,7 +387,8 @@ def _write(
     depth = None if source.depth is None else source.depth[rows, columns]
     as_z = target.lens.has_z_depth
     if job.copies and source.is_z == as_z:
-        color = np.where(np.isnan(made.source_cos)[:, :, None], np.float32(np.nan), color)
+        outside = np.isnan(made.target_cos[row:end_row, column:end_column])
+        color = np.where(outside[:, :, None], np.float32(np.nan), color)
         color = _in_frame(color, made)
         depth = None if depth is None else _in_frame(depth, made)
     else:

@@ -303,6 +303,34 @@ def test_no_pair_of_lenses_and_no_value_gives_what_is_no_answer(size):
         assert ((finite > 0.99e-6) & (finite < 1.01e9)).all()
 
 
+@pytest.mark.parametrize("name", ["bicubic", "lanczos", "adaptive"])
+@pytest.mark.parametrize("pixels", [96, 12])
+@pytest.mark.parametrize("angles", [(45, 0, 10), (0, 45, -20), (-135, 0, 0)])
+def test_a_cube_map_is_as_exact_at_its_faces_borders_as_inside(name, pixels, angles):
+    cube = CubeMap(width=6 * 64, height=64)
+    scene = Waves(16)
+    # A view of the middle of an edge.
+    target = Rectilinear(width=pixels, height=pixels, focal_length=60, sensor_size=(36, 36))
+    rotation = lens_map.rotation_matrix(*angles)
+    truth = scene.pixels(target, rotation, 5)
+
+    # The same pixels of a single face, so wide that the edge is in its midst.
+    wide = Rectilinear(width=192, height=192, focal_length=6, sensor_size=(36, 36))
+    ahead = lens_map.rotation_matrix(*(90 * round(angle / 90 + 0.1) for angle in angles[:2]), 0)
+    # On its side of the edge, up to 3 pixels from it; beyond, the wide face has finer pixels.
+    side = np.abs(rays_of(target) @ (ahead.T @ rotation).T)
+    away = (1 - side[..., :2].max(axis=-1) / side[..., 2]) * 32
+    near = (away > 0) & (away < 3)
+
+    def rms(source, turned):
+        made = lens_map.compute(source, target, turned.T @ rotation, name)
+        pixels = as_source(scene.pixels(source, turned))
+        error = apply(pixels, made)[..., 0] - truth
+        return np.sqrt(np.mean(error[near] ** 2))
+
+    assert rms(cube, IDENTITY) < 1.1 * rms(wide, ahead)
+
+
 # Depth
 
 

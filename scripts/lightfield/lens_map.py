@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from lightfield.errors import UserError
 from lightfield.files import atomic_path
-from lightfield.lenses import Array, CubeMap, Lens
+from lightfield.lenses import CUBE_FACES, Array, CubeMap, Lens, cube_face_rotation
 from lightfield.resample import ADAPTIVE, DEFAULT_FILTER, FILTERS, SUPPORT
 
 # What a target pixel (or one of its samples) finds in the source.
@@ -77,6 +77,10 @@ class LensMap:
     # next, the first index being x or y and the second the way.
     footprints: Array | None = None
     counts: Array | None = None
+    # Of a cube map: (h + 2b, 6 (h + 2b), 2) float32, where in the strip of faces each pixel of the
+    # strip of faces with borders of b pixels lies. All other coordinates, `source_cos` and the
+    # flags are then of the strip with borders, and the window is the whole of the one without.
+    strip: Array | None = None
 
     @property
     def topology(self) -> tuple[bool, bool, bool, int]:
@@ -129,20 +133,7 @@ def compute(
         np.arange(-1, target.width + 1) + 0.5,
         np.arange(-1, target.height + 1) + 0.5,
     )
-    jacobian = _jacobian(padded, source.width, wraps, panels)
-    centers = _framed(padded[1:-1, 1:-1], source)
-    points = centers
-    if samples > 1:
-        x = (np.arange(target.width * samples) + 0.5) / samples
-        y = _strips((np.arange(target.height * samples) + 0.5) / samples)
-        # In float32 from the start: they are n² times as many as the pixels.
-        points = np.concatenate(
-            [
-                _framed(_coordinates(source, target, rotation, x, rows), source).astype(np.float32)
-                for rows in y
-            ]
-        )
-    source_cos = _cosines(source)
+    jacobian = _jacobian(padded, source, wraps)
     reach = np.asarray(SUPPORT[filter_name])
     footprints, counts = None, None
     if filter_name == ADAPTIVE:
@@ -152,8 +143,32 @@ def compute(
         else:
             extent = np.abs(footprints * (counts[..., None, :] - 1)).sum(axis=-1) / 2
             reach = reach + np.ceil(extent.max(axis=-1))
-    window = _window(points, source, reach, wraps or panels > 1)
-    corner = np.array([window[2], window[0]], points.dtype)
+    border = 0
+    if isinstance(source, CubeMap):
+        border = min(int(reach.max()) + 1, source.height)
+    centers = _framed(padded[1:-1, 1:-1], source, border)
+    points = centers
+    if samples > 1:
+        x = (np.arange(target.width * samples) + 0.5) / samples
+        y = _strips((np.arange(target.height * samples) + 0.5) / samples)
+        # In float32 from the start: they are n² times as many as the pixels.
+        points = np.concatenate(
+            [
+                _framed(_coordinates(source, target, rotation, x, rows), source, border).astype(
+                    np.float32
+                )
+                for rows in y
+            ]
+        )
+    strip = None
+    if isinstance(source, CubeMap):
+        strip = _strip_with_borders(source, border)
+        source_cos = _face_cosines(source, border)
+        window, corner = (0, source.height, 0, source.width), np.zeros(2, points.dtype)
+    else:
+        source_cos = _cosines(source)
+        window = _window(points, source, reach, wraps)
+        corner = np.array([window[2], window[0]], points.dtype)
     centers32 = (centers - corner).astype(np.float32)
     nothing = np.isnan(centers[..., 0])
     scale = np.where(nothing, np.nan, magnification(jacobian))
@@ -164,11 +179,12 @@ def compute(
         centers=centers32,
         samples=centers32 if samples == 1 else (points - corner).astype(np.float32),
         flags=_flags(points, ~np.isnan(source_cos), reach, panels),
-        source_cos=np.ascontiguousarray(source_cos[window[0] : window[1], window[2] : window[3]]),
+        source_cos=source_cos if strip is not None else _cut(source_cos, window),
         target_cos=_cosines(target),
         magnification=scale.astype(np.float32),
         footprints=footprints,
         counts=counts,
+        strip=strip,
     )
     # Read-only, as `load` gives them, so that both use the same compiled kernels.
     for array in _arrays(lens_map).values():
@@ -302,6 +318,25 @@ def _cosines(lens: Lens) -> Array:
     )
 
 
+def _cut(pixels: Array, window: tuple[int, int, int, int]) -> Array:
+    return np.ascontiguousarray(pixels[window[0] : window[1], window[2] : window[3]])
+
+
+def _strip_with_borders(source: CubeMap, border: int) -> Array:
+    """Return where the pixels of the faces with borders lie in the strip; see `LensMap.strip`."""
+    places = np.arange(-border, source.height + border) + 0.5
+    rays = source.face.rays(places[None, :], places[:, None])
+    faces = [source.pixels(rays @ cube_face_rotation(face).T) for face in CUBE_FACES]
+    return np.concatenate(faces, axis=1).astype(np.float32)
+
+
+def _face_cosines(source: CubeMap, border: int) -> Array:
+    """Return cos θ from each face's own axis, in the strip with borders, which repeat the edge."""
+    places = np.arange(source.height) + 0.5
+    cosines = -source.face.rays(places[None, :], places[:, None])[..., 2]
+    return np.asarray(np.tile(np.pad(cosines.astype(np.float32), border, mode="edge"), 6))
+
+
 def _strips(values: Array) -> list[Array]:
     return np.array_split(values, max(1, len(values) // _STRIP))
 
@@ -315,17 +350,23 @@ def _coordinates(source: Lens, target: Lens, rotation: Array, x: Array, y: Array
     return np.concatenate(parts)
 
 
-def _framed(coordinates: Array, source: Lens) -> Array:
-    """Return the coordinates with NaN in place of those outside the source's frame."""
+def _framed(coordinates: Array, source: Lens, border: int) -> Array:
+    """Return the coordinates with NaN in place of those outside the source's frame.
+
+    Those in a cube map's strip become those in its strip of faces with a ``border``.
+    """
     inside = (coordinates >= 0) & (coordinates <= [source.width, source.height])
-    return np.where(inside.all(axis=-1, keepdims=True), coordinates, np.nan)
+    shift = np.zeros_like(coordinates)
+    if border:
+        face = np.floor(coordinates[..., 0] / source.height)
+        shift[..., 0], shift[..., 1] = (2 * face + 1) * border, border
+    return np.where(inside.all(axis=-1, keepdims=True), coordinates + shift, np.nan)
 
 
-def _jacobian(padded: Array, width: int, wraps: bool, panels: int) -> Array:
+def _jacobian(padded: Array, source: Lens, wraps: bool) -> Array:
     """Return central differences (H, W, 2, 2) of (H + 2, W + 2, 2) source coordinates.
 
-    ``width`` is the source's. Where one neighbour has no coordinates, or lies on another panel,
-    the difference is one-sided, and 0 where neither will do.
+    Where one neighbour has no coordinates the difference is one-sided, and 0 where neither has.
     """
     out = np.empty((padded.shape[0] - 2, padded.shape[1] - 2, 2, 2))
     middle = padded[1:-1, 1:-1]
@@ -334,18 +375,28 @@ def _jacobian(padded: Array, width: int, wraps: bool, panels: int) -> Array:
         (padded[:-2, 1:-1], padded[2:, 1:-1]),
     )
     for axis, (before, after) in enumerate(neighbours):
+        if isinstance(source, CubeMap):
+            before, after = (_on_face_of(source, c, middle) for c in (before, after))
         backward, forward = middle - before, after - middle
-        for difference, neighbour in ((backward, before), (forward, after)):
-            if wraps:
-                difference[..., 0] -= width * np.round(difference[..., 0] / width)
-            if panels > 1:
-                here, there = (np.floor(c[..., 0] * panels / width) for c in (middle, neighbour))
-                difference[here != there] = np.nan
+        if wraps:
+            for difference in (backward, forward):
+                difference[..., 0] -= source.width * np.round(difference[..., 0] / source.width)
         lacks = np.isnan(forward), np.isnan(backward)
         forward = np.where(lacks[0], backward, forward)
         backward = np.where(lacks[1], forward, backward)
         # A grazing ray moves beyond all bounds: as good as beyond every image.
         out[..., axis] = np.clip(np.nan_to_num((forward + backward) / 2), -1e9, 1e9)
+    return out
+
+
+def _on_face_of(source: CubeMap, coordinates: Array, middle: Array) -> Array:
+    """Return the coordinates, those on another face than ``middle`` continued onto its plane."""
+    out = coordinates.copy()
+    here, there = (np.floor(c[..., 0] / source.height) for c in (middle, coordinates))
+    for index, name in enumerate(CUBE_FACES):
+        other = (here == index) & (there != index)
+        rays = source.rays(out[other, 0], out[other, 1]) @ cube_face_rotation(name)
+        out[other] = source.face.pixels(rays) + np.array([index * source.height, 0])
     return out
 
 
@@ -390,10 +441,10 @@ def _flags(points: Array, valid: Array, reach: Array, panels: int) -> Array:
     return flags
 
 
-def _window(points: Array, source: Lens, reach: Array, whole: bool) -> tuple[int, int, int, int]:
+def _window(points: Array, source: Lens, reach: Array, wraps: bool) -> tuple[int, int, int, int]:
     """Return the rows and columns [row, end) × [column, end) that the filter may read.
 
-    All columns if ``whole``, for a source whose columns are not in a row from left to right.
+    All columns if the source ``wraps`` around.
     """
     if np.isnan(points[..., 0]).all():
         return 0, 1, 0, 1
@@ -407,6 +458,6 @@ def _window(points: Array, source: Lens, reach: Array, whole: bool) -> tuple[int
     size = np.array([source.width, source.height])
     left, top = (int(start) for start in np.clip(np.floor(low), 0, size - 1))
     right, bottom = (int(end) for end in np.clip(np.ceil(high), 1, size))
-    if whole:
+    if wraps:
         left, right = 0, source.width
     return top, bottom, left, right

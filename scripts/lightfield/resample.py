@@ -436,9 +436,48 @@ def _resample(source: Array, lens_map: "LensMap", rows: slice, out: Array) -> No
         )
 
 
+@kernel
+def _continue_faces(source: Array, strip: Array, out: Array) -> None:
+    """Give each face of a cube map a border, bicubic samples of the faces around it."""
+    size, side = source.shape[0], strip.shape[0]
+    border = (side - size) // 2
+    wx, wy = np.empty(6, np.float32), np.empty(6, np.float32)
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            row, column = i - border, j % side - border
+            if 0 <= row < size and 0 <= column < size:
+                out[i, j] = source[row, j // side * size + column]
+                continue
+            x, y = strip[i, j, 0] - np.float32(0.5), strip[i, j, 1] - np.float32(0.5)
+            column, row = int(np.floor(x)), int(np.floor(y))
+            _fill_weights(4, x - np.float32(column), wx)
+            _fill_weights(4, y - np.float32(row), wy)
+            first = int(strip[i, j, 0]) // size * size
+            for c in range(4):
+                total = darkest = np.float32(0)
+                for a in range(4):
+                    for b in range(4):
+                        p = min(max(row + a - 1, 0), size - 1)
+                        q = min(max(column + b - 1, first), first + size - 1)
+                        total += wy[a] * wx[b] * source[p, q, c]
+                        darkest = min(darkest, source[p, q, c])
+                # NaN, which stays, marks what is no sample.
+                out[i, j, c] = darkest if total < darkest else total
+
+
+def _with_borders(source: Array, lens_map: "LensMap") -> Array:
+    """Return the window, of a cube map with what surrounds each face."""
+    if lens_map.strip is None:
+        return source
+    out = np.empty((*lens_map.strip.shape[:2], 4), np.float32)
+    _continue_faces(source, lens_map.strip, out)
+    return out
+
+
 def resample_color(source: Array, lens_map: "LensMap") -> Array:
     """Resample a source window (h, w, 4) float32 to (H, W, 4); NaN where it has no source."""
     height, width = lens_map.target_cos.shape
+    source = _with_borders(source, lens_map)
     if source.shape[:2] != lens_map.source_cos.shape:
         raise UserError(
             f"the source window has {source.shape[1]} × {source.shape[0]} pixels and the lens map "
@@ -651,6 +690,10 @@ def resample_depth(
     pixel that the ray falls in is taken, so no depth lies between two surfaces. Returns (H, W)
     float32; a miss (inf) stays inf, NaN marks a pixel without a source.
     """
+    if lens_map.strip is not None:
+        # A depth beyond its face's edge would be along another axis, or between two surfaces.
+        border = (lens_map.strip.shape[0] - depth.shape[0]) // 2
+        depth = np.hstack([np.pad(face, border, mode="edge") for face in np.hsplit(depth, 6)])
     inverse = np.empty(depth.shape, np.float32)
     if depth.dtype == np.float16:
         bits = np.ascontiguousarray(depth).view(np.uint16)
