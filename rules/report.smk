@@ -129,7 +129,7 @@ rule figures:
         ENVIRONMENT
     params:
         rig=lambda wildcards: json.dumps(dataset_of(wildcards).cameras),
-        folder=f"{DATASET}/report",
+        folder=lambda wildcards, output: str(Path(output[0]).parent),
     message:
         "Drawing the rig, depth and noise of {wildcards.scene}/{wildcards.rig}"
     shell:
@@ -153,7 +153,7 @@ rule page:
     conda:
         ENVIRONMENT
     params:
-        dataset=DATASET,
+        dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
         rig=lambda wildcards: json.dumps(dataset_of(wildcards).cameras),
         measurements=measurements,
         # Not in the command: when a measurement was made anew, so is the page.
@@ -176,7 +176,7 @@ rule index:
     conda:
         ENVIRONMENT
     params:
-        results=RESULTS,
+        results=lambda wildcards, output: str(Path(output[0]).parent),
     message:
         "Making the page of all datasets"
     shell:
