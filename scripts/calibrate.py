@@ -2,7 +2,7 @@
 
 Each way (plain, adaptive, denoised, both) is tried on probe views with ever more effort until it
 reaches the target, and its effort is then interpolated to meet the target, not to surpass it. The
-cheapest is chosen, and held-out views, other cameras under other seeds, confirm it.
+cheapest is chosen, and held-out views, the nearest other cameras under other seeds, confirm it.
 
 Cost is counted in samples a pixel, not in seconds, so that a scene makes the same choice each time:
 the bytes of its views follow from it. `lightfield.metrics` defines the error.
@@ -12,7 +12,7 @@ import argparse
 import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
@@ -26,9 +26,9 @@ from lightfield.files import read_json, write_json
 DENOISING_SAMPLES = 4
 
 # A reference takes renders of so many samples until its own error is this part of the target.
-REFERENCE_SAMPLES = 64
+REFERENCE_SAMPLES = 16
 REFERENCE_PART = 0.2
-FEWEST_SEEDS, MOST_SEEDS = 4, 64
+FEWEST_SEEDS, MOST_SEEDS = 4, 256
 
 PROBE_SEED, HELD_OUT_SEED = 1, 2
 
@@ -68,9 +68,15 @@ class Bench:
     """Some views, their references, and what was measured on them."""
 
     def __init__(
-        self, maker: trials.Trials, frames: Sequence[trials.Frame], seed: int, target: float
+        self,
+        maker: trials.Trials,
+        probes: Sequence[trials.Probe],
+        seed: int,
+        target: float,
+        exposure: float | None = None,
     ) -> None:
-        self.maker, self.frames, self.seed = maker, frames, seed
+        self.maker, self.probes, self.seed = maker, probes, seed
+        self._exposure = exposure
         self.seeds = FEWEST_SEEDS
         self._make_references()
         while self.own_error > REFERENCE_PART * target and self.seeds < MOST_SEEDS:
@@ -78,21 +84,22 @@ class Bench:
             self._make_references()
 
     def _make_references(self) -> None:
-        self.references = []
-        for number, frame in enumerate(self.frames, 1):
-            self.references.append(self.maker.reference(frame, self.seeds, REFERENCE_SAMPLES))
-            tell(f"reference {number} of {len(self.frames)}, {self.seeds * REFERENCE_SAMPLES} spp")
+        found = []
+        for number, probe in enumerate(self.probes, 1):
+            found.append(self.maker.reference(probe, self.seeds, REFERENCE_SAMPLES))
+            tell(f"reference {number} of {len(self.probes)}, {self.seeds * REFERENCE_SAMPLES} spp")
+        self.references = metrics.exposed_alike(found, self._exposure)
         self.own_error = fmean(reference.own_error for reference in self.references)
 
     def measure(self, way: str, settings: Mapping[str, Any]) -> tuple[Measurement, list[float]]:
         """Render every view under ``settings``; also return the error of each."""
-        renders = [self.maker.render(frame, self.seed, settings) for frame in self.frames]
+        renders = [self.maker.render(probe, self.seed, settings) for probe in self.probes]
         errors = [
             metrics.relative_mse(render.colour, reference)
             for render, reference in zip(renders, self.references, strict=True)
         ]
         samples = fmean(render.samples for render in renders)
-        megapixels = self.maker.lens.width * self.maker.lens.height / 1e6
+        megapixels = self.probes[0].width * self.probes[0].height / 1e6
         found = Measurement(
             way=way,
             settings={**trials.PLAIN, **settings},
@@ -113,9 +120,9 @@ def main() -> None:
         "--lightfield", required=True, type=Path, help="lightfield.json with render.target_error"
     )
     parser.add_argument(
-        "--views", type=int, default=8, help="probe views, and as many held out (default: 8)"
+        "--probes", type=int, default=16, help="windows of views, as many held out (default: 16)"
     )
-    parser.add_argument("--size", type=int, default=64, help="of their longer side (default: 64)")
+    parser.add_argument("--size", type=int, default=64, help="of their sides (default: 64)")
     parser.add_argument("--device", default="auto", help="what Cycles renders on (default: auto)")
     parser.add_argument("--threads", type=int, default=1, help="CPU threads (default: 1)")
     parser.add_argument("--cache", required=True, type=Path, help="folder of what was rendered")
@@ -130,18 +137,22 @@ def main() -> None:
         arguments.blend,
         arguments.inventory,
         lightfield,
-        arguments.size,
         arguments.device,
         arguments.threads,
         arguments.cache,
     )
-    frames = lightfield["frames"]
-    count = max(1, min(arguments.views, len(frames) // 2))
-    probes = Bench(maker, trials.spread(frames, count, 0.25), PROBE_SEED, target)
+    known = maker.probes(arguments.size, arguments.probes)
+    frames = [frame for frame in lightfield["frames"] if frame not in [p.frame for p in known]]
+    others = [
+        replace(probe, frame=trials.neighbour(frames, probe.frame) or probe.frame)
+        for probe in known
+    ]
+    probes = Bench(maker, known, PROBE_SEED, target)
     limits = render.get("most_samples"), render.get("denoise")
     needed, measured = search(probes, target, *limits)
     choice = choose(eligible(measured, *limits), target)
-    held_out = Bench(maker, trials.spread(frames, count, 0.75), HELD_OUT_SEED, target)
+    _, known_errors = probes.measure(choice.way, choice.settings)
+    held_out = Bench(maker, others, HELD_OUT_SEED, target, probes.references[0].exposure)
     _, errors = held_out.measure(choice.way, choice.settings)
     error = fmean(errors)
     confirmed = abs(error / target - 1) <= CONFIRMED
@@ -153,18 +164,19 @@ def main() -> None:
         "reached": reaches(choice, target),
         "cost_samples": choice.cost,
         "probe_error": choice.error,
+        "probe_standard_error": stdev(known_errors) / math.sqrt(len(known_errors)),
         "held_out_error": error,
         "held_out_ratio": error / target,
-        "held_out_standard_error": stdev(errors) / math.sqrt(count) if count > 1 else None,
+        "held_out_standard_error": stdev(errors) / math.sqrt(len(errors)),
         "confirmed": confirmed,
         "plain_samples_needed": needed,
         "times_fewer_samples": needed / choice.cost,
         "denoising_samples": DENOISING_SAMPLES,
-        "resolution": [maker.lens.width, maker.lens.height],
-        "probes": [frame["name"] for frame in probes.frames],
+        "size": arguments.size,
+        "probes": [probe.name for probe in known],
         "held_out": [
-            {"view": frame["name"], "error": value}
-            for frame, value in zip(held_out.frames, errors, strict=True)
+            {"probe": probe.name, "error": value}
+            for probe, value in zip(others, errors, strict=True)
         ],
         "references": {
             "samples": [bench.seeds * REFERENCE_SAMPLES for bench in (probes, held_out)],
@@ -177,7 +189,7 @@ def main() -> None:
         write_json(arguments.seconds, seconds(measured, choice, needed))
     print(
         f"{choice.way}, {choice.settings}: error {choice.error:.3g} on the probe views and "
-        f"{error:.3g} ± {record['held_out_standard_error'] or 0:.1g} on others, wanted {target:g}; "
+        f"{error:.3g} ± {record['held_out_standard_error']:.1g} on others, wanted {target:g}; "
         f"{record['times_fewer_samples']:.1f} times cheaper than plain path tracing"
     )
     if not record["reached"]:
@@ -278,6 +290,9 @@ def climb(
         points.append((effort, bench.measure(way, {**settings_at(effort), **also})[0]))
         now = points[-1][1]
         if reaches(now, target) or effort >= last or now.cost >= affordable:
+            break
+        # Every pixel takes the most that it may.
+        if len(points) > 1 and now.samples == points[-2][1].samples:
             break
         if len(points) > 2:
             before = points[-2][1]

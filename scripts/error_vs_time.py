@@ -1,6 +1,6 @@
 """Measure the error of renders against their time: sampling plain, adaptive, guided, denoised.
 
-Small views of the dataset are rendered in every way and compared with references made of other
+Windows of the dataset's views are rendered in every way and compared with references of other
 seeds (`lightfield.metrics` says how). What is rendered is kept with its time: killed and started
 again, this goes on where it was. The time is Cycles' own for rendering, denoising included, of one
 render the median over its seeds; it is right only where nothing else runs on the same core.
@@ -16,7 +16,7 @@ import csv
 import math
 import statistics
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -66,12 +66,12 @@ def main() -> None:
         "--calibration", type=Path, help="what scripts/calibrate.py chose for a target error"
     )
     parser.add_argument(
-        "--views",
+        "--probes",
         type=int,
-        default=2,
-        help="views to render, and the nearest neighbour of the first (default: 2)",
+        default=3,
+        help="windows of views to render, beside that of the first one's neighbour (default: 3)",
     )
-    parser.add_argument("--size", type=int, default=64, help="of their longer side (default: 64)")
+    parser.add_argument("--size", type=int, default=64, help="of their sides (default: 64)")
     parser.add_argument(
         "--octaves", type=int, default=8, help="of sample counts, beginning at 1 (default: 8)"
     )
@@ -95,34 +95,32 @@ def main() -> None:
         arguments.blend,
         arguments.inventory,
         lightfield,
-        arguments.size,
         arguments.device,
         arguments.threads,
         arguments.cache,
     )
-    frames = trials.spread(lightfield["frames"], arguments.views, 0.5)
-    near = trials.neighbour(lightfield["frames"], frames[0])
+    probes = maker.probes(arguments.size, arguments.probes)
+    near = trials.neighbour(lightfield["frames"], probes[0].frame)
     if near:
-        frames = [frames[0], near, *(frame for frame in frames[1:] if frame != near)]
-    progress = Progress(len(frames), f"{arguments.output.name}: references")
-    references = []
-    for frame in frames:
-        references.append(
-            maker.reference(frame, REFERENCE_SEEDS, arguments.reference // REFERENCE_SEEDS)
-        )
+        probes.insert(1, replace(probes[0], frame=near))
+    progress = Progress(len(probes), f"{arguments.output.name}: references")
+    made = []
+    for probe in probes:
+        made.append(maker.reference(probe, REFERENCE_SEEDS, arguments.reference // REFERENCE_SEEDS))
         progress.done()
+    references = metrics.exposed_alike(made)
 
     seeds = range(1, arguments.seeds + 1)
-    on_cpu = maker.render(frames[0], seeds[0], {"samples": 1}).device == "CPU"
+    on_cpu = maker.render(probes[0], seeds[0], {"samples": 1}).device == "CPU"
     ways = all_ways(lightfield["render"], arguments.octaves, guiding=on_cpu)
     progress = Progress(
-        len(ways) * len(frames) * len(seeds), f"{arguments.output.name}: trials", "renders"
+        len(ways) * len(probes) * len(seeds), f"{arguments.output.name}: trials", "renders"
     )
     points, pairs = [], []
     for method, settings in ways:
         renders = []
-        for frame in frames:
-            renders.append([maker.render(frame, seed, settings) for seed in seeds])
+        for probe in probes:
+            renders.append([maker.render(probe, seed, settings) for seed in seeds])
             progress.done(len(seeds))
         points.append(measured(method, settings, renders, references))
         if near and references[0].depth is not None:
@@ -130,13 +128,14 @@ def main() -> None:
                 {
                     "method": method,
                     "settings": settings,
-                    **neighbours(maker, frames, references, renders),
+                    **neighbours(maker, probes, references, renders),
                 }
             )
 
     content = {
         "measured_on": {
-            "views": [frame["name"] for frame in frames],
+            "probes": [probe.name for probe in probes],
+            "size": arguments.size,
             "resolution": [maker.lens.width, maker.lens.height],
             "seeds": len(seeds),
             "reference_samples": arguments.reference,
@@ -250,13 +249,16 @@ def evaluated(points: Sequence[Point], references: Sequence[metrics.Reference]) 
 
 def neighbours(
     maker: trials.Trials,
-    frames: Sequence[trials.Frame],
+    probes: Sequence[trials.Probe],
     references: Sequence[metrics.Reference],
     renders: Sequence[Sequence[trials.Trial]],
 ) -> dict[str, float]:
     """Return how the first two views disagree, as `metrics.Disagreement`, the mean over seeds."""
-    pair = (references[0], references[1])
-    seen = trials.both_see((maker.camera(frames[0]), maker.camera(frames[1])), pair)
+    pair, windows = (references[0], references[1]), (probes[0], probes[1])
+    cameras = maker.camera(probes[0].frame), maker.camera(probes[1].frame)
+    seen = trials.both_see(cameras, windows, pair)
+    if not len(seen[0]):
+        return {}
     found = [
         asdict(metrics.disagreement((first.colour, second.colour), pair, seen))
         for first, second in zip(renders[0], renders[1], strict=True)

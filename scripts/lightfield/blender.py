@@ -154,6 +154,15 @@ def set_sampling(settings: Mapping[str, Any]) -> None:
         cycles.use_guiding = settings["guiding"]
 
 
+def set_window(x: int, y: int, width: int, height: int) -> None:
+    """Let every view that follows consist of these pixels alone, (0, 0) being the top left one."""
+    render = bpy.context.scene.render
+    render.use_border = render.use_crop_to_border = True
+    across, down = render.resolution_x, render.resolution_y
+    render.border_min_x, render.border_max_x = x / across, (x + width) / across
+    render.border_min_y, render.border_max_y = 1 - (y + height) / down, 1 - y / down
+
+
 def watch_samples() -> None:
     """Let every view that follows say how many samples its pixels took, and the work they were."""
     _first_layer(bpy.context.scene).cycles.pass_debug_sample_count = True

@@ -5,7 +5,7 @@ counts only pixels that the lens has a ray for.
 
 The one that is minimised is the relative mean squared error, (x − r)² / (r² + ε), the mean over
 channels and over all pixels but the worst thousandth (Rousselle, Knaus and Zwicker 2011, section
-5). Both images are exposed so that the reference's geometric mean luminance is middle grey, and ε
+5). Images are exposed so that the references' geometric mean luminance is middle grey, 0.18, and ε
 is 0.01. The thousandth makes it robust: a few fireflies would otherwise decide it, so that it would
 take thousands of views to tell two ways to render apart. Its expectation then is only nearly
 proportional to 1/N for N samples, as the whole mean's is exactly if the samples are independent.
@@ -16,7 +16,7 @@ subtracting an estimate of it, from how its n renders differ, leaves the image's
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import flip_evaluator
@@ -41,18 +41,14 @@ class Reference:
 
     colour (h, w, 3): scene-linear, the mean of the renders; variance (h, w, 3): the estimated
     variance of that mean; depth (h, w): the median of the renders' depths, inf for a miss, or None;
-    mask (h, w): pixels that the lens has a ray for.
+    mask (h, w): pixels that the lens has a ray for; exposure: stops at which it is looked at.
     """
 
     colour: Array
     variance: Array
     depth: Array | None
     mask: Mask
-
-    @property
-    def exposure(self) -> float:
-        """Stops that bring the reference's typical pixel to middle grey."""
-        return exposure_for(self.colour[self.mask])
+    exposure: float
 
     @property
     def weights(self) -> Array:
@@ -77,8 +73,17 @@ def make_reference(
     stack = np.stack(colours).astype(np.float64)
     with np.errstate(invalid="ignore"):
         depth = np.median(np.stack(depths), axis=0).astype(np.float64) if depths else None
-    variance = stack.var(axis=0, ddof=1) / len(stack)
-    return Reference(stack.mean(axis=0), variance, depth, mask)
+    mean, variance = stack.mean(axis=0), stack.var(axis=0, ddof=1) / len(stack)
+    return Reference(mean, variance, depth, mask, exposure_for(mean[mask]))
+
+
+def exposed_alike(
+    references: Sequence[Reference], exposure: float | None = None
+) -> list[Reference]:
+    """Return references under one ``exposure``; that for all their pixels together by default."""
+    if exposure is None:
+        exposure = exposure_for(np.concatenate([r.colour[r.mask] for r in references]))
+    return [replace(reference, exposure=exposure) for reference in references]
 
 
 @dataclass(frozen=True)
@@ -86,9 +91,10 @@ class Errors:
     """What one image differs by from its reference.
 
     relative_mse: without the reference's own error, and below 0 by chance where it is far smaller
-    than that; psnr (decibel), ssim and flip (0 is equal) of the tone-mapped sRGB image; depth: mean
-    of |z/r − 1|, at most 1 a pixel, where a pixel in which only one of the two hit anything counts
-    as 1, or None without depth. Cycles takes depth from one sample, so that more do not improve it.
+    than that; psnr (decibel; inf if equal), ssim and flip (0 is equal) of the tone-mapped image;
+    depth: mean of |z/r − 1|, at most 1 a pixel, where a pixel in which only one of the two hit
+    anything counts as 1, or None without depth. Cycles takes depth from one sample, so that more
+    do not improve it.
     """
 
     relative_mse: float
@@ -117,9 +123,11 @@ def compare(
     flip = flip_evaluator.evaluate(
         truth.astype(np.float32), shown.astype(np.float32), "LDR", applyMagma=False
     )[0]
+    with np.errstate(divide="ignore"):
+        psnr = -10 * np.log10(np.mean((shown - truth)[mask] ** 2))
     return Errors(
         relative_mse=relative_mse(colour, reference),
-        psnr=float(-10 * np.log10(np.mean((shown - truth)[mask] ** 2))),
+        psnr=float(psnr),
         ssim=float(similarity[mask].mean()),
         flip=float(flip.reshape(mask.shape)[mask].mean()),
         depth=None

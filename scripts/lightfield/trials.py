@@ -1,9 +1,13 @@
-"""Small views of a dataset, rendered in many ways to learn what each way costs and what it gives.
+"""Windows of a dataset's views, rendered in many ways to learn what each way costs and gives.
+
+Whole views made small would show more detail a pixel than the dataset does, which a denoiser cannot
+tell from noise; so a probe is a part of a view at the view's own resolution.
 
 Every render is kept in a folder, under a key of all that it follows from, with the time that it
 took, so that what is interrupted goes on where it was and what is repeated costs nothing.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,9 +29,29 @@ PLAIN = {"adaptive_threshold": 0, "denoise": False}
 # Seeds of references begin here, and those of trials at 1: no trial is part of its reference.
 REFERENCE_SEED = 1000
 
+R2 = (0.7548776662466927, 0.5698402909980532)
+# A probe has at least this part of its pixels in the image circle.
+FULL_ENOUGH = 0.75
+
 SECONDS_ATTRIBUTE = "plenoforge:core_seconds"
 SAMPLES_ATTRIBUTE = "plenoforge:samples"
 DEVICE_ATTRIBUTE = "plenoforge:device"
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A window of one view at its own resolution: its top left pixel, and its size."""
+
+    frame: Frame
+    x: int
+    y: int
+    width: int
+    height: int
+
+    @property
+    def name(self) -> str:
+        """The view's name and the window's place in it."""
+        return f"{self.frame['name']}+{self.x}+{self.y}"
 
 
 @dataclass(frozen=True)
@@ -48,7 +72,7 @@ class Trial:
 
 
 class Trials:
-    """Renders small views of the dataset of a lightfield.json, or takes them from ``cache``.
+    """Renders probes of the dataset of a lightfield.json, or takes them from ``cache``.
 
     Blender starts only when something has to be rendered.
     """
@@ -58,31 +82,27 @@ class Trials:
         blend: Path,
         inventory: Path,
         lightfield: Mapping[str, Any],
-        size: int,
         device: str,
         threads: int,
         cache: Path,
     ) -> None:
-        lens = lenses.from_lightfield(lightfield)
-        scale = min(1.0, size / max(lens.width, lens.height))
-        self.lens = lens.resized(*(max(1, round(x * scale)) for x in (lens.width, lens.height)))
+        self.lens = lenses.from_lightfield(lightfield)
         # How many samples are taken, and why, is for each trial to say.
         render = {k: v for k, v in lightfield["render"].items() if k not in UNCALIBRATED}
-        self.lightfield = {**lightfield, **self.lens.to_lightfield(), "render": render}
-        rows, columns = np.mgrid[: self.lens.height, : self.lens.width] + 0.5
-        self.mask: Mask = np.isfinite(self.lens.rays(columns, rows)).all(axis=-1)
+        self.lightfield = {**lightfield, "render": render}
         self._blend, self._inventory = blend, inventory
         self._device, self._threads, self._cache = device, threads, cache
         self._started = False
 
-    def render(self, frame: Frame, seed: int, sampling: Mapping[str, Any]) -> Trial:
-        """Render one of the frames under the render settings that ``sampling`` changes."""
+    def render(self, probe: Probe, seed: int, sampling: Mapping[str, Any]) -> Trial:
+        """Render a probe under the render settings that ``sampling`` changes."""
         settings = {**self.lightfield["render"], **PLAIN, **sampling, "seed": seed}
-        content = {**self.lightfield, "render": settings, "device": self._device}
-        key = keys.render_key(content, frame)
+        window = [probe.x, probe.y, probe.width, probe.height]
+        content = {**self.lightfield, "render": settings, "device": self._device, "window": window}
+        key = keys.render_key(content, probe.frame)
         path = self._cache / f"{key[:32]}.exr"
         if not images.is_finished(path, key):
-            self._render(frame, settings, path, key)
+            self._render(probe, settings, path, key)
         image = images.read_image(path)
         return Trial(
             colour=np.stack([image.channels[c] for c in "RGB"], axis=-1),
@@ -92,28 +112,58 @@ class Trials:
             device=str(image.attributes[DEVICE_ATTRIBUTE]),
         )
 
-    def reference(self, frame: Frame, seeds: int, samples: int) -> Reference:
-        """Render a frame with ``seeds`` seeds, ``samples`` samples each, and take their mean."""
+    def reference(self, probe: Probe, seeds: int, samples: int) -> Reference:
+        """Render a probe with ``seeds`` seeds, ``samples`` samples each, and take their mean."""
         renders = [
-            self.render(frame, REFERENCE_SEED + number, {"samples": samples})
+            self.render(probe, REFERENCE_SEED + number, {"samples": samples})
             for number in range(seeds)
         ]
         depths = [render.depth for render in renders if render.depth is not None]
-        return make_reference([render.colour for render in renders], depths or None, self.mask)
+        colours = [render.colour for render in renders]
+        return make_reference(colours, depths or None, self.mask(probe))
+
+    def mask(self, probe: Probe) -> Mask:
+        """Return which pixels of a probe the lens has a ray for, (h, w)."""
+        rows, columns = np.mgrid[: probe.height, : probe.width]
+        rays = self.lens.rays(columns + probe.x + 0.5, rows + probe.y + 0.5)
+        inside: Mask = np.isfinite(rays).all(axis=-1)
+        return inside
 
     def camera(self, frame: Frame) -> Camera:
         """Return where a frame looks from, as `lightfield.consistency` wants it."""
         kind = "z" if self.lightfield["camera"]["type"] == "PERSP" else "distance"
         return Camera(self.lens, np.array(frame["world_matrix"]), kind)
 
-    def _render(self, frame: Frame, settings: Mapping[str, Any], path: Path, key: str) -> None:
+    def probes(self, size: int, count: int) -> list[Probe]:
+        """Choose ``count`` windows of ``size``², spread evenly over the frames and the image.
+
+        A view no larger than a window is a probe as a whole.
+        """
+        frames = self.lightfield["frames"]
+        size = min(size, self.lens.width, self.lens.height)
+        found: list[Probe] = []
+        point = 0
+        while len(found) < count:
+            frame = frames[int((len(found) + 0.5) * len(frames) / count)]
+            # Roberts' R2 sequence, which fills a square evenly.
+            point += 1
+            across, down = (point * step % 1 for step in R2)
+            x, y = round(across * (self.lens.width - size)), round(down * (self.lens.height - size))
+            probe = Probe(frame, x, y, size, size)
+            # In the corners of a fisheye view there is nothing.
+            if self.mask(probe).mean() >= FULL_ENOUGH:
+                found.append(probe)
+        return found
+
+    def _render(self, probe: Probe, settings: Mapping[str, Any], path: Path, key: str) -> None:
         from lightfield import blender
 
         if not self._started:
             self._start(settings)
         blender.set_sampling(settings)
-        pose = np.array(frame["world_matrix"])
-        raw = blender.render_view(pose, keys.view_seed(settings["seed"], frame["name"]))
+        blender.set_window(probe.x, probe.y, probe.width, probe.height)
+        seed = keys.view_seed(settings["seed"], probe.frame["name"])
+        raw = blender.render_view(np.array(probe.frame["world_matrix"]), seed)
         assert raw.samples is not None and raw.worked_seconds is not None
         seconds = raw.worked_seconds if self._on == "CPU" else raw.render_seconds
         channels = {name: raw.colour[:, :, index] for index, name in enumerate("RGB")}
@@ -124,7 +174,7 @@ class Trials:
             channels,
             {
                 images.KEY_ATTRIBUTE: key,
-                SAMPLES_ATTRIBUTE: float(raw.samples[self.mask].mean()),
+                SAMPLES_ATTRIBUTE: float(raw.samples[self.mask(probe)].mean()),
                 SECONDS_ATTRIBUTE: seconds,
                 DEVICE_ATTRIBUTE: self._on,
             },
@@ -142,27 +192,20 @@ class Trials:
         blender.watch_samples()
         # The first render also loads what all others use; it is not timed.
         blender.set_sampling({**settings, "samples": 1, "denoise": True})
+        blender.set_window(0, 0, min(64, self.lens.width), min(64, self.lens.height))
         blender.render_view(np.array(self.lightfield["frames"][0]["world_matrix"]), 0)
         self._started = True
 
 
-def spread(frames: Sequence[Frame], count: int, phase: float) -> list[Frame]:
-    """Choose up to ``count`` frames evenly; ``phase``, 0 to 1, is where in its part each lies.
-
-    Two choices of the same count with phases ¼ and ¾ share no frame if there are enough.
-    """
-    count = min(count, len(frames))
-    return [frames[int((number + phase) * len(frames) / count)] for number in range(count)]
-
-
 def neighbour(frames: Sequence[Frame], frame: Frame) -> Frame | None:
-    """Return the nearest other frame that looks the same way to within 45 degrees, if any."""
+    """Return the nearest other frame that looks the same way to within 70 degrees, if any."""
     own = np.array(frame["world_matrix"])
+    alike = math.cos(math.radians(70))
     others = [
         (round(float(np.linalg.norm(matrix[:3, 3] - own[:3, 3])), 6), index)
         for index, other in enumerate(frames)
         if other["name"] != frame["name"]
-        and (matrix := np.array(other["world_matrix"]))[:3, 2] @ own[:3, 2] > np.sqrt(0.5)
+        and (matrix := np.array(other["world_matrix"]))[:3, 2] @ own[:3, 2] > alike
     ]
     return frames[min(others)[1]] if others else None
 
@@ -172,26 +215,29 @@ SAME_DEPTH = 0.03
 
 
 def both_see(
-    cameras: tuple[Camera, Camera], references: tuple[Reference, Reference]
+    cameras: tuple[Camera, Camera],
+    probes: tuple[Probe, Probe],
+    references: tuple[Reference, Reference],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Find surfaces that two views see: flat indices (n,) of pixels of the one and of the other.
+    """Find surfaces that two probes see: flat indices (n,) of pixels of the one and of the other.
 
-    The first view's pixels are lifted by depth and looked up in the second; those that its depth
+    The first one's pixels are lifted by depth and looked up in the second; those that its depth
     says are hidden there are left out. Both references need depth.
     """
     first, second = cameras
+    window = probes[1]
     depths = references[0].depth, references[1].depth
     assert depths[0] is not None and depths[1] is not None
     rows, columns = np.nonzero(references[0].mask & np.isfinite(depths[0]))
-    points = first.lift(depths[0][rows, columns], columns, rows)
-    x, y = second.pixels(points).T
-    height, width = depths[1].shape
+    points = first.lift(depths[0][rows, columns], columns + probes[0].x, rows + probes[0].y)
+    x, y = (second.pixels(points) - (window.x, window.y)).T
     with np.errstate(invalid="ignore"):
-        inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+        inside = (x >= 0) & (x < window.width) & (y >= 0) & (y < window.height)
     across, down = (np.where(inside, value, 0).astype(np.int64) for value in (x, y))
     inside &= references[1].mask[down, across]
-    there = second.lift(depths[1][down, across], across, down)
+    there = second.lift(depths[1][down, across], across + window.x, down + window.y)
     with np.errstate(invalid="ignore"):
         expected, found = (np.linalg.norm(p - second.position, axis=1) for p in (points, there))
         same = inside & (np.abs(found / expected - 1) < SAME_DEPTH)
-    return (rows * width + columns)[same], (down * width + across)[same]
+    here = rows * probes[0].width + columns
+    return here[same], (down * window.width + across)[same]

@@ -1,0 +1,175 @@
+"""A target error instead of a sample count: what is chosen, whether it holds, and for good."""
+
+import json
+from pathlib import Path
+
+import pytest
+from checkouts import checkout, planned, snakemake
+
+import calibrate
+from lightfield import config, lenses, rigs
+from lightfield.errors import UserError
+
+TARGET = 0.02
+CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [24, 24]}
+RIG = {"type": "sphere", "subdivisions": 1, "size": 0.5, "center": [0, 0, 1.5], "camera": CAMERA}
+SCENE = """
+scene: {{builder: test_room}}
+render: {{{render}}}
+rigs:
+  LFSphere:
+    type: sphere
+    subdivisions: 1
+    size: 0.5
+    center: [0, 0, 1.5]
+    camera: {{lens: equidistant, fov: 180, resolution: [24, 24]}}
+"""
+ASKED = ("--config", "scenes=[aimed]", "rigs=all", "preset=full")
+
+
+@pytest.fixture(scope="module")
+def room_probes(tmp_path_factory, run_program, room):
+    """What scripts/calibrate.py is given: the room, its inventory, and cameras in it."""
+    folder = tmp_path_factory.mktemp("probes")
+    content = rigs.lightfield(RIG, lenses.from_camera(CAMERA).to_lightfield())
+    content |= {"depth": "z", "frame": 1, "scene": {}}
+    run_program("inventory.py", "--blend", room, "--output", folder / "inventory.json")
+
+    def arguments(**render):
+        path = folder / f"{len(list(folder.iterdir()))}.json"
+        path.write_text(json.dumps(content | {"render": {"seed": 0, **render}}))
+        return ("--blend", room, "--inventory", folder / "inventory.json", "--lightfield", path)
+
+    return arguments
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory, run_program, room_probes):
+    """Calibrate the room, in a folder of its own each time."""
+
+    def run(target, *more, **limits):
+        folder = tmp_path_factory.mktemp("calibrated")
+        told = run_program(
+            "calibrate.py",
+            *room_probes(target_error=target, **limits),
+            *("--probes", "4", "--size", "24", "--device", "cpu", "--cache", folder / "cache"),
+            *("--output", folder / "record.json", "--seconds", folder / "seconds.json"),
+            *more,
+        )
+        return folder, told
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def once(calibrated):
+    return calibrated(TARGET)
+
+
+def test_other_views_confirm_the_choice(once):
+    folder, told = once
+    record = json.loads((folder / "record.json").read_text())
+    assert record["reached"] and record["confirmed"]
+    assert abs(record["held_out_error"] / TARGET - 1) < 0.2
+    assert not set(record["probes"]) & {entry["probe"] for entry in record["held_out"]}
+    assert set(record["choice"]) == {"samples", "adaptive_threshold", "denoise"}
+    assert "warning" not in told.stderr
+    # Evidence: no candidate that reaches the target is cheaper.
+    good = [c for c in record["candidates"] if c["error"] <= TARGET * 1.05]
+    assert min(c["cost"] for c in good) == record["cost_samples"]
+    assert max(record["references"]["own_error"]) < TARGET / 4
+    seconds = json.loads((folder / "seconds.json").read_text())
+    assert len(seconds["candidates"]) == len(record["candidates"])
+
+
+def test_the_choice_is_the_same_to_the_byte_on_other_threads(once, calibrated):
+    again, _ = calibrated(TARGET, "--threads", "2")
+    first, second = (folder / "record.json" for folder in (once[0], again))
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_a_preset_limits_the_choice(calibrated):
+    folder, told = calibrated(0.01, most_samples=4, denoise=False)
+    record = json.loads((folder / "record.json").read_text())
+    assert record["choice"]["samples"] <= 4
+    assert record["choice"]["denoise"] is False
+    assert not record["reached"]
+    assert "warning: render.target_error: 0.01 is not reached within the preset's" in told.stderr
+
+
+def test_effort_follows_from_what_lies_on_both_sides_of_the_target():
+    # A power law of slope −½ between the points, and 1/N beyond the last.
+    points = [(1, 0.8), (4, 0.4), (16, 0.2)]
+    assert calibrate.effort_for(0.4, points) == pytest.approx(4)
+    assert calibrate.effort_for(0.2828427, points) == pytest.approx(8)
+    assert calibrate.effort_for(0.1, points) == pytest.approx(32)
+    assert calibrate.effort_for(0.9, points) == 1
+
+
+def test_only_a_scene_with_a_target_is_calibrated(tmp_path):
+    aimed = SCENE.format(render="target_error: 0.02")
+    counted = SCENE.format(render="samples: 4")
+    tmp_path.joinpath("aimed").mkdir()
+    tmp_path.joinpath("counted").mkdir()
+    jobs = planned(checkout(tmp_path / "aimed", aimed=aimed), *ASKED)
+    assert jobs["calibrate"] == jobs["probe_cameras"] == 1
+    others = planned(checkout(tmp_path / "counted", aimed=counted), *ASKED)
+    assert not {"calibrate", "probe_cameras"} & set(others)
+    del jobs["calibrate"], jobs["probe_cameras"]
+    assert jobs == others
+
+
+def test_what_was_chosen_is_what_is_rendered_and_shards_stay(tmp_path):
+    folder = checkout(tmp_path, aimed=SCENE.format(render="target_error: 0.05"))
+    record = folder / "work/aimed/calibration.json"
+    record.parent.mkdir(parents=True)
+    before = planned(folder, *ASKED)
+    choice = {"samples": 3000, "adaptive_threshold": 0.25, "denoise": True}
+    record.write_text(json.dumps({"target_error": 0.05, "choice": choice, "cost_samples": 3000}))
+    after = planned(folder, *ASKED)
+    assert after["render"] == before["render"]
+    result = snakemake(
+        folder,
+        *ASKED,
+        "--rerun-triggers",
+        "mtime",
+        "--allowed-rules",
+        "lightfield",
+        "--",
+        "results/aimed/LFSphere/lightfield.json",
+    )
+    assert result.returncode == 0, result.stderr
+    written = json.loads((folder / "results/aimed/LFSphere/lightfield.json").read_text())
+    assert {key: written["render"][key] for key in choice} == choice
+    assert written["render"]["target_error"] == 0.05
+
+
+LIMITS = {"samples": 12, "denoise": True}
+
+
+def test_a_scene_has_samples_or_a_target(tmp_path):
+    def read(render):
+        path = tmp_path / "scene.yaml"
+        path.write_text(SCENE.format(render=render))
+        return config.read_scene(path)
+
+    assert read("target_error: 0.01")["render"]["target_error"] == 0.01
+    for render, told in {
+        "seed: 1": "render: is missing the key samples (or target_error)",
+        "samples: 4, target_error: 0.1": "render.samples: goes without target_error",
+        "denoise: true, target_error: 0.1": "render.denoise: goes without target_error",
+        "target_error: 0": "render.target_error: is 0; must be a number above 0 and at most 1",
+        "target_eror: 0.1": "render.target_eror: unknown key; did you mean target_error?",
+    }.items():
+        with pytest.raises(UserError) as caught:
+            read(render)
+        assert told in str(caught.value)
+
+
+def test_presets_limit_what_a_calibration_may_choose(monkeypatch, tmp_path):
+    monkeypatch.setattr(config, "SCENES", tmp_path)
+    Path(tmp_path, "aimed.yaml").write_text(SCENE.format(render="target_error: 0.05"))
+    full = config.scene_datasets("aimed", "full", {})[0].render
+    assert not {"samples", "denoise", "adaptive_threshold", "most_samples"} & set(full)
+    preview = config.scene_datasets("aimed", "preview", LIMITS)[0].render
+    assert (preview["most_samples"], preview["denoise"]) == (12, True)

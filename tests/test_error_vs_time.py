@@ -1,0 +1,160 @@
+"""Error against render time, measured small: what is written, and nothing rendered twice."""
+
+import csv
+import json
+from itertools import pairwise
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from lightfield import images, lenses, rigs, trials
+from lightfield.metrics import Reference
+
+CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
+RIG = {"type": "plane", "cameras": [4, 1], "size": 0.3, "center": [0, 0, 1.5]}
+RENDER = {"samples": 4, "adaptive_threshold": 0, "denoise": True, "seed": 0}
+
+
+def lightfield():
+    content = rigs.lightfield(RIG, lenses.from_camera(CAMERA).to_lightfield())
+    return content | {"depth": "z", "frame": 1, "scene": {}, "render": RENDER}
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory, run_program, room):
+    folder = tmp_path_factory.mktemp("error")
+    (folder / "lightfield.json").write_text(json.dumps(lightfield()))
+    run_program("inventory.py", "--blend", room, "--output", folder / "inventory.json")
+
+    def run():
+        return run_program(
+            "error_vs_time.py",
+            *("--blend", room, "--inventory", folder / "inventory.json", "--device", "cpu"),
+            *("--lightfield", folder / "lightfield.json", "--cache", folder / "cache"),
+            *("--probes", "1", "--size", "32", "--octaves", "4", "--reference", "256"),
+            *("--output", folder / "room"),
+        )
+
+    run.folder = folder
+    run()
+    return run
+
+
+@pytest.fixture(scope="module")
+def content(measured):
+    return json.loads((measured.folder / "room.json").read_text())
+
+
+def test_plain_path_tracing_converges_as_monte_carlo_does(content):
+    """Cycles' Sobol points make a smooth room converge a little faster than independent ones."""
+    slope = content["slopes"]["plain"]["over_samples"]["slope"]
+    assert -1.3 < slope < -0.9
+    errors = [p["relative_mse"] for p in content["points"] if p["method"] == "plain"]
+    assert len(errors) == 5
+    assert all(more > less for more, less in pairwise(errors))
+    assert 0 < content["reference_error"] < errors[-1]
+
+
+def test_every_way_is_measured_and_the_scenes_own_is_known(content):
+    counts = {}
+    for point in content["points"]:
+        counts[point["method"]] = counts.get(point["method"], 0) + 1
+        assert point["seconds"] > 0
+        assert 0 <= point["flip"] <= 1 and point["ssim"] <= 1
+    assert counts == {
+        "plain": 5,
+        "adaptive": 5,
+        "denoised": 5,
+        "adaptive + denoised": 5,
+        "path guiding": 5,
+        "this scene's settings": 1,
+    }
+    (own,) = content["settings"]
+    (same,) = (
+        point
+        for point in content["points"]
+        if point["method"] == "denoised" and point["settings"]["samples"] == RENDER["samples"]
+    )
+    assert own["relative_mse"] == same["relative_mse"]
+
+
+def test_nothing_on_the_pareto_front_is_beaten(content):
+    front = content["pareto_front"]
+    assert front
+    for point in content["points"]:
+        for other in front:
+            better = point["seconds"] < other["seconds"]
+            assert not (
+                better and point["relative_mse"] < other["relative_mse"] and point["resolved"]
+            )
+
+
+def test_noise_of_neighbouring_views_is_independent(content):
+    plain = next(n for n in content["neighbouring_views"] if n["method"] == "plain")
+    assert plain["share"] == pytest.approx(1, abs=0.15)
+    assert plain["total"] > plain["floor"] > 0
+
+
+def test_files_can_be_read_by_others(measured, content):
+    rows = list(csv.DictReader((measured.folder / "room.csv").open()))
+    assert len(rows) == len(content["points"])
+    assert float(rows[0]["relative_mse"]) == content["points"][0]["relative_mse"]
+    assert sum(row["pareto"] == "True" for row in rows) == len(content["pareto_front"])
+    assert ElementTree.parse(measured.folder / "room.svg").getroot().tag.endswith("svg")
+    assert images.read_image(measured.folder / "room.png").channels
+
+
+def test_a_second_run_renders_nothing(measured):
+    before = {p.name: p.stat().st_mtime_ns for p in (measured.folder / "cache").iterdir()}
+    made = (measured.folder / "room.json").read_bytes()
+    measured()
+    assert {p.name: p.stat().st_mtime_ns for p in (measured.folder / "cache").iterdir()} == before
+    assert (measured.folder / "room.json").read_bytes() == made
+
+
+def trial_maker(**changes):
+    content = lightfield() | changes
+    return trials.Trials("none.blend", "none.json", content, "cpu", 1, "none")
+
+
+def test_probes_lie_in_the_image_circle_and_in_different_views():
+    maker = trial_maker()
+    probes = maker.probes(16, 4)
+    assert len({probe.frame["name"] for probe in probes}) == 4
+    for probe in probes:
+        assert 0 <= probe.x <= 48 and 0 <= probe.y <= 48
+        assert maker.mask(probe).mean() >= 0.75
+    # The whole view where that is small: π/4 of it.
+    (whole,) = maker.probes(100, 1)
+    assert (whole.x, whole.y, whole.width, whole.height) == (0, 0, 64, 64)
+    assert maker.mask(whole).mean() == pytest.approx(np.pi / 4, abs=0.01)
+
+
+def test_the_same_wall_is_found_in_both_views():
+    """Two cameras 0.4 m apart look at a wall 2 m away: rays of θ and θ' meet it in one point."""
+    maker = trial_maker()
+    looking = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]])
+    beside = looking.copy()
+    beside[0, 3] = 0.4
+    frames = [{"name": str(n), "world_matrix": m.tolist()} for n, m in enumerate((looking, beside))]
+    probes = tuple(trials.Probe(frame, 8, 8, 48, 48) for frame in frames)
+    mask = maker.mask(probes[0])
+    rows, columns = np.mgrid[8:56, 8:56] + 0.5
+    rays = maker.lens.rays(columns, rows)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        depth = np.where(mask, 2 / -rays[..., 2], np.inf)
+    zero = np.zeros((48, 48, 3))
+    reference = Reference(zero, zero, depth, mask, 0.0)
+    cameras = tuple(maker.camera(frame) for frame in frames)
+    here, there = trials.both_see(cameras, probes, (reference, reference))
+    middle = 24 * 48 + 24
+    # The pixel right of the optical axis, at 1/32 of 90 degrees, half a pixel on.
+    angle = np.radians(90) / 32 * 0.5
+    other = np.arctan((2 * np.tan(angle) - 0.4) / 2) / np.radians(90) * 32 + 24
+    (found,) = there[here == middle]
+    assert found % 48 == int(other)
+    assert abs(found // 48 - 24) <= 1
+    # Nothing is seen where the second depth says that something is in front.
+    near = Reference(zero, zero, depth / 2, mask, 0.0)
+    assert not len(trials.both_see(cameras, probes, (reference, near))[0])

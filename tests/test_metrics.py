@@ -1,0 +1,169 @@
+"""Errors of images against known noise, other programs, and pencil and paper."""
+
+import cv2
+import flip_evaluator
+import numpy as np
+import pytest
+from scipy.stats import linregress
+from skimage.metrics import structural_similarity
+
+from lightfield import metrics
+
+SIZE = 64
+MASK = np.hypot(*(np.mgrid[:SIZE, :SIZE] + 0.5 - SIZE / 2)) < SIZE / 2
+
+
+def scene():
+    """A smooth picture around middle grey, in which each channel differs."""
+    y, x = np.mgrid[:SIZE, :SIZE] / SIZE
+    return np.stack([0.1 + 0.3 * x, 0.2 + 0.2 * y, 0.3 - 0.2 * x * y], axis=-1)
+
+
+def noisy(truth, deviation, seed):
+    noise = np.random.default_rng(seed).normal(0, deviation, truth.shape)
+    return (truth + noise).astype(np.float32)
+
+
+def reference(truth, deviation, renders, depths=None):
+    colours = [noisy(truth, deviation, 100 + number) for number in range(renders)]
+    return metrics.make_reference(colours, depths, MASK)
+
+
+def expected(truth, deviation, exposure):
+    """The integral that relative MSE estimates, for noise of one deviation everywhere."""
+    gain = 4**exposure
+    return float((gain * deviation**2 / (gain * truth[MASK] ** 2 + 0.01)).mean())
+
+
+def test_two_seeds_tell_how_wrong_their_mean_is():
+    truth, deviation = scene(), 0.02
+    found = reference(truth, deviation, 2)
+    # The variance of a mean of two is half that of one.
+    wanted = expected(truth, deviation, found.exposure) / 2
+    # A standard deviation of √(2/n) over n values, and the worst thousandth of squares is missing.
+    assert found.own_error == pytest.approx(wanted, rel=0.05)
+    # It is no estimate of spread alone: the mean is that far from the truth, which tests know.
+    actual = float((((found.colour - truth)[MASK] ** 2) * found.weights).mean())
+    assert found.own_error == pytest.approx(actual, rel=0.06)
+
+
+@pytest.mark.parametrize("renders", [2, 8])
+def test_the_references_own_error_is_not_counted(renders):
+    truth = scene()
+    found = reference(truth, 0.02, renders)
+    # An image with half the noise of one of the reference's renders.
+    image = noisy(truth, 0.01, 7)
+    wanted = expected(truth, 0.01, found.exposure)
+    assert metrics.relative_mse(image, found) == pytest.approx(wanted, rel=0.08)
+
+
+def test_the_exposure_puts_the_typical_pixel_at_middle_grey():
+    found = metrics.make_reference(
+        [np.full((8, 8, 3), 0.72, np.float32)] * 2, None, MASK[28:36, 28:36]
+    )
+    assert found.exposure == pytest.approx(-2)
+    # (0.72 · ¼)² + 0.01 under an error of 0.072 · ¼.
+    image = np.full((8, 8, 3), 0.792, np.float32)
+    assert metrics.relative_mse(image, found) == pytest.approx(0.018**2 / 0.0424, rel=1e-5)
+
+
+def test_brightness_of_a_scene_does_not_change_its_error():
+    truth = scene()
+    dim, bright = (
+        metrics.relative_mse(
+            noisy(truth, 0.03, 1) * gain,
+            metrics.make_reference(
+                [c * gain for c in [noisy(truth, 0.01, 2), noisy(truth, 0.01, 3)]], None, MASK
+            ),
+        )
+        for gain in (np.float32(1), np.float32(64))
+    )
+    assert dim == pytest.approx(bright, rel=1e-4)
+
+
+def test_a_few_fireflies_do_not_decide_and_many_do():
+    truth = scene()
+    found = reference(truth, 1e-4, 4)
+    image = noisy(truth, 0.02, 5)
+    calm = metrics.relative_mse(image, found)
+    few, many = image.copy(), image.copy()
+    few[32, 30:32] = 50
+    many[32, 16:48] = 50
+    assert metrics.relative_mse(few, found) == pytest.approx(calm, rel=0.02)
+    assert metrics.relative_mse(many, found) > 100 * calm
+
+
+def test_what_lies_outside_the_image_circle_does_not_count():
+    truth = scene()
+    found = reference(truth, 0.01, 4)
+    image = noisy(truth, 0.03, 5)
+    spoilt = np.where(MASK[..., None], image, np.float32(9))
+    assert metrics.compare(spoilt, None, found) == metrics.compare(image, None, found)
+
+
+def test_pictures_are_compared_as_opencv_and_scikit_image_do():
+    truth = scene()
+    whole = np.ones_like(MASK)
+    found = metrics.make_reference([truth.astype(np.float32)] * 2, None, whole)
+    image = noisy(truth, 0.03, 5)
+    errors = metrics.compare(image, None, found)
+    shown, wanted = metrics.developed(image, found), metrics.developed(truth, found)
+    assert errors.psnr == pytest.approx(cv2.PSNR(wanted, shown, R=1.0), abs=1e-6)
+    # Its own mean leaves out the border.
+    similarity = structural_similarity(
+        wanted,
+        shown,
+        data_range=1,
+        channel_axis=-1,
+        gaussian_weights=True,
+        use_sample_covariance=False,
+    )
+    assert errors.ssim == pytest.approx(similarity, abs=0.01)
+    mean = flip_evaluator.evaluate(*(x.astype(np.float32) for x in (wanted, shown)), "LDR")[1]
+    assert errors.flip == pytest.approx(mean, rel=1e-5)
+    same = metrics.compare(truth.astype(np.float32), None, found)
+    assert (same.psnr, same.ssim, same.flip) == (np.inf, pytest.approx(1), 0)
+
+
+def test_depth_counts_misses():
+    truth = np.array([1.0, 2.0, np.inf, np.inf, 4.0, 1.0])
+    depth = np.array([1.1, 2.0, np.inf, 7.0, np.inf, 9.0])
+    assert metrics.depth_error(depth, truth) == pytest.approx((0.1 + 0 + 0 + 1 + 1 + 1) / 6)
+
+
+def test_a_power_law_is_found_and_its_slopes_error_is_that_of_linear_regression():
+    x = [1, 2, 4, 8, 16]
+    line = metrics.fit(x, [3 / value for value in x])
+    assert (line.slope, line.factor) == (pytest.approx(-1), pytest.approx(3))
+    assert line.at(32) == pytest.approx(3 / 32)
+    assert line.inverse(3 / 32) == pytest.approx(32)
+    y = [2.9, 1.6, 0.7, 0.4, 0.18]
+    wanted = linregress(np.log(x), np.log(y))
+    line = metrics.fit(x, y)
+    assert line.slope == pytest.approx(wanted.slope)
+    assert line.slope_error == pytest.approx(wanted.stderr)
+    assert metrics.fit([5, 5, 5], [1, 2, 3]) is None
+
+
+def test_the_pareto_front_holds_what_nothing_beats():
+    cost, error = [1, 2, 2, 3, 4, 5], [9, 5, 4, 6, 4, 1]
+    assert metrics.pareto(cost, error) == [0, 2, 5]
+
+
+def test_independent_errors_disagree_fully_and_common_ones_not_at_all():
+    truth = scene()
+    one, other = reference(truth, 1e-4, 4), reference(truth * 1.1, 1e-4, 4)
+    everywhere = np.flatnonzero(MASK)
+    common = np.random.default_rng(3).normal(0, 0.03, truth.shape)
+    bias = [(picture + common).astype(np.float32) for picture in (truth, truth * 1.1)]
+    noise = [noisy(truth, 0.03, 11), noisy(truth * 1.1, 0.03, 12)]
+    alike = metrics.disagreement(tuple(bias), (one, other), (everywhere, everywhere))
+    apart = metrics.disagreement(tuple(noise), (one, other), (everywhere, everywhere))
+    assert alike.share == pytest.approx(0, abs=0.01)
+    assert apart.share == pytest.approx(1, abs=0.05)
+    # A tenth of each pixel, over a denominator that the 0.01 makes larger.
+    assert 0.05 < apart.floor < 0.1
+    assert apart.floor == pytest.approx(alike.floor, rel=0.01)
+    assert apart.added**2 == pytest.approx(2 * expected(truth, 0.03, one.exposure), rel=0.1)
+    assert apart.total**2 == pytest.approx(apart.added**2 + apart.floor**2, rel=0.05)
+    assert alike.total == pytest.approx(alike.floor, rel=1e-3)
