@@ -6,12 +6,12 @@ again, this goes on where it was. The time is Cycles' own for rendering, denoisi
 render the median over its seeds; it is right only where nothing else runs on the same core.
 
 The slope of a method is that of its error over its time, both in logarithms. Plain path tracing's
-is −1 over samples, whether indirect light is clamped or not, as a sample is clamped and not a pixel.
-Two things bend it: where light is smooth Cycles' Sobol points converge faster than independent ones
-would (−1.1 in the lone monk's courtyard), and where paths are rare and bright, leaving out the worst
-thousandth of pixels hides more of them at few samples than at many (−0.97 in the garden). Over time
-it is a little steeper, as each render has a fixed cost too. Adaptive sampling and denoising are
-biased, so theirs are flatter.
+is −1 over samples, whether indirect light is clamped or not: samples are clamped, not pixels. Two
+things bend it. Where light is smooth, Cycles' Sobol points converge faster than independent ones
+would (−1.1 in the lone monk's courtyard); and where paths are rare and bright, leaving out the
+worst thousandth of pixels hides more of them at few samples than at many (−0.97 in the garden).
+Over time it is a little steeper, as each render has a fixed cost too. Adaptive sampling and
+denoising are biased, so theirs are flatter.
 """
 
 import argparse
