@@ -53,16 +53,16 @@ def draw_rig(stem: Path, rig: dict[str, Any], poses: np.ndarray) -> None:
     ahead = np.array([-np.sin(turn) * np.cos(rise), np.cos(turn) * np.cos(rise), -np.sin(rise)])
     screen = np.stack([right, np.cross(right, ahead)], axis=-1)
     places, forwards = poses[:, :3, 3], -poses[:, :3, 2]
-    extent = np.linalg.norm(np.ptp(places, axis=0)) or 1.0
+    drawn = np.concatenate([places, *outline(rig)])
+    extent = np.linalg.norm(np.ptp(drawn, axis=0)) or 1.0
     arrow = min(0.09, 0.5 / np.sqrt(len(poses))) * extent
     order = np.argsort(-(places @ ahead), kind="stable")
     # What is nearer is drawn later and darker.
     near = np.linspace(0.35, 1.0, len(poses))
     ends = places[order] + arrow * forwards[order]
+    lines = [line @ screen for line in outline(rig)]
     with plot(stem, size=(7, 6)) as axes:
-        axes.add_collection(
-            LineCollection([line @ screen for line in outline(rig)], colors=GREY, linewidths=0.8)
-        )
+        axes.add_collection(LineCollection(lines, colors=GREY, linewidths=0.8))
         start, end = places[order] @ screen, ends @ screen
         axes.quiver(
             *start.T,
@@ -77,7 +77,7 @@ def draw_rig(stem: Path, rig: dict[str, Any], poses: np.ndarray) -> None:
         )
         dots = [(*matplotlib.colors.to_rgb(BLUE), alpha) for alpha in near]
         axes.scatter(*start.T, s=min(14.0, 900 / np.sqrt(len(poses))), c=dots, linewidths=0)
-        draw_axes(axes, screen, np.concatenate([start, end]), extent)
+        draw_axes(axes, screen, np.concatenate([start, end, *lines]), extent)
         axes.set_aspect("equal")
         axes.set_axis_off()
 

@@ -137,24 +137,29 @@ UNITS: dict[str, Callable[[float], str]] = {
     "bytes": bytes_,
     "kwh": lambda value: f"{value:.3g} kWh",
     "gigabytes": lambda value: bytes_(1e9 * value),
-    "hours": lambda value: f"{value:.3g} h",
+    "hours": lambda value: f"{number(value)} h",
     "watts": lambda value: f"{value:g} W",
 }
+
+
+# How some words of keys are written.
+WRITTEN = {"mse": "MSE", "psnr": "PSNR", "ssim": "SSIM", "flip": "FLIP", "cpu": "CPU", "kwh": "kWh"}
 
 
 def measure(value: Any, name: str) -> str:
     """Return a cell of what is called ``name``, in the unit that the name ends in."""
     unit = UNITS.get(name.rpartition("_")[2])
     plain = isinstance(value, int | float) and not isinstance(value, bool)
-    return unit(value) if unit and plain else cell(value)
+    return unit(value) if unit and plain and "_per_" not in name else cell(value)
 
 
 def title(name: str) -> str:
     """Return a key as words, without the unit that `measure` writes with its value."""
     words = name.split("_")
-    if len(words) > 1 and words[-1] in UNITS and words[-1] != "hours":
+    if len(words) > 1 and words[-1] in UNITS and words[-1] != "hours" and "per" not in words:
         words.pop()
-    return {"bytes": "size", "gigabytes": "size", "watts": "power"}.get(name, " ".join(words))
+    text = " ".join(WRITTEN.get(word, word) for word in words)
+    return {"bytes": "size", "gigabytes": "size", "watts": "power"}.get(name, text)
 
 
 def _superscript(value: int) -> str:

@@ -194,7 +194,8 @@ def _with_units(facts: Mapping[str, Any], currency: str) -> list[tuple[str, str]
     for name, value in facts.items():
         if name.endswith("_uncertainty") or name == "currency" or _is_sentence(value):
             continue
-        text = page.measure(value, name)
+        sides = name == "resolution" and isinstance(value, list)
+        text = " × ".join(map(str, value)) if sides else page.measure(value, name)
         uncertain = facts.get(f"{name}_uncertainty")
         if uncertain is not None:
             text = f"{text} ± {page.measure(uncertain, name)}"
@@ -228,7 +229,7 @@ def _tables(content: Any) -> tuple[dict[str, Table], dict[str, Any]]:
             tables[title] = Table(
                 columns, [[row.get(column) for column in columns] for row in rows]
             )
-        elif not isinstance(value, list | Mapping):
+        elif not isinstance(value, list | Mapping) and value is not None:
             facts[str(name)] = value
     return tables, facts
 
