@@ -36,6 +36,16 @@ sys.path.insert(0, str(SCRIPTS))
 from lightfield import images, lens_map  # noqa: E402
 from lightfield.errors import UserError  # noqa: E402
 from lightfield.lenses import Array, Equidistant, Lens, Rectilinear  # noqa: E402
+from lightfield.plots import (  # noqa: E402
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    plot,
+)
 from lightfield.resample import (  # noqa: E402
     DEFAULT_FILTER,
     kernel,
@@ -53,17 +63,17 @@ SENSOR = 36.0
 # Times that differ by less are equal: repeats differ by as much.
 SAME_TIME = 0.03
 CAMERA = ["--rectilinear", "18,36"]
-# Okabe and Ito's colours, which the colour-blind tell apart, and a marker each.
-STYLES = {
-    "nearest": ("#999999", "s"),
-    "bilinear": ("#56B4E9", "o"),
-    "bicubic": ("#0072B2", "^"),
-    "lanczos": ("#009E73", "v"),
-    "adaptive": ("#D55E00", "*"),
-    "st_warp": ("#CC79A7", "D"),
-    "OpenCV": ("#E69F00", "P"),
-    "peer": ("#000000", "x"),
-}
+STYLES = dict(
+    zip(
+        ["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp", "OpenCV", "peer"],
+        zip(
+            [GREY, SKY, BLUE, GREEN, VERMILION, PURPLE, ORANGE, "black"],
+            ["s", "o", "^", "v", "*", "D", "P", "X"],
+            strict=True,
+        ),
+        strict=True,
+    )
+)
 
 
 @dataclass(frozen=True)
@@ -113,7 +123,7 @@ def main() -> None:
         results = measure_errors(arguments, Path(folder))
     front = pareto_front(results)
     write_table(arguments.output / "reprojection.csv", results, front)
-    plot(arguments.output / "reprojection", results, front)
+    draw(arguments.output / "reprojection", results, front)
     default = [row for row in results if row.method == DEFAULT_FILTER]
     on_front = all(row in front for row in default)
     print(f"default filter {DEFAULT_FILTER}: {'on' if on_front else 'NOT on'} the Pareto front")
@@ -346,62 +356,50 @@ def write_table(path: Path, results: Sequence[Result], front: Sequence[Result]) 
             writer.writerow([*vars(result).values(), result in front])
 
 
-def plot(path: Path, results: Sequence[Result], front: Sequence[Result]) -> None:
+def draw(stem: Path, results: Sequence[Result], front: Sequence[Result]) -> None:
     """Draw error over time, a panel for each scenario, as SVG and PNG."""
-    import matplotlib
-
-    matplotlib.use("agg")
-    # The same figures give the same file.
-    matplotlib.rcParams["svg.hashsalt"] = "reprojection"
-    from matplotlib import pyplot
-
     names = list(dict.fromkeys(result.scenario for result in results))
-    figure, panels = pyplot.subplots(1, len(names), figsize=(15, 5.5), layout="constrained")
-    for panel, name in zip(panels, names, strict=True):
-        rows = [result for result in results if result.scenario == name]
-        best = sorted((r for r in front if r.scenario == name), key=lambda r: r.view_cpu_s)
-        panel.plot(
-            [r.view_cpu_s for r in best],
-            [r.rms_error for r in best],
-            color="#000000",
-            linewidth=1,
-            linestyle=":",
-            label="Pareto front",
+    with plot(stem, columns=len(names), size=(15, 5.5)) as panels:
+        for panel, name in zip(panels, names, strict=True):
+            draw_scenario(panel, [r for r in results if r.scenario == name], front)
+        panels[0].set_ylabel("root mean square error (scene mean is 1)")
+        panels[-1].legend(loc="upper right")
+
+
+def draw_scenario(panel: Any, rows: Sequence[Result], front: Sequence[Result]) -> None:
+    """Draw the results of one scenario, and the front that they have."""
+    best = sorted((r for r in rows if r in front), key=lambda r: r.view_cpu_s)
+    times, errors = [r.view_cpu_s for r in best], [r.rms_error for r in best]
+    panel.plot(times, errors, color="black", linewidth=1, linestyle=":", label="Pareto front")
+    for method, (color, marker) in STYLES.items():
+        points = [r for r in rows if r.method == method]
+        if not points:
+            continue
+        panel.scatter(
+            [r.view_cpu_s for r in points],
+            [r.rms_error for r in points],
+            color=color,
+            marker=marker,
+            s=150 if method == DEFAULT_FILTER else 45,
+            zorder=3,
+            label=f"{method} (default)" if method == DEFAULT_FILTER else method,
         )
-        for method, (color, marker) in STYLES.items():
-            points = [r for r in rows if r.method == method]
-            if not points:
-                continue
-            panel.scatter(
-                [r.view_cpu_s for r in points],
-                [r.rms_error for r in points],
-                color=color,
-                marker=marker,
-                s=150 if method == DEFAULT_FILTER else 45,
-                zorder=3,
-                label=f"{method} (default)" if method == DEFAULT_FILTER else method,
-            )
-            for r in points:
-                if r.samples > 1:
-                    panel.annotate(
-                        f"{r.samples}²",
-                        (r.view_cpu_s, r.rms_error),
-                        xytext=(5, 4),
-                        textcoords="offset points",
-                        fontsize=8,
-                        color=color,
-                    )
-        panel.set_xscale("log")
-        panel.set_yscale("log")
-        panel.set_title(f"{name} ({rows[0].width} × {rows[0].height} pixels)")
-        panel.set_xlabel("CPU time a view, EXR to EXR (s)")
-        panel.grid(which="major", color="#dddddd", linewidth=0.6)
-        panel.set_axisbelow(True)
-    panels[0].set_ylabel("root mean square error (scene mean is 1)")
-    panels[-1].legend(fontsize=9, loc="upper right")
-    figure.savefig(path.with_suffix(".svg"), metadata={"Date": None})
-    figure.savefig(path.with_suffix(".png"), dpi=110)
-    pyplot.close(figure)
+        for r in points:
+            if r.samples > 1:
+                panel.annotate(
+                    f"{r.samples}²",
+                    (r.view_cpu_s, r.rms_error),
+                    xytext=(5, 4),
+                    textcoords="offset points",
+                    fontsize=8,
+                    color=color,
+                )
+    panel.set(
+        xscale="log",
+        yscale="log",
+        xlabel="CPU time a view, EXR to EXR (s)",
+        title=f"{rows[0].scenario} ({rows[0].width} × {rows[0].height} pixels)",
+    )
 
 
 # Batches

@@ -10,7 +10,7 @@ import hashlib
 import itertools
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from functools import cached_property
@@ -37,7 +37,7 @@ from lightfield.lens_arguments import Target, add_geometry_flags, geometry, join
 from lightfield.lens_map import LensMap
 from lightfield.lenses import CUBE_FACES, Array, CubeMap, Lens
 from lightfield.progress import Progress
-from lightfield.resample import narrow, resample_color, resample_depth, widen
+from lightfield.resample import color_strips, narrow, resample_depth, widen
 from lightfield.rigs import matrix_to_euler
 from lightfield.tonemap import decode_srgb, to_8_bit, tone_map
 
@@ -389,28 +389,38 @@ def _write(
     if job.copies and source.is_z == as_z:
         outside = np.isnan(made.target_cos[row:end_row, column:end_column])
         color = np.where(outside[:, :, None], np.float32(np.nan), color)
-        color = _in_frame(color, made)
+        strips: Iterable[tuple[slice, Array]] = [(np.s_[:], _in_frame(color, made))]
         depth = None if depth is None else _in_frame(depth, made)
     else:
-        color = resample_color(color, made)
+        strips = color_strips(color, made)
         if depth is not None:
             found = resample_depth(depth, source.is_z, as_z, made)
             with np.errstate(over="ignore"):
                 depth = found.astype(depth.dtype, copy=False)
-    empty = np.isnan(color[:, :, 0])
-    if source.has_alpha:
-        with np.errstate(invalid="ignore", divide="ignore"):
-            color[:, :, :3] /= color[:, :, 3:]
-    color = tone_map(color[:, :, :3], arguments.exposure, arguments.reinhard)
+    size = made.target_cos.shape
+    empty = np.empty(size, bool)
+    half = np.empty((3, *size), np.float16)
+    pixels = np.empty((*size, 3), np.uint8)
+    for rows, strip in strips:
+        empty[rows] = np.isnan(strip[:, :, 0])
+        if source.has_alpha:
+            with np.errstate(invalid="ignore", divide="ignore"):
+                strip[:, :, :3] /= strip[:, :, 3:]
+        strip = tone_map(strip[:, :, :3], arguments.exposure, arguments.reinhard)
+        if "exr" in outputs:
+            half[:, rows] = narrow(strip, 3)
+        if "png" in outputs:
+            pixels[rows] = to_8_bit(strip)
     marked = bool(empty.any())
-    if depth is not None and marked:
-        depth[empty] = np.nan
+    if marked:
+        half[:, empty] = 0
+        if depth is not None:
+            depth[empty] = np.nan
     attributes = {KEY_ATTRIBUTE: key}
     for kind, path in outputs.items():
         match kind:
             case "exr":
-                color = np.where(empty[:, :, None], np.float32(0), color) if marked else color
-                channels = dict(zip("RGB", narrow(color, 3), strict=True))
+                channels = dict(zip("RGB", half, strict=True))
                 if depth is not None:
                     channels["Z"] = depth
                     attributes = attributes | {DEPTH_ATTRIBUTE: "z" if as_z else "distance"}
@@ -418,7 +428,6 @@ def _write(
                     channels["A"] = (~empty).astype(np.float16)
                 write_exr(path, channels, attributes)
             case "png":
-                pixels = to_8_bit(color)
                 if marked:
                     pixels = np.dstack([pixels, np.where(empty, 0, 255).astype(np.uint8)])
                 write_png(path, pixels, {KEY_ATTRIBUTE: key, **PNG_OPTIONS})

@@ -26,7 +26,6 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import mpmath
 import numpy as np
 from mpmath import mpf
@@ -50,10 +49,8 @@ from lightfield.lenses import (
     Rectilinear,
     Stereographic,
 )
+from lightfield.plots import BLUE, VERMILION, plot
 from lightfield.progress import Progress
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 
 ROUNDINGS = 16  # roundings, each of one eps, in the longest chain of operations of one step
 RIM = 32  # a point this many eps from the rim may count as inside or outside
@@ -964,41 +961,35 @@ def write_summary(path: Path, rows: Sequence[Row]) -> None:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def write_plot(paths: Sequence[Path], rows: Sequence[Row]) -> None:
+def write_plot(stem: Path, rows: Sequence[Row]) -> None:
     """Plot every lens pair's round-trip error over the condition of its round trip."""
-    plt.rcParams["svg.hashsalt"] = "stability"
-    figure, axes = plt.subplots(figsize=(8, 5.5), layout="constrained")
-    # Okabe and Ito's colours, and a shape each, so that colour is not needed.
-    for dtype, colour, marker in (("float32", "#D55E00", "o"), ("float64", "#0072B2", "s")):
-        eps = float(np.finfo(dtype).eps)
-        chosen = [
-            r for r in rows if r.dtype == dtype and r.source and 0 < r.round_trip_bound < math.inf
-        ]
-        moves = np.array([r.round_trip_bound / (ROUNDINGS * eps) for r in chosen])
-        errors = np.array([r.round_trip_error for r in chosen])
-        # A round trip without any error is shown at the bottom.
-        floor = eps / 100
-        axes.scatter(
-            moves, np.maximum(errors, floor), s=10, c=colour, marker=marker, alpha=0.5,
-            linewidths=0, label=f"{dtype} ({len(chosen)} lens pairs)",
-        )  # fmt: skip
-        if len(moves):
-            line = np.array([moves.min(), moves.max()])
-            axes.plot(line, ROUNDINGS * eps * line, c=colour, label=f"bound of {dtype}")
-    axes.set(
-        xscale="log",
-        yscale="log",
-        xlabel="absolute condition number of the round trip / px per unit relative perturbation",
-        ylabel="round-trip error / px (exact ones at the bottom)",
-        title="Round trips of every lens pair over the extremes",
-    )
-    axes.grid(alpha=0.3)
-    axes.legend()
-    for path in paths:
-        metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-        with atomic_path(path) as temporary:
-            figure.savefig(temporary, dpi=150, metadata=metadata)
-    plt.close(figure)
+    with plot(stem, size=(8, 5.5)) as axes:
+        for dtype, colour, marker in (("float32", VERMILION, "o"), ("float64", BLUE, "s")):
+            eps = float(np.finfo(dtype).eps)
+            chosen = [
+                r
+                for r in rows
+                if r.dtype == dtype and r.source and 0 < r.round_trip_bound < math.inf
+            ]
+            moves = np.array([r.round_trip_bound / (ROUNDINGS * eps) for r in chosen])
+            errors = np.array([r.round_trip_error for r in chosen])
+            # A round trip without any error is shown at the bottom.
+            floor = eps / 100
+            axes.scatter(
+                moves, np.maximum(errors, floor), s=10, c=colour, marker=marker, alpha=0.5,
+                linewidths=0, label=f"{dtype} ({len(chosen)} lens pairs)",
+            )  # fmt: skip
+            if len(moves):
+                line = np.array([moves.min(), moves.max()])
+                axes.plot(line, ROUNDINGS * eps * line, c=colour, label=f"bound of {dtype}")
+        axes.set(
+            xscale="log",
+            yscale="log",
+            xlabel="condition number of the round trip / px per unit relative perturbation",
+            ylabel="round-trip error / px (exact ones at the bottom)",
+            title="Round trips of every lens pair over the extremes",
+        )
+        axes.legend()
 
 
 def main() -> None:
@@ -1008,7 +999,7 @@ def main() -> None:
     rows = measure(extreme_lenses())
     write_csv(arguments.output / "stability.csv", rows)
     write_summary(arguments.output / "stability.md", rows)
-    write_plot([arguments.output / f"stability.{kind}" for kind in ("svg", "png")], rows)
+    write_plot(arguments.output / "stability", rows)
     failed = [row for row in rows if row.verdict == "FAIL"]
     print(f"{len(rows)} cases, {len(failed)} outside their bounds", file=sys.stderr)
     if failed:

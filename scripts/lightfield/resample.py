@@ -5,7 +5,7 @@ left out and the other weights are scaled up, and where nothing is left the resu
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numba
@@ -31,6 +31,8 @@ SUPPORT = {NEAREST: 0, "bilinear": 1, "bicubic": 2, "lanczos": 3, ADAPTIVE: 2, S
 _TAPS = {"bilinear": 2, "bicubic": 4, "lanczos": 6, ADAPTIVE: 4}
 FILTERS = tuple(SUPPORT)
 DEFAULT_FILTER = ADAPTIVE
+
+_STRIP = 64  # rows, or rows of samples, resampled at a time
 
 # Depth is interpolated where its third differences are below this fraction of it, so a step of
 # half as much may remain unseen: 1e-4, or for halves what their own steps are.
@@ -476,6 +478,14 @@ def _with_borders(source: Array, lens_map: "LensMap") -> Array:
 
 def resample_color(source: Array, lens_map: "LensMap") -> Array:
     """Resample a source window (h, w, 4) float32 to (H, W, 4); NaN where it has no source."""
+    out = np.empty((*lens_map.target_cos.shape, 4), np.float32)
+    for rows, strip in color_strips(source, lens_map):
+        out[rows] = strip
+    return out
+
+
+def color_strips(source: Array, lens_map: "LensMap") -> Iterator[tuple[slice, Array]]:
+    """Yield the rows of what `resample_color` returns, as many at a time as the caches hold."""
     height, width = lens_map.target_cos.shape
     source = _with_borders(source, lens_map)
     if source.shape[:2] != lens_map.source_cos.shape:
@@ -484,31 +494,31 @@ def resample_color(source: Array, lens_map: "LensMap") -> Array:
             f"expects {lens_map.source_cos.shape[1]} × {lens_map.source_cos.shape[0]}"
         )
     if lens_map.settings["filter"] == ST_WARP:
-        return _st_warp(source, lens_map)
-    out = np.empty((height, width, 4), np.float32)
+        yield slice(0, height), _st_warp(source, lens_map)
+        return
     samples = lens_map.settings["samples"]
-    if lens_map.footprints is not None and lens_map.counts is not None:
-        _adaptive(
-            source,
-            lens_map.source_cos,
-            lens_map.centers,
-            lens_map.footprints,
-            lens_map.counts,
-            lens_map.flags,
-            lens_map.topology,
-            out,
-        )
-    elif samples == 1:
-        _resample(source, lens_map, slice(None), out)
-    else:
-        # A few rows at a time: the samples of a whole image could fill the memory.
-        for first in range(0, height, 16):
-            rows = out[first : first + 16]
-            fine = np.empty((len(rows) * samples, width * samples, 4), np.float32)
-            start = first * samples
-            _resample(source, lens_map, slice(start, start + len(fine)), fine)
-            _block_mean(fine, samples, rows)
-    return out
+    step = max(1, _STRIP // samples)
+    for first in range(0, height, step):
+        rows = slice(first, min(first + step, height))
+        out = np.empty((rows.stop - first, width, 4), np.float32)
+        if lens_map.footprints is not None and lens_map.counts is not None:
+            _adaptive(
+                source,
+                lens_map.source_cos,
+                lens_map.centers[rows],
+                lens_map.footprints[rows],
+                lens_map.counts[rows],
+                lens_map.flags[rows],
+                lens_map.topology,
+                out,
+            )
+        elif samples == 1:
+            _resample(source, lens_map, rows, out)
+        else:
+            fine = np.empty((len(out) * samples, width * samples, 4), np.float32)
+            _resample(source, lens_map, slice(first * samples, rows.stop * samples), fine)
+            _block_mean(fine, samples, out)
+        yield rows, out
 
 
 def _st_warp(source: Array, lens_map: "LensMap") -> Array:
