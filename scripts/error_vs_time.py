@@ -32,7 +32,8 @@ from lightfield.progress import Progress
 PLAIN, ADAPTIVE, DENOISED = "plain", "adaptive", "denoised"
 BOTH, GUIDED, OWN = "adaptive + denoised", "path guiding", "this scene's settings"
 
-THRESHOLDS = (0.4, 0.2, 0.1, 0.05, 0.02)
+# Above 0.2, the fewest samples that adaptive sampling takes decide.
+THRESHOLDS = (0.2, 0.1, 0.05, 0.02, 0.01)
 
 # A reference's samples are split among so many seeds, whose differences tell its own error.
 REFERENCE_SEEDS = 8
