@@ -41,11 +41,12 @@ def main() -> None:
     path = folder / "lightfield.json"
     lightfield = read_json(path)
     try:
-        camera, frames = lightfield["camera"], lightfield["frames"]
+        told = facts(folder, lightfield, arguments.rig)
         name = str(lightfield["scene"]["name"])
+        looks = report_views.collect(folder / IMAGES, lightfield, arguments.rig)
+        listed = files(folder, lightfield)
     except (LookupError, TypeError) as error:
         raise UserError(f"{path}: is not what scripts/make_lightfield.py writes: {error}") from None
-    looks = report_views.collect(folder / IMAGES, lightfield, arguments.rig)
     report = folder / REPORT
     measured = {
         "reprojection": report_tables.reprojection(arguments.measurements),
@@ -57,8 +58,7 @@ def main() -> None:
         "page.html.j2",
         name=arguments.name,
         home="../" * (arguments.name.count("/") + 2) + "index.html",
-        facts=facts(folder, lightfield, arguments.rig, page.lens_text(camera)),
-        views=len(frames),
+        facts=told,
         pictures={stem: page.photo(report / f"{stem}.png", WIDEST) for stem in PICTURES},
         plots={stem: page.plot(report / stem) for stem in PLOTS},
         looks=looks,
@@ -66,7 +66,7 @@ def main() -> None:
         validation=report_tables.validation(folder / "validation.json"),
         measured=measured,
         costs=report_tables.costs(report / "costs.json"),
-        files=files(folder, lightfield),
+        files=listed,
         transforms=sorted(
             path.relative_to(folder).as_posix() for path in folder.glob("**/transforms.json")
         ),
@@ -75,7 +75,7 @@ def main() -> None:
 
 
 def facts(
-    folder: Path, lightfield: Mapping[str, Any], rig: Mapping[str, Any], lens: str
+    folder: Path, lightfield: Mapping[str, Any], rig: Mapping[str, Any]
 ) -> list[tuple[str, str]]:
     """Return what one wants to know first of a dataset, each with its title."""
     width, height = lightfield["resolution"]
@@ -90,7 +90,7 @@ def facts(
     return [
         ("Views", str(len(lightfield["frames"]))),
         ("Rig", rig_text(rig)),
-        ("Lens", lens),
+        ("Lens", page.lens_text(lightfield["camera"])),
         ("Resolution", f"{width} × {height}"),
         ("Samples", samples),
         ("Depth", depth.get(lightfield.get("depth") or "", "none")),
@@ -120,7 +120,7 @@ def files(folder: Path, lightfield: Mapping[str, Any]) -> list[tuple[str, str]]:
     }.get(lightfield.get("depth") or "", "")
     if depth:
         depth += "; inf where a ray hit nothing"
-    first = lightfield["frames"][0]["name"] if lightfield["frames"] else "view"
+    first = lightfield["frames"][0]["name"]
     found = [
         (f"{IMAGES}/{first}.exr …", f"the views: scene-linear Rec. 709 R, G, B as half{depth}"),
         ("lightfield.json", "the lens once; position, rotation, and world_matrix of each view"),

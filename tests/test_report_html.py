@@ -329,6 +329,7 @@ def test_an_index_leads_to_every_page(sphere, run_program, show):
     [
         ("lightfield.json", "{}", "lightfield.json: is not what"),
         ("lightfield.json", "[", "lightfield.json: is not JSON"),
+        ("lightfield.json", '{"frames": []}', "lightfield.json: is not what"),
         ("validation.json", "{}", "validation.json: is not what"),
         ("report/costs.json", "[]", "costs.json: must be a mapping"),
         ("report/panorama.png", "no", "panorama.png: is no picture"),

@@ -21,6 +21,10 @@ LENSES = {
     "FISHEYE_EQUISOLID": "equisolid fisheye",
     "FISHEYE_LENS_POLYNOMIAL": "polynomial fisheye",
     "EQUIRECTANGULAR": "equirectangular panorama",
+    "FISHEYE_STEREOGRAPHIC": "stereographic fisheye",
+    "FISHEYE_ORTHOGRAPHIC": "orthographic fisheye",
+    "FISHEYE_KANNALA_BRANDT": "Kannala–Brandt fisheye",
+    "CUBE_MAP": "cube map",
     "PERSP": "rectilinear",
 }
 # A plot stays sharp as SVG; one of thousands of points is smaller as PNG.

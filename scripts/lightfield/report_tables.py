@@ -14,6 +14,7 @@ from lightfield.files import read_json
 # Of the stability table, so many of the cases that use most of their bound are shown at once.
 WORST_CASES = 12
 
+CHECK_KEYS = ("passed", "detail", "problems", "warnings", "figures")
 # The tables of error_vs_time that are shown at once, in this order, by their names there.
 ERROR_TABLES = {
     "slopes": "Slope of the error, both axes logarithmic; plain path tracing's is −1 in theory",
@@ -49,7 +50,8 @@ def validation(path: Path) -> dict[str, Any] | None:
     try:
         for check in content["checks"]:
             group, _, name = check["name"].rpartition("/")
-            groups.setdefault(group, []).append({**check, "short": name})
+            told = {key: check[key] for key in CHECK_KEYS}
+            groups.setdefault(group, []).append({**told, "short": name})
         return {"valid": content["valid"], "groups": groups}
     except (LookupError, TypeError, AttributeError):
         raise UserError(f"{path}: is not what scripts/validate.py writes") from None
@@ -125,10 +127,11 @@ def stability(files: Sequence[Path]) -> Measurement | None:
 def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
     """Return the error of a scene's renders against their run time, as far as it was measured."""
     path = _named(files, f"error_vs_time/{scene}.json")
-    stem = path or next((file for file in files if file.stem == scene), None)
-    if stem is None:
+    if path is None:
         return None
-    content = read_json(path) if path else {}
+    content = read_json(path)
+    if not isinstance(content, Mapping):
+        raise UserError(f"{path}: must be a mapping")
     tables, _ = _tables(content)
     known = {name: table for name, table in tables.items() if name in ERROR_TABLES}
     whole = {name: table for name, table in tables.items() if name not in known}
@@ -137,7 +140,7 @@ def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
         known["slopes"] = _slopes(content["slopes"])
     measured_on = content.get("measured_on")
     return Measurement(
-        page.plot(stem.with_suffix("")),
+        page.plot(path.with_suffix("")),
         {ERROR_TABLES[name]: known[name] for name in ERROR_TABLES if name in known},
         {name.capitalize(): table for name, table in whole.items()},
         _with_units(measured_on, "") if isinstance(measured_on, Mapping) else [],
@@ -213,10 +216,8 @@ def _is_sentence(value: Any) -> bool:
     return isinstance(value, str) and len(value) > 40
 
 
-def _tables(content: Any) -> tuple[dict[str, Table], dict[str, Any]]:
+def _tables(content: Mapping[str, Any]) -> tuple[dict[str, Table], dict[str, Any]]:
     """Split a JSON mapping into tables (lists of mappings, mappings of mappings) and the rest."""
-    if not isinstance(content, Mapping):
-        return {}, {}
     tables, facts = {}, {}
     for name, value in content.items():
         title = str(name).replace("_", " ")
@@ -235,7 +236,7 @@ def _tables(content: Any) -> tuple[dict[str, Table], dict[str, Any]]:
 
 
 def _named(files: Sequence[Path], ending: str) -> Path | None:
-    return next((file for file in files if file.as_posix().endswith(f"/{ending}")), None)
+    return next((file for file in files if f"/{file.as_posix()}".endswith(f"/{ending}")), None)
 
 
 def _read_csv(path: Path) -> list[dict[str, str]]:
