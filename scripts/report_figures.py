@@ -76,7 +76,7 @@ def draw_rig(stem: Path, rig: dict[str, Any], poses: np.ndarray) -> None:
             headlength=5,
         )
         dots = [(*matplotlib.colors.to_rgb(BLUE), alpha) for alpha in near]
-        axes.scatter(*start.T, s=min(14.0, 900 / np.sqrt(len(poses))), c=dots, linewidths=0)
+        axes.scatter(*start.T, s=min(14.0, 350 / np.sqrt(len(poses))), c=dots, linewidths=0)
         draw_axes(axes, screen, np.concatenate([start, end, *lines]), extent)
         axes.set_aspect("equal")
         axes.set_axis_off()
