@@ -400,6 +400,10 @@ def draw_scenario(panel: Any, rows: Sequence[Result], front: Sequence[Result]) -
         xlabel="CPU time a view, EXR to EXR (s)",
         title=f"{rows[0].scenario} ({rows[0].width} × {rows[0].height} pixels)",
     )
+    # Times that hardly differ shall not look as if they did.
+    low, high = panel.get_xlim()
+    middle = math.sqrt(low * high)
+    panel.set_xlim(min(low, middle / 2.5), max(high, middle * 2.5))
 
 
 # Batches

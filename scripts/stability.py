@@ -985,7 +985,8 @@ def write_plot(stem: Path, rows: Sequence[Row]) -> None:
         axes.set(
             xscale="log",
             yscale="log",
-            xlabel="condition number of the round trip / px per unit relative perturbation",
+            xlabel="absolute condition number of the round trip "
+            "/ px per unit relative perturbation",
             ylabel="round-trip error / px (exact ones at the bottom)",
             title="Round trips of every lens pair over the extremes",
         )

@@ -309,6 +309,25 @@ def test_no_reproject_keeps_the_pixels(dataset, run):
     assert read_image(dataset / "out" / "view_0000f.exr").channels["R"].shape == (24, 24)
 
 
+@pytest.mark.parametrize("config_says", [None, "z"])
+def test_file_and_configuration_agree_on_the_meaning_of_depth(dataset, run, config_says):
+    # What the file says of itself counts.
+    name = "view_0000f.exr"
+    channels = view_channels(FISHEYE)
+    channels["Z"] = np.where(np.isinf(channels["Z"]), channels["Z"], np.float32(2))
+    write_exr(dataset / "exr" / name, channels, {"plenoforge:depth": "distance"})
+    config = json.loads((dataset / "lightfield.json").read_text())
+    if config_says:
+        (dataset / "lightfield.json").write_text(json.dumps(config | {"depth": config_says}))
+    run("--no-reproject", "--exr")
+    after = read_image(dataset / "out" / name)
+    written = json.loads((dataset / "out" / "lightfield.json").read_text())
+    assert after.attributes["plenoforge:depth"] == written["depth"] == "z"
+    expected = view_channels(FISHEYE)["Z"]
+    inside = np.isfinite(expected)
+    assert np.allclose(after.channels["Z"][inside], expected[inside], rtol=1e-6)
+
+
 def test_a_cube_map_and_back(dataset, run, monkeypatch):
     run("--cubemap", "64", "--exr")
     out = dataset / "out"

@@ -442,3 +442,37 @@ def test_depth_is_taken_at_the_pixel_centre_whatever_the_samples():
     depth = as_depth(plane_distance(rays_of(source), np.array([0.3, 0, -1.0]), 2.0), source)
     one, many = (lens_map.compute(source, narrow_lens(64), IDENTITY, "bicubic", n) for n in (1, 4))
     assert np.allclose(apply_depth(depth, one), apply_depth(depth, many), rtol=1e-6)
+
+
+def test_depth_reaches_as_far_as_colour_at_the_rim_of_the_image_circle():
+    # Its rim cuts pixels of the source in two.
+    fisheye = Equidistant(width=64, height=64, fov=2.5)
+    target = Equidistant(width=400, height=400, fov=2.6)
+    rays = rays_of(fisheye)
+    distance = 3 + rays[..., 0] + (rays[..., 1] > 0.2)
+    made = lens_map.compute(fisheye, target, IDENTITY)
+    color = apply(as_source(np.nan_to_num(distance)), made)[..., 0]
+    depth = apply_depth(np.nan_to_num(distance).astype("f4"), made, False, False)
+    seen = np.isfinite(color)
+    assert 0.8 < seen.mean() / (math.pi / 4 * (2.5 / 2.6) ** 2) < 1.2
+    assert np.array_equal(np.isfinite(depth), seen)
+    # Every depth is one that the source has within a pixel and a half.
+    points = fisheye.pixels(rays_of(target)[seen])
+    column, row = np.clip(points.astype(int), 0, 63).T
+    padded = np.pad(distance, 1, constant_values=np.nan)
+    around = np.stack(
+        [padded[row + i, column + j] for i, j in itertools.product(range(3), repeat=2)]
+    )
+    assert (depth[seen] >= np.nanmin(around, axis=0) * (1 - 1e-6)).all()
+    assert (depth[seen] <= np.nanmax(around, axis=0) * (1 + 1e-6)).all()
+
+
+@pytest.mark.parametrize("dtype", ["f2", "f4"])
+def test_a_depth_of_zero_stays_one(dtype):
+    made = lens_map.compute(FISHEYE, FISHEYE, IDENTITY)
+    depth = np.full((256, 256), 3, dtype)
+    depth[100:104, 90] = 0
+    for is_z in (False, True):
+        found = apply_depth(depth, made, is_z, is_z)
+        assert not found[100:104, 90].any()
+        assert np.allclose(found[110:140, 80:100], 3, rtol=1e-6)

@@ -41,8 +41,9 @@ _SMOOTH = {np.dtype(np.float32): np.float32(2e-4), np.dtype(np.float16): np.floa
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
-# Infinities and NaNs keep their meaning: only contraction and the sign of zero are relaxed.
-_OPTIONS = {"nogil": True, "fastmath": {"contract", "nsz"}}
+# Infinities and NaNs keep their meaning: only contraction and the sign of zero are relaxed, and
+# dividing by zero gives one of them.
+_OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz"}}
 
 
 def kernel(function: _F) -> _F:
@@ -649,6 +650,7 @@ def _value(
 @kernel
 def _pick(
     inverse: Array,
+    valid: Array,
     centers: Array,
     cos: Array,
     as_z: bool,
@@ -682,7 +684,20 @@ def _pick(
                 low, high = min(min(a, b), min(c, d)), max(max(a, b), max(c, d))
                 found = min(max(smooth, low), high)
             else:
-                found = inverse[min(int(y), height - 1), min(int(x), width - 1)]
+                nearest = min(int(y), height - 1), min(int(x), width - 1)
+                found = inverse[nearest]
+                if valid[nearest] != valid[nearest]:
+                    # Beyond the rim of the image circle: the nearest of the four pixels around.
+                    shortest = np.float32(4)
+                    for q in range(2):
+                        for p in range(2):
+                            k, m = _source_index(
+                                row + q, column + p, int(x), height, width, topology
+                            )
+                            away = (fx - p) * (fx - p) + (fy - q) * (fy - q)
+                            if k >= 0 and valid[k, m] == valid[k, m] and away < shortest:
+                                shortest = away
+                                found = inverse[k, m]
             if found == 0:
                 out[i, j] = np.inf
             else:
@@ -696,9 +711,9 @@ def resample_depth(
 
     ``source_is_z`` and ``target_is_z`` say which of Z-depth and distance the two images hold. On a
     smooth surface 1 / distance is interpolated, which is nearly linear for a plane, within the
-    range of the four pixels around; elsewhere the
-    pixel that the ray falls in is taken, so no depth lies between two surfaces. Returns (H, W)
-    float32; a miss (inf) stays inf, NaN marks a pixel without a source.
+    range of the four pixels around; elsewhere the pixel that the ray falls in is taken, or beyond
+    the rim of the image circle the nearest of those four, so no depth lies between two surfaces.
+    Returns (H, W) float32; a miss (inf) stays inf, NaN marks a pixel without a source.
     """
     if lens_map.strip is not None:
         # A depth beyond its face's edge would be along another axis, or between two surfaces.
@@ -713,6 +728,7 @@ def resample_depth(
     out = np.empty(lens_map.target_cos.shape, np.float32)
     _pick(
         inverse,
+        lens_map.source_cos,
         lens_map.centers,
         lens_map.target_cos,
         target_is_z,
