@@ -26,6 +26,7 @@ from typing import Any
 from lightfield import metrics, plots, trials
 from lightfield.calibration import calibrated
 from lightfield.cli import run
+from lightfield.errors import UserError
 from lightfield.files import atomic_path, read_json, write_json
 from lightfield.progress import Progress
 
@@ -95,6 +96,11 @@ def main() -> None:
     if arguments.calibration:
         render = calibrated(lightfield["render"], read_json(arguments.calibration))
         lightfield["render"] = render
+    elif "samples" not in lightfield["render"]:
+        raise UserError(
+            f"{arguments.lightfield}: render has a target error and no samples; "
+            "give --calibration, what scripts/calibrate.py chose for it"
+        )
     maker = trials.Trials(
         arguments.blend,
         arguments.inventory,

@@ -6,11 +6,11 @@ card where that renders; gigabytes are those of the rendered views.
 
 import argparse
 import math
-import os
 import statistics
 from pathlib import Path
 from typing import Any
 
+from lightfield import processors
 from lightfield.cli import run
 from lightfield.files import atomic_path, read_json
 
@@ -61,7 +61,7 @@ def table(datasets: list[tuple[str, int, dict[str, Any]]]) -> str:
         f"| all | {total_views} | | | | {total_hours:.0f} ± {math.sqrt(variance):.0f} "
         f"| {total_bytes / 1e9:.0f} |"
     )
-    cores = len(os.sched_getaffinity(0))
+    cores = processors.available()
     if all(probe["device"] == "CPU" for _, _, probe in datasets):
         days = total_hours / cores / 24
         lines += ["", f"Hours of one processor core; this machine's {cores} take {days:.1f} days."]

@@ -6,7 +6,6 @@ only what is missing. Its journal, one JSON line a rendered view, tells what was
 """
 
 import argparse
-import os
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 import psutil
 
-from lightfield import depth, images, keys, lenses
+from lightfield import depth, images, keys, lenses, processors
 from lightfield.cli import run
 from lightfield.errors import UserError
 from lightfield.files import read_json, sha256, write_json
@@ -111,14 +110,15 @@ def render_views(
     progress: Progress,
 ) -> None:
     """Open the scene once and render ``frames`` one after the other."""
+    threads = arguments.threads or processors.available()
     # Only now, because it takes a second and a shard that is finished does not need it.
-    from lightfield import blender
+    with processors.only(threads):
+        from lightfield import blender
 
     inventory = read_json(arguments.inventory) if arguments.inventory else {"left_out": []}
     blender.open_scene(arguments.blend)
     if "hidden_objects" in inventory["left_out"]:
         blender.remove_objects(inventory["hidden"])
-    threads = arguments.threads or len(os.sched_getaffinity(0))
     device = blender.set_up_render(lightfield["render"], lightfield, arguments.device, threads)
     blender.leave_out(inventory["left_out"])
     to_depth = depth_factors(lightfield)

@@ -323,10 +323,9 @@ class _Source:
         low, high = np.min(windows, axis=0), np.max(windows, axis=0)
         self.rows, self.columns = (int(low[0]), int(high[1])), (int(low[2]), int(high[3]))
         faces = [self._read(job, path) for path in view.paths]
-        # A cube map's faces stand side by side.
-        self.color = np.concatenate([face[0] for face in faces], axis=1)
+        self.color = _side_by_side([face[0] for face in faces])
         depths = [face[1] for face in faces if face[1] is not None]
-        self.depth = np.concatenate(depths, axis=1) if len(depths) == len(faces) else None
+        self.depth = _side_by_side(depths) if len(depths) == len(faces) else None
         self.has_alpha = faces[0][2]
         # The file knows best; the configuration may be another program's.
         meaning = faces[0][3] or job.config.get("depth") or _depth_name(job.source)
@@ -353,6 +352,11 @@ class _Source:
         if depth is not None and depth.dtype != np.float16:
             depth = depth.astype(np.float32, copy=False)
         return color, depth, alpha is not None, image.attributes.get(DEPTH_ATTRIBUTE)
+
+
+def _side_by_side(faces: list[Array]) -> Array:
+    """Return a cube map's faces as one strip; the one image of another lens as it is."""
+    return faces[0] if len(faces) == 1 else np.concatenate(faces, axis=1)
 
 
 def _linear(planes: list[Array], alpha: Array | None) -> Array:

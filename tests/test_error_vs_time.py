@@ -113,6 +113,21 @@ def test_a_second_run_renders_nothing(measured):
     assert (measured.folder / "room.json").read_bytes() == made
 
 
+def test_a_target_error_that_was_not_calibrated_is_told(measured, run_program, room):
+    content = lightfield() | {"render": {"target_error": 0.01}}
+    path = measured.folder / "target.json"
+    path.write_text(json.dumps(content))
+    result = run_program(
+        "error_vs_time.py",
+        *("--blend", room, "--inventory", measured.folder / "inventory.json"),
+        *("--lightfield", path, "--cache", "none", "--output", measured.folder / "none"),
+        check=False,
+    )
+    assert result.returncode == 1
+    assert "target.json" in result.stderr and "--calibration" in result.stderr
+    assert "Traceback" not in result.stderr
+
+
 def trial_maker(**changes):
     content = lightfield() | changes
     return trials.Trials("none.blend", "none.json", content, "cpu", 1, "none")

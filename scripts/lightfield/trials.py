@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield import images, keys, lenses
+from lightfield import images, keys, lenses, processors
 from lightfield.calibration import UNCALIBRATED
 from lightfield.consistency import Camera
 from lightfield.files import read_json
@@ -156,7 +156,8 @@ class Trials:
         return found
 
     def _render(self, probe: Probe, settings: Mapping[str, Any], path: Path, key: str) -> None:
-        from lightfield import blender
+        with processors.only(self._threads):
+            from lightfield import blender
 
         if not self._started:
             self._start(settings)

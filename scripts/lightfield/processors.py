@@ -1,0 +1,31 @@
+"""How many of the machine's processors this process uses."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+
+def available() -> int:
+    """Return how many processors this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+@contextmanager
+def only(count: int) -> Iterator[None]:
+    """Let a library that is imported in here start no more threads than ``count``.
+
+    TBB, whose threads Blender and OpenImageDenoise use beside Cycles' own, makes one for each
+    processor that it may use when it is loaded. Idle ones keep asking for work: they take a tenth
+    of each processor from the renders of other shards.
+    """
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, sorted(allowed)[:count])
+    try:
+        yield
+    finally:
+        # Afterwards each thread runs where the system puts it, those that were started too.
+        for thread in Path("/proc/self/task").iterdir():
+            # One may have ended since.
+            with suppress(ProcessLookupError):
+                os.sched_setaffinity(int(thread.name), allowed)

@@ -1,0 +1,53 @@
+"""A library sees fewer processors while it is imported; the process uses all of its own later."""
+
+import os
+import threading
+from pathlib import Path
+
+import pytest
+
+from lightfield import processors
+
+
+def test_every_thread_may_use_all_processors_again():
+    allowed = os.sched_getaffinity(0)
+    done = threading.Event()
+    with processors.only(1):
+        assert processors.available() == 1
+        thread = threading.Thread(target=done.wait)
+        thread.start()
+    found = [os.sched_getaffinity(int(task.name)) for task in Path("/proc/self/task").iterdir()]
+    done.set()
+    thread.join()
+    assert all(processors_of == allowed for processors_of in found)
+    assert processors.available() == len(allowed)
+
+
+def test_more_than_there_are_is_all_of_them():
+    with processors.only(10**6):
+        assert os.sched_getaffinity(0)
+
+
+def test_an_error_changes_nothing():
+    allowed = os.sched_getaffinity(0)
+    with pytest.raises(ImportError), processors.only(1):
+        raise ImportError
+    assert os.sched_getaffinity(0) == allowed
+
+
+PROGRAM = """
+import sys
+from pathlib import Path
+from lightfield import processors
+with processors.only(int(sys.argv[1])):
+    from lightfield import blender
+blender.open_scene(Path(sys.argv[2]))
+print(len(list(Path("/proc/self/task").iterdir())))
+"""
+
+
+def test_blender_starts_a_thread_less_for_a_processor_less(tmp_path, run_program, room):
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    started = [int(run_program(program, n, room).stdout.split()[-1]) for n in (1, 2)]
+    assert started[1] - started[0] == min(2, processors.available()) - 1
