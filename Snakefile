@@ -22,6 +22,10 @@ include: "rules/benchmark.smk"
 include: "rules/error.smk"
 
 
+onstart:
+    write_json(RUN, {f"{RESULTS}/{d.scene}/{d.rig}": d.view_count for d in CHOSEN})
+
+
 rule all:
     default_target: True
     input:

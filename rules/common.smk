@@ -12,6 +12,7 @@ shell.prefix(f"export PATH={shlex.quote(str(Path(sys.executable).parent))}:$PATH
 
 from lightfield.config import VIEWS, load_config, load_datasets, scene_datasets
 from lightfield.errors import UserError
+from lightfield.files import write_json
 from lightfield.keys import scene_fingerprint
 
 try:
@@ -48,6 +49,8 @@ PANORAMA = f"{MADE}/panorama"
 # Pictures of a report that are drawn together, each as .svg and .png.
 STILLS = ("rig", "depth_panorama", "noise")
 REPROJECTED = f"{DATASET}/{{reprojection}}"
+# Which datasets are being built, for the progress lines of each shard.
+RUN = f"{WORK}/run.json"
 
 
 wildcard_constraints:

@@ -25,6 +25,7 @@ rule render:
         folder=f"{DATASET}/exr",
         journal=f"{MADE}/render/{{first}}-{{end}}.journal.jsonl",
         device=SETTINGS["device"],
+        run=RUN,
     message:
         "Rendering views {wildcards.first} to {wildcards.end} of {wildcards.scene}/{wildcards.rig}"
     shell:
@@ -32,4 +33,5 @@ rule render:
         " --inventory {input.inventory}"
         " --views {wildcards.first}:{wildcards.end} --device {params.device} --threads {threads}"
         " --output {params.folder} --journal {params.journal} --record {output}"
+        " --run {params.run}"
         " 2>&1 | tee {log}"

@@ -8,10 +8,9 @@ render the median over its seeds; it is right only where nothing else runs on th
 The slope of a method is that of its error over its time, both in logarithms. Plain path tracing's
 is −1 over samples, whether indirect light is clamped or not: samples are clamped, not pixels. Two
 things bend it. Where light is smooth, Cycles' Sobol points converge faster than independent ones
-would (−1.1 in the lone monk's courtyard); and where paths are rare and bright, leaving out the
-worst thousandth of pixels hides more of them at few samples than at many (−0.97 in the garden).
-Over time it is a little steeper, as each render has a fixed cost too. Adaptive sampling and
-denoising are biased, so theirs are flatter.
+would; and where paths are rare and bright, leaving out the worst thousandth of pixels hides more of
+them at few samples than at many. So the slope of all pixels is told too, which is −1 there, with
+larger errors. Adaptive sampling and denoising are biased, so theirs are flatter.
 """
 
 import argparse
@@ -54,6 +53,7 @@ class Point:
     samples: float
     seconds: float
     relative_mse: float
+    relative_mse_whole: float
     standard_error: float
     resolved: bool
     psnr: float
@@ -193,7 +193,7 @@ def measured(
     flat = [error for views in errors for error in views]
     mean = {
         name: statistics.fmean(getattr(error, name) for error in flat)
-        for name in ("relative_mse", "psnr", "ssim", "flip")
+        for name in ("relative_mse", "relative_mse_whole", "psnr", "ssim", "flip")
     }
     height, width = references[0].mask.shape
     by_seed = [
@@ -231,6 +231,12 @@ def evaluated(points: Sequence[Point], references: Sequence[metrics.Reference]) 
         by_samples = metrics.fit([point.samples for point in own], error)
         if by_time and by_samples:
             slopes[method] = {"over_time": asdict(by_time), "over_samples": asdict(by_samples)}
+        # Nearly all of it may be a few pixels, and then it is below 0 by chance.
+        own = [point for point in own if point.relative_mse_whole > 0]
+        error = [point.relative_mse_whole for point in own]
+        of_all = metrics.fit([point.samples for point in own], error)
+        if method in slopes and of_all:
+            slopes[method]["of_all_pixels_over_samples"] = asdict(of_all)
         if method == PLAIN:
             plain = by_time, by_samples
     front = metrics.pareto([p.seconds for p in seen], [p.relative_mse for p in seen])
@@ -304,10 +310,9 @@ def draw(stem: Path, points: Sequence[Point], content: Mapping[str, Any]) -> Non
             line = content["slopes"].get(method)
             told = ""
             if line:
-                slope = line["over_time"]
-                told = f", slope {slope['slope']:.2f} ± {slope['slope_error']:.2f}".replace(
-                    "-", "−"
-                )
+                told = f", slope {slope_told(line['over_time'])}"
+                if "of_all_pixels_over_samples" in line:
+                    told += f" (all pixels {slope_told(line['of_all_pixels_over_samples'])})"
             axes.errorbar(
                 [point.seconds for point in own],
                 [point.relative_mse for point in own],
@@ -351,6 +356,11 @@ def draw(stem: Path, points: Sequence[Point], content: Mapping[str, Any]) -> Non
         axes.set_xlabel(f"render time, {unit} seconds per megapixel")
         axes.set_ylabel("relative mean squared error")
         axes.legend(fontsize=8)
+
+
+def slope_told(line: Mapping[str, float]) -> str:
+    """Return a slope and its standard error as text."""
+    return f"{line['slope']:.2f} ± {line['slope_error']:.2f}".replace("-", "−")
 
 
 if __name__ == "__main__":

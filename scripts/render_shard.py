@@ -7,7 +7,7 @@ only what is missing. Its journal, one JSON line a rendered view, tells what was
 
 import argparse
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from lightfield.cli import run
 from lightfield.errors import UserError
 from lightfield.files import read_json, sha256, write_json
 from lightfield.journal import Journal
-from lightfield.progress import Progress
+from lightfield.progress import Progress, duration
 
 
 def main() -> None:
@@ -40,6 +40,7 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="folder of the views")
     parser.add_argument("--record", type=Path, help="JSON of the views' sizes and checksums")
     parser.add_argument("--journal", type=Path, help="JSON lines of what was rendered and how fast")
+    parser.add_argument("--run", type=Path, help="JSON of a run: each dataset's views, by folder")
     parser.add_argument(
         "--device",
         default="auto",
@@ -63,9 +64,7 @@ def main() -> None:
     label = f"render {arguments.output.parent}"
     if arguments.views != ":":
         label += f" {arguments.views}"
-    others = (
-        Others(lightfield, arguments.output) if len(frames) < len(lightfield["frames"]) else str
-    )
+    others = Others(frames, lightfield, arguments.output, arguments.run)
     progress = Progress(len(missing), label, already=len(frames) - len(missing), note=others)
     if missing:
         render_views(missing, lightfield, arguments, journal, progress)
@@ -87,8 +86,8 @@ def view_path(folder: Path, frame: Mapping[str, Any]) -> Path:
     return folder / f"{frame['name']}.exr"
 
 
-class Others:
-    """Counts the finished views of the whole dataset, other shards' too; looks at each once."""
+class Finished:
+    """Counts a dataset's finished views, whoever renders them; looks at each finished one once."""
 
     def __init__(self, lightfield: Mapping[str, Any], folder: Path) -> None:
         self.total = len(lightfield["frames"])
@@ -97,9 +96,53 @@ class Others:
             for frame in lightfield["frames"]
         }
 
-    def __call__(self) -> str:
+    def count(self) -> int:
         self.missing = {p: key for p, key in self.missing.items() if not images.has_key(p, key)}
-        return f"; of the whole dataset {self.total - len(self.missing)} of {self.total}"
+        return self.total - len(self.missing)
+
+
+class Others:
+    """Ends a shard's progress lines with those of the whole dataset and of the whole run.
+
+    ``run`` is a JSON of how many views each dataset of the run has, by the dataset's folder. The
+    time left is at the rate of all shards since this one began.
+    """
+
+    def __init__(
+        self,
+        frames: Sequence[Mapping[str, Any]],
+        lightfield: Mapping[str, Any],
+        folder: Path,
+        run: Path | None,
+    ) -> None:
+        self.own = len(frames)
+        self.dataset = Finished(lightfield, folder)
+        self.run: dict[str, int] = read_json(run) if run else {}
+        # It lists what was chosen, and this may have been asked for by name.
+        if str(folder.parent) not in self.run:
+            self.run = {}
+        self.datasets = {str(folder.parent): self.dataset}
+        self.began, self.first = time.monotonic(), self.count()
+
+    def count(self) -> int:
+        """Return how many views of the run are finished."""
+        for name in self.run.keys() - self.datasets.keys():
+            # Another job makes it when its turn has come.
+            path = Path(name, "lightfield.json")
+            if path.exists():
+                self.datasets[name] = Finished(read_json(path), Path(name, "exr"))
+        return sum(dataset.count() for dataset in self.datasets.values())
+
+    def __call__(self) -> str:
+        done, total, text = self.count(), sum(self.run.values()), ""
+        if self.own < self.dataset.total:
+            text = f"; of the whole dataset {self.dataset.count()} of {self.dataset.total}"
+        if self.own < total:
+            text += f"; of the run {done} of {total}"
+            if self.first < done < total:
+                each = (time.monotonic() - self.began) / (done - self.first)
+                text += f", {duration(each * (total - done))} left"
+        return text
 
 
 def render_views(

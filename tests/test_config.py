@@ -201,6 +201,7 @@ def test_every_scene_of_the_repository_is_right():
         (["preset=best"], "preset: is 'best'; must be one of tiny, preview, full"),
         (["scenes=[gardn]"], "there is no scene 'gardn'"),
         (["rigs=[LFSpher]"], "rigs: 'LFSpher' is in none of the scenes garden"),
+        (["scenes=[garden, lone_monk]"], "none of LFSphere_e100cm_d170cm is in lone_monk; it has "),
         (["device=quantum"], 'device: is "quantum"; must be one of auto, cpu, optix,'),
         (["views_per_shard=0"], "views_per_shard: is 0; must be auto or a whole number"),
         (["results=."], "results: is '.'; must be a folder of its own"),

@@ -50,6 +50,8 @@ def test_plain_path_tracing_converges_as_monte_carlo_does(content):
     """Cycles' Sobol points make a smooth room converge a little faster than independent ones."""
     slope = content["slopes"]["plain"]["over_samples"]["slope"]
     assert -1.3 < slope < -0.9
+    whole = content["slopes"]["plain"]["of_all_pixels_over_samples"]["slope"]
+    assert -1.3 < whole < -0.9
     errors = [p["relative_mse"] for p in content["points"] if p["method"] == "plain"]
     assert len(errors) == 5
     assert all(more > less for more, less in pairwise(errors))

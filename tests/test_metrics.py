@@ -91,6 +91,8 @@ def test_a_few_fireflies_do_not_decide_and_many_do():
     many[32, 16:48] = 50
     assert metrics.relative_mse(few, found) == pytest.approx(calm, rel=0.02)
     assert metrics.relative_mse(many, found) > 100 * calm
+    # They do decide where all pixels count.
+    assert metrics.relative_mse(few, found, left_out=0) > 100 * calm
 
 
 def test_what_lies_outside_the_image_circle_does_not_count():

@@ -175,7 +175,30 @@ def test_progress_begins_at_once_and_reads_in_a_log(capsys, monkeypatch):
 
 def test_a_shard_tells_of_the_views_that_others_finished(dataset):
     dataset.render("a")
-    others = render_shard.Others(dataset.content, dataset.folder / "exr")
+    frames = dataset.content["frames"]
+    others = render_shard.Others(frames[:2], dataset.content, dataset.folder / "exr", None)
     assert others() == "; of the whole dataset 1 of 4"
     dataset.render("c", "d")
     assert others() == "; of the whole dataset 3 of 4"
+    # Alone it would only say the same again.
+    assert render_shard.Others(frames, dataset.content, dataset.folder / "exr", None)() == ""
+
+
+def test_a_shard_tells_how_far_the_run_is(dataset, tmp_path, monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(render_shard.time, "monotonic", lambda: now[0])
+    later = tmp_path / "later"
+    run = tmp_path / "run.json"
+    run.write_text(json.dumps({str(dataset.folder): 4, str(later): 6}))
+    dataset.render("a")
+    frames = dataset.content["frames"]
+    others = render_shard.Others(frames, dataset.content, dataset.folder / "exr", run)
+    assert others() == "; of the run 1 of 10"
+    dataset.render("b", "c")
+    now[0] += 30
+    # 15 s a view.
+    assert others() == "; of the run 3 of 10, 1 min 45 s left"
+    # The other dataset's cameras are placed, and nothing is rendered there.
+    later.mkdir()
+    (later / "lightfield.json").write_text(json.dumps(dataset.content))
+    assert others().startswith("; of the run 3 of 10")

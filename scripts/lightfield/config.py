@@ -107,6 +107,13 @@ def load_datasets(config: Mapping[str, Any]) -> list[Dataset]:
                 f"config.yaml: rigs: {rig!r} is in none of the scenes {', '.join(config['scenes'])}"
                 f"; must be all or some of {', '.join(sorted(known))}"
             )
+    for scene in config["scenes"]:
+        own = [dataset.rig_name for dataset in found if dataset.name == scene]
+        if not set(own) & set(config["rigs"]):
+            raise UserError(
+                f"config.yaml: rigs: none of {', '.join(config['rigs'])} is in {scene}; "
+                f"it has {', '.join(own)}; all takes them all"
+            )
     return [dataset for dataset in found if dataset.rig_name in config["rigs"]]
 
 

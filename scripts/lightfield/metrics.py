@@ -7,8 +7,9 @@ The one that is minimised is the relative mean squared error, (x − r)² / (r²
 channels and over all pixels but the worst thousandth (Rousselle, Knaus and Zwicker 2011, section
 5). Images are exposed so that the references' geometric mean luminance is middle grey, 0.18, and ε
 is 0.01. The thousandth makes it robust: a few fireflies would otherwise decide it, so that it would
-take thousands of views to tell two ways to render apart. Its expectation then is only nearly
-proportional to 1/N for N samples, as the whole mean's is exactly if the samples are independent.
+take thousands of views to tell two ways to render apart. Of N independent samples the expected
+error of all pixels is proportional to 1/N exactly. Without the worst it falls slower: where light
+comes in rare bright paths, few samples make few bright pixels, and the thousandth is most of them.
 
 An independent reference adds its own variance to every expected square and nothing else, so
 subtracting an estimate of it, from how its n renders differ, leaves the image's own error.
@@ -91,13 +92,15 @@ class Errors:
     """What one image differs by from its reference.
 
     relative_mse: without the reference's own error, and below 0 by chance where it is far smaller
-    than that; psnr (decibel; inf if equal), ssim and flip (0 is equal) of the tone-mapped image;
+    than that; relative_mse_whole: the same of all pixels, the worst thousandth too; psnr (decibel;
+    inf if equal), ssim and flip (0 is equal) of the tone-mapped image;
     depth: mean of |z/r − 1|, at most 1 a pixel, where a pixel in which only one of the two hit
     anything counts as 1, or None without depth. Cycles takes depth from one sample, so that more
     do not improve it.
     """
 
     relative_mse: float
+    relative_mse_whole: float
     psnr: float
     ssim: float
     flip: float
@@ -127,6 +130,7 @@ def compare(
         psnr = -10 * np.log10(np.mean((shown - truth)[mask] ** 2))
     return Errors(
         relative_mse=relative_mse(colour, reference),
+        relative_mse_whole=relative_mse(colour, reference, left_out=0),
         psnr=float(psnr),
         ssim=float(similarity[mask].mean()),
         flip=float(flip.reshape(mask.shape)[mask].mean()),
@@ -136,18 +140,23 @@ def compare(
     )
 
 
-def relative_mse(colour: NDArray[np.float32], reference: Reference) -> float:
-    """Return the relative mean squared error, without what the reference itself adds to it."""
+def relative_mse(
+    colour: NDArray[np.float32], reference: Reference, left_out: float = OUTLIERS
+) -> float:
+    """Return the relative mean squared error, without what the reference itself adds to it.
+
+    ``left_out`` is the part of the pixels that does not count, those with the largest errors.
+    """
     squares = (colour.astype(np.float64) - reference.colour)[reference.mask] ** 2
     found = (squares * reference.weights).mean(axis=-1)
     own = (reference.variance[reference.mask] * reference.weights).mean(axis=-1)
-    kept = _inliers(found)
+    kept = _inliers(found, left_out)
     return float((found - own)[kept].mean())
 
 
-def _inliers(errors: Array) -> NDArray[np.int64]:
-    """Return the indices of all but the worst thousandth of some pixels, in rising order."""
-    return np.argsort(errors, kind="stable")[: errors.size - math.ceil(OUTLIERS * errors.size)]
+def _inliers(errors: Array, left_out: float = OUTLIERS) -> NDArray[np.int64]:
+    """Return the indices of all but the worst part of some pixels, in rising order."""
+    return np.argsort(errors, kind="stable")[: errors.size - math.ceil(left_out * errors.size)]
 
 
 def developed(colour: NDArray[Any], reference: Reference) -> Array:
