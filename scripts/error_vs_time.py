@@ -231,14 +231,16 @@ def evaluated(points: Sequence[Point], references: Sequence[metrics.Reference]) 
         by_samples = metrics.fit([point.samples for point in own], error)
         if by_time and by_samples:
             slopes[method] = {"over_time": asdict(by_time), "over_samples": asdict(by_samples)}
+        if method == PLAIN:
+            plain = by_time, by_samples
         # Nearly all of it may be a few pixels, and then it is below 0 by chance.
         own = [point for point in own if point.relative_mse_whole > 0]
         error = [point.relative_mse_whole for point in own]
-        of_all = metrics.fit([point.samples for point in own], error)
-        if method in slopes and of_all:
-            slopes[method]["of_all_pixels_over_samples"] = asdict(of_all)
-        if method == PLAIN:
-            plain = by_time, by_samples
+        by_time = metrics.fit([point.seconds for point in own], error)
+        by_samples = metrics.fit([point.samples for point in own], error)
+        if method in slopes and by_time and by_samples:
+            slopes[method]["of_all_pixels_over_time"] = asdict(by_time)
+            slopes[method]["of_all_pixels_over_samples"] = asdict(by_samples)
     front = metrics.pareto([p.seconds for p in seen], [p.relative_mse for p in seen])
     saved = []
     if plain and plain[0] and plain[1]:
@@ -311,8 +313,8 @@ def draw(stem: Path, points: Sequence[Point], content: Mapping[str, Any]) -> Non
             told = ""
             if line:
                 told = f", slope {slope_told(line['over_time'])}"
-                if "of_all_pixels_over_samples" in line:
-                    told += f" (all pixels {slope_told(line['of_all_pixels_over_samples'])})"
+                if "of_all_pixels_over_time" in line:
+                    told += f" (all pixels {slope_told(line['of_all_pixels_over_time'])})"
             axes.errorbar(
                 [point.seconds for point in own],
                 [point.relative_mse for point in own],

@@ -149,7 +149,12 @@ def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
 
 def _slopes(slopes: Mapping[str, Any]) -> Table:
     """Return each method's slopes, ± their standard errors."""
-    over = ("over_time", "over_samples", "of_all_pixels_over_samples")
+    over = (
+        "over_time",
+        "over_samples",
+        "of_all_pixels_over_time",
+        "of_all_pixels_over_samples",
+    )
 
     def told(fit: Any) -> str | None:
         if not isinstance(fit, Mapping) or "slope" not in fit:
