@@ -46,8 +46,8 @@ print(len(list(Path("/proc/self/task").iterdir())))
 """
 
 
-def test_blender_starts_a_thread_less_for_a_processor_less(tmp_path, run_program, room):
+def test_blender_starts_fewer_threads_for_fewer_processors(tmp_path, run_program, room):
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
     started = [int(run_program(program, n, room).stdout.split()[-1]) for n in (1, 2)]
-    assert started[1] - started[0] == min(2, processors.available()) - 1
+    assert (started[0] < started[1]) == (processors.available() > 1)
