@@ -406,7 +406,7 @@ def full_datasets(name):
 def full_size(wildcards):
     """Return what the scene YAML says of a dataset's size, whatever the preset, as JSON.
 
-    Samples are null where the YAML has a target error instead.
+    Samples and denoise are null where the YAML has a target error instead.
     """
     full = full_datasets(dataset_of(wildcards).name)[wildcards.rig]
     return json.dumps(
@@ -414,6 +414,7 @@ def full_size(wildcards):
             "views": full.view_count,
             "resolution": full.cameras["camera"]["resolution"],
             "samples": full.render.get("samples"),
+            "denoise": full.render.get("denoise"),
         }
     )
 

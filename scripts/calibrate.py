@@ -18,12 +18,9 @@ from statistics import fmean, stdev
 from typing import Any
 
 from lightfield import metrics, trials
+from lightfield.calibration import DENOISING_SAMPLES, cost_in_samples
 from lightfield.cli import run
 from lightfield.files import read_json, write_json
-
-# What denoising a pixel costs in samples of it: 18 µs against 6, measured on one core of an EPYC in
-# views of the garden of 256² and more. In the small windows of probes it is up to twice as much.
-DENOISING_SAMPLES = 3
 
 # A reference takes renders of so many samples until its own error is this part of the target.
 REFERENCE_SAMPLES = 16
@@ -104,7 +101,7 @@ class Bench:
             way=way,
             settings={**trials.PLAIN, **settings},
             samples=samples,
-            cost=samples + (DENOISING_SAMPLES if settings.get("denoise") else 0),
+            cost=cost_in_samples(samples, settings.get("denoise", False)),
             error=fmean(errors),
             seconds=fmean(render.seconds for render in renders) / megapixels,
         )

@@ -28,11 +28,11 @@ that is the processor time divided by the number of cores. While it renders on a
 whole machine counts. Waiting and idle time are nobody's.
 
 The extrapolation multiplies each view's path-tracing time by the ratio of pixels and of samples,
-and takes the mean. Its uncertainty is the standard error of that mean over the views, with the
-correction for a finite number of views, sqrt(1 - n / N); null if there is only one view. That the
-time follows pixels and samples in proportion is assumed. What else each view needs (writing,
-reprojection, validation) is taken in proportion to views and pixels, everything else as it was.
-The first view of each process, which prepares the scene for Cycles, tells of neither.
+of which denoising counts as three, and takes the mean. That the time follows them in proportion is
+assumed. Its uncertainty is the standard error of that mean over the views, with the correction for
+a finite number of views, sqrt(1 - n / N); null if there is only one view. What else each view needs
+(writing, reprojection, validation) is taken in proportion to views and pixels, everything else as
+it was. The first view of each process, which prepares the scene for Cycles, tells of neither.
 Gigabytes are those of the rendered views, in proportion to their pixels: an upper estimate, because
 larger views compress better. "device" and "extrapolation" are null if no journal tells of a
 rendered view, as when the working folder was deleted and the views were kept.
@@ -50,6 +50,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield import journal
+from lightfield.calibration import cost_in_samples
 from lightfield.cli import run
 from lightfield.files import read_json, write_json
 
@@ -91,7 +92,7 @@ def main() -> None:
         "--full",
         required=True,
         type=json.loads,
-        help="JSON: views, resolution, and samples; null for those of this dataset",
+        help="JSON: views, resolution, samples and denoise; null for those of this dataset",
     )
     parser.add_argument(
         "--reprojection", action="append", default=[], help="name of one; given for each"
@@ -338,13 +339,17 @@ def extrapolation(
     # First views tell little of the others, and count only where there are none.
     latest = [rendering for rendering in kept if not rendering.first] or list(kept)
     here = len(lightfield["frames"])
-    samples = lightfield["render"]["samples"]
+    render = lightfield["render"]
+    samples, denoise = render["samples"], render["denoise"]
     wanted = full["samples"] or samples
+    # Where a target error decides, both are unknown until then.
+    denoise_wanted = denoise if full["denoise"] is None else full["denoise"]
+    effort = cost_in_samples(wanted, denoise_wanted) / cost_in_samples(samples, denoise)
     width, height = lightfield["resolution"]
     pixels = math.prod(full["resolution"]) / (width * height)
     count = full["views"]
 
-    times = [view.path_tracing * pixels * wanted / samples for view in latest]
+    times = [view.path_tracing * pixels * effort for view in latest]
     error = None
     if len(times) > 1:
         unseen = max(0.0, 1 - len(times) / count)
@@ -376,8 +381,8 @@ def extrapolation(
         "gigabytes": view_bytes / here * count * pixels / 1e9,
         "basis": (
             f"path tracing of {len(times)} views: {width} × {height} pixels, {samples} samples"
-            + (" and denoising" if lightfield["render"]["denoise"] else "")
-            + ", in proportion to pixels and samples, on "
+            + (", and denoising, which counts as three" if denoise else "")
+            + "; in proportion to pixels and samples; on "
             + ("the processor" if processor else "a graphics card: hours are the machine's")
             + "; ± is the standard error over these views; all else as measured, the part that "
             "every view needs in proportion to views and pixels"

@@ -10,6 +10,7 @@ import costs
 from lightfield import config, journal
 from lightfield.errors import UserError
 
+FULL = {"views": 3, "resolution": [8, 4], "samples": 2, "denoise": False}
 TARIFF = {"watts": 100, "cores": 4, "price_per_kwh": 0.5, "currency": "EUR"}
 HEAD = "s\th:m:s\tmax_rss\tmax_vms\tmax_uss\tmax_pss\tio_in\tio_out\tmean_load\tcpu_time\n"
 
@@ -96,7 +97,7 @@ def dataset(tmp_path, run_program):
             *("--dataset", folder, "--journals", journals, "--benchmarks", work / "rig"),
             *("--scene-benchmarks", work / "scene", "--blend", work / "scene.blend"),
             *("--energy", json.dumps(TARIFF), "--reprojection", "flat"),
-            *("--full", json.dumps(full or {"views": 3, "resolution": [8, 4], "samples": 2})),
+            *("--full", json.dumps(FULL | (full or {}))),
             *("--output", tmp_path / "costs.json"),
         )
         return json.loads((tmp_path / "costs.json").read_text())
@@ -205,6 +206,16 @@ def test_views_kept_without_their_journals_cost_nothing_that_is_known(dataset):
     found = dataset({"started": 5.0, "host": "there", "pid": 1}, end(6.0, 1.0, 0.5, 9))
     assert found["extrapolation"] is None
     assert found["shards"][0]["views_rendered"] == 0
+
+
+def test_denoising_counts_as_three_samples(dataset):
+    lines = [*start(0.0), *(view(name, 10.0, wall=6.0, traced=5.0, cpu=6.0) for name in "abc")]
+    plain, denoised = (
+        dataset(*lines, full={"denoise": denoise})["extrapolation"]["core_hours"]
+        for denoise in (False, True)
+    )
+    # 3 views of 5 s and 2 samples.
+    assert denoised - plain == pytest.approx(3 * 5.0 * 3 / 2 / 3600)
 
 
 def test_a_line_that_a_kill_cut_short_is_left_out(tmp_path):
