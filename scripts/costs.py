@@ -28,11 +28,12 @@ that is the processor time divided by the number of cores. While it renders on a
 whole machine counts. Waiting and idle time are nobody's.
 
 The extrapolation multiplies each view's path-tracing time by the ratio of pixels and of samples,
-of which denoising counts as three, and takes the mean. That the time follows them in proportion is
-assumed. Its uncertainty is the standard error of that mean over the views, with the correction for
-a finite number of views, sqrt(1 - n / N); null if there is only one view. What else each view needs
-(writing, reprojection, validation) is taken in proportion to views and pixels, everything else as
-it was. The first view of each process, which prepares the scene for Cycles, tells of neither.
+denoising counted in samples as `lightfield.calibration` does, and takes the mean. That the time
+follows them in proportion is assumed. Its uncertainty is the standard error of that mean over the
+views, with the correction for a finite number of views, sqrt(1 - n / N); null if there is only one
+view. What else each view needs (writing, reprojection, validation) is taken in proportion to views
+and pixels, everything else as it was. The first view of each process, which prepares the scene for
+Cycles, tells of neither.
 Gigabytes are those of the rendered views, in proportion to their pixels: an upper estimate, because
 larger views compress better. "device" and "extrapolation" are null if no journal tells of a
 rendered view, as when the working folder was deleted and the views were kept.
@@ -50,7 +51,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield import journal
-from lightfield.calibration import cost_in_samples
+from lightfield.calibration import DENOISING_SAMPLES, cost_in_samples
 from lightfield.cli import run
 from lightfield.files import read_json, write_json
 
@@ -381,7 +382,7 @@ def extrapolation(
         "gigabytes": view_bytes / here * count * pixels / 1e9,
         "basis": (
             f"path tracing of {len(times)} views: {width} × {height} pixels, {samples} samples"
-            + (", and denoising, which counts as three" if denoise else "")
+            + (f", and denoising, which counts as {DENOISING_SAMPLES}" if denoise else "")
             + "; in proportion to pixels and samples; on "
             + ("the processor" if processor else "a graphics card: hours are the machine's")
             + "; ± is the standard error over these views; all else as measured, the part that "

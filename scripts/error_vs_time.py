@@ -223,34 +223,28 @@ def evaluated(points: Sequence[Point], references: Sequence[metrics.Reference]) 
     """Return what follows from the points: slopes, the Pareto front, and what each way saves."""
     seen = [point for point in points if point.resolved]
     slopes: dict[str, Any] = {}
-    plain = None
     for method in dict.fromkeys(point.method for point in points):
         own = [point for point in seen if point.method == method]
-        error = [point.relative_mse for point in own]
-        by_time = metrics.fit([point.seconds for point in own], error)
-        by_samples = metrics.fit([point.samples for point in own], error)
-        if by_time and by_samples:
-            slopes[method] = {"over_time": asdict(by_time), "over_samples": asdict(by_samples)}
-        if method == PLAIN:
-            plain = by_time, by_samples
-        # Nearly all of it may be a few pixels, and then it is below 0 by chance.
-        own = [point for point in own if point.relative_mse_whole > 0]
-        error = [point.relative_mse_whole for point in own]
-        by_time = metrics.fit([point.seconds for point in own], error)
-        by_samples = metrics.fit([point.samples for point in own], error)
-        if method in slopes and by_time and by_samples:
-            slopes[method]["of_all_pixels_over_time"] = asdict(by_time)
-            slopes[method]["of_all_pixels_over_samples"] = asdict(by_samples)
+        lines, of_all_pixels = (
+            fitted(own, error) for error in ("relative_mse", "relative_mse_whole")
+        )
+        if lines:
+            slopes[method] = {over: asdict(line) for over, line in lines.items()}
+            slopes[method] |= {
+                f"of_all_pixels_{over}": asdict(line) for over, line in of_all_pixels.items()
+            }
+    plain = fitted([point for point in seen if point.method == PLAIN], "relative_mse")
     front = metrics.pareto([p.seconds for p in seen], [p.relative_mse for p in seen])
     saved = []
-    if plain and plain[0] and plain[1]:
+    if plain:
         saved = [
             {
                 "method": point.method,
                 "settings": point.settings,
                 "relative_mse": point.relative_mse,
-                "times_faster": plain[0].inverse(point.relative_mse) / point.seconds,
-                "times_fewer_samples": plain[1].inverse(point.relative_mse) / point.samples,
+                "times_faster": plain["over_time"].inverse(point.relative_mse) / point.seconds,
+                "times_fewer_samples": plain["over_samples"].inverse(point.relative_mse)
+                / point.samples,
             }
             for point in seen
             if point.method != PLAIN
@@ -263,6 +257,16 @@ def evaluated(points: Sequence[Point], references: Sequence[metrics.Reference]) 
         "settings": [asdict(point) for point in points if point.method == OWN],
         "points": [asdict(point) for point in points],
     }
+
+
+def fitted(points: Sequence[Point], error: str) -> dict[str, metrics.Line]:
+    """Fit one kind of error of some points over time and over samples; nothing if too few."""
+    # Where it is nearly all in a few pixels, it may be below 0 by chance.
+    known = [point for point in points if getattr(point, error) > 0]
+    errors = [getattr(point, error) for point in known]
+    by_time = metrics.fit([point.seconds for point in known], errors)
+    by_samples = metrics.fit([point.samples for point in known], errors)
+    return {"over_time": by_time, "over_samples": by_samples} if by_time and by_samples else {}
 
 
 def neighbours(

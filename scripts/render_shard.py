@@ -64,7 +64,8 @@ def main() -> None:
     label = f"render {arguments.output.parent}"
     if arguments.views != ":":
         label += f" {arguments.views}"
-    others = Others(frames, lightfield, arguments.output, arguments.run)
+    # A shard that is finished has no line to end, and need not look at any other's files.
+    others = Others(frames, lightfield, arguments.output, arguments.run) if missing else str
     progress = Progress(len(missing), label, already=len(frames) - len(missing), note=others)
     if missing:
         render_views(missing, lightfield, arguments, journal, progress)
@@ -96,8 +97,12 @@ class Finished:
             for frame in lightfield["frames"]
         }
 
-    def count(self) -> int:
+    def look(self) -> None:
+        """Find out which of the views that were missing are finished by now."""
         self.missing = {p: key for p, key in self.missing.items() if not images.has_key(p, key)}
+
+    @property
+    def count(self) -> int:
         return self.total - len(self.missing)
 
 
@@ -131,12 +136,14 @@ class Others:
             path = Path(name, "lightfield.json")
             if path.exists():
                 self.datasets[name] = Finished(read_json(path), Path(name, "exr"))
-        return sum(dataset.count() for dataset in self.datasets.values())
+        for dataset in self.datasets.values():
+            dataset.look()
+        return sum(dataset.count for dataset in self.datasets.values())
 
     def __call__(self) -> str:
         done, total, text = self.count(), sum(self.run.values()), ""
         if self.own < self.dataset.total:
-            text = f"; of the whole dataset {self.dataset.count()} of {self.dataset.total}"
+            text = f"; of the whole dataset {self.dataset.count} of {self.dataset.total}"
         if self.own < total:
             text += f"; of the run {done} of {total}"
             if self.first < done < total:

@@ -19,13 +19,14 @@ def test_every_thread_may_use_all_processors_again():
     found = [os.sched_getaffinity(int(task.name)) for task in Path("/proc/self/task").iterdir()]
     done.set()
     thread.join()
-    assert all(processors_of == allowed for processors_of in found)
+    assert all(affinity == allowed for affinity in found)
     assert processors.available() == len(allowed)
 
 
 def test_more_than_there_are_is_all_of_them():
+    allowed = os.sched_getaffinity(0)
     with processors.only(10**6):
-        assert os.sched_getaffinity(0)
+        assert os.sched_getaffinity(0) == allowed
 
 
 def test_an_error_changes_nothing():

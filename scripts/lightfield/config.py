@@ -108,8 +108,9 @@ def load_datasets(config: Mapping[str, Any]) -> list[Dataset]:
                 f"; must be all or some of {', '.join(sorted(known))}"
             )
     for scene in config["scenes"]:
-        own = [dataset.rig_name for dataset in found if dataset.name == scene]
-        if not set(own) & set(config["rigs"]):
+        # A sequence has a dataset for each frame.
+        own = dict.fromkeys(dataset.rig_name for dataset in found if dataset.name == scene)
+        if not own.keys() & set(config["rigs"]):
             raise UserError(
                 f"config.yaml: rigs: none of {', '.join(config['rigs'])} is in {scene}; "
                 f"it has {', '.join(own)}; all takes them all"
