@@ -28,9 +28,11 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
-from lightfield import config, lenses, pruning, rigs
-from lightfield.cli import run
-from lightfield.files import atomic_path
+from lightfield.core.cli import run
+from lightfield.core.files import atomic_path
+from lightfield.dataset import config
+from lightfield.geometry import lenses, rigs
+from lightfield.rendering import pruning
 
 # Tried, and not part of the workflow: a pruning must save something and keep every pixel.
 NOT_KEPT = {
@@ -108,7 +110,7 @@ def make_scene(task: tuple[str, str, float, Path]) -> dict[str, Any]:
     import bpy
 
     import inventory
-    from lightfield import blender
+    from lightfield.rendering import blender
 
     source = config.load_scene(scene)["scene"]
     blender.new_scene()
@@ -193,7 +195,7 @@ class Renderer:
     def __init__(self, task: Task) -> None:
         import bpy
 
-        from lightfield import blender
+        from lightfield.rendering import blender
 
         lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [96, 96]})
         rig = {"type": "lattice", "cameras": [VIEWS, 1, 1], "size": 0.3, "center": [0, 0, 1.1]}
@@ -224,7 +226,8 @@ class Renderer:
         """Render a view; return the CPU seconds that it took."""
         import numpy as np
 
-        from lightfield import blender, images
+        from lightfield.imaging import images
+        from lightfield.rendering import blender
 
         began = time.process_time()
         raw = blender.render_view(np.array(self.poses[number]), 1)

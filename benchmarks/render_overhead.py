@@ -17,7 +17,7 @@ from typing import Any
 SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
 sys.path.insert(0, str(SCRIPTS))
 
-from lightfield import lenses, rigs  # noqa: E402
+from lightfield.geometry import lenses, rigs  # noqa: E402
 
 RESOLUTION = 256
 SECONDS = 2.0

@@ -33,10 +33,10 @@ import numpy as np
 SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
 sys.path.insert(0, str(SCRIPTS))
 
-from lightfield import images, lens_map  # noqa: E402
-from lightfield.errors import UserError  # noqa: E402
-from lightfield.lenses import Array, Equidistant, Lens, Rectilinear  # noqa: E402
-from lightfield.plots import (  # noqa: E402
+from lightfield.core.errors import UserError  # noqa: E402
+from lightfield.geometry.lenses import Array, Equidistant, Lens, Rectilinear  # noqa: E402
+from lightfield.imaging import images  # noqa: E402
+from lightfield.report.plots import (  # noqa: E402
     BLUE,
     GREEN,
     GREY,
@@ -46,7 +46,8 @@ from lightfield.plots import (  # noqa: E402
     VERMILION,
     plot,
 )
-from lightfield.resample import (  # noqa: E402
+from lightfield.reprojection import lens_map  # noqa: E402
+from lightfield.reprojection.resample import (  # noqa: E402
     DEFAULT_FILTER,
     kernel,
     narrow,
@@ -498,6 +499,6 @@ def bare(folder: Path, small: bool) -> float:
 
 
 if __name__ == "__main__":
-    from lightfield import cli
+    from lightfield.core import cli
 
     cli.run(main)

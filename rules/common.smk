@@ -10,10 +10,10 @@ sys.path.insert(0, str(Path(workflow.basedir) / "scripts"))
 # The rules call `python`: let that be the one that runs Snakemake.
 shell.prefix(f"export PATH={shlex.quote(str(Path(sys.executable).parent))}:$PATH; ")
 
-from lightfield.config import VIEWS, load_config, load_datasets, scene_datasets
-from lightfield.errors import UserError
-from lightfield.files import write_json
-from lightfield.keys import scene_fingerprint
+from lightfield.dataset.config import VIEWS, load_config, load_datasets, scene_datasets
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_json
+from lightfield.dataset.keys import scene_fingerprint
 
 try:
     SETTINGS = load_config(config)

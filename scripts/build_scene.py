@@ -5,10 +5,11 @@ import importlib
 import json
 from pathlib import Path
 
-from lightfield import blender, config
-from lightfield.cli import run
-from lightfield.errors import UserError
-from lightfield.files import atomic_path
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import atomic_path
+from lightfield.dataset import config
+from lightfield.rendering import blender
 
 
 def main() -> None:

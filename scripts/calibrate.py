@@ -5,7 +5,7 @@ reaches the target, and its effort is then interpolated to meet the target, not 
 cheapest is chosen, and held-out views, the nearest other cameras under other seeds, confirm it.
 
 Cost is counted in samples a pixel, not in seconds, so that a scene makes the same choice each time:
-the bytes of its views follow from it. `lightfield.metrics` defines the error.
+the bytes of its views follow from it. `lightfield.measurement.metrics` defines the error.
 """
 
 import argparse
@@ -17,10 +17,10 @@ from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
 
-from lightfield import metrics, trials
-from lightfield.calibration import DENOISING_SAMPLES, cost_in_samples
-from lightfield.cli import run
-from lightfield.files import read_json, write_json
+from lightfield.core.cli import run
+from lightfield.core.files import read_json, write_json
+from lightfield.measurement import metrics, trials
+from lightfield.measurement.calibration import DENOISING_SAMPLES, cost_in_samples
 
 # A reference takes renders of so many samples until its own error is this part of the target.
 REFERENCE_SAMPLES = 16

@@ -7,10 +7,10 @@ configs/scenes/<scene>.lock.json, and every later one must be the same.
 import argparse
 from pathlib import Path
 
-from lightfield import config
-from lightfield.cli import run
-from lightfield.errors import UserError
-from lightfield.files import sha256, write_json
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import sha256, write_json
+from lightfield.dataset import config
 
 
 def main() -> None:

@@ -11,11 +11,11 @@ import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-from lightfield import blender
-from lightfield.cli import run
-from lightfield.errors import UserError
-from lightfield.files import read_json, write_json
-from lightfield.rigs import icosphere
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json, write_json
+from lightfield.geometry.rigs import icosphere
+from lightfield.rendering import blender
 
 # Geometry farther than this from a camera, in metres, is not looked for.
 REACH = 0.5

@@ -8,9 +8,9 @@ import matplotlib
 import numpy as np
 import OpenImageIO as oiio
 
-from lightfield import images, pictures
-from lightfield.cli import run
-from lightfield.files import read_json
+from lightfield.core.cli import run
+from lightfield.core.files import read_json
+from lightfield.imaging import images, pictures
 
 SHEET_WIDTH = 1600
 GAP = 4

@@ -28,16 +28,15 @@ that is the processor time divided by the number of cores. While it renders on a
 whole machine counts. Waiting and idle time are nobody's.
 
 The extrapolation multiplies each view's path-tracing time by the ratio of pixels and of samples,
-denoising counted in samples as `lightfield.calibration` does, and takes the mean. That the time
-follows them in proportion is assumed. Its uncertainty is the standard error of that mean over the
-views, with the correction for a finite number of views, sqrt(1 - n / N); null if there is only one
-view. What else each view needs (writing, reprojection, validation) is taken in proportion to views
-and pixels, everything else as it was. The first view of each process, which prepares the scene for
-Cycles, tells of neither.
-Gigabytes are those of the rendered views, in proportion to their pixels: an upper estimate, because
-larger views compress better. "device" and "extrapolation" are null if no journal tells of a
-rendered view, as when the working folder was deleted and the views were kept.
-"""
+denoising counted in samples as `lightfield.measurement.calibration` does, and takes the mean. That
+the time follows them in proportion is assumed. Its uncertainty is the standard error of that mean
+over the views, with the correction for a finite number of views, sqrt(1 - n / N); null if there is
+only one view. What else each view needs (writing, reprojection, validation) is taken in proportion
+to views and pixels, everything else as it was. The first view of each process, which prepares the
+scene for Cycles, tells of neither. Gigabytes are those of the rendered views, in proportion to
+their pixels: an upper estimate, because larger views compress better. "device" and "extrapolation"
+are null if no journal tells of a rendered view, as when the working folder was deleted and the
+views were kept."""
 
 import argparse
 import csv
@@ -50,10 +49,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lightfield import journal
-from lightfield.calibration import DENOISING_SAMPLES, cost_in_samples
-from lightfield.cli import run
-from lightfield.files import read_json, write_json
+from lightfield.core.cli import run
+from lightfield.core.files import read_json, write_json
+from lightfield.dataset import journal
+from lightfield.measurement.calibration import DENOISING_SAMPLES, cost_in_samples
 
 # The stages that every dataset has, in the order of the work; others come between.
 FIRST_STAGES, LAST_STAGES = ("scene", "cameras", "render"), ("export", "validate", "report")

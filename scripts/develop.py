@@ -3,8 +3,8 @@
 import argparse
 from pathlib import Path
 
-from lightfield import images, pictures
-from lightfield.cli import run
+from lightfield.core.cli import run
+from lightfield.imaging import images, pictures
 
 
 def main() -> None:

@@ -1,9 +1,9 @@
 """Measure the error of renders against their time: sampling plain, adaptive, guided, denoised.
 
-Windows of the dataset's views are rendered in every way and compared with references of other
-seeds (`lightfield.metrics` says how). What is rendered is kept with its time: killed and started
-again, this goes on where it was. The time is Cycles' own for rendering, denoising included, of one
-render the median over its seeds; it is right only where nothing else runs on the same core.
+Windows of the dataset's views are rendered in every way and compared with references of other seeds
+(`lightfield.measurement.metrics` says how). What is rendered is kept with its time: killed and
+started again, this goes on where it was. The time is Cycles' own for rendering, denoising included,
+of one render the median over its seeds; it is right only where nothing else runs on the same core.
 
 The slope of a method is that of its error over its time, both in logarithms. Plain path tracing's
 is −1 over samples, whether indirect light is clamped or not: samples are clamped, not pixels. Two
@@ -22,12 +22,13 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from lightfield import metrics, plots, trials
-from lightfield.calibration import calibrated
-from lightfield.cli import run
-from lightfield.errors import UserError
-from lightfield.files import atomic_path, read_json, write_json
-from lightfield.progress import Progress
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import atomic_path, read_json, write_json
+from lightfield.core.progress import Progress
+from lightfield.measurement import metrics, trials
+from lightfield.measurement.calibration import calibrated
+from lightfield.report import plots
 
 PLAIN, ADAPTIVE, DENOISED = "plain", "adaptive", "denoised"
 BOTH, GUIDED, OWN = "adaptive + denoised", "path guiding", "this scene's settings"

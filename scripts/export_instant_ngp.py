@@ -21,10 +21,13 @@ from typing import Any
 
 import numpy as np
 
-from lightfield import cli, images, instant_ngp, lenses, rigs
-from lightfield.errors import UserError
-from lightfield.files import read_json, write_json
-from lightfield.progress import Progress
+from lightfield.core import cli
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json, write_json
+from lightfield.core.progress import Progress
+from lightfield.export import instant_ngp
+from lightfield.geometry import lenses, rigs
+from lightfield.imaging import images
 
 # Enough views to know how far the scene reaches, and pixels of each.
 BOUNDS_VIEWS = 64

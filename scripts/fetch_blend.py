@@ -7,9 +7,9 @@ has the suffix .part.
 import argparse
 from pathlib import Path
 
-from lightfield import config, download
-from lightfield.cli import run
-from lightfield.errors import UserError
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.dataset import config, download
 
 
 def main() -> None:

@@ -11,10 +11,10 @@ from typing import Any
 
 import bpy
 
-from lightfield import blender, pruning
-from lightfield.cli import run
-from lightfield.errors import UserError
-from lightfield.files import write_json
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_json
+from lightfield.rendering import blender, pruning
 
 # Shader nodes by the feature that they give a material; the Principled BSDF by its inputs.
 SHADERS = {

@@ -8,8 +8,9 @@ import argparse
 import sys
 from pathlib import Path
 
-from lightfield import cli, lens_map
-from lightfield.lens_arguments import add_geometry_flags, geometry, joined
+from lightfield.core import cli
+from lightfield.reprojection import lens_map
+from lightfield.reprojection.lens_arguments import add_geometry_flags, geometry, joined
 
 
 def parser() -> argparse.ArgumentParser:

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lightfield import config, keys, lenses, rigs
-from lightfield.calibration import calibrated
-from lightfield.cli import run
-from lightfield.errors import UserError
-from lightfield.files import read_json, write_json
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json, write_json
+from lightfield.dataset import config, keys
+from lightfield.geometry import lenses, rigs
+from lightfield.measurement.calibration import calibrated
 
 # What of a scene YAML's `scene` block is written down: not where a file came from, nor where it is.
 SOURCE_KEYS = ("builder", "parameters", "frame")

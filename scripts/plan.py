@@ -10,9 +10,9 @@ import statistics
 from pathlib import Path
 from typing import Any
 
-from lightfield import processors
-from lightfield.cli import run
-from lightfield.files import atomic_path, read_json
+from lightfield.core import processors
+from lightfield.core.cli import run
+from lightfield.core.files import atomic_path, read_json
 
 HEAD = "| dataset | views | resolution | samples | s a view | hours | GB |"
 

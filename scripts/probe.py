@@ -12,10 +12,11 @@ import sys
 import tempfile
 from pathlib import Path
 
-from lightfield import journal, lenses
-from lightfield.cli import run
-from lightfield.errors import UserError
-from lightfield.files import read_json, write_json
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json, write_json
+from lightfield.dataset import journal
+from lightfield.geometry import lenses
 
 
 def main() -> None:

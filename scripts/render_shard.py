@@ -14,12 +14,15 @@ from typing import Any
 import numpy as np
 import psutil
 
-from lightfield import depth, images, keys, lenses, processors
-from lightfield.cli import run
-from lightfield.errors import UserError
-from lightfield.files import read_json, sha256, write_json
-from lightfield.journal import Journal
-from lightfield.progress import Progress, duration
+from lightfield.core import processors
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json, sha256, write_json
+from lightfield.core.progress import Progress, duration
+from lightfield.dataset import keys
+from lightfield.dataset.journal import Journal
+from lightfield.geometry import depth, lenses
+from lightfield.imaging import images
 
 
 def main() -> None:
@@ -163,7 +166,7 @@ def render_views(
     threads = arguments.threads or processors.available()
     # Only now, because it takes a second and a shard that is finished does not need it.
     with processors.only(threads):
-        from lightfield import blender
+        from lightfield.rendering import blender
 
     inventory = read_json(arguments.inventory) if arguments.inventory else {"left_out": []}
     blender.open_scene(arguments.blend)

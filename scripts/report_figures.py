@@ -14,11 +14,12 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.ticker import FuncFormatter
 
-from lightfield import images, noise
-from lightfield.cli import run
-from lightfield.files import read_json
-from lightfield.plots import BLUE, GREY, plot
-from lightfield.rig_outline import outline
+from lightfield.core.cli import run
+from lightfield.core.files import read_json
+from lightfield.imaging import images
+from lightfield.measurement import noise
+from lightfield.report.plots import BLUE, GREY, plot
+from lightfield.report.rig_outline import outline
 
 # From where the rig is looked at: degrees round it from −Y, and above the ground.
 AZIMUTH, ELEVATION = 30.0, 24.0

@@ -11,11 +11,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from lightfield import page, report_tables, report_views
-from lightfield.cli import run
-from lightfield.errors import UserError
-from lightfield.files import read_json
-from lightfield.validation import IMAGES, REPORT
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json
+from lightfield.report import page
+from lightfield.report import tables as report_tables
+from lightfield.report import views as report_views
+from lightfield.validation.validation import IMAGES, REPORT
 
 PICTURES = ("panorama", "contact_sheet")
 PLOTS = ("rig", "depth_panorama", "noise")

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from lightfield import page, report_tables
-from lightfield.cli import run
-from lightfield.files import read_json
-from lightfield.validation import REPORT
+from lightfield.core.cli import run
+from lightfield.core.files import read_json
+from lightfield.report import page
+from lightfield.report import tables as report_tables
+from lightfield.validation.validation import REPORT
 
 THUMBNAIL = 480
 

@@ -20,10 +20,13 @@ from typing import Any
 import numpy as np
 import OpenImageIO as oiio
 
-from lightfield import cli, lens_map
-from lightfield.errors import UserError
-from lightfield.files import sha256, write_json
-from lightfield.images import (
+from lightfield.core import cli
+from lightfield.core.errors import UserError
+from lightfield.core.files import sha256, write_json
+from lightfield.core.progress import Progress
+from lightfield.geometry.lenses import CUBE_FACES, Array, CubeMap, Lens
+from lightfield.geometry.rigs import matrix_to_euler
+from lightfield.imaging.images import (
     DEPTH_ATTRIBUTE,
     KEY_ATTRIBUTE,
     Attribute,
@@ -33,13 +36,11 @@ from lightfield.images import (
     write_exr,
     write_png,
 )
-from lightfield.lens_arguments import Target, add_geometry_flags, geometry, joined
-from lightfield.lens_map import LensMap
-from lightfield.lenses import CUBE_FACES, Array, CubeMap, Lens
-from lightfield.progress import Progress
-from lightfield.resample import color_strips, narrow, resample_depth, widen
-from lightfield.rigs import matrix_to_euler
-from lightfield.tonemap import decode_srgb, to_8_bit, tone_map
+from lightfield.imaging.tonemap import decode_srgb, to_8_bit, tone_map
+from lightfield.reprojection import lens_map
+from lightfield.reprojection.lens_arguments import Target, add_geometry_flags, geometry, joined
+from lightfield.reprojection.lens_map import LensMap
+from lightfield.reprojection.resample import color_strips, narrow, resample_depth, widen
 
 VERSION = 2  # of the pixels: part of every key, raised when the same settings give other pixels
 # A seventh of the time that zlib's own level and the choice of a filter for each row take, and

@@ -2,7 +2,7 @@
 
 For every rig: views, cameras along each axis, size, mean distance to the nearest camera at another
 place, mean distance between the neighbours of the camera grid, and the immersive interpolation
-volume by its definition in the paper (lightfield/interpolation_volume.py says how).
+volume by its definition in the paper (lightfield/geometry/interpolation_volume.py says how).
 """
 
 import argparse
@@ -15,9 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from lightfield import cli, config, lenses, rigs
-from lightfield.files import atomic_path
-from lightfield.interpolation_volume import (
+from lightfield.core import cli
+from lightfield.core.files import atomic_path
+from lightfield.dataset import config
+from lightfield.geometry import lenses, rigs
+from lightfield.geometry.interpolation_volume import (
     cells,
     interpolation_volume,
     neighbour_spacing,

@@ -30,12 +30,13 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from lightfield import lens_map, resample, rigs
-from lightfield.cli import run
-from lightfield.depth import distance_from_z, z_from_distance
-from lightfield.errors import UserError
-from lightfield.files import atomic_path
-from lightfield.lenses import (
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import atomic_path
+from lightfield.core.progress import Progress
+from lightfield.geometry import rigs
+from lightfield.geometry.depth import distance_from_z, z_from_distance
+from lightfield.geometry.lenses import (
     Array,
     CubeMap,
     Equidistant,
@@ -49,8 +50,8 @@ from lightfield.lenses import (
     Rectilinear,
     Stereographic,
 )
-from lightfield.plots import BLUE, VERMILION, plot
-from lightfield.progress import Progress
+from lightfield.report.plots import BLUE, VERMILION, plot
+from lightfield.reprojection import lens_map, resample
 
 ROUNDINGS = 16  # roundings, each of one eps, in the longest chain of operations of one step
 RIM = 32  # a point this many eps from the rim may count as inside or outside

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lightfield import images, journal, keys
-from lightfield.cli import run
-from lightfield.files import read_json
-from lightfield.progress import duration
+from lightfield.core.cli import run
+from lightfield.core.files import read_json
+from lightfield.core.progress import duration
+from lightfield.dataset import journal, keys
+from lightfield.imaging import images
 
 WINDOW = 600.0
 # A process on another machine that has been silent for so long is taken for dead.

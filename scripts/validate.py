@@ -10,10 +10,10 @@ import argparse
 import sys
 from pathlib import Path
 
-from lightfield.cli import run
-from lightfield.errors import UserError
-from lightfield.files import atomic_path, sha256, write_json
-from lightfield.validation import REPORT, validate
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import atomic_path, sha256, write_json
+from lightfield.validation.validation import REPORT, validate
 
 # A check that fails in more places than this is told by its first ones; validation.json has all.
 _LINES_A_CHECK = 20

@@ -14,7 +14,7 @@ import numpy as np
 from mathutils import Matrix
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
-from lightfield import images
+from lightfield.imaging import images
 
 
 def build() -> None:

@@ -12,7 +12,8 @@ import bpy
 import numpy as np
 
 import inventory
-from lightfield import blender, lenses, pruning, rigs
+from lightfield.geometry import lenses, rigs
+from lightfield.rendering import blender, pruning
 from scenes import test_room
 
 RENDER = {"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0}

@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from lightfield import images
+from lightfield.imaging import images
 
 POSITION = (1, 2, -1.5)
 HALF_SIZE = 10

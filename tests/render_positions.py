@@ -14,7 +14,8 @@ import bpy
 import numpy as np
 
 import render_shard
-from lightfield import blender, images
+from lightfield.imaging import images
+from lightfield.rendering import blender
 
 
 def main(blend: Path, output: Path, cases: Path) -> None:

@@ -9,9 +9,9 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 from checkouts import checkout, planned, snakemake
 
-from lightfield import config, download
-from lightfield.errors import UserError
-from lightfield.files import sha256
+from lightfield.core.errors import UserError
+from lightfield.core.files import sha256
+from lightfield.dataset import config, download
 
 CONTENT = bytes(range(256)) * 12345
 SUM = hashlib.sha256(CONTENT).hexdigest()
@@ -249,7 +249,7 @@ bpy.context.scene.frame_set(3)
 print("trusted:", *sorted(path.name for path in folder.iterdir()))
 for name in ("script", "driver"):
     (folder / name).unlink(missing_ok=True)
-from lightfield import blender
+from lightfield.rendering import blender
 blender.open_scene(folder / "trap.blend")
 bpy.context.scene.frame_set(2)
 bpy.context.scene.frame_set(3)

@@ -7,8 +7,9 @@ import pytest
 from checkouts import checkout, planned, snakemake
 
 import calibrate
-from lightfield import config, lenses, rigs
-from lightfield.errors import UserError
+from lightfield.core.errors import UserError
+from lightfield.dataset import config
+from lightfield.geometry import lenses, rigs
 
 TARGET = 0.02
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [24, 24]}

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from lightfield import config
-from lightfield.errors import UserError
+from lightfield.core.errors import UserError
+from lightfield.dataset import config
 
 RIGHT = {
     "scene": {"builder": "test_room"},

@@ -7,8 +7,8 @@ import statistics
 import pytest
 
 import costs
-from lightfield import config, journal
-from lightfield.errors import UserError
+from lightfield.core.errors import UserError
+from lightfield.dataset import config, journal
 
 FULL = {"views": 3, "resolution": [8, 4], "samples": 2, "denoise": False}
 TARIFF = {"watts": 100, "cores": 4, "price_per_kwh": 0.5, "currency": "EUR"}

@@ -6,8 +6,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from lightfield.depth import distance_from_z, z_from_distance
-from lightfield.lenses import Equidistant
+from lightfield.geometry.depth import distance_from_z, z_from_distance
+from lightfield.geometry.lenses import Equidistant
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

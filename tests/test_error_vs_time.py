@@ -8,8 +8,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from lightfield import images, lenses, rigs, trials
-from lightfield.metrics import Reference
+from lightfield.geometry import lenses, rigs
+from lightfield.imaging import images
+from lightfield.measurement import trials
+from lightfield.measurement.metrics import Reference
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
 RIG = {"type": "plane", "cameras": [4, 1], "size": 0.3, "center": [0, 0, 1.5]}

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import export_instant_ngp
-from lightfield import images, lenses, rigs
-from lightfield.errors import UserError
+from lightfield.core.errors import UserError
+from lightfield.geometry import lenses, rigs
+from lightfield.imaging import images
 
 RIG: dict[str, Any] = {
     "type": "cylinder",

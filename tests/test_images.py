@@ -6,8 +6,8 @@ import OpenEXR
 import OpenImageIO as oiio
 import pytest
 
-from lightfield.errors import UserError
-from lightfield.images import read_header, read_image, write_exr, write_png
+from lightfield.core.errors import UserError
+from lightfield.imaging.images import read_header, read_image, write_exr, write_png
 
 ATTRIBUTES = {"plenoforge:depth": "z", "plenoforge:nan": 3, "plenoforge:scale": 0.5}
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from checkouts import checkout, planned
 
-from lightfield import pruning
+from lightfield.rendering import pruning
 
 NOTHING = {"hidden": [], "animated": [], "moving": [], "motion_blur": False}
 
@@ -116,7 +116,7 @@ bpy.ops.wm.save_as_mainfile(filepath=folder + "/linked.blend", relative_remap=Fa
 
 def test_missing_textures_and_libraries_are_errors(run_program, tmp_path):
     (tmp_path / "make.py").write_text(MISSING)
-    scripts = Path(pruning.__file__).parents[1]
+    scripts = Path(pruning.__file__).parents[2]
     run_program(tmp_path / "make.py", tmp_path, scripts)
     output = tmp_path / "inventory.json"
     for name, file, told in (

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from lightfield import lens_map
-from lightfield.errors import UserError
-from lightfield.lenses import CubeMap, Equidistant, Equirectangular, Rectilinear
+from lightfield.core.errors import UserError
+from lightfield.geometry.lenses import CubeMap, Equidistant, Equirectangular, Rectilinear
+from lightfield.reprojection import lens_map
 
 FISHEYE = Equidistant(width=101, height=101, fov=math.pi)
 IDENTITY = np.eye(3)

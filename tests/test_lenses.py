@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from lightfield.depth import z_from_distance
-from lightfield.errors import UserError
-from lightfield.lenses import (
+from lightfield.core.errors import UserError
+from lightfield.geometry.depth import z_from_distance
+from lightfield.geometry.lenses import (
     CUBE_FACES,
     CubeMap,
     Equidistant,

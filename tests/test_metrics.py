@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import linregress
 from skimage.metrics import structural_similarity
 
-from lightfield import metrics
+from lightfield.measurement import metrics
 
 SIZE = 64
 MASK = np.hypot(*(np.mgrid[:SIZE, :SIZE] + 0.5 - SIZE / 2)) < SIZE / 2

@@ -6,7 +6,8 @@ import re
 import pytest
 
 import plan
-from lightfield import config, lenses, rigs
+from lightfield.dataset import config
+from lightfield.geometry import lenses, rigs
 
 SILVR = ("garden", "lone_monk", "barbershop")
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lightfield import processors
+from lightfield.core import processors
 
 
 def test_every_thread_may_use_all_processors_again():
@@ -39,9 +39,9 @@ def test_an_error_changes_nothing():
 PROGRAM = """
 import sys
 from pathlib import Path
-from lightfield import processors
+from lightfield.core import processors
 with processors.only(int(sys.argv[1])):
-    from lightfield import blender
+    from lightfield.rendering import blender
 blender.open_scene(Path(sys.argv[2]))
 print(len(list(Path("/proc/self/task").iterdir())))
 """

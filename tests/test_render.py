@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lightfield import images, lenses, rigs
-from lightfield.files import sha256
+from lightfield.core.files import sha256
+from lightfield.geometry import lenses, rigs
+from lightfield.imaging import images
 
 RENDER = {
     "samples": 1,

@@ -11,8 +11,11 @@ import pytest
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
-from lightfield import epipolar, images, lenses, noise, packing, rigs
-from lightfield.files import write_json
+from lightfield.core.files import write_json
+from lightfield.geometry import lenses, rigs
+from lightfield.imaging import images
+from lightfield.measurement import noise
+from lightfield.report import epipolar, packing
 
 RADIUS = 5.0
 SPHERE = {

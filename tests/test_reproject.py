@@ -13,11 +13,17 @@ import numpy as np
 import pytest
 
 import reproject
-from lightfield import lens_map, resample
-from lightfield.errors import UserError
-from lightfield.files import sha256
-from lightfield.images import read_header, read_image, write_exr, write_png
-from lightfield.lenses import CUBE_FACES, CubeMap, Equidistant, Equirectangular, Rectilinear
+from lightfield.core.errors import UserError
+from lightfield.core.files import sha256
+from lightfield.geometry.lenses import (
+    CUBE_FACES,
+    CubeMap,
+    Equidistant,
+    Equirectangular,
+    Rectilinear,
+)
+from lightfield.imaging.images import read_header, read_image, write_exr, write_png
+from lightfield.reprojection import lens_map, resample
 
 SIZE = 48
 FISHEYE = Equidistant(width=SIZE, height=SIZE, fov=math.pi)

@@ -8,8 +8,7 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
-from lightfield import lens_map, resample
-from lightfield.lenses import (
+from lightfield.geometry.lenses import (
     CubeMap,
     Equidistant,
     Equirectangular,
@@ -18,6 +17,7 @@ from lightfield.lenses import (
     Rectilinear,
     Stereographic,
 )
+from lightfield.reprojection import lens_map, resample
 
 FILTERS = ["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp"]
 IDENTITY = np.eye(3)

@@ -10,8 +10,12 @@ import numpy as np
 import pytest
 
 import rig_table
-from lightfield import lenses, rigs
-from lightfield.interpolation_volume import interpolation_volume, neighbour_spacing, spacing
+from lightfield.geometry import lenses, rigs
+from lightfield.geometry.interpolation_volume import (
+    interpolation_volume,
+    neighbour_spacing,
+    spacing,
+)
 
 FISHEYE = {"lens": "equidistant", "fov": 180, "resolution": [256, 256]}
 NARROW = {"lens": "equidistant", "fov": 150, "resolution": [256, 256]}

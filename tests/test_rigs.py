@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightfield import rigs
-from lightfield.errors import UserError
+from lightfield.core.errors import UserError
+from lightfield.geometry import rigs
 
 LENS: dict[str, Any] = {
     "camera": {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT", "fisheye_fov": math.pi},

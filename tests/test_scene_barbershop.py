@@ -12,7 +12,7 @@ import yaml
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-from lightfield.rigs import poses
+from lightfield.geometry.rigs import poses
 from scenes import barbershop
 
 ROOT = Path(__file__).resolve().parents[1]

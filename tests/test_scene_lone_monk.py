@@ -11,7 +11,7 @@ import pytest
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-from lightfield.rigs import poses
+from lightfield.geometry.rigs import poses
 from scenes import lone_monk
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"

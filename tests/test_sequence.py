@@ -7,8 +7,9 @@ import pytest
 import yaml
 from checkouts import checkout, planned
 
-from lightfield import config, images
-from lightfield.errors import UserError
+from lightfield.core.errors import UserError
+from lightfield.dataset import config
+from lightfield.imaging import images
 
 SCENE = """
 scene: {builder: garden, parameters: {detail: 0.02}, frame: 5}

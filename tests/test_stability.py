@@ -11,9 +11,9 @@ import pytest
 from mpmath import mpf
 
 import stability
-from lightfield.errors import UserError
-from lightfield.lenses import Equidistant, Lens, Rectilinear
-from lightfield.progress import Progress
+from lightfield.core.errors import UserError
+from lightfield.core.progress import Progress
+from lightfield.geometry.lenses import Equidistant, Lens, Rectilinear
 
 ALL = stability.extreme_lenses()
 

@@ -13,7 +13,9 @@ import pytest
 from checkouts import ROOT, snakemake
 
 import render_shard
-from lightfield import images, keys, progress
+from lightfield.core import progress
+from lightfield.dataset import keys
+from lightfield.imaging import images
 
 NAMES = ["a", "b", "c", "d"]
 IDENTITY = np.eye(4).tolist()

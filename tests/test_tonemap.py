@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from skimage.color import xyz2rgb
 
-from lightfield.tonemap import decode_srgb, encode_srgb, to_8_bit, tone_map
+from lightfield.imaging.tonemap import decode_srgb, encode_srgb, to_8_bit, tone_map
 
 
 def test_reinhard_makes_its_maximum_white_and_keeps_order():

@@ -17,8 +17,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightfield import images, lenses, rigs, validation
-from lightfield.files import sha256, write_json
+from lightfield.core.files import sha256, write_json
+from lightfield.geometry import lenses, rigs
+from lightfield.imaging import images
+from lightfield.validation import validation
 
 SCRIPTS = Path(__file__).parents[1] / "scripts"
 CYCLES_ROOM = Path(__file__).parent / "cycles_room.py"

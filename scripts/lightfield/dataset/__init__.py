@@ -1,0 +1,1 @@
+"""What a dataset is: its configuration, its keys, its records."""

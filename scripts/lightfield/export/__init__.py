@@ -1,0 +1,1 @@
+"""The files with which each trainer opens a dataset."""

@@ -1,0 +1,1 @@
+"""Where cameras are and through which lens they look: rigs, lenses, depth."""

@@ -1,0 +1,28 @@
+"""Depth along the optical axis (Z-depth) and distance from the camera, each from the other."""
+
+import numpy as np
+
+from lightfield.geometry.lenses import Array
+
+
+def z_from_distance(distance: Array, rays: Array) -> Array:
+    """Return the Z-depth of points at ``distance`` (...) metres along unit ``rays`` (..., 3).
+
+    z = distance · cos θ, negative behind the camera. A miss (inf) stays inf and NaN stays NaN;
+    the dtype is the wider of the two inputs.
+    """
+    with np.errstate(invalid="ignore"):
+        z = distance * -rays[..., 2]
+    return np.where(np.isinf(distance) & ~np.isnan(rays[..., 2]), distance, z)
+
+
+def distance_from_z(z: Array, rays: Array) -> Array:
+    """Return the distance of points at Z-depth ``z`` (...) metres along unit ``rays`` (..., 3).
+
+    distance = z / cos θ. A miss (inf) stays inf and NaN stays NaN. NaN also marks what no
+    Z-depth can say: rays in the camera plane, and a depth on the other side of that plane.
+    """
+    with np.errstate(invalid="ignore", divide="ignore"):
+        distance = z / -rays[..., 2]
+        distance = np.where((rays[..., 2] != 0) & (distance >= 0), distance, np.nan)
+    return np.where(np.isinf(z) & ~np.isnan(rays[..., 2]), z, distance)

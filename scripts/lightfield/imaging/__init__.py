@@ -1,0 +1,1 @@
+"""Images in and out, and from scene-linear light to pixels that a person looks at."""

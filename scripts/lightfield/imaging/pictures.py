@@ -1,0 +1,50 @@
+"""Pictures of views, made to be looked at: exposed, tone-mapped, in sRGB."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+
+from lightfield.imaging import images
+from lightfield.imaging.tonemap import to_8_bit, tone_map
+
+Array = np.ndarray[Any, Any]
+
+# Scene-linear grey that the eye takes as the middle between black and white.
+MIDDLE_GREY = 0.18
+# The brightest value that still shows as less than white, in multiples of middle grey's exposure.
+WHITE = 5.0
+# More views than this are thinned evenly, so that each can still be recognised.
+MOST_VIEWS = 120
+
+
+def read_colour(path: Path) -> Array:
+    """Read an image's scene-linear colour as (height, width, 3) float32."""
+    channels = images.read_image(path, "RGB").channels
+    return np.stack([channels[name] for name in "RGB"], axis=-1, dtype=np.float32)
+
+
+def exposure_for(colour: Array) -> float:
+    """Return the exposure in stops that puts the typical pixel of (..., 3) at middle grey.
+
+    Typical is the geometric mean of the luminance (Reinhard et al. 2002, equation 1) over pixels
+    that are not black, so that what lies outside an image circle does not count.
+    """
+    luminance = colour @ np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+    lit = luminance[np.isfinite(luminance) & (luminance > 1e-6)]
+    return float(np.log2(MIDDLE_GREY / np.exp(np.log(lit).mean()))) if lit.size else 0.0
+
+
+def develop(colour: Array, exposure: float) -> Array:
+    """Turn scene-linear (height, width, 3) colour into 8-bit sRGB pixels."""
+    return to_8_bit(tone_map(np.ascontiguousarray(colour), exposure, WHITE))
+
+
+def shrunk(colour: Array, width: int, height: int) -> Array:
+    """Return (…, …, 3) colour resized to ``width`` × ``height`` pixels, without aliasing."""
+    resized = oiio.ImageBufAlgo.resize(
+        oiio.ImageBuf(np.ascontiguousarray(colour, dtype=np.float32)),
+        roi=oiio.ROI(0, width, 0, height),
+    )
+    return np.asarray(resized.get_pixels(oiio.FLOAT)).clip(min=0)

@@ -1,0 +1,1 @@
+"""How large the error of a render is, what it costs, and which settings reach a target."""

@@ -1,0 +1,268 @@
+"""How far a rendered image is from the truth, and how well that truth itself is known.
+
+The truth is a reference: the mean of n renders that differ in nothing but their seeds. Every metric
+counts only pixels that the lens has a ray for.
+
+The one that is minimised is the relative mean squared error, (x − r)² / (r² + ε), the mean over
+channels and over all pixels but the worst thousandth (Rousselle, Knaus and Zwicker 2011, section
+5). Images are exposed so that the references' geometric mean luminance is middle grey, 0.18, and ε
+is 0.01. The thousandth makes it robust: a few fireflies would otherwise decide it, so that it would
+take thousands of views to tell two ways to render apart. Of N independent samples the expected
+error of all pixels is proportional to 1/N exactly. Without the worst it falls slower: where light
+comes in rare bright paths, few samples make few bright pixels, and the thousandth is most of them.
+
+An independent reference adds its own variance to every expected square and nothing else, so
+subtracting an estimate of it, from how its n renders differ, leaves the image's own error.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import flip_evaluator
+import numpy as np
+from numpy.typing import NDArray
+from skimage.metrics import structural_similarity
+
+from lightfield.imaging.pictures import WHITE, exposure_for
+from lightfield.imaging.tonemap import encode_srgb, tone_map
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+EPSILON = 0.01
+# The part of the pixels that is left out, those with the largest errors.
+OUTLIERS = 0.001
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What an image is compared with.
+
+    colour (h, w, 3): scene-linear, the mean of the renders; variance (h, w, 3): the estimated
+    variance of that mean; depth (h, w): the median of the renders' depths, inf for a miss, or None;
+    mask (h, w): pixels that the lens has a ray for; exposure: stops at which it is looked at.
+    """
+
+    colour: Array
+    variance: Array
+    depth: Array | None
+    mask: Mask
+    exposure: float
+
+    @property
+    def weights(self) -> Array:
+        """What a squared difference of each pixel and channel is multiplied by, (n, 3)."""
+        gain = 4.0**self.exposure
+        weights: Array = gain / (gain * self.colour[self.mask] ** 2 + EPSILON)
+        return weights
+
+    @property
+    def own_error(self) -> float:
+        """Expected relative mean squared error of the reference itself."""
+        own = (self.variance[self.mask] * self.weights).mean(axis=-1)
+        return float(own[_inliers(own)].mean())
+
+
+def make_reference(
+    colours: Sequence[NDArray[np.float32]],
+    depths: Sequence[NDArray[np.float32]] | None,
+    mask: Mask,
+) -> Reference:
+    """Make a reference of at least two renders, (h, w, 3) each, with depths (h, w) if any."""
+    stack = np.stack(colours).astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        depth = np.median(np.stack(depths), axis=0).astype(np.float64) if depths else None
+    mean, variance = stack.mean(axis=0), stack.var(axis=0, ddof=1) / len(stack)
+    return Reference(mean, variance, depth, mask, exposure_for(mean[mask]))
+
+
+def exposed_alike(
+    references: Sequence[Reference], exposure: float | None = None
+) -> list[Reference]:
+    """Return references under one ``exposure``; that for all their pixels together by default."""
+    if exposure is None:
+        exposure = exposure_for(np.concatenate([r.colour[r.mask] for r in references]))
+    return [replace(reference, exposure=exposure) for reference in references]
+
+
+@dataclass(frozen=True)
+class Errors:
+    """What one image differs by from its reference.
+
+    relative_mse: without the reference's own error, and below 0 by chance where it is far smaller
+    than that; relative_mse_whole: the same of all pixels, the worst thousandth too; psnr (decibel;
+    inf if equal), ssim and flip (0 is equal) of the tone-mapped image;
+    depth: mean of |z/r − 1|, at most 1 a pixel, where a pixel in which only one of the two hit
+    anything counts as 1, or None without depth. Cycles takes depth from one sample, so that more
+    do not improve it.
+    """
+
+    relative_mse: float
+    relative_mse_whole: float
+    psnr: float
+    ssim: float
+    flip: float
+    depth: float | None
+
+
+def compare(
+    colour: NDArray[np.float32], depth: NDArray[np.float32] | None, reference: Reference
+) -> Errors:
+    """Compare an image, (h, w, 3) scene-linear with depth (h, w), with its reference."""
+    mask = reference.mask
+    shown, truth = (developed(x, reference) for x in (colour, reference.colour))
+    similarity = structural_similarity(
+        truth,
+        shown,
+        data_range=1.0,
+        channel_axis=-1,
+        gaussian_weights=True,
+        sigma=1.5,
+        use_sample_covariance=False,
+        full=True,
+    )[1]
+    flip = flip_evaluator.evaluate(
+        truth.astype(np.float32), shown.astype(np.float32), "LDR", applyMagma=False
+    )[0]
+    with np.errstate(divide="ignore"):
+        psnr = -10 * np.log10(np.mean((shown - truth)[mask] ** 2))
+    return Errors(
+        relative_mse=relative_mse(colour, reference),
+        relative_mse_whole=relative_mse(colour, reference, left_out=0),
+        psnr=float(psnr),
+        ssim=float(similarity[mask].mean()),
+        flip=float(flip.reshape(mask.shape)[mask].mean()),
+        depth=None
+        if depth is None or reference.depth is None
+        else depth_error(depth[mask], reference.depth[mask]),
+    )
+
+
+def relative_mse(
+    colour: NDArray[np.float32], reference: Reference, left_out: float = OUTLIERS
+) -> float:
+    """Return the relative mean squared error, without what the reference itself adds to it.
+
+    ``left_out`` is the part of the pixels that does not count, those with the largest errors.
+    """
+    squares = (colour.astype(np.float64) - reference.colour)[reference.mask] ** 2
+    found = (squares * reference.weights).mean(axis=-1)
+    own = (reference.variance[reference.mask] * reference.weights).mean(axis=-1)
+    kept = _inliers(found, left_out)
+    return float((found - own)[kept].mean())
+
+
+def _inliers(errors: Array, left_out: float = OUTLIERS) -> NDArray[np.int64]:
+    """Return the indices of all but the worst part of some pixels, in rising order."""
+    return np.argsort(errors, kind="stable")[: errors.size - math.ceil(left_out * errors.size)]
+
+
+def developed(colour: NDArray[Any], reference: Reference) -> Array:
+    """Return the sRGB image in [0, 1] that is looked at: exposed and tone-mapped as reports are."""
+    mapped = tone_map(np.ascontiguousarray(colour, np.float32), reference.exposure, WHITE)
+    return np.where(reference.mask[..., np.newaxis], encode_srgb(mapped), 0.0)
+
+
+def depth_error(depth: NDArray[Any], truth: NDArray[Any]) -> float:
+    """Return the mean relative error of depths, as `Errors` has it; inf is a miss."""
+    missed, gone = np.isinf(depth), np.isinf(truth)
+    with np.errstate(invalid="ignore"):
+        error = np.minimum(np.abs(depth / truth - 1), 1.0)
+    return float(np.where(missed | gone, missed != gone, error).mean())
+
+
+@dataclass(frozen=True)
+class Line:
+    """A power law y = factor · x^slope, fitted in logarithms, and the slope's standard error."""
+
+    slope: float
+    slope_error: float
+    factor: float
+
+    def at(self, x: float) -> float:
+        """Return y at x."""
+        return float(self.factor * x**self.slope)
+
+    def inverse(self, y: float) -> float:
+        """Return x at y."""
+        return float((y / self.factor) ** (1 / self.slope))
+
+
+def fit(x: Sequence[float], y: Sequence[float]) -> Line | None:
+    """Fit a power law by least squares of the logarithms; None for fewer than three different x."""
+    if len(set(x)) < 3:
+        return None
+    logs = np.log(x), np.log(y)
+    (slope, offset), covariance = np.polyfit(*logs, 1, cov=True)
+    return Line(float(slope), float(np.sqrt(covariance[0, 0])), float(np.exp(offset)))
+
+
+def pareto(cost: Sequence[float], error: Sequence[float]) -> list[int]:
+    """Return the points to which no other is better in one and at least as good in the other."""
+    best, front = np.inf, []
+    for index in sorted(range(len(cost)), key=lambda i: (cost[i], error[i])):
+        if error[index] < best:
+            best = error[index]
+            front.append(index)
+    return front
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """How two views differ where both see the same surface.
+
+    total: root of the mean relative squared difference of the images; floor: the same of their
+    references, so what reflections, texture and the look-up of nearest pixels make; added: root of
+    the mean relative squared difference of the images' errors, so what rendering makes; share:
+    added² as a part of both images' squared errors: 1 where errors are independent of each other,
+    as noise is, less where both views are wrong alike.
+    """
+
+    total: float
+    floor: float
+    added: float
+    share: float
+
+
+def disagreement(
+    images: tuple[NDArray[np.float32], NDArray[np.float32]],
+    references: tuple[Reference, Reference],
+    seen: tuple[NDArray[np.int64], NDArray[np.int64]],
+) -> Disagreement:
+    """Compare two views at pixels ``seen``, flat indices (n,) into each of a surface both see.
+
+    The pixels nearest to each other are compared: interpolation would take noise away. Weights are
+    those of the first view's reference. What the references' own errors add is subtracted.
+    """
+    truths = [r.colour.reshape(-1, 3)[where] for r, where in zip(references, seen, strict=True)]
+    errors = [
+        image.astype(np.float64).reshape(-1, 3)[where] - truth
+        for image, truth, where in zip(images, truths, seen, strict=True)
+    ]
+    gain = 4.0 ** references[0].exposure
+    weights = gain / (gain * truths[0] ** 2 + EPSILON)
+    own = sum(
+        r.variance.reshape(-1, 3)[where] * weights
+        for r, where in zip(references, seen, strict=True)
+    )
+    both = (errors[0] ** 2 + errors[1] ** 2) * weights
+    # The same pixels are left out of every mean.
+    kept = _inliers(both.mean(axis=-1))
+    apart, between = errors[0] - errors[1], truths[0] - truths[1]
+    total, floor, added, sum_ = (
+        float(value[kept].mean())
+        for value in (
+            (apart + between) ** 2 * weights,
+            between**2 * weights - own,
+            apart**2 * weights - own,
+            both - own,
+        )
+    )
+    return Disagreement(
+        total=math.sqrt(total),
+        floor=math.sqrt(max(floor, 0.0)),
+        added=math.sqrt(max(added, 0.0)),
+        share=added / sum_,
+    )

@@ -1,0 +1,1 @@
+"""Views from Blender: the one room that imports bpy."""

@@ -1,0 +1,179 @@
+"""Epipolar-plane images: one line of sight of every camera of a row, beneath each other.
+
+Bolles, Baker and Marimont, *Epipolar-plane image analysis*, 1987. Cameras of a straight row share
+the planes through their baseline. In such a plane, with u the tangent of the angle from the
+perpendicular to the baseline, a point at the perpendicular distance D draws a straight line that
+shifts by 1/D in u for each metre along the baseline. Cameras of a level ring share only the plane
+of the ring; there, over the azimuth in the world, the endlessly far stands still.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lightfield.geometry import rigs
+from lightfield.geometry.depth import distance_from_z
+from lightfield.geometry.lenses import Lens
+
+Array = NDArray[Any]
+
+FEWEST_CAMERAS = 3
+# Cameras of a sphere whose heights differ by less, as a part of its own, are in one ring: its
+# vertices follow from rounded ones.
+SAME_LEVEL = 1e-3
+TILTS = tuple(range(-40, 41, 10))
+"""Degrees by which an image's plane, or cone round a ring, is raised above the level one."""
+COLUMNS = {"line": 512, "ring": 720}
+# A straight row's images end at this angle, where tangents grow faster than there are pixels.
+WIDEST = math.radians(60)
+
+
+@dataclass(frozen=True)
+class Row:
+    """Cameras in a straight ``line`` or a level ``ring``, in order.
+
+    ``views`` are their numbers; ``axes`` (3, 3) are in its rows: of a line its direction, the
+    direction that the cameras look in, and up; of a ring the directions at azimuth 90° and 0°,
+    and up. ``places`` are metres along a line, or the azimuth in radians round a ring.
+    """
+
+    kind: Literal["line", "ring"]
+    views: list[int]
+    axes: Array
+    places: Array
+
+
+def find_row(rig: Mapping[str, Any], matrices: Array) -> Row | None:
+    """Return the row in the middle of a rig, or None where no three cameras are in one.
+
+    ``matrices`` (views, 4, 4) are the poses of all its views. A grid's is its front's middle row;
+    a sphere's is the level of cameras nearest the equator.
+    """
+    faces = len(rigs.CUBE_FACES) if rig.get("cube_map") else 1
+    positions = matrices[::faces, :3, 3]
+    turn = rigs.euler_to_matrix(np.radians(np.array(rig.get("rotation", (0, 0, 0)), float)))
+    numbers = _numbers(rig, (positions - np.array(rig.get("center", (0, 0, 0)))) @ turn)
+    if len(numbers) < FEWEST_CAMERAS:
+        return None
+    views = [number * faces for number in numbers]
+    if rig["type"] in ("sphere", "cylinder"):
+        local = (positions[numbers] - np.array(rig.get("center", (0, 0, 0)))) @ turn
+        azimuth = np.arctan2(local[:, 0], local[:, 1])
+        order = np.argsort(azimuth, kind="stable")
+        return Row("ring", [views[i] for i in order], turn.T, azimuth[order])
+    places = matrices[views, :3, 3]
+    along = places[-1] - places[0]
+    length = float(np.linalg.norm(along))
+    if length == 0:
+        return None
+    along = along / length
+    if along @ matrices[views[0], :3, 0] < 0:
+        along, views, places = -along, views[::-1], places[::-1]
+    forward = -matrices[views[0], :3, 2]
+    forward = forward - (forward @ along) * along
+    forward = forward / np.linalg.norm(forward)
+    axes = np.stack([along, forward, np.cross(along, forward)])
+    return Row("line", views, axes, (places - places.mean(axis=0)) @ along)
+
+
+def _numbers(rig: Mapping[str, Any], local: Array) -> list[int]:
+    """Return the numbers of the positions in a row; ``local`` are positions in the rig's axes."""
+    kind = rig["type"]
+    if kind == "sphere":
+        order = np.argsort(local[:, 2], kind="stable")
+        heights = local[order, 2]
+        gaps = np.flatnonzero(np.diff(heights) > SAME_LEVEL * np.ptp(heights)) + 1
+        rings = [ring for ring in np.split(order, gaps) if len(ring) >= FEWEST_CAMERAS]
+        nearest = min(rings, key=lambda ring: abs(local[ring, 2].mean()), default=order[:0])
+        return [int(number) for number in np.sort(nearest)]
+    if kind == "poses":
+        return []
+    counts = list(rig["cameras"])
+    first = 0
+    if kind == "lattice":
+        columns = counts[0]
+        first = (counts[2] // 2 * counts[1] + counts[1] // 2) * columns
+    elif kind == "cuboid":
+        x, y, z = counts
+        columns = max(x, y)
+        # The front, or where it is the longer one, the left side, which comes after the back.
+        first = z // 2 * columns + (0 if x >= y else 2 * x * z)
+    else:
+        columns = counts[0]
+        first = counts[1] // 2 * columns
+    return list(range(first, first + columns))
+
+
+def directions(row: Row, tilt: float, columns: int) -> Array:
+    """Return the world directions (columns, 3) of an image whose plane is raised by ``tilt``.
+
+    A line's have the length 1 perpendicular to it, so that they times D reach the depth D; a
+    ring's have the length 1.
+    """
+    side, ahead, up = row.axes
+    middle = (np.arange(columns) + 0.5) / columns
+    lift = math.radians(tilt)
+    if row.kind == "line":
+        tangents = (2 * middle - 1) * math.tan(WIDEST)
+        rays: Array = tangents[:, np.newaxis] * side + math.cos(lift) * ahead + math.sin(lift) * up
+        return rays
+    azimuth = (2 * middle - 1) * math.pi
+    level = np.sin(azimuth)[:, np.newaxis] * side + np.cos(azimuth)[:, np.newaxis] * ahead
+    rays = math.cos(lift) * level + math.sin(lift) * up
+    return rays
+
+
+def sample(
+    lens: Lens,
+    matrix: Array,
+    colour: Array,
+    depth: Array | None,
+    meaning: str | None,
+    rays: Array,
+) -> tuple[Array, Array]:
+    """Return the light (n, 3) and depth (n,) that a view has along world ``rays`` (n, 3).
+
+    ``depth`` is what the view stores, ``meaning`` says which; the result is in lengths of the
+    rays: a point lies at position + depth · ray. Light is interpolated, depth is the nearest
+    pixel's. NaN depth marks what the lens does not see.
+    """
+    height, width = colour.shape[:2]
+    own = rays @ matrix[:3, :3]
+    x, y = np.moveaxis(lens.pixels(own), -1, 0)
+    with np.errstate(invalid="ignore"):
+        seen = (x >= 0) & (x <= width) & (y >= 0) & (y <= height)
+    light = np.zeros((len(rays), 3), np.float32)
+    light[seen] = _bilinear(colour, x[seen] - 0.5, y[seen] - 0.5)
+    reach = np.full(len(rays), np.nan)
+    reach[seen] = np.inf
+    if depth is not None:
+        column = np.minimum(x[seen].astype(int), width - 1)
+        line = np.minimum(y[seen].astype(int), height - 1)
+        found = depth[line, column].astype(np.float64)
+        if meaning == "z":
+            found = distance_from_z(found, lens.rays(column + 0.5, line + 0.5))
+        reach[seen] = found / np.linalg.norm(own[seen], axis=-1)
+    return light, reach
+
+
+def _bilinear(values: Array, x: Array, y: Array) -> Array:
+    height, width = values.shape[:2]
+    left = np.clip(np.floor(x).astype(int), 0, max(width - 2, 0))
+    top = np.clip(np.floor(y).astype(int), 0, max(height - 2, 0))
+    right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
+    across = np.clip(x - left, 0, 1)[:, np.newaxis]
+    down = np.clip(y - top, 0, 1)[:, np.newaxis]
+    upper = values[top, left] * (1 - across) + values[top, right] * across
+    lower = values[bottom, left] * (1 - across) + values[bottom, right] * across
+    mixed: Array = upper * (1 - down) + lower * down
+    return mixed
+
+
+def thinned(views: Sequence[int], most: int) -> list[int]:
+    """Return at most ``most`` positions in ``views``, evenly spread, first and last among them."""
+    count = min(len(views), most)
+    return [round(i) for i in np.linspace(0, len(views) - 1, count).tolist()]

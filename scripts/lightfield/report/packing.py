@@ -1,0 +1,90 @@
+"""Light and depth in the 8-bit pixels of a web page's pictures, with more range than a display has.
+
+A page decodes them in the browser (templates/page.js), so that exposure and depth can be
+looked at there. Both are logarithmic, so that every stop, near or far, has as many steps.
+"""
+
+import base64
+import io
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+Array = NDArray[Any]
+
+# More than a scene's light usually spans; a step is then 4 to 5 percent, as fine as 8-bit sRGB's
+# in its darker half.
+MOST_STOPS = 18.0
+# Steps of depth: 12 bits, which is 0.3 percent over a scene from centimetres to hundreds of metres.
+DEPTH_STEPS = 4096
+NO_DEPTH, MISS = 0, DEPTH_STEPS - 1
+
+
+def light_range(colour: Array) -> tuple[float, float]:
+    """Return (low, high), in stops (log2), of all that is worth keeping of (..., 3) light.
+
+    From its 0.1 percentile to its highest value, but at most `MOST_STOPS` of it.
+    """
+    lit = colour[np.isfinite(colour) & (colour > 0)]
+    if not lit.size:
+        return -1.0, 1.0
+    low, high = np.log2(np.percentile(lit, 0.1)), np.log2(lit.max())
+    high = max(high, low + 1.0)
+    return float(max(low, high - MOST_STOPS)), float(high)
+
+
+def pack_light(colour: Array, limits: tuple[float, float]) -> NDArray[np.uint8]:
+    """Return light (...) as codes: 0 is none, 1 to 255 are ``limits`` in equal steps of log2."""
+    low, high = limits
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steps = (np.log2(colour) - low) / (high - low) * 254
+    codes = np.clip(np.round(np.nan_to_num(steps, nan=0.0)) + 1, 1, 255)
+    packed: NDArray[np.uint8] = np.where(colour > 0, codes, 0).astype(np.uint8)
+    return packed
+
+
+def depth_range(depth: Array) -> tuple[float, float]:
+    """Return (low, high), in log2 metres, of all finite, positive depths."""
+    hit = depth[np.isfinite(depth) & (depth > 0)]
+    if not hit.size:
+        return 0.0, 1.0
+    low, high = np.log2(hit.min()), np.log2(hit.max())
+    # Rays that graze the camera's own plane have a Z-depth of nearly nothing.
+    low = max(low, np.log2(np.percentile(hit, 1)) - 4)
+    return float(low), float(max(high, low + 1.0))
+
+
+def pack_depth(depth: Array, limits: tuple[float, float]) -> NDArray[np.uint8]:
+    """Return depth (...) in metres as (..., 3): the high and the low byte of 16 times its code.
+
+    Codes are `NO_DEPTH` for NaN, `MISS` for inf, and between them ``limits`` in equal steps of
+    log2.
+    """
+    low, high = limits
+    with np.errstate(divide="ignore", invalid="ignore"):
+        steps = (np.log2(depth) - low) / (high - low) * (MISS - 2)
+    steps = np.nan_to_num(steps, nan=0.0, posinf=0.0, neginf=0.0)
+    codes = np.clip(np.round(steps) + 1, 1, MISS - 1)
+    codes = np.where(np.isposinf(depth), MISS, np.where(np.isnan(depth), NO_DEPTH, codes))
+    words = (codes * 16).astype(np.uint16)
+    packed = np.zeros((*words.shape, 3), np.uint8)
+    packed[..., 0], packed[..., 1] = words >> 8, words & 255
+    return packed
+
+
+def webp(pixels: NDArray[np.uint8], quality: int | None = None) -> str:
+    """Return (height, width, 3) pixels as the data URI of a WebP; without ``quality``, lossless."""
+    file = io.BytesIO()
+    picture = Image.fromarray(np.ascontiguousarray(pixels))
+    if quality is None:
+        picture.save(file, "WEBP", lossless=True, quality=40, method=3)
+    else:
+        picture.save(file, "WEBP", quality=quality, method=4)
+    return data_uri(file.getvalue(), "image/webp")
+
+
+def data_uri(content: bytes, kind: str) -> str:
+    """Return bytes as a data URI of the MIME type ``kind``."""
+    return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"

@@ -1,0 +1,170 @@
+"""Pages that are one file each: templates filled in, with styles, programs and pictures inside."""
+
+import io
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+from PIL import Image
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import atomic_path
+from lightfield.report.packing import data_uri
+
+TEMPLATES = Path(__file__).resolve().parent / "templates"
+
+LENSES = {
+    "FISHEYE_EQUIDISTANT": "equidistant fisheye",
+    "FISHEYE_EQUISOLID": "equisolid fisheye",
+    "FISHEYE_LENS_POLYNOMIAL": "polynomial fisheye",
+    "EQUIRECTANGULAR": "equirectangular panorama",
+    "FISHEYE_STEREOGRAPHIC": "stereographic fisheye",
+    "FISHEYE_ORTHOGRAPHIC": "orthographic fisheye",
+    "FISHEYE_KANNALA_BRANDT": "Kannala–Brandt fisheye",
+    "CUBE_MAP": "cube map",
+    "PERSP": "rectilinear",
+}
+# A plot stays sharp as SVG; one of thousands of points is smaller as PNG.
+LARGEST_SVG = 300_000
+PHOTO_QUALITY = 84
+
+
+def write(output: Path, template: str, **content: Any) -> None:
+    """Fill in one of `TEMPLATES`, whatever ``content`` holds escaped, and write it atomically."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"number": number, "cell": cell, "measure": measure, "named": title}
+    # These are the project's own files, not somebody's text.
+    css, js = (Markup((TEMPLATES / name).read_text("utf-8")) for name in ("page.css", "page.js"))
+    text = environment.get_template(template).render(css=css, js=js, **content)
+    with atomic_path(output) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def photo(path: Path, widest: int) -> str | None:
+    """Return a picture as a data URI, at most ``widest`` pixels wide; None where there is none."""
+    if not path.is_file():
+        return None
+    try:
+        with Image.open(path) as opened:
+            picture = opened.convert("RGB")
+    except OSError as error:
+        raise UserError(f"{path}: is no picture that can be read: {error}") from None
+    if picture.width > widest:
+        height = max(1, round(picture.height * widest / picture.width))
+        picture = picture.resize((widest, height), Image.Resampling.LANCZOS)
+    file = io.BytesIO()
+    picture.save(file, "WEBP", quality=PHOTO_QUALITY, method=4)
+    return data_uri(file.getvalue(), "image/webp")
+
+
+def plot(stem: Path) -> str | None:
+    """Return the plot ``stem``.svg or .png as a data URI, or None where there is neither."""
+    svg, png = stem.with_name(f"{stem.name}.svg"), stem.with_name(f"{stem.name}.png")
+    if svg.is_file() and (svg.stat().st_size <= LARGEST_SVG or not png.is_file()):
+        return data_uri(svg.read_bytes(), "image/svg+xml")
+    return data_uri(png.read_bytes(), "image/png") if png.is_file() else None
+
+
+def lens_text(camera: Mapping[str, Any]) -> str:
+    """Return a lens in words: its projection and field of view."""
+    kind = camera.get("panorama_type") if camera.get("type") == "PANO" else camera.get("type")
+    text = LENSES.get(str(kind), str(kind).replace("_", " ").lower())
+    if "fisheye_fov" in camera:
+        return f"{text}, {math.degrees(camera['fisheye_fov']):.4g}°"
+    if "focal_length" in camera:
+        return f"{text}, {camera['focal_length']:.4g} mm"
+    return text
+
+
+def bytes_(value: float) -> str:
+    """Return a number of bytes in words: 12.3 MB."""
+    for unit in ("bytes", "kB", "MB", "GB"):
+        if value < 999.5:
+            return f"{value:.3g} {unit}"
+        value /= 1000
+    return f"{value:.3g} TB"
+
+
+def seconds(value: float) -> str:
+    """Return a duration in words: 4.2 s, 3 min 20 s, 5 h 12 min, 12.1 days."""
+    if value < 99.5:
+        return f"{value:.3g} s"
+    minutes = round(value / 60)
+    if minutes < 60:
+        return f"{int(value // 60)} min {int(value % 60)} s"
+    if minutes < 48 * 60:
+        return f"{minutes // 60} h {minutes % 60} min"
+    return f"{value / 86400:.1f} days"
+
+
+def number(value: float) -> str:
+    """Return a number to three digits, in powers of ten where it is very small or large."""
+    if not math.isfinite(value):
+        return "∞" if value > 0 else "–"
+    if value != 0 and not 1e-3 <= abs(value) < 1e5:
+        mantissa, exponent = f"{value:.2e}".split("e")
+        return f"{mantissa}·10{_superscript(int(exponent))}"
+    return f"{value:.4g}"
+
+
+def cell(value: Any) -> str:
+    """Return a table's cell as text: numbers shortened, lists joined, None as a dash."""
+    if value is None or value == "":
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | float):
+        return number(value)
+    if isinstance(value, list | tuple):
+        return ", ".join(cell(part) for part in value)
+    if isinstance(value, dict):
+        return ", ".join(
+            f"{str(key).replace('_', ' ')} {cell(part)}" for key, part in value.items()
+        )
+    try:
+        return number(float(value))
+    except (TypeError, ValueError):
+        return str(value)
+
+
+UNITS: dict[str, Callable[[float], str]] = {
+    "seconds": seconds,
+    "bytes": bytes_,
+    "kwh": lambda value: f"{value:.3g} kWh",
+    "gigabytes": lambda value: bytes_(1e9 * value),
+    "hours": lambda value: f"{number(value)} h",
+    "watts": lambda value: f"{value:g} W",
+}
+
+
+# How some words of keys are written.
+WRITTEN = {"mse": "MSE", "psnr": "PSNR", "ssim": "SSIM", "flip": "FLIP", "cpu": "CPU", "kwh": "kWh"}
+
+
+def measure(value: Any, name: str) -> str:
+    """Return a cell of what is called ``name``, in the unit that the name ends in."""
+    unit = UNITS.get(name.rpartition("_")[2])
+    plain = isinstance(value, int | float) and not isinstance(value, bool)
+    return unit(value) if unit and plain and "_per_" not in name else cell(value)
+
+
+def title(name: str) -> str:
+    """Return a key as words, without the unit that `measure` writes with its value."""
+    words = name.split("_")
+    if len(words) > 1 and words[-1] in UNITS and words[-1] != "hours" and "per" not in words:
+        words.pop()
+    text = " ".join(WRITTEN.get(word, word) for word in words)
+    return {"bytes": "size", "gigabytes": "size", "watts": "power"}.get(name, text)
+
+
+def _superscript(value: int) -> str:
+    return str(value).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))

@@ -1,0 +1,275 @@
+"""What a dataset's page tells in tables: checks, measurements and costs, each from its file."""
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json
+from lightfield.report import page
+
+# Of the stability table, so many of the cases that use most of their bound are shown at once.
+WORST_CASES = 12
+
+CHECK_KEYS = ("passed", "detail", "problems", "warnings", "figures")
+# The tables of error_vs_time that are shown at once, in this order, by their names there.
+ERROR_TABLES = {
+    "slopes": "Slope of the error, both axes logarithmic; plain path tracing's is −1 in theory",
+    "settings": "This scene's settings",
+    "pareto front": "On the Pareto front: no other way is both faster and better",
+}
+
+
+@dataclass(frozen=True)
+class Table:
+    """Column titles and rows of cells; ``rows`` may hold numbers, text, or None."""
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Any]]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One measurement: its plot as a data URI, and tables by their titles; whole ones apart."""
+
+    plot: str | None
+    tables: dict[str, Table] = field(default_factory=dict)
+    whole: dict[str, Table] = field(default_factory=dict)
+    facts: Sequence[tuple[str, str]] = ()
+
+
+def validation(path: Path) -> dict[str, Any] | None:
+    """Return validation.json's content with its checks grouped by the image set they are of."""
+    if not path.is_file():
+        return None
+    content = read_json(path)
+    groups: dict[str, list[dict[str, Any]]] = {}
+    try:
+        for check in content["checks"]:
+            group, _, name = check["name"].rpartition("/")
+            told = {key: check[key] for key in CHECK_KEYS}
+            groups.setdefault(group, []).append({**told, "short": name})
+        return {"valid": content["valid"], "groups": groups}
+    except (LookupError, TypeError, AttributeError):
+        raise UserError(f"{path}: is not what scripts/validate.py writes") from None
+
+
+def reprojection(files: Sequence[Path]) -> Measurement | None:
+    """Return the error of reprojection against its run time: the best methods of each case."""
+    path = _named(files, "reprojection.csv")
+    if path is None:
+        return None
+    rows = _read_csv(path)
+    columns = list(rows[0]) if rows else []
+    front = [row for row in rows if row.get("on_front") == "True"]
+    best = Table(
+        ["case", "method", "samples", "RMS error", "largest error", "CPU time a view"],
+        [
+            [
+                row.get("scenario"),
+                row.get("method"),
+                row.get("samples"),
+                row.get("rms_error"),
+                row.get("largest_error"),
+                _milliseconds(row.get("view_cpu_s")),
+            ]
+            for row in front
+        ],
+    )
+    return Measurement(
+        page.plot(path.with_suffix("")),
+        {"On the Pareto front: no other method is both faster and better": best},
+        {f"All {len(rows)} measurements": Table(columns, [list(row.values()) for row in rows])},
+    )
+
+
+def stability(files: Sequence[Path]) -> Measurement | None:
+    """Return what the lenses' extremes showed: counts of verdicts, and the worst cases."""
+    path = _named(files, "stability.csv")
+    if path is None:
+        return None
+    rows = _read_csv(path)
+    counts: dict[tuple[str, str], dict[str, int]] = {}
+    for row in rows:
+        verdicts = counts.setdefault((row.get("group", ""), row.get("dtype", "")), {})
+        verdict = row.get("verdict", "")
+        verdicts[verdict] = verdicts.get(verdict, 0) + 1
+    kinds = sorted({verdict for verdicts in counts.values() for verdict in verdicts}, key=len)
+    summary = Table(
+        ["cases", "precision", *kinds],
+        [
+            [group, dtype, *(verdicts.get(kind, 0) for kind in kinds)]
+            for (group, dtype), verdicts in counts.items()
+        ],
+    )
+    worst = sorted(rows, key=_bound_used, reverse=True)[:WORST_CASES]
+    names = ["case", "dtype", "condition", "error", "error_bound", "unit", "verdict"]
+    shown = [[*(row.get(name) for name in names), f"{_bound_used(row):.0%}"] for row in worst]
+    columns = list(rows[0]) if rows else []
+    failed = sum(not row.get("verdict", "").startswith("ok") for row in rows)
+    return Measurement(
+        page.plot(path.with_suffix("")),
+        {
+            "Verdicts": summary,
+            "The cases that use most of what their condition number allows": Table(
+                ["case", "precision", "condition", "error", "bound", "unit", "verdict", "of bound"],
+                shown,
+            ),
+        },
+        {f"All {len(rows)} cases": Table(columns, [list(row.values()) for row in rows])},
+        [("cases", str(len(rows))), ("outside their bound", str(failed))],
+    )
+
+
+def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
+    """Return the error of a scene's renders against their run time, as far as it was measured."""
+    path = _named(files, f"error_vs_time/{scene}.json")
+    if path is None:
+        return None
+    content = read_json(path)
+    if not isinstance(content, Mapping):
+        raise UserError(f"{path}: must be a mapping")
+    tables, _ = _tables(content)
+    known = {name: table for name, table in tables.items() if name in ERROR_TABLES}
+    whole = {name: table for name, table in tables.items() if name not in known}
+    whole.pop("measured on", None)
+    if "slopes" in known:
+        known["slopes"] = _slopes(content["slopes"])
+    measured_on = content.get("measured_on")
+    return Measurement(
+        page.plot(path.with_suffix("")),
+        {ERROR_TABLES[name]: known[name] for name in ERROR_TABLES if name in known},
+        {name.capitalize(): table for name, table in whole.items()},
+        _with_units(measured_on, "") if isinstance(measured_on, Mapping) else [],
+    )
+
+
+def _slopes(slopes: Mapping[str, Any]) -> Table:
+    """Return each method's slopes, ± their standard errors."""
+    over = (
+        "over_time",
+        "over_samples",
+        "of_all_pixels_over_time",
+        "of_all_pixels_over_samples",
+    )
+
+    def told(fit: Any) -> str | None:
+        if not isinstance(fit, Mapping) or "slope" not in fit:
+            return None
+        return f"{fit['slope']:.2f} ± {fit.get('slope_error', math.nan):.2f}".replace("-", "−")
+
+    return Table(
+        ["method", *(name.replace("_", " ") for name in over)],
+        [
+            [method, *(told(fits.get(name)) for name in over)]
+            for method, fits in slopes.items()
+            if isinstance(fits, Mapping)
+        ],
+    )
+
+
+def costs(path: Path) -> dict[str, Any] | None:
+    """Return what costs.json tells, or None where no costs were counted.
+
+    ``tables`` by title; ``facts`` and ``full`` (of the dataset at full size, extrapolated) as
+    pairs of title and text; ``notes`` and ``basis``, how they were counted.
+    """
+    if not path.is_file():
+        return None
+    content = read_json(path)
+    if not isinstance(content, Mapping):
+        raise UserError(f"{path}: must be a mapping")
+    tables, facts = _tables(
+        {key: value for key, value in content.items() if key != "extrapolation"}
+    )
+    full = content.get("extrapolation") or {}
+    currency = str(content.get("currency") or "")
+    return {
+        "tables": tables,
+        "facts": _with_units(facts, currency),
+        "notes": _sentences(facts),
+        "full": _with_units(full, currency),
+        "basis": _sentences(full),
+    }
+
+
+def _with_units(facts: Mapping[str, Any], currency: str) -> list[tuple[str, str]]:
+    """Return titles and figures in the units that their names end in, each ± its uncertainty."""
+    told = []
+    for name, value in facts.items():
+        if name.endswith("_uncertainty") or name == "currency" or _is_sentence(value):
+            continue
+        sides = name == "resolution" and isinstance(value, list)
+        text = " × ".join(map(str, value)) if sides else page.measure(value, name)
+        uncertain = facts.get(f"{name}_uncertainty")
+        if uncertain is not None:
+            text = f"{text} ± {page.measure(uncertain, name)}"
+        if "price" in name:
+            text = f"{text} {currency}"
+        told.append((page.title(name), text))
+    return told
+
+
+def _sentences(facts: Mapping[str, Any]) -> list[str]:
+    return [value for value in facts.values() if _is_sentence(value)]
+
+
+def _is_sentence(value: Any) -> bool:
+    return isinstance(value, str) and len(value) > 40
+
+
+def _tables(content: Mapping[str, Any]) -> tuple[dict[str, Table], dict[str, Any]]:
+    """Split a JSON mapping into tables (lists of mappings, mappings of mappings) and the rest."""
+    tables, facts = {}, {}
+    for name, value in content.items():
+        title = str(name).replace("_", " ")
+        rows = value
+        if isinstance(value, Mapping) and value:
+            of_rows = all(isinstance(row, Mapping) for row in value.values())
+            rows = [{"": key, **row} for key, row in value.items()] if of_rows else [value]
+        if isinstance(rows, list) and rows and all(isinstance(row, Mapping) for row in rows):
+            columns = list(dict.fromkeys(str(key) for row in rows for key in row))
+            tables[title] = Table(
+                columns, [[row.get(column) for column in columns] for row in rows]
+            )
+        elif not isinstance(value, list | Mapping) and value is not None:
+            facts[str(name)] = value
+    return tables, facts
+
+
+def _named(files: Sequence[Path], ending: str) -> Path | None:
+    return next((file for file in files if f"/{file.as_posix()}".endswith(f"/{ending}")), None)
+
+
+def _read_csv(path: Path) -> list[dict[str, str]]:
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            return [
+                {str(key): value or "" for key, value in row.items() if key}
+                for row in csv.DictReader(file)
+            ]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise UserError(f"{path}: cannot be read as CSV: {error}") from None
+
+
+def _bound_used(row: Mapping[str, str]) -> float:
+    """Return the largest part of its bounds that a case of the stability table uses."""
+    used = []
+    for error, bound in (("error", "error_bound"), ("round_trip_error", "round_trip_bound")):
+        try:
+            part = float(row.get(error, "")) / float(row.get(bound, ""))
+        except (ValueError, ZeroDivisionError):
+            continue
+        if math.isfinite(part):
+            used.append(part)
+    return max(used, default=0.0)
+
+
+def _milliseconds(text: str | None) -> str | None:
+    try:
+        return f"{page.number(1000 * float(text or ''))} ms"
+    except ValueError:
+        return text

@@ -1,0 +1,242 @@
+"""What a dataset's page shows of the views themselves, packed to be looked at in a browser."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from numpy.typing import NDArray
+
+from lightfield.geometry import lenses
+from lightfield.geometry.lenses import Lens
+from lightfield.imaging import images, pictures
+from lightfield.measurement.noise import relative_noise
+from lightfield.report import epipolar
+from lightfield.report.packing import (
+    DEPTH_STEPS,
+    data_uri,
+    depth_range,
+    light_range,
+    pack_depth,
+    pack_light,
+    webp,
+)
+from lightfield.report.rig_outline import outline
+
+Array = NDArray[Any]
+
+# The longer side of an embedded view in pixels; smaller where many views would make a heavy page.
+SIDE, SMALLER_SIDE = 256, 192
+MANY_VIEWS = 60
+LIGHT_QUALITY = 88
+# Views are sampled for epipolar-plane images at this size, which their columns have too.
+EPIPOLAR_SIDE = 512
+MOST_ROWS = 48
+# A view's noise is measured in its middle.
+NOISE_SIDE = 512
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+
+
+@dataclass(frozen=True)
+class View:
+    """One view as the page needs it: linear colour and depth as stored, both small; its noise."""
+
+    colour: Array
+    depth: Array | None
+    noise: float
+
+
+@dataclass(frozen=True)
+class Looks:
+    """What `collect` found: ``data`` for the page's program, and numbers to be told in words."""
+
+    data: dict[str, Any]
+    embedded: int
+    views: int
+    noise: tuple[float, float, float] | None
+    row: epipolar.Row | None
+    row_shown: int
+
+
+def collect(folder: Path, lightfield: Mapping[str, Any], rig: Mapping[str, Any]) -> Looks:
+    """Read the views that the page shows and pack them.
+
+    ``folder`` holds the views of ``lightfield``, and ``rig`` is the scene YAML's mapping. Raises
+    `UserError` for a view that cannot be read.
+    """
+    frames = lightfield["frames"]
+    matrices = np.array([frame["world_matrix"] for frame in frames], float)
+    lens = lenses.from_lightfield(lightfield)
+    meaning = lightfield.get("depth", "z" if lens.has_z_depth else "distance")
+    shown = list(range(len(frames)))[:: math.ceil(len(frames) / pictures.MOST_VIEWS)]
+    side = SIDE if len(shown) <= MANY_VIEWS else SMALLER_SIDE
+    small = _fitted(lens, side)
+
+    loaded = [read(folder / f"{frames[i]['name']}.exr", small, meaning) for i in shown]
+    light = np.stack([view.colour for view in loaded])
+    found = [view.depth for view in loaded if view.depth is not None]
+    depths = np.stack(found) if found else None
+    limits = light_range(light)
+    packed_views = []
+    outside = _outside(small)
+    reach = None
+    if depths is not None:
+        depths = np.where(outside, np.nan, depths)
+        reach = depth_range(depths)
+    for number, view in enumerate(shown):
+        entry = {"view": view, "light": webp(pack_light(light[number], limits), LIGHT_QUALITY)}
+        if depths is not None and reach is not None:
+            entry["depth"] = webp(pack_depth(depths[number], reach))
+        packed_views.append(entry)
+
+    noises = [view.noise for view in loaded if math.isfinite(view.noise)]
+    row = epipolar.find_row(rig, matrices)
+    data = {
+        "views": [
+            {
+                "name": str(frame["name"]),
+                "at": _rounded(matrix[:3, 3]),
+                "right": _rounded(matrix[:3, 0]),
+                "up": _rounded(matrix[:3, 1]),
+                "ahead": _rounded(-matrix[:3, 2]),
+            }
+            for frame, matrix in zip(frames, matrices, strict=True)
+        ],
+        "outline": [[_rounded(point) for point in line] for line in outline(rig)],
+        "resolution": [lens.width, lens.height],
+        "size": [small.width, small.height],
+        "light": limits,
+        "white": pictures.WHITE,
+        "exposure": round(pictures.exposure_for(light), 2),
+        "depth": _depth_scale(depths, reach, meaning),
+        "embedded": packed_views,
+        # A view that looks level and ahead shows more of a scene than the first one may.
+        "first": int(np.argmin(np.round(matrices[shown, 1, 2], 6))),
+        "row": None,
+    }
+    kept: list[int] = []
+    if row:
+        kept = epipolar.thinned(row.views, MOST_ROWS)
+        data["row"] = _epipolar_images(folder, frames, matrices, lens, meaning, row, kept, limits)
+    return Looks(
+        data,
+        len(shown),
+        len(frames),
+        (min(noises), float(np.median(noises)), max(noises)) if noises else None,
+        row,
+        len(kept),
+    )
+
+
+def read(path: Path, small: Lens, meaning: str | None) -> View:
+    """Read a view at the resolution of ``small``: colour averaged, depth that of one pixel."""
+    channels = images.read_image(path, "RGBZ" if meaning else "RGB").channels
+    colour = np.stack([channels[name] for name in "RGB"], axis=-1, dtype=np.float32)
+    colour = np.where(np.isfinite(colour), colour, 0).astype(np.float32)
+    height, width = colour.shape[:2]
+    middle = colour[_middle(height), _middle(width)]
+    ratio = relative_noise(middle @ LUMINANCE)
+    known = ratio[np.isfinite(ratio)]
+    if (width, height) != (small.width, small.height):
+        colour = pictures.shrunk(colour, small.width, small.height)
+    depth = None
+    if meaning:
+        rows = (np.arange(small.height) + 0.5) * height / small.height
+        columns = (np.arange(small.width) + 0.5) * width / small.width
+        depth = channels["Z"][np.ix_(rows.astype(int), columns.astype(int))].astype(np.float32)
+    return View(colour, depth, float(np.median(known)) if known.size else math.nan)
+
+
+def _middle(length: int) -> slice:
+    start = max(0, (length - NOISE_SIDE) // 2)
+    return slice(start, start + NOISE_SIDE)
+
+
+def _fitted(lens: Lens, side: int) -> Lens:
+    """Return the lens at a resolution whose longer side is at most ``side``."""
+    part = min(1.0, side / max(lens.width, lens.height))
+    return lens.resized(max(1, round(lens.width * part)), max(1, round(lens.height * part)))
+
+
+def _outside(lens: Lens) -> Array:
+    """Return which pixels (height, width) have no ray."""
+    x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
+    outside: Array = np.isnan(lens.rays(x, y)[..., 0])
+    return outside
+
+
+def _rounded(values: Array) -> list[float]:
+    return [round(value, 5) + 0.0 for value in values.tolist()]
+
+
+def _depth_scale(
+    depths: Array | None, reach: tuple[float, float] | None, meaning: str | None
+) -> dict[str, Any] | None:
+    """Return what depth codes mean, and which colours, from near to far, depths are shown in."""
+    if depths is None or reach is None:
+        return None
+    hit = depths[np.isfinite(depths) & (depths > 0)]
+    near, far = np.log2(np.percentile(hit, [5, 98])).tolist() if hit.size else reach
+    palette = matplotlib.colormaps["viridis_r"](np.arange(256), bytes=True)[:, :3]
+    return {
+        "range": reach,
+        "steps": DEPTH_STEPS,
+        "shown": [near, max(far, near + 0.1)],
+        "meaning": meaning,
+        "colours": data_uri(palette.tobytes(), "").rpartition(",")[2],
+    }
+
+
+def _epipolar_images(
+    folder: Path,
+    frames: Any,
+    matrices: Array,
+    lens: Lens,
+    meaning: str | None,
+    row: epipolar.Row,
+    kept: list[int],
+    limits: tuple[float, float],
+) -> dict[str, Any]:
+    """Return a row's epipolar-plane images, all tilts beneath each other in one picture."""
+    fitted = _fitted(lens, EPIPOLAR_SIDE)
+    columns = epipolar.COLUMNS[row.kind]
+    count = len(kept)
+    light = np.zeros((len(epipolar.TILTS), count, columns, 3), np.float32)
+    depth = np.full((len(epipolar.TILTS), count, columns), np.nan)
+    for place, position in enumerate(kept):
+        number = row.views[position]
+        view = read(folder / f"{frames[number]['name']}.exr", fitted, meaning)
+        for tilted, tilt in enumerate(epipolar.TILTS):
+            rays = epipolar.directions(row, tilt, columns)
+            light[tilted, place], depth[tilted, place] = epipolar.sample(
+                fitted, matrices[number], view.colour, view.depth, meaning, rays
+            )
+    reach = depth_range(depth)
+    sight = np.isfinite(depth) | np.isposinf(depth)
+    used = np.flatnonzero(sight.any(axis=(0, 1)))
+    first, last = (int(used[0]), int(used[-1]) + 1) if used.size else (0, columns)
+    light, depth = light[:, :, first:last], depth[:, :, first:last]
+    centers = matrices[[row.views[i] for i in kept], :3, 3] @ row.axes.T
+    return {
+        "kind": row.kind,
+        "views": row.views,
+        "rows": [row.views[i] for i in kept],
+        "places": _rounded(row.places[kept]),
+        "centers": [_rounded(center[:2]) for center in centers],
+        "tilts": epipolar.TILTS,
+        "first": first,
+        "columns": columns,
+        "widest": math.tan(epipolar.WIDEST),
+        "shape": [count, last - first],
+        "light": webp(_stacked(pack_light(light, limits))),
+        "depth": webp(_stacked(pack_depth(depth, reach))),
+        "range": reach,
+    }
+
+
+def _stacked(values: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return (tilts, rows, columns, 3) as one picture, the tilts beneath each other."""
+    return values.reshape(-1, *values.shape[2:])

@@ -1,0 +1,1 @@
+"""The same views through other lenses: lens maps, filters, colour and depth."""

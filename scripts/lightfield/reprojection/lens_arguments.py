@@ -1,0 +1,330 @@
+"""Command-line flags for a reprojection's geometry, in the words of SILVR's reprojection tool.
+
+Lengths are in mm, the angles of lenses in radians; only a rotation is in degrees.
+"""
+
+import argparse
+import json
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json
+from lightfield.geometry.lenses import (
+    CUBE_FACES,
+    Array,
+    CubeMap,
+    Equidistant,
+    Equirectangular,
+    Equisolid,
+    KannalaBrandt,
+    Lens,
+    Orthographic,
+    Polynomial,
+    Rectilinear,
+    Stereographic,
+    cube_face_rotation,
+    from_camera,
+    from_lightfield,
+)
+from lightfield.reprojection import lens_map
+from lightfield.reprojection.resample import DEFAULT_FILTER, FILTERS
+
+Numbers = Sequence[float]
+
+
+@dataclass(frozen=True)
+class _Flag:
+    metavar: str
+    counts: tuple[int, ...]
+    make: Callable[[int, int, Numbers], Lens]
+    help: str
+
+
+def _sensor(width: int, height: int, sensor_width: float) -> tuple[float, float]:
+    return (sensor_width, sensor_width * height / width)
+
+
+_FLAGS = {
+    "rectilinear": _Flag(
+        "FOCAL_LENGTH,SENSOR_WIDTH",
+        (2,),
+        lambda w, h, n: Rectilinear(
+            width=w, height=h, focal_length=n[0], sensor_size=_sensor(w, h, n[1])
+        ),
+        "perspective lens",
+    ),
+    "equisolid": _Flag(
+        "FOCAL_LENGTH,SENSOR_WIDTH,FOV",
+        (3,),
+        lambda w, h, n: Equisolid(
+            width=w, height=h, focal_length=n[0], sensor_size=_sensor(w, h, n[1]), fov=n[2]
+        ),
+        "equisolid fisheye",
+    ),
+    "equidistant": _Flag(
+        "FOV", (1,), lambda w, h, n: Equidistant(width=w, height=h, fov=n[0]), "equidistant fisheye"
+    ),
+    "stereographic": _Flag(
+        "FOV",
+        (1,),
+        lambda w, h, n: Stereographic(width=w, height=h, fov=n[0]),
+        "stereographic fisheye",
+    ),
+    "orthographic": _Flag(
+        "FOV",
+        (1,),
+        lambda w, h, n: Orthographic(width=w, height=h, fov=n[0]),
+        "orthographic fisheye",
+    ),
+    "equirectangular": _Flag(
+        "LONG_MIN,LONG_MAX,LAT_MIN,LAT_MAX|full",
+        (4,),
+        lambda w, h, n: Equirectangular(
+            width=w, height=h, longitude=(n[0], n[1]), latitude=(n[2], n[3])
+        ),
+        "panorama",
+    ),
+    "polynomial": _Flag(
+        "K0,K1,K2,K3,K4,SENSOR_WIDTH,FOV",
+        (7,),
+        lambda w, h, n: Polynomial(
+            width=w,
+            height=h,
+            coefficients=tuple(n[:5]),
+            sensor_size=_sensor(w, h, n[5]),
+            fov=n[6],
+        ),
+        "Blender's polynomial fisheye",
+    ),
+    "kannala-brandt": _Flag(
+        "FOCAL_LENGTH,SENSOR_WIDTH,K1,K2,K3,K4[,FOV]",
+        (6, 7),
+        lambda w, h, n: KannalaBrandt(
+            width=w,
+            height=h,
+            focal_length=n[0],
+            sensor_size=_sensor(w, h, n[1]),
+            coefficients=tuple(n[2:6]),
+            fov=n[6] if len(n) == 7 else 2 * math.pi,
+        ),
+        "OpenCV's fisheye",
+    ),
+}
+
+
+def joined(arguments: Sequence[str]) -> list[str]:
+    """Return the command line with ``--flag -1,2`` as ``--flag=-1,2``, which argparse needs."""
+    out: list[str] = []
+    for argument in arguments:
+        if re.match(r"-[\d.]", argument) and out and re.fullmatch(r"--[a-z-]+", out[-1]):
+            out[-1] += f"={argument}"
+        else:
+            out.append(argument)
+    return out
+
+
+def add_geometry_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that `geometry` reads."""
+    files = parser.add_argument_group("Configuration")
+    files.add_argument("--input-cfg", type=Path, metavar="JSON", help="the images' lightfield.json")
+    files.add_argument(
+        "--no-configs", metavar="WIDTH,HEIGHT", help="size of the images, whose lens --i-… gives"
+    )
+    _add_lens_flags(parser, "i-", "Input lens, with --no-configs")
+    _add_lens_flags(parser, "", "Output lens")
+    optics = parser.add_argument_group("Output optics")
+    optics.add_argument("--no-reproject", action="store_true", help="keep the input lens")
+    optics.add_argument(
+        "--rotation",
+        default="0,0,0",
+        metavar="PAN,PITCH,ROLL",
+        help="turn the camera left, down and clockwise, degrees",
+    )
+    optics.add_argument("--scale", type=float, default=1.0, help="size over the input's, default 1")
+    optics.add_argument(
+        "--output-resolution", metavar="WIDTH,HEIGHT", help="size, instead of --scale"
+    )
+    sampling = parser.add_argument_group("Sampling")
+    sampling.add_argument("-s", "--samples", type=int, default=1, help="n × n samples a pixel")
+    kind = sampling.add_mutually_exclusive_group()
+    kind.add_argument("--nn", action="store_const", dest="filter", const="nearest")
+    kind.add_argument("--bl", action="store_const", dest="filter", const="bilinear")
+    kind.add_argument("--bc", action="store_const", dest="filter", const="bicubic")
+    kind.add_argument(
+        "--filter", choices=FILTERS, help=f"default {DEFAULT_FILTER}, or bicubic with --samples"
+    )
+
+
+def _add_lens_flags(parser: argparse.ArgumentParser, prefix: str, title: str) -> None:
+    group = parser.add_argument_group(title, "Lengths in mm, angles in radians.")
+    choice = group.add_mutually_exclusive_group()
+    for name, flag in _FLAGS.items():
+        choice.add_argument(f"--{prefix}{name}", metavar=flag.metavar, help=flag.help)
+    if prefix:
+        choice.add_argument(
+            "--i-cubemap",
+            action="store_true",
+            help="six faces <name>_f, _b, _l, _r, _u, _d; the size is 6 × N, N",
+        )
+    else:
+        choice.add_argument(
+            "--camera",
+            metavar="JSON",
+            help="a scene YAML's camera: lens, resolution and the lens's own keys, in degrees",
+        )
+        choice.add_argument(
+            "--cubemap", type=int, metavar="SIZE", help="six perspective faces of 90°, SIZE² pixels"
+        )
+
+
+@dataclass(frozen=True)
+class Target:
+    """One image to make of each view: its lens, and how its rays turn into the source camera's.
+
+    ``suffix`` is what its name has after the view's; ``rotation`` is (3, 3).
+    """
+
+    suffix: str
+    lens: Lens
+    rotation: Array
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """What the command line says of a reprojection's geometry; ``config`` is the input's."""
+
+    config: dict[str, Any]
+    source: Lens
+    targets: list[Target]
+    filter: str
+    samples: int
+
+    def compute(self, target: Target) -> lens_map.LensMap:
+        """Compute the lens map of one of the targets."""
+        return lens_map.compute(
+            self.source, target.lens, target.rotation, self.filter, self.samples
+        )
+
+    def settings(self, target: Target) -> dict[str, Any]:
+        """Return what the lens map of one of the targets depends on."""
+        return lens_map.settings(
+            self.source, target.lens, target.rotation, self.filter, self.samples
+        )
+
+
+def geometry(arguments: argparse.Namespace) -> Geometry:
+    """Read the flags of `add_geometry_flags`; a `UserError` names the one that is wrong."""
+    if arguments.samples < 1:
+        raise UserError(f"--samples {arguments.samples}: must be at least 1")
+    config, source = _source(arguments)
+    return Geometry(
+        config=config,
+        source=source,
+        targets=_targets(arguments, source),
+        # The adaptive filter covers the pixel by itself; samples are those of SILVR's default.
+        filter=arguments.filter or (DEFAULT_FILTER if arguments.samples == 1 else "bicubic"),
+        samples=arguments.samples,
+    )
+
+
+def _source(arguments: argparse.Namespace) -> tuple[dict[str, Any], Lens]:
+    if arguments.no_configs:
+        if arguments.input_cfg:
+            raise UserError("--no-configs: excludes --input-cfg")
+        width, height = size(arguments.no_configs, "--no-configs")
+        lens = _lens(arguments, "i-", width, height)
+        if lens is None:
+            raise UserError("--no-configs: needs the input lens, one of the flags --i-…")
+        return {}, lens
+    if _lens(arguments, "i-", 6, 1) is not None:
+        raise UserError("--i-…: the input lens comes from --input-cfg; or give --no-configs")
+    if not arguments.input_cfg:
+        raise UserError("--input-cfg: is missing; without one, give --no-configs and --i-…")
+    config = read_json(arguments.input_cfg)
+    if not isinstance(config, dict):
+        raise UserError(f"{arguments.input_cfg}: must hold a mapping")
+    try:
+        return config, from_lightfield(config)
+    except UserError as error:
+        raise UserError(f"{arguments.input_cfg}: {error}") from None
+
+
+def _targets(arguments: argparse.Namespace, source: Lens) -> list[Target]:
+    if arguments.output_resolution:
+        width, height = size(arguments.output_resolution, "--output-resolution")
+    else:
+        if not 0 < arguments.scale < math.inf:
+            raise UserError(f"--scale {arguments.scale:g}: must be positive")
+        width, height = int(source.width * arguments.scale), int(source.height * arguments.scale)
+        if min(width, height) < 1:
+            raise UserError(f"--scale {arguments.scale:g}: leaves no pixel")
+    rotation = lens_map.rotation_matrix(
+        *numbers(arguments.rotation, "--rotation", "PAN,PITCH,ROLL", (3,))
+    )
+    if arguments.cubemap is not None:
+        if arguments.no_reproject:
+            raise UserError("--no-reproject: excludes an output lens")
+        if arguments.cubemap < 1:
+            raise UserError(f"--cubemap {arguments.cubemap}: must be at least 1 pixel")
+        face = CubeMap(width=6 * arguments.cubemap, height=arguments.cubemap).face
+        return [
+            Target(f"_{name}", face, rotation @ cube_face_rotation(name)) for name in CUBE_FACES
+        ]
+    lens = _lens(arguments, "", width, height)
+    if arguments.camera:
+        try:
+            lens = from_camera(json.loads(arguments.camera))
+        except (ValueError, KeyError, UserError) as error:
+            raise UserError(f"--camera {arguments.camera}: {error}") from None
+    if arguments.no_reproject:
+        if lens is not None:
+            raise UserError("--no-reproject: excludes an output lens")
+        lens = source.resized(width, height)
+    if lens is None:
+        raise UserError("--rectilinear, …: give the output lens, or --no-reproject")
+    return [Target("", lens, np.asarray(rotation))]
+
+
+def _lens(arguments: argparse.Namespace, prefix: str, width: int, height: int) -> Lens | None:
+    """Return the lens of the flag that was given, at ``width`` × ``height``; None without one."""
+    attribute = prefix.replace("-", "_")
+    if prefix and arguments.i_cubemap:
+        return CubeMap(width=width, height=height)
+    for name, flag in _FLAGS.items():
+        text = getattr(arguments, attribute + name.replace("-", "_"))
+        if text is None:
+            continue
+        if name == "equirectangular" and text == "full":
+            text = f"{-math.pi},{math.pi},{-math.pi / 2},{math.pi / 2}"
+        values = numbers(text, f"--{prefix}{name}", flag.metavar, flag.counts)
+        try:
+            return flag.make(width, height, values)
+        except UserError as error:
+            raise UserError(f"--{prefix}{name} {text}: {error}") from None
+    return None
+
+
+def numbers(text: str, flag: str, form: str, counts: Sequence[int]) -> list[float]:
+    """Return the comma-separated numbers of ``text``; a `UserError` unless as many as allowed."""
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) not in counts or not all(map(math.isfinite, values)):
+        raise UserError(f"{flag} {text}: must have the form {form}")
+    return values
+
+
+def size(text: str, flag: str) -> tuple[int, int]:
+    """Return the WIDTH,HEIGHT of ``text`` in pixels."""
+    width, height = numbers(text, flag, "WIDTH,HEIGHT", (2,))
+    if width != int(width) or height != int(height) or width < 1 or height < 1:
+        raise UserError(f"{flag} {text}: must be two positive whole numbers of pixels")
+    return int(width), int(height)

@@ -1,0 +1,426 @@
+"""Do the views of a light field see the same world? Depth of one view, looked up in another.
+
+A view's depth is lifted into the world as small surface patches: 3 × 3 pixels and the plane that
+fits them best. Cycles samples depth once a pixel, somewhere under the pixel filter, so one depth
+value is only good to the slope of the surface times that jitter; the plane averages it, and how far
+the nine points lie from it (`Patches.spread`) tells how far one can trust it. Patches that no plane
+fits (edges, thin structures) are not used to ask, and give a range instead of an answer.
+
+A patch's centre is then projected into another view, and the plane of the 3 × 3 pixels recorded
+there is the answer. The distance from centre to plane has a sign: a point behind the recorded
+surface is occluded, which is allowed, and a point in front of it is a contradiction, because that
+view looked through the place where the first one saw a surface. A relation of two views is always
+tried both ways, so whatever is wrong makes contradictions in one of them.
+
+Errors too small for single points (a fraction of a pixel) show in the mean: `displacement` gives
+the rigid motion between two views that their residuals ask for, `scales` the error of field of view
+and of depth that all pairs together ask for; both are first-order least squares on point-to-plane
+distances (Chen and Medioni 1992).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from statistics import fmean
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lightfield.geometry import depth as depth_conversion
+from lightfield.geometry.lenses import Lens
+
+Array = NDArray[np.float64]
+
+# The nine pixels of a patch, row by row.
+_ROWS, _COLUMNS = (offset.ravel() for offset in np.mgrid[-1:2, -1:2])
+
+# A patch is a surface when its points lie within so many pixel footprints of their plane (standard
+# deviation; the jitter of Cycles' default filter gives up to 0.25) and it is not seen edge-on.
+SMOOTH_SPREAD = 0.35
+GRAZING_COSINE = 0.2
+
+# A point lies on a recorded surface within this many standard deviations of both planes, and never
+# closer than this part of a footprint (curvature that a plane cannot follow).
+TOLERANCE_DEVIATIONS = 4.0
+TOLERANCE_FOOTPRINTS = 0.05
+
+# Fewer points than this say nothing about a pair of views, nor about six unknowns of motion.
+FEWEST_POINTS = 30
+NEIGHBOURS = 6
+# Among so many of the nearest views are the farther neighbours.
+NEIGHBOURHOOD = 48
+
+UNKNOWN, AGREE, OCCLUDED, CONTRADICT = 0, 1, 2, 3
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Where a view is and what it sees: its lens, camera-to-world (4, 4), and what its depth means.
+
+    ``depth`` is ``"z"`` (along the optical axis) or ``"distance"`` (along the ray), in metres.
+    ``grain`` is the angle in radians, if any, within which a depth may come from beside its
+    pixel's centre: a pixel of the view from which this one was reprojected.
+    """
+
+    lens: Lens
+    world_matrix: Array
+    depth: str
+    grain: float = 0.0
+
+    @property
+    def position(self) -> Array:
+        return self.world_matrix[:3, 3]
+
+    def lift(self, depth: Array, columns: NDArray[np.int64], rows: NDArray[np.int64]) -> Array:
+        """Return the world points (..., 3) that ``depth`` puts on the rays of the pixel centres."""
+        rays = self.lens.rays(columns + 0.5, rows + 0.5)
+        if self.depth == "z":
+            depth = depth_conversion.distance_from_z(depth, rays)
+        with np.errstate(invalid="ignore"):
+            arms = rays * depth[..., np.newaxis]
+            points: Array = arms @ self.world_matrix[:3, :3].T + self.position
+        return points
+
+    def pixels(self, points: Array) -> Array:
+        """Return the pixel coordinates (..., 2) of world points, NaN where they are not seen."""
+        return self.lens.pixels((points - self.position) @ self.world_matrix[:3, :3])
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Surface patches of one view, in world coordinates and metres; n of them.
+
+    points (n, 3): the centres; normals (n, 3): unit, towards the camera; spread (n,): standard
+    deviation of the nine points from their plane; footprint (n,): the width of a pixel, or of the
+    grain if that is coarser, at that distance, across the ray; error (n,): how far the plane may
+    lie off the surface by the grain and by what the file's number format resolves.
+    """
+
+    points: Array
+    normals: Array
+    spread: Array
+    footprint: Array
+    error: Array
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __getitem__(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> "Patches":
+        return Patches(*(getattr(self, field.name)[which] for field in fields(self)))
+
+
+def _patches(
+    camera: Camera, depth: NDArray[Any], columns: NDArray[np.int64], rows: NDArray[np.int64]
+) -> tuple[Patches, NDArray[np.bool_]]:
+    """Fit planes to 3 × 3 pixels about inner pixels; also say which of them are smooth surfaces."""
+    columns, rows = columns[:, np.newaxis] + _COLUMNS, rows[:, np.newaxis] + _ROWS
+    values = depth[rows, columns]
+    with np.errstate(invalid="ignore", over="ignore"):
+        points = camera.lift(values.astype(np.float64), columns, rows)
+        finite = np.isfinite(points).all(axis=(1, 2))
+        points[~finite] = 0.0
+        centres = points.mean(axis=1)
+        around = points - centres[:, np.newaxis]
+        variances, axes = np.linalg.eigh(around.transpose(0, 2, 1) @ around)
+        normals = axes[:, :, 0]
+        sight = camera.position - centres
+        distance = np.linalg.norm(sight, axis=1)
+        cosine = np.einsum("ij,ij->i", normals, sight) / distance
+        normals = normals * np.where(cosine < 0, -1.0, 1.0)[:, np.newaxis]
+        directions = points - camera.position
+        directions /= np.linalg.norm(directions, axis=2, keepdims=True)
+        widths = [
+            np.linalg.norm(directions[:, a] - directions[:, b], axis=1) for a, b in ((3, 5), (1, 7))
+        ]
+        footprint = distance * np.maximum(np.sqrt(widths[0] * widths[1]) / 2, camera.grain)
+        # Nine points less the three unknowns of a plane.
+        spread = np.sqrt(np.maximum(variances[:, 0], 0.0) / 6)
+        precision = distance * float(np.finfo(depth.dtype).eps)
+        # Half a grain along both sides of a pixel, on a surface that the ray meets at an angle.
+        sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+        error = precision + distance * camera.grain * sine / np.sqrt(2.0)
+        smooth = (
+            finite
+            & (spread < SMOOTH_SPREAD * footprint + precision)
+            & (np.abs(cosine) > GRAZING_COSINE)
+        )
+    return Patches(centres, normals, spread, footprint, error), smooth
+
+
+def sample(camera: Camera, depth: NDArray[Any], rays: int) -> Patches:
+    """Return up to ``rays`` smooth patches of a view, spread evenly over it.
+
+    The image is divided into square cells; of four fixed places in each the smoothest is taken.
+    ``depth``: (height, width) of a float type, misses +inf.
+    """
+    height, width = depth.shape
+    cell = max((height * width / rays) ** 0.5, 2.0)
+    down, across = int(height / cell), int(width / cell)
+    # The four places of a cell: the corners of a square turned so that none share a row or column.
+    places = np.array([(0.3, 0.1), (0.9, 0.3), (0.1, 0.7), (0.7, 0.9)])
+    y, x = np.mgrid[0:down, 0:across].reshape(2, -1, 1) + places.T[:, np.newaxis]
+    rows = np.clip(y * (height / down), 1, height - 2).astype(np.int64)
+    columns = np.clip(x * (width / across), 1, width - 2).astype(np.int64)
+    patches, smooth = _patches(camera, depth, columns.ravel(), rows.ravel())
+    roughness = np.full(len(smooth), np.inf)
+    roughness[smooth] = patches.spread[smooth] / patches.footprint[smooth]
+    roughness = roughness.reshape(-1, 4)
+    best = roughness.argmin(axis=1) + 4 * np.arange(len(roughness))
+    return patches[best[smooth[best]]]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What one view says of another's n patches.
+
+    verdict (n,): AGREE, OCCLUDED or CONTRADICT, or UNKNOWN beside pixels without a source. Where
+    the answer is a smooth patch too, ``fine`` is true, ``asked`` and ``found`` are the patches, and
+    ``residual`` (n,) is how far the one's centre lies in front of the other's plane, in units of
+    ``footprint`` (n,), metres.
+    """
+
+    verdict: NDArray[np.int64]
+    fine: NDArray[np.bool_]
+    asked: Patches
+    found: Patches
+    residual: Array
+    footprint: Array
+
+
+def _looks_for(asked: Patches, camera: Camera) -> tuple[NDArray[np.bool_], Array]:
+    """Return which patches turn towards a view and lie in it, and at which pixels (n, 2)."""
+    sight = camera.position - asked.points
+    distance = np.linalg.norm(sight, axis=1)
+    facing = np.einsum("ij,ij->i", asked.normals, sight) > GRAZING_COSINE * distance
+    where = camera.pixels(asked.points)
+    last = np.array([camera.lens.width, camera.lens.height]) - 1.0
+    with np.errstate(invalid="ignore"):
+        inside = ((where >= 1.0) & (where < last)).all(axis=1)
+    return facing & inside, where
+
+
+def compare(asked: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison:
+    """Look for the patches of another view in the view that ``camera`` took with ``depth``.
+
+    Patches that the view cannot see, or sees from behind, are not in the answer.
+    """
+    looked_for, where = _looks_for(asked, camera)
+    asked = asked[looked_for]
+    columns, rows = np.floor(where[looked_for]).astype(np.int64).T
+    found, smooth = _patches(camera, depth, columns, rows)
+    residual = np.einsum("ij,ij->i", found.normals, asked.points - found.points)
+    # The centre of nine jittered points, and the plane of nine a pixel's half diagonal off centre.
+    deviation = np.sqrt(asked.spread**2 / 9 + found.spread**2 * (1 / 9 + 0.5 / 6))
+    footprint = np.maximum(asked.footprint, found.footprint)
+    tolerance = (
+        TOLERANCE_DEVIATIONS * deviation
+        + TOLERANCE_FOOTPRINTS * footprint
+        + asked.error
+        + found.error
+    )
+    verdict = np.full(len(asked), AGREE)
+    verdict[residual < -tolerance] = OCCLUDED
+    verdict[residual > tolerance] = CONTRADICT
+    rough = np.flatnonzero(~smooth)
+    nearest, farthest = _recorded_range(camera, depth, columns[rough], rows[rough])
+    expected = np.linalg.norm(asked.points[rough] - camera.position, axis=1)
+    slack = tolerance[rough] + footprint[rough]
+    verdict[rough] = AGREE
+    verdict[rough[farthest < expected - slack]] = OCCLUDED
+    verdict[rough[nearest > expected + slack]] = CONTRADICT
+    verdict[rough[np.isnan(nearest)]] = UNKNOWN
+    scaled = residual / np.maximum(footprint, np.finfo(np.float64).tiny)
+    return Comparison(verdict, smooth, asked, found, scaled, footprint)
+
+
+def _recorded_range(
+    camera: Camera, depth: NDArray[Any], columns: NDArray[np.int64], rows: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """Return the least and largest distance in 3 × 3 pixels; NaN where one has no source."""
+    columns, rows = columns[:, np.newaxis] + _COLUMNS, rows[:, np.newaxis] + _ROWS
+    nine = depth[rows, columns].astype(np.float64)
+    points = camera.lift(nine, columns, rows)
+    with np.errstate(invalid="ignore"):
+        distance = np.linalg.norm(points - camera.position, axis=2)
+    # A miss has no point: its coordinates are inf, or NaN where the ray's are 0.
+    distance[np.isposinf(nine)] = np.inf
+    return distance.min(axis=1), distance.max(axis=1)
+
+
+# Residuals beyond this many footprints are another surface, not a slightly wrong view.
+_SAME_SURFACE = 1.0
+
+
+def displacement(comparison: Comparison, camera: Camera) -> float | None:
+    """Return by how many pixels the asked patches must move to lie on the found ones.
+
+    The rigid motion about ``camera``, which found them, that makes the residuals least, in the
+    directions that they determine; its root mean square over the points, in pixel footprints.
+    None: too few residuals.
+    """
+    used = comparison.fine & (np.abs(comparison.residual) < _SAME_SURFACE)
+    if used.sum() < FEWEST_POINTS:
+        return None
+    residual, found = comparison.residual[used], comparison.found[used]
+    points, footprint = comparison.asked.points[used], comparison.footprint[used, np.newaxis]
+    arms = (points - camera.position) / footprint
+    # Unknowns of like size: both in pixels, the rotation as seen at the median distance.
+    arms /= np.median(np.linalg.norm(arms, axis=1))
+    size = np.median(footprint)
+    rows = np.hstack([found.normals * size / footprint, np.cross(arms, found.normals)])
+    motion = np.zeros(6)
+    for _ in range(5):
+        root = np.sqrt(_huber(residual + rows @ motion))
+        motion = np.linalg.lstsq(rows * root[:, np.newaxis], -residual * root, rcond=0.1)[0]
+    shifts = motion[:3] * size / footprint + np.cross(motion[3:], arms)
+    return float(np.sqrt((shifts**2).sum(axis=1).mean()))
+
+
+def _huber(residual: Array) -> Array:
+    """Return Huber's weights; the scale is 1.5 times the median residual."""
+    scale = 1.5 * np.median(np.abs(residual)) + 1e-12
+    weights: Array = scale / np.maximum(np.abs(residual), scale)
+    return weights
+
+
+@dataclass(frozen=True)
+class ScaleTerms:
+    """What one comparison adds to the least squares of `scales`."""
+
+    squares: Array
+    products: Array
+    residual: float
+    count: int
+
+    def __add__(self, other: "ScaleTerms") -> "ScaleTerms":
+        return ScaleTerms(
+            self.squares + other.squares,
+            self.products + other.products,
+            self.residual + other.residual,
+            self.count + other.count,
+        )
+
+
+def scale_terms(comparison: Comparison, asking: Camera, answering: Camera) -> ScaleTerms:
+    """Return the terms of one comparison's residuals for `scales`."""
+    used = comparison.fine & (np.abs(comparison.residual) < _SAME_SURFACE)
+    if used.sum() < FEWEST_POINTS:
+        return ScaleTerms(np.zeros((2, 2)), np.zeros(2), 0.0, 0)
+    residual, footprint = comparison.residual[used], comparison.footprint[used]
+    asked, found = comparison.asked[used], comparison.found[used]
+    # Where the two surfaces go when every angle from the axis, or every depth, grows.
+    by_angle = _outwards(asking, asked.points) - _outwards(answering, found.points)
+    by_depth = answering.position - asking.position
+    rows = np.stack(
+        [np.einsum("ij,ij->i", found.normals, by_angle), found.normals @ by_depth], axis=1
+    )
+    rows /= footprint[:, np.newaxis]
+    weights = _huber(residual)
+    return ScaleTerms(
+        (rows * weights[:, np.newaxis]).T @ rows,
+        -(rows * weights[:, np.newaxis]).T @ residual,
+        float((weights * residual**2).sum()),
+        int(used.sum()),
+    )
+
+
+def _outwards(camera: Camera, points: Array) -> Array:
+    """Return θ ∂point/∂θ: how points move when their angles θ from the optical axis are scaled."""
+    arms = points - camera.position
+    distance = np.linalg.norm(arms, axis=1, keepdims=True)
+    axis = -camera.world_matrix[:3, 2]
+    cosine = arms @ axis[:, np.newaxis] / distance
+    sine = np.linalg.norm(np.cross(arms, axis), axis=1, keepdims=True) / distance
+    tangent = (arms * cosine - axis * distance) / np.maximum(sine, 1e-12)
+    outwards: Array = np.arctan2(sine, cosine) * tangent
+    return outwards
+
+
+def scales(terms: ScaleTerms) -> tuple[Array, Array]:
+    """Return by which part all angles from the axis and all depths must grow, and their deviation.
+
+    Two arrays (2,): angle and depth. A deviation is inf where the residuals do not determine it.
+    """
+    if terms.count < FEWEST_POINTS or np.linalg.cond(terms.squares) > 1e9:
+        return np.zeros(2), np.full(2, np.inf)
+    inverse = np.linalg.inv(terms.squares)
+    found = inverse @ terms.products
+    left = max(terms.residual - float(found @ terms.products), 0.0)
+    return found, np.sqrt(np.diagonal(inverse) * left / terms.count)
+
+
+def neighbours(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tuple[int, int]]:
+    """Return the pairs (i, j), i < j, of views to compare, in order.
+
+    To each view the three nearest that can look for enough of its patches, and three farther away,
+    whose wider baselines show what the near ones cannot. Views at one place count as neighbours.
+    """
+    positions = np.array([camera.position for camera in cameras])
+    pairs = set()
+    for view, own in enumerate(patches):
+        if len(own) < FEWEST_POINTS:
+            continue
+        away = np.round(np.linalg.norm(positions - positions[view], axis=1), 6)
+        away[view] = -1.0
+        near = np.argsort(away, kind="stable")[1 : NEIGHBOURHOOD + 1]
+        starts = [0] * (NEIGHBOURS // 2)
+        starts += [len(near) * step // 4 for step in range(1, NEIGHBOURS - NEIGHBOURS // 2 + 1)]
+        chosen: set[int] = set()
+        blind: set[int] = set()
+        for start in starts:
+            for other in near[start:].tolist():
+                if other in chosen or other in blind:
+                    continue
+                if _looks_for(own, cameras[other])[0].sum() >= FEWEST_POINTS:
+                    chosen.add(other)
+                    break
+                blind.add(other)
+        pairs |= {(min(view, other), max(view, other)) for other in chosen}
+    return sorted(pairs)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What one view says of another's patches, or two of each other's, in a few numbers.
+
+    Counts of points by verdict; ``displacement`` as that function gives it, in pixels, or None.
+    """
+
+    agree: int
+    occluded: int
+    contradict: int
+    displacement: float | None
+    terms: ScaleTerms
+
+    @property
+    def contradiction(self) -> float | None:
+        """The part of the points not occluded that contradict; None where there are too few."""
+        decided = self.agree + self.contradict
+        return self.contradict / decided if decided >= FEWEST_POINTS else None
+
+    def __add__(self, other: "Answer") -> "Answer":
+        known = [x.displacement for x in (self, other) if x.displacement is not None]
+        return Answer(
+            self.agree + other.agree,
+            self.occluded + other.occluded,
+            self.contradict + other.contradict,
+            fmean(known) if known else None,
+            self.terms + other.terms,
+        )
+
+
+def ask(patches: Patches, asking: Camera, answering: Camera, depth: NDArray[Any]) -> Answer:
+    """Look for the ``patches`` of one view in another, whose ``depth`` is (height, width)."""
+    comparison = compare(patches, answering, depth)
+    counts = np.bincount(comparison.verdict, minlength=4)
+    return Answer(
+        int(counts[AGREE]),
+        int(counts[OCCLUDED]),
+        int(counts[CONTRADICT]),
+        displacement(comparison, answering),
+        scale_terms(comparison, asking, answering),
+    )
+
+
+NOTHING = Answer(0, 0, 0, None, ScaleTerms(np.zeros((2, 2)), np.zeros(2), 0.0, 0))
+"""The sum of no answers."""

@@ -1,0 +1,283 @@
+"""What each image of a dataset tells by itself: is it whole, and does it hold what it must?"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import sha256
+from lightfield.geometry.lenses import Array, Lens
+from lightfield.imaging import images
+from lightfield.validation import consistency
+from lightfield.validation.consistency import Answer, Camera, Patches
+
+Bools = NDArray[np.bool_]
+
+RAYS_A_VIEW = 400
+
+# Pixels this near to the rim of what a lens sees may hold light from both sides of it.
+RIM_PIXELS = 2
+# An image has one colour if no larger part of it than this has another.
+FEW = 0.002
+# So much of what lies outside the image circle may be lighter than that.
+MOST_LIT_OUTSIDE, FAINT = 0.05, 0.001
+# Of more differently turned views than this, the regions are computed again.
+MOST_REGIONS = 16
+
+
+@dataclass(frozen=True)
+class ImageSet:
+    """The views of one lightfield.json: the dataset's own (``name`` "") or a reprojection's.
+
+    ``folder`` holds the images, relative to the dataset; ``depth`` is what channel Z means, or
+    None; ``matrices`` (n, 4, 4) are camera-to-world; ``grain`` is the angle in radians between the
+    pixels at the centre of the views from which these were reprojected, 0 for rendered views.
+    """
+
+    name: str
+    folder: str
+    lens: Lens
+    depth: str | None
+    views: list[str]
+    matrices: NDArray[np.float64]
+    grain: float = 0.0
+
+    @property
+    def prefix(self) -> str:
+        """What its files' paths and its checks' names begin with."""
+        return f"{self.name}/" if self.name else ""
+
+    def camera(self, view: int) -> Camera:
+        assert self.depth is not None
+        return Camera(self.lens, self.matrices[view], self.depth, self.grain)
+
+
+@dataclass(frozen=True)
+class File:
+    """An image file: ``path`` relative to the dataset, and the set and view that it is of.
+
+    What is no view (a mask, a depth map, a picture for a trainer) has ``view`` −1, and has only to
+    be readable and of its set's size.
+    """
+
+    path: str
+    set: int
+    view: int = -1
+
+
+@dataclass
+class Facts:
+    """What one file tells by itself; ``problems`` by the check to which they belong.
+
+    ``clamped`` and ``nan`` are the renderer's counts, ``marked`` whether the pixels without a
+    source could be compared, ``constant`` whether a reprojected view has one colour (as a piece of
+    sky or a wall may), ``patches`` what geometry needs of a view with depth.
+    """
+
+    checksum: str
+    bytes: int
+    problems: dict[str, str] = field(default_factory=dict)
+    clamped: int | None = None
+    nan: int | None = None
+    marked: bool = False
+    constant: bool = False
+    patches: Patches | None = None
+
+
+class Examiner:
+    """Reads a dataset's images; what all views of a set share is computed once."""
+
+    def __init__(self, dataset: Path, sets: Sequence[ImageSet]) -> None:
+        self.dataset = dataset
+        self.sets = sets
+        self.regions: dict[Any, tuple[Bools, Bools]] = {}
+
+    def examine(self, file: File) -> Facts:
+        """Read an image file whole and tell everything that it tells by itself."""
+        path = self.dataset / file.path
+        facts = Facts(sha256(path), path.stat().st_size)
+        image_set = self.sets[file.set]
+        try:
+            image = images.read_image(path)
+        except UserError as error:
+            text = " ".join(str(error).split()).replace(f"{path}: ", "")
+            facts.problems["images"] = text.replace(str(path), file.path)
+            return facts
+        height, width = next(iter(image.channels.values())).shape
+        if (width, height) != (image_set.lens.width, image_set.lens.height):
+            facts.problems["images"] = (
+                f"is {width} × {height}; must be {image_set.lens.width} × {image_set.lens.height}"
+            )
+        elif file.view >= 0:
+            problem = _format_problem(file, image_set, image)
+            if problem:
+                facts.problems["images"] = problem
+            else:
+                self._examine_view(file, image, facts)
+        return facts
+
+    def answer(self, file: File, questions: list[tuple[int, Patches]]) -> list[Answer]:
+        """Look up in one view what others saw; ``questions`` are their numbers and patches."""
+        image_set = self.sets[file.set]
+        depth = images.read_image(self.dataset / file.path, ["Z"]).channels["Z"]
+        camera = image_set.camera(file.view)
+        return [
+            consistency.ask(patches, image_set.camera(asking), camera, depth)
+            for asking, patches in questions
+        ]
+
+    def _examine_view(self, file: File, image: images.Image, facts: Facts) -> None:
+        image_set = self.sets[file.set]
+        rendered = not image_set.name
+        seen, outside = self._of_lens(image_set.lens)
+        depth = image.channels.get("Z")
+        empty = depth is not None and bool(np.isposinf(depth).all())
+        colour = [image.channels[name] for name in "RGB"]
+        middle = (image_set.lens.height // 2, image_set.lens.width // 2)
+        others = max(int(((channel != channel[middle]) & seen).sum()) for channel in colour)
+        constant = others <= FEW * int(seen.sum())
+        facts.constant = constant and not rendered
+        problems = _colour_problems(colour)
+        if constant and rendered and not empty:
+            problems.append("has one colour everywhere")
+        # Cycles leaves a few values of 1e-6 there, and its denoiser a little more.
+        if rendered and outside.any():
+            lit = np.mean([channel[outside] > FAINT for channel in colour])
+            if lit > MOST_LIT_OUTSIDE:
+                problems.append("has colour where the lens sees nothing")
+        if problems:
+            facts.problems["colour"] = ", ".join(problems)
+        if depth is not None:
+            problems = []
+            meaning = image.attributes.get(images.DEPTH_ATTRIBUTE, image_set.depth)
+            if meaning != image_set.depth:
+                problems.append(f"is {meaning!r} by its header, {image_set.depth!r} by its list")
+            unknown = int(np.isnan(depth).sum())
+            if rendered and unknown:
+                problems.append(f"{unknown} depths are not a number")
+            if rendered and not np.isposinf(depth[outside]).all():
+                problems.append("has depth where the lens sees nothing")
+            wrong = int((depth <= 0).sum())
+            problems += [f"{wrong} depths are not positive"] if wrong else []
+            if problems:
+                facts.problems["depth"] = ", ".join(problems)
+            camera = image_set.camera(file.view)
+            facts.patches = consistency.sample(camera, depth, RAYS_A_VIEW)
+        if not rendered:
+            self._compare_marks(file, image, facts)
+        elif images.NAN_ATTRIBUTE in image.attributes:
+            facts.nan = int(image.attributes[images.NAN_ATTRIBUTE])
+            facts.clamped = int(image.attributes.get(images.CLAMPED_ATTRIBUTE, 0))
+            if facts.nan:
+                facts.problems["counts"] = f"{facts.nan} rendered values were not a number"
+
+    def _compare_marks(self, file: File, image: images.Image, facts: Facts) -> None:
+        """Compare the pixels that are marked as without source with what the two lenses say."""
+        regions = self._of_source(file)
+        if regions is None:
+            return
+        with_source, without = regions
+        if "Z" in image.channels:
+            marked = np.isnan(image.channels["Z"])
+        elif "A" in image.channels:
+            marked = image.channels["A"] == 0
+        else:
+            marked = np.zeros(without.shape, bool)
+        facts.marked = True
+        problems = []
+        for region, text in (
+            (without & ~marked, "pixels without a source are not marked"),
+            (with_source & marked, "pixels with a source are marked as without"),
+        ):
+            count = int(region.sum())
+            problems += [f"{count} {text}"] if count else []
+        if any(image.channels[name][without].any() for name in "RGB"):
+            problems.append("has colour in pixels without a source")
+        if problems:
+            facts.problems["marks"] = ", ".join(problems)
+
+    def _of_lens(self, lens: Lens) -> tuple[Bools, Bools]:
+        """Return where the lens has a ray, and where it has none, less the rim."""
+        if lens not in self.regions:
+            seen = np.isfinite(_rays(lens)[..., 0])
+            self.regions[lens] = _inner(seen), _inner(~seen)
+        return self.regions[lens]
+
+    def _of_source(self, file: File) -> tuple[Bools, Bools] | None:
+        """Return where a reprojected view's source sees something, and where not, less the rim.
+
+        None: the dataset has no view of the same name at the same place.
+        """
+        target, source = self.sets[file.set], self.sets[0]
+        name = target.views[file.view]
+        if name not in source.views:  # a face of a cube map is named for its view, and itself
+            name = name.rpartition("_")[0]
+        if source.name or name not in source.views:
+            return None
+        to_world, from_world = target.matrices[file.view], source.matrices[source.views.index(name)]
+        if np.abs(to_world[:3, 3] - from_world[:3, 3]).max() > 1e-5:
+            return None
+        # Rounded, and free of −0, so that views turned alike share one answer.
+        turn = np.round(from_world[:3, :3].T @ to_world[:3, :3], 5).astype(np.float32) + 0
+        key = (target.lens, turn.tobytes())
+        if key not in self.regions:
+            pixels = source.lens.pixels(_rays(target.lens) @ turn.T)
+            frame = np.array([source.lens.width, source.lens.height], np.float32)
+            with np.errstate(invalid="ignore"):
+                seen = ((pixels >= 0) & (pixels <= frame)).all(axis=-1)
+            if len(self.regions) > MOST_REGIONS:
+                self.regions.clear()
+            self.regions[key] = _inner(seen), _inner(~seen)
+        return self.regions[key]
+
+
+def _rays(lens: Lens) -> Array:
+    """Return the rays (height, width, 3), float32, of all pixel centres."""
+    x = np.arange(lens.width, dtype=np.float32) + np.float32(0.5)
+    y = np.arange(lens.height, dtype=np.float32) + np.float32(0.5)
+    return lens.rays(x[np.newaxis, :], y[:, np.newaxis])
+
+
+def _inner(region: Bools) -> Bools:
+    """Return a region without its rim; the image's edge is no rim."""
+    inner: Bools = binary_erosion(region, np.ones((3, 3)), RIM_PIXELS, border_value=1)
+    return inner
+
+
+def _format_problem(file: File, image_set: ImageSet, image: images.Image) -> str | None:
+    """Say which channels a view has and should have, if they differ in name or type."""
+    found = {name: str(pixels.dtype) for name, pixels in image.channels.items()}
+    colour = [*"RGB", *(["A"] if "A" in found and image_set.name else [])]
+    if file.path.endswith(".png"):
+        wanted = dict.fromkeys(colour, "uint16" if found.get("R") == "uint16" else "uint8")
+    else:
+        wanted = dict.fromkeys(colour, "float16")
+        if image_set.depth:
+            wanted["Z"] = "float16" if found.get("Z") == "float16" else "float32"
+    if found == wanted:
+        return None
+    texts = [
+        " ".join(f"{name}:{kind}" for name, kind in sorted(channels.items()))
+        for channels in (found, wanted)
+    ]
+    return f"has the channels {texts[0]}; must have {texts[1]}"
+
+
+def _colour_problems(channels: list[Array]) -> list[str]:
+    """Say which colours are no finite numbers, or that all are black."""
+    problems = []
+    finite = [np.isfinite(channel) for channel in channels]
+    if not all(part.all() for part in finite):
+        bad = [channel[~part] for channel, part in zip(channels, finite, strict=True)]
+        nan = sum(int(np.isnan(values).sum()) for values in bad)
+        infinite = sum(len(values) for values in bad) - nan
+        problems += [f"{nan} values are not a number"] if nan else []
+        problems += [f"{infinite} values are infinite"] if infinite else []
+    if not any(channel.any() for channel in channels):
+        problems.append("is black")
+    return problems
