@@ -141,6 +141,13 @@ def thin(rig: Mapping[str, Any], max_views: int) -> dict[str, Any]:
     raise UserError(f"a rig of type {kind} cannot have as few as {max_views} views")
 
 
+def lf_type(rig: Mapping[str, Any]) -> str:
+    """Return lightfield.json's ``lf_type`` of a rig; a rig of poses has that of its file."""
+    if rig["type"] == "poses":
+        return _read_poses(Path(rig["file"]))[0]
+    return LF_TYPE[rig["type"]]
+
+
 def lightfield(rig: Mapping[str, Any], lens: Mapping[str, Any]) -> dict[str, Any]:
     """Return the content of lightfield.json for a rig seen through a lens.
 
@@ -164,12 +171,9 @@ def lightfield(rig: Mapping[str, Any], lens: Mapping[str, Any]) -> dict[str, Any
         if rig.get("evaluation_split"):
             frame["split"] = "test" if pose.number % 2 else "train"
         frames.append(frame)
-    lf_type = LF_TYPE[rig["type"]]
-    if rig["type"] == "poses":
-        lf_type = _read_poses(Path(rig["file"]))[0]
     return {
         "camera": lens["camera"],
-        "lf_type": lf_type,
+        "lf_type": lf_type(rig),
         "resolution": lens["resolution"],
         "sensor_size": lens["sensor_size"],
         "frames": frames,

@@ -1,0 +1,246 @@
+"""lightfield.json: the lens of a dataset once, and the pose of each of its views.
+
+The keys are SILVR's (``camera``, ``lf_type``, ``resolution``, ``sensor_size``, ``frames``) and ours
+beside them: ``depth``, what channel Z of the views means, ``frame`` of the scene, ``scene`` and
+``render``, what was rendered and how. Files that SILVR's tools wrote are read too.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json, write_json
+from lightfield.geometry import lenses, rigs
+from lightfield.geometry.lenses import Lens, Rectilinear
+
+Floats = NDArray[np.float64]
+
+NAME = "lightfield.json"
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One of ``frames``: what SILVR calls a frame is a view, for a scene has frames of its own.
+
+    ``matrix`` (4, 4) is camera-to-world, in metres; the camera looks along −Z, +Y is up.
+    ``position`` (3,) in metres and ``rotation`` (3,), XYZ Euler angles in radians as Blender has
+    them, say the same. ``others`` are the frame's other keys.
+    """
+
+    name: str
+    matrix: Floats
+    position: Floats
+    rotation: Floats
+    others: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def split(self) -> str | None:
+        """Whether the view is meant to ``train`` on or to ``test`` with; None where all are."""
+        return self.others.get("split")
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "name": self.name,
+            "position": self.position.tolist(),
+            "rotation": self.rotation.tolist(),
+            "world_matrix": self.matrix.tolist(),
+            **self.others,
+        }
+
+
+@dataclass(eq=False)
+class LightField:
+    """A lightfield.json: ``content`` holds all its keys but ``frames``, which are the ``views``.
+
+    ``lens`` is that of every view. ``depth`` is what channel Z of the views means: "z", along the
+    optical axis, "distance", or None for no depth; where the file lacks the key, as SILVR's do, it
+    is "z" if the lens can have that. Raises `UserError`, one line with ``path`` and the key, for a
+    lens that is not known and for a depth that it cannot have.
+    """
+
+    content: Mapping[str, Any]
+    views: Sequence[View]
+    path: Path = Path(NAME)
+    lens: Lens = field(init=False)
+    depth: str | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        try:
+            self.lens = lenses.from_lightfield(self.content)
+        except UserError as error:
+            raise UserError(f"{self.path}: {error}") from None
+        usual = "z" if self.lens.has_z_depth else "distance"
+        self.depth = self.content.get("depth", usual)
+        if self.depth not in (None, "distance", usual):
+            raise UserError(
+                f"{self.path}: depth: is {self.depth!r}; with this lens it must be "
+                f"{'z, ' if usual == 'z' else ''}distance or null"
+            )
+
+    @classmethod
+    def from_rig(cls, rig: Mapping[str, Any], lens: Lens, **keys: Any) -> "LightField":
+        """Return what a rig sees through a lens; ``keys`` are further ones of the file.
+
+        Where the rig asks for an evaluation split, it is "test" for odd sequence numbers, as
+        SILVR's paper suggests, and "train" for the others. Raises `UserError` where a cube map's
+        lens is not a 90° rectilinear.
+        """
+        intrinsics = lens.to_lightfield()
+        if rig.get("cube_map"):
+            diagonal = np.diagonal(intrinsics["camera"].get("projection_matrix", np.zeros((4, 4))))
+            if not np.allclose(diagonal[:2], 1.0, rtol=0, atol=1e-6):
+                raise UserError("cube_map: its camera must be rectilinear with fov: 90 and square")
+        content = {
+            "camera": intrinsics["camera"],
+            "lf_type": rigs.lf_type(rig),
+            "resolution": intrinsics["resolution"],
+            "sensor_size": intrinsics["sensor_size"],
+            **keys,
+        }
+        split = ("train", "test") if rig.get("evaluation_split") else None
+        views = [
+            View(
+                pose.name,
+                np.round(pose.matrix(), 12) + 0.0,  # without noise such as 6e-17 or −0
+                np.array(pose.position),
+                np.array(pose.rotation),
+                {"split": split[pose.number % 2]} if split else {},
+            )
+            for pose in rigs.poses(rig)
+        ]
+        return cls(content, views)
+
+    @classmethod
+    def read(cls, path: Path | str) -> "LightField":
+        """Read a file; whatever is wrong with it is a `UserError` of one line that names the key.
+
+        Of ``world_matrix`` on one side and ``position`` and ``rotation`` on the other, one may be
+        missing. Where both are there they are not compared: validation does that.
+        """
+        path = Path(path)
+        content = read_json(path)
+        if not isinstance(content, dict):
+            raise UserError(f"{path}: must be a mapping, not a {type(content).__name__}")
+        return cls.from_json(content, path)
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any], path: Path = Path(NAME)) -> "LightField":
+        """Return what a file's ``content`` says; errors are those of `read`."""
+        others = dict(content)
+        frames = others.pop("frames", None)
+        lightfield = cls(others, (), path)
+        try:
+            if not isinstance(frames, list):
+                raise UserError("frames: must be a list of views")
+            if not frames:
+                raise UserError("frames: is empty")
+            views = [_view(f"frames[{index}]", frame) for index, frame in enumerate(frames)]
+            seen: set[str] = set()
+            for index, view in enumerate(views):
+                if view.name in seen:
+                    raise UserError(f"frames[{index}]: {view.name}: is the name of two frames")
+                seen.add(view.name)
+        except UserError as error:
+            raise UserError(f"{path}: {error}") from None
+        return replace(lightfield, views=views)
+
+    def write(self, path: Path | str) -> None:
+        """Write the file, atomically."""
+        write_json(path, self.to_json())
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the file's content."""
+        return {**self.content, "frames": [view.to_json() for view in self.views]}
+
+    def changed(
+        self, lens: Lens | None = None, views: Sequence[View] | None = None, **keys: Any
+    ) -> "LightField":
+        """Return a copy with another lens, other views, or other values of ``keys``."""
+        intrinsics = lens.to_lightfield() if lens else {}
+        return replace(
+            self,
+            content={**self.content, **intrinsics, **keys},
+            views=self.views if views is None else views,
+        )
+
+    @property
+    def folder(self) -> Path:
+        """The folder that the file lies in."""
+        return self.path.parent
+
+    @property
+    def cycles_depth(self) -> str:
+        """What Cycles' depth pass holds: "z" for a perspective camera, or else "distance"."""
+        return "z" if isinstance(self.lens, Rectilinear) else "distance"
+
+    @cached_property
+    def matrices(self) -> Floats:
+        """The views' camera-to-world matrices, (n, 4, 4)."""
+        return np.array([view.matrix for view in self.views]).reshape(-1, 4, 4)
+
+    @property
+    def frame(self) -> int:
+        """The frame of the scene that was rendered."""
+        return int(self._key("frame"))
+
+    @property
+    def scene(self) -> Mapping[str, Any]:
+        """What was rendered: ``name``, ``fingerprint`` and how the scene was built."""
+        found: Mapping[str, Any] = self._key("scene")
+        return found
+
+    @property
+    def render(self) -> Mapping[str, Any]:
+        """How it was rendered: the scene YAML's ``render`` block."""
+        found: Mapping[str, Any] = self._key("render")
+        return found
+
+    def _key(self, key: str) -> Any:
+        if key not in self.content:
+            raise UserError(f"{self.path}: {key}: is missing; scripts/make_lightfield.py writes it")
+        return self.content[key]
+
+
+def _view(where: str, frame: Any) -> View:
+    """Return the view of one of ``frames``; its matrix from the angles or they from it."""
+    if not isinstance(frame, dict):
+        raise UserError(f"{where}: must be a mapping, not {frame!r}")
+    others = dict(frame)
+    name = others.pop("name", None)
+    if not isinstance(name, str) or not name or "/" in name or "\\" in name:
+        raise UserError(f"{where}: name: must be a file name, not {name!r}")
+    numbers = {}
+    for key, shape in (("world_matrix", (4, 4)), ("position", (3,)), ("rotation", (3,))):
+        if key in others:
+            numbers[key] = _numbers(f"{where}: {key}", others.pop(key), shape)
+    matrix = numbers.get("world_matrix")
+    if matrix is None:
+        for key in ("position", "rotation"):
+            if key not in numbers:
+                raise UserError(f"{where}: {key}: is missing, and so is world_matrix")
+        matrix = np.eye(4)
+        matrix[:3, :3] = rigs.euler_to_matrix(numbers["rotation"])
+        matrix[:3, 3] = numbers["position"]
+    position = numbers.get("position", matrix[:3, 3])
+    rotation = numbers.get("rotation")
+    if rotation is None:
+        rotation = rigs.matrix_to_euler(matrix[:3, :3])
+    return View(name, matrix, position, rotation, others)
+
+
+def _numbers(where: str, value: Any, shape: tuple[int, ...]) -> Floats:
+    """Return finite numbers of a given shape as an array."""
+    try:
+        array = np.array(value)
+    except ValueError:  # rows of different lengths
+        array = np.empty(0)
+    if array.shape != shape or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+        size = " × ".join(map(str, shape))
+        raise UserError(f"{where}: must be {size} finite numbers")
+    return array.astype(np.float64)
