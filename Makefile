@@ -1,28 +1,49 @@
 # `make` sets up the environment and builds the default dataset; `make test` sets up and runs the tests.
 
-PYTHON ?= $(shell command -v python3.11 || echo python3)
 CORES ?= $(shell getconf _NPROCESSORS_ONLN)
 
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
-.PHONY: all test check
+PIP = .venv/bin/pip --quiet --disable-pip-version-check
+# Of the environment's Python, as in the locks' names.
+VERSION = $$(.venv/bin/python -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+LOCK = uv pip compile --generate-hashes --no-emit-index-url --no-header --quiet
+
+.PHONY: all test check locks
 
 all: .venv/complete
 	snakemake --cores $(CORES)
 
 test: check
+	python envs/check_system.py --browser
 	python -m pytest -n $(CORES)
 
 # Style, types, and Snakemake's own advice.
-check: .venv/complete
+check: .venv/complete-for-tests
 	ruff check .
 	ruff format --check .
 	mypy scripts/lightfield
 	snakefmt --check Snakefile rules
 	snakemake --lint
 
-.venv/complete: envs/requirements.txt envs/check_system.py
-	$(PYTHON) envs/check_system.py
-	$(PYTHON) -m venv --clear .venv
-	.venv/bin/pip install --quiet --disable-pip-version-check --require-hashes -r envs/requirements.txt
-	touch .venv/complete
+# PYTHON names an interpreter; without it the best that is there is taken.
+.venv/complete: envs/requirements-3.13.txt envs/requirements-3.11.txt
+	@set -e; python=$$(envs/find_python.sh $(PYTHON)); \
+	echo "setting up .venv with $$python: some minutes, mostly to download 400 MB"; \
+	"$$python" envs/check_system.py; \
+	"$$python" -m venv --clear .venv
+	@$(PIP) install --require-hashes -r envs/requirements-$(VERSION).txt
+	@touch $@
+
+.venv/complete-for-tests: .venv/complete envs/requirements-test-3.13.txt envs/requirements-test-3.11.txt
+	@$(PIP) install --require-hashes -r envs/requirements-test-$(VERSION).txt
+	@touch $@
+
+# Resolve anew what the locks do not hold yet; delete a lock to renew all that is in it. Needs uv.
+locks:
+	for version in 3.13 3.11; do \
+		$(LOCK) --python-version $$version envs/requirements-test.in -o envs/requirements-test-$$version.txt && \
+		$(LOCK) --python-version $$version envs/requirements.in \
+			--constraints envs/requirements-test-$$version.txt -o envs/requirements-$$version.txt || exit; \
+	done
+	echo uv | $(LOCK) --universal - -o envs/requirements-uv.txt

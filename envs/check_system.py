@@ -1,9 +1,16 @@
-"""Check what the environment cannot bring along: Python 3.11 and the libraries that bpy links to.
+"""Install what the environment cannot bring along, as root on Debian or Ubuntu, or say what it is.
 
-Uses the standard library only, because it runs before anything is installed.
+That is the libraries that bpy links to, Python's own module for environments, and for the tests a
+browser. Uses the standard library only, because it runs before anything is installed.
 """
 
+import argparse
 import ctypes
+import importlib
+import importlib.util
+import os
+import shutil
+import subprocess
 import sys
 
 # Shared library: Debian and Ubuntu package.
@@ -20,22 +27,36 @@ LIBRARIES = {
 
 
 def main() -> None:
-    problems = []
-    if sys.version_info[:2] != (3, 11):
-        found = ".".join(map(str, sys.version_info[:2]))
-        problems.append(
-            f"Python 3.11 is needed (bpy 5.0 has no other); this is {found}. "
-            "Name another with: make PYTHON=/path/to/python3.11"
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--browser", action="store_true", help="the tests' browser too")
+    browser = parser.parse_args().browser
+    packages = missing(browser)
+    if not packages:
+        return
+    if shutil.which("apt-get") and os.geteuid() == 0:
+        print(f"installing {' '.join(packages)}", flush=True)
+        environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
+        for words in (["update"], ["install", "--yes", *packages]):
+            subprocess.run(["apt-get", "--quiet=2", *words], env=environment, check=False)
+        importlib.invalidate_caches()
+        packages = missing(browser)
+    if packages:
+        sys.exit(
+            "error: system packages are missing; on Debian or Ubuntu: "
+            f"sudo apt-get install {' '.join(packages)}"
         )
+
+
+def missing(browser: bool) -> list[str]:
+    """Return the Debian packages of what is not there."""
+    packages = []
     if sys.platform == "linux":
-        missing = [package for library, package in LIBRARIES.items() if not loads(library)]
-        if missing:
-            problems.append(
-                "Blender needs system libraries that are not installed; on Debian or Ubuntu:\n"
-                f"  sudo apt-get install {' '.join(missing)}"
-            )
-    if problems:
-        sys.exit("error: " + "\nerror: ".join(problems))
+        packages = [package for library, package in LIBRARIES.items() if not loads(library)]
+    if not importlib.util.find_spec("ensurepip"):
+        packages.append("python{}.{}-venv".format(*sys.version_info))
+    if browser and not shutil.which("chromium"):
+        packages.append("chromium")
+    return packages
 
 
 def loads(library: str) -> bool:

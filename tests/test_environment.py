@@ -1,0 +1,90 @@
+"""Which Python `make` takes: the first that runs, and else what uv downloads."""
+
+import shutil
+import subprocess
+
+import pytest
+from checkouts import ROOT
+
+
+class Machine:
+    """Has no Python; a test adds programs that answer with a text, and finds what `make` takes."""
+
+    def __init__(self, home):
+        self.home, self.programs = home, home / "programs"
+        self.programs.mkdir()
+        for name in ("bash", "dirname"):
+            (self.programs / name).symlink_to(shutil.which(name))
+        # Not root, who would install what is missing.
+        self.add("id", "echo 1000")
+
+    def add(self, path, script):
+        program = self.programs / path
+        program.parent.mkdir(parents=True, exist_ok=True)
+        program.write_text(f"#!{shutil.which('bash')}\n{script}\n")
+        program.chmod(0o755)
+        return str(program)
+
+    def find(self, *words):
+        return subprocess.run(
+            [self.programs / "bash", ROOT / "envs/find_python.sh", *words],
+            env={"PATH": f"{self.home}/shims:{self.programs}", "HOME": str(self.home)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+
+@pytest.fixture
+def machine(tmp_path):
+    return Machine(tmp_path)
+
+
+def test_a_newer_python_comes_first(machine):
+    machine.add("python3", "echo 3.11")
+    newer = machine.add("python3.13", "echo 3.13")
+    assert machine.find().stdout == f"{newer}\n"
+
+
+def test_a_shim_that_does_not_run_does_not_count(machine):
+    machine.add("../shims/python3.13", "echo command not found >&2; exit 127")
+    older = machine.add("python3.11", "echo 3.11")
+    assert machine.find().stdout == f"{older}\n"
+    behind = machine.add("python3.13", "echo 3.13")
+    assert machine.find().stdout == f"{behind}\n"
+
+
+def test_a_python_that_pyenv_keeps_is_found(machine):
+    machine.add("../shims/python3.13", "exit 127")
+    kept = machine.home / ".pyenv/versions/3.13.0/bin/python3"
+    machine.add(kept, "echo 3.13")
+    assert machine.find().stdout == f"{kept}\n"
+
+
+def test_without_any_uv_downloads_one(machine):
+    machine.add("python3", "echo 3.12")
+    machine.add("uv", '[[ $2 != find ]] || echo "$UV_PYTHON_INSTALL_DIR/bin/python3.13"')
+    result = machine.find()
+    assert result.stdout == f"{ROOT}/.python/bin/python3.13\n"
+    assert "downloading" in result.stderr
+
+
+def test_where_nothing_can_be_downloaded_one_line_says_what_to_install(machine):
+    machine.add("python3", "echo 3.12")
+    machine.add("uv", "[[ $1 == --version ]]")
+    result = machine.find()
+    assert (result.returncode, result.stdout) == (1, "")
+    *_, last = result.stderr.splitlines()
+    assert last.startswith("error: no Python 3.13 or 3.11 runs here")
+    assert "sudo apt-get install python3 python3-venv" in last
+
+
+def test_a_named_python_must_run_and_be_of_a_supported_version(machine):
+    older = machine.add("python3.11", "echo 3.11")
+    machine.add("python3.13", "echo 3.13")
+    assert machine.find(older).stdout == f"{older}\n"
+    for script in ("echo 3.12", "exit 127"):
+        wrong = machine.add("python3.14", script)
+        result = machine.find(wrong)
+        assert result.returncode == 1
+        assert result.stderr.startswith(f"error: PYTHON is {wrong}, which is not Python 3.13 or")
