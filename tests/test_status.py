@@ -13,6 +13,7 @@ import pytest
 from checkouts import ROOT, snakemake
 
 import render_shard
+import status
 from lightfield.core import progress
 from lightfield.dataset import keys
 from lightfield.imaging import images
@@ -22,7 +23,7 @@ IDENTITY = np.eye(4).tolist()
 
 
 @pytest.fixture
-def dataset(tmp_path, run_program):
+def dataset(tmp_path, monkeypatch, capsys):
     """A dataset of four views of which the first ``count`` are rendered, and its status."""
     folder, made = tmp_path / "results/scene/rig", tmp_path / "work/scene/rig"
     content = {
@@ -30,10 +31,12 @@ def dataset(tmp_path, run_program):
         "frames": [{"name": name, "world_matrix": IDENTITY} for name in NAMES],
     }
 
-    def status(others=()):
-        words = ("--dataset", "scene/rig", 4, "flat", *others)
+    def lines(others=()):
         folders = ("--results", tmp_path / "results", "--work", tmp_path / "work")
-        return run_program("status.py", *folders, *words).stdout.splitlines()
+        words = ("status.py", *folders, "--dataset", "scene/rig", 4, "flat", *others)
+        monkeypatch.setattr(sys, "argv", list(map(str, words)))
+        status.main()
+        return capsys.readouterr().out.splitlines()
 
     def render(*names, settings=content):
         (folder / "exr").mkdir(parents=True, exist_ok=True)
@@ -49,9 +52,9 @@ def dataset(tmp_path, run_program):
         text = "".join(json.dumps(line) + "\n" for line in lines)
         (made / f"render/{name}.journal.jsonl").write_text(text)
 
-    status.folder, status.content = folder, content
-    status.render, status.journal = render, journal
-    return status
+    lines.folder, lines.content = folder, content
+    lines.render, lines.journal = render, journal
+    return lines
 
 
 def started(ago, pid):
@@ -79,10 +82,13 @@ def test_views_of_other_settings_are_not_counted(dataset):
     assert dataset()[1] == "  rendered: 2 of 4, no rate yet"
 
 
-def test_the_rate_of_the_shards_at_work_tells_the_time_left(dataset):
+def test_the_rate_of_the_shards_at_work_tells_the_time_left(dataset, monkeypatch):
     dataset.render("a", "b")
-    # The first process of the machine stands for the renderer's: it is there, and old enough.
-    dataset.journal("0-4", started(1000, pid=1), *(finished("a", ago) for ago in (900, 500, 1)))
+    # This process stands for the renderer's. It began just now, so the clock is put forward.
+    now = time.time() + 1000
+    monkeypatch.setattr(status.time, "time", lambda: now)
+    start = started(1000, pid=os.getpid())
+    dataset.journal("0-4", start, *(finished("a", ago) for ago in (900, 500, 1)))
     lines = dataset()
     # Two views within the last ten minutes, and two are left.
     assert lines[1] == (
