@@ -26,6 +26,13 @@ onstart:
     write_json(RUN, {f"{RESULTS}/{d.scene}/{d.rig}": d.view_count for d in CHOSEN})
 
 
+onerror:
+    # Snakemake has something to say after this, too: what failed is repeated when it has.
+    atexit.register(
+        print, failure_report(failed_jobs()), file=sys.stderr, flush=True
+    )
+
+
 rule all:
     default_target: True
     input:

@@ -1,17 +1,24 @@
 # The configuration, and where everything lies. Every path of the workflow comes from here.
+import atexit
 import json
 import math
+import os
 import shlex
 import sys
 from functools import cache
 from pathlib import Path
 
 sys.path.insert(0, str(Path(workflow.basedir) / "scripts"))
-# The rules call `python`: let that be the one that runs Snakemake.
-shell.prefix(f"export PATH={shlex.quote(str(Path(sys.executable).parent))}:$PATH; ")
+# A prefix takes the place of Snakemake's own, whose strict mode keeps the exit status of a program
+# before `| tee`. The rules call `python`: let that be the one that runs Snakemake.
+shell.prefix(
+    "set -euo pipefail;"
+    f" export PATH={shlex.quote(str(Path(sys.executable).parent))}:$PATH; "
+)
 
 from lightfield.dataset.config import VIEWS, load_config, load_datasets, scene_datasets
 from lightfield.core.errors import UserError
+from lightfield.core.failures import failure_report
 from lightfield.core.files import write_json
 from lightfield.dataset.keys import scene_fingerprint
 
@@ -433,6 +440,19 @@ def reprojection_words(wildcards):
 def panorama_width(wildcards):
     """Give the panorama twice a 180 degree fisheye view's angular resolution, within 4096 pixels."""
     return min(4 * dataset_of(wildcards).cameras["camera"]["resolution"][0], 4096)
+
+
+def failed_jobs():
+    """Return rule and log of each job that failed; of a group's, of those that began in vain."""
+    failed = [job for job in workflow.scheduler.failed if not job.is_group()]
+    failed += [
+        job
+        for group in workflow.scheduler.failed
+        if group.is_group()
+        for job in group.jobs
+        if Path(job.log[0]).exists() and not all(map(os.path.exists, job.output))
+    ]
+    return sorted((job.rule.name, Path(job.log[0])) for job in failed)
 
 
 def drop_false_records():

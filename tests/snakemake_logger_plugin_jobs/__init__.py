@@ -7,6 +7,8 @@ from logging import LogRecord
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
+FILES = ("input", "output", "log")
+
 
 class LogHandler(LogHandlerBase):
     writes_to_stream = True
@@ -19,6 +21,7 @@ class LogHandler(LogHandlerBase):
         if getattr(record, "event", None) != LogEvent.JOB_INFO:
             return
         job = {"rule": record.rule_name, "cpus": record.threads}
+        job |= {name: [str(file) for file in getattr(record, name)] for name in FILES}
         for name in ("mem_mb", "runtime", "gpu"):
             job[name] = record.resources.get(name)
         print(json.dumps(job), file=sys.stderr)

@@ -1,1 +1,1 @@
-"""Errors, files, progress and command lines: what every other room stands on."""
+"""Errors, failures, files, progress and command lines: what every other room stands on."""

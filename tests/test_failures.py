@@ -1,0 +1,179 @@
+"""Failing programs: each fails its job, and why is the last thing that the terminal says."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from checkouts import checkout
+
+from lightfield.core.failures import cause, failure_report
+
+ROOT = Path(__file__).parents[1]
+# A scene that needs what the smoke scene does not: a download, and a calibration.
+BROUGHT = """
+scene:
+  blend: scene.blend
+  url: https://example.org/scene.blend
+  sha256: "0000000000000000000000000000000000000000000000000000000000000000"
+render: {target_error: 0.1}
+rigs:
+  LFPlane:
+    type: plane
+    cameras: [2, 1]
+    camera: {lens: equidistant, fov: 180, resolution: [16, 16]}
+exports:
+  instant_ngp: {sources: [views]}
+"""
+TARGETS = [
+    *("all", "smoke", "package_all", "rig_tables", "plan", "status"),
+    *("error_vs_time", "reprojection_benchmark", "stability", "render_overhead"),
+]
+CHOSEN = ["--config", "scenes=[brought]", "rigs=all", "preset=full"]
+RULES = [
+    *("fetch_brought",),
+    *(
+        rule
+        for file in sorted((ROOT / "rules").glob("*.smk"))
+        for rule, body in re.findall(
+            r"^rule (\w+):\n((?:(?: .*)?\n)+)", file.read_text() + "\n", re.M
+        )
+        if "    shell:" in body
+    ),
+]
+# In place of every program: it does its work, as far as Snakemake can see, and fails after that.
+FAILING = f"""#!{sys.executable}
+import os, sys
+from pathlib import Path
+for name in os.environ["WORK_TO_DO"].split(os.pathsep):
+    if name:
+        Path(name).write_text("done")
+print("what comes before it")
+sys.exit("error: the stand-in fails")
+"""
+WHEN = 1_700_000_000
+
+
+class Failing:
+    """A checkout whose programs fail; every file that a job reads or writes is there."""
+
+    def __init__(self, folder):
+        self.folder = checkout(folder, brought=BROUGHT)
+        programs = [*(ROOT / "scripts").glob("*.py"), *(ROOT / "benchmarks").glob("*.py")]
+        for program in programs:
+            stand_in = self.folder / program.relative_to(ROOT)
+            stand_in.parent.mkdir(exist_ok=True)
+            stand_in.write_text(FAILING)
+        (self.folder / "bin").mkdir()
+        (self.folder / "bin/tar").write_text(FAILING)
+        (self.folder / "bin/tar").chmod(0o755)
+        plan = self.run("--dry-run", "--forceall", "--logger", "jobs", *CHOSEN, "--", *TARGETS)
+        jobs = [json.loads(line) for line in plan.stdout.splitlines() if line.startswith("{")]
+        self.jobs = {job["rule"]: job for job in jobs if job["log"]}
+        self.files = {file for job in jobs for file in (*job["input"], *job["output"])}
+        self.files = {file for file in self.files if not file.startswith("configs/")}
+
+    def run(self, *arguments, work=()):
+        return subprocess.run(
+            [sys.executable, "-m", "snakemake", "--cores", "1", *arguments],
+            cwd=self.folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=os.environ
+            | {
+                "PATH": f"{self.folder / 'bin'}:{os.environ['PATH']}",
+                "PYTHONPATH": str(Path(__file__).parent),
+                "WORK_TO_DO": os.pathsep.join(work),
+            },
+        )
+
+    def fail(self, *rules, options=()):
+        """Run the job of each rule alone; return what the terminal says."""
+        # One content and one time that pass for a record, a calibration, and a checked .blend.
+        content = {"files": {}, "cost_samples": 4, "bytes": 200, "mtime_ns": WHEN * 10**9}
+        for file in self.files:
+            path = self.folder / file
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(json.dumps(content).ljust(200))
+            os.utime(path, (WHEN, WHEN))
+        jobs = [self.jobs[rule] for rule in rules]
+        targets = [job["output"][0] if job["output"] else job["rule"] for job in jobs]
+        work = [file for job in jobs for file in job["output"]]
+        run = self.run(
+            *("--rerun-triggers", "mtime", *options, *CHOSEN, "--force", *targets), work=work
+        )
+        assert run.returncode != 0, run.stdout
+        return run.stdout
+
+
+@pytest.fixture(scope="session")
+def failing(tmp_path_factory):
+    return Failing(tmp_path_factory.mktemp("failing"))
+
+
+def last_words(failing, *rules):
+    return "".join(
+        f"{rule} failed: error: the stand-in fails\n  log: {failing.jobs[rule]['log'][0]}\n"
+        for rule in rules
+    )
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_a_program_that_fails_after_its_work_fails_its_job(failing, rule):
+    terminal = failing.fail(rule)
+    assert f"Error in rule {rule}:" in terminal
+    assert "MissingOutputException" not in terminal
+    assert terminal.endswith(last_words(failing, rule)), terminal
+    job = failing.jobs[rule]
+    assert (failing.folder / job["log"][0]).is_file()
+    assert not any((failing.folder / file).exists() for file in job["output"])
+
+
+def test_every_job_that_failed_is_named_at_the_end(failing):
+    terminal = failing.fail("stability", "rig_tables")
+    assert terminal.endswith(last_words(failing, "rig_tables", "stability")), terminal
+
+
+# Of the two jobs of this group the second waits for the first; it did not fail.
+@pytest.mark.parametrize("groups", [[], ["--groups", "render=shard", "reproject=shard"]])
+def test_a_job_that_fails_on_a_cluster_is_named_at_the_end(failing, groups):
+    submit = failing.folder / "submit.sh"
+    submit.write_text('bash "$1" > node.log 2>&1 && echo success || echo failed\n')
+    options = [
+        *("--executor", "cluster-generic", "--jobs", "1", "--cluster-generic-status-cmd", "echo"),
+        *("--cluster-generic-submit-cmd", "bash submit.sh", "--seconds-between-status-checks", "1"),
+        *groups,
+    ]
+    terminal = failing.fail("render", options=options)
+    assert terminal.endswith(last_words(failing, "render")), terminal
+
+
+def test_the_cause_is_the_last_error_or_else_the_last_line(tmp_path):
+    log = tmp_path / "log"
+    assert cause(log) is None
+    log.write_text("\n \n")
+    assert cause(log) is None
+    log.write_text("render: 3 of 6 views\nMemoryError\n\n")
+    assert cause(log) == "MemoryError"
+    log.write_text("error: before a retry\nerror: no such scene\nBlender quit\n")
+    assert cause(log) == "error: no such scene"
+    log.write_bytes(b"tar: a: Cannot open: \xff\ntar: Exiting with failure status due to\n")
+    assert cause(log) == "tar: a: Cannot open: �"
+
+
+def test_the_same_cause_of_many_jobs_is_said_once(tmp_path):
+    for name, text in (("a", "error: no GPU"), ("b", "error: no GPU"), ("c", "error: full")):
+        (tmp_path / name).write_text(text)
+    jobs = [("render", tmp_path / name) for name in "abcd"]
+    assert failure_report(jobs).splitlines() == [
+        "render failed: error: no GPU",
+        f"  log: {tmp_path / 'a'} (and 1 more with the same cause)",
+        "render failed: error: full",
+        f"  log: {tmp_path / 'c'}",
+        "render failed: it said nothing",
+        f"  log: {tmp_path / 'd'}",
+    ]
