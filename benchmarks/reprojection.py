@@ -34,7 +34,9 @@ SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
 sys.path.insert(0, str(SCRIPTS))
 
 from lightfield.core.errors import UserError  # noqa: E402
-from lightfield.geometry.lenses import Array, Equidistant, Lens, Rectilinear  # noqa: E402
+from lightfield.geometry.lenses import Array, Lens  # noqa: E402
+from lightfield.geometry.lenses.equidistant import Equidistant  # noqa: E402
+from lightfield.geometry.lenses.rectilinear import Rectilinear  # noqa: E402
 from lightfield.imaging import images  # noqa: E402
 from lightfield.report.plots import (  # noqa: E402
     BLUE,

@@ -24,7 +24,8 @@ from lightfield.core import cli
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
 from lightfield.core.progress import Progress
-from lightfield.geometry.lenses import CUBE_FACES, Array, CubeMap, Lens
+from lightfield.geometry.lenses import Array, Lens
+from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.rigs import matrix_to_euler
 from lightfield.imaging.images import (
     DEPTH_ATTRIBUTE,

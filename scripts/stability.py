@@ -36,20 +36,17 @@ from lightfield.core.files import atomic_path
 from lightfield.core.progress import Progress
 from lightfield.geometry import rigs
 from lightfield.geometry.depth import distance_from_z, z_from_distance
-from lightfield.geometry.lenses import (
-    Array,
-    CubeMap,
-    Equidistant,
-    Equirectangular,
-    Equisolid,
-    FovLens,
-    KannalaBrandt,
-    Lens,
-    Orthographic,
-    Polynomial,
-    Rectilinear,
-    Stereographic,
-)
+from lightfield.geometry.lenses import Array, Lens
+from lightfield.geometry.lenses.base import CircleFisheye
+from lightfield.geometry.lenses.cube_map import CubeMap
+from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.equisolid import Equisolid
+from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
+from lightfield.geometry.lenses.orthographic import Orthographic
+from lightfield.geometry.lenses.polynomial import Polynomial
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.lenses.stereographic import Stereographic
 from lightfield.report.plots import BLUE, VERMILION, plot
 from lightfield.reprojection import lens_map, resample
 
@@ -134,7 +131,7 @@ def half_fov(lens: Any) -> mpf:
 @functools.cache
 def scales(lens: Lens) -> Pixel:
     """Return what one pixel is, across and down, in the unit of the lens's r."""
-    if isinstance(lens, FovLens):
+    if isinstance(lens, CircleFisheye):
         return mpf(2) / lens.width, mpf(2) / lens.height
     return mpf(lens.sensor[0]) / lens.width, mpf(lens.sensor[1]) / lens.height
 

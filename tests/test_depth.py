@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lightfield.geometry.depth import distance_from_z, z_from_distance
-from lightfield.geometry.lenses import Equidistant
+from lightfield.geometry.lenses.equidistant import Equidistant
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

@@ -7,7 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from lightfield.core.errors import UserError
-from lightfield.geometry.lenses import CubeMap, Equidistant, Equirectangular, Rectilinear
+from lightfield.geometry.lenses.cube_map import CubeMap
+from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.reprojection import lens_map
 
 FISHEYE = Equidistant(width=101, height=101, fov=math.pi)

@@ -15,13 +15,10 @@ import pytest
 import reproject
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.geometry.lenses import (
-    CUBE_FACES,
-    CubeMap,
-    Equidistant,
-    Equirectangular,
-    Rectilinear,
-)
+from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
+from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging.images import read_header, read_image, write_exr, write_png
 from lightfield.reprojection import lens_map, resample
 
@@ -352,7 +349,9 @@ def test_a_cube_map_and_back(dataset, run, monkeypatch):
     for path in out.glob("*_[blrud].exr"):
         # Only the front half was seen: fill the rest, so that the cube is a whole one.
         face = path.stem[-1]
-        x, y = np.meshgrid(np.arange(64) + 0.5 + 64 * CUBE_FACES.index(face), np.arange(64) + 0.5)
+        x, y = np.meshgrid(
+            np.arange(64) + 0.5 + 64 * list(CUBE_FACES).index(face), np.arange(64) + 0.5
+        )
         color = scene_color(cube.rays(x, y))
         write_exr(path, {c: color[..., i].astype("f2") for i, c in enumerate("RGB")})
     command = ["reproject.py", "--input-dir", str(out), "--input-cfg", str(dataset / "cube.json")]

@@ -8,15 +8,13 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 
-from lightfield.geometry.lenses import (
-    CubeMap,
-    Equidistant,
-    Equirectangular,
-    Equisolid,
-    Lens,
-    Rectilinear,
-    Stereographic,
-)
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.cube_map import CubeMap
+from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.equisolid import Equisolid
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.lenses.stereographic import Stereographic
 from lightfield.reprojection import lens_map, resample
 
 FILTERS = ["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp"]

@@ -13,7 +13,9 @@ from mpmath import mpf
 import stability
 from lightfield.core.errors import UserError
 from lightfield.core.progress import Progress
-from lightfield.geometry.lenses import Equidistant, Lens, Rectilinear
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 ALL = stability.extreme_lenses()
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.geometry.depth import distance_from_z, z_from_distance
-from lightfield.geometry.lenses import Lens, Rectilinear
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import Pose
 
 Floats = NDArray[np.float64]

@@ -16,23 +16,16 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
-from lightfield.geometry.lenses import (
-    CUBE_FACES,
-    Array,
-    CubeMap,
-    Equidistant,
-    Equirectangular,
-    Equisolid,
-    KannalaBrandt,
-    Lens,
-    Orthographic,
-    Polynomial,
-    Rectilinear,
-    Stereographic,
-    cube_face_rotation,
-    from_camera,
-    from_lightfield,
-)
+from lightfield.geometry.lenses import Array, Lens, from_camera, from_lightfield
+from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
+from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.equisolid import Equisolid
+from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
+from lightfield.geometry.lenses.orthographic import Orthographic
+from lightfield.geometry.lenses.polynomial import Polynomial
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.lenses.stereographic import Stereographic
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.resample import DEFAULT_FILTER, FILTERS
 
@@ -274,9 +267,7 @@ def _targets(arguments: argparse.Namespace, source: Lens) -> list[Target]:
         if arguments.cubemap < 1:
             raise UserError(f"--cubemap {arguments.cubemap}: must be at least 1 pixel")
         face = CubeMap(width=6 * arguments.cubemap, height=arguments.cubemap).face
-        return [
-            Target(f"_{name}", face, rotation @ cube_face_rotation(name)) for name in CUBE_FACES
-        ]
+        return [Target(f"_{name}", face, rotation @ turn) for name, turn in CUBE_FACES.items()]
     lens = _lens(arguments, "", width, height)
     if arguments.camera:
         try:

@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path
-from lightfield.geometry.lenses import CUBE_FACES, Array, CubeMap, Lens, cube_face_rotation
+from lightfield.geometry.lenses import Array, Lens
+from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.reprojection.resample import ADAPTIVE, DEFAULT_FILTER, FILTERS, SUPPORT
 
 # What a target pixel (or one of its samples) finds in the source.
@@ -326,7 +327,7 @@ def _strip_with_borders(source: CubeMap, border: int) -> Array:
     """Return where the pixels of the faces with borders lie in the strip; see `LensMap.strip`."""
     places = np.arange(-border, source.height + border) + 0.5
     rays = source.face.rays(places[None, :], places[:, None])
-    faces = [source.pixels(rays @ cube_face_rotation(face).T) for face in CUBE_FACES]
+    faces = [source.pixels(rays @ rotation.T) for rotation in CUBE_FACES.values()]
     return np.concatenate(faces, axis=1).astype(np.float32)
 
 
@@ -393,9 +394,9 @@ def _on_face_of(source: CubeMap, coordinates: Array, middle: Array) -> Array:
     """Return the coordinates, those on another face than ``middle`` continued onto its plane."""
     out = coordinates.copy()
     here, there = (np.floor(c[..., 0] / source.height) for c in (middle, coordinates))
-    for index, name in enumerate(CUBE_FACES):
+    for index, rotation in enumerate(CUBE_FACES.values()):
         other = (here == index) & (there != index)
-        rays = source.rays(out[other, 0], out[other, 1]) @ cube_face_rotation(name)
+        rays = source.rays(out[other, 0], out[other, 1]) @ rotation
         out[other] = source.face.pixels(rays) + np.array([index * source.height, 0])
     return out
 

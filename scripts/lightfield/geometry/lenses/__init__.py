@@ -1,0 +1,70 @@
+"""Every projection as a class of its own, in a file of its own that holds all there is to it."""
+
+import importlib
+import pkgutil
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Union
+
+from pydantic import Field, TypeAdapter, ValidationError
+
+from lightfield.core.errors import UserError
+from lightfield.geometry.lenses.base import LENSES, Array, Lens, LensSettings, pair
+
+__all__ = ["LENSES", "Array", "CameraSettings", "Lens", "from_camera", "from_lightfield"]
+
+for _module in pkgutil.iter_modules(__path__):
+    importlib.import_module(f"{__name__}.{_module.name}")
+
+if TYPE_CHECKING:
+    CameraSettings = LensSettings
+else:
+    CameraSettings = Annotated[
+        Union[tuple(lens.Settings for lens in LENSES.values() if lens.Settings)],  # noqa: UP007
+        Field(discriminator="lens"),
+    ]
+"""A scene YAML's ``camera``: the settings of any lens, which its key ``lens`` chooses."""
+
+
+def from_camera(camera: Mapping[str, Any]) -> Lens:
+    """Return the lens of a scene YAML's ``camera`` mapping.
+
+    ``fov`` is in degrees: across the image's width for a rectilinear lens, that of the image
+    circle for a fisheye. ``sensor_size`` is its width, or both sides, in mm. Raises `UserError`.
+    """
+    try:
+        settings: LensSettings = TypeAdapter(CameraSettings).validate_python(camera)
+    except ValidationError as error:
+        problem = error.errors()[0]
+        key = ".".join(["camera", *map(str, problem["loc"][1:])])
+        raise UserError(f"{key}: {problem['msg']}") from None
+    return settings.make()
+
+
+def from_lightfield(content: Mapping[str, Any]) -> Lens:
+    """Return the lens of a lightfield.json, one of ours or one that SILVR's tools wrote.
+
+    A key that is missing or has an unknown value is a `UserError` that names it.
+    """
+    try:
+        camera = content["camera"]
+        width, height = content["resolution"]
+        image: dict[str, Any] = {"width": int(width), "height": int(height)}
+        if "sensor_size" in content:
+            image["sensor_size"] = pair(content["sensor_size"])
+        if "principal_point" in camera:
+            image["principal_point"] = pair(camera["principal_point"])
+        return _lens_of(camera).read(camera, image)
+    except KeyError as error:
+        raise UserError(f"{error.args[0]}: is missing, so the lens is not known") from None
+    except (TypeError, ValueError) as error:
+        raise UserError(f"camera, resolution or sensor_size: {error}") from None
+
+
+def _lens_of(camera: Mapping[str, Any]) -> type[Lens]:
+    if camera["type"] not in ("PERSP", "PANO"):
+        raise UserError(f"camera.type: {camera['type']!r} is neither PERSP nor PANO")
+    kind = "PERSP" if camera["type"] == "PERSP" else camera["panorama_type"]
+    for lens in LENSES.values():
+        if kind in lens.camera_types:
+            return lens
+    raise UserError(f"camera.panorama_type: {kind!r} is not a lens of this program")

@@ -1,0 +1,407 @@
+"""What every lens is: two inverse methods, and how it is read from each of three places.
+
+The camera looks along −Z with +Y up and +X right. Pixel coordinates run right (x) and down (y)
+from the image's top left corner, pixel centres at (i + 0.5). θ is a ray's angle from the optical
+axis, r the distance from the principal point. Conventions are those of Blender's Cycles, measured
+on its Position pass with bpy 5.0.1:
+
+- equidistant: on a non-square image the image circle is an ellipse that touches all four edges;
+  the sensor plays no part. The other lenses given by a field of view alone follow suit here.
+- equisolid and polynomial: r is in millimetres on the sensor, so circles stay circles when the
+  sensor's pixels are square.
+- polynomial: θ = −(k0 + k1 r + k2 r² + k3 r³ + k4 r⁴), so a usual lens has k1 < 0, and k1 > 0
+  turns the image by 180°.
+- equirectangular: longitude grows to the right, latitude upwards, (0, 0) is the optical axis.
+
+Arithmetic follows the input: float32 in, float32 out, anything else float64. NaN marks what a
+lens cannot do: a pixel without a ray (outside the image circle), a ray that the lens does not see.
+The image's frame is not part of a lens: both methods extend beyond it, and a caller that reads
+pixels has to check that they lie in [0, width] × [0, height].
+"""
+
+import math
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from lightfield.core.errors import UserError
+
+Array = npt.NDArray[Any]
+Pair = tuple[float, float]
+
+SENSOR_WIDTH = 36.0  # mm, Blender's default
+# Blender keeps angles in float32, whose π, π/2 and 2π exceed the true ones by less than this.
+ANGLE_SLACK = 1e-6
+
+LENSES: dict[str, "type[Lens]"] = {}
+"""Every lens, by its name."""
+
+# YAML's numbers: neither a text nor true or false is one.
+Number = Annotated[float, Field(strict=True)]
+Positive = Annotated[float, Field(strict=True, gt=0)]
+Pixels = Annotated[int, Field(strict=True, ge=1, le=65536)]
+FocalLength = Annotated[float, Field(strict=True, gt=0, description="Millimetres.")]
+
+
+class LensSettings(BaseModel):
+    """One camera's lens and image, as a scene YAML has them; each lens adds its own keys.
+
+    What the schema cannot say is for the lens itself to check, with errors of the form
+    ``key: what is wrong``.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    lens: str
+    resolution: list[Pixels] = Field(
+        min_length=2, max_length=2, description="Width and height in pixels."
+    )
+    sensor_size: Positive | Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = (
+        Field(None, description="Millimetres: the width, or width and height.")
+    )
+    principal_point: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = Field(
+        None, description="In pixels; without it, the centre."
+    )
+
+    @model_validator(mode="after")
+    def _is_a_lens(self) -> Self:
+        try:
+            self.make()
+        except UserError as error:
+            raise ValueError(str(error)) from None
+        return self
+
+    def make(self) -> "Lens":
+        """Return the lens."""
+        width, height = self.resolution
+        size, center = self.sensor_size, self.principal_point
+        if isinstance(size, float):
+            size = [size, size * height / width]
+        return LENSES[self.lens](
+            width=width,
+            height=height,
+            sensor_size=pair(size) if size else None,
+            principal_point=pair(center) if center else None,
+            **self.optics(),
+        )
+
+    def optics(self) -> dict[str, Any]:
+        """Return the lens's own parameters, in its units: mm and radians."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lens(ABC):
+    """A projection on an image of ``width`` × ``height`` pixels.
+
+    ``sensor_size`` is in mm (default: 36 wide, square pixels), ``principal_point`` in pixels
+    (default: the image's centre).
+
+    Beside its geometry a lens's class says what it is called and how it is read:
+
+    - ``name``: in a scene YAML, and as a flag of a command;
+    - ``title``: in words;
+    - ``camera_types``: its ``panorama_type`` in lightfield.json, for a perspective camera its
+      ``type``; the first is written, any of them is read;
+    - ``in_cycles``: whether Cycles renders it, else it is reached by reprojection;
+    - ``Settings``: its keys in a scene YAML, or None if it is no lens for one;
+    - ``form``: the numbers of its flag, in mm and radians, optional ones in brackets.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    camera_types: ClassVar[tuple[str, ...]]
+    in_cycles: ClassVar[bool] = False
+    Settings: ClassVar[type[LensSettings] | None] = None
+    form: ClassVar[str | None] = None
+
+    width: int
+    height: int
+    sensor_size: Pair | None = None
+    principal_point: Pair | None = None
+
+    def __init_subclass__(cls) -> None:
+        if "name" in vars(cls):
+            LENSES[cls.name] = cls
+
+    def __post_init__(self) -> None:
+        if self.width < 1 or self.height < 1:
+            raise UserError(f"resolution: {self.width} × {self.height} is not an image")
+        if not all(0.0 < side < math.inf for side in self.sensor):
+            raise UserError(f"sensor_size: {list(self.sensor)} must be positive millimetres")
+        if not all(math.isfinite(coordinate) for coordinate in self.center):
+            raise UserError(f"principal_point: {list(self.center)} must be finite pixels")
+
+    @property
+    def sensor(self) -> Pair:
+        """The sensor's width and height in mm."""
+        return self.sensor_size or (SENSOR_WIDTH, SENSOR_WIDTH * self.height / self.width)
+
+    @property
+    def center(self) -> Pair:
+        """The principal point in pixels."""
+        return self.principal_point or (self.width / 2, self.height / 2)
+
+    @property
+    def description(self) -> str:
+        """The projection and its field of view in words."""
+        return self.title
+
+    @property
+    @abstractmethod
+    def has_z_depth(self) -> bool:
+        """Whether every ray has cos θ ≥ 0, so that Z-depth can hold its depth."""
+
+    def rays(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Array:
+        """Return unit rays (..., 3) of the pixel coordinates ``x``, ``y`` (...).
+
+        NaN where the lens has no ray.
+        """
+        x, y = np.broadcast_arrays(*_as_float(x, y))
+        # One dimension at least, for numpy computes with scalars in float64.
+        rays = self._rays(np.atleast_1d(x), np.atleast_1d(y))
+        return rays.astype(x.dtype, copy=False).reshape(*x.shape, 3)
+
+    def pixels(self, rays: npt.ArrayLike) -> Array:
+        """Return the pixel coordinates (..., 2) of ``rays`` (..., 3) of any length above zero.
+
+        NaN where the lens does not see the ray; what it sees may lie outside the frame.
+        """
+        (array,) = _as_float(rays)
+        pixels = self._pixels(np.atleast_2d(array)).astype(array.dtype, copy=False)
+        pixels[~np.isfinite(pixels).all(axis=-1)] = np.nan
+        return pixels.reshape(*array.shape[:-1], 2)
+
+    def pixel_rays(self) -> Array:
+        """Return the unit rays (height, width, 3) of all pixels' centres, in float64."""
+        return self.rays(np.arange(self.width) + 0.5, np.arange(self.height)[:, None] + 0.5)
+
+    @abstractmethod
+    def _rays(self, x: Array, y: Array) -> Array:
+        """Return `rays` of arrays of one shape and dtype."""
+
+    @abstractmethod
+    def _pixels(self, rays: Array) -> Array:
+        """Return `pixels` of an array; NaN or inf in either coordinate marks a miss."""
+
+    def resized(self, width: int, height: int) -> Self:
+        """Return the lens of the same field of view with another number of pixels."""
+        center = self.principal_point and (
+            self.principal_point[0] * width / self.width,
+            self.principal_point[1] * height / self.height,
+        )
+        return replace(
+            self, width=width, height=height, sensor_size=self.sensor, principal_point=center
+        )
+
+    def to_lightfield(self) -> dict[str, Any]:
+        """Return ``camera``, ``resolution`` and ``sensor_size`` as lightfield.json has them."""
+        kind = self.camera_types[0]
+        names = {"type": "PERSP"} if kind == "PERSP" else {"type": "PANO", "panorama_type": kind}
+        camera = {**names, **self._to_camera()}
+        if self.principal_point is not None:
+            camera["principal_point"] = list(self.principal_point)
+        return {
+            "camera": camera,
+            "resolution": [self.width, self.height],
+            "sensor_size": list(self.sensor),
+        }
+
+    def _to_camera(self) -> dict[str, Any]:
+        """Return the lens's own keys in the ``camera`` mapping of lightfield.json."""
+        return {}
+
+    @classmethod
+    def read(cls, camera: Mapping[str, Any], image: Mapping[str, Any]) -> Self:
+        """Return the lens of a ``camera`` mapping of lightfield.json.
+
+        ``image`` holds the fields that all lenses have, as far as the file has them. A missing
+        key is a KeyError, a wrong value a TypeError, ValueError or `UserError`.
+        """
+        return cls(**image, **cls._from_camera(camera))
+
+    @classmethod
+    def _from_camera(cls, camera: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the lens's own parameters that `_to_camera` wrote, or one of SILVR's tools."""
+        return {}
+
+    @classmethod
+    def from_flag(cls, text: str, width: int, height: int) -> Self:
+        """Return the lens of the numbers of its flag; raises `UserError`."""
+        assert cls.form is not None
+        numbers = named_numbers(text, cls.form)
+        sensor = numbers.pop("SENSOR_WIDTH", None)
+        size = None if sensor is None else (sensor, sensor * height / width)
+        return cls(width=width, height=height, sensor_size=size, **cls._from_flag(numbers))
+
+    @classmethod
+    def _from_flag(cls, numbers: Mapping[str, float]) -> dict[str, Any]:
+        """Return the lens's own parameters, of its flag's numbers by their names in `form`."""
+        return {name.lower(): number for name, number in numbers.items()}
+
+
+class RadialLens(Lens):
+    """A lens whose r depends on θ alone; r is counted in the unit of `_unit`."""
+
+    @property
+    @abstractmethod
+    def _unit(self) -> Pair:
+        """The units of r that a pixel's width and height make."""
+
+    @property
+    @abstractmethod
+    def _limit(self) -> float:
+        """The largest r of the lens."""
+
+    @abstractmethod
+    def _sin_cos(self, r: Array) -> tuple[Array, Array]:
+        """Return sin θ and cos θ at r."""
+
+    @abstractmethod
+    def _radius(self, sin: Array, cos: Array) -> Array:
+        """Return r of θ, in which ``sin`` ≥ 0; NaN where there is none."""
+
+    def _rays(self, x: Array, y: Array) -> Array:
+        u = (x - self.center[0]) * self._unit[0]
+        v = (self.center[1] - y) * self._unit[1]
+        r = np.hypot(u, v)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            sin, cos = self._sin_cos(r)
+            # The azimuth at r = 0 matters only where θ(0) ≠ 0: there Cycles takes "up".
+            ray = np.stack(
+                [sin * np.where(r > 0, u / r, 0), sin * np.where(r > 0, v / r, 1), -cos], axis=-1
+            )
+            ray[~((r <= self._limit * slack(x.dtype)) & np.isfinite(r))] = np.nan
+        return np.asarray(ray)
+
+    def _pixels(self, rays: Array) -> Array:
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            # Scaled by the largest component: no overflow, and NaN for a ray of zero or inf.
+            rays = rays / np.abs(rays).max(axis=-1, keepdims=True)
+            side = np.hypot(rays[..., 0], rays[..., 1])
+            length = np.hypot(side, rays[..., 2])
+            r = self._radius(side / length, -rays[..., 2] / length)
+            r = np.where(np.abs(r) <= self._limit * slack(rays.dtype), r, np.nan)
+            # The azimuth of the axis itself matters only backwards: "up" there, too.
+            u = r * np.where(side > 0, rays[..., 0] / side, 0)
+            v = r * np.where(side > 0, rays[..., 1] / side, 1)
+            x = self.center[0] + u / self._unit[0]
+            y = self.center[1] - v / self._unit[1]
+        return np.stack([x, y], axis=-1)
+
+    @property
+    def has_z_depth(self) -> bool:
+        with np.errstate(invalid="ignore"):
+            return bool(self._sin_cos(np.asarray(self._limit))[1] >= -ANGLE_SLACK)
+
+    def _pixel_size(self, length: float = 1.0) -> Pair:
+        """Return a pixel's width and height on the sensor, in lengths of ``length`` mm."""
+        return (self.sensor[0] / self.width / length, self.sensor[1] / self.height / length)
+
+
+class FisheyeSettings(LensSettings):
+    """A fisheye in a scene YAML."""
+
+    fov: float
+
+    def optics(self) -> dict[str, Any]:
+        return {"fov": math.radians(self.fov)}
+
+
+def fov_up_to(largest: float, default: Any = ...) -> Any:
+    """Return the field `fov` of a fisheye's settings, of at most ``largest`` degrees."""
+    text = "Full field of view, degrees."
+    return Field(default, strict=True, gt=0, le=largest, description=text)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fisheye(RadialLens):
+    """A lens that sees what is within ``fov`` / 2 radians of its axis."""
+
+    largest_fov: ClassVar[float] = 360.0  # degrees
+
+    fov: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0.0 < self.fov <= math.radians(self.largest_fov) + ANGLE_SLACK:
+            raise UserError(
+                f"fov: {math.degrees(self.fov):g} degrees is not within 0 to "
+                f"{self.largest_fov:g}, the {self.title}'s limit"
+            )
+
+    @property
+    def description(self) -> str:
+        return f"{self.title}, {math.degrees(self.fov):.4g}°"
+
+    def _to_camera(self) -> dict[str, Any]:
+        return {"fisheye_fov": self.fov}
+
+    @classmethod
+    def _from_camera(cls, camera: Mapping[str, Any]) -> dict[str, Any]:
+        return {"fov": float(camera["fisheye_fov"])}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CircleFisheye(Fisheye):
+    """A fisheye whose image circle (radius 1) touches the image's edges."""
+
+    form = "FOV"
+
+    @property
+    def _unit(self) -> Pair:
+        return (2 / self.width, 2 / self.height)
+
+    @property
+    def _limit(self) -> float:
+        return 1.0
+
+
+def checked_focal_length(focal_length: float) -> None:
+    if not 0.0 < focal_length < math.inf:
+        raise UserError(f"focal_length: {focal_length:g} must be positive millimetres")
+
+
+def checked_coefficients(coefficients: Sequence[float], count: int, names: str) -> None:
+    if len(coefficients) != count or not all(map(math.isfinite, coefficients)):
+        raise UserError(f"coefficients: {list(coefficients)} must be {count} numbers, {names}")
+
+
+def slack(dtype: np.dtype[Any]) -> float:
+    """Return the factor by which rounding may carry a point on the rim beyond it."""
+    return 1.0 + 8.0 * float(np.finfo(dtype).eps)
+
+
+def pair(values: Sequence[float]) -> Pair:
+    """Return two numbers as floats."""
+    first, second = values
+    return float(first), float(second)
+
+
+def named_numbers(text: str, form: str) -> dict[str, float]:
+    """Return the comma-separated numbers of ``text`` by their names in ``form``.
+
+    Names in brackets, as B in ``A[,B]``, may be missing. Raises `UserError` unless ``text`` is
+    of the form.
+    """
+    names = re.findall(r"\w+", form)
+    least = len(re.findall(r"\w+", form.partition("[")[0]))
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if not least <= len(values) <= len(names) or not all(map(math.isfinite, values)):
+        raise UserError(f"must have the form {form}")
+    return dict(zip(names, values, strict=False))
+
+
+def _as_float(*arrays: npt.ArrayLike) -> list[Array]:
+    """Return the arrays in float32 if all are, else in float64."""
+    same = all(np.asarray(array).dtype == np.float32 for array in arrays)
+    return [np.asarray(array, np.float32 if same else np.float64) for array in arrays]

@@ -1,0 +1,87 @@
+"""The cube map: six perspective faces."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightfield.core.errors import UserError
+from lightfield.geometry.lenses.base import SENSOR_WIDTH, Array, Lens
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+
+CUBE_FACES: dict[str, Array] = {
+    name: np.column_stack([right, up, np.cross(right, up)]).astype(np.float64)
+    for name, right, up in (
+        ("f", (1, 0, 0), (0, 1, 0)),
+        ("b", (-1, 0, 0), (0, 1, 0)),
+        ("l", (0, 0, -1), (0, 1, 0)),
+        ("r", (0, 0, 1), (0, 1, 0)),
+        ("u", (1, 0, 0), (0, 0, 1)),
+        ("d", (1, 0, 0), (0, 0, -1)),
+    )
+}
+"""Faces in order: the rotation (3, 3) from each face's camera to the cube map's.
+
+Faces are named as the sides of a cuboid rig, and turned as they are there: f looks along −Z,
+b along +Z, l along −X, r along +X, u along +Y and d along −Y; f, b, l and r have +Y up, u has
++Z up and d has −Z up.
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CubeMap(Lens):
+    """Six square rectilinear faces of 90°, side by side in the order f b l r u d.
+
+    On disk each face is an image of its own; in memory they form one strip, six times as wide as
+    high, of which the columns from i · height on are face i. A kernel must not reach across a
+    face's border, where the strip's neighbours are no neighbours in space. Source: Greene 1986.
+    """
+
+    name = "cube_map"
+    title = "cube map"
+    camera_types = ("CUBE_MAP",)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.principal_point is not None:
+            raise UserError("principal_point: a cube map has none")
+        if self.width != 6 * self.height:
+            raise UserError(
+                f"resolution: {self.width} × {self.height} is not a cube map's; "
+                f"its width is 6 times its height, so {6 * self.height} × {self.height}"
+            )
+
+    @property
+    def face(self) -> Rectilinear:
+        """The lens of one face."""
+        return Rectilinear(width=self.height, height=self.height, focal_length=SENSOR_WIDTH / 2)
+
+    def _rays(self, x: Array, y: Array) -> Array:
+        size = self.height
+        with np.errstate(invalid="ignore"):
+            inside = (x >= 0) & (x <= self.width) & (y >= 0) & (y <= size)
+        index = np.minimum(np.where(inside, x, 0) // size, 5).astype(np.intp)
+        local = self.face.rays(x - (index * size).astype(x.dtype), y)
+        rotations = np.stack(list(CUBE_FACES.values())).astype(x.dtype)
+        ray = (rotations[index] @ local[..., None])[..., 0]
+        ray[~inside] = np.nan
+        return np.asarray(ray)
+
+    def _pixels(self, rays: Array) -> Array:
+        rotations = [rotation.astype(rays.dtype) for rotation in CUBE_FACES.values()]
+        out = np.full((*rays.shape[:-1], 2), np.nan, rays.dtype)
+        with np.errstate(invalid="ignore"):
+            # The face that a ray meets is the one whose axis it is nearest.
+            index = np.argmax(np.stack([-(rays @ r[:, 2]) for r in rotations]), axis=0)
+            for i, rotation in enumerate(rotations):
+                chosen = index == i
+                x, y = np.moveaxis(self.face.pixels(rays[chosen] @ rotation), -1, 0)
+                # Rounding must not carry a pixel to the next face of the strip, which is no
+                # neighbour in space.
+                first, end = np.asarray([i, i + 1], rays.dtype) * self.height
+                out[chosen, 0] = np.clip(x + first, first, np.nextafter(end, first))
+                out[chosen, 1] = np.clip(y, 0, self.height)
+        return out
+
+    @property
+    def has_z_depth(self) -> bool:
+        return False

@@ -1,0 +1,127 @@
+"""The panorama of longitudes and latitudes."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field
+
+from lightfield.core.errors import UserError
+from lightfield.geometry.lenses.base import ANGLE_SLACK, Array, Lens, LensSettings, Pair, pair
+
+Longitude = Annotated[float, Field(strict=True, ge=-180, le=180)]
+Latitude = Annotated[float, Field(strict=True, ge=-90, le=90)]
+
+
+class EquirectangularSettings(LensSettings):
+    """A panorama, or a part of one, in a scene YAML."""
+
+    lens: Literal["equirectangular"]
+    longitude: list[Longitude] = Field(
+        [-180.0, 180.0], min_length=2, max_length=2, description="Smallest and largest, degrees."
+    )
+    latitude: list[Latitude] = Field(
+        [-90.0, 90.0], min_length=2, max_length=2, description="Smallest and largest, degrees."
+    )
+
+    def optics(self) -> dict[str, Any]:
+        return {
+            "longitude": pair([math.radians(value) for value in self.longitude]),
+            "latitude": pair([math.radians(value) for value in self.latitude]),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equirectangular(Lens):
+    """Longitude linear in x, latitude linear in y, in radians. Source: Cycles' EQUIRECTANGULAR.
+
+    A ray outside a partial range of longitudes goes to the side of the frame that it is nearer;
+    a pole, which has every longitude, goes to longitude 0.
+    """
+
+    name = "equirectangular"
+    title = "equirectangular panorama"
+    # SILVR's reprojection tool writes RECTILINEAR for its equirectangular panoramas.
+    camera_types = ("EQUIRECTANGULAR", "RECTILINEAR")
+    in_cycles = True
+    Settings = EquirectangularSettings
+    form = "LONG_MIN,LONG_MAX,LAT_MIN,LAT_MAX|full"
+
+    longitude: Pair = (-math.pi, math.pi)
+    latitude: Pair = (-math.pi / 2, math.pi / 2)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.principal_point is not None:
+            raise UserError("principal_point: an equirectangular lens has none; use its ranges")
+        for name, (low, high), largest in (
+            ("longitude", self.longitude, math.inf),
+            ("latitude", self.latitude, math.pi / 2),
+        ):
+            if not (low < high and max(-low, high) <= largest + ANGLE_SLACK):
+                raise UserError(
+                    f"{name}: {math.degrees(low):g} to {math.degrees(high):g} degrees "
+                    "is not a range that grows within the sphere"
+                )
+        if self.longitude[1] - self.longitude[0] > 2 * math.pi + 2 * ANGLE_SLACK:
+            raise UserError("longitude: the range is more than 360 degrees")
+
+    def _rays(self, x: Array, y: Array) -> Array:
+        (west, east), (south, north) = self.longitude, self.latitude
+        longitude = west + (east - west) * (x / self.width)
+        latitude = north - (north - south) * (y / self.height)
+        with np.errstate(invalid="ignore"):
+            radius = np.maximum(np.cos(latitude), 0)
+            ray = np.stack(
+                [radius * np.sin(longitude), np.sin(latitude), -radius * np.cos(longitude)],
+                axis=-1,
+            )
+            ray[~((np.abs(latitude) <= math.pi / 2 + ANGLE_SLACK) & np.isfinite(x))] = np.nan
+        return np.asarray(ray)
+
+    def _pixels(self, rays: Array) -> Array:
+        (west, east), (south, north) = self.longitude, self.latitude
+        with np.errstate(invalid="ignore", divide="ignore"):
+            rays = rays / np.abs(rays).max(axis=-1, keepdims=True)
+        # 0 − z, not −z: atan2(0, −0) is π, and a pole belongs to longitude 0.
+        longitude = np.arctan2(rays[..., 0], 0 - rays[..., 2])
+        latitude = np.arctan2(rays[..., 1], np.hypot(rays[..., 0], rays[..., 2]))
+        turns = np.round((longitude - (west + east) / 2) / (2 * math.pi))
+        longitude = longitude - 2 * math.pi * turns
+        x = (longitude - west) / (east - west) * self.width
+        y = (north - latitude) / (north - south) * self.height
+        return np.stack([x, y], axis=-1)
+
+    @property
+    def has_z_depth(self) -> bool:
+        return max(-self.longitude[0], self.longitude[1]) <= math.pi / 2 + ANGLE_SLACK
+
+    def _to_camera(self) -> dict[str, Any]:
+        return {
+            "longitude_min": self.longitude[0],
+            "longitude_max": self.longitude[1],
+            "latitude_min": self.latitude[0],
+            "latitude_max": self.latitude[1],
+        }
+
+    @classmethod
+    def _from_camera(cls, camera: Mapping[str, Any]) -> dict[str, Any]:
+        return {
+            name: (float(camera[f"{name}_min"]), float(camera[f"{name}_max"]))
+            for name in ("longitude", "latitude")
+        }
+
+    @classmethod
+    def from_flag(cls, text: str, width: int, height: int) -> Self:
+        if text == "full":
+            return cls(width=width, height=height)
+        return super().from_flag(text, width, height)
+
+    @classmethod
+    def _from_flag(cls, numbers: Mapping[str, float]) -> dict[str, Any]:
+        return {
+            "longitude": (numbers["LONG_MIN"], numbers["LONG_MAX"]),
+            "latitude": (numbers["LAT_MIN"], numbers["LAT_MAX"]),
+        }
