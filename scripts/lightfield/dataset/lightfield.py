@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
 from lightfield.geometry import lenses, rigs
-from lightfield.geometry.lenses import Lens, Rectilinear
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 Floats = NDArray[np.float64]
 
