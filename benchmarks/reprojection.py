@@ -34,6 +34,7 @@ SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
 sys.path.insert(0, str(SCRIPTS))
 
 from lightfield.core.errors import UserError  # noqa: E402
+from lightfield.core.files import atomic_path  # noqa: E402
 from lightfield.geometry.lenses import Array, Lens  # noqa: E402
 from lightfield.geometry.lenses.equidistant import Equidistant  # noqa: E402
 from lightfield.geometry.lenses.rectilinear import Rectilinear  # noqa: E402
@@ -134,7 +135,10 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             batches = measure_batches(arguments, Path(folder))
         path = arguments.output / "reprojection_batches.csv"
-        with path.open("w", newline="", encoding="utf-8") as file:
+        with (
+            atomic_path(path) as temporary,
+            temporary.open("w", newline="", encoding="utf-8") as file,
+        ):
             writer = csv.writer(file)
             writer.writerow(["job", "program", "views", "cpu_s_a_view"])
             writer.writerows(batches)
@@ -352,7 +356,10 @@ def pareto_front(results: Sequence[Result]) -> list[Result]:
 
 def write_table(path: Path, results: Sequence[Result], front: Sequence[Result]) -> None:
     """Write the results as CSV, those on the front marked."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with (
+        atomic_path(path) as temporary,
+        temporary.open("w", newline="", encoding="utf-8") as file,
+    ):
         writer = csv.writer(file)
         writer.writerow([*Result.__dataclass_fields__, "on_front"])
         for result in results:

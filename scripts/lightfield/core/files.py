@@ -3,7 +3,8 @@
 import hashlib
 import json
 import os
-from collections.abc import Iterator
+import shutil
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -12,22 +13,41 @@ from lightfield.core.errors import UserError
 
 
 @contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn an OSError into a `UserError` that names ``path`` and the room on its disk."""
+    try:
+        yield
+    except OSError as error:
+        folder = next(parent for parent in path.absolute().parents if parent.exists())
+        free = shutil.disk_usage(folder).free
+        reason = error.strerror or error
+        raise UserError(
+            f"{path}: cannot be written: {reason}; {free} bytes are free on its disk"
+        ) from None
+
+
+@contextmanager
 def atomic_path(target: Path | str) -> Iterator[Path]:
     """Yield a temporary path beside ``target``; on success it is flushed to disk and renamed.
 
     The temporary name keeps the target's suffix, because image writers choose the format by it.
-    On any error the temporary file is removed and the target is left as it was.
+    On any error the temporary file is removed and the target is left as it was; an OSError, and an
+    empty file, become a `UserError`. Python reports every byte that it cannot write. A library
+    that may not must be checked by whoever calls it: it raises an OSError for a file cut short.
     """
     target = Path(target)
-    target.parent.mkdir(parents=True, exist_ok=True)
     temporary = target.with_name(f".{target.stem}.{os.getpid()}.tmp{target.suffix}")
-    try:
-        yield temporary
-        with temporary.open("rb+") as file:
-            os.fsync(file.fileno())
-        temporary.replace(target)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with writing(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            yield temporary
+            with temporary.open("rb+") as file:
+                if not file.seek(0, os.SEEK_END):
+                    raise OSError("the file is empty")
+                os.fsync(file.fileno())
+            temporary.replace(target)
+        finally:
+            temporary.unlink(missing_ok=True)
 
 
 def sha256(path: Path | str) -> str:
@@ -41,6 +61,36 @@ def write_json(path: Path | str, content: Any) -> None:
     text = json.dumps(content, indent=1, allow_nan=False) + "\n"
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def append_json_line(path: Path, entry: Mapping[str, Any]) -> None:
+    """Add ``entry`` to a file of one JSON object a line, at once and flushed to disk.
+
+    A last line that a kill or a full disk cut short is ended first.
+    """
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        line = json.dumps(entry).encode() + b"\n"
+        with path.open("a+b") as file:
+            if file.tell():
+                file.seek(-1, os.SEEK_END)
+                line = line if file.read() == b"\n" else b"\n" + line
+            file.write(line)
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def read_json_lines(path: Path) -> list[dict[str, Any]]:
+    """Return the objects of such a file, in their order; what is not one is left out."""
+    entries = []
+    for line in path.read_bytes().splitlines():
+        try:
+            entry = json.loads(line)
+        except ValueError:
+            continue
+        if isinstance(entry, dict):
+            entries.append(entry)
+    return entries
 
 
 def read_json(path: Path | str) -> Any:

@@ -11,7 +11,6 @@ that was really spent. Times of day are seconds since 1970. A process's lines ar
   process that was killed lacks this line.
 """
 
-import json
 import os
 import resource
 import socket
@@ -23,6 +22,8 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+
+from lightfield.core.files import append_json_line, read_json_lines
 
 
 class Journal:
@@ -37,9 +38,7 @@ class Journal:
     def append(self, entry: Mapping[str, Any]) -> None:
         """Add one line, at once."""
         if self.path:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            with self.path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(entry) + "\n")
+            append_json_line(self.path, entry)
 
     def end(self) -> None:
         """Add the line of a process that has done all its work."""
@@ -113,11 +112,7 @@ def read(path: Path) -> list[Run]:
     A line that a kill cut short is left out, and so is what stands before the first start.
     """
     runs: list[Run] = []
-    for line in path.read_text(encoding="utf-8").splitlines():
-        try:
-            entry = json.loads(line)
-        except json.JSONDecodeError:
-            continue
+    for entry in read_json_lines(path):
         if "started" in entry:
             runs.append(Run(entry))
         elif not runs:

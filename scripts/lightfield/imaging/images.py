@@ -4,6 +4,8 @@ OpenImageIO reads and writes, but for the pixels of EXR files in scan lines, whi
 package reads twice as fast and writes in two thirds of the time.
 """
 
+import struct
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -129,7 +131,8 @@ def write_exr(
         try:
             OpenEXR.File(header | dict(attributes or {}), planes).write(str(temporary))
         except RuntimeError as error:
-            raise UserError(f"{path}: cannot be written: {error}") from None
+            raise OSError(error) from None
+        _check_exr(temporary)
 
 
 def write_png(
@@ -152,7 +155,44 @@ def write_png(
     with atomic_path(path) as temporary:
         file = oiio.ImageOutput.create(str(temporary))
         if not (file.open(str(temporary), spec) and file.write_image(pixels) and file.close()):
-            raise UserError(f"{path}: cannot be written: {file.geterror()}")
+            raise OSError(file.geterror())
+        _check_png(temporary)
+
+
+def _check_exr(path: Path) -> None:
+    """Raise an OSError for an EXR in scan lines that was cut short while it was written.
+
+    OpenEXR reports no error of its last steps: the end of the pixels and the table of the chunks.
+    """
+    try:
+        file = OpenEXR.InputFile(str(path))
+        whole = file.isComplete()
+        if whole:
+            header = file.header()
+            last = header["dataWindow"].max.y
+            file.channels(list(header["channels"]), scanLine1=last, scanLine2=last)
+    except OSError:
+        whole = False
+    if not whole:
+        raise OSError("the file is cut short")
+
+
+def _check_png(path: Path) -> None:
+    """Raise an OSError for a PNG whose chunks are not all there, with the checksums they carry.
+
+    OpenImageIO reports no error of its last steps: small files may be empty, large ones cut short.
+    """
+    content = memoryview(path.read_bytes())
+    place, kind = 8, b""
+    try:
+        while kind != b"IEND":
+            length, kind = struct.unpack_from(">I4s", content, place)
+            (checksum,) = struct.unpack_from(">I", content, place + 8 + length)
+            if zlib.crc32(content[place + 4 : place + 8 + length]) != checksum:
+                raise OSError("the file is damaged: a chunk differs from its checksum")
+            place += 12 + length
+    except struct.error:
+        raise OSError("the file is cut short") from None
 
 
 def _open(path: Path | str) -> Any:

@@ -7,6 +7,7 @@ scene kept in memory.
 import math
 import os
 import re
+import struct
 import sys
 import tempfile
 import time
@@ -59,10 +60,31 @@ def new_scene() -> None:
 
 
 def save_scene(path: Path) -> None:
-    """Save the current scene as a compressed .blend without backup copies."""
+    """Save the current scene as a compressed .blend without backup copies; OSError if it fails."""
     bpy.context.preferences.filepaths.save_version = 0
-    with _quiet():
-        bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True, copy=True)
+    try:
+        with _quiet():
+            bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True, copy=True)
+    except RuntimeError as error:
+        raise OSError(str(error).strip()) from None
+    _check_blend(path)
+
+
+def _check_blend(path: Path) -> None:
+    """Raise an OSError for a compressed .blend that is cut short, of which Blender says nothing.
+
+    It ends with the table of its Zstandard frames: see "Zstandard Seekable Format" of the zstd
+    project. A head of 8 bytes, 8 bytes a frame of which the first 4 are its compressed length, and
+    9 bytes, which begin with the number of frames and end with a magic number.
+    """
+    content = path.read_bytes()
+    whole = content.endswith(b"\xb1\xea\x92\x8f")
+    if whole:
+        count = int.from_bytes(content[-9:-5], "little")
+        lengths = struct.unpack(f"<{2 * count}I", content[-9 - 8 * count : -9])[::2]
+        whole = len(content) == sum(lengths) + 8 + 8 * count + 9
+    if not whole:
+        raise OSError("the file is cut short")
 
 
 def open_scene(path: Path) -> None:

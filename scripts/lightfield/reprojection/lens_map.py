@@ -215,6 +215,11 @@ def save(path: Path | str, lens_map: LensMap) -> None:
         for name, array in fields.items():
             record[name][0] = array
         np.save(temporary, record)
+        try:
+            # NumPy does not report what is lost when it closes the file.
+            np.load(temporary, mmap_mode="r")
+        except ValueError as error:
+            raise OSError(f"the file is cut short: {error}") from None
 
 
 def load(path: Path | str) -> LensMap:

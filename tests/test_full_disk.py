@@ -1,0 +1,189 @@
+"""Every writer on a disk that is full: an error that names the file, and the old file unharmed."""
+
+import os
+import resource
+import subprocess
+from contextlib import contextmanager, nullcontext
+
+import numpy as np
+import pytest
+
+from lightfield.core import files
+from lightfield.core.errors import UserError
+from lightfield.dataset.journal import Journal
+from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.imaging import images
+from lightfield.rendering import blender
+from lightfield.report import page, plots
+from lightfield.reprojection import lens_map
+
+BLOCK = os.sysconf("SC_PAGE_SIZE")
+DISK_BLOCKS = 256
+FISHEYE = Equidistant(width=24, height=24, fov=3.0)
+
+
+def noise(seed, *shape):
+    return np.random.default_rng(seed).random(shape, np.float32)
+
+
+def write_exr(path, seed):
+    values = noise(seed, 64, 48)
+    half = values.astype(np.float16)
+    images.write_exr(path, {"R": half, "G": half, "B": half, "Z": values})
+
+
+def write_small_exr(path, seed):
+    images.write_exr(path, {"R": noise(seed, 2, 2).astype(np.float16)})
+
+
+def write_png(path, seed):
+    pixels = (noise(seed, 96, 64, 3) * 255).astype(np.uint8)
+    images.write_png(path, pixels, {images.KEY_ATTRIBUTE: "key"})
+
+
+def write_small_png(path, seed):
+    images.write_png(path, (noise(seed, 2, 2) * 255).astype(np.uint8))
+
+
+def write_plot(path, seed):
+    with plots.plot(path.with_suffix("")) as axes:
+        axes.plot(noise(seed, 20))
+
+
+def write_page(path, seed):
+    keys = ("rig", "link", "resolution", "lens", "valid", "picture")
+    page.write(
+        path, "index.html.j2", datasets=[dict.fromkeys(keys) | {"scene": "a", "views": seed}]
+    )
+
+
+def write_json(path, seed):
+    files.write_json(path, list(range(seed, seed + 4000)))
+
+
+def write_small_json(path, seed):
+    files.write_json(path, {"seed": seed})
+
+
+def write_lens_map(path, seed):
+    target = Rectilinear(width=12, height=12, focal_length=18 + seed)
+    lens_map.save(path, lens_map.compute(FISHEYE, target, np.eye(3)))
+
+
+def write_blend(path, seed):
+    blender.new_scene()
+    blender.bpy.context.scene.frame_end = 100 + seed
+    with files.atomic_path(path) as temporary:
+        blender.save_scene(temporary)
+
+
+# A .blend holds memory addresses: written again it may be somewhat smaller.
+SMALLER = {"a.blend": 2000}
+WRITERS = [
+    (write_exr, "a.exr"),
+    (write_small_exr, "a.exr"),
+    (write_png, "a.png"),
+    (write_small_png, "a.png"),
+    (write_plot, "a.svg"),
+    (write_plot, "a.png"),
+    (write_page, "a.html"),
+    (write_json, "a.json"),
+    (write_small_json, "a.json"),
+    (write_lens_map, "a.npy"),
+    (write_blend, "a.blend"),
+]
+
+
+@contextmanager
+def largest_file(size):
+    """Let no file grow beyond ``size`` bytes, as RLIMIT_FSIZE does."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A small file system of its own where that may be mounted, else a plain folder."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    size = f"size={DISK_BLOCKS * BLOCK}"
+    mount = ["mount", "-t", "tmpfs", "-o", size, "tmpfs", folder]
+    mounted = subprocess.run(mount, capture_output=True, check=False).returncode == 0
+    yield folder, mounted
+    if mounted:
+        subprocess.run(["umount", folder], check=True)
+
+
+@contextmanager
+def nearly_full(disk, blocks):
+    """Leave ``blocks`` blocks of a small disk; on another one, of each file."""
+    folder, mounted = disk
+    filler = folder / "filler"
+    with nullcontext() if mounted else largest_file(blocks * BLOCK):
+        if mounted:
+            free = os.statvfs(folder).f_bavail
+            filler.write_bytes(bytes((free - blocks) * BLOCK))
+        try:
+            yield
+        finally:
+            filler.unlink(missing_ok=True)
+
+
+def assert_refused(write, path):
+    """Assert that the file is not replaced and that the error is one line with its path."""
+    before = {p.name: p.read_bytes() for p in path.parent.iterdir()}
+    with pytest.raises(UserError) as caught:
+        write(path, 1)
+    told = str(caught.value)
+    assert told.startswith(f"{path.with_suffix('')}.")
+    assert ": cannot be written: " in told and "bytes are free" in told and "\n" not in told
+    after = {p.name: p.read_bytes() for p in path.parent.iterdir()}
+    assert after.keys() == before.keys()
+    assert after[path.name] == before[path.name]
+
+
+@pytest.mark.parametrize(("write", "name"), WRITERS)
+def test_no_byte_is_lost_unseen(write, name, tmp_path):
+    path = tmp_path / "folder" / name
+    write(path, 1)
+    size = path.stat().st_size - SMALLER.get(name, 0)
+    write(path, 0)
+    for part in (0, 1, size // 2, size - 13, size - 5, size - 1):
+        with largest_file(part):
+            assert_refused(write, path)
+    before = path.read_bytes()
+    write(path, 1)
+    assert path.read_bytes() != before
+
+
+@pytest.mark.parametrize(("write", "name"), WRITERS)
+def test_after_space_is_made_the_file_is_written(write, name, small_disk):
+    path = small_disk[0] / name
+    write(path, 1)
+    blocks = -(-(path.stat().st_size - SMALLER.get(name, 0)) // BLOCK)
+    write(path, 0)
+    for left in {0, blocks // 2, max(0, blocks - 2)}:
+        with nearly_full(small_disk, left):
+            assert_refused(write, path)
+    before = path.read_bytes()
+    write(path, 1)
+    assert path.read_bytes() != before
+
+
+def test_a_journal_goes_on_after_a_line_that_was_cut_short(tmp_path):
+    path = tmp_path / "journal.jsonl"
+    journal = Journal(path)
+    size = path.stat().st_size
+    with (
+        largest_file(size + 5),
+        pytest.raises(UserError, match=r"journal\.jsonl: cannot be written: File too large"),
+    ):
+        journal.append({"view": "lost"})
+    assert path.stat().st_size == size + 5
+    journal.append({"view": "kept"})
+    assert [entry.get("view") for entry in files.read_json_lines(path)] == [None, "kept"]
