@@ -31,7 +31,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 from lightfield.core.cli import run
 from lightfield.core.files import atomic_path
 from lightfield.dataset import config
-from lightfield.geometry import lenses, rigs
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
 from lightfield.rendering import pruning
 
 # Tried, and not part of the workflow: a pruning must save something and keep every pixel.
@@ -200,15 +201,15 @@ class Renderer:
         lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [96, 96]})
         rig = {"type": "lattice", "cameras": [VIEWS, 1, 1], "size": 0.3, "center": [0, 0, 1.1]}
         settings = {"samples": 4, "adaptive_threshold": 0, "denoise": False}
-        content = rigs.lightfield(rig, lens.to_lightfield())
-        content |= {"depth": "z" if task.depth else None, "frame": 1}
-        self.poses = [frame["world_matrix"] for frame in content["frames"]]
+        depth = "z" if task.depth else None
+        lightfield = LightField.from_rig(rig, lens, depth=depth, frame=1)
+        self.poses = lightfield.matrices
         self.digest = hashlib.sha256()
         self.sizes: list[int] = []
         blender.open_scene(task.blend)
         if "hidden_objects" in task.left_out:
             blender.remove_objects(blender.removable_objects())
-        blender.set_up_render(settings, content, "cpu", 1)
+        blender.set_up_render(settings, lightfield, "cpu", 1)
         blender.leave_out(task.left_out)
         scene = bpy.context.scene
         if task.passes:

@@ -17,7 +17,8 @@ from typing import Any
 SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
 sys.path.insert(0, str(SCRIPTS))
 
-from lightfield.geometry import lenses, rigs  # noqa: E402
+from lightfield.dataset.lightfield import LightField  # noqa: E402
+from lightfield.geometry import lenses  # noqa: E402
 
 RESOLUTION = 256
 SECONDS = 2.0
@@ -61,13 +62,9 @@ def measure(folder: Path, blend: Path, count: int, samples: int) -> list[dict[st
     )
     rig = {"type": "plane", "cameras": [count + 1, 1], "center": [0, 0, 1.5], "size": 1}
     render = {"samples": samples, "adaptive_threshold": 0, "denoise": False, "seed": 0}
-    content = rigs.lightfield(rig, lens.to_lightfield()) | {
-        "depth": "z",
-        "frame": 1,
-        "render": render | {"depth_precision": "float"},
-    }
+    render |= {"depth_precision": "float"}
     lightfield, journal = folder / f"{samples}.json", folder / f"{samples}.jsonl"
-    lightfield.write_text(json.dumps(content))
+    LightField.from_rig(rig, lens, depth="z", frame=1, render=render).write(lightfield)
     run(
         "render_shard.py",
         *("--blend", blend, "--lightfield", lightfield, "--output", folder / str(samples)),

@@ -18,7 +18,8 @@ from statistics import fmean, stdev
 from typing import Any
 
 from lightfield.core.cli import run
-from lightfield.core.files import read_json, write_json
+from lightfield.core.files import write_json
+from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import metrics, trials
 from lightfield.measurement.calibration import DENOISING_SAMPLES, cost_in_samples
 
@@ -127,8 +128,8 @@ def main() -> None:
     parser.add_argument("--seconds", type=Path, help="JSON of the seconds that each way took")
     arguments = parser.parse_args()
 
-    lightfield = read_json(arguments.lightfield)
-    render = lightfield["render"]
+    lightfield = LightField.read(arguments.lightfield)
+    render = lightfield.render
     target = render["target_error"]
     maker = trials.Trials(
         arguments.blend,
@@ -139,10 +140,9 @@ def main() -> None:
         arguments.cache,
     )
     known = maker.probes(arguments.size, arguments.probes)
-    frames = [frame for frame in lightfield["frames"] if frame not in [p.frame for p in known]]
+    views = [view for view in lightfield.views if view not in [p.view for p in known]]
     others = [
-        replace(probe, frame=trials.neighbour(frames, probe.frame) or probe.frame)
-        for probe in known
+        replace(probe, view=trials.neighbour(views, probe.view) or probe.view) for probe in known
     ]
     probes = Bench(maker, known, PROBE_SEED, target)
     limits = render.get("most_samples"), render.get("denoise")

@@ -13,7 +13,8 @@ from mathutils.bvhtree import BVHTree
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, write_json
+from lightfield.core.files import write_json
+from lightfield.dataset.lightfield import LightField
 from lightfield.geometry.rigs import icosphere
 from lightfield.rendering import blender
 
@@ -30,11 +31,11 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 
-    lightfield = read_json(arguments.lightfield)
-    names = [frame["name"] for frame in lightfield["frames"]]
-    positions = np.array([frame["position"] for frame in lightfield["frames"]])
+    lightfield = LightField.read(arguments.lightfield)
+    names = [view.name for view in lightfield.views]
+    positions = np.array([view.position for view in lightfield.views])
     blender.open_scene(arguments.blend)
-    bpy.context.scene.frame_set(lightfield["frame"])
+    bpy.context.scene.frame_set(lightfield.frame)
     distances = clearances(positions)
     inside = enclosing_objects(positions)
     views = {

@@ -9,7 +9,7 @@ import numpy as np
 import OpenImageIO as oiio
 
 from lightfield.core.cli import run
-from lightfield.core.files import read_json
+from lightfield.dataset.lightfield import LightField
 from lightfield.imaging import images, pictures
 
 SHEET_WIDTH = 1600
@@ -28,11 +28,12 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="PNG to write")
     arguments = parser.parse_args()
 
-    lightfield = read_json(arguments.lightfield)
-    names = [frame["name"] for frame in lightfield["frames"]]
+    lightfield = LightField.read(arguments.lightfield)
+    names = [view.name for view in lightfield.views]
     step = math.ceil(len(names) / pictures.MOST_VIEWS)
+    lens = lightfield.lens
     images.write_png(
-        arguments.output, sheet(arguments.views, names[::step], *lightfield["resolution"])
+        arguments.output, sheet(arguments.views, names[::step], lens.width, lens.height)
     )
 
 

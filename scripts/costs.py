@@ -50,8 +50,9 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.cli import run
-from lightfield.core.files import read_json, write_json
+from lightfield.core.files import write_json
 from lightfield.dataset import journal
+from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.measurement.calibration import DENOISING_SAMPLES, cost_in_samples
 
 # The stages that every dataset has, in the order of the work; others come between.
@@ -121,7 +122,7 @@ def main() -> None:
             shards=sorted(rendered, key=lambda shard: [int(n) for n in shard["shard"].split("-")]),
             stages=stages,
             sizes={name: stage_bytes(name, arguments) for name in stages},
-            lightfield=read_json(arguments.dataset / "lightfield.json"),
+            lightfield=LightField.read(arguments.dataset / NAME),
             tariff=Tariff.read(arguments.energy),
             full=arguments.full,
             reprojections=arguments.reprojection,
@@ -272,7 +273,7 @@ def costs(
     shards: list[dict[str, Any]],
     stages: Mapping[str, Stage],
     sizes: Mapping[str, int],
-    lightfield: Mapping[str, Any],
+    lightfield: LightField,
     tariff: Tariff,
     full: Mapping[str, Any],
     reprojections: list[str],
@@ -326,7 +327,7 @@ def extrapolation(
     runs: list[journal.Run],
     stages: Mapping[str, Stage],
     view_bytes: int,
-    lightfield: Mapping[str, Any],
+    lightfield: LightField,
     tariff: Tariff,
     full: Mapping[str, Any],
     reprojections: list[str],
@@ -338,15 +339,15 @@ def extrapolation(
     kept = {one.view: one for one in sorted(every, key=lambda one: one.finished)}.values()
     # First views tell little of the others, and count only where there are none.
     latest = [rendering for rendering in kept if not rendering.first] or list(kept)
-    here = len(lightfield["frames"])
-    render = lightfield["render"]
+    here = len(lightfield.views)
+    render = lightfield.render
     samples, denoise = render["samples"], render["denoise"]
     wanted = full["samples"] or samples
     # Where a target error decides, both are unknown until then.
     denoise_wanted = denoise if full["denoise"] is None else full["denoise"]
     effort = cost_in_samples(wanted, denoise_wanted) / cost_in_samples(samples, denoise)
-    width, height = lightfield["resolution"]
-    pixels = math.prod(full["resolution"]) / (width * height)
+    lens = lightfield.lens
+    pixels = math.prod(full["resolution"]) / (lens.width * lens.height)
     count = full["views"]
 
     times = [view.path_tracing * pixels * effort for view in latest]
@@ -380,7 +381,8 @@ def extrapolation(
         "price_uncertainty": None if uncertainty is None else tariff.price(uncertainty),
         "gigabytes": view_bytes / here * count * pixels / 1e9,
         "basis": (
-            f"path tracing of {len(times)} views: {width} × {height} pixels, {samples} samples"
+            f"path tracing of {len(times)} views: {lens.width} × {lens.height} pixels, "
+            f"{samples} samples"
             + (f", and denoising, which counts as {DENOISING_SAMPLES}" if denoise else "")
             + "; in proportion to pixels and samples; on "
             + ("the processor" if processor else "a graphics card: hours are the machine's")

@@ -26,6 +26,7 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, read_json, write_json
 from lightfield.core.progress import Progress
+from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import metrics, trials
 from lightfield.measurement.calibration import calibrated
 from lightfield.report import plots
@@ -93,11 +94,11 @@ def main() -> None:
     )
     arguments = parser.parse_args()
 
-    lightfield = read_json(arguments.lightfield)
+    lightfield = LightField.read(arguments.lightfield)
     if arguments.calibration:
-        render = calibrated(lightfield["render"], read_json(arguments.calibration))
-        lightfield["render"] = render
-    elif "samples" not in lightfield["render"]:
+        render = calibrated(lightfield.render, read_json(arguments.calibration))
+        lightfield = lightfield.changed(render=render)
+    elif "samples" not in lightfield.render:
         raise UserError(
             f"{arguments.lightfield}: render has a target error and no samples; "
             "give --calibration, what scripts/calibrate.py chose for it"
@@ -111,9 +112,9 @@ def main() -> None:
         arguments.cache,
     )
     probes = maker.probes(arguments.size, arguments.probes)
-    near = trials.neighbour(lightfield["frames"], probes[0].frame)
+    near = trials.neighbour(lightfield.views, probes[0].view)
     if near:
-        probes.insert(1, replace(probes[0], frame=near))
+        probes.insert(1, replace(probes[0], view=near))
     progress = Progress(len(probes), f"{arguments.output.name}: references")
     made = []
     for probe in probes:
@@ -123,7 +124,7 @@ def main() -> None:
 
     seeds = range(1, arguments.seeds + 1)
     on_cpu = maker.render(probes[0], seeds[0], {"samples": 1}).device == "CPU"
-    ways = all_ways(lightfield["render"], arguments.octaves, guiding=on_cpu)
+    ways = all_ways(lightfield.render, arguments.octaves, guiding=on_cpu)
     progress = Progress(
         len(ways) * len(probes) * len(seeds), f"{arguments.output.name}: trials", "renders"
     )
@@ -278,7 +279,7 @@ def neighbours(
 ) -> dict[str, float]:
     """Return how the first two views disagree, as `metrics.Disagreement`, the mean over seeds."""
     pair, windows = (references[0], references[1]), (probes[0], probes[1])
-    cameras = maker.camera(probes[0].frame), maker.camera(probes[1].frame)
+    cameras = maker.camera(probes[0].view), maker.camera(probes[1].view)
     seen = trials.both_see(cameras, windows, pair)
     if not len(seen[0]):
         return {}

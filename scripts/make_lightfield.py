@@ -8,9 +8,10 @@ from typing import Any
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, write_json
+from lightfield.core.files import read_json
 from lightfield.dataset import config, keys
-from lightfield.geometry import lenses, rigs
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
 from lightfield.measurement.calibration import calibrated
 
 # What of a scene YAML's `scene` block is written down: not where a file came from, nor where it is.
@@ -53,30 +54,21 @@ def main() -> None:
     cameras = dataset.cameras
     if arguments.panorama:
         cameras = panorama_rig(cameras, arguments.panorama)
-    lightfield = content(arguments.scene, dataset, cameras)
+    render = dict(dataset.render)
     if arguments.calibration:
-        record = read_json(arguments.calibration)
-        lightfield["render"] = calibrated(lightfield["render"], record)
-    write_json(arguments.output, lightfield)
-
-
-def content(scene: str, dataset: config.Dataset, cameras: Mapping[str, Any]) -> dict[str, Any]:
-    """Return lightfield.json's content: SILVR's keys, and ours that say how it is rendered."""
-    lens = lenses.from_camera(cameras["camera"])
-    lightfield = rigs.lightfield(cameras, lens.to_lightfield())
-    frames = lightfield.pop("frames")
-    return {
-        **lightfield,
-        "depth": config.depth_meaning(dataset.render["depth"], cameras["camera"]),
-        "frame": dataset.source["frame"],
-        "scene": {
-            "name": scene,
+        render = calibrated(render, read_json(arguments.calibration))
+    LightField.from_rig(
+        cameras,
+        lenses.from_camera(cameras["camera"]),
+        depth=config.depth_meaning(render["depth"], cameras["camera"]),
+        frame=dataset.source["frame"],
+        scene={
+            "name": arguments.scene,
             **{key: dataset.source[key] for key in SOURCE_KEYS if key in dataset.source},
             "fingerprint": keys.scene_fingerprint(dataset.source),
         },
-        "render": dict(dataset.render),
-        "frames": frames,
-    }
+        render=render,
+    ).write(arguments.output)
 
 
 def panorama_rig(cameras: Mapping[str, Any], width: int) -> dict[str, Any]:

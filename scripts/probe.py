@@ -14,9 +14,9 @@ from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, write_json
+from lightfield.core.files import write_json
 from lightfield.dataset import journal
-from lightfield.geometry import lenses
+from lightfield.dataset.lightfield import LightField
 
 
 def main() -> None:
@@ -30,20 +30,17 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 
-    lightfield = read_json(arguments.lightfield)
-    frames = lightfield["frames"]
-    width, height = lightfield["resolution"]
-    scale = min(1.0, arguments.size / max(width, height))
-    small = [max(1, round(side * scale)) for side in (width, height)]
-    lens = lenses.from_lightfield(lightfield).resized(*small)
+    lightfield = LightField.read(arguments.lightfield)
+    views, lens = lightfield.views, lightfield.lens
+    scale = min(1.0, arguments.size / max(lens.width, lens.height))
+    small = [max(1, round(side * scale)) for side in (lens.width, lens.height)]
     # The first view's time holds some of the start-up, so it is rendered and not counted.
-    step = max(1, len(frames) // (arguments.views + 1))
-    chosen = frames[::step][: arguments.views + 1]
+    step = max(1, len(views) // (arguments.views + 1))
+    chosen = views[::step][: arguments.views + 1]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_json(
-            folder / "lightfield.json", {**lightfield, **lens.to_lightfield(), "frames": chosen}
-        )
+        probe = lightfield.changed(lens=lens.resized(*small), views=chosen)
+        probe.write(folder / "lightfield.json")
         result = subprocess.run(
             [
                 *(sys.executable, Path(__file__).with_name("render_shard.py")),
@@ -61,13 +58,13 @@ def main() -> None:
         sizes = [(folder / "exr" / f"{view['view']}.exr").stat().st_size for view in rendered]
     # On a processor the time that it worked, whatever else it did meanwhile.
     busy = "cpu_seconds" if run.start["device"] == "CPU" else "render_seconds"
-    factor = width * height / math.prod(small)
+    factor = lens.width * lens.height / math.prod(small)
     write_json(
         arguments.output,
         {
-            "views": len(frames),
-            "resolution": [width, height],
-            "samples": lightfield["render"]["samples"],
+            "views": len(views),
+            "resolution": [lens.width, lens.height],
+            "samples": lightfield.render["samples"],
             "device": run.start["device"],
             "view_seconds": [view[busy] * factor for view in rendered],
             "view_bytes": [size * factor for size in sizes],

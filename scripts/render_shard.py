@@ -7,7 +7,7 @@ only what is missing. Its journal, one JSON line a rendered view, tells what was
 
 import argparse
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,8 @@ from lightfield.core.files import read_json, sha256, write_json
 from lightfield.core.progress import Progress, duration
 from lightfield.dataset import keys
 from lightfield.dataset.journal import Journal
-from lightfield.geometry import depth, lenses
+from lightfield.dataset.lightfield import LightField, View
+from lightfield.geometry import depth
 from lightfield.imaging import images
 
 
@@ -54,13 +55,13 @@ def main() -> None:
     arguments = parser.parse_args()
 
     journal = Journal(arguments.journal)
-    lightfield = read_json(arguments.lightfield)
-    frames = lightfield["frames"][parse_slice(arguments.views)]
+    lightfield = LightField.read(arguments.lightfield)
+    views = lightfield.views[parse_slice(arguments.views)]
     missing = [
-        frame
-        for frame in frames
+        view
+        for view in views
         if not images.is_finished(
-            view_path(arguments.output, frame), keys.render_key(lightfield, frame)
+            view_path(arguments.output, view), keys.render_key(lightfield, view)
         )
     ]
     # The dataset's folder says which scene and rig it is, and in a sequence which frame.
@@ -68,12 +69,12 @@ def main() -> None:
     if arguments.views != ":":
         label += f" {arguments.views}"
     # A shard that is finished has no line to end, and need not look at any other's files.
-    others = Others(frames, lightfield, arguments.output, arguments.run) if missing else str
-    progress = Progress(len(missing), label, already=len(frames) - len(missing), note=others)
+    others = Others(len(views), lightfield, arguments.output, arguments.run) if missing else str
+    progress = Progress(len(missing), label, already=len(views) - len(missing), note=others)
     if missing:
         render_views(missing, lightfield, arguments, journal, progress)
     if arguments.record:
-        write_json(arguments.record, record([view_path(arguments.output, f) for f in frames]))
+        write_json(arguments.record, record([view_path(arguments.output, v) for v in views]))
     journal.end()
 
 
@@ -85,19 +86,18 @@ def parse_slice(text: str) -> slice:
     return slice(int(first) if first else None, int(end) if end else None)
 
 
-def view_path(folder: Path, frame: Mapping[str, Any]) -> Path:
+def view_path(folder: Path, view: View) -> Path:
     """Return the path of a view's EXR in the folder of the views."""
-    return folder / f"{frame['name']}.exr"
+    return folder / f"{view.name}.exr"
 
 
 class Finished:
     """Counts a dataset's finished views, whoever renders them; looks at each finished one once."""
 
-    def __init__(self, lightfield: Mapping[str, Any], folder: Path) -> None:
-        self.total = len(lightfield["frames"])
+    def __init__(self, lightfield: LightField, folder: Path) -> None:
+        self.total = len(lightfield.views)
         self.missing = {
-            view_path(folder, frame): keys.render_key(lightfield, frame)
-            for frame in lightfield["frames"]
+            view_path(folder, view): keys.render_key(lightfield, view) for view in lightfield.views
         }
 
     def look(self) -> None:
@@ -112,18 +112,12 @@ class Finished:
 class Others:
     """Ends a shard's progress lines with those of the whole dataset and of the whole run.
 
-    ``run`` is a JSON of how many views each dataset of the run has, by the dataset's folder. The
-    time left is at the rate of all shards since this one began.
+    ``own`` views are the shard's. ``run`` is a JSON of how many views each dataset of the run has,
+    by the dataset's folder. The time left is at the rate of all shards since this one began.
     """
 
-    def __init__(
-        self,
-        frames: Sequence[Mapping[str, Any]],
-        lightfield: Mapping[str, Any],
-        folder: Path,
-        run: Path | None,
-    ) -> None:
-        self.own = len(frames)
+    def __init__(self, own: int, lightfield: LightField, folder: Path, run: Path | None) -> None:
+        self.own = own
         self.dataset = Finished(lightfield, folder)
         self.run: dict[str, int] = read_json(run) if run else {}
         # It lists what was chosen, and this may have been asked for by name.
@@ -138,7 +132,7 @@ class Others:
             # Another job makes it when its turn has come.
             path = Path(name, "lightfield.json")
             if path.exists():
-                self.datasets[name] = Finished(read_json(path), Path(name, "exr"))
+                self.datasets[name] = Finished(LightField.read(path), Path(name, "exr"))
         for dataset in self.datasets.values():
             dataset.look()
         return sum(dataset.count for dataset in self.datasets.values())
@@ -156,13 +150,13 @@ class Others:
 
 
 def render_views(
-    frames: list[Mapping[str, Any]],
-    lightfield: Mapping[str, Any],
+    views: Sequence[View],
+    lightfield: LightField,
     arguments: argparse.Namespace,
     journal: Journal,
     progress: Progress,
 ) -> None:
-    """Open the scene once and render ``frames`` one after the other."""
+    """Open the scene once and render ``views`` one after the other."""
     threads = arguments.threads or processors.available()
     # Only now, because it takes a second and a shard that is finished does not need it.
     with processors.only(threads):
@@ -172,7 +166,7 @@ def render_views(
     blender.open_scene(arguments.blend)
     if "hidden_objects" in inventory["left_out"]:
         blender.remove_objects(inventory["hidden"])
-    device = blender.set_up_render(lightfield["render"], lightfield, arguments.device, threads)
+    device = blender.set_up_render(lightfield.render, lightfield, arguments.device, threads)
     blender.leave_out(inventory["left_out"])
     to_depth = depth_factors(lightfield)
     journal.append(
@@ -186,16 +180,16 @@ def render_views(
 
     process = psutil.Process()
     progress.begin()
-    for frame in frames:
+    for view in views:
         began, began_cpu = time.perf_counter(), time.process_time()
-        seed = keys.view_seed(lightfield["render"]["seed"], frame["name"])
-        raw = blender.render_view(np.array(frame["world_matrix"]), seed)
+        seed = keys.view_seed(lightfield.render["seed"], view.name)
+        raw = blender.render_view(view.matrix, seed)
         channels, attributes = view_channels(raw, lightfield, to_depth)
-        attributes[images.KEY_ATTRIBUTE] = keys.render_key(lightfield, frame)
-        images.write_exr(view_path(arguments.output, frame), channels, attributes)
+        attributes[images.KEY_ATTRIBUTE] = keys.render_key(lightfield, view)
+        images.write_exr(view_path(arguments.output, view), channels, attributes)
         journal.append(
             {
-                "view": frame["name"],
+                "view": view.name,
                 "finished": round(time.time(), 3),
                 "wall_seconds": round(time.perf_counter() - began, 4),
                 "cpu_seconds": round(time.process_time() - began_cpu, 4),
@@ -207,21 +201,17 @@ def render_views(
         progress.done()
 
 
-def depth_factors(lightfield: Mapping[str, Any]) -> np.ndarray | None:
-    """Return the unit rays that turn Cycles' depth into the dataset's, or None if it is that.
-
-    Cycles gives Z-depth for a perspective camera and distance for a panoramic one.
-    """
-    cycles_gives = "z" if lightfield["camera"]["type"] == "PERSP" else "distance"
-    if lightfield["depth"] in (None, cycles_gives):
+def depth_factors(lightfield: LightField) -> np.ndarray | None:
+    """Return the unit rays that turn Cycles' depth into the dataset's, or None if it is that."""
+    if lightfield.depth in (None, lightfield.cycles_depth):
         return None
-    lens = lenses.from_lightfield(lightfield)
+    lens = lightfield.lens
     rows, columns = np.mgrid[: lens.height, : lens.width]
     return lens.rays(columns + 0.5, rows + 0.5)
 
 
 def view_channels(
-    raw, lightfield: Mapping[str, Any], rays: np.ndarray | None
+    raw, lightfield: LightField, rays: np.ndarray | None
 ) -> tuple[dict[str, np.ndarray], dict[str, images.Attribute]]:
     """Turn what Cycles made into the channels and attributes of a view's EXR.
 
@@ -236,18 +226,18 @@ def view_channels(
         images.CLAMPED_ATTRIBUTE: clamped,
         images.NAN_ATTRIBUTE: nan,
     }
-    if lightfield["depth"] is not None:
+    if lightfield.depth is not None:
         z = raw.depth
-        if rays is not None and lightfield["depth"] == "z":
+        if rays is not None and lightfield.depth == "z":
             z = depth.z_from_distance(z, rays)
         elif rays is not None:
             z = depth.distance_from_z(z, rays)
         # Outside the image circle there is no ray; nothing was hit there.
         z = np.where(np.isnan(z), np.inf, z)
-        half = lightfield["render"]["depth_precision"] == "half"
+        half = lightfield.render["depth_precision"] == "half"
         with np.errstate(over="ignore"):
             channels["Z"] = z.astype(np.float16 if half else np.float32)
-        attributes[images.DEPTH_ATTRIBUTE] = lightfield["depth"]
+        attributes[images.DEPTH_ATTRIBUTE] = lightfield.depth
     return channels, attributes
 
 

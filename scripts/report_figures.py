@@ -15,7 +15,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.ticker import FuncFormatter
 
 from lightfield.core.cli import run
-from lightfield.core.files import read_json
+from lightfield.dataset.lightfield import LightField
 from lightfield.imaging import images
 from lightfield.measurement import noise
 from lightfield.report.plots import BLUE, GREY, plot
@@ -36,8 +36,7 @@ def main() -> None:
     parser.add_argument("--panorama", required=True, type=Path, help="EXR seen from the centre")
     parser.add_argument("--output", required=True, type=Path, help="folder to write to")
     arguments = parser.parse_args()
-    frames = read_json(arguments.lightfield)["frames"]
-    poses = np.array([frame["world_matrix"] for frame in frames])
+    poses = LightField.read(arguments.lightfield).matrices
     draw_rig(arguments.output / "rig", arguments.rig, poses)
     panorama = images.read_image(arguments.panorama).channels
     colour = np.stack([panorama[name] for name in "RGB"], axis=-1, dtype=np.float32)

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.cli import run
-from lightfield.core.errors import UserError
-from lightfield.core.files import read_json
+from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.report import page
 from lightfield.report import tables as report_tables
 from lightfield.report import views as report_views
@@ -40,15 +39,9 @@ def main() -> None:
     arguments = parser.parse_args()
 
     folder: Path = arguments.dataset
-    path = folder / "lightfield.json"
-    lightfield = read_json(path)
-    try:
-        told = facts(folder, lightfield, arguments.rig)
-        name = str(lightfield["scene"]["name"])
-        looks = report_views.collect(folder / IMAGES, lightfield, arguments.rig)
-        listed = files(folder, lightfield)
-    except (LookupError, TypeError) as error:
-        raise UserError(f"{path}: is not what scripts/make_lightfield.py writes: {error}") from None
+    lightfield = LightField.read(folder / NAME)
+    name = str(lightfield.scene["name"])
+    looks = report_views.collect(folder / IMAGES, lightfield, arguments.rig)
     report = folder / REPORT
     measured = {
         "reprojection": report_tables.reprojection(arguments.measurements),
@@ -60,15 +53,15 @@ def main() -> None:
         "page.html.j2",
         name=arguments.name,
         home="../" * (arguments.name.count("/") + 2) + "index.html",
-        facts=told,
+        facts=facts(folder, lightfield, arguments.rig),
         pictures={stem: page.photo(report / f"{stem}.png", WIDEST) for stem in PICTURES},
         plots={stem: page.plot(report / stem) for stem in PLOTS},
         looks=looks,
-        render=lightfield.get("render", {}),
+        render=lightfield.render,
         validation=report_tables.validation(folder / "validation.json"),
         measured=measured,
         costs=report_tables.costs(report / "costs.json"),
-        files=listed,
+        files=files(folder, lightfield),
         transforms=sorted(
             path.relative_to(folder).as_posix() for path in folder.glob("**/transforms.json")
         ),
@@ -76,12 +69,9 @@ def main() -> None:
     )
 
 
-def facts(
-    folder: Path, lightfield: Mapping[str, Any], rig: Mapping[str, Any]
-) -> list[tuple[str, str]]:
+def facts(folder: Path, lightfield: LightField, rig: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return what one wants to know first of a dataset, each with its title."""
-    width, height = lightfield["resolution"]
-    render = lightfield.get("render", {})
+    lens, render = lightfield.lens, lightfield.render
     samples = f"{render.get('samples', '–')} a pixel"
     if render.get("adaptive_threshold"):
         samples = f"up to {samples}, adaptive"
@@ -90,12 +80,12 @@ def facts(
     depth = {"z": "Z-depth, metres", "distance": "distance, metres"}
     size = sum(path.stat().st_size for path in (folder / IMAGES).glob("*.exr"))
     return [
-        ("Views", str(len(lightfield["frames"]))),
+        ("Views", str(len(lightfield.views))),
         ("Rig", rig_text(rig)),
-        ("Lens", page.lens_text(lightfield["camera"])),
-        ("Resolution", f"{width} × {height}"),
+        ("Lens", page.lens_text(lightfield.content["camera"])),
+        ("Resolution", f"{lens.width} × {lens.height}"),
         ("Samples", samples),
-        ("Depth", depth.get(lightfield.get("depth") or "", "none")),
+        ("Depth", depth.get(lightfield.depth or "", "none")),
         ("Size of the views", page.bytes_(size)),
         ("Rendered by", f"Cycles in bpy {version('bpy')}"),
     ]
@@ -114,23 +104,22 @@ def rig_text(rig: Mapping[str, Any]) -> str:
     return f"{kind}, {' × '.join(f'{side:g}' for side in size)} m"
 
 
-def files(folder: Path, lightfield: Mapping[str, Any]) -> list[tuple[str, str]]:
+def files(folder: Path, lightfield: LightField) -> list[tuple[str, str]]:
     """Return the dataset's files and what each is."""
     depth = {
         "z": ", and Z: metres along the optical axis",
         "distance": ", and Z: metres from the camera",
-    }.get(lightfield.get("depth") or "", "")
+    }.get(lightfield.depth or "", "")
     if depth:
         depth += "; inf where a ray hit nothing"
-    first = lightfield["frames"][0]["name"]
+    first = lightfield.views[0].name
     found = [
         (f"{IMAGES}/{first}.exr …", f"the views: scene-linear Rec. 709 R, G, B as half{depth}"),
         ("lightfield.json", "the lens once; position, rotation, and world_matrix of each view"),
     ]
-    for inner in sorted(folder.glob("*/lightfield.json")):
-        name = inner.parent.name
-        lens = page.lens_text(read_json(inner).get("camera", {}))
-        found.append((f"{name}/", f"the same views through another lens: {lens}"))
+    for inner in sorted(folder.glob(f"*/{NAME}")):
+        lens = page.lens_text(LightField.read(inner).content["camera"])
+        found.append((f"{inner.parent.name}/", f"the same views through another lens: {lens}"))
     return [
         *found,
         ("validation.json", "what was checked, and what came out"),

@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 from lightfield.core.cli import run
-from lightfield.core.files import read_json
+from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.report import page
 from lightfield.report import tables as report_tables
 from lightfield.validation.validation import REPORT
@@ -30,17 +30,16 @@ def main() -> None:
 def entry(results: Path, path: Path) -> dict[str, Any]:
     """Return what the index tells of the dataset that has its page at ``path``."""
     folder = path.parents[1]
-    lightfield = read_json(folder / "lightfield.json")
+    lightfield = LightField.read(folder / NAME)
     scene, *rig = folder.relative_to(results).parts
     validation = report_tables.validation(folder / "validation.json")
-    width, height = lightfield["resolution"]
     return {
         "scene": scene,
         "rig": "/".join(rig),
         "link": quote(path.relative_to(results).as_posix()),
-        "views": len(lightfield["frames"]),
-        "resolution": f"{width} × {height}",
-        "lens": page.lens_text(lightfield["camera"]),
+        "views": len(lightfield.views),
+        "resolution": f"{lightfield.lens.width} × {lightfield.lens.height}",
+        "lens": page.lens_text(lightfield.content["camera"]),
         "valid": validation["valid"] if validation else None,
         "picture": page.photo(path.parent / "panorama.png", THUMBNAIL),
     }

@@ -8,15 +8,14 @@ are left take as long as those, and that as many processes go on working.
 
 import argparse
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from lightfield.core.cli import run
 from lightfield.core.files import read_json
 from lightfield.core.progress import duration
 from lightfield.dataset import journal, keys
+from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.imaging import images
 
 WINDOW = 600.0
@@ -83,12 +82,14 @@ def main() -> None:
 
 def look(dataset: Dataset, now: float) -> Rendering:
     """Find out how far the rendering of a dataset is at ``now``, in seconds since 1970."""
-    lightfield = lightfield_of(dataset)
-    frames = lightfield["frames"]
+    path = dataset.folder / NAME
+    lightfield = LightField.read(path) if path.exists() else None
+    views = lightfield.views if lightfield else []
     finished = {
-        frame["name"]
-        for frame in frames
-        if images.has_key(view_file(dataset, frame["name"]), keys.render_key(lightfield, frame))
+        view.name
+        for view in views
+        if lightfield
+        and images.has_key(view_file(dataset, view.name), keys.render_key(lightfield, view))
     }
     recent, seconds = 0, 0.0
     running: list[str] = []
@@ -101,7 +102,7 @@ def look(dataset: Dataset, now: float) -> Rendering:
         first, end = shard_bounds(path)
         last = runs[-1]
         at_work = last.is_running()
-        missing = any(frame["name"] not in finished for frame in frames[first:end])
+        missing = any(view.name not in finished for view in views[first:end])
         text = f"{first}:{end}"
         if at_work:
             running.append(text)
@@ -119,12 +120,6 @@ def look(dataset: Dataset, now: float) -> Rendering:
     if not running:
         recent = 0
     return Rendering(finished, recent, seconds, running, silent, killed)
-
-
-def lightfield_of(dataset: Dataset) -> Mapping[str, Any]:
-    """Return the dataset's lightfield.json, or one without frames where there is none yet."""
-    path = dataset.folder / "lightfield.json"
-    return read_json(path) if path.exists() else {"frames": []}
 
 
 def shard_bounds(path: Path) -> tuple[int, int]:

@@ -12,7 +12,8 @@ import bpy
 import numpy as np
 
 import inventory
-from lightfield.geometry import lenses, rigs
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
 from lightfield.rendering import blender, pruning
 from scenes import test_room
 
@@ -135,15 +136,14 @@ def rendered(path, found=None):
     """Return the colours and depths of a view of a scene, pruned if its inventory is given."""
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
     rig = {"type": "lattice", "cameras": [1, 1, 1], "center": [0.2, 0.1, 1.4]}
-    lightfield = rigs.lightfield(rig, lens.to_lightfield())
-    lightfield |= {"depth": "distance", "frame": FRAME}
+    lightfield = LightField.from_rig(rig, lens, depth="distance", frame=FRAME)
     names = pruning.left_out(found) if found else []
     blender.open_scene(path)
     if "hidden_objects" in names:
         blender.remove_objects(found["hidden"])
     blender.set_up_render(RENDER, lightfield, "cpu", 1)
     blender.leave_out(names)
-    pose = np.array(lightfield["frames"][0]["world_matrix"])
+    pose = lightfield.views[0].matrix
     # The second view shows what the first may have changed.
     views = [blender.render_view(pose, seed) for seed in (1, 2)]
     return np.stack([np.dstack([view.colour, view.depth]) for view in views])

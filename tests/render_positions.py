@@ -14,18 +14,19 @@ import bpy
 import numpy as np
 
 import render_shard
+from lightfield.dataset.lightfield import LightField
 from lightfield.imaging import images
 from lightfield.rendering import blender
 
 
 def main(blend: Path, output: Path, cases: Path) -> None:
     results = {}
-    for name, lightfield in json.loads(cases.read_text()).items():
+    for name, content in json.loads(cases.read_text()).items():
+        lightfield = LightField.from_json(content)
         blender.open_scene(blend)
-        blender.set_up_render(lightfield["render"], lightfield, "cpu", 1)
+        blender.set_up_render(lightfield.render, lightfield, "cpu", 1)
         scene = bpy.context.scene
-        matrix = np.array(lightfield["frames"][0]["world_matrix"])
-        raw = blender.render_view(matrix, 0)
+        raw = blender.render_view(lightfield.views[0].matrix, 0)
         channels, _ = render_shard.view_channels(
             raw, lightfield, render_shard.depth_factors(lightfield)
         )

@@ -9,7 +9,8 @@ from checkouts import checkout, planned, snakemake
 import calibrate
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
-from lightfield.geometry import lenses, rigs
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
 
 TARGET = 0.02
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [24, 24]}
@@ -32,13 +33,12 @@ ASKED = ("--config", "scenes=[aimed]", "rigs=all", "preset=full")
 def room_probes(tmp_path_factory, run_program, room):
     """What scripts/calibrate.py is given: the room, its inventory, and cameras in it."""
     folder = tmp_path_factory.mktemp("probes")
-    content = rigs.lightfield(RIG, lenses.from_camera(CAMERA).to_lightfield())
-    content |= {"depth": "z", "frame": 1, "scene": {}}
+    made = LightField.from_rig(RIG, lenses.from_camera(CAMERA), depth="z", frame=1)
     run_program("inventory.py", "--blend", room, "--output", folder / "inventory.json")
 
     def arguments(**render):
         path = folder / f"{len(list(folder.iterdir()))}.json"
-        path.write_text(json.dumps(content | {"render": {"seed": 0, **render}}))
+        made.changed(render={"seed": 0, **render}).write(path)
         return ("--blend", room, "--inventory", folder / "inventory.json", "--lightfield", path)
 
     return arguments

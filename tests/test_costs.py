@@ -4,11 +4,14 @@ import json
 import math
 import statistics
 
+import numpy as np
 import pytest
 
 import costs
 from lightfield.core.errors import UserError
 from lightfield.dataset import config, journal
+from lightfield.dataset.lightfield import LightField, View
+from lightfield.geometry import lenses
 
 FULL = {"views": 3, "resolution": [8, 4], "samples": 2, "denoise": False}
 TARIFF = {"watts": 100, "cores": 4, "price_per_kwh": 0.5, "currency": "EUR"}
@@ -66,15 +69,13 @@ RESUMED = [
 def dataset(tmp_path, run_program):
     """A dataset of three views of 8 x 4 pixels with the journals and TSVs of its jobs."""
     folder, work = tmp_path / "results", tmp_path / "work"
-    content = {
-        "resolution": [8, 4],
-        "frames": [{"name": name} for name in "abc"],
-        "render": {"samples": 2, "denoise": False},
-    }
+    lens = lenses.from_camera({"lens": "equirectangular", "resolution": [8, 4]})
+    render = {"samples": 2, "denoise": False}
+    views = [View.placed(name, np.eye(4)) for name in "abc"]
     for path, size in (("exr/a.exr", 100), ("exr/b.exr", 200), ("flat/a.png", 70)):
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_bytes(b"x" * size)
-    (folder / "lightfield.json").write_text(json.dumps(content))
+    LightField({**lens.to_lightfield(), "render": render}, views).write(folder / "lightfield.json")
     (work / "scene.blend").parent.mkdir()
     (work / "scene.blend").write_bytes(b"x" * 5000)
     for path, row in {

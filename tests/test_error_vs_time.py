@@ -8,7 +8,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from lightfield.geometry import lenses, rigs
+from lightfield.dataset.lightfield import LightField, View
+from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.measurement import trials
 from lightfield.measurement.metrics import Reference
@@ -18,15 +19,15 @@ RIG = {"type": "plane", "cameras": [4, 1], "size": 0.3, "center": [0, 0, 1.5]}
 RENDER = {"samples": 4, "adaptive_threshold": 0, "denoise": True, "seed": 0}
 
 
-def lightfield():
-    content = rigs.lightfield(RIG, lenses.from_camera(CAMERA).to_lightfield())
-    return content | {"depth": "z", "frame": 1, "scene": {}, "render": RENDER}
+def lightfield(render=RENDER):
+    lens = lenses.from_camera(CAMERA)
+    return LightField.from_rig(RIG, lens, depth="z", frame=1, render=render)
 
 
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory, run_program, room):
     folder = tmp_path_factory.mktemp("error")
-    (folder / "lightfield.json").write_text(json.dumps(lightfield()))
+    lightfield().write(folder / "lightfield.json")
     run_program("inventory.py", "--blend", room, "--output", folder / "inventory.json")
 
     def run():
@@ -118,9 +119,8 @@ def test_a_second_run_renders_nothing(measured):
 
 
 def test_a_target_error_that_was_not_calibrated_is_told(measured, run_program, room):
-    content = lightfield() | {"render": {"target_error": 0.01}}
     path = measured.folder / "target.json"
-    path.write_text(json.dumps(content))
+    lightfield({"target_error": 0.01}).write(path)
     result = run_program(
         "error_vs_time.py",
         *("--blend", room, "--inventory", measured.folder / "inventory.json"),
@@ -132,15 +132,14 @@ def test_a_target_error_that_was_not_calibrated_is_told(measured, run_program, r
     assert "Traceback" not in result.stderr
 
 
-def trial_maker(**changes):
-    content = lightfield() | changes
-    return trials.Trials("none.blend", "none.json", content, "cpu", 1, "none")
+def trial_maker():
+    return trials.Trials("none.blend", "none.json", lightfield(), "cpu", 1, "none")
 
 
 def test_probes_lie_in_the_image_circle_and_in_different_views():
     maker = trial_maker()
     probes = maker.probes(16, 4)
-    assert len({probe.frame["name"] for probe in probes}) == 4
+    assert len({probe.view.name for probe in probes}) == 4
     for probe in probes:
         assert 0 <= probe.x <= 48 and 0 <= probe.y <= 48
         assert maker.mask(probe).mean() >= 0.75
@@ -156,8 +155,8 @@ def test_the_same_wall_is_found_in_both_views():
     looking = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]])
     beside = looking.copy()
     beside[0, 3] = 0.4
-    frames = [{"name": str(n), "world_matrix": m.tolist()} for n, m in enumerate((looking, beside))]
-    probes = tuple(trials.Probe(frame, 8, 8, 48, 48) for frame in frames)
+    views = [View.placed(str(number), matrix) for number, matrix in enumerate((looking, beside))]
+    probes = tuple(trials.Probe(view, 8, 8, 48, 48) for view in views)
     mask = maker.mask(probes[0])
     rows, columns = np.mgrid[8:56, 8:56] + 0.5
     rays = maker.lens.rays(columns, rows)
@@ -165,7 +164,7 @@ def test_the_same_wall_is_found_in_both_views():
         depth = np.where(mask, 2 / -rays[..., 2], np.inf)
     zero = np.zeros((48, 48, 3))
     reference = Reference(zero, zero, depth, mask, 0.0)
-    cameras = tuple(maker.camera(frame) for frame in frames)
+    cameras = tuple(maker.camera(view) for view in views)
     here, there = trials.both_see(cameras, probes, (reference, reference))
     middle = 24 * 48 + 24
     # The pixel right of the optical axis, at 1/32 of 90 degrees, half a pixel on.

@@ -12,7 +12,8 @@ import pytest
 
 import export_instant_ngp
 from lightfield.core.errors import UserError
-from lightfield.geometry import lenses, rigs
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
 from lightfield.imaging import images
 
 RIG: dict[str, Any] = {
@@ -37,7 +38,7 @@ PANORAMA = {"lens": "equirectangular", "resolution": [64, 32]}
 
 def written(tmp_path: Path, camera: Any, rig: Any = RIG, **extra: Any) -> dict[str, Any]:
     lens = lenses.from_camera(camera)
-    content = rigs.lightfield(rig, lens.to_lightfield()) | extra
+    content = LightField.from_rig(rig, lens, **extra).to_json()
     (tmp_path / "lightfield.json").write_text(json.dumps(content))
     return content
 

@@ -10,7 +10,8 @@ import pytest
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.dataset.lightfield import LightField
+from lightfield.dataset import keys
+from lightfield.dataset.lightfield import LightField, View
 from lightfield.geometry import lenses, rigs
 
 FISHEYE = lenses.from_camera({"lens": "equidistant", "resolution": [64, 64], "fov": 180})
@@ -18,6 +19,7 @@ WIDE = lenses.from_camera({"lens": "equidistant", "resolution": [64, 64], "fov":
 PERSPECTIVE = lenses.from_camera({"lens": "rectilinear", "resolution": [64, 48], "fov": 60})
 PANORAMA = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
 CUBOID = {"type": "cuboid", "cameras": [3, 2, 2], "evaluation_split": "odd"}
+GONE = object()
 PLANE = {"type": "plane", "cameras": [2, 1], "center": [1, 2, 3], "rotation": [10, 20, 30]}
 
 
@@ -139,56 +141,48 @@ def test_a_key_of_ours_that_another_tool_did_not_write_is_named(key: str) -> Non
         getattr(LightField.from_rig(PLANE, FISHEYE), key)
 
 
-def frame(**changes: Any) -> dict[str, Any]:
-    first, second = content()["frames"]
-    return {"frames": [first, {k: v for k, v in (second | changes).items() if v != "none"}]}
+NO_NAME = "name: must be a file name, not "
+THREE = "must be 3 finite numbers"
+FOUR = "world_matrix: must be 4 × 4 finite numbers"
+NO_POSE = "world_matrix: is missing, or position and rotation are"
 
-
-NUMBERS = [[math.pi] * 4] * 3
-
-BROKEN: dict[str, tuple[Any, str]] = {
+BROKEN = {
     "no mapping": ([], "must be a mapping, not a list"),
     "no camera": ({"frames": []}, "camera: is missing"),
-    "no frames": ({"frames": None}, "frames: must be a list of views"),
-    "no view": ({"frames": []}, "frames: is empty"),
-    "frame is no mapping": ({"frames": [3]}, r"frames\[0\]: must be a mapping, not 3"),
-    "no name": (frame(name="none"), r"frames\[1\]: name: must be a file name, not None"),
-    "number as name": (frame(name=3), r"frames\[1\]: name: must be a file name, not 3"),
-    "empty name": (frame(name=""), r"frames\[1\]: name: must be a file name"),
-    "folder as name": (frame(name="../x"), r"frames\[1\]: name: must be a file name"),
-    "backslash in name": (frame(name="..\\x"), r"frames\[1\]: name: must be a file name"),
-    "a name twice": (frame(name="view_0000f"), r"frames\[1\]: view_0000f: is the name of two"),
-    "three rows": (frame(world_matrix=NUMBERS), r"frames\[1\]: world_matrix: must be 4 × 4 finite"),
-    "uneven rows": (
-        frame(world_matrix=[[1], [1, 2]]),
-        r"frames\[1\]: world_matrix: must be 4 × 4 finite",
-    ),
-    "infinity": (frame(position=[1, 2, 1e999]), r"frames\[1\]: position: must be 3 finite numbers"),
-    "texts": (frame(position=["1", "2", "3"]), r"frames\[1\]: position: must be 3 finite numbers"),
-    "flags": (frame(position=[True] * 3), r"frames\[1\]: position: must be 3 finite numbers"),
-    "four angles": (
-        frame(rotation=[1, 2, 3, 4]),
-        r"frames\[1\]: rotation: must be 3 finite numbers",
-    ),
-    "no rotation": (
-        frame(world_matrix="none", rotation="none"),
-        r"frames\[1\]: rotation: is missing, and so is world_matrix",
-    ),
-    "no position": (
-        frame(world_matrix="none", position="none"),
-        r"frames\[1\]: position: is missing, and so is world_matrix",
-    ),
+    "no frames": (content(frames=None), "frames: must be a list of views"),
+    "no view": (content(frames=[]), "frames: is empty"),
+    "frame is no mapping": (content(frames=[3]), "frames[0]: must be a mapping, not 3"),
 }
+BROKEN_FRAMES: dict[str, tuple[dict[str, Any], str]] = {
+    "no name": ({"name": GONE}, NO_NAME + "None"),
+    "number as name": ({"name": 3}, NO_NAME + "3"),
+    "empty name": ({"name": ""}, NO_NAME + "''"),
+    "folder as name": ({"name": "../x"}, NO_NAME + "'../x'"),
+    "backslash in name": ({"name": "x\\y"}, NO_NAME),
+    "a name twice": ({"name": "view_0000f"}, "view_0000f: is the name of two frames"),
+    "three rows": ({"world_matrix": [[1.5] * 4] * 3}, FOUR),
+    "uneven rows": ({"world_matrix": [[1], [1, 2]]}, FOUR),
+    "infinity": ({"position": [1, 2, math.inf]}, f"position: {THREE}"),
+    "texts": ({"position": ["1", "2", "3"]}, f"position: {THREE}"),
+    "flags": ({"position": [True] * 3}, f"position: {THREE}"),
+    "four angles": ({"rotation": [1, 2, 3, 4]}, f"rotation: {THREE}"),
+    "no rotation": ({"world_matrix": GONE, "rotation": GONE}, NO_POSE),
+    "no position": ({"world_matrix": GONE, "position": GONE}, NO_POSE),
+}
+for case, (changes, message) in BROKEN_FRAMES.items():
+    first, second = content()["frames"]
+    second = {key: value for key, value in (second | changes).items() if value is not GONE}
+    BROKEN[case] = content(frames=[first, second]), f"frames[1]: {message}"
 
 
 @pytest.mark.parametrize("case", BROKEN)
 def test_what_is_wrong_with_a_file_is_said_in_one_line(case: str, tmp_path: Path) -> None:
-    changes, message = BROKEN[case]
-    held = changes if case in ("no mapping", "no camera") else content(**changes)
+    held, message = BROKEN[case]
     path = tmp_path / "lightfield.json"
     path.write_text(json.dumps(held))
-    with pytest.raises(UserError, match=rf"^{path}: {message}") as caught:
+    with pytest.raises(UserError) as caught:
         LightField.read(path)
+    assert str(caught.value).startswith(f"{path}: {message}")
     assert "\n" not in str(caught.value)
 
 
@@ -212,3 +206,43 @@ def test_cube_map_refuses_a_lens_that_is_not_90_degrees() -> None:
     ):
         with pytest.raises(UserError, match=r"cube_map: .*fov: 90 and square"):
             LightField.from_rig(rig, wrong)
+
+
+# ---- the key of a view's pixels ---------------------------------------------------------------
+
+
+def test_a_views_key_changes_with_all_that_its_pixels_depend_on() -> None:
+    first = LightField.from_rig(PLANE, FISHEYE, depth="z", render={"samples": 4}, frame=1)
+    view = first.views[0]
+    moved = view.matrix + 1e-12 * np.eye(4)[[3, 1, 2, 0]]
+    found = [
+        keys.render_key(first, view),
+        keys.render_key(first, View.placed("other", view.matrix)),
+        keys.render_key(first, View.placed(view.name, moved)),
+        keys.render_key(first.changed(depth="distance"), view),
+        keys.render_key(first.changed(depth=None), view),
+        keys.render_key(first.changed(lens=WIDE, depth="distance"), view),
+        keys.render_key(first.changed(render={"samples": 5}), view),
+        keys.render_key(first.changed(frame=2), view),
+        keys.render_key(first.changed(scene={"fingerprint": "0"}), view),
+    ]
+    assert len(set(found)) == len(found)
+    assert all(len(key) == 64 for key in found)
+
+
+def test_a_views_key_follows_from_nothing_else(tmp_path: Path) -> None:
+    first = LightField.from_rig(PLANE, FISHEYE, depth="z", render={"samples": 4}, frame=1)
+    key = keys.render_key(first, first.views[0])
+    first.write(tmp_path / "elsewhere.json")
+    again = LightField.read(tmp_path / "elsewhere.json")
+    assert keys.render_key(again, again.views[0]) == key
+    assert keys.render_key(first.changed(views=first.views[:1]), first.views[0]) == key
+    other_split = View.placed(first.views[0].name, first.views[0].matrix, {"split": "test"})
+    assert keys.render_key(first, other_split) == key
+
+
+def test_a_views_seed_is_its_own_and_one_that_cycles_takes() -> None:
+    seeds = [keys.view_seed(seed, name) for seed in (0, 1) for name in ("a", "b")]
+    assert len(set(seeds)) == 4
+    assert all(0 <= keys.view_seed(0, str(n)) < 2**31 for n in range(200))
+    assert keys.view_seed(0, "a") == seeds[0]

@@ -7,6 +7,7 @@ import pytest
 
 import plan
 from lightfield.dataset import config
+from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 
 SILVR = ("garden", "lone_monk", "barbershop")
@@ -73,10 +74,8 @@ def test_a_probe_foretells_the_size_of_the_views(run_program, room, tmp_path):
     rig = {"type": "sphere", "subdivisions": 1, "center": [0, 0, 1.5]}
     render = {"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0}
     render |= {"depth_precision": "float"}
-    content = rigs.lightfield(rig, lens.to_lightfield())
-    content |= {"depth": "z", "frame": 1, "render": render, "scene": {}}
     lightfield, inventory = tmp_path / "lightfield.json", tmp_path / "inventory.json"
-    lightfield.write_text(json.dumps(content))
+    LightField.from_rig(rig, lens, depth="z", frame=1, render=render).write(lightfield)
     run_program("inventory.py", "--blend", room, "--output", inventory)
     shared = ("--blend", room, "--inventory", inventory, "--lightfield", lightfield)
     run_program("probe.py", *shared, "--size", "64", "--output", tmp_path / "probe.json")

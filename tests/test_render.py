@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from lightfield.core.files import sha256
-from lightfield.geometry import lenses, rigs
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
 from lightfield.imaging import images
 
 RENDER = {
@@ -63,8 +64,7 @@ RIG = {
 def lightfield(camera, render, rig=RIG):
     lens = lenses.from_camera(camera)
     depth = "z" if lens.has_z_depth else "distance"
-    content = rigs.lightfield(rig, lens.to_lightfield())
-    return content | {"depth": depth, "frame": 1, "render": render, "scene": {}}
+    return LightField.from_rig(rig, lens, depth=depth, frame=1, render=render, scene={})
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def rendered(tmp_path_factory, run_program, room):
     cases = folder / "cases.json"
     narrow = RENDER | {"filter_width": 0.01}
     cases.write_text(
-        json.dumps({name: lightfield(camera, narrow) for name, camera in CAMERAS.items()})
+        json.dumps({name: lightfield(camera, narrow).to_json() for name, camera in CAMERAS.items()})
     )
     program = Path(__file__).with_name("render_positions.py")
     run_program(program, room, folder / "out.npz", cases)
@@ -85,7 +85,7 @@ def test_pixels_look_where_cycles_looked(name, rendered):
     """Our pose and lens against the points that Cycles itself says it hit."""
     lens = lenses.from_camera(CAMERAS[name])
     content = lightfield(CAMERAS[name], RENDER)
-    world = np.array(content["frames"][0]["world_matrix"])
+    world = content.views[0].matrix
     x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
     rays = lens.rays(x, y)
     offset = rendered[f"{name}.points"] - world[:3, 3]
@@ -97,8 +97,8 @@ def test_pixels_look_where_cycles_looked(name, rendered):
     angle = 2 * np.arcsin(np.linalg.norm(rays - hit, axis=-1) / 2)
     assert np.median(angle[seen]) < 1e-4
     # The rim of a 180 degree lens aside, where Z-depth has no digits left.
-    usable = seen & (-hit[..., 2] > 0.01) if content["depth"] == "z" else seen
-    truth = -hit[..., 2] * distance if content["depth"] == "z" else distance
+    usable = seen & (-hit[..., 2] > 0.01) if content.depth == "z" else seen
+    truth = -hit[..., 2] * distance if content.depth == "z" else distance
     error = np.abs(rendered[f"{name}.z"] / truth - 1)[usable]
     assert np.median(error) < 1e-6
     assert np.quantile(error, 0.99) < 1e-4
@@ -110,7 +110,7 @@ def shard(tmp_path, run_program, room):
     """A rig of four views and what renders it."""
     camera = {"lens": "equidistant", "fov": 180, "resolution": [32, 32]}
     rig = RIG | {"type": "plane", "cameras": [2, 2], "size": 0.5}
-    content = lightfield(camera, RENDER | {"samples": 2}, rig)
+    content = lightfield(camera, RENDER | {"samples": 2}, rig).to_json()
     file = tmp_path / "lightfield.json"
     file.write_text(json.dumps(content))
     views, journal, record = tmp_path / "exr", tmp_path / "journal", tmp_path / "record.json"
@@ -187,7 +187,8 @@ def test_colour_beyond_half_is_clamped_and_counted():
         colour = np.array([[[1e6, 2.0, -1e6], [np.nan, np.inf, 0.5]]], dtype=np.float32)
         depth = np.array([[3.0, np.inf]], dtype=np.float32)
 
-    content = {"depth": "distance", "render": {"depth_precision": "half"}}
+    camera = {"lens": "equirectangular", "resolution": [2, 1]}
+    content = lightfield(camera, {"depth_precision": "half"})
     channels, attributes = render_shard.view_channels(Raw, content, None)
     assert attributes[images.CLAMPED_ATTRIBUTE] == 3
     assert attributes[images.NAN_ATTRIBUTE] == 1

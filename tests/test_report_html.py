@@ -12,6 +12,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from lightfield.core.files import write_json
+from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
 from lightfield.measurement import noise
@@ -56,11 +57,13 @@ def view(lens, matrix):
 def write_dataset(folder, rig, depth="z", names=None):
     """Write the views of a rig in a sphere, as the renderer writes them."""
     lens = lenses.from_camera(rig["camera"])
-    lightfield = rigs.lightfield(rig, lens.to_lightfield()) | {
-        "depth": depth,
-        "scene": {"name": "ball"},
-        "render": {"samples": 4, "adaptive_threshold": 0, "denoise": False},
-    }
+    lightfield = LightField.from_rig(
+        rig,
+        lens,
+        depth=depth,
+        scene={"name": "ball"},
+        render={"samples": 4, "adaptive_threshold": 0, "denoise": False},
+    ).to_json()
     for number, frame in enumerate(lightfield["frames"]):
         frame["name"] = names[number] if names else frame["name"]
         colour, z = view(lens, np.array(frame["world_matrix"]))
@@ -330,9 +333,9 @@ def test_an_index_leads_to_every_page(sphere, run_program, show):
 @pytest.mark.parametrize(
     ("file", "text", "expected"),
     [
-        ("lightfield.json", "{}", "lightfield.json: is not what"),
+        ("lightfield.json", "{}", "lightfield.json: camera: is missing"),
         ("lightfield.json", "[", "lightfield.json: is not JSON"),
-        ("lightfield.json", '{"frames": []}', "lightfield.json: is not what"),
+        ("lightfield.json", '{"frames": []}', "lightfield.json: camera: is missing"),
         ("validation.json", "{}", "validation.json: is not what"),
         ("report/costs.json", "[]", "costs.json: must be a mapping"),
         ("report/panorama.png", "no", "panorama.png: is no picture"),

@@ -11,13 +11,8 @@ import numpy as np
 import pytest
 
 from lightfield.core.errors import UserError
-from lightfield.geometry import rigs
-
-LENS: dict[str, Any] = {
-    "camera": {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT", "fisheye_fov": math.pi},
-    "resolution": [64, 64],
-    "sensor_size": [36.0, 36.0],
-}
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses, rigs
 
 # Every dataset of SILVR: the number of views as published, and the rig.
 SILVR: dict[str, tuple[int, dict[str, Any]]] = {
@@ -257,36 +252,6 @@ def test_cube_map_faces_look_along_six_axes_of_the_camera() -> None:
         assert np.linalg.det(matrix[:3, :3]) == pytest.approx(1)
 
 
-def test_cube_map_refuses_a_lens_that_is_not_90_degrees() -> None:
-    rig = {"type": "plane", "cameras": [1, 1], "cube_map": True}
-    with pytest.raises(UserError, match="cube_map"):
-        rigs.lightfield(rig, LENS)
-    wide = np.diag([0.5, 0.5, -1, -1]).tolist()
-    with pytest.raises(UserError, match="fov: 90"):
-        rigs.lightfield(rig, {**LENS, "camera": {"type": "PERSP", "projection_matrix": wide}})
-    square = np.diag([1.0, 1.0, -1, -1]).tolist()
-    camera = {"type": "PERSP", "projection_matrix": square}
-    assert len(rigs.lightfield(rig, {**LENS, "camera": camera})["frames"]) == 6
-
-
-def test_lightfield_json_holds_what_silvrs_readers_read() -> None:
-    content = rigs.lightfield(
-        {"type": "cuboid", "cameras": [3, 2, 2], "evaluation_split": "odd"}, LENS
-    )
-    content = json.loads(json.dumps(content, allow_nan=False))
-    assert content["lf_type"] == "CUBOID"
-    assert content["camera"] == LENS["camera"]
-    assert content["resolution"] == [64, 64]
-    for frame in content["frames"]:
-        matrix = np.array(frame["world_matrix"])
-        np.testing.assert_array_equal(matrix[:3, 3], frame["position"])
-        np.testing.assert_array_equal(matrix[3], [0, 0, 0, 1])
-        turned = rigs.euler_to_matrix(np.array(frame["rotation"]))
-        np.testing.assert_allclose(matrix[:3, :3], turned, atol=1e-11)
-        number = int(frame["name"][len("view_x") : -1])
-        assert frame["split"] == ("test" if number % 2 else "train")
-
-
 def test_more_than_9999_views_keep_one_name_each() -> None:
     names = [view.name for view in rigs.poses({"type": "plane", "cameras": [101, 101]})]
     assert names[9999:10001] == ["view_9999f", "view_10000f"]
@@ -295,7 +260,8 @@ def test_more_than_9999_views_keep_one_name_each() -> None:
 
 def test_poses_from_csv_and_lightfield_json_agree(tmp_path: Path) -> None:
     rig = {"type": "sphere", "subdivisions": 1, "size": 3, "rotation": [10, 20, 30]}
-    content = rigs.lightfield(rig, LENS)
+    lens = lenses.from_camera({"lens": "equidistant", "resolution": [64, 64], "fov": 180})
+    content = LightField.from_rig(rig, lens).to_json()
     (tmp_path / "lightfield.json").write_text(json.dumps(content))
     rows = [[f["name"], *f["position"], *f["rotation"]] for f in content["frames"]]
     lines = ["name,x,y,z,rx,ry,rz", *(",".join(map(str, row)) for row in rows)]
@@ -304,7 +270,7 @@ def test_poses_from_csv_and_lightfield_json_agree(tmp_path: Path) -> None:
         again = {"type": "poses", "file": str(tmp_path / file)}
         assert rigs.view_count(again) == 12
         assert rigs.poses(again) == rigs.poses(rig)
-        assert rigs.lightfield(again, LENS)["lf_type"] == lf_type
+        assert rigs.lf_type(again) == lf_type
 
 
 @pytest.mark.parametrize(

@@ -16,20 +16,19 @@ import render_shard
 import status
 from lightfield.core import progress
 from lightfield.dataset import keys
+from lightfield.dataset.lightfield import LightField, View
+from lightfield.geometry import lenses
 from lightfield.imaging import images
 
 NAMES = ["a", "b", "c", "d"]
-IDENTITY = np.eye(4).tolist()
 
 
 @pytest.fixture
 def dataset(tmp_path, monkeypatch, capsys):
     """A dataset of four views of which the first ``count`` are rendered, and its status."""
     folder, made = tmp_path / "results/scene/rig", tmp_path / "work/scene/rig"
-    content = {
-        "resolution": [2, 1],
-        "frames": [{"name": name, "world_matrix": IDENTITY} for name in NAMES],
-    }
+    lens = lenses.from_camera({"lens": "equirectangular", "resolution": [2, 1]})
+    content = LightField(lens.to_lightfield(), [View.placed(name, np.eye(4)) for name in NAMES])
 
     def lines(others=()):
         folders = ("--results", tmp_path / "results", "--work", tmp_path / "work")
@@ -40,12 +39,12 @@ def dataset(tmp_path, monkeypatch, capsys):
 
     def render(*names, settings=content):
         (folder / "exr").mkdir(parents=True, exist_ok=True)
-        (folder / "lightfield.json").write_text(json.dumps(content))
-        for frame in settings["frames"]:
-            if frame["name"] in names:
-                key = {images.KEY_ATTRIBUTE: keys.render_key(settings, frame)}
+        content.write(folder / "lightfield.json")
+        for view in settings.views:
+            if view.name in names:
+                key = {images.KEY_ATTRIBUTE: keys.render_key(settings, view)}
                 colour = np.zeros((1, 2), np.float16)
-                images.write_exr(folder / f"exr/{frame['name']}.exr", {"R": colour}, key)
+                images.write_exr(folder / f"exr/{view.name}.exr", {"R": colour}, key)
 
     def journal(name, *lines):
         (made / "render").mkdir(parents=True, exist_ok=True)
@@ -77,7 +76,7 @@ def test_a_build_that_was_never_started_is_told(dataset):
 
 def test_views_of_other_settings_are_not_counted(dataset):
     dataset.render("a", "b")
-    dataset.render("c", settings=dataset.content | {"resolution": [4, 1]})
+    dataset.render("c", settings=dataset.content.changed(resolution=[4, 1]))
     (dataset.folder / "exr/d.exr").write_bytes(b"no image")
     assert dataset()[1] == "  rendered: 2 of 4, no rate yet"
 
@@ -183,13 +182,12 @@ def test_progress_begins_at_once_and_reads_in_a_log(capsys, monkeypatch):
 
 def test_a_shard_tells_of_the_views_that_others_finished(dataset):
     dataset.render("a")
-    frames = dataset.content["frames"]
-    others = render_shard.Others(frames[:2], dataset.content, dataset.folder / "exr", None)
+    others = render_shard.Others(2, dataset.content, dataset.folder / "exr", None)
     assert others() == "; of the whole dataset 1 of 4"
     dataset.render("c", "d")
     assert others() == "; of the whole dataset 3 of 4"
     # Alone it would only say the same again.
-    assert render_shard.Others(frames, dataset.content, dataset.folder / "exr", None)() == ""
+    assert render_shard.Others(4, dataset.content, dataset.folder / "exr", None)() == ""
 
 
 def test_a_shard_tells_how_far_the_run_is(dataset, tmp_path, monkeypatch):
@@ -199,8 +197,7 @@ def test_a_shard_tells_how_far_the_run_is(dataset, tmp_path, monkeypatch):
     run = tmp_path / "run.json"
     run.write_text(json.dumps({str(dataset.folder): 4, str(later): 6}))
     dataset.render("a")
-    frames = dataset.content["frames"]
-    others = render_shard.Others(frames, dataset.content, dataset.folder / "exr", run)
+    others = render_shard.Others(4, dataset.content, dataset.folder / "exr", run)
     assert others() == "; of the run 1 of 10"
     dataset.render("b", "c")
     now[0] += 30
@@ -208,5 +205,5 @@ def test_a_shard_tells_how_far_the_run_is(dataset, tmp_path, monkeypatch):
     assert others() == "; of the run 3 of 10, 1 min 45 s left"
     # The other dataset's cameras are placed, and nothing is rendered there.
     later.mkdir()
-    (later / "lightfield.json").write_text(json.dumps(dataset.content))
+    dataset.content.write(later / "lightfield.json")
     assert others().startswith("; of the run 3 of 10")

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from lightfield.core.files import sha256, write_json
+from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
 from lightfield.validation import validation
@@ -92,7 +93,7 @@ def make_dataset(
     folder: Path, rig: Mapping[str, Any], camera: Mapping[str, Any], depth: str | None = "z"
 ) -> Path:
     lens = lenses.from_camera(camera)
-    content = rigs.lightfield(rig, lens.to_lightfield()) | {"depth": depth}
+    content = LightField.from_rig(rig, lens, depth=depth).to_json()
     rng = np.random.default_rng(1)
     for frame in content["frames"]:
         attributes = {images.NAN_ATTRIBUTE: 0, images.CLAMPED_ATTRIBUTE: 0}
@@ -772,7 +773,7 @@ def cycles_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     dataset = tmp_path_factory.mktemp("cycles") / "yard" / "sphere"
     lens = lenses.from_camera({**FISHEYE, "resolution": [96, 96]})
     rig = {**SPHERE, "center": [0, 0, 1.2]}
-    content = rigs.lightfield(rig, lens.to_lightfield()) | {"depth": "z"}
+    content = LightField.from_rig(rig, lens, depth="z").to_json()
     write_json(dataset / "lightfield.json", content)
     subprocess.run([sys.executable, str(CYCLES_ROOM), str(dataset)], check=True)
     return dataset

@@ -12,6 +12,7 @@ from importlib.metadata import version
 from typing import Any
 
 from lightfield.dataset.config import BUILDERS
+from lightfield.dataset.lightfield import LightField, View
 
 # Raised when the program that renders changes what it writes for the same settings.
 RENDER_VERSION = 1
@@ -30,10 +31,10 @@ def scene_fingerprint(source: Mapping[str, Any]) -> str:
     return _digest([*map(_hash, texts), source["parameters"], version("bpy")])
 
 
-def render_key(lightfield: Mapping[str, Any], frame: Mapping[str, Any]) -> str:
-    """Return the key of one of the ``frames`` of a lightfield.json: 64 hexadecimal digits."""
-    whole = {key: value for key, value in lightfield.items() if key != "frames"}
-    return _digest([RENDER_VERSION, version("bpy"), whole, frame["name"], frame["world_matrix"]])
+def render_key(lightfield: LightField, view: View) -> str:
+    """Return the key of one of the views of a light field: 64 hexadecimal digits."""
+    pose = view.matrix.tolist()
+    return _digest([RENDER_VERSION, version("bpy"), lightfield.content, view.name, pose])
 
 
 def view_seed(seed: int, name: str) -> int:

@@ -40,6 +40,12 @@ class View:
     rotation: Floats
     others: Mapping[str, Any] = field(default_factory=dict)
 
+    @classmethod
+    def placed(cls, name: str, matrix: Floats, others: Mapping[str, Any] | None = None) -> "View":
+        """Return a view of which the matrix (4, 4) is known."""
+        rotation = rigs.matrix_to_euler(matrix[:3, :3])
+        return cls(name, matrix, matrix[:3, 3], rotation, others or {})
+
     @property
     def split(self) -> str | None:
         """Whether the view is meant to ``train`` on or to ``test`` with; None where all are."""
@@ -220,16 +226,15 @@ def _view(where: str, frame: Any) -> View:
     for key, shape in (("world_matrix", (4, 4)), ("position", (3,)), ("rotation", (3,))):
         if key in others:
             numbers[key] = _numbers(f"{where}: {key}", others.pop(key), shape)
-    matrix = numbers.get("world_matrix")
+    matrix, position, rotation = map(numbers.get, ("world_matrix", "position", "rotation"))
     if matrix is None:
-        for key in ("position", "rotation"):
-            if key not in numbers:
-                raise UserError(f"{where}: {key}: is missing, and so is world_matrix")
+        if position is None or rotation is None:
+            raise UserError(f"{where}: world_matrix: is missing, or position and rotation are")
         matrix = np.eye(4)
-        matrix[:3, :3] = rigs.euler_to_matrix(numbers["rotation"])
-        matrix[:3, 3] = numbers["position"]
-    position = numbers.get("position", matrix[:3, 3])
-    rotation = numbers.get("rotation")
+        matrix[:3, :3] = rigs.euler_to_matrix(rotation)
+        matrix[:3, 3] = position
+    if position is None:
+        position = matrix[:3, 3]
     if rotation is None:
         rotation = rigs.matrix_to_euler(matrix[:3, :3])
     return View(name, matrix, position, rotation, others)

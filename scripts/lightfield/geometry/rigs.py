@@ -148,38 +148,6 @@ def lf_type(rig: Mapping[str, Any]) -> str:
     return LF_TYPE[rig["type"]]
 
 
-def lightfield(rig: Mapping[str, Any], lens: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the content of lightfield.json for a rig seen through a lens.
-
-    ``lens`` is what `Lens.to_lightfield` returns. Where the rig asks for an evaluation split,
-    each frame holds ``split``: "test" for odd sequence numbers, as SILVR's paper suggests, and
-    "train" for the others. Raises `UserError` where a cube map's lens is not a 90° rectilinear.
-    """
-    if rig.get("cube_map"):
-        camera = lens["camera"]
-        diagonal = np.diagonal(camera.get("projection_matrix", np.zeros((4, 4))))[:2]
-        if camera["type"] != "PERSP" or not np.allclose(diagonal, 1.0, rtol=0, atol=1e-6):
-            raise UserError("cube_map: its camera must be rectilinear with fov: 90 and square")
-    frames = []
-    for pose in poses(rig):
-        frame: dict[str, Any] = {
-            "name": pose.name,
-            "position": list(pose.position),
-            "rotation": list(pose.rotation),
-            "world_matrix": _plain(pose.matrix()),
-        }
-        if rig.get("evaluation_split"):
-            frame["split"] = "test" if pose.number % 2 else "train"
-        frames.append(frame)
-    return {
-        "camera": lens["camera"],
-        "lf_type": lf_type(rig),
-        "resolution": lens["resolution"],
-        "sensor_size": lens["sensor_size"],
-        "frames": frames,
-    }
-
-
 def euler_to_matrix(euler: Floats) -> Floats:
     """Return the rotations (…, 3, 3) of XYZ Euler angles (…, 3): Rz · Ry · Rx, as in Blender."""
     cx, cy, cz = np.moveaxis(np.cos(euler), -1, 0)

@@ -19,13 +19,11 @@ from numpy.typing import NDArray
 from lightfield.core import processors
 from lightfield.core.files import read_json
 from lightfield.dataset import keys
-from lightfield.geometry import lenses
+from lightfield.dataset.lightfield import LightField, View
 from lightfield.imaging import images
 from lightfield.measurement.calibration import UNCALIBRATED
 from lightfield.measurement.metrics import Mask, Reference, make_reference
 from lightfield.validation.consistency import Camera
-
-Frame = Mapping[str, Any]
 
 PLAIN = {"adaptive_threshold": 0, "denoise": False}
 
@@ -45,7 +43,7 @@ DEVICE_ATTRIBUTE = "plenoforge:device"
 class Probe:
     """A window of one view at its own resolution: its top left pixel, and its size."""
 
-    frame: Frame
+    view: View
     x: int
     y: int
     width: int
@@ -54,7 +52,7 @@ class Probe:
     @property
     def name(self) -> str:
         """The view's name and the window's place in it."""
-        return f"{self.frame['name']}+{self.x}+{self.y}"
+        return f"{self.view.name}+{self.x}+{self.y}"
 
 
 @dataclass(frozen=True)
@@ -84,25 +82,25 @@ class Trials:
         self,
         blend: Path,
         inventory: Path,
-        lightfield: Mapping[str, Any],
+        lightfield: LightField,
         device: str,
         threads: int,
         cache: Path,
     ) -> None:
-        self.lens = lenses.from_lightfield(lightfield)
+        self.lens = lightfield.lens
         # How many samples are taken, and why, is for each trial to say.
-        render = {k: v for k, v in lightfield["render"].items() if k not in UNCALIBRATED}
-        self.lightfield = {**lightfield, "render": render}
+        render = {k: v for k, v in lightfield.render.items() if k not in UNCALIBRATED}
+        self.lightfield = lightfield.changed(render=render)
         self._blend, self._inventory = blend, inventory
         self._device, self._threads, self._cache = device, threads, cache
         self._started = False
 
     def render(self, probe: Probe, seed: int, sampling: Mapping[str, Any]) -> Trial:
         """Render a probe under the render settings that ``sampling`` changes."""
-        settings = {**self.lightfield["render"], **PLAIN, **sampling, "seed": seed}
+        settings = {**self.lightfield.render, **PLAIN, **sampling, "seed": seed}
         window = [probe.x, probe.y, probe.width, probe.height]
-        content = {**self.lightfield, "render": settings, "device": self._device, "window": window}
-        key = keys.render_key(content, probe.frame)
+        one = self.lightfield.changed(render=settings, device=self._device, window=window)
+        key = keys.render_key(one, probe.view)
         path = self._cache / f"{key[:32]}.exr"
         if not images.is_finished(path, key):
             self._render(probe, settings, path, key)
@@ -132,27 +130,26 @@ class Trials:
         inside: Mask = np.isfinite(rays).all(axis=-1)
         return inside
 
-    def camera(self, frame: Frame) -> Camera:
-        """Return where a frame looks from, as `lightfield.validation.consistency` wants it."""
-        kind = "z" if self.lightfield["camera"]["type"] == "PERSP" else "distance"
-        return Camera(self.lens, np.array(frame["world_matrix"]), kind)
+    def camera(self, view: View) -> Camera:
+        """Return where a view looks from, as `lightfield.validation.consistency` wants it."""
+        return Camera(self.lens, view.matrix, self.lightfield.cycles_depth)
 
     def probes(self, size: int, count: int) -> list[Probe]:
-        """Choose ``count`` windows of ``size``², spread evenly over the frames and the image.
+        """Choose ``count`` windows of ``size``², spread evenly over the views and the image.
 
         A view no larger than a window is a probe as a whole.
         """
-        frames = self.lightfield["frames"]
+        views = self.lightfield.views
         size = min(size, self.lens.width, self.lens.height)
         found: list[Probe] = []
         point = 0
         while len(found) < count:
-            frame = frames[int((len(found) + 0.5) * len(frames) / count)]
+            view = views[int((len(found) + 0.5) * len(views) / count)]
             # Roberts' R2 sequence, which fills a square evenly.
             point += 1
             across, down = (point * step % 1 for step in R2)
             x, y = round(across * (self.lens.width - size)), round(down * (self.lens.height - size))
-            probe = Probe(frame, x, y, size, size)
+            probe = Probe(view, x, y, size, size)
             # In the corners of a fisheye view there is nothing.
             if self.mask(probe).mean() >= FULL_ENOUGH:
                 found.append(probe)
@@ -166,8 +163,8 @@ class Trials:
             self._start(settings)
         blender.set_sampling(settings)
         blender.set_window(probe.x, probe.y, probe.width, probe.height)
-        seed = keys.view_seed(settings["seed"], probe.frame["name"])
-        raw = blender.render_view(np.array(probe.frame["world_matrix"]), seed)
+        seed = keys.view_seed(settings["seed"], probe.view.name)
+        raw = blender.render_view(probe.view.matrix, seed)
         assert raw.samples is not None and raw.worked_seconds is not None
         seconds = raw.worked_seconds if self._on == "CPU" else raw.render_seconds
         channels = {name: raw.colour[:, :, index] for index, name in enumerate("RGB")}
@@ -197,21 +194,19 @@ class Trials:
         # The first render also loads what all others use; it is not timed.
         blender.set_sampling({**settings, "samples": 1, "denoise": True})
         blender.set_window(0, 0, min(64, self.lens.width), min(64, self.lens.height))
-        blender.render_view(np.array(self.lightfield["frames"][0]["world_matrix"]), 0)
+        blender.render_view(self.lightfield.views[0].matrix, 0)
         self._started = True
 
 
-def neighbour(frames: Sequence[Frame], frame: Frame) -> Frame | None:
-    """Return the nearest other frame that looks the same way to within 70 degrees, if any."""
-    own = np.array(frame["world_matrix"])
+def neighbour(views: Sequence[View], view: View) -> View | None:
+    """Return the nearest other view that looks the same way to within 70 degrees, if any."""
     alike = math.cos(math.radians(70))
     others = [
-        (round(float(np.linalg.norm(matrix[:3, 3] - own[:3, 3])), 6), index)
-        for index, other in enumerate(frames)
-        if other["name"] != frame["name"]
-        and (matrix := np.array(other["world_matrix"]))[:3, 2] @ own[:3, 2] > alike
+        (round(float(np.linalg.norm(other.matrix[:3, 3] - view.matrix[:3, 3])), 6), index)
+        for index, other in enumerate(views)
+        if other.name != view.name and other.matrix[:3, 2] @ view.matrix[:3, 2] > alike
     ]
-    return frames[min(others)[1]] if others else None
+    return views[min(others)[1]] if others else None
 
 
 # Two depths of one surface differ by less than this part: pixels are coarse, and depth is jittered.

@@ -22,6 +22,7 @@ import mathutils
 import numpy as np
 
 from lightfield.core.errors import UserError
+from lightfield.dataset.lightfield import LightField
 from lightfield.imaging import images
 
 Array = np.ndarray[Any, Any]
@@ -98,13 +99,13 @@ def open_scene(path: Path) -> None:
 
 def set_up_render(
     settings: Mapping[str, Any],
-    lightfield: Mapping[str, Any],
+    lightfield: LightField,
     device: str,
     threads: int,
 ) -> str:
     """Set Cycles up for every view that follows; returns what it renders on, CPU or GPU.
 
-    ``settings`` is a scene YAML's ``render`` block, ``lightfield`` a lightfield.json's content.
+    ``settings`` is a scene YAML's ``render`` block.
     Raises `UserError` if the ``device`` is not there.
     """
     scene = bpy.context.scene
@@ -124,7 +125,8 @@ def set_up_render(
     render.use_persistent_data = True
     render.threads_mode = "FIXED"
     render.threads = threads
-    render.resolution_x, render.resolution_y = lightfield["resolution"]
+    render.resolution_x = lightfield.lens.width
+    render.resolution_y = lightfield.lens.height
     render.resolution_percentage = 100
     render.pixel_aspect_x = render.pixel_aspect_y = 1
     render.use_border = False
@@ -143,7 +145,7 @@ def set_up_render(
         if name.startswith("use_pass_"):
             setattr(layer, name, False)
     layer.use_pass_combined = True
-    layer.use_pass_z = lightfield["depth"] is not None
+    layer.use_pass_z = lightfield.depth is not None
     layer.cycles.denoising_store_passes = False
     layer.cycles.pass_debug_sample_count = False
     # Passes of the artist's own, and those of light groups.
@@ -152,8 +154,8 @@ def set_up_render(
             group.remove(entry)
 
     _use_device(scene, device)
-    _set_camera(scene, lightfield)
-    scene.frame_set(lightfield["frame"])
+    _set_camera(scene, lightfield.content)
+    scene.frame_set(lightfield.frame)
     return str(cycles.device)
 
 

@@ -1,7 +1,7 @@
 """What a dataset's page shows of the views themselves, packed to be looked at in a browser."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ import matplotlib
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.geometry import lenses
+from lightfield.dataset.lightfield import LightField
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images, pictures
 from lightfield.measurement.noise import relative_noise
@@ -61,21 +61,19 @@ class Looks:
     row_shown: int
 
 
-def collect(folder: Path, lightfield: Mapping[str, Any], rig: Mapping[str, Any]) -> Looks:
+def collect(folder: Path, lightfield: LightField, rig: Mapping[str, Any]) -> Looks:
     """Read the views that the page shows and pack them.
 
     ``folder`` holds the views of ``lightfield``, and ``rig`` is the scene YAML's mapping. Raises
     `UserError` for a view that cannot be read.
     """
-    frames = lightfield["frames"]
-    matrices = np.array([frame["world_matrix"] for frame in frames], float)
-    lens = lenses.from_lightfield(lightfield)
-    meaning = lightfield.get("depth", "z" if lens.has_z_depth else "distance")
-    shown = list(range(len(frames)))[:: math.ceil(len(frames) / pictures.MOST_VIEWS)]
+    names = [view.name for view in lightfield.views]
+    matrices, lens, meaning = lightfield.matrices, lightfield.lens, lightfield.depth
+    shown = list(range(len(names)))[:: math.ceil(len(names) / pictures.MOST_VIEWS)]
     side = SIDE if len(shown) <= MANY_VIEWS else SMALLER_SIDE
     small = _fitted(lens, side)
 
-    loaded = [read(folder / f"{frames[i]['name']}.exr", small, meaning) for i in shown]
+    loaded = [read(folder / f"{names[i]}.exr", small, meaning) for i in shown]
     light = np.stack([view.colour for view in loaded])
     found = [view.depth for view in loaded if view.depth is not None]
     depths = np.stack(found) if found else None
@@ -97,13 +95,13 @@ def collect(folder: Path, lightfield: Mapping[str, Any], rig: Mapping[str, Any])
     data = {
         "views": [
             {
-                "name": str(frame["name"]),
+                "name": name,
                 "at": _rounded(matrix[:3, 3]),
                 "right": _rounded(matrix[:3, 0]),
                 "up": _rounded(matrix[:3, 1]),
                 "ahead": _rounded(-matrix[:3, 2]),
             }
-            for frame, matrix in zip(frames, matrices, strict=True)
+            for name, matrix in zip(names, matrices, strict=True)
         ],
         "outline": [[_rounded(point) for point in line] for line in outline(rig)],
         "resolution": [lens.width, lens.height],
@@ -120,11 +118,11 @@ def collect(folder: Path, lightfield: Mapping[str, Any], rig: Mapping[str, Any])
     kept: list[int] = []
     if row:
         kept = epipolar.thinned(row.views, MOST_ROWS)
-        data["row"] = _epipolar_images(folder, frames, matrices, lens, meaning, row, kept, limits)
+        data["row"] = _epipolar_images(folder, names, matrices, lens, meaning, row, kept, limits)
     return Looks(
         data,
         len(shown),
-        len(frames),
+        len(names),
         (min(noises), float(np.median(noises)), max(noises)) if noises else None,
         row,
         len(kept),
@@ -192,7 +190,7 @@ def _depth_scale(
 
 def _epipolar_images(
     folder: Path,
-    frames: Any,
+    names: Sequence[str],
     matrices: Array,
     lens: Lens,
     meaning: str | None,
@@ -208,7 +206,7 @@ def _epipolar_images(
     depth = np.full((len(epipolar.TILTS), count, columns), np.nan)
     for place, position in enumerate(kept):
         number = row.views[position]
-        view = read(folder / f"{frames[number]['name']}.exr", fitted, meaning)
+        view = read(folder / f"{names[number]}.exr", fitted, meaning)
         for tilted, tilt in enumerate(epipolar.TILTS):
             rays = epipolar.directions(row, tilt, columns)
             light[tilted, place], depth[tilted, place] = epipolar.sample(
