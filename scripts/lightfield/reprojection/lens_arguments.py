@@ -7,7 +7,7 @@ import argparse
 import json
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,100 +16,11 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
-from lightfield.geometry.lenses import Array, Lens, from_camera, from_lightfield
+from lightfield.geometry.lenses import LENSES, Array, Lens, from_camera, from_lightfield
+from lightfield.geometry.lenses.base import named_numbers
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
-from lightfield.geometry.lenses.equidistant import Equidistant
-from lightfield.geometry.lenses.equirectangular import Equirectangular
-from lightfield.geometry.lenses.equisolid import Equisolid
-from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
-from lightfield.geometry.lenses.orthographic import Orthographic
-from lightfield.geometry.lenses.polynomial import Polynomial
-from lightfield.geometry.lenses.rectilinear import Rectilinear
-from lightfield.geometry.lenses.stereographic import Stereographic
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.resample import DEFAULT_FILTER, FILTERS
-
-Numbers = Sequence[float]
-
-
-@dataclass(frozen=True)
-class _Flag:
-    metavar: str
-    counts: tuple[int, ...]
-    make: Callable[[int, int, Numbers], Lens]
-    help: str
-
-
-def _sensor(width: int, height: int, sensor_width: float) -> tuple[float, float]:
-    return (sensor_width, sensor_width * height / width)
-
-
-_FLAGS = {
-    "rectilinear": _Flag(
-        "FOCAL_LENGTH,SENSOR_WIDTH",
-        (2,),
-        lambda w, h, n: Rectilinear(
-            width=w, height=h, focal_length=n[0], sensor_size=_sensor(w, h, n[1])
-        ),
-        "perspective lens",
-    ),
-    "equisolid": _Flag(
-        "FOCAL_LENGTH,SENSOR_WIDTH,FOV",
-        (3,),
-        lambda w, h, n: Equisolid(
-            width=w, height=h, focal_length=n[0], sensor_size=_sensor(w, h, n[1]), fov=n[2]
-        ),
-        "equisolid fisheye",
-    ),
-    "equidistant": _Flag(
-        "FOV", (1,), lambda w, h, n: Equidistant(width=w, height=h, fov=n[0]), "equidistant fisheye"
-    ),
-    "stereographic": _Flag(
-        "FOV",
-        (1,),
-        lambda w, h, n: Stereographic(width=w, height=h, fov=n[0]),
-        "stereographic fisheye",
-    ),
-    "orthographic": _Flag(
-        "FOV",
-        (1,),
-        lambda w, h, n: Orthographic(width=w, height=h, fov=n[0]),
-        "orthographic fisheye",
-    ),
-    "equirectangular": _Flag(
-        "LONG_MIN,LONG_MAX,LAT_MIN,LAT_MAX|full",
-        (4,),
-        lambda w, h, n: Equirectangular(
-            width=w, height=h, longitude=(n[0], n[1]), latitude=(n[2], n[3])
-        ),
-        "panorama",
-    ),
-    "polynomial": _Flag(
-        "K0,K1,K2,K3,K4,SENSOR_WIDTH,FOV",
-        (7,),
-        lambda w, h, n: Polynomial(
-            width=w,
-            height=h,
-            coefficients=tuple(n[:5]),
-            sensor_size=_sensor(w, h, n[5]),
-            fov=n[6],
-        ),
-        "Blender's polynomial fisheye",
-    ),
-    "kannala-brandt": _Flag(
-        "FOCAL_LENGTH,SENSOR_WIDTH,K1,K2,K3,K4[,FOV]",
-        (6, 7),
-        lambda w, h, n: KannalaBrandt(
-            width=w,
-            height=h,
-            focal_length=n[0],
-            sensor_size=_sensor(w, h, n[1]),
-            coefficients=tuple(n[2:6]),
-            fov=n[6] if len(n) == 7 else 2 * math.pi,
-        ),
-        "OpenCV's fisheye",
-    ),
-}
 
 
 def joined(arguments: Sequence[str]) -> list[str]:
@@ -158,8 +69,9 @@ def add_geometry_flags(parser: argparse.ArgumentParser) -> None:
 def _add_lens_flags(parser: argparse.ArgumentParser, prefix: str, title: str) -> None:
     group = parser.add_argument_group(title, "Lengths in mm, angles in radians.")
     choice = group.add_mutually_exclusive_group()
-    for name, flag in _FLAGS.items():
-        choice.add_argument(f"--{prefix}{name}", metavar=flag.metavar, help=flag.help)
+    for lens in LENSES.values():
+        if lens.form:
+            choice.add_argument(f"--{prefix}{lens.flag()}", metavar=lens.form, help=lens.title)
     if prefix:
         choice.add_argument(
             "--i-cubemap",
@@ -231,7 +143,7 @@ def _source(arguments: argparse.Namespace) -> tuple[dict[str, Any], Lens]:
     if arguments.no_configs:
         if arguments.input_cfg:
             raise UserError("--no-configs: excludes --input-cfg")
-        width, height = size(arguments.no_configs, "--no-configs")
+        width, height = _size(arguments.no_configs, "--no-configs")
         lens = _lens(arguments, "i-", width, height)
         if lens is None:
             raise UserError("--no-configs: needs the input lens, one of the flags --i-…")
@@ -251,7 +163,7 @@ def _source(arguments: argparse.Namespace) -> tuple[dict[str, Any], Lens]:
 
 def _targets(arguments: argparse.Namespace, source: Lens) -> list[Target]:
     if arguments.output_resolution:
-        width, height = size(arguments.output_resolution, "--output-resolution")
+        width, height = _size(arguments.output_resolution, "--output-resolution")
     else:
         if not 0 < arguments.scale < math.inf:
             raise UserError(f"--scale {arguments.scale:g}: must be positive")
@@ -259,7 +171,7 @@ def _targets(arguments: argparse.Namespace, source: Lens) -> list[Target]:
         if min(width, height) < 1:
             raise UserError(f"--scale {arguments.scale:g}: leaves no pixel")
     rotation = lens_map.rotation_matrix(
-        *numbers(arguments.rotation, "--rotation", "PAN,PITCH,ROLL", (3,))
+        *_numbers(arguments.rotation, "--rotation", "PAN,PITCH,ROLL")
     )
     if arguments.cubemap is not None:
         if arguments.no_reproject:
@@ -288,34 +200,25 @@ def _lens(arguments: argparse.Namespace, prefix: str, width: int, height: int) -
     attribute = prefix.replace("-", "_")
     if prefix and arguments.i_cubemap:
         return CubeMap(width=width, height=height)
-    for name, flag in _FLAGS.items():
-        text = getattr(arguments, attribute + name.replace("-", "_"))
-        if text is None:
-            continue
-        if name == "equirectangular" and text == "full":
-            text = f"{-math.pi},{math.pi},{-math.pi / 2},{math.pi / 2}"
-        values = numbers(text, f"--{prefix}{name}", flag.metavar, flag.counts)
-        try:
-            return flag.make(width, height, values)
-        except UserError as error:
-            raise UserError(f"--{prefix}{name} {text}: {error}") from None
+    for lens in LENSES.values():
+        text = getattr(arguments, attribute + lens.name, None)
+        if text is not None:
+            try:
+                return lens.from_flag(text, width, height)
+            except UserError as error:
+                raise UserError(f"--{prefix}{lens.flag()} {text}: {error}") from None
     return None
 
 
-def numbers(text: str, flag: str, form: str, counts: Sequence[int]) -> list[float]:
-    """Return the comma-separated numbers of ``text``; a `UserError` unless as many as allowed."""
+def _numbers(text: str, flag: str, form: str) -> list[float]:
     try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if len(values) not in counts or not all(map(math.isfinite, values)):
-        raise UserError(f"{flag} {text}: must have the form {form}")
-    return values
+        return list(named_numbers(text, form).values())
+    except UserError as error:
+        raise UserError(f"{flag} {text}: {error}") from None
 
 
-def size(text: str, flag: str) -> tuple[int, int]:
-    """Return the WIDTH,HEIGHT of ``text`` in pixels."""
-    width, height = numbers(text, flag, "WIDTH,HEIGHT", (2,))
+def _size(text: str, flag: str) -> tuple[int, int]:
+    width, height = _numbers(text, flag, "WIDTH,HEIGHT")
     if width != int(width) or height != int(height) or width < 1 or height < 1:
         raise UserError(f"{flag} {text}: must be two positive whole numbers of pixels")
     return int(width), int(height)

@@ -232,6 +232,11 @@ class Lens(ABC):
         return {}
 
     @classmethod
+    def flag(cls) -> str:
+        """Return the lens's flag of a command, without its dashes."""
+        return cls.name.replace("_", "-")
+
+    @classmethod
     def from_flag(cls, text: str, width: int, height: int) -> Self:
         """Return the lens of the numbers of its flag; raises `UserError`."""
         assert cls.form is not None
@@ -387,11 +392,11 @@ def pair(values: Sequence[float]) -> Pair:
 def named_numbers(text: str, form: str) -> dict[str, float]:
     """Return the comma-separated numbers of ``text`` by their names in ``form``.
 
-    Names in brackets, as B in ``A[,B]``, may be missing. Raises `UserError` unless ``text`` is
-    of the form.
+    Names in brackets, as B in ``A[,B]``, may be missing; what follows a bar is another form.
+    Raises `UserError` unless ``text`` is of the form.
     """
-    names = re.findall(r"\w+", form)
-    least = len(re.findall(r"\w+", form.partition("[")[0]))
+    names = re.findall(r"\w+", form.partition("|")[0])
+    least = len(re.findall(r"\w+", form.partition("[")[0].partition("|")[0]))
     try:
         values = [float(part) for part in text.split(",")]
     except ValueError:
