@@ -464,8 +464,7 @@ def write_batch(folder: Path, size: int, count: int) -> None:
     lens = Equidistant(width=size, height=size, fov=math.pi)
     rng = np.random.default_rng(0)
     gray = Waves(size / 4).means(lens, 1)
-    x, y = np.meshgrid(np.arange(size) + 0.5, np.arange(size) + 0.5)
-    rays = lens.rays(x, y)
+    rays = lens.pixel_rays()
     outside = np.isnan(rays[..., 0])
     # A room of 4 × 3 × 6 m.
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -75,8 +75,7 @@ class Export:
         except UserError as error:
             raise UserError(f"{arguments.input_cfg}: {error}") from None
         self.meaning = content.get("depth")
-        x, y = np.meshgrid(np.arange(self.lens.width) + 0.5, np.arange(self.lens.height) + 0.5)
-        self.rays = self.lens.rays(x, y)
+        self.rays = self.lens.pixel_rays()
         self.blind = instant_ngp.blind_pixels(self.lens)
         self.image_dir: Path = arguments.image_dir or arguments.input_cfg.parent
         self.exr_dir: Path = arguments.exr_dir or arguments.output.parent / "instant_ngp"

@@ -205,9 +205,7 @@ def depth_factors(lightfield: LightField) -> np.ndarray | None:
     """Return the unit rays that turn Cycles' depth into the dataset's, or None if it is that."""
     if lightfield.depth in (None, lightfield.cycles_depth):
         return None
-    lens = lightfield.lens
-    rows, columns = np.mgrid[: lens.height, : lens.width]
-    return lens.rays(columns + 0.5, rows + 0.5)
+    return lightfield.lens.pixel_rays()
 
 
 def view_channels(

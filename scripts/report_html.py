@@ -82,7 +82,7 @@ def facts(folder: Path, lightfield: LightField, rig: Mapping[str, Any]) -> list[
     return [
         ("Views", str(len(lightfield.views))),
         ("Rig", rig_text(rig)),
-        ("Lens", page.lens_text(lightfield.content["camera"])),
+        ("Lens", lightfield.lens.description),
         ("Resolution", f"{lens.width} × {lens.height}"),
         ("Samples", samples),
         ("Depth", depth.get(lightfield.depth or "", "none")),
@@ -118,7 +118,7 @@ def files(folder: Path, lightfield: LightField) -> list[tuple[str, str]]:
         ("lightfield.json", "the lens once; position, rotation, and world_matrix of each view"),
     ]
     for inner in sorted(folder.glob(f"*/{NAME}")):
-        lens = page.lens_text(LightField.read(inner).content["camera"])
+        lens = LightField.read(inner).lens.description
         found.append((f"{inner.parent.name}/", f"the same views through another lens: {lens}"))
     return [
         *found,

@@ -39,7 +39,7 @@ def entry(results: Path, path: Path) -> dict[str, Any]:
         "link": quote(path.relative_to(results).as_posix()),
         "views": len(lightfield.views),
         "resolution": f"{lightfield.lens.width} × {lightfield.lens.height}",
-        "lens": page.lens_text(lightfield.content["camera"]),
+        "lens": lightfield.lens.description,
         "valid": validation["valid"] if validation else None,
         "picture": page.photo(path.parent / "panorama.png", THUMBNAIL),
     }

@@ -799,8 +799,7 @@ def resampling_cases() -> Iterator[Row]:
     """HDR to the half limit, denormals, infinities and NaNs through the resampling filters."""
     source = Equirectangular(width=64, height=32)
     target = Equidistant(width=33, height=33, fov=math.radians(220))
-    columns, lines = np.meshgrid(np.arange(33) + 0.5, np.arange(33) + 0.5)
-    rays = target.rays(columns, lines)
+    rays = target.pixel_rays()
     seen = np.isfinite(rays[..., 0])
     for name in resample.FILTERS:
         mapping = lens_map.compute(source, target, np.eye(3), name)

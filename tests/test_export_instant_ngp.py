@@ -228,8 +228,7 @@ def rendered(
     """Write EXR views of a sphere around each camera: every pixel with a ray at one distance."""
     lens = lenses.from_camera(camera)
     width, height = content["resolution"]
-    x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
-    cosine = -lens.rays(x, y)[..., 2]
+    cosine = -lens.pixel_rays()[..., 2]
     depth = distance * cosine if meaning == "z" else np.full_like(cosine, distance)
     depth = np.where(np.isnan(cosine), np.inf, depth).astype(np.float32)
     colour = np.full((height, width), 0.25, np.float16)

@@ -86,8 +86,7 @@ def test_pixels_look_where_cycles_looked(name, rendered):
     lens = lenses.from_camera(CAMERAS[name])
     content = lightfield(CAMERAS[name], RENDER)
     world = content.views[0].matrix
-    x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
-    rays = lens.rays(x, y)
+    rays = lens.pixel_rays()
     offset = rendered[f"{name}.points"] - world[:3, 3]
     distance = np.linalg.norm(offset, axis=-1)
     hit = (offset / distance[..., None]) @ world[:3, :3]

@@ -42,8 +42,7 @@ def light_of(points):
 
 def view(lens, matrix):
     """Return colour and Z-depth of the inside of a sphere about the origin, solved exactly."""
-    x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
-    rays = lens.rays(x, y)
+    rays = lens.pixel_rays()
     world = rays @ matrix[:3, :3].T
     place = matrix[:3, 3]
     along = world @ place

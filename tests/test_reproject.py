@@ -34,8 +34,7 @@ def scene_color(rays):
 
 def view_channels(lens, shift=0.0):
     """Colour, and Z-depth (or distance) of a sphere of 2 m around the camera."""
-    x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
-    rays = lens.rays(x, y)
+    rays = lens.pixel_rays()
     color = np.nan_to_num(scene_color(rays) + shift)
     depth = np.where(np.isnan(rays[..., 2]), np.inf, 2 * -rays[..., 2] if lens.has_z_depth else 2)
     channels = {name: color[..., i].astype("f2") for i, name in enumerate("RGB")}
@@ -362,8 +361,7 @@ def test_a_cube_map_and_back(dataset, run, monkeypatch):
     assert names(dataset / "pano") == ["view_0000f.png"]
     channels = read_image(dataset / "pano" / "view_0000f.png").channels
     assert "A" not in channels
-    x, y = np.meshgrid(np.arange(64) + 0.5, np.arange(32) + 0.5)
-    light = np.clip(scene_color(Equirectangular(width=64, height=32).rays(x, y)), 0, 1)
+    light = np.clip(scene_color(Equirectangular(width=64, height=32).pixel_rays()), 0, 1)
     expected = 255 * np.where(light < 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
     for i, name in enumerate("RGB"):
         difference = np.abs(channels[name] - expected[..., i])
@@ -402,9 +400,7 @@ def test_every_lens_is_a_target_and_a_source(dataset, run, flags):
     ]
     reproject.main()
     back = read_image(dataset / "back" / "view_0000f.exr").channels
-    x, y = np.meshgrid(np.arange(21) + 0.5, np.arange(21) + 0.5)
-    lens = Rectilinear(width=21, height=21, focal_length=40, sensor_size=(36, 36))
-    rays = lens.rays(x, y)
+    rays = Rectilinear(width=21, height=21, focal_length=40, sensor_size=(36, 36)).pixel_rays()
     assert np.abs(back["R"] - scene_color(rays)[..., 0]).max() < 0.01
     assert np.abs(back["Z"] / (2 * -rays[..., 2]) - 1).max() < 1e-4
 
@@ -544,8 +540,7 @@ def test_a_reprojection_is_what_cycles_renders_through_that_lens(renders, name):
     is_z = isinstance(lens, Rectilinear)
     ours = resample.resample_depth(depth, False, is_z, made)
     # Away from the room's edges, where two walls meet.
-    x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
-    rays = lens.rays(x, y)
+    rays = lens.pixel_rays()
     distance = direct / -rays[..., 2] if is_z else direct
     rotation = AHEAD @ lens_map.rotation_matrix(*angles)
     points = PLACE + distance[..., None] * (rays @ rotation.T)

@@ -87,12 +87,12 @@ def blind_pixels(lens: Lens) -> NDArray[np.bool_]:
     The loader trains such a pixel with the ray of the optical axis, so it has to be hidden. Of
     a fisheye the loader drops the exact centre and everything at 90° from the axis or beyond.
     """
-    x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
-    rays = lens.rays(x, y)
+    rays = lens.pixel_rays()
     blind: NDArray[np.bool_] = np.isnan(rays).any(axis=-1)
     if not isinstance(lens, Rectilinear) and not _is_full_panorama(lens):
         blind |= ~(rays[..., 2] < -1e-6)
-        blind |= (x == lens.center[0]) & (y == lens.center[1])
+        y, x = np.ogrid[: lens.height, : lens.width]
+        blind |= (x + 0.5 == lens.center[0]) & (y + 0.5 == lens.center[1])
     return blind
 
 

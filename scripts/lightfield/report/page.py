@@ -2,7 +2,7 @@
 
 import io
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,17 +16,6 @@ from lightfield.report.packing import data_uri
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 
-LENSES = {
-    "FISHEYE_EQUIDISTANT": "equidistant fisheye",
-    "FISHEYE_EQUISOLID": "equisolid fisheye",
-    "FISHEYE_LENS_POLYNOMIAL": "polynomial fisheye",
-    "EQUIRECTANGULAR": "equirectangular panorama",
-    "FISHEYE_STEREOGRAPHIC": "stereographic fisheye",
-    "FISHEYE_ORTHOGRAPHIC": "orthographic fisheye",
-    "FISHEYE_KANNALA_BRANDT": "Kannala–Brandt fisheye",
-    "CUBE_MAP": "cube map",
-    "PERSP": "rectilinear",
-}
 # A plot stays sharp as SVG; one of thousands of points is smaller as PNG.
 LARGEST_SVG = 300_000
 PHOTO_QUALITY = 84
@@ -72,17 +61,6 @@ def plot(stem: Path) -> str | None:
     if svg.is_file() and (svg.stat().st_size <= LARGEST_SVG or not png.is_file()):
         return data_uri(svg.read_bytes(), "image/svg+xml")
     return data_uri(png.read_bytes(), "image/png") if png.is_file() else None
-
-
-def lens_text(camera: Mapping[str, Any]) -> str:
-    """Return a lens in words: its projection and field of view."""
-    kind = camera.get("panorama_type") if camera.get("type") == "PANO" else camera.get("type")
-    text = LENSES.get(str(kind), str(kind).replace("_", " ").lower())
-    if "fisheye_fov" in camera:
-        return f"{text}, {math.degrees(camera['fisheye_fov']):.4g}°"
-    if "focal_length" in camera:
-        return f"{text}, {camera['focal_length']:.4g} mm"
-    return text
 
 
 def bytes_(value: float) -> str:

@@ -161,8 +161,7 @@ def _fitted(lens: Lens, side: int) -> Lens:
 
 def _outside(lens: Lens) -> Array:
     """Return which pixels (height, width) have no ray."""
-    x, y = np.meshgrid(np.arange(lens.width) + 0.5, np.arange(lens.height) + 0.5)
-    outside: Array = np.isnan(lens.rays(x, y)[..., 0])
+    outside: Array = np.isnan(lens.pixel_rays()[..., 0])
     return outside
 
 

@@ -204,7 +204,7 @@ class Examiner:
     def _of_lens(self, lens: Lens) -> tuple[Bools, Bools]:
         """Return where the lens has a ray, and where it has none, less the rim."""
         if lens not in self.regions:
-            seen = np.isfinite(_rays(lens)[..., 0])
+            seen = np.isfinite(lens.pixel_rays(np.float32)[..., 0])
             self.regions[lens] = _inner(seen), _inner(~seen)
         return self.regions[lens]
 
@@ -226,7 +226,7 @@ class Examiner:
         turn = np.round(from_world[:3, :3].T @ to_world[:3, :3], 5).astype(np.float32) + 0
         key = (target.lens, turn.tobytes())
         if key not in self.regions:
-            pixels = source.lens.pixels(_rays(target.lens) @ turn.T)
+            pixels = source.lens.pixels(target.lens.pixel_rays(np.float32) @ turn.T)
             frame = np.array([source.lens.width, source.lens.height], np.float32)
             with np.errstate(invalid="ignore"):
                 seen = ((pixels >= 0) & (pixels <= frame)).all(axis=-1)
@@ -234,13 +234,6 @@ class Examiner:
                 self.regions.clear()
             self.regions[key] = _inner(seen), _inner(~seen)
         return self.regions[key]
-
-
-def _rays(lens: Lens) -> Array:
-    """Return the rays (height, width, 3), float32, of all pixel centres."""
-    x = np.arange(lens.width, dtype=np.float32) + np.float32(0.5)
-    y = np.arange(lens.height, dtype=np.float32) + np.float32(0.5)
-    return lens.rays(x[np.newaxis, :], y[:, np.newaxis])
 
 
 def _inner(region: Bools) -> Bools:

@@ -178,9 +178,10 @@ class Lens(ABC):
         pixels[~np.isfinite(pixels).all(axis=-1)] = np.nan
         return pixels.reshape(*array.shape[:-1], 2)
 
-    def pixel_rays(self) -> Array:
-        """Return the unit rays (height, width, 3) of all pixels' centres, in float64."""
-        return self.rays(np.arange(self.width) + 0.5, np.arange(self.height)[:, None] + 0.5)
+    def pixel_rays(self, dtype: npt.DTypeLike = np.float64) -> Array:
+        """Return the unit rays (height, width, 3) of all pixels' centres."""
+        x, y = (np.arange(side, dtype=dtype) + 0.5 for side in (self.width, self.height))
+        return self.rays(x[None, :], y[:, None])
 
     @abstractmethod
     def _rays(self, x: Array, y: Array) -> Array:
