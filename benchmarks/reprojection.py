@@ -35,10 +35,12 @@ sys.path.insert(0, str(SCRIPTS))
 
 from lightfield.core.errors import UserError  # noqa: E402
 from lightfield.core.files import atomic_path  # noqa: E402
+from lightfield.core.kernels import kernel  # noqa: E402
 from lightfield.geometry.lenses import Array, Lens  # noqa: E402
 from lightfield.geometry.lenses.equidistant import Equidistant  # noqa: E402
 from lightfield.geometry.lenses.rectilinear import Rectilinear  # noqa: E402
 from lightfield.imaging import images  # noqa: E402
+from lightfield.imaging.halves import narrow, widen  # noqa: E402
 from lightfield.report.plots import (  # noqa: E402
     BLUE,
     GREEN,
@@ -50,13 +52,8 @@ from lightfield.report.plots import (  # noqa: E402
     plot,
 )
 from lightfield.reprojection import lens_map  # noqa: E402
-from lightfield.reprojection.resample import (  # noqa: E402
-    DEFAULT_FILTER,
-    kernel,
-    narrow,
-    resample_color,
-    widen,
-)
+from lightfield.reprojection.colour import resample_colour  # noqa: E402
+from lightfield.reprojection.filters import DEFAULT_FILTER  # noqa: E402
 
 try:
     import cv2
@@ -266,7 +263,7 @@ def methods(
         window = np.ascontiguousarray(pixels[row:end_row, column:end_column])
 
         def ours(window: Array = window, made: lens_map.LensMap = made) -> Array:
-            return np.asarray(resample_color(window, made)[:, :, 0])
+            return np.asarray(resample_colour(window, made)[:, :, 0])
 
         found.append((name, samples, ours))
     if cv2 is not None:

@@ -27,6 +27,7 @@ from lightfield.core.progress import Progress
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.rigs import matrix_to_euler
+from lightfield.imaging.halves import narrow, widen
 from lightfield.imaging.images import (
     DEPTH_ATTRIBUTE,
     KEY_ATTRIBUTE,
@@ -39,9 +40,10 @@ from lightfield.imaging.images import (
 )
 from lightfield.imaging.tonemap import decode_srgb, to_8_bit, tone_map
 from lightfield.reprojection import lens_map
+from lightfield.reprojection.colour import colour_strips
+from lightfield.reprojection.depth import resample_depth
 from lightfield.reprojection.lens_arguments import Target, add_geometry_flags, geometry, joined
 from lightfield.reprojection.lens_map import LensMap
-from lightfield.reprojection.resample import color_strips, narrow, resample_depth, widen
 
 VERSION = 2  # of the pixels: part of every key, raised when the same settings give other pixels
 # A seventh of the time that zlib's own level and the choice of a filter for each row take, and
@@ -398,7 +400,7 @@ def _write(
         strips: Iterable[tuple[slice, Array]] = [(np.s_[:], _in_frame(color, made))]
         depth = None if depth is None else _in_frame(depth, made)
     else:
-        strips = color_strips(color, made)
+        strips = colour_strips(color, made)
         if depth is not None:
             found = resample_depth(depth, source.is_z, as_z, made)
             with np.errstate(over="ignore"):

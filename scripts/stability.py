@@ -48,7 +48,10 @@ from lightfield.geometry.lenses.polynomial import Polynomial
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.lenses.stereographic import Stereographic
 from lightfield.report.plots import BLUE, VERMILION, plot
-from lightfield.reprojection import lens_map, resample
+from lightfield.reprojection import lens_map
+from lightfield.reprojection.colour import resample_colour
+from lightfield.reprojection.depth import resample_depth
+from lightfield.reprojection.filters import FILTERS
 
 ROUNDINGS = 16  # roundings, each of one eps, in the longest chain of operations of one step
 RIM = 32  # a point this many eps from the rim may count as inside or outside
@@ -801,7 +804,7 @@ def resampling_cases() -> Iterator[Row]:
     target = Equidistant(width=33, height=33, fov=math.radians(220))
     rays = target.pixel_rays()
     seen = np.isfinite(rays[..., 0])
-    for name in resample.FILTERS:
+    for name in FILTERS:
         mapping = lens_map.compute(source, target, np.eye(3), name)
         row, end_row, column, end_column = mapping.window
         shape = (end_row - row, end_column - column, 4)
@@ -810,7 +813,7 @@ def resampling_cases() -> Iterator[Row]:
             ("denormal 1e-41", 1e-41),
             ("zero", 0.0),
         ):
-            out = resample.resample_color(np.full(shape, value, np.float32), mapping)
+            out = resample_colour(np.full(shape, value, np.float32), mapping)
             spacing = float(np.spacing(np.float32(value)))
             error = np.abs(out[seen].astype(np.float64) - float(np.float32(value))).max() / spacing
             yield resampling_row(
@@ -823,18 +826,18 @@ def resampling_cases() -> Iterator[Row]:
         # Eight source pixels are 45 degrees: further than any filter reads here.
         far = seen & (rays @ bad_ray < math.cos(math.pi / 4))
         clean = np.random.default_rng(5).uniform(1, 2, shape).astype(np.float32)
-        before = resample.resample_color(clean, mapping)
+        before = resample_colour(clean, mapping)
         for label, value in (("infinity", math.inf), ("NaN", math.nan)):
             dirty = clean.copy()
             dirty[bad] = value
-            after = resample.resample_color(dirty, mapping)
+            after = resample_colour(dirty, mapping)
             kept = np.array_equal(after[far], before[far]) and not np.isinf(after).any()
             yield resampling_row(f"{name}: one pixel of {label}", 0 if kept else math.inf, far)
     mapping = lens_map.compute(source, target, np.eye(3))
     row, end_row, column, end_column = mapping.window
     for depth in (1e-6, 1.0, 1e9, math.inf):
         sphere = np.full((end_row - row, end_column - column), depth, np.float32)
-        out = resample.resample_depth(sphere, False, False, mapping)
+        out = resample_depth(sphere, False, False, mapping)
         if math.isinf(depth):
             error = 0.0 if np.isposinf(out[seen]).all() else math.inf
         else:

@@ -92,11 +92,11 @@ def test_how_sources_continue():
 
     low = Equirectangular(width=64, height=16, latitude=(-math.pi / 2, 0))
     slice_ = Equirectangular(width=64, height=32, longitude=(-1, 1))
-    assert topology(Equirectangular(width=64, height=32)) == (True, True, True, 1)
-    assert topology(low) == (True, False, True, 1)
-    assert topology(slice_) == (False, False, False, 1)
-    assert topology(FISHEYE) == (False, False, False, 1)
-    assert topology(CubeMap(width=96, height=16)) == (False, False, False, 6)
+    assert topology(Equirectangular(width=64, height=32)) == (True, True, True)
+    assert topology(low) == (True, False, True)
+    assert topology(slice_) == (False, False, False)
+    assert topology(FISHEYE) == (False, False, False)
+    assert topology(CubeMap(width=96, height=16)) == (False, False, False)
 
 
 def test_the_window_holds_all_that_is_read_and_little_more():

@@ -19,8 +19,12 @@ from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.imaging.halves import widen
 from lightfield.imaging.images import read_header, read_image, write_exr, write_png
-from lightfield.reprojection import lens_map, resample
+from lightfield.reprojection import kernels, lens_map
+from lightfield.reprojection.colour import resample_colour
+from lightfield.reprojection.depth import resample_depth
+from lightfield.reprojection.filters import FILTERS
 
 SIZE = 48
 FISHEYE = Equidistant(width=SIZE, height=SIZE, fov=math.pi)
@@ -521,12 +525,12 @@ def test_a_reprojection_is_what_cycles_renders_through_that_lens(renders, name):
     # Not the pixels on the rim of an image circle, of which a part has no light.
     known = (~np.isnan(made.target_cos)).astype(np.uint8)
     whole = cv2.erode(known, np.ones((3, 3)), borderValue=0) > 0
-    seen = (made.flags == lens_map.INSIDE) & whole
+    seen = (made.flags == kernels.INSIDE) & whole
     assert seen.mean() > 0.7
     row, end_row, column, end_column = made.window
     window = np.s_[row:end_row, column:end_column]
     color = renders["fisheye.1.color"][window]
-    found = resample.resample_color(resample.widen(color, color, color), made)[..., 0]
+    found = resample_colour(widen(color, color, color), made)[..., 0]
     one, other = renders[f"{name}.2.color"], renders[f"{name}.3.color"]
     noise = np.sqrt(np.mean((one - other)[seen] ** 2) / 2)
     error = (found - (one + other) / 2)[seen]
@@ -538,7 +542,7 @@ def test_a_reprojection_is_what_cycles_renders_through_that_lens(renders, name):
     direct = renders[f"{name}.2.depth"]
     # Cycles' depth is along the axis for a perspective camera, else the distance.
     is_z = isinstance(lens, Rectilinear)
-    ours = resample.resample_depth(depth, False, is_z, made)
+    ours = resample_depth(depth, False, is_z, made)
     # Away from the room's edges, where two walls meet.
     rays = lens.pixel_rays()
     distance = direct / -rays[..., 2] if is_z else direct
@@ -560,7 +564,7 @@ def test_the_benchmark_measures_every_method(tmp_path, run_program):
     with (tmp_path / "reprojection.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert {row["scenario"] for row in rows} == {"minify by 8", "unity", "magnify by 3"}
-    assert {row["method"] for row in rows} >= set(resample.FILTERS) | {"OpenCV"}
+    assert {row["method"] for row in rows} >= set(FILTERS) | {"OpenCV"}
     error = {(r["scenario"], r["method"], r["samples"]): float(r["rms_error"]) for r in rows}
     # What is known of the methods without measuring them.
     assert error["minify by 8", "adaptive", "1"] < error["minify by 8", "bicubic", "1"] / 5

@@ -5,8 +5,8 @@ import functools
 import numpy as np
 import numpy.typing as npt
 
+from lightfield.core.kernels import kernel
 from lightfield.geometry.lenses import Array
-from lightfield.reprojection.resample import kernel
 
 
 def tone_map(color: Array, exposure: float, reinhard: float) -> Array:

@@ -20,7 +20,7 @@ from lightfield.geometry.lenses import LENSES, Array, Lens, from_camera, from_li
 from lightfield.geometry.lenses.base import named_numbers
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.reprojection import lens_map
-from lightfield.reprojection.resample import DEFAULT_FILTER, FILTERS
+from lightfield.reprojection.filters import DEFAULT_FILTER, FILTERS
 
 
 def joined(arguments: Sequence[str]) -> list[str]:

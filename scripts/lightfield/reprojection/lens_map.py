@@ -18,12 +18,8 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
-from lightfield.reprojection.resample import ADAPTIVE, DEFAULT_FILTER, FILTERS, SUPPORT
-
-# What a target pixel (or one of its samples) finds in the source.
-NOTHING = 0  # the source does not see the ray
-INSIDE = 1  # every source pixel that the filter reads exists
-CAREFUL = 2  # some may not: the image's edge, its seam or pole, the rim of the image circle
+from lightfield.reprojection.filters import DEFAULT_FILTER, FILTERS
+from lightfield.reprojection.kernels import CAREFUL, INSIDE, NOTHING, Topology
 
 _STRIP = 64  # rows computed at a time, so that the temporary arrays stay in the caches
 _MOST_SAMPLES = 256  # each way, of a footprint that meets a pole
@@ -65,7 +61,7 @@ class LensMap:
     # (H, W, 2) float32 (x, y) of the pixels' centres; NaN where the source does not see the ray.
     centers: Array
     # (H·n, W·n, 2) float32 (x, y) of the n × n samples of each pixel; `centers` itself if n = 1.
-    samples: Array
+    coordinates: Array
     # (H·n, W·n) uint8: NOTHING, INSIDE or CAREFUL for each sample.
     flags: Array
     # (h, w) and (H, W) float32: cos θ at each pixel's centre; NaN where it has no ray.
@@ -84,27 +80,27 @@ class LensMap:
     strip: Array | None = None
 
     @property
-    def topology(self) -> tuple[bool, bool, bool, int]:
+    def topology(self) -> Topology:
         """How the source continues beyond its frame.
 
         Whether the last column is the neighbour of the first; whether the first and the last row
-        surround a pole; how many panels stand side by side without being neighbours in space.
+        surround a pole.
         """
-        wraps, top, bottom, panels = self.settings["topology"]
-        return wraps, top, bottom, panels
+        wraps, top, bottom, _ = self.settings["topology"]
+        return wraps, top, bottom
 
 
 def settings(
     source: Lens, target: Lens, rotation: Array, filter_name: str, samples: int
 ) -> dict[str, Any]:
-    """Return all that a lens map depends on, as JSON can hold it."""
+    """Return all that a lens map depends on, as JSON can hold it: a part of every view's key."""
     return {
         "source": source.to_lightfield(),
         "target": target.to_lightfield(),
         "rotation": np.asarray(rotation, np.float64).tolist(),
         "filter": filter_name,
         "samples": samples,
-        "topology": list(_topology(source)),
+        "topology": [*_topology(source), len(CUBE_FACES) if isinstance(source, CubeMap) else 1],
     }
 
 
@@ -123,9 +119,11 @@ def compute(
         raise UserError(f"samples: {samples} must be at least 1")
     if filter_name not in FILTERS:
         raise UserError(f"filter: {filter_name!r} is not one of {', '.join(FILTERS)}")
-    if samples > 1 and filter_name == ADAPTIVE:
-        raise UserError("samples: the adaptive filter covers the whole pixel already; leave 1")
-    wraps, _, _, panels = _topology(source)
+    if samples > 1 and FILTERS[filter_name].cover:
+        raise UserError(
+            f"samples: the {filter_name} filter covers the whole pixel already; leave 1"
+        )
+    wraps, _, _ = _topology(source)
     # One pixel more on every side, for central differences at the border too.
     padded = _coordinates(
         source,
@@ -135,10 +133,10 @@ def compute(
         np.arange(-1, target.height + 1) + 0.5,
     )
     jacobian = _jacobian(padded, source, wraps)
-    reach = np.asarray(SUPPORT[filter_name])
+    reach = np.asarray(FILTERS[filter_name].reach)
     footprints, counts = None, None
-    if filter_name == ADAPTIVE:
-        footprints, counts = _footprints(jacobian)
+    if FILTERS[filter_name].cover:
+        footprints, counts = _footprints(jacobian, source)
         if counts.max() == 1:
             footprints, counts = None, None
         else:
@@ -146,7 +144,8 @@ def compute(
             reach = reach + np.ceil(extent.max(axis=-1))
     border = 0
     if isinstance(source, CubeMap):
-        border = min(int(reach.max()) + 1, source.height)
+        # Depth reads two pixels on each side of the one that the ray falls in.
+        border = max(int(reach.max()) + 1, 2)
     centers = _framed(padded[1:-1, 1:-1], source, border)
     points = centers
     if samples > 1:
@@ -178,8 +177,8 @@ def compute(
         summary=_summary(scale),
         window=window,
         centers=centers32,
-        samples=centers32 if samples == 1 else (points - corner).astype(np.float32),
-        flags=_flags(points, ~np.isnan(source_cos), reach, panels),
+        coordinates=centers32 if samples == 1 else (points - corner).astype(np.float32),
+        flags=_flags(points, ~np.isnan(source_cos), reach),
         source_cos=source_cos if strip is not None else _cut(source_cos, window),
         target_cos=_cosines(target),
         magnification=scale.astype(np.float32),
@@ -203,8 +202,8 @@ def save(path: Path | str, lens_map: LensMap) -> None:
         }
     ).encode()
     fields = _arrays(lens_map)
-    if lens_map.samples is lens_map.centers:
-        del fields["samples"]
+    if lens_map.coordinates is lens_map.centers:
+        del fields["coordinates"]
     dtype = np.dtype(
         [("description", f"S{_HEADER}")]
         + [(name, array.dtype, array.shape) for name, array in fields.items()]
@@ -232,7 +231,7 @@ def load(path: Path | str) -> LensMap:
             settings=description["settings"],
             summary=description["summary"],
             window=tuple(description["window"]),
-            **({"samples": arrays["centers"]} | arrays),
+            **({"coordinates": arrays["centers"]} | arrays),
         )
     except (OSError, EOFError, ValueError, KeyError, IndexError, TypeError) as error:
         raise UserError(f"{path}: is not a lens map that can be read: {error}") from None
@@ -259,7 +258,7 @@ def warnings(lens_map: LensMap) -> list[str]:
         )
     steps = math.ceil(1 / smallest)
     samples = lens_map.settings["samples"]
-    if lens_map.settings["filter"] != ADAPTIVE and samples * 1.5 * smallest < 1:
+    if not FILTERS[lens_map.settings["filter"]].cover and samples * 1.5 * smallest < 1:
         found.append(
             f"aliasing: one target pixel spans up to {1 / smallest:.3g} of the source's; "
             f"--filter adaptive or --samples {steps} helps"
@@ -302,17 +301,17 @@ def _summary(scale: Array) -> dict[str, float]:
     }
 
 
-def _topology(source: Lens) -> tuple[bool, bool, bool, int]:
+def _topology(source: Lens) -> Topology:
     """Find from its rays how a source continues; see `LensMap.topology`."""
     if isinstance(source, CubeMap):
-        return False, False, False, 6
+        return False, False, False
     height = np.array([0.25, 0.5, 0.75]) * source.height
     width = np.array([0.0, 0.4, 0.8]) * source.width
     left, right = source.rays(np.zeros(3), height), source.rays(np.full(3, source.width), height)
     wraps = bool(np.allclose(left, right, atol=1e-5))
     ends = [source.rays(width, np.full(3, y)) for y in (0.0, float(source.height))]
     top, bottom = (wraps and bool(np.allclose(rays, rays[0], atol=1e-5)) for rays in ends)
-    return wraps, top, bottom, 1
+    return wraps, top, bottom
 
 
 def _cosines(lens: Lens) -> Array:
@@ -406,34 +405,32 @@ def _on_face_of(source: CubeMap, coordinates: Array, middle: Array) -> Array:
     return out
 
 
-def _footprints(jacobian: Array) -> tuple[Array, Array]:
+def _footprints(jacobian: Array, source: Lens) -> tuple[Array, Array]:
     """Return the adaptive filter's steps from sample to sample, and how many samples each way.
 
     A pixel is a mean over its area, in the source too, so what is missing to a target pixel that
     spans s source pixels is a box of width √(s² − 1), by the variances. n samples at distance d
     have the variance of a box of width d √(n² − 1), so that gives d; n is as small as the bicubic
     kernel, under which d may exceed a pixel, allows. Where s is little above 1 or below it, one
-    sample is all: magnifying does not blur.
+    sample is all: magnifying does not blur. A face of a cube map continues in its plane no further
+    than its own width.
     """
     span = np.hypot(jacobian[..., 0, :], jacobian[..., 1, :])
     box = np.sqrt(np.maximum(span * span - 1, 0))
+    if isinstance(source, CubeMap):
+        box = np.minimum(box, source.height)
     counts = np.where(box > 0.5, np.clip(np.ceil(0.75 * box), 2, _MOST_SAMPLES), 1)
     with np.errstate(invalid="ignore", divide="ignore"):
         scale = np.where(counts > 1, box / span / np.sqrt(counts * counts - 1), 0)
     return (jacobian * scale[..., None, :]).astype(np.float32), counts.astype(np.uint16)
 
 
-def _flags(points: Array, valid: Array, reach: Array, panels: int) -> Array:
+def _flags(points: Array, valid: Array, reach: Array) -> Array:
     """Return NOTHING, INSIDE or CAREFUL for each of the ``points``."""
     # Imported here because applying a map, which is most of the work, does without.
     from scipy.ndimage import distance_transform_cdt
 
-    depth = np.hstack(
-        [
-            distance_transform_cdt(np.pad(panel, 1), metric="chessboard")[1:-1, 1:-1]
-            for panel in np.hsplit(valid, panels)
-        ]
-    )
+    depth = distance_transform_cdt(np.pad(valid, 1), metric="chessboard")[1:-1, 1:-1]
     flags = np.empty(points.shape[:2], np.uint8)
     for rows in _strips(np.arange(len(points))):
         strip = points[rows]

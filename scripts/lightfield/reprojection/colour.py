@@ -1,0 +1,94 @@
+"""Colour through a lens map."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+
+from lightfield.core.errors import UserError
+from lightfield.geometry.lenses import Array
+from lightfield.reprojection import kernels
+from lightfield.reprojection.filters import FILTERS
+from lightfield.reprojection.lens_map import LensMap
+
+_STRIP = 64  # rows, or rows of samples, resampled at a time
+
+
+def resample_colour(source: Array, lens_map: LensMap) -> Array:
+    """Resample a source window (h, w, 4) float32 to (H, W, 4); NaN where it has no source."""
+    out = np.empty((*lens_map.target_cos.shape, 4), np.float32)
+    for rows, strip in colour_strips(source, lens_map):
+        out[rows] = strip
+    return out
+
+
+def colour_strips(source: Array, lens_map: LensMap) -> Iterator[tuple[slice, Array]]:
+    """Yield the rows of what `resample_colour` returns, as many at a time as the caches hold."""
+    height, width = lens_map.target_cos.shape
+    source = _with_borders(source, lens_map)
+    valid, topology = lens_map.source_cos, lens_map.topology
+    if source.shape[:2] != valid.shape:
+        raise UserError(
+            f"the source window has {source.shape[1]} × {source.shape[0]} pixels and the lens map "
+            f"expects {valid.shape[1]} × {valid.shape[0]}"
+        )
+    name, samples = lens_map.settings["filter"], lens_map.settings["samples"]
+    chosen = FILTERS[name]
+    if chosen.sample is None:
+        yield slice(0, height), _st_warp(source, lens_map)
+        return
+    step = max(1, _STRIP // samples)
+    for first in range(0, height, step):
+        rows = slice(first, min(first + step, height))
+        fine = slice(rows.start * samples, rows.stop * samples)
+        coordinates, flags = lens_map.coordinates[fine], lens_map.flags[fine]
+        out = np.empty((*flags.shape, 4), np.float32)
+        if chosen.cover and lens_map.footprints is not None and lens_map.counts is not None:
+            footprints, counts = lens_map.footprints[rows], lens_map.counts[rows]
+            chosen.cover(source, valid, coordinates, footprints, counts, flags, topology, out)
+        else:
+            chosen.sample(source, valid, coordinates, flags, topology, out)
+        if samples > 1:
+            mean = np.empty((rows.stop - first, width, 4), np.float32)
+            kernels.block_mean(out, samples, mean)
+            out = mean
+        yield rows, out
+
+
+def _with_borders(source: Array, lens_map: LensMap) -> Array:
+    """Return the window, of a cube map with what surrounds each face."""
+    if lens_map.strip is None:
+        return source
+    out = np.empty((*lens_map.strip.shape[:2], 4), np.float32)
+    kernels.continue_faces(source, lens_map.strip, out)
+    return out
+
+
+def _st_warp(source: Array, lens_map: LensMap) -> Array:
+    """Resample with OpenImageIO's st_warp and its Catmull-Rom filter."""
+    height, width = lens_map.target_cos.shape
+    valid = np.isfinite(source).all(axis=-1) & ~np.isnan(lens_map.source_cos)
+    # A fifth channel counts the weights that fell on valid pixels.
+    channels = np.dstack([np.where(valid[..., None], source, 0), valid]).astype(np.float32)
+    scale = np.array([source.shape[1], source.shape[0]], np.float32)
+    st = np.where((lens_map.flags == kernels.NOTHING)[..., None], -1, lens_map.coordinates / scale)
+    warped = _image_buffer(np.zeros((*st.shape[:2], 5), np.float32))
+    if not oiio.ImageBufAlgo.st_warp(
+        warped, _image_buffer(channels), _image_buffer(st.astype(np.float32)), "catmull-rom",
+        nthreads=1,
+    ):  # fmt: skip
+        raise UserError(f"filter: st_warp failed: {warped.geterror()}")
+    samples = lens_map.settings["samples"]
+    pixels = np.asarray(warped.get_pixels(oiio.FLOAT))
+    blocks = pixels.reshape(height, samples, width, samples, 5).mean(axis=(1, 3))
+    weight = blocks[..., 4:]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.where(weight > 1e-3, blocks[..., :4] / weight, np.nan))
+
+
+def _image_buffer(pixels: Array) -> Any:
+    height, width, count = pixels.shape
+    buffer = oiio.ImageBuf(oiio.ImageSpec(width, height, count, "float"))
+    buffer.set_pixels(oiio.ROI(0, width, 0, height, 0, 1, 0, count), np.ascontiguousarray(pixels))
+    return buffer

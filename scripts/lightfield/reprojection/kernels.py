@@ -1,0 +1,353 @@
+"""The loops that resample colour: weights, samples that need care, and whole strips of pixels.
+
+Sources are (h, w, 4) float32; what is not finite is no sample: it is left out and the other
+weights are scaled up, and where nothing is left the result is NaN. ``valid`` (h, w) is NaN where
+the source has no ray. ``coordinates`` (H, W, 2) are a sample's (x, y) in the source, and ``flags``
+(H, W) say of each: `NOTHING`, `INSIDE` or `CAREFUL`. ``topology`` is that of a lens map.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from lightfield.core.kernels import inline, kernel, part
+from lightfield.geometry.lenses import Array
+
+# What a sample finds in the source.
+NOTHING = 0  # the source does not see the ray
+INSIDE = 1  # every source pixel that the filter reads exists
+CAREFUL = 2  # some may not: the image's edge, its seam or pole, the rim of the image circle
+
+Weights = Callable[[Any], tuple[Any, ...]]
+Topology = tuple[bool, bool, bool]
+
+
+@part
+def linear_weights(t: Any) -> tuple[Any, ...]:
+    """Weights of the two pixels around a point at ``t`` in [0, 1) past the left one."""
+    return np.float32(1) - t, t
+
+
+@part
+def cubic_weights(t: Any) -> tuple[Any, ...]:
+    """Weights of four pixels, for a point at ``t`` in [0, 1) past the second.
+
+    Source: Catmull and Rom 1974; the cubic convolution of third order of Keys 1981 (a = −1/2).
+    """
+    half, one = np.float32(0.5), np.float32(1)
+    return (
+        t * (t * (one - half * t) - half),
+        one + t * t * (np.float32(1.5) * t - np.float32(2.5)),
+        t * (half + t * (np.float32(2) - np.float32(1.5) * t)),
+        t * t * (half * t - half),
+    )
+
+
+@part
+def lanczos_weights(t: Any) -> tuple[Any, ...]:
+    """Weights of six pixels, for a point at ``t`` in [0, 1) past the third.
+
+    sinc(u) sinc(u / 3) (Turkowski 1990), made to sum to one.
+    """
+    zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
+    if t < np.float32(1e-5):
+        return zero, zero, one, zero, zero, zero
+    # sin(π u / 3) at u = t + 2, t + 1, …, t − 3, by the addition theorem.
+    third = np.float32(np.pi / 3) * t
+    a, b = half * np.sin(third), np.float32(math.sqrt(0.75)) * np.cos(third)
+    w0 = (b - a) / ((t + 2) * (t + 2))
+    w1 = -(b + a) / ((t + 1) * (t + 1))
+    w2 = 2 * a / (t * t)
+    w3 = (b - a) / ((t - 1) * (t - 1))
+    w4 = -(b + a) / ((t - 2) * (t - 2))
+    w5 = 2 * a / ((t - 3) * (t - 3))
+    # sin(π u) is the same in all but for the sign, which is in them, and drops out.
+    scale = one / (w0 + w1 + w2 + w3 + w4 + w5)
+    return w0 * scale, w1 * scale, w2 * scale, w3 * scale, w4 * scale, w5 * scale
+
+
+@kernel
+def source_index(
+    row: int, column: int, height: int, width: int, topology: Topology
+) -> tuple[int, int]:
+    """The pixel that continues the image at (row, column), or row −1 if none does."""
+    wraps, top, bottom = topology
+    if wraps:
+        # Beyond a pole lies the same row, half a turn away.
+        if row < 0 and top:
+            row, column = -1 - row, column + width // 2
+        elif row >= height and bottom:
+            row, column = 2 * height - 1 - row, column + width // 2
+        column %= width
+    if row < 0 or row >= height or column < 0 or column >= width:
+        return -1, 0
+    return row, column
+
+
+@inline
+def _sample(source: Array, row: int, column: int, wy: Any, wx: Any) -> tuple[Any, Any, Any, Any]:
+    """The weighted sum of the pixels from (row, column) on, all of which exist."""
+    # Unsigned, so that no index is checked for counting from the end.
+    i, j = np.uint64(row), np.uint64(column)
+    s0 = s1 = s2 = s3 = np.float32(0)
+    for a in range(np.uint64(len(wy))):
+        r0 = r1 = r2 = r3 = np.float32(0)
+        for b in range(np.uint64(len(wx))):
+            r0 += wx[b] * source[i + a, j + b, 0]
+            r1 += wx[b] * source[i + a, j + b, 1]
+            r2 += wx[b] * source[i + a, j + b, 2]
+            r3 += wx[b] * source[i + a, j + b, 3]
+        s0 += wy[a] * r0
+        s1 += wy[a] * r1
+        s2 += wy[a] * r2
+        s3 += wy[a] * r3
+    return s0, s1, s2, s3
+
+
+@kernel
+def _finite_and_not_negative(s0: Any, s1: Any, s2: Any, s3: Any) -> bool:
+    return bool(s0 + s1 + s2 + s3 < np.inf and min(min(s0, s1), min(s2, s3)) >= 0)
+
+
+@kernel
+def _sum_of_present(
+    source: Array,
+    valid: Array,
+    row: int,
+    column: int,
+    wy: Any,
+    wx: Any,
+    topology: Topology,
+    result: Array,
+) -> tuple[Any, bool]:
+    """Sum the pixels from (row, column) on that are there; their weight, and whether all are.
+
+    ``result`` (2, 4) becomes the sum, and the least of the pixels and zero.
+    """
+    height, width = source.shape[0], source.shape[1]
+    complete = True
+    total = np.float32(0)
+    result[:] = 0
+    for a in range(len(wy)):
+        for b in range(len(wx)):
+            i, j = source_index(row + a, column + b, height, width, topology)
+            if i >= 0 and valid[i, j] == valid[i, j] and np.isfinite(np.sum(source[i, j])):
+                weight = wy[a] * wx[b]
+                total += weight
+                for c in range(4):
+                    result[0, c] += weight * source[i, j, c]
+                    result[1, c] = min(result[1, c], source[i, j, c])
+            else:
+                complete = False
+    return total, complete
+
+
+@kernel
+def _careful(
+    source: Array,
+    valid: Array,
+    row: int,
+    column: int,
+    fy: Any,
+    fx: Any,
+    wy: Any,
+    wx: Any,
+    topology: Topology,
+    result: Array,
+) -> bool:
+    """Sample where pixels may be missing or negative; whether any is there.
+
+    The sample lies (``fy``, ``fx``) past pixel (``row``, ``column``). Where one is missing, the
+    answer is bilinear among those of the four nearest that are there: a kernel with negative lobes
+    does not survive the loss of a part of it. Nor do such lobes make light negative: what comes
+    out below zero is raised to the darkest of the pixels.
+    """
+    reach = len(wx) // 2 - 1
+    total, complete = _sum_of_present(
+        source, valid, row - reach, column - reach, wy, wx, topology, result
+    )
+    if not complete:
+        ly, lx = linear_weights(fy), linear_weights(fx)
+        total, _ = _sum_of_present(source, valid, row, column, ly, lx, topology, result)
+    # The bilinear weights of all that is there may be zero: the point lies on what is not.
+    if total < np.float32(1e-4):
+        return False
+    for c in range(4):
+        result[0, c] = max(result[0, c] / total, result[1, c])
+    return True
+
+
+@kernel
+def nearest(
+    source: Array,
+    valid: Array,
+    coordinates: Array,
+    flags: Array,
+    topology: Topology,
+    out: Array,
+) -> None:
+    """Take the pixel that each sample falls in."""
+    height, width = source.shape[0], source.shape[1]
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = np.nan
+            if flags[i, j] != NOTHING:
+                row = min(int(coordinates[i, j, 1]), height - 1)
+                column = min(int(coordinates[i, j, 0]), width - 1)
+                p = source[row, column]
+                if valid[row, column] == valid[row, column] and np.isfinite(
+                    p[0] + p[1] + p[2] + p[3]
+                ):
+                    out[i, j] = p
+
+
+def interpolating(weights: Weights) -> Callable[..., None]:
+    """Make the kernel that interpolates at every sample."""
+
+    def interpolate(
+        source: Array,
+        valid: Array,
+        coordinates: Array,
+        flags: Array,
+        topology: Topology,
+        out: Array,
+    ) -> None:
+        half = np.float32(0.5)
+        result = np.empty((2, 4), np.float32)
+        for i in range(out.shape[0]):
+            for j in range(out.shape[1]):
+                flag = flags[i, j]
+                if flag == NOTHING:
+                    out[i, j] = np.nan
+                    continue
+                x, y = coordinates[i, j, 0] - half, coordinates[i, j, 1] - half
+                fx, fy = x - np.floor(x), y - np.floor(y)
+                row, column = int(np.floor(y)), int(np.floor(x))
+                wx, wy = weights(fx), weights(fy)
+                if flag == INSIDE:
+                    reach = len(wx) // 2 - 1
+                    s0, s1, s2, s3 = _sample(source, row - reach, column - reach, wy, wx)
+                    if _finite_and_not_negative(s0, s1, s2, s3):
+                        out[i, j, 0] = s0
+                        out[i, j, 1] = s1
+                        out[i, j, 2] = s2
+                        out[i, j, 3] = s3
+                        continue
+                if _careful(source, valid, row, column, fy, fx, wy, wx, topology, result):
+                    out[i, j] = result[0]
+                else:
+                    out[i, j] = np.nan
+
+    return kernel(interpolate)
+
+
+def covering(weights: Weights) -> Callable[..., None]:
+    """Make the kernel that averages interpolated samples over each pixel's footprint."""
+
+    def cover(
+        source: Array,
+        valid: Array,
+        centers: Array,
+        footprints: Array,
+        counts: Array,
+        flags: Array,
+        topology: Topology,
+        out: Array,
+    ) -> None:
+        half = np.float32(0.5)
+        result = np.empty((2, 4), np.float32)
+        for i in range(out.shape[0]):
+            for j in range(out.shape[1]):
+                out[i, j] = np.nan
+                flag = flags[i, j]
+                if flag == NOTHING:
+                    continue
+                across, down = counts[i, j, 0], counts[i, j, 1]
+                x, y = centers[i, j, 0], centers[i, j, 1]
+                ux, uy = footprints[i, j, 0, 0], footprints[i, j, 1, 0]
+                vx, vy = footprints[i, j, 0, 1], footprints[i, j, 1, 1]
+                a0 = a1 = a2 = a3 = np.float32(0)
+                found = 0
+                for q in range(down):
+                    v = np.float32(q) - half * np.float32(down - 1)
+                    for p in range(across):
+                        u = np.float32(p) - half * np.float32(across - 1)
+                        px = x + u * ux + v * vx - half
+                        py = y + u * uy + v * vy - half
+                        fx, fy = px - np.floor(px), py - np.floor(py)
+                        row, column = int(np.floor(py)), int(np.floor(px))
+                        wx, wy = weights(fx), weights(fy)
+                        s0 = s1 = s2 = s3 = np.float32(np.nan)
+                        if flag == INSIDE:
+                            reach = len(wx) // 2 - 1
+                            s0, s1, s2, s3 = _sample(source, row - reach, column - reach, wy, wx)
+                        if not _finite_and_not_negative(s0, s1, s2, s3):
+                            if not _careful(
+                                source, valid, row, column, fy, fx, wy, wx, topology, result
+                            ):
+                                continue
+                            s0, s1, s2, s3 = result[0, 0], result[0, 1], result[0, 2], result[0, 3]
+                        found += 1
+                        a0 += s0
+                        a1 += s1
+                        a2 += s2
+                        a3 += s3
+                if found:
+                    scale = np.float32(1) / np.float32(found)
+                    out[i, j, 0] = a0 * scale
+                    out[i, j, 1] = a1 * scale
+                    out[i, j, 2] = a2 * scale
+                    out[i, j, 3] = a3 * scale
+
+    return kernel(cover)
+
+
+@kernel
+def block_mean(fine: Array, samples: int, out: Array) -> None:
+    """Average blocks of ``samples`` × ``samples`` pixels, of those that are numbers."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            a0 = a1 = a2 = a3 = np.float32(0)
+            found = 0
+            for p in range(i * samples, (i + 1) * samples):
+                for q in range(j * samples, (j + 1) * samples):
+                    if fine[p, q, 0] == fine[p, q, 0]:
+                        found += 1
+                        a0 += fine[p, q, 0]
+                        a1 += fine[p, q, 1]
+                        a2 += fine[p, q, 2]
+                        a3 += fine[p, q, 3]
+            scale = np.float32(1) / np.float32(found) if found else np.float32(np.nan)
+            out[i, j, 0] = a0 * scale
+            out[i, j, 1] = a1 * scale
+            out[i, j, 2] = a2 * scale
+            out[i, j, 3] = a3 * scale
+
+
+@kernel
+def continue_faces(source: Array, strip: Array, out: Array) -> None:
+    """Give each face of a cube map a border, bicubic samples of the faces around it."""
+    size, side = source.shape[0], strip.shape[0]
+    border = (side - size) // 2
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            row, column = i - border, j % side - border
+            if 0 <= row < size and 0 <= column < size:
+                out[i, j] = source[row, j // side * size + column]
+                continue
+            x, y = strip[i, j, 0] - np.float32(0.5), strip[i, j, 1] - np.float32(0.5)
+            column, row = int(np.floor(x)), int(np.floor(y))
+            wx, wy = cubic_weights(x - np.float32(column)), cubic_weights(y - np.float32(row))
+            first = int(strip[i, j, 0]) // size * size
+            for c in range(4):
+                total = darkest = np.float32(0)
+                for a in range(4):
+                    for b in range(4):
+                        p = min(max(row + a - 1, 0), size - 1)
+                        q = min(max(column + b - 1, first), first + size - 1)
+                        total += wy[a] * wx[b] * source[p, q, c]
+                        darkest = min(darkest, source[p, q, c])
+                # NaN, which stays, marks what is no sample.
+                out[i, j, c] = darkest if total < darkest else total
