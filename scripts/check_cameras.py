@@ -15,7 +15,7 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField
-from lightfield.geometry.rigs import icosphere
+from lightfield.geometry.rigs.sphere import icosphere
 from lightfield.rendering import blender
 
 # Geometry farther than this from a camera, in metres, is not looked for.

@@ -37,7 +37,7 @@ BOUNDS_PIXELS = 64
 def main() -> None:
     arguments = parsed()
     content = read_json(arguments.input_cfg)
-    views = rigs.poses({"type": "poses", "file": arguments.input_cfg})
+    views = rigs.from_settings({"type": "poses", "file": str(arguments.input_cfg)}).poses()
     export = Export(arguments, content, views)
     scale, offset = export.placement()
     common = export.lens_keys | {"scale": scale, "offset": offset}

@@ -16,10 +16,10 @@ from matplotlib.ticker import FuncFormatter
 
 from lightfield.core.cli import run
 from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import rigs
 from lightfield.imaging import images
 from lightfield.measurement import noise
 from lightfield.report.plots import BLUE, GREY, plot
-from lightfield.report.rig_outline import outline
 
 # From where the rig is looked at: degrees round it from −Y, and above the ground.
 AZIMUTH, ELEVATION = 30.0, 24.0
@@ -37,7 +37,7 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="folder to write to")
     arguments = parser.parse_args()
     poses = LightField.read(arguments.lightfield).matrices
-    draw_rig(arguments.output / "rig", arguments.rig, poses)
+    draw_rig(arguments.output / "rig", rigs.from_settings(arguments.rig), poses)
     panorama = images.read_image(arguments.panorama).channels
     colour = np.stack([panorama[name] for name in "RGB"], axis=-1, dtype=np.float32)
     # Without depth the map is grey: the workflow's plan names the same pictures for every dataset.
@@ -46,21 +46,21 @@ def main() -> None:
     draw_noise(arguments.output / "noise", colour)
 
 
-def draw_rig(stem: Path, rig: dict[str, Any], poses: np.ndarray) -> None:
+def draw_rig(stem: Path, rig: rigs.Rig, poses: np.ndarray) -> None:
     """Draw each camera as a dot and an arrow along its view, as Figure 2 of the SILVR paper."""
     turn, rise = np.radians(AZIMUTH), np.radians(ELEVATION)
     right = np.array([np.cos(turn), np.sin(turn), 0.0])
     ahead = np.array([-np.sin(turn) * np.cos(rise), np.cos(turn) * np.cos(rise), -np.sin(rise)])
     screen = np.stack([right, np.cross(right, ahead)], axis=-1)
     places, forwards = poses[:, :3, 3], -poses[:, :3, 2]
-    drawn = np.concatenate([places, *outline(rig)])
+    drawn = np.concatenate([places, *rig.outline()])
     extent = np.linalg.norm(np.ptp(drawn, axis=0)) or 1.0
     arrow = min(0.09, 0.5 / np.sqrt(len(poses))) * extent
     order = np.argsort(-(places @ ahead), kind="stable")
     # What is nearer is drawn later and darker.
     near = np.linspace(0.35, 1.0, len(poses))
     ends = places[order] + arrow * forwards[order]
-    lines = [line @ screen for line in outline(rig)]
+    lines = [line @ screen for line in rig.outline()]
     with plot(stem, size=(7, 6)) as axes:
         axes.add_collection(LineCollection(lines, colors=GREY, linewidths=0.8))
         start, end = places[order] @ screen, ends @ screen

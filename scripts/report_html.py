@@ -6,13 +6,12 @@ What is not there (measurements that were not asked for, depth, costs) is told, 
 
 import argparse
 import json
-from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 from lightfield.core.cli import run
 from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.geometry import rigs
 from lightfield.report import page
 from lightfield.report import tables as report_tables
 from lightfield.report import views as report_views
@@ -39,9 +38,10 @@ def main() -> None:
     arguments = parser.parse_args()
 
     folder: Path = arguments.dataset
+    rig = rigs.from_settings(arguments.rig)
     lightfield = LightField.read(folder / NAME)
     name = str(lightfield.scene["name"])
-    looks = report_views.collect(folder / IMAGES, lightfield, arguments.rig)
+    looks = report_views.collect(folder / IMAGES, lightfield, rig)
     report = folder / REPORT
     measured = {
         "reprojection": report_tables.reprojection(arguments.measurements),
@@ -53,7 +53,7 @@ def main() -> None:
         "page.html.j2",
         name=arguments.name,
         home="../" * (arguments.name.count("/") + 2) + "index.html",
-        facts=facts(folder, lightfield, arguments.rig),
+        facts=facts(folder, lightfield, rig),
         pictures={stem: page.photo(report / f"{stem}.png", WIDEST) for stem in PICTURES},
         plots={stem: page.plot(report / stem) for stem in PLOTS},
         looks=looks,
@@ -69,7 +69,7 @@ def main() -> None:
     )
 
 
-def facts(folder: Path, lightfield: LightField, rig: Mapping[str, Any]) -> list[tuple[str, str]]:
+def facts(folder: Path, lightfield: LightField, rig: rigs.Rig) -> list[tuple[str, str]]:
     """Return what one wants to know first of a dataset, each with its title."""
     lens, render = lightfield.lens, lightfield.render
     samples = f"{render.get('samples', '–')} a pixel"
@@ -91,17 +91,14 @@ def facts(folder: Path, lightfield: LightField, rig: Mapping[str, Any]) -> list[
     ]
 
 
-def rig_text(rig: Mapping[str, Any]) -> str:
+def rig_text(rig: rigs.Rig) -> str:
     """Return a rig in words: its type, its cameras along each axis, and its size."""
-    kind = str(rig.get("type", "rig"))
-    if "cameras" in rig:
-        kind += " " + " × ".join(str(count) for count in rig["cameras"])
-    if "size" not in rig:
-        return kind
-    size = rig["size"]
-    if isinstance(size, int | float):
-        return f"{kind}, {'⌀ ' if rig.get('type') in ('sphere', 'cylinder') else ''}{size:g} m"
-    return f"{kind}, {' × '.join(f'{side:g}' for side in size)} m"
+    kind = rig.type
+    if isinstance(rig, rigs.Grid):
+        kind += " " + " × ".join(map(str, rig.cameras))
+    if isinstance(rig.size, tuple):
+        return f"{kind}, {' × '.join(f'{side:g}' for side in rig.size)} m"
+    return f"{kind}, {'⌀ ' if rig.is_round else ''}{rig.size:g} m"
 
 
 def files(folder: Path, lightfield: LightField) -> list[tuple[str, str]]:

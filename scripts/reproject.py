@@ -26,7 +26,7 @@ from lightfield.core.files import sha256, write_json
 from lightfield.core.progress import Progress
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
-from lightfield.geometry.rigs import matrix_to_euler
+from lightfield.geometry.rotations import matrix_to_euler
 from lightfield.imaging.halves import narrow, widen
 from lightfield.imaging.images import (
     DEPTH_ATTRIBUTE,

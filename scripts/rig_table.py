@@ -8,7 +8,6 @@ volume by its definition in the paper (lightfield/geometry/interpolation_volume.
 import argparse
 import csv
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,9 +17,8 @@ import numpy as np
 from lightfield.core import cli
 from lightfield.core.files import atomic_path
 from lightfield.dataset import config
-from lightfield.geometry import lenses, rigs
+from lightfield.geometry import rigs
 from lightfield.geometry.interpolation_volume import (
-    cells,
     interpolation_volume,
     neighbour_spacing,
     spacing,
@@ -68,7 +66,7 @@ def main() -> None:
     parser.add_argument("--csv", type=Path, required=True, help="the same figures, unrounded")
     arguments = parser.parse_args()
     rows = [
-        row(path.stem, name, rig)
+        row(path.stem, name, rigs.from_settings(rig))
         for path in arguments.scenes
         for name, rig in config.read_scene(path)["rigs"].items()
     ]
@@ -81,37 +79,26 @@ def main() -> None:
         write_csv(rows, file)
 
 
-def row(scene: str, name: str, rig: Mapping[str, Any]) -> Row:
+def row(scene: str, name: str, rig: rigs.Rig) -> Row:
     """Compute one rig's line of the table."""
-    positions = np.array([view.position for view in rigs.poses(rig)])
-    if rig.get("cube_map"):
-        positions = positions[:: len(rigs.CUBE_FACES)]
-    mesh = cells(rig)
-    volume = interpolation_volume(rig, lenses.from_camera(rig["camera"]))
-    size = np.broadcast_to(np.asarray(rig["size"], dtype=float), 3)
-    along = "–" if rig["type"] in ("sphere", "poses") else ", ".join(map(str, rig["cameras"]))
-    if rig["type"] == "sphere" and np.ptp(size) == 0:
-        extent = f"⌀ {size[0]:g} m"
+    positions = np.array([view.position for view in rig.poses()[:: rig.views_a_position]])
+    volume = interpolation_volume(rig, rig.camera.make())
+    if isinstance(rig, rigs.Sphere) and np.ptp(rig.sides) == 0:
+        extent = f"⌀ {rig.sides[0]:g} m"
     else:
-        extent = " × ".join(f"{side:g}" for side in size) + " m"
+        extent = " × ".join(f"{side:g}" for side in rig.sides) + " m"
     return Row(
         scene=scene,
         rig=name,
-        views=rigs.view_count(rig),
-        along=along,
+        views=rig.view_count,
+        along=", ".join(map(str, rig.cameras)) if isinstance(rig, rigs.Grid) else "–",
         size=extent,
         nearest=spacing(positions),
-        neighbours=neighbour_spacing(mesh or [], positions),
+        neighbours=neighbour_spacing(rig.cells() or [], positions),
         immersive=volume.immersive if volume else None,
         enclosed=volume.enclosed if volume else None,
-        formula=formula_volume(rig["type"], size),
+        formula=rig.unit_volume and rig.unit_volume * float(np.prod(rig.sides)),
     )
-
-
-def formula_volume(kind: str, size: Any) -> float | None:
-    """Return the volume in m³ of the box or ellipsoid that a rig is placed on."""
-    box = float(np.prod(size))
-    return {"cuboid": box, "lattice": box, "sphere": math.pi / 6 * box}.get(kind)
 
 
 def markdown(rows: list[Row]) -> str:

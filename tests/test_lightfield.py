@@ -12,7 +12,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import keys
 from lightfield.dataset.lightfield import LightField, View
-from lightfield.geometry import lenses, rigs
+from lightfield.geometry import lenses, rigs, rotations
 
 FISHEYE = lenses.from_camera({"lens": "equidistant", "resolution": [64, 64], "fov": 180})
 WIDE = lenses.from_camera({"lens": "equidistant", "resolution": [64, 64], "fov": 181})
@@ -47,7 +47,7 @@ def test_it_holds_what_silvrs_readers_read() -> None:
         np.testing.assert_array_equal(matrix[:3, 3], frame["position"])
         np.testing.assert_array_equal(matrix[3], [0, 0, 0, 1])
         assert "-0.0" not in json.dumps(frame["world_matrix"])
-        turned = rigs.euler_to_matrix(np.array(frame["rotation"]))
+        turned = rotations.euler_to_matrix(np.array(frame["rotation"]))
         np.testing.assert_allclose(matrix[:3, :3], turned, atol=1e-11)
         number = int(frame["name"][len("view_x") : -1])
         assert frame["split"] == ("test" if number % 2 else "train")
@@ -62,7 +62,7 @@ def test_what_is_read_is_written_again_byte_for_byte(tmp_path: Path) -> None:
         assert first.read_bytes() == second.read_bytes()
         assert [view.split for view in LightField.read(second).views] == [
             ("train", "test")[pose.number % 2] if rig is CUBOID else None
-            for pose in rigs.poses(rig)
+            for pose in rigs.from_settings(rig).poses()
         ]
 
 

@@ -48,7 +48,7 @@ def test_a_spheres_name_tells_its_elevation_and_diameter_in_centimetres(scene):
     spheres = [d for d in config.scene_datasets(scene, "full", {}) if "LFSphere" in d.rig]
     assert len(spheres) == 2
     for dataset in spheres:
-        heights = [pose.position[2] for pose in rigs.poses(dataset.cameras)]
+        heights = [pose.position[2] for pose in rigs.from_settings(dataset.cameras).poses()]
         elevation, diameter = map(
             int, re.fullmatch(r"LFSphere_e(\d+)cm_d(\d+)cm", dataset.rig).groups()
         )

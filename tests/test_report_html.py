@@ -123,7 +123,9 @@ def sphere(tmp_path_factory, run_program):
     folder = tmp_path_factory.mktemp("ball") / "LFSphere"
     lightfield = write_dataset(folder, SPHERE)
     panorama = lenses.from_camera({"lens": "equirectangular", "resolution": [128, 64]})
-    colour, _ = view(panorama, rigs.poses({"type": "lattice", "cameras": [1, 1, 1]})[0].matrix())
+    colour, _ = view(
+        panorama, rigs.from_settings({"type": "lattice", "cameras": [1, 1, 1]}).poses()[0].matrix()
+    )
     channels = dict(zip("RGB", np.moveaxis(colour.astype(np.float32), -1, 0), strict=True))
     channels["Z"] = np.full((64, 128), RADIUS, np.float32)
     images.write_exr(folder / "panorama.exr", channels)
@@ -372,8 +374,8 @@ def test_stills_are_the_same_each_time(sphere, run_program, tmp_path):
 @pytest.mark.parametrize("tilt", [-30, 0, 20])
 def test_epipolar_images_hold_the_light_and_depth_of_the_scene(rig, tilt):
     lens = lenses.from_camera({**rig["camera"], "resolution": [256, 192]})
-    poses = np.array([pose.matrix() for pose in rigs.poses(rig)])
-    row = epipolar.find_row(rig, poses)
+    poses = np.array([pose.matrix() for pose in rigs.from_settings(rig).poses()])
+    row = epipolar.find_row(rigs.from_settings(rig), poses)
     rays = epipolar.directions(row, tilt, 90)
     seen = 0
     for number in row.views:
@@ -400,21 +402,22 @@ def test_epipolar_images_hold_the_light_and_depth_of_the_scene(rig, tilt):
         ({"type": "lattice", "cameras": [3, 1, 1], "cube_map": True}, (0, 6, 12)),
         ({"type": "cylinder", "cameras": [6, 2]}, range(6, 12)),
         ({"type": "lattice", "cameras": [2, 2, 2]}, None),
-        ({"type": "poses", "file": "unused"}, None),
+        ({"type": "poses", "file": "unused.csv"}, None),
     ],
 )
 def test_the_row_is_the_middle_one(change, expected):
     rig = {"size": 1.0, "center": [1, 2, 3], "rotation": [0, 0, 30]} | change
+    rig = rigs.from_settings(rig)
     unread = change["type"] == "poses"
-    poses = np.tile(np.eye(4), (9, 1, 1)) if unread else [p.matrix() for p in rigs.poses(rig)]
+    poses = np.tile(np.eye(4), (9, 1, 1)) if unread else [p.matrix() for p in rig.poses()]
     row = epipolar.find_row(rig, np.array(poses))
     assert (sorted(row.views) if row else None) == (list(expected) if expected else None)
 
 
 def test_a_spheres_row_is_its_equator():
     rig = {**SPHERE, "subdivisions": 3, "center": [0, 0, 1]}
-    poses = rigs.poses(rig)
-    row = epipolar.find_row(rig, np.array([pose.matrix() for pose in poses]))
+    poses = rigs.from_settings(rig).poses()
+    row = epipolar.find_row(rigs.from_settings(rig), np.array([pose.matrix() for pose in poses]))
     assert len(row.views) == 20
     assert all(poses[view].position[2] == pytest.approx(1, abs=1e-4) for view in row.views)
     assert (np.diff(row.places) > 0).all()

@@ -24,7 +24,7 @@ PANORAMA = {"lens": "equirectangular", "resolution": [64, 32]}
 
 
 def volume(rig: Any, camera: Any) -> float:
-    result = interpolation_volume(rig, lenses.from_camera(camera))
+    result = interpolation_volume(rigs.from_settings(rig), lenses.from_camera(camera))
     assert result is not None
     return result.immersive
 
@@ -36,7 +36,7 @@ def traced_volume(rig: dict[str, Any], sees: Any, count: int) -> tuple[float, fl
     cameras that all see the ray's direction. ``sees`` tells it from directions in the camera's
     coordinates. The rays go to a fine grid on each triangle of the sphere, its corners included.
     """
-    views = rigs.poses(rig)
+    views = rigs.from_settings(rig).poses()
     matrices = np.stack([view.matrix()[:3, :3] for view in views])
     positions = np.array([view.position for view in views])
     center = positions.mean(axis=0)
@@ -139,7 +139,7 @@ def test_loose_poses_span_no_surface(tmp_path: Path) -> None:
     path = tmp_path / "poses.csv"
     path.write_text("name,x,y,z,rx,ry,rz\na,0,0,0,0,0,0\n")
     rig = {"type": "poses", "file": str(path)}
-    assert interpolation_volume(rig, lenses.from_camera(FISHEYE)) is None
+    assert interpolation_volume(rigs.from_settings(rig), lenses.from_camera(FISHEYE)) is None
 
 
 def test_spacing_leaves_out_cameras_at_the_same_place() -> None:

@@ -13,6 +13,8 @@ import pytest
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses, rigs
+from lightfield.geometry.rigs import from_settings
+from lightfield.geometry.rigs.sphere import icosphere
 
 # Every dataset of SILVR: the number of views as published, and the rig.
 SILVR: dict[str, tuple[int, dict[str, Any]]] = {
@@ -53,6 +55,8 @@ OTHERS: dict[str, tuple[int, dict[str, Any]]] = {
         {"type": "sphere", "subdivisions": 3, "rotation": [90, 45, -60], "center": [0, 0, 2]},
     ),
 }
+
+RIGS = {label: (count, from_settings(rig)) for label, (count, rig) in (SILVR | OTHERS).items()}
 
 # The addon's method, by Blender's own means; nothing of the project is imported here.
 BLENDER = r"""
@@ -151,9 +155,9 @@ def blender(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 @pytest.mark.parametrize("label", [*SILVR, *OTHERS])
 def test_every_camera_is_where_blender_puts_it(label: str, blender: dict[str, Any]) -> None:
-    count, rig = {**SILVR, **OTHERS}[label]
-    views = rigs.poses(rig)
-    assert len(views) == count == rigs.view_count(rig)
+    count, rig = RIGS[label]
+    views = rig.poses()
+    assert len(views) == count == rig.view_count
     assert [view.name for view in views] == blender[f"{label} names"].tolist()
     matrices = np.stack([view.matrix() for view in views])
     np.testing.assert_allclose(
@@ -164,15 +168,13 @@ def test_every_camera_is_where_blender_puts_it(label: str, blender: dict[str, An
 
 
 def test_the_silvr_rigs_have_7358_cameras() -> None:
-    counts = [rigs.view_count(rig) for label, (_, rig) in SILVR.items()]
-    assert sum(counts[:6]) == 7358
+    assert sum([RIGS[label][1].view_count for label in SILVR][:6]) == 7358
 
 
 @pytest.mark.parametrize("label", ["garden sphere", "turned sphere", "turned cuboid"])
 def test_euler_angles_are_those_that_blender_chooses(label: str, blender: dict[str, Any]) -> None:
     """Of the two sets of angles; where their sums are equal, rounding decides in Blender."""
-    _, rig = {**SILVR, **OTHERS}[label]
-    ours = np.array([view.rotation for view in rigs.poses(rig)])
+    ours = np.array([view.rotation for view in RIGS[label][1].poses()])
     theirs = blender[f"{label} eulers"].astype(float)
     other = np.array([1, -1, 1]) * ours + math.pi
     other = (other + math.pi) % (2 * math.pi) - math.pi
@@ -186,12 +188,13 @@ def test_euler_angles_are_those_that_blender_chooses(label: str, blender: dict[s
 @pytest.mark.parametrize("subdivisions", range(1, 8))
 def test_icosphere_is_blenders(subdivisions: int, blender: dict[str, Any]) -> None:
     theirs = blender[f"icosphere {subdivisions}"]
-    np.testing.assert_allclose(rigs.icosphere(subdivisions), theirs, rtol=0, atol=1e-6)
-    assert rigs.view_count({"type": "sphere", "subdivisions": subdivisions}) == len(theirs)
+    np.testing.assert_allclose(icosphere(subdivisions), theirs, rtol=0, atol=1e-6)
+    rig = from_settings({"type": "sphere", "subdivisions": subdivisions})
+    assert rig.view_count == len(theirs)
 
 
 def test_sphere_cameras_look_outward_and_upright_and_the_poles_face_up_and_down() -> None:
-    views = rigs.poses({"type": "sphere", "subdivisions": 3, "size": 2})
+    views = from_settings({"type": "sphere", "subdivisions": 3, "size": 2}).poses()
     for view in views:
         matrix = view.matrix()
         np.testing.assert_allclose(-matrix[:3, 2], view.position, atol=1e-7)
@@ -211,11 +214,12 @@ def test_sphere_cameras_look_outward_and_upright_and_the_poles_face_up_and_down(
     ],
 )
 def test_an_axis_of_one_camera_sits_in_the_middle(rig: Any, expected: set[float]) -> None:
-    assert {view.position[0] for view in rigs.poses(rig)} == expected
+    assert {view.position[0] for view in from_settings(rig).poses()} == expected
 
 
 def test_lattice_is_the_corners_of_a_cube_and_level() -> None:
-    views = rigs.poses({"type": "lattice", "cameras": [2, 2, 2], "size": 2, "center": [1, 2, 3]})
+    lattice = {"type": "lattice", "cameras": [2, 2, 2], "size": 2, "center": [1, 2, 3]}
+    views = from_settings(lattice).poses()
     corners = {(x, y, z) for x in (0, 2) for y in (1, 3) for z in (2, 4)}
     assert {view.position for view in views} == corners
     assert [view.name for view in views] == [f"view_{i:04d}f" for i in range(8)]
@@ -224,16 +228,17 @@ def test_lattice_is_the_corners_of_a_cube_and_level() -> None:
 
 
 def test_face_inside_turns_cameras_half_way_about_their_up_axis() -> None:
-    rig = {"type": "cuboid", "cameras": [2, 2, 2]}
-    for out, inside in zip(rigs.poses(rig), rigs.poses({**rig, "face_inside": True}), strict=True):
+    rig = from_settings({"type": "cuboid", "cameras": [2, 2, 2]})
+    turned = rig.model_copy(update={"face_inside": True})
+    for out, inside in zip(rig.poses(), turned.poses(), strict=True):
         flipped = out.matrix() @ np.diag([-1, 1, -1, 1])
         np.testing.assert_allclose(inside.matrix(), flipped, atol=1e-9)
 
 
 def test_cube_map_faces_look_along_six_axes_of_the_camera() -> None:
-    rig = {"type": "plane", "cameras": [2, 1], "cube_map": True}
-    views = rigs.poses(rig)
-    assert rigs.view_count(rig) == len(views) == 12
+    rig = from_settings({"type": "plane", "cameras": [2, 1], "cube_map": True})
+    views = rig.poses()
+    assert rig.view_count == len(views) == 12
     assert [view.name for view in views[6:]] == [f"view_0001f_{face}" for face in "fblrud"]
     # The plane's camera looks along +Y with +Z up: look and up of each face, by hand.
     expected = {
@@ -253,7 +258,8 @@ def test_cube_map_faces_look_along_six_axes_of_the_camera() -> None:
 
 
 def test_more_than_9999_views_keep_one_name_each() -> None:
-    names = [view.name for view in rigs.poses({"type": "plane", "cameras": [101, 101]})]
+    rig = from_settings({"type": "plane", "cameras": [101, 101]})
+    names = [view.name for view in rig.poses()]
     assert names[9999:10001] == ["view_9999f", "view_10000f"]
     assert len(set(names)) == 10201
 
@@ -268,9 +274,9 @@ def test_poses_from_csv_and_lightfield_json_agree(tmp_path: Path) -> None:
     (tmp_path / "poses.csv").write_text("\n".join(lines) + "\n")
     for file, lf_type in (("lightfield.json", "SPHERE"), ("poses.csv", "PLANE")):
         again = {"type": "poses", "file": str(tmp_path / file)}
-        assert rigs.view_count(again) == 12
-        assert rigs.poses(again) == rigs.poses(rig)
-        assert rigs.lf_type(again) == lf_type
+        assert from_settings(again).view_count == 12
+        assert from_settings(again).poses() == from_settings(rig).poses()
+        assert from_settings(again).lf_type == lf_type
 
 
 @pytest.mark.parametrize(
@@ -303,56 +309,62 @@ def test_a_malformed_pose_file_is_named_with_row_and_key(
     if text is not None:
         path.write_text(text)
     with pytest.raises(UserError, match=message) as error:
-        rigs.poses({"type": "poses", "file": str(path)})
+        from_settings({"type": "poses", "file": str(path)}).poses()
     assert str(path) in str(error.value)
 
 
 @pytest.mark.parametrize("label", [*SILVR, "plane", "cylinder"])
 @pytest.mark.parametrize("limit", [12, 20, 42, 100, 500, 10_000])
 def test_thin_is_the_same_rig_within_the_limit(label: str, limit: int) -> None:
-    _, rig = {**SILVR, **OTHERS}[label]
-    thinner = rigs.thin(rig, limit)
-    assert rigs.view_count(thinner) == len(rigs.poses(thinner)) <= limit
-    kept = {key: value for key, value in rig.items() if key not in ("cameras", "subdivisions")}
-    assert kept == {key: thinner[key] for key in kept}
-    if rigs.view_count(rig) <= limit:
+    rig = RIGS[label][1]
+    thinner = rig.thinned(limit)
+    assert thinner.view_count == len(thinner.poses()) <= limit
+    counts = {"cameras", "subdivisions", "camera"}
+    assert thinner.model_dump(exclude=counts) == rig.model_dump(exclude=counts)
+    if rig.view_count <= limit:
         assert thinner == rig
         return
     # Nothing denser of the same kind fits.
-    if rig["type"] == "sphere":
-        denser = [{**thinner, "subdivisions": thinner["subdivisions"] + 1}]
-    else:
-        counts = thinner["cameras"]
+    if isinstance(thinner, rigs.Grid) and isinstance(rig, rigs.Grid):
         denser = [
-            {**thinner, "cameras": [n + (i == axis) for i, n in enumerate(counts)]}
-            for axis in range(len(counts))
-            if counts[axis] < rig["cameras"][axis]
+            {"cameras": tuple(n + (i == axis) for i, n in enumerate(thinner.cameras))}
+            for axis, full in enumerate(rig.cameras)
+            if thinner.cameras[axis] < full
         ]
-    assert all(rigs.view_count(more) > limit for more in denser)
+    else:
+        assert isinstance(thinner, rigs.Sphere)
+        denser = [{"subdivisions": thinner.subdivisions + 1}]
+    assert all(thinner.model_copy(update=more).view_count > limit for more in denser)
+
+
+def cameras(rig: dict[str, Any], limit: int) -> tuple[int, ...]:
+    """Return a grid's cameras along each axis when it is thinned."""
+    thinner = from_settings(rig).thinned(limit)
+    assert isinstance(thinner, rigs.Grid)
+    return thinner.cameras
 
 
 def test_thin_keeps_proportions_and_two_cameras_an_axis() -> None:
     _, rig = SILVR["lone_monk cuboid"]
-    shares = np.array(rigs.thin(rig, 600)["cameras"]) / rig["cameras"]
+    shares = np.array(cameras(rig, 600)) / rig["cameras"]
     assert np.ptp(shares) < 0.1
-    _, rig = SILVR["barbershop cuboid"]
-    assert min(rigs.thin(rig, 42)["cameras"]) >= 2
-    assert rigs.thin({"type": "plane", "cameras": [9, 1]}, 4)["cameras"] == [4, 1]
+    assert min(cameras(SILVR["barbershop cuboid"][1], 42)) >= 2
+    assert cameras({"type": "plane", "cameras": [9, 1]}, 4) == (4, 1)
     lattice = {"type": "lattice", "cameras": [2, 2, 2]}
-    assert rigs.thin(lattice, 8) == lattice
-    assert rigs.thin({**lattice, "cube_map": True}, 24)["cameras"] == [2, 2, 1]
+    assert cameras(lattice, 8) == (2, 2, 2)
+    assert cameras({**lattice, "cube_map": True}, 24) == (2, 2, 1)
 
 
 def test_thin_takes_an_even_subset_of_a_pose_file(tmp_path: Path) -> None:
     path = tmp_path / "poses.csv"
     rows = [f"v{i},{i},0,0,0,0,0" for i in range(101)]
     path.write_text("\n".join(["name,x,y,z,rx,ry,rz", *rows]))
-    thinner = rigs.thin({"type": "poses", "file": str(path)}, 5)
-    assert rigs.view_count(thinner) == 5
-    assert [view.name for view in rigs.poses(thinner)] == ["v0", "v25", "v50", "v75", "v100"]
+    thinner = from_settings({"type": "poses", "file": str(path)}).thinned(5)
+    assert thinner.view_count == 5
+    assert [view.name for view in thinner.poses()] == ["v0", "v25", "v50", "v75", "v100"]
 
 
 @pytest.mark.parametrize("label", ["garden sphere", "garden cuboid"])
 def test_thin_says_when_no_such_rig_is_small_enough(label: str) -> None:
     with pytest.raises(UserError, match="cannot have as few as 5 views"):
-        rigs.thin(SILVR[label][1], 5)
+        RIGS[label][1].thinned(5)

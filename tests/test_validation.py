@@ -19,7 +19,7 @@ import pytest
 
 from lightfield.core.files import sha256, write_json
 from lightfield.dataset.lightfield import LightField
-from lightfield.geometry import lenses, rigs
+from lightfield.geometry import lenses, rotations
 from lightfield.imaging import images
 from lightfield.validation import validation
 
@@ -148,7 +148,7 @@ def relist(dataset: Path, change: Callable[[dict[str, Any]], None]) -> None:
     for frame in content["frames"]:
         matrix = np.array(frame["world_matrix"])
         frame["position"] = matrix[:3, 3].tolist()
-        frame["rotation"] = rigs.matrix_to_euler(matrix[:3, :3]).tolist()
+        frame["rotation"] = rotations.matrix_to_euler(matrix[:3, :3]).tolist()
     write_json(dataset / "lightfield.json", content)
 
 
@@ -190,7 +190,7 @@ def turn(views: list[int], turned: np.ndarray, local: bool = True) -> Callable[[
 def degrees(axis: int, angle: float) -> np.ndarray:
     euler = np.zeros(3)
     euler[axis] = math.radians(angle)
-    return rigs.euler_to_matrix(euler)
+    return rotations.euler_to_matrix(euler)
 
 
 def swap(one: int, other: int) -> Callable[[dict[str, Any]], None]:

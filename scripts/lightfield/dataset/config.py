@@ -60,7 +60,7 @@ class Dataset:
     @property
     def view_count(self) -> int:
         """Number of views of the rig."""
-        return rigs.view_count(self.cameras)
+        return rigs.from_settings(self.cameras).view_count
 
     @property
     def depth(self) -> str | None:
@@ -129,7 +129,11 @@ def scene_datasets(scene: str, preset: str, limits: Mapping[str, Any]) -> list[D
     render = _limited_render(settings["render"], limits)
     found = []
     for name, rig in settings["rigs"].items():
-        cameras = rigs.thin(_located(rig), limits["views"]) if "views" in limits else _located(rig)
+        cameras = _located(rig)
+        if "views" in limits:
+            thinned = rigs.from_settings(cameras).thinned(limits["views"])
+            counts = thinned.model_dump(include={"cameras", "subdivisions", "max_views"})
+            cameras = {**cameras, **{k: v for k, v in counts.items() if v is not None}}
         cameras = {**cameras, "camera": _limited(rig["camera"], limits)}
         reprojections = {
             key: {**reprojection, "camera": _limited(reprojection["camera"], limits)}

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
-from lightfield.geometry import lenses, rigs
+from lightfield.geometry import lenses, rigs, rotations
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
@@ -43,7 +43,7 @@ class View:
     @classmethod
     def placed(cls, name: str, matrix: Floats, others: Mapping[str, Any] | None = None) -> "View":
         """Return a view of which the matrix (4, 4) is known."""
-        rotation = rigs.matrix_to_euler(matrix[:3, :3])
+        rotation = rotations.matrix_to_euler(matrix[:3, :3])
         return cls(name, matrix, matrix[:3, 3], rotation, others or {})
 
     @property
@@ -91,26 +91,27 @@ class LightField:
             )
 
     @classmethod
-    def from_rig(cls, rig: Mapping[str, Any], lens: Lens, **keys: Any) -> "LightField":
+    def from_rig(cls, rig: rigs.Rig | Mapping[str, Any], lens: Lens, **keys: Any) -> "LightField":
         """Return what a rig sees through a lens; ``keys`` are further ones of the file.
 
         Where the rig asks for an evaluation split, it is "test" for odd sequence numbers, as
         SILVR's paper suggests, and "train" for the others. Raises `UserError` where a cube map's
         lens is not a 90° rectilinear.
         """
+        rig = rigs.from_settings(rig)
         intrinsics = lens.to_lightfield()
-        if rig.get("cube_map"):
+        if rig.cube_map:
             diagonal = np.diagonal(intrinsics["camera"].get("projection_matrix", np.zeros((4, 4))))
             if not np.allclose(diagonal[:2], 1.0, rtol=0, atol=1e-6):
                 raise UserError("cube_map: its camera must be rectilinear with fov: 90 and square")
         content = {
             "camera": intrinsics["camera"],
-            "lf_type": rigs.lf_type(rig),
+            "lf_type": rig.lf_type,
             "resolution": intrinsics["resolution"],
             "sensor_size": intrinsics["sensor_size"],
             **keys,
         }
-        split = ("train", "test") if rig.get("evaluation_split") else None
+        split = ("train", "test") if rig.evaluation_split else None
         views = [
             View(
                 pose.name,
@@ -119,7 +120,7 @@ class LightField:
                 np.array(pose.rotation),
                 {"split": split[pose.number % 2]} if split else {},
             )
-            for pose in rigs.poses(rig)
+            for pose in rig.poses()
         ]
         return cls(content, views)
 
@@ -231,12 +232,12 @@ def _view(where: str, frame: Any) -> View:
         if position is None or rotation is None:
             raise UserError(f"{where}: world_matrix: is missing, or position and rotation are")
         matrix = np.eye(4)
-        matrix[:3, :3] = rigs.euler_to_matrix(rotation)
+        matrix[:3, :3] = rotations.euler_to_matrix(rotation)
         matrix[:3, 3] = position
     if position is None:
         position = matrix[:3, 3]
     if rotation is None:
-        rotation = rigs.matrix_to_euler(matrix[:3, :3])
+        rotation = rotations.matrix_to_euler(matrix[:3, :3])
     return View(name, matrix, position, rotation, others)
 
 

@@ -22,17 +22,15 @@ sees beyond 90° is not counted, unless it sees all round.
 
 import math
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, HalfspaceIntersection, KDTree, QhullError
 
-from lightfield.geometry import rigs
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.rigs import Rig
 
 CONE_SIDES = 360
 
@@ -50,26 +48,24 @@ class InterpolationVolume:
     enclosed: float
 
 
-def interpolation_volume(rig: Mapping[str, Any], lens: Lens) -> InterpolationVolume | None:
+def interpolation_volume(rig: Rig, lens: Lens) -> InterpolationVolume | None:
     """Return the volumes of a rig seen through a lens; None for loose poses, which span nothing."""
-    mesh = cells(rig)
+    mesh = rig.cells()
     if mesh is None:
         return None
-    views = rigs.poses(rig)
-    if rig.get("cube_map"):
-        views = views[:: len(rigs.CUBE_FACES)]
+    views = rig.poses()[:: rig.views_a_position]
     matrices = np.stack([view.matrix() for view in views])
     positions = matrices[:, :3, 3]
     if not is_closed(mesh, positions):
         return InterpolationVolume(0.0, 0.0)
     hull = ConvexHull(positions)
-    if rig.get("cube_map") or sees_all_round(lens):
+    if rig.cube_map or sees_all_round(lens):
         return InterpolationVolume(float(hull.volume), float(hull.volume))
     sides = cone_sides(lens)
     if sides is None:
         return InterpolationVolume(0.0, float(hull.volume))
     # Facing inside, a ray runs from the surface through the point: the cone opens towards it.
-    sign = -1.0 if rig.get("face_inside") else 1.0
+    sign = -1.0 if rig.face_inside else 1.0
     normals = sign * sides @ np.swapaxes(matrices[:, :3, :3], 1, 2)
     bounds = np.full(normals.shape[:2], np.inf)
     for camera, corner in neighbours(mesh):
@@ -99,36 +95,6 @@ def neighbour_spacing(mesh: list[tuple[int, ...]], positions: Floats) -> float:
         return math.nan
     ends = positions[[sorted(edge) for edge in edges]]
     return float(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=-1).mean())
-
-
-def cells(rig: Mapping[str, Any]) -> list[tuple[int, ...]] | None:
-    """Return the cells between neighbouring camera positions, as indices in the poses' order."""
-    kind = rig["type"]
-    if kind == "poses":
-        return None
-    if kind == "sphere":
-        hull = ConvexHull(rigs.icosphere(rig["subdivisions"]))
-        return [tuple(map(int, corners)) for corners in hull.simplices]
-    counts = rig["cameras"]
-    if kind == "lattice":
-        nx, ny, nz = counts
-        index = np.arange(nx * ny * nz).reshape(nz, ny, nx)
-        faces = [index[0], index[-1], index[:, 0], index[:, -1], index[:, :, 0], index[:, :, -1]]
-        return [cell for face in faces for cell in _quads(face)]
-    if kind == "cuboid":
-        nx, ny, nz = counts
-        sides = [(nx, nz), (nx, nz), (ny, nz), (ny, nz), (nx, ny), (nx, ny)]
-    else:
-        sides = [tuple(counts)]
-    found = []
-    start = 0
-    for columns, rows in sides:
-        grid = np.arange(start, start + columns * rows).reshape(rows, columns)
-        start += columns * rows
-        if kind == "cylinder":
-            grid = np.column_stack([grid, grid[:, 0]])
-        found += _quads(grid)
-    return found
 
 
 def is_closed(mesh: list[tuple[int, ...]], positions: Floats) -> bool:
@@ -208,11 +174,6 @@ def _seen(lens: Lens, directions: Floats) -> NDArray[np.bool_]:
 
 def _edges(cell: tuple[int, ...]) -> list[tuple[int, int]]:
     return list(zip(cell, (*cell[1:], cell[0]), strict=True))
-
-
-def _quads(grid: NDArray[np.int64]) -> list[tuple[int, ...]]:
-    corners = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1)
-    return [tuple(cell) for cell in corners.reshape(-1, 4).tolist()]
 
 
 def _tightest(planes: Floats) -> Floats:

@@ -8,23 +8,20 @@ of the ring; there, over the azimuth in the world, the endlessly far stands stil
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.geometry import rigs
 from lightfield.geometry.depth import distance_from_z
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.rigs import Rig
 
 Array = NDArray[Any]
 
 FEWEST_CAMERAS = 3
-# Cameras of a sphere whose heights differ by less, as a part of its own, are in one ring: its
-# vertices follow from rounded ones.
-SAME_LEVEL = 1e-3
 TILTS = tuple(range(-40, 41, 10))
 """Degrees by which an image's plane, or cone round a ring, is raised above the level one."""
 COLUMNS = {"line": 512, "ring": 720}
@@ -47,24 +44,22 @@ class Row:
     places: Array
 
 
-def find_row(rig: Mapping[str, Any], matrices: Array) -> Row | None:
+def find_row(rig: Rig, matrices: Array) -> Row | None:
     """Return the row in the middle of a rig, or None where no three cameras are in one.
 
     ``matrices`` (views, 4, 4) are the poses of all its views. A grid's is its front's middle row;
     a sphere's is the level of cameras nearest the equator.
     """
-    faces = len(rigs.CUBE_FACES) if rig.get("cube_map") else 1
-    positions = matrices[::faces, :3, 3]
-    turn = rigs.euler_to_matrix(np.radians(np.array(rig.get("rotation", (0, 0, 0)), float)))
-    numbers = _numbers(rig, (positions - np.array(rig.get("center", (0, 0, 0)))) @ turn)
+    faces = rig.views_a_position
+    local = (matrices[::faces, :3, 3] - np.array(rig.center)) @ rig.turn
+    numbers = rig.middle_row(local)
     if len(numbers) < FEWEST_CAMERAS:
         return None
     views = [number * faces for number in numbers]
-    if rig["type"] in ("sphere", "cylinder"):
-        local = (positions[numbers] - np.array(rig.get("center", (0, 0, 0)))) @ turn
-        azimuth = np.arctan2(local[:, 0], local[:, 1])
+    if rig.is_round:
+        azimuth = np.arctan2(local[numbers, 0], local[numbers, 1])
         order = np.argsort(azimuth, kind="stable")
-        return Row("ring", [views[i] for i in order], turn.T, azimuth[order])
+        return Row("ring", [views[i] for i in order], rig.turn.T, azimuth[order])
     places = matrices[views, :3, 3]
     along = places[-1] - places[0]
     length = float(np.linalg.norm(along))
@@ -78,34 +73,6 @@ def find_row(rig: Mapping[str, Any], matrices: Array) -> Row | None:
     forward = forward / np.linalg.norm(forward)
     axes = np.stack([along, forward, np.cross(along, forward)])
     return Row("line", views, axes, (places - places.mean(axis=0)) @ along)
-
-
-def _numbers(rig: Mapping[str, Any], local: Array) -> list[int]:
-    """Return the numbers of the positions in a row; ``local`` are positions in the rig's axes."""
-    kind = rig["type"]
-    if kind == "sphere":
-        order = np.argsort(local[:, 2], kind="stable")
-        heights = local[order, 2]
-        gaps = np.flatnonzero(np.diff(heights) > SAME_LEVEL * np.ptp(heights)) + 1
-        rings = [ring for ring in np.split(order, gaps) if len(ring) >= FEWEST_CAMERAS]
-        nearest = min(rings, key=lambda ring: abs(local[ring, 2].mean()), default=order[:0])
-        return [int(number) for number in np.sort(nearest)]
-    if kind == "poses":
-        return []
-    counts = list(rig["cameras"])
-    first = 0
-    if kind == "lattice":
-        columns = counts[0]
-        first = (counts[2] // 2 * counts[1] + counts[1] // 2) * columns
-    elif kind == "cuboid":
-        x, y, z = counts
-        columns = max(x, y)
-        # The front, or where it is the longer one, the left side, which comes after the back.
-        first = z // 2 * columns + (0 if x >= y else 2 * x * z)
-    else:
-        columns = counts[0]
-        first = counts[1] // 2 * columns
-    return list(range(first, first + columns))
 
 
 def directions(row: Row, tilt: float, columns: int) -> Array:

@@ -1,7 +1,7 @@
 """What a dataset's page shows of the views themselves, packed to be looked at in a browser."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.rigs import Rig
 from lightfield.imaging import images, pictures
 from lightfield.measurement.noise import relative_noise
 from lightfield.report import epipolar
@@ -24,7 +25,6 @@ from lightfield.report.packing import (
     pack_light,
     webp,
 )
-from lightfield.report.rig_outline import outline
 
 Array = NDArray[Any]
 
@@ -61,10 +61,10 @@ class Looks:
     row_shown: int
 
 
-def collect(folder: Path, lightfield: LightField, rig: Mapping[str, Any]) -> Looks:
+def collect(folder: Path, lightfield: LightField, rig: Rig) -> Looks:
     """Read the views that the page shows and pack them.
 
-    ``folder`` holds the views of ``lightfield``, and ``rig`` is the scene YAML's mapping. Raises
+    ``folder`` holds the views of ``lightfield``, and ``rig`` holds its cameras. Raises
     `UserError` for a view that cannot be read.
     """
     names = [view.name for view in lightfield.views]
@@ -103,7 +103,7 @@ def collect(folder: Path, lightfield: LightField, rig: Mapping[str, Any]) -> Loo
             }
             for name, matrix in zip(names, matrices, strict=True)
         ],
-        "outline": [[_rounded(point) for point in line] for line in outline(rig)],
+        "outline": [[_rounded(point) for point in line] for line in rig.outline()],
         "resolution": [lens.width, lens.height],
         "size": [small.width, small.height],
         "light": limits,

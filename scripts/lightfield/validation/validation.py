@@ -25,7 +25,7 @@ import OpenImageIO as oiio
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256
 from lightfield.core.progress import Progress
-from lightfield.geometry import lenses, rigs
+from lightfield.geometry import lenses, rotations
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.validation import consistency
 from lightfield.validation.consistency import Answer, Patches
@@ -233,7 +233,7 @@ def _poses_check(path: str, views: list[str], matrices: Array, eulers: Array, at
     faults = {view: "is the name of two frames" for view in views if views.count(view) > 1}
     for view, difference in zip(
         views,
-        np.abs(rigs.euler_to_matrix(eulers) - turns).max(axis=(1, 2))
+        np.abs(rotations.euler_to_matrix(eulers) - turns).max(axis=(1, 2))
         + np.abs(at - matrices[:, :3, 3]).max(axis=1)
         + np.abs(matrices[:, 3] - (0, 0, 0, 1)).max(axis=1),
         strict=True,

@@ -28,9 +28,10 @@ from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from lightfield.core.errors import UserError
+from lightfield.core.settings import Settings
 
 Array = npt.NDArray[Any]
 Pair = tuple[float, float]
@@ -49,14 +50,12 @@ Pixels = Annotated[int, Field(strict=True, ge=1, le=65536)]
 FocalLength = Annotated[float, Field(strict=True, gt=0, description="Millimetres.")]
 
 
-class LensSettings(BaseModel):
+class LensSettings(Settings):
     """One camera's lens and image, as a scene YAML has them; each lens adds its own keys.
 
     What the schema cannot say is for the lens itself to check, with errors of the form
     ``key: what is wrong``.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     lens: str
     resolution: list[Pixels] = Field(

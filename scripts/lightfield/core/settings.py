@@ -1,0 +1,144 @@
+"""What users write in YAML: the base class of its models, and their mistakes in one line."""
+
+import difflib
+import json
+import re
+from collections.abc import Callable, Iterable, Mapping
+from typing import Annotated, Any, TypeVar
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    WrapValidator,
+    model_validator,
+)
+from pydantic_core import ErrorDetails
+
+from lightfield.core.errors import UserError
+
+Model = TypeVar("Model")
+
+
+class Settings(BaseModel):
+    """A mapping of known keys: nothing is converted (4.0 is no whole number), nothing ignored.
+
+    A model's validator raises ``ValueError("key: what is wrong")``; the key may be dotted.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, content: Any) -> Any:
+        known = cls.model_fields
+        if isinstance(content, Mapping) and cls.model_config["extra"] == "forbid":
+            for key in content:
+                if key not in known:
+                    hint = suggestion(key, known) or f"; allowed here: {', '.join(known)}"
+                    raise ValueError(f"{key}: unknown key{hint}")
+        return content
+
+
+def as_list(count: int) -> BeforeValidator:
+    """Return what makes a tuple of a YAML list of ``count`` values."""
+
+    def check(value: Any) -> Any:
+        if not isinstance(value, list | tuple) or len(value) != count:
+            raise ValueError(f"must be a list of {count} values")
+        return tuple(value)
+
+    return BeforeValidator(check)
+
+
+def _unchanged(value: Any, check: Callable[[Any], Any]) -> Any:
+    check(value)
+    return value
+
+
+# Beside a number that a dataset's identity follows from: 10 stays 10, and does not become 10.0.
+AS_WRITTEN = WrapValidator(_unchanged)
+
+Vector = Annotated[tuple[float, float, float], as_list(3)]
+# Of a folder that a key names.
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Return ``; did you mean …?``, or nothing where no name that is known is near."""
+    close = difflib.get_close_matches(name, list(known), n=1)
+    return f"; did you mean {close[0]}?" if close else ""
+
+
+def checked(model: TypeAdapter[Model], content: Any, file: str) -> Model:
+    """Return a file's content as ``model``; raises `UserError` with file, key, value, and why."""
+    try:
+        return model.validate_python(content)
+    except ValidationError as error:
+        raise UserError(f"{file}: {_first(error.errors(), content)}") from None
+
+
+def _first(errors: list[ErrorDetails], content: Any) -> str:
+    """Say in one line what is wrong with the first key that is."""
+    found = [(*_find(error, content), error) for error in errors]
+    # Of a value that may be of several types, each type has an error, and the deepest knows most.
+    start = found[0][0]
+    path = max((p for p, _, _ in found if p[: len(start)] == start), key=len)
+    same = [(value, error) for p, value, error in found if p == path]
+    value, error = same[0]
+    key = ".".join(f"[{part}]" if isinstance(part, int) else part for part in path)
+    prefix = f"{key}: " if key else ""
+    context = error.get("ctx", {})
+    match error["type"]:
+        case "value_error" if isinstance(value, Mapping):
+            problem = str(context["error"])
+            below = key and re.match(r"[\w.-]+: ", problem)
+            return f"{key}.{problem}" if below else f"{prefix}{problem}"
+        case "missing" | "union_tag_not_found":
+            name = context.get("discriminator", error["loc"][-1])
+            return f"{prefix}is missing the key {str(name).strip(chr(39))}"
+        case "union_tag_invalid":
+            kind = f"{key}.{context['discriminator']}".replace("'", "")
+            return f'{kind}: is "{context["tag"]}"; must be one of {context["expected_tags"]}'
+    if error["loc"][-1:] == ("[key]",):
+        return (
+            f"{'.'.join(map(str, path[:-1]))}: {path[-1]!r} is no name; "
+            "use letters, digits and . _ - , with a letter or digit first"
+        )
+    text = json.dumps(value, default=str)
+    text = text if len(text) <= 60 else f"{text[:57]}..."
+    allowed = dict.fromkeys(_allowed(error) for _, error in same)
+    return f"{prefix}is {text}; must {' or '.join(allowed).replace(' or be ', ' or ')}"
+
+
+def _find(error: ErrorDetails, content: Any) -> tuple[tuple[int | str, ...], Any]:
+    """Return the keys that lead to a wrong value, without pydantic's names of types, and it."""
+    path: list[int | str] = []
+    for part in error["loc"]:
+        here = isinstance(content, Mapping) and part in content
+        if here or (isinstance(content, list) and isinstance(part, int) and part < len(content)):
+            content = content[part]
+            path.append(part)
+    return tuple(path), content
+
+
+def _allowed(error: ErrorDetails) -> str:
+    """Return what pydantic allows, to follow after ``must``."""
+    match error["type"]:
+        case "value_error":
+            return str(error["ctx"]["error"]).removeprefix("must ")
+        case "model_type" | "dict_type":
+            return "be a mapping of keys to values"
+        case "int_type" | "int_from_float":
+            return "be a whole number"
+        case "string_type":
+            return "be a text"
+        case "bool_type":
+            return "be true or false"
+        case "list_type":
+            return "be a list"
+    text = re.sub(r"^\w+ should ", "", error["msg"])
+    return re.sub(r" after validation, not .*", "", text)

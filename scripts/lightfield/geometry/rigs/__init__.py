@@ -1,0 +1,45 @@
+"""Camera rigs: how many views a rig has, and the name and pose of each; one file a type of rig.
+
+Order, names and orientations are those of the SILVR datasets and of the Blender addon that
+rendered them (https://github.com/IDLabMedia/blender-lightfield-addon, ``lightfield_*.py``). No
+Blender is needed here.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field, TypeAdapter
+
+from lightfield.core.settings import checked
+from lightfield.geometry.rigs.cuboid import Cuboid
+from lightfield.geometry.rigs.cylinder import Cylinder
+from lightfield.geometry.rigs.grid import Grid
+from lightfield.geometry.rigs.lattice import Lattice
+from lightfield.geometry.rigs.plane import Plane
+from lightfield.geometry.rigs.poses import Poses
+from lightfield.geometry.rigs.rig import CUBE_FACES, Pose, Rig
+from lightfield.geometry.rigs.sphere import Sphere
+
+__all__ = [
+    "CUBE_FACES",
+    "AnyRig",
+    "Grid",
+    "Pose",
+    "Poses",
+    "Rig",
+    "Sphere",
+    "from_settings",
+]
+
+AnyRig = Annotated[
+    Plane | Cuboid | Cylinder | Sphere | Lattice | Poses, Field(discriminator="type")
+]
+_SETTINGS: TypeAdapter[Rig] = TypeAdapter(AnyRig, config=ConfigDict(defer_build=True))
+
+
+def from_settings(settings: Mapping[str, Any] | Rig) -> Rig:
+    """Return the rig that a scene YAML's mapping means; raises `UserError` for a wrong key.
+
+    A rig is returned as it is.
+    """
+    return checked(_SETTINGS, settings, "rig")

@@ -1,0 +1,60 @@
+"""A cuboid: cameras on its six sides, each looking outward."""
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from lightfield.core.settings import as_list
+from lightfield.geometry.rigs.grid import Cell, Count, Grid, axis, box_outline, grid, quads
+from lightfield.geometry.rigs.rig import UnitPoses, stack
+from lightfield.geometry.rotations import Floats
+
+
+class Cuboid(Grid):
+    shape = "CUBOID"
+    fewest = (2, 2, 2)
+    unit_volume = 1.0
+
+    type: Literal["cuboid"]
+    cameras: Annotated[tuple[Count, Count, Count], as_list(3)] = Field(
+        description="Cameras along x, y and z."
+    )
+
+    @staticmethod
+    def count(cameras: tuple[int, ...]) -> int:
+        nx, ny, nz = cameras
+        return 2 * (nx * nz + ny * nz + nx * ny)
+
+    def unit_poses(self) -> UnitPoses:
+        x, y, z = (axis(count) for count in self.cameras)
+        front, back = grid(x, -z), grid(-x, -z)
+        left, right = grid(y, -z), grid(-y, -z)
+        up, down = grid(-x, y), grid(x, -y)
+        level = math.pi / 2
+        return UnitPoses.of_sides(
+            ("f", stack(front[0], 0.5, front[1]), np.array([level, 0.0, 0.0])),
+            ("b", stack(back[0], -0.5, back[1]), np.array([level, 0.0, math.pi])),
+            ("l", stack(-0.5, *left), np.array([level, 0.0, math.pi / 2])),
+            ("r", stack(0.5, *right), np.array([level, 0.0, -math.pi / 2])),
+            ("u", stack(*up, 0.5), np.array([math.pi, 0.0, 0.0])),
+            ("d", stack(*down, -0.5), np.array([0.0, 0.0, 0.0])),
+        )
+
+    def _row(self) -> tuple[int, int]:
+        nx, ny, nz = self.cameras
+        # Of the front, or where it is the longer one, the left side, which comes after the back.
+        return nz // 2 * max(nx, ny) + (0 if nx >= ny else 2 * nx * nz), max(nx, ny)
+
+    def cells(self) -> list[Cell]:
+        nx, ny, nz = self.cameras
+        found = []
+        start = 0
+        for columns, rows in ((nx, nz), (nx, nz), (ny, nz), (ny, nz), (nx, ny), (nx, ny)):
+            found += quads(np.arange(start, start + columns * rows).reshape(rows, columns))
+            start += columns * rows
+        return found
+
+    def unit_outline(self) -> list[Floats]:
+        return box_outline()

@@ -1,0 +1,43 @@
+"""A cylinder: rings of cameras round z, open above and below, each looking outward."""
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from lightfield.core.settings import as_list
+from lightfield.geometry.rigs.grid import Cell, Count, Grid, axis, grid, quads
+from lightfield.geometry.rigs.rig import UnitPoses, circle, stack
+from lightfield.geometry.rotations import Floats
+
+
+class Cylinder(Grid):
+    shape = "CYLINDER"
+    fewest = (3, 2)
+    is_round = True
+
+    type: Literal["cylinder"]
+    cameras: Annotated[tuple[Count, Count], as_list(2)] = Field(
+        description="Cameras round it and up."
+    )
+
+    def unit_poses(self) -> UnitPoses:
+        columns, rows = self.cameras
+        angle, down = grid(2 * np.pi * np.arange(columns) / columns, -axis(rows))
+        places = stack(0.5 * np.sin(angle), 0.5 * np.cos(angle), down)
+        return UnitPoses.of_sides(("", places, stack(math.pi / 2, 0.0, -angle)))
+
+    def cells(self) -> list[Cell]:
+        columns, rows = self.cameras
+        numbers = np.arange(columns * rows).reshape(rows, columns)
+        return quads(np.column_stack([numbers, numbers[:, 0]]))
+
+    def unit_outline(self) -> list[Floats]:
+        cosine, sine = circle()
+        rings = [stack(cosine, sine, z) for z in (-0.5, 0.5)]
+        sides = [
+            np.array([[x, y, -0.5], [x, y, 0.5]])
+            for x, y in ((0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5))
+        ]
+        return rings + sides

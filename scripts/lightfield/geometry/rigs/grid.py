@@ -1,0 +1,96 @@
+"""What the rigs that are given by their cameras along each axis have in common."""
+
+import math
+from typing import Annotated, Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from lightfield.geometry.rigs.rig import Rig
+from lightfield.geometry.rotations import Floats
+
+Count = Annotated[int, Field(ge=1, le=2000)]
+Cell = tuple[int, ...]
+
+_SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5]])
+
+
+class Grid(Rig):
+    """A rig of ``cameras`` along each axis; thinned, it keeps ``fewest`` of them if it can."""
+
+    fewest: ClassVar[tuple[int, ...]]
+
+    cameras: tuple[int, ...]
+
+    @staticmethod
+    def count(cameras: tuple[int, ...]) -> int:
+        """Return how many positions as many cameras along each axis make."""
+        return math.prod(cameras)
+
+    @property
+    def positions(self) -> int:
+        return self.count(self.cameras)
+
+    def middle_row(self, places: Floats) -> list[int]:
+        first, columns = self._row()
+        return list(range(first, first + columns))
+
+    def _row(self) -> tuple[int, int]:
+        """Return the first number and the length of the row in the middle."""
+        return self.cameras[1] // 2 * self.cameras[0], self.cameras[0]
+
+    def _thinned_to(self, positions: int) -> Self | None:
+        """Take cameras from the axis that has kept the largest part of its own.
+
+        So all axes thin alike; an axis keeps ``fewest`` as long as the number of views allows.
+        """
+        for fewest in (self.fewest, [1] * len(self.cameras)):
+            counts = list(self.cameras)
+            axes = range(len(counts))
+            while self.count(tuple(counts)) > positions:
+                thick = [axis for axis in axes if counts[axis] > fewest[axis]]
+                if not thick:
+                    break
+                # Among equals the last axis, the vertical one, goes first.
+                counts[max(thick, key=lambda axis: (counts[axis] / self.cameras[axis], axis))] -= 1
+            else:
+                return self.model_copy(update={"cameras": self._filled(counts, positions)})
+        return None
+
+    def _filled(self, counts: list[int], positions: int) -> tuple[int, ...]:
+        """Return ``counts`` with as many cameras again as fit, axis by axis."""
+        for axis, full in enumerate(self.cameras):
+            while counts[axis] < full:
+                counts[axis] += 1
+                if self.count(tuple(counts)) > positions:
+                    counts[axis] -= 1
+                    break
+        return tuple(counts)
+
+
+def axis(count: int) -> Floats:
+    """Return evenly spaced places from −½ to ½; one camera sits in the middle."""
+    return np.linspace(-0.5, 0.5, count) if count > 1 else np.zeros(1)
+
+
+def grid(columns: Floats, rows: Floats) -> tuple[Floats, Floats]:
+    """Return the column's and the row's value of each camera, row by row."""
+    return np.tile(columns, len(rows)), np.repeat(rows, len(columns))
+
+
+def quads(numbers: NDArray[Any]) -> list[Cell]:
+    """Return the cells of a grid (rows, columns) of positions' numbers."""
+    corners = (numbers[:-1, :-1], numbers[:-1, 1:], numbers[1:, 1:], numbers[1:, :-1])
+    return [tuple(map(int, cell)) for cell in np.stack(corners, axis=-1).reshape(-1, 4)]
+
+
+def square_outline() -> list[Floats]:
+    """Return an upright square across y."""
+    return [np.stack([_SQUARE[:, 0], np.zeros(5), _SQUARE[:, 1]], axis=-1)]
+
+
+def box_outline() -> list[Floats]:
+    faces = [np.column_stack([_SQUARE, np.full(5, z)]) for z in (-0.5, 0.5)]
+    edges = [np.array([[x, y, -0.5], [x, y, 0.5]]) for x, y in _SQUARE[:4]]
+    return faces + edges

@@ -1,0 +1,245 @@
+"""What every rig is: its settings in the scene YAML, and from them the name and pose of each view.
+
+Positions are made in a unit box centred on the origin, then scaled by ``size``, rotated by
+``rotation`` and moved to ``center``; the rotation turns the cameras too, the size does not.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from lightfield.core.errors import UserError
+from lightfield.core.settings import Settings, Vector, as_list
+from lightfield.geometry.lenses import CameraSettings
+from lightfield.geometry.rotations import Floats, euler_to_matrix, matrix_to_euler
+
+CUBE_FACES = {
+    "f": (0.0, 0.0, 0.0),
+    "b": (0.0, math.pi, 0.0),
+    "l": (0.0, math.pi / 2, 0.0),
+    "r": (0.0, -math.pi / 2, 0.0),
+    "u": (math.pi / 2, 0.0, 0.0),
+    "d": (-math.pi / 2, 0.0, 0.0),
+}
+"""Faces of a cube map, in order: the XYZ Euler angles that turn the camera about its OWN axes.
+
+The rig's camera itself looks at f; l and r turn it by 90° about its up axis, b by 180°, and
+u and d pitch it up and down by 90°.
+"""
+
+Side = Annotated[float, Field(ge=0)]
+Frame = Annotated[int, Field(ge=0, le=1048574)]
+
+
+@dataclass(frozen=True)
+class Pose:
+    """One camera of a rig.
+
+    ``number`` is the sequence number within the view's name, ``position`` is in metres and
+    ``rotation`` holds Blender's XYZ Euler angles in radians.
+    """
+
+    name: str
+    number: int
+    position: tuple[float, float, float]
+    rotation: tuple[float, float, float]
+
+    def matrix(self) -> Floats:
+        """Return the (4, 4) camera-to-world matrix; the camera looks along −Z, +Y is up."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = euler_to_matrix(np.array(self.rotation))
+        matrix[:3, 3] = self.position
+        return matrix
+
+
+@dataclass(frozen=True)
+class UnitPoses:
+    """The cameras of a rig in the unit box, one an entry.
+
+    ``positions`` (n, 3) reach from −½ to ½, ``rotations`` (n, 3) are XYZ Euler angles in radians.
+    """
+
+    names: Sequence[str]
+    numbers: NDArray[np.int64]
+    positions: Floats
+    rotations: Floats
+
+    @classmethod
+    def of_sides(cls, *sides: tuple[str, Floats, Floats]) -> Self:
+        """Number the cameras of each side from 0; a side is its letter, positions and rotations."""
+        return cls(
+            [f"view_{side}{i:04d}f" for side, places, _ in sides for i in range(len(places))],
+            np.concatenate([np.arange(len(places)) for _, places, _ in sides]),
+            np.concatenate([places for _, places, _ in sides]),
+            np.concatenate([np.broadcast_to(turns, places.shape) for _, places, turns in sides]),
+        )
+
+
+class Frames(Settings):
+    first: Frame
+    last: Frame
+    step: int = Field(1, ge=1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.first > self.last:
+            raise ValueError(f"first is {self.first}; must be at most last")
+        return self
+
+
+class Rig(Settings):
+    """The keys of every rig; a type of rig adds its own, and says where its cameras are.
+
+    ``shape`` is the nearest of the four types that SILVR knows.
+    """
+
+    shape: ClassVar[Literal["PLANE", "CUBOID", "CYLINDER", "SPHERE"]]
+    # Whether the cameras of a row stand round z.
+    is_round: ClassVar[bool] = False
+    # Of what the cameras stand on, in the unit box; None where it is open.
+    unit_volume: ClassVar[float | None] = None
+
+    type: str
+    size: Side | Annotated[tuple[Side, Side, Side], as_list(3)] = Field(
+        1, description="Metres, along every axis or along x, y and z."
+    )
+    center: Vector = Field((0, 0, 0), description="Metres.")
+    rotation: Vector = Field(
+        (0, 0, 0), description="Of the whole rig: XYZ Euler angles in degrees."
+    )
+    face_inside: bool = Field(False, description="Turn every camera round.")
+    cube_map: bool = Field(False, description="Six 90 degree views at each position.")
+    frames: Frames | None = Field(
+        None,
+        description="A sequence: each of these frames of the animation is a dataset of its own.",
+    )
+    evaluation_split: Literal["odd"] | None = Field(
+        None, description="odd: the views with odd sequence numbers are for evaluation."
+    )
+    # A scene YAML's rigs all have one; where a rig's places alone matter there may be none.
+    camera: CameraSettings = None  # type: ignore[assignment]
+
+    @property
+    def positions(self) -> int:
+        """The number of places where cameras stand."""
+        raise NotImplementedError
+
+    def unit_poses(self) -> UnitPoses:
+        """Return the cameras in the unit box, in SILVR's order."""
+        raise NotImplementedError
+
+    def _thinned_to(self, positions: int) -> Self | None:
+        """Return the densest such rig of at most as many positions; None where there is none."""
+        raise NotImplementedError
+
+    @property
+    def lf_type(self) -> str:
+        """What lightfield.json calls the rig."""
+        return self.shape
+
+    @property
+    def view_count(self) -> int:
+        """The number of views; only a rig of poses has to read its file."""
+        return self.positions * self.views_a_position
+
+    @property
+    def views_a_position(self) -> int:
+        return len(CUBE_FACES) if self.cube_map else 1
+
+    def thinned(self, max_views: int) -> Self:
+        """Return the densest version of the rig that has at most ``max_views`` views.
+
+        Raises `UserError` where even the smallest rig of this type has more views.
+        """
+        if self.view_count <= max_views:
+            return self
+        thinner = self._thinned_to(max_views // self.views_a_position)
+        if thinner is None:
+            raise UserError(f"a rig of type {self.type} cannot have as few as {max_views} views")
+        return thinner
+
+    def to_world(self, points: Floats) -> Floats:
+        """Return points (…, 3) of the unit box where the rig has them, in metres."""
+        placed: Floats = points * self.sides @ self.turn.T + np.asarray(self.center, dtype=float)
+        return placed
+
+    @property
+    def sides(self) -> Floats:
+        """The size (3,) along x, y and z, in metres."""
+        return np.broadcast_to(np.asarray(self.size, dtype=float), 3)
+
+    @property
+    def turn(self) -> Floats:
+        """The rotation matrix (3, 3) of the whole rig."""
+        return euler_to_matrix(np.radians(np.asarray(self.rotation, dtype=float)))
+
+    def poses(self) -> list[Pose]:
+        """Return every view's pose, in the order in which SILVR numbers and lists them.
+
+        Raises `UserError` for a pose file that cannot be read.
+        """
+        unit = self.unit_poses()
+        names, numbers, rotations = unit.names, unit.numbers, unit.rotations
+        positions = self.to_world(unit.positions)
+        turn = self.turn
+        if self.face_inside or self.cube_map or np.any(turn != np.eye(3)):
+            matrices = turn @ euler_to_matrix(rotations)
+            if self.face_inside:
+                matrices = matrices @ np.diag([-1.0, 1.0, -1.0])  # half a turn about its own up
+            if self.cube_map:
+                faces = euler_to_matrix(np.array(list(CUBE_FACES.values())))
+                matrices = (matrices[:, None] @ faces).reshape(-1, 3, 3)
+                names = [f"{name}_{face}" for name in names for face in CUBE_FACES]
+                numbers = np.repeat(numbers, len(CUBE_FACES))
+                positions = np.repeat(positions, len(CUBE_FACES), axis=0)
+            rotations = matrix_to_euler(matrices)
+        return [
+            Pose(name, number, tuple(position), tuple(rotation))
+            for name, number, position, rotation in zip(
+                names, numbers.tolist(), plain(positions), plain(rotations), strict=True
+            )
+        ]
+
+    def cells(self) -> list[tuple[int, ...]] | None:
+        """Return the cells between neighbouring positions, as indices in their order.
+
+        None for cameras that stand on no surface.
+        """
+        return None
+
+    def middle_row(self, places: Floats) -> list[int]:
+        """Return the numbers of neighbouring positions in a row; none where there is no row.
+
+        ``places`` (n, 3) are the positions in metres, in the rig's own axes.
+        """
+        return []
+
+    def unit_outline(self) -> list[Floats]:
+        """Return the shape that the cameras stand on, as polylines (n, 3) in the unit box."""
+        return []
+
+    def outline(self) -> list[Floats]:
+        """Return that shape in world coordinates."""
+        return [self.to_world(line) for line in self.unit_outline()]
+
+
+def plain(values: Floats) -> Any:
+    """Return nested lists of floats rounded to 1e-12, without noise such as 6e-17 or −0."""
+    return (np.round(values, 12) + 0.0).tolist()
+
+
+def stack(*coordinates: Floats | float) -> Floats:
+    """Return points (n, 3) of their coordinates, each (n,) or one number for all."""
+    stacked: Floats = np.stack(np.broadcast_arrays(*coordinates), axis=-1)
+    return stacked
+
+
+def circle() -> tuple[Floats, Floats]:
+    """Return cosine and sine of a closed circle of diameter 1, to draw."""
+    angle = np.linspace(0, 2 * np.pi, 73)
+    return np.cos(angle) / 2, np.sin(angle) / 2

@@ -1,0 +1,49 @@
+"""Rotations as Blender writes them: matrices, and XYZ Euler angles in radians."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def euler_to_matrix(euler: Floats) -> Floats:
+    """Return the rotations (…, 3, 3) of XYZ Euler angles (…, 3): Rz · Ry · Rx, as in Blender."""
+    cx, cy, cz = np.moveaxis(np.cos(euler), -1, 0)
+    sx, sy, sz = np.moveaxis(np.sin(euler), -1, 0)
+    rows = [
+        [cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz],
+        [cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz],
+        [-sy, sx * cy, cx * cy],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def matrix_to_euler(matrix: Floats) -> Floats:
+    """Return the XYZ Euler angles (…, 3), in radians, of rotations (…, 3, 3).
+
+    Of the two sets of angles that give a rotation it takes the one with the smaller sum of
+    magnitudes, as Blender's Matrix.to_euler does. At gimbal lock the rotation about Z is 0.
+    """
+    # A fresh zero is positive: rounding noise and -0 must not decide between +π and −π.
+    m = np.where(np.abs(matrix) < 1e-15, 0.0, matrix)
+    cosine = np.hypot(m[..., 0, 0], m[..., 1, 0])
+    locked = cosine < 1e-12
+
+    def angles(sign: float) -> Floats:
+        x = np.where(
+            locked,
+            np.arctan2(-m[..., 1, 2], m[..., 1, 1]),
+            np.arctan2(sign * m[..., 2, 1], sign * m[..., 2, 2]),
+        )
+        # Z from what is left when the turn about X is undone, so that the two agree however
+        # near gimbal lock is (Day, "Extracting Euler angles from a rotation matrix").
+        sine, cos = np.sin(x), np.cos(x)
+        z = np.arctan2(
+            sine * m[..., 0, 2] - cos * m[..., 0, 1], cos * m[..., 1, 1] - sine * m[..., 1, 2]
+        )
+        y = np.arctan2(-m[..., 2, 0], sign * cosine)
+        return np.stack([x, y, np.where(locked, 0.0, z)], axis=-1)
+
+    first, second = angles(1.0), angles(-1.0)
+    smaller = np.abs(second).sum(-1) < np.abs(first).sum(-1) - 1e-12
+    return np.where((smaller & ~locked)[..., None], second, first)
