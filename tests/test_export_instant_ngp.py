@@ -175,7 +175,7 @@ def test_a_camera_worked_by_hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 def test_frames_keep_the_views_order_which_natural_sorting_leaves_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    rig = {"type": "plane", "cameras": [10001, 1]}
+    rig = {"type": "plane", "cameras": [1001, 10]}
     content = written(tmp_path, {**FISHEYE, "resolution": [1, 1]}, rig)
     content["frames"] = [*content["frames"][:12], *content["frames"][9990:]]
     (tmp_path / "lightfield.json").write_text(json.dumps(content))
