@@ -6,6 +6,7 @@ import os
 import shlex
 import sys
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 
 sys.path.insert(0, str(Path(workflow.basedir) / "scripts"))

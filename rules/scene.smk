@@ -36,6 +36,9 @@ rule check_blend:
         f"{WORK}/benchmarks/{{name}}/check_blend.tsv"
     conda:
         ENVIRONMENT
+    params:
+        # Not in the command: with another bpy all that is made of the file is made anew.
+        bpy=version("bpy"),
     message:
         "Checking {input}"
     shell:

@@ -5,6 +5,7 @@ configs/scenes/<scene>.lock.json, and every later one must be the same.
 """
 
 import argparse
+from importlib.metadata import version
 from pathlib import Path
 
 from lightfield.core.cli import run
@@ -31,7 +32,12 @@ def main() -> None:
         raise UserError(f"{arguments.blend}: its sha256 is {found}, but {origin} says {expected}")
     write_json(
         arguments.output,
-        {"sha256": found, "bytes": status.st_size, "mtime_ns": status.st_mtime_ns},
+        {
+            "sha256": found,
+            "bytes": status.st_size,
+            "mtime_ns": status.st_mtime_ns,
+            "bpy": version("bpy"),
+        },
     )
 
 

@@ -5,6 +5,7 @@ import json
 import sys
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib.metadata import version
 
 import pytest
 from checkouts import checkout, planned, snakemake
@@ -268,6 +269,57 @@ def test_scripts_and_drivers_in_a_blend_do_not_run(run_program, tmp_path):
     # The traps do work where Blender is told to trust the file.
     assert "trusted: driver script trap.blend" in told
     assert "ours: trap.blend" in told
+
+
+def test_another_bpy_makes_everything_of_a_brought_blend_anew(tmp_path, monkeypatch):
+    folder = checkout(tmp_path, brought=BLEND_SCENE.format(blend="mine.blend", more=""))
+    (folder / "mine.blend").write_bytes(CONTENT)
+    chosen = ("results/brought/LFPlane/lightfield.json", "--config", "scenes=[brought]")
+    chosen += ("rigs=all", "preset=full")
+    assert snakemake(folder, *chosen).returncode == 0
+    again = snakemake(folder, *chosen)
+    assert "Nothing to be done" in again.stdout + again.stderr
+
+    other = tmp_path / "other/bpy-9.9.9.dist-info"
+    other.mkdir(parents=True)
+    (other / "METADATA").write_text("Metadata-Version: 2.1\nName: bpy\nVersion: 9.9.9\n")
+    monkeypatch.setenv("PYTHONPATH", str(other.parent))
+    assert planned(folder, *chosen) == {"check_blend": 1, "lightfield": 1}
+
+
+LINKED = """
+import sys
+import bpy
+for name in ("library", "main"):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    if name == "library":
+        bpy.context.collection.objects.link(bpy.data.objects.new("thing", None))
+    else:
+        with bpy.data.libraries.load(sys.argv[1] + "/library.blend", link=True) as (_, wanted):
+            wanted.objects = ["thing"]
+        bpy.context.collection.objects.link(wanted.objects[0])
+    bpy.ops.wm.save_as_mainfile(filepath=f"{sys.argv[1]}/{name}.blend", compress=False)
+"""
+
+
+@pytest.mark.parametrize("newer", ["main", "library"])
+def test_a_blend_newer_than_bpy_is_an_error_that_names_both_versions(newer, run_program, tmp_path):
+    (tmp_path / "make.py").write_text(LINKED)
+    run_program(tmp_path / "make.py", tmp_path)
+    words = ("--blend", tmp_path / "main.blend", "--output", tmp_path / "inventory.json")
+    run_program("inventory.py", *words)
+
+    major, minor = map(int, version("bpy").split(".")[:2])
+    path = tmp_path / f"{newer}.blend"
+    content = path.read_bytes()
+    mark = f"v{major:02}{minor:02}".encode()
+    assert mark in content[:17]
+    path.write_bytes(content.replace(mark, f"v{major:02}{minor + 1:02}".encode(), 1))
+    result = run_program("inventory.py", *words, check=False)
+    assert result.returncode == 1
+    told = result.stderr.splitlines()[-1]
+    assert told.startswith(f"error: {path}: was saved by Blender {major}.{minor + 1}, and Blender ")
+    assert f"Blender {version('bpy')}" in told
 
 
 def test_a_blend_needs_no_builder_and_a_builder_no_blend(server, tmp_path):

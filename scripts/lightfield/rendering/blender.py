@@ -89,12 +89,26 @@ def _check_blend(path: Path) -> None:
 
 
 def open_scene(path: Path) -> None:
-    """Open a .blend with its scripts disabled; raises `UserError` if Blender cannot read it."""
+    """Open a .blend with its scripts disabled.
+
+    Raises `UserError` if Blender cannot read it, or would lose what it does not know: where a newer
+    version saved it, or a library that it links.
+    """
+    here = bpy.app.version_string
     try:
         with _quiet():
             bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
     except RuntimeError as error:
-        raise UserError(f"{path}: Blender cannot open it: {str(error).strip()}") from None
+        raise UserError(f"{path}: Blender {here} cannot open it: {str(error).strip()}") from None
+    libraries = [(path_of(library), library.version) for library in bpy.data.libraries]
+    for file, saved in [(path, bpy.data.version), *libraries]:
+        if tuple(saved[:2]) > bpy.app.version[:2]:
+            newer = f"{saved[0]}.{saved[1]}"
+            raise UserError(
+                f"{file}: was saved by Blender {newer}, and Blender {here} would lose what is "
+                f"new in it; build with bpy {newer}, or save it with Blender "
+                f"{bpy.app.version[0]}.{bpy.app.version[1]}"
+            )
 
 
 def set_up_render(
@@ -266,7 +280,8 @@ def leave_out(names: Collection[str]) -> None:
 def animated() -> Iterator[tuple[Any, bool]]:
     """Yield every data-block with animation or drivers, and whether these are its node tree's."""
     for name, collection in bpy.data.bl_rna.properties.items():
-        if collection.type != "COLLECTION":
+        # Blender 5.2 lists everything once more in `all_ids`.
+        if collection.type != "COLLECTION" or name == "all_ids":
             continue
         for owner in getattr(bpy.data, name):
             for block in (owner, getattr(owner, "node_tree", None)):
