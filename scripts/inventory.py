@@ -97,7 +97,8 @@ def inventory() -> dict[str, Any]:
     images = set()
     for shader in (*materials, *([scene.world] if scene.world else []), *lights):
         for feature, image in surface_features(shader):
-            if feature:
+            # A light emits by nature, whether it has nodes (as each has since Blender 5.2) or not.
+            if feature and shader not in lights:
                 features[feature].add(shader.name_full)
             if image:
                 images.add(image)

@@ -127,7 +127,7 @@ def compare(
         truth.astype(np.float32), shown.astype(np.float32), "LDR", applyMagma=False
     )[0]
     with np.errstate(divide="ignore"):
-        psnr = -10 * np.log10(np.mean((shown - truth)[mask] ** 2))
+        psnr = -10 * np.log10(np.mean((shown - truth)[mask] ** 2, dtype=np.float64))
     return Errors(
         relative_mse=relative_mse(colour, reference),
         relative_mse_whole=relative_mse(colour, reference, left_out=0),
