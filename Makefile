@@ -4,7 +4,7 @@ CORES ?= $(shell getconf _NPROCESSORS_ONLN)
 
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
-PIP = .venv/bin/pip --quiet --disable-pip-version-check
+PIP = .venv/bin/pip -qq --disable-pip-version-check
 # Of the environment's Python, as in the locks' names.
 VERSION = $$(.venv/bin/python -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 LOCK = uv pip compile --generate-hashes --no-emit-index-url --no-header --quiet
