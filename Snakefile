@@ -23,7 +23,12 @@ include: "rules/error.smk"
 
 
 onstart:
-    write_json(RUN, {f"{RESULTS}/{d.scene}/{d.rig}": d.view_count for d in CHOSEN})
+    try:
+        write_json(
+            RUN, {f"{RESULTS}/{d.scene}/{d.rig}": d.view_count for d in CHOSEN}
+        )
+    except UserError as error:
+        sys.exit(f"error: {error}")
 
 
 onerror:

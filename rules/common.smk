@@ -460,7 +460,8 @@ def drop_false_records():
     """Remove the record of every shard whose files are no longer those that it describes.
 
     Snakemake sees only whether a record is there. A view that was deleted or cut short shows in
-    its size; its shard then runs again and makes what is missing.
+    its size; its shard then runs again and makes what is missing. By the log of checksums beside the
+    record it finds every other file that is not as it was made.
     """
     for dataset in DATASETS.values():
         folder = Path(RESULTS, dataset.scene, dataset.rig)

@@ -1,15 +1,15 @@
 """Render a run of a dataset's views in one process, keeping every view that is already right.
 
-Each view is written the moment it is done. A view whose file is whole and carries the render key
-that its settings give is left as it is, so that this program, killed and started again, renders
-only what is missing. Its journal, one JSON line a rendered view, tells what was done and how fast.
+Each view is written, and its checksum logged beside the record, the moment it is done. A view whose
+file has the bytes that were logged for the render key that its settings give is left as it is, so
+that this program, killed and started again, renders only what is missing. Its journal, one JSON
+line a rendered view, tells what was done and how fast.
 """
 
 import argparse
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import psutil
@@ -17,11 +17,12 @@ import psutil
 from lightfield.core import processors
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, sha256, write_json
+from lightfield.core.files import read_json
 from lightfield.core.progress import Progress, duration
 from lightfield.dataset import keys
 from lightfield.dataset.journal import Journal
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.dataset.records import ShardRecord
 from lightfield.geometry import depth
 from lightfield.imaging import images
 
@@ -57,10 +58,11 @@ def main() -> None:
     journal = Journal(arguments.journal)
     lightfield = LightField.read(arguments.lightfield)
     views = lightfield.views[parse_slice(arguments.views)]
+    record = ShardRecord(arguments.record, arguments.output)
     missing = [
         view
         for view in views
-        if not images.is_finished(
+        if not record.is_finished(
             view_path(arguments.output, view), keys.render_key(lightfield, view)
         )
     ]
@@ -72,9 +74,8 @@ def main() -> None:
     others = Others(len(views), lightfield, arguments.output, arguments.run) if missing else str
     progress = Progress(len(missing), label, already=len(views) - len(missing), note=others)
     if missing:
-        render_views(missing, lightfield, arguments, journal, progress)
-    if arguments.record:
-        write_json(arguments.record, record([view_path(arguments.output, v) for v in views]))
+        render_views(missing, lightfield, arguments, record, journal, progress)
+    record.write(view_path(arguments.output, view) for view in views)
     journal.end()
 
 
@@ -153,6 +154,7 @@ def render_views(
     views: Sequence[View],
     lightfield: LightField,
     arguments: argparse.Namespace,
+    record: ShardRecord,
     journal: Journal,
     progress: Progress,
 ) -> None:
@@ -185,8 +187,9 @@ def render_views(
         seed = keys.view_seed(lightfield.render["seed"], view.name)
         raw = blender.render_view(view.matrix, seed)
         channels, attributes = view_channels(raw, lightfield, to_depth)
-        attributes[images.KEY_ATTRIBUTE] = keys.render_key(lightfield, view)
-        images.write_exr(view_path(arguments.output, view), channels, attributes)
+        path, key = view_path(arguments.output, view), keys.render_key(lightfield, view)
+        images.write_exr(path, channels, attributes | {images.KEY_ATTRIBUTE: key})
+        record.add(path, key)
         journal.append(
             {
                 "view": view.name,
@@ -237,19 +240,6 @@ def view_channels(
             channels["Z"] = z.astype(np.float16 if half else np.float32)
         attributes[images.DEPTH_ATTRIBUTE] = lightfield.depth
     return channels, attributes
-
-
-def record(paths: list[Path]) -> dict[str, Any]:
-    """Return sizes and checksums of a shard's views, by their paths in the dataset."""
-    return {
-        "files": {
-            f"{path.parent.name}/{path.name}": {
-                "bytes": path.stat().st_size,
-                "sha256": sha256(path),
-            }
-            for path in paths
-        }
-    }
 
 
 if __name__ == "__main__":

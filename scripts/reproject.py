@@ -24,6 +24,7 @@ from lightfield.core import cli
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
 from lightfield.core.progress import Progress
+from lightfield.dataset.records import ShardRecord
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.rotations import matrix_to_euler
@@ -32,7 +33,6 @@ from lightfield.imaging.images import (
     DEPTH_ATTRIBUTE,
     KEY_ATTRIBUTE,
     Attribute,
-    is_finished,
     read_header,
     read_image,
     write_exr,
@@ -126,6 +126,7 @@ class Job:
             raise UserError(f"--depth-png {arguments.depth_png:g}: must be positive")
         if arguments.no_configs and arguments.output_cfg:
             raise UserError("--output-cfg: needs --input-cfg, which --no-configs excludes")
+        self.record = ShardRecord(arguments.record, arguments.output_dir)
 
     @cached_property
     def copies(self) -> bool:
@@ -301,7 +302,7 @@ def reproject_view(job: Job, view: View) -> list[Path]:
             continue
         identity = identity or _identity(view)
         key = job.key(target, identity)
-        if not all(is_finished(path, key) for path in outputs.values()):
+        if not all(job.record.is_finished(path, key) for path in outputs.values()):
             todo.append((index, target, outputs, key))
     if todo:
         source = _Source(job, view, [job.maps[index].window for index, *_ in todo])
@@ -448,6 +449,7 @@ def _write(
                 write_png(path, np.where(known, scaled, 0).astype(np.uint16), {KEY_ATTRIBUTE: key})
             case "mask":
                 write_png(path, np.where(empty, 255, 0).astype(np.uint8), {KEY_ATTRIBUTE: key})
+        job.record.add(path, key)
 
 
 def _in_frame(window: Array, made: LensMap) -> Array:
@@ -456,19 +458,6 @@ def _in_frame(window: Array, made: LensMap) -> Array:
     row, end_row, column, end_column = made.window
     out[row:end_row, column:end_column] = window
     return out
-
-
-def _record(job: Job, views: list[View], made: list[Path]) -> dict[str, Any]:
-    # A record's paths start at the dataset, the folder that the output folder lies in.
-    dataset = job.arguments.output_dir.resolve().parent
-    files = {
-        path.resolve().relative_to(dataset).as_posix(): {
-            "bytes": path.stat().st_size,
-            "sha256": sha256(path),
-        }
-        for path in sorted(made)
-    }
-    return {"files": files, "counts": {"views": len(views), "files": len(files)}}
 
 
 def main() -> None:
@@ -497,8 +486,7 @@ def main() -> None:
         progress.done()
     if failed:
         raise UserError(f"{failed} of {len(views)} views could not be reprojected")
-    if arguments.record:
-        write_json(arguments.record, _record(job, views, paths))
+    job.record.write(sorted(paths), counts={"views": len(views), "files": len(paths)})
 
 
 def _run(job: Job, views: list[View]) -> Iterator[tuple[View, Any]]:

@@ -157,6 +157,51 @@ def test_a_view_is_rendered_once_and_again_only_if_it_must(shard):
     assert list(json.loads(shard.record.read_text())["files"]) == [f"exr/{names[0]}.exr"]
 
 
+def test_only_the_bytes_that_were_made_are_kept(shard):
+    names = [frame["name"] for frame in shard.content["frames"]]
+    shard()
+    made = {path.name: sha256(path) for path in shard.views.iterdir()}
+    deleted, recoloured, flipped, _ = (shard.views / f"{name}.exr" for name in names)
+    deleted.unlink()
+    image = images.read_image(recoloured)
+    ours = {k: value for k, value in image.attributes.items() if k.startswith("plenoforge:")}
+    red = image.channels["R"] + np.float16(1)
+    images.write_exr(recoloured, image.channels | {"R": red}, ours)
+    assert images.read_image(recoloured).attributes == image.attributes
+    content = bytearray(flipped.read_bytes())
+    content[len(content) // 2] ^= 1
+    flipped.write_bytes(content)
+    shard.record.unlink()
+    shard()
+    assert {path.name: sha256(path) for path in shard.views.iterdir()} == made
+    assert shard.journalled() == [*names, *names[:3]]
+    files = json.loads(shard.record.read_text())["files"]
+    assert {f"exr/{name}": sha256(shard.views / name) for name in made} == {
+        name: file["sha256"] for name, file in files.items()
+    }
+
+
+def test_a_view_whose_checksum_was_not_logged_is_made_once_more(shard):
+    names = [frame["name"] for frame in shard.content["frames"]]
+    shard()
+    log = shard.record.with_name("record.sums.jsonl")
+    lines = log.read_text().splitlines(keepends=True)
+    assert len(lines) == len(names)
+    # A kill while the last line was being written.
+    log.write_text("".join(lines)[:-20])
+    shard()
+    assert shard.journalled() == [*names, names[-1]]
+    shard()
+    assert shard.journalled() == [*names, names[-1]]
+
+
+def test_shards_of_other_bounds_keep_what_there_is(shard):
+    names = [frame["name"] for frame in shard.content["frames"]]
+    shard()
+    shard("--views", "1:3", "--record", shard.record.with_name("1-3.json"))
+    assert shard.journalled() == names
+
+
 def test_bytes_do_not_depend_on_order_threads_or_neighbours(shard):
     shard()
     together = {path.name: sha256(path) for path in shard.views.iterdir()}

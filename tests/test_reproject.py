@@ -267,6 +267,29 @@ def test_only_what_is_missing_or_out_of_date_is_made_again(dataset, run):
     assert changed(before) == set()
 
 
+def test_only_the_bytes_that_were_made_are_kept(dataset, run):
+    out, record = dataset / "out", dataset / "record.json"
+    flags = (*PERSPECTIVE, "--png", "--exr", "--record", str(record))
+    run(*flags)
+    made = {path.name: path.read_bytes() for path in out.glob("view*")}
+    first = record.read_bytes()
+    before = {path.name: path.stat().st_mtime_ns for path in out.glob("view*")}
+    turned = out / "view_0000f.png"
+    pixels = read_image(turned).channels
+    key = read_header(turned).attributes["plenoforge:key"]
+    write_png(turned, np.dstack([pixels[c] for c in "RGB"])[::-1].copy(), {"plenoforge:key": key})
+    assert turned.read_bytes() != made[turned.name]
+    flipped = bytearray(made["view_0001f.exr"])
+    flipped[-5] ^= 1
+    (out / "view_0001f.exr").write_bytes(flipped)
+    record.unlink()
+    run(*flags)
+    assert {path.name: path.read_bytes() for path in out.glob("view*")} == made
+    assert record.read_bytes() == first
+    kept = {name for name, stamp in before.items() if (out / name).stat().st_mtime_ns == stamp}
+    assert kept == {"view_0002f.png", "view_0002f.exr"}
+
+
 def test_a_saved_lens_map_gives_the_same_bytes(dataset, run, run_program):
     run(*PERSPECTIVE, "--png", "--exr")
     out = dataset / "out"

@@ -129,6 +129,24 @@ def test_a_deleted_and_a_truncated_view_are_made_again_alone(smoke, checkout, tm
     assert 0 < shard["repeated_seconds"] < shard["wall_seconds"]
 
 
+def test_what_was_changed_beside_a_missing_file_is_made_again_alone(smoke, tmp_path):
+    folder = tmp_path / "copy"
+    shutil.copytree(smoke, folder)
+    before = rendered(folder)
+    (folder / CUBOID / "exr/view_b0000f.exr").unlink()
+    flipped = folder / CUBOID / "exr/view_u0000f.exr"
+    content = bytearray(flipped.read_bytes())
+    content[len(content) // 2] ^= 1
+    flipped.write_bytes(content)
+    (folder / CUBOID / "perspective/view_l0000f.png").unlink()
+    one = folder / CUBOID / "perspective/view_f0000f.png"
+    one.write_bytes((folder / CUBOID / "perspective/view_r0000f.png").read_bytes())
+    snakemake(folder, "--cores", "2", "smoke")
+    again = rendered(folder) - before
+    assert sorted(name for _, name in again.elements()) == ["view_b0000f", "view_u0000f"]
+    assert_same_bytes(smoke, folder)
+
+
 def test_snakemakes_own_report_holds_the_figures_and_their_captions(smoke, tmp_path):
     snakemake(smoke, "--cores", "1", "smoke", "--report", str(tmp_path / "report.zip"))
     with zipfile.ZipFile(tmp_path / "report.zip") as file:

@@ -1,0 +1,92 @@
+"""A shard's record, and its log of checksums, by which a finished file is recognised.
+
+The record is a JSON of the shard's files, written when all are finished: "files" gives each one's
+"bytes" and "sha256" by its path in the dataset. The log beside it, <record's name>.sums.jsonl, is
+one JSON line for each file, "file", "key" (of the settings that made it), "bytes" and "sha256",
+added at the moment when the file is finished. It outlives the record, which is removed when its
+files are no longer those on disk: a file is finished if its bytes are those that were logged.
+"""
+
+from collections.abc import Iterable
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from lightfield.core.files import append_json_line, read_json_lines, sha256, write_json
+from lightfield.imaging import images
+
+_LOG_SUFFIX = ".sums.jsonl"
+
+
+class ShardRecord:
+    """The record at ``path`` of a shard's files, all of them in ``folder`` of a dataset.
+
+    With ``path`` None nothing is recorded, and a finished file is one that can be read whole and
+    has the key in its header.
+    """
+
+    def __init__(self, path: Path | None, folder: Path) -> None:
+        self._path, self._folder = path, folder
+        self._dataset_folder = folder.resolve().name
+        self._finished: dict[str, dict[str, Any]] = {}
+
+    def is_finished(self, file: Path, key: str) -> bool:
+        """Whether a file has the bytes that it had when it was made by the settings of ``key``."""
+        if self._path is None:
+            return images.is_finished(file, key)
+        if not file.exists():
+            return False
+        name, sums = self._name(file), _sums(file)
+        entry = (name, key, sums["sha256"])
+        # A view that was made when shards had other bounds is in another shard's log.
+        if entry not in self._logged_here and entry not in self._logged_elsewhere:
+            return False
+        self._finished[name] = sums
+        return True
+
+    def add(self, file: Path, key: str) -> None:
+        """Log a file that has just been finished; a kill before that makes it once more."""
+        if self._path is None:
+            return
+        name, sums = self._name(file), _sums(file)
+        append_json_line(_log(self._path), {"file": name, "key": key, **sums})
+        self._finished[name] = sums
+
+    def write(self, files: Iterable[Path], **more: Any) -> None:
+        """Write the record of ``files``, and what else it shall hold."""
+        if self._path is None:
+            return
+        names = {self._name(file): file for file in files}
+        content = {name: self._finished.get(name) or _sums(file) for name, file in names.items()}
+        write_json(self._path, {"files": content, **more})
+
+    def _name(self, file: Path) -> str:
+        return f"{self._dataset_folder}/{file.relative_to(self._folder).as_posix()}"
+
+    @cached_property
+    def _logged_here(self) -> set[tuple[Any, Any, Any]]:
+        assert self._path
+        log = _log(self._path)
+        return _entries([log] if log.exists() else [])
+
+    @cached_property
+    def _logged_elsewhere(self) -> set[tuple[Any, Any, Any]]:
+        assert self._path
+        return _entries(self._path.parent.glob(f"*{_LOG_SUFFIX}"))
+
+
+def _log(record: Path) -> Path:
+    return record.with_name(record.stem + _LOG_SUFFIX)
+
+
+def _entries(logs: Iterable[Path]) -> set[tuple[Any, Any, Any]]:
+    """Return file, key and SHA-256 of every line of the logs."""
+    return {
+        (entry.get("file"), entry.get("key"), entry.get("sha256"))
+        for log in logs
+        for entry in read_json_lines(log)
+    }
+
+
+def _sums(file: Path) -> dict[str, Any]:
+    return {"bytes": file.stat().st_size, "sha256": sha256(file)}
