@@ -98,11 +98,12 @@ def _first(errors: list[ErrorDetails], content: Any) -> str:
             below = key and re.match(r"[\w.-]+: ", problem)
             return f"{key}.{problem}" if below else f"{prefix}{problem}"
         case "missing" | "union_tag_not_found":
-            name = context.get("discriminator", error["loc"][-1])
+            name = context["discriminator"] if "discriminator" in context else error["loc"][-1]
             return f"{prefix}is missing the key {str(name).strip(chr(39))}"
         case "union_tag_invalid":
-            kind = f"{key}.{context['discriminator']}".replace("'", "")
-            return f'{kind}: is "{context["tag"]}"; must be one of {context["expected_tags"]}'
+            kind = ".".join(filter(None, [key, context["discriminator"].strip("'")]))
+            known = context["expected_tags"].replace("'", "")
+            return f'{kind}: is "{context["tag"]}"; must be one of {known}'
     if error["loc"][-1:] == ("[key]",):
         return (
             f"{'.'.join(map(str, path[:-1]))}: {path[-1]!r} is no name; "

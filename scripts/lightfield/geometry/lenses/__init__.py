@@ -5,9 +5,10 @@ import pkgutil
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Union
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Field, TypeAdapter
 
 from lightfield.core.errors import UserError
+from lightfield.core.settings import checked
 from lightfield.geometry.lenses.base import LENSES, Array, Lens, LensSettings, pair
 
 __all__ = ["LENSES", "Array", "CameraSettings", "Lens", "from_camera", "from_lightfield"]
@@ -23,21 +24,18 @@ else:
         Field(discriminator="lens"),
     ]
 """A scene YAML's ``camera``: the settings of any lens, which its key ``lens`` chooses."""
+_SETTINGS: TypeAdapter[LensSettings] = TypeAdapter(
+    CameraSettings, config=ConfigDict(defer_build=True)
+)
 
 
-def from_camera(camera: Mapping[str, Any]) -> Lens:
+def from_camera(camera: Mapping[str, Any] | LensSettings) -> Lens:
     """Return the lens of a scene YAML's ``camera`` mapping.
 
     ``fov`` is in degrees: across the image's width for a rectilinear lens, that of the image
     circle for a fisheye. ``sensor_size`` is its width, or both sides, in mm. Raises `UserError`.
     """
-    try:
-        settings: LensSettings = TypeAdapter(CameraSettings).validate_python(camera)
-    except ValidationError as error:
-        problem = error.errors()[0]
-        key = ".".join(["camera", *map(str, problem["loc"][1:])])
-        raise UserError(f"{key}: {problem['msg']}") from None
-    return settings.make()
+    return checked(_SETTINGS, camera, "camera").make()
 
 
 def from_lightfield(content: Mapping[str, Any]) -> Lens:

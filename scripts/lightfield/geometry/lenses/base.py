@@ -31,7 +31,7 @@ import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from lightfield.core.errors import UserError
-from lightfield.core.settings import Settings
+from lightfield.core.settings import Settings, as_list
 
 Array = npt.NDArray[Any]
 Pair = tuple[float, float]
@@ -43,11 +43,9 @@ ANGLE_SLACK = 1e-6
 LENSES: dict[str, "type[Lens]"] = {}
 """Every lens, by its name."""
 
-# YAML's numbers: neither a text nor true or false is one.
-Number = Annotated[float, Field(strict=True)]
-Positive = Annotated[float, Field(strict=True, gt=0)]
-Pixels = Annotated[int, Field(strict=True, ge=1, le=65536)]
-FocalLength = Annotated[float, Field(strict=True, gt=0, description="Millimetres.")]
+Pixels = Annotated[int, Field(ge=1, le=65536)]
+Millimetres = Annotated[float, Field(gt=0)]
+FocalLength = Annotated[Millimetres, Field(description="Millimetres.")]
 
 
 class LensSettings(Settings):
@@ -58,13 +56,13 @@ class LensSettings(Settings):
     """
 
     lens: str
-    resolution: list[Pixels] = Field(
-        min_length=2, max_length=2, description="Width and height in pixels."
+    resolution: Annotated[tuple[Pixels, Pixels], as_list(2)] = Field(
+        description="Width and height in pixels."
     )
-    sensor_size: Positive | Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = (
+    sensor_size: Millimetres | Annotated[tuple[Millimetres, Millimetres], as_list(2)] | None = (
         Field(None, description="Millimetres: the width, or width and height.")
     )
-    principal_point: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = Field(
+    principal_point: Annotated[Pair, as_list(2)] | None = Field(
         None, description="In pixels; without it, the centre."
     )
 
@@ -79,14 +77,14 @@ class LensSettings(Settings):
     def make(self) -> "Lens":
         """Return the lens."""
         width, height = self.resolution
-        size, center = self.sensor_size, self.principal_point
+        size = self.sensor_size
         if isinstance(size, float):
-            size = [size, size * height / width]
+            size = (size, size * height / width)
         return LENSES[self.lens](
             width=width,
             height=height,
-            sensor_size=pair(size) if size else None,
-            principal_point=pair(center) if center else None,
+            sensor_size=size,
+            principal_point=self.principal_point,
             **self.optics(),
         )
 
@@ -322,7 +320,7 @@ class FisheyeSettings(LensSettings):
 def fov_up_to(largest: float, default: Any = ...) -> Any:
     """Return the field `fov` of a fisheye's settings, of at most ``largest`` degrees."""
     text = "Full field of view, degrees."
-    return Field(default, strict=True, gt=0, le=largest, description=text)
+    return Field(default, gt=0, le=largest, description=text)
 
 
 @dataclass(frozen=True, kw_only=True)

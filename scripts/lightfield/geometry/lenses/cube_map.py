@@ -1,5 +1,6 @@
 """The cube map: six perspective faces."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,24 +8,28 @@ import numpy as np
 from lightfield.core.errors import UserError
 from lightfield.geometry.lenses.base import SENSOR_WIDTH, Array, Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.rotations import euler_to_matrix
 
-CUBE_FACES: dict[str, Array] = {
-    name: np.column_stack([right, up, np.cross(right, up)]).astype(np.float64)
-    for name, right, up in (
-        ("f", (1, 0, 0), (0, 1, 0)),
-        ("b", (-1, 0, 0), (0, 1, 0)),
-        ("l", (0, 0, -1), (0, 1, 0)),
-        ("r", (0, 0, 1), (0, 1, 0)),
-        ("u", (1, 0, 0), (0, 0, 1)),
-        ("d", (1, 0, 0), (0, 0, -1)),
-    )
+CUBE_FACE_ANGLES = {
+    "f": (0.0, 0.0, 0.0),
+    "b": (0.0, math.pi, 0.0),
+    "l": (0.0, math.pi / 2, 0.0),
+    "r": (0.0, -math.pi / 2, 0.0),
+    "u": (math.pi / 2, 0.0, 0.0),
+    "d": (-math.pi / 2, 0.0, 0.0),
 }
-"""Faces in order: the rotation (3, 3) from each face's camera to the cube map's.
+"""Faces in order: the XYZ Euler angles that turn the cube map's camera to each.
 
 Faces are named as the sides of a cuboid rig, and turned as they are there: f looks along −Z,
 b along +Z, l along −X, r along +X, u along +Y and d along −Y; f, b, l and r have +Y up, u has
 +Z up and d has −Z up.
 """
+CUBE_FACES: dict[str, Array] = {
+    # Without noise such as 6e-17 or −0.
+    name: np.round(euler_to_matrix(np.array(angles))) + 0.0
+    for name, angles in CUBE_FACE_ANGLES.items()
+}
+"""Faces in order: the rotation (3, 3) from each face's camera to the cube map's."""
 
 
 @dataclass(frozen=True, kw_only=True)

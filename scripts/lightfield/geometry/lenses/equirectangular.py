@@ -9,27 +9,28 @@ import numpy as np
 from pydantic import Field
 
 from lightfield.core.errors import UserError
-from lightfield.geometry.lenses.base import ANGLE_SLACK, Array, Lens, LensSettings, Pair, pair
+from lightfield.core.settings import as_list
+from lightfield.geometry.lenses.base import ANGLE_SLACK, Array, Lens, LensSettings, Pair
 
-Longitude = Annotated[float, Field(strict=True, ge=-180, le=180)]
-Latitude = Annotated[float, Field(strict=True, ge=-90, le=90)]
+Longitude = Annotated[float, Field(ge=-180, le=180)]
+Latitude = Annotated[float, Field(ge=-90, le=90)]
 
 
 class EquirectangularSettings(LensSettings):
     """A panorama, or a part of one, in a scene YAML."""
 
     lens: Literal["equirectangular"]
-    longitude: list[Longitude] = Field(
-        [-180.0, 180.0], min_length=2, max_length=2, description="Smallest and largest, degrees."
+    longitude: Annotated[tuple[Longitude, Longitude], as_list(2)] = Field(
+        (-180, 180), description="Smallest and largest, degrees."
     )
-    latitude: list[Latitude] = Field(
-        [-90.0, 90.0], min_length=2, max_length=2, description="Smallest and largest, degrees."
+    latitude: Annotated[tuple[Latitude, Latitude], as_list(2)] = Field(
+        (-90, 90), description="Smallest and largest, degrees."
     )
 
     def optics(self) -> dict[str, Any]:
         return {
-            "longitude": pair([math.radians(value) for value in self.longitude]),
-            "latitude": pair([math.radians(value) for value in self.latitude]),
+            "longitude": _radians(self.longitude),
+            "latitude": _radians(self.latitude),
         }
 
 
@@ -125,3 +126,7 @@ class Equirectangular(Lens):
             "longitude": (numbers["LONG_MIN"], numbers["LONG_MAX"]),
             "latitude": (numbers["LAT_MIN"], numbers["LAT_MAX"]),
         }
+
+
+def _radians(degrees: Pair) -> Pair:
+    return math.radians(degrees[0]), math.radians(degrees[1])

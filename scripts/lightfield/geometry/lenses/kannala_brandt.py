@@ -4,17 +4,17 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
+from lightfield.core.settings import as_list
 from lightfield.geometry.lenses.base import (
     Array,
     Fisheye,
     FisheyeSettings,
     FocalLength,
-    Number,
     Pair,
     checked_coefficients,
     checked_focal_length,
@@ -29,8 +29,8 @@ class KannalaBrandtSettings(FisheyeSettings):
 
     lens: Literal["kannala_brandt"]
     focal_length: FocalLength
-    coefficients: list[Number] = Field(
-        min_length=4, max_length=4, description="k1 to k4 of the radius."
+    coefficients: Annotated[tuple[float, float, float, float], as_list(4)] = Field(
+        description="k1 to k4 of the radius."
     )
     fov: float = fov_up_to(360, default=360)
 
@@ -38,7 +38,7 @@ class KannalaBrandtSettings(FisheyeSettings):
         return {
             **super().optics(),
             "focal_length": self.focal_length,
-            "coefficients": tuple(self.coefficients),
+            "coefficients": self.coefficients,
         }
 
 

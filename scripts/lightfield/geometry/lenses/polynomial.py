@@ -4,17 +4,17 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from lightfield.core.errors import UserError
+from lightfield.core.settings import as_list
 from lightfield.geometry.lenses.base import (
     Array,
     Fisheye,
     FisheyeSettings,
-    Number,
     Pair,
     checked_coefficients,
     fov_up_to,
@@ -26,13 +26,13 @@ class PolynomialSettings(FisheyeSettings):
     """Blender's polynomial fisheye in a scene YAML."""
 
     lens: Literal["polynomial"]
-    coefficients: list[Number] = Field(
-        min_length=5, max_length=5, description="k0 to k4 of the angle, radians / mm^i."
+    coefficients: Annotated[tuple[float, float, float, float, float], as_list(5)] = Field(
+        description="k0 to k4 of the angle, radians / mm^i."
     )
     fov: float = fov_up_to(360)
 
     def optics(self) -> dict[str, Any]:
-        return {**super().optics(), "coefficients": tuple(self.coefficients)}
+        return {**super().optics(), "coefficients": self.coefficients}
 
 
 @dataclass(frozen=True, kw_only=True)

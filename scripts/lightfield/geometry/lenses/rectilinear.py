@@ -26,7 +26,7 @@ class RectilinearSettings(LensSettings):
     """A perspective lens in a scene YAML: its field of view, or its focal length."""
 
     lens: Literal["rectilinear"]
-    fov: Annotated[float, Field(strict=True, gt=0, lt=180)] | None = Field(
+    fov: Annotated[float, Field(gt=0, lt=180)] | None = Field(
         None, description="Full field of view across the image's width, degrees."
     )
     focal_length: FocalLength | None = Field(None, description="Millimetres, instead of fov.")

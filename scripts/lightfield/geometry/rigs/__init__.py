@@ -17,11 +17,10 @@ from lightfield.geometry.rigs.grid import Grid
 from lightfield.geometry.rigs.lattice import Lattice
 from lightfield.geometry.rigs.plane import Plane
 from lightfield.geometry.rigs.poses import Poses
-from lightfield.geometry.rigs.rig import CUBE_FACES, Pose, Rig
+from lightfield.geometry.rigs.rig import Pose, Rig
 from lightfield.geometry.rigs.sphere import Sphere
 
 __all__ = [
-    "CUBE_FACES",
     "AnyRig",
     "Grid",
     "Pose",

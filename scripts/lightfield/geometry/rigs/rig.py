@@ -4,7 +4,6 @@ Positions are made in a unit box centred on the origin, then scaled by ``size``,
 ``rotation`` and moved to ``center``; the rotation turns the cameras too, the size does not.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -16,21 +15,8 @@ from pydantic import Field, model_validator
 from lightfield.core.errors import UserError
 from lightfield.core.settings import Settings, Vector, as_list
 from lightfield.geometry.lenses import CameraSettings
+from lightfield.geometry.lenses.cube_map import CUBE_FACE_ANGLES
 from lightfield.geometry.rotations import Floats, euler_to_matrix, matrix_to_euler
-
-CUBE_FACES = {
-    "f": (0.0, 0.0, 0.0),
-    "b": (0.0, math.pi, 0.0),
-    "l": (0.0, math.pi / 2, 0.0),
-    "r": (0.0, -math.pi / 2, 0.0),
-    "u": (math.pi / 2, 0.0, 0.0),
-    "d": (-math.pi / 2, 0.0, 0.0),
-}
-"""Faces of a cube map, in order: the XYZ Euler angles that turn the camera about its OWN axes.
-
-The rig's camera itself looks at f; l and r turn it by 90° about its up axis, b by 180°, and
-u and d pitch it up and down by 90°.
-"""
 
 Side = Annotated[float, Field(ge=0)]
 Frame = Annotated[int, Field(ge=0, le=1048574)]
@@ -149,7 +135,7 @@ class Rig(Settings):
 
     @property
     def views_a_position(self) -> int:
-        return len(CUBE_FACES) if self.cube_map else 1
+        return len(CUBE_FACE_ANGLES) if self.cube_map else 1
 
     def thinned(self, max_views: int) -> Self:
         """Return the densest version of the rig that has at most ``max_views`` views.
@@ -192,11 +178,11 @@ class Rig(Settings):
             if self.face_inside:
                 matrices = matrices @ np.diag([-1.0, 1.0, -1.0])  # half a turn about its own up
             if self.cube_map:
-                faces = euler_to_matrix(np.array(list(CUBE_FACES.values())))
+                faces = euler_to_matrix(np.array(list(CUBE_FACE_ANGLES.values())))
                 matrices = (matrices[:, None] @ faces).reshape(-1, 3, 3)
-                names = [f"{name}_{face}" for name in names for face in CUBE_FACES]
-                numbers = np.repeat(numbers, len(CUBE_FACES))
-                positions = np.repeat(positions, len(CUBE_FACES), axis=0)
+                names = [f"{name}_{face}" for name in names for face in CUBE_FACE_ANGLES]
+                numbers = np.repeat(numbers, len(CUBE_FACE_ANGLES))
+                positions = np.repeat(positions, len(CUBE_FACE_ANGLES), axis=0)
             rotations = matrix_to_euler(matrices)
         return [
             Pose(name, number, tuple(position), tuple(rotation))
