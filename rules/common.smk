@@ -74,6 +74,7 @@ wildcard_constraints:
 # Jobs of seconds: too short to queue for on a cluster, they run where Snakemake does.
 localrules:
     check_blend,
+    checksums,
     contact_sheet,
     costs,
     export_reprojection_to_instant_ngp,

@@ -1,6 +1,7 @@
-# Checksums of all that is published, and what the pixels must satisfy.
+# What the pixels must satisfy, and checksums of all that is published.
 
 
+# An invalid dataset is an outcome too: it gets its validation.json and its page, and fails below.
 rule validate:
     input:
         records=lambda wildcards: all_records(dataset_of(wildcards)),
@@ -8,7 +9,7 @@ rule validate:
         cameras=f"{MADE}/cameras.json",
     output:
         validation=f"{DATASET}/validation.json",
-        sums=f"{DATASET}/sha256sums.txt",
+        sums=f"{MADE}/checksums.txt",
     log:
         f"{WORK}/logs/{{scene}}/{{rig}}/validate.log",
     benchmark:
@@ -28,3 +29,22 @@ rule validate:
         "python scripts/validate.py --dataset {params.dataset} {params.reprojections}"
         " --records {input.records} --clearance {input.cameras} --processes {threads}"
         " --output {output.validation} --sums {output.sums} 2>&1 | tee {log}"
+
+
+rule checksums:
+    input:
+        validation=f"{DATASET}/validation.json",
+        sums=f"{MADE}/checksums.txt",
+        # An invalid dataset fails here, and has its page by then.
+        page=ancient(f"{DATASET}/report/index.html"),
+    output:
+        f"{DATASET}/sha256sums.txt",
+    log:
+        f"{WORK}/logs/{{scene}}/{{rig}}/checksums.log",
+    conda:
+        ENVIRONMENT
+    message:
+        "Publishing the checksums of {wildcards.scene}/{wildcards.rig}"
+    shell:
+        "python scripts/publish_checksums.py --validation {input.validation} --page {input.page}"
+        " --sums {input.sums} --output {output} 2>&1 | tee {log}"

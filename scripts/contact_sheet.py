@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import sys
 from pathlib import Path
 
 import matplotlib
@@ -9,6 +10,7 @@ import numpy as np
 import OpenImageIO as oiio
 
 from lightfield.core.cli import run
+from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField
 from lightfield.imaging import images, pictures
 
@@ -43,10 +45,7 @@ def sheet(folder: Path, names: list[str], width: int, height: int) -> np.ndarray
     rows = math.ceil(len(names) / columns)
     cell_width = min(width, (SHEET_WIDTH - GAP) // columns - GAP)
     cell_height = max(1, round(cell_width * height / width))
-    views = [
-        pictures.shrunk(pictures.read_colour(folder / f"{name}.exr"), cell_width, cell_height)
-        for name in names
-    ]
+    views = [small_view(folder / f"{name}.exr", cell_width, cell_height) for name in names]
     exposure = pictures.exposure_for(np.stack(views))
 
     step_x, step_y = cell_width + GAP, cell_height + GAP + CAPTION
@@ -69,6 +68,19 @@ def sheet(folder: Path, names: list[str], width: int, height: int) -> np.ndarray
             aligny="center",
         )
     return buffer.get_pixels(oiio.UINT8)
+
+
+def small_view(path: Path, width: int, height: int) -> np.ndarray:
+    """Return a view's colour at a cell's size; black where there is none, as validation will say.
+
+    Pixels that hold no number are black too.
+    """
+    try:
+        colour = pictures.read_colour(path)
+    except UserError as error:
+        print(f"warning: {error}", file=sys.stderr)
+        return np.zeros((height, width, 3), dtype=np.float32)
+    return pictures.shrunk(np.where(np.isfinite(colour), colour, 0), width, height)
 
 
 if __name__ == "__main__":

@@ -6,16 +6,18 @@ What is not there (measurements that were not asked for, depth, costs) is told, 
 
 import argparse
 import json
+from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from lightfield.core.cli import run
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.geometry import rigs
-from lightfield.report import page
+from lightfield.report import faults, page
 from lightfield.report import tables as report_tables
 from lightfield.report import views as report_views
-from lightfield.validation.validation import IMAGES, REPORT
+from lightfield.validation.validation import IMAGES, REPORT, SUMS
 
 PICTURES = ("panorama", "contact_sheet")
 PLOTS = ("rig", "depth_panorama", "noise")
@@ -41,7 +43,11 @@ def main() -> None:
     rig = rigs.from_settings(arguments.rig)
     lightfield = LightField.read(folder / NAME)
     name = str(lightfield.scene["name"])
-    looks = report_views.collect(folder / IMAGES, lightfield, rig)
+    validation = report_tables.validation(folder / "validation.json")
+    looks = report_views.collect(folder / IMAGES, lightfield, rig, unreadable(validation))
+    listed = files(folder, lightfield)
+    if validation is None or validation["valid"]:
+        listed.append((SUMS, f"checksums of all of these: sha256sum -c {SUMS}"))
     report = folder / REPORT
     measured = {
         "reprojection": report_tables.reprojection(arguments.measurements),
@@ -58,15 +64,42 @@ def main() -> None:
         plots={stem: page.plot(report / stem) for stem in PLOTS},
         looks=looks,
         render=lightfield.render,
-        validation=report_tables.validation(folder / "validation.json"),
+        validation=validation,
+        faults=fault_pictures(folder, validation),
         measured=measured,
         costs=report_tables.costs(report / "costs.json"),
-        files=files(folder, lightfield),
+        files=listed,
         transforms=sorted(
             path.relative_to(folder).as_posix() for path in folder.glob("**/transforms.json")
         ),
         scene=name,
     )
+
+
+def failed_checks(validation: Mapping[str, Any] | None) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield each failed check with the image set that it is of, "" for the views."""
+    for group, checks in (validation or {"groups": {}})["groups"].items():
+        yield from ((group, check) for check in checks if check["passed"] is False)
+
+
+def unreadable(validation: Mapping[str, Any] | None) -> set[str]:
+    """Return the views of which validation says that they are missing or no whole images."""
+    return {
+        view
+        for group, check in failed_checks(validation)
+        if not group and check["short"] in ("views", "images")
+        for view in check["views"]
+    }
+
+
+def fault_pictures(
+    folder: Path, validation: Mapping[str, Any] | None
+) -> dict[tuple[str, str], list[faults.Fault]]:
+    """Return pictures of the views that failed a check, by image set and check."""
+    return {
+        (group, check["short"]): faults.collect(folder / (group or IMAGES), check["views"])
+        for group, check in failed_checks(validation)
+    }
 
 
 def facts(folder: Path, lightfield: LightField, rig: rigs.Rig) -> list[tuple[str, str]]:
@@ -120,7 +153,6 @@ def files(folder: Path, lightfield: LightField) -> list[tuple[str, str]]:
     return [
         *found,
         ("validation.json", "what was checked, and what came out"),
-        ("sha256sums.txt", "checksums of all of these: sha256sum -c sha256sums.txt"),
     ]
 
 

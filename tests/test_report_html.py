@@ -16,7 +16,7 @@ from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
 from lightfield.measurement import noise
-from lightfield.report import epipolar, packing
+from lightfield.report import epipolar, faults, packing
 
 RADIUS = 5.0
 SPHERE = {
@@ -356,6 +356,39 @@ def test_what_cannot_be_read_is_told_in_a_line(run_program, tmp_path, file, text
 
 
 # What the page is made of.
+
+
+def test_pictures_of_a_fault_mark_every_wrong_pixel(tmp_path):
+    channels = {name: np.full((300, 520), 0.2, np.float32) for name in "RGBZ"}
+    channels["G"][100, 201] = np.nan
+    channels["Z"][151] = (-1, np.inf, *np.linspace(1, 9, 518))
+    images.write_exr(tmp_path / "a.exr", channels)
+    images.write_png(tmp_path / "b.png", np.full((8, 8, 3), 90, np.uint8))
+    (tmp_path / "c.exr").write_text("no image")
+    first, second = faults.collect(tmp_path, ["a", "b", "c", "missing"])
+    assert (first.name, second.name, second.depth) == ("a.exr", "b.png", None)
+    colour, depth = decoded(first.colour), decoded(first.depth)
+    # Each pixel stands for 3 × 3.
+    assert colour.shape == depth.shape == (100, 174, 3)
+    assert np.argwhere((colour == faults.WRONG).all(axis=-1)).tolist() == [[33, 67]]
+    assert np.argwhere((depth == faults.WRONG).all(axis=-1)).tolist() == [[50, 0]]
+    assert (decoded(second.colour) == 90).all()
+
+
+def decoded(uri):
+    content = base64.b64decode(uri.partition(",")[2])
+    return np.asarray(Image.open(io.BytesIO(content)).convert("RGB"))
+
+
+@pytest.mark.parametrize("view", ["view_0001f", "view_0007f"])
+def test_a_view_that_validation_could_not_read_is_no_error_of_the_page(run_program, tmp_path, view):
+    write_dataset(tmp_path, LINE)
+    (tmp_path / "exr" / f"{view}.exr").write_text("no image")
+    problem = f"exr/{view}.exr: is no image"
+    check = {"detail": "", "warnings": [], "figures": {}, "problems": [problem]}
+    check |= {"name": "images", "passed": False, "views": [view]}
+    write_json(tmp_path / "validation.json", {"valid": False, "checks": [check]})
+    assert problem in make_page(run_program, tmp_path, LINE).read_text()
 
 
 def test_stills_are_the_same_each_time(sphere, run_program, tmp_path):

@@ -708,15 +708,27 @@ def test_missing_picture_of_a_reprojection_is_named(small_dataset: Path) -> None
 
 
 def run(dataset: Path, *more: str) -> subprocess.CompletedProcess[str]:
+    return program(
+        *("validate.py", "--dataset", str(dataset)),
+        *("--output", str(dataset / "validation.json"), "--sums", str(sums_of(dataset)), *more),
+    )
+
+
+def publish(dataset: Path) -> subprocess.CompletedProcess[str]:
+    return program(
+        *("publish_checksums.py", "--validation", str(dataset / "validation.json")),
+        *("--page", "the page", "--sums", str(sums_of(dataset))),
+        *("--output", str(dataset / "sha256sums.txt")),
+    )
+
+
+def sums_of(dataset: Path) -> Path:
+    return dataset.with_suffix(".sums")
+
+
+def program(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [
-            sys.executable,
-            str(SCRIPTS / "validate.py"),
-            *("--dataset", str(dataset)),
-            *("--output", str(dataset / "validation.json")),
-            *("--sums", str(dataset / "sha256sums.txt")),
-            *more,
-        ],
+        [sys.executable, str(SCRIPTS / name), *arguments],
         capture_output=True,
         text=True,
         check=False,
@@ -739,6 +751,9 @@ def test_program_writes_the_same_bytes_each_time_and_sums_that_hold(
         first.stdout,
     )
     assert not leftover.exists()
+    for folder in (dataset, other):
+        published = publish(folder)
+        assert published.returncode == 0, published.stderr
     for name in ("validation.json", "sha256sums.txt"):
         assert (dataset / name).read_bytes() == (other / name).read_bytes()
     sums = (dataset / "sha256sums.txt").read_text().splitlines()
@@ -752,16 +767,27 @@ def test_program_names_what_is_wrong_and_publishes_no_sums(dataset: Path) -> Non
     (dataset / "sha256sums.txt").write_text("of an earlier validation")
     on_file(truncate)(dataset)
     (dataset / "exr" / "view_0009f.exr").unlink()
+    (dataset / "stray").touch()
     result = run(dataset)
-    assert result.returncode == 1
+    assert result.returncode == 0
     assert not (dataset / "sha256sums.txt").exists()
     content = json.loads((dataset / "validation.json").read_text())
     assert content["valid"] is False
     assert "Traceback" not in result.stderr
     assert re.search(r"^room/sphere: images: exr/view_0005f.exr: .+$", result.stderr, re.M)
     assert "room/sphere: views: exr/view_0009f.exr: is missing\n" in result.stderr
-    assert result.stderr.splitlines()[-1].startswith("error: room/sphere is not valid")
     assert result.stdout.startswith("room/sphere: INVALID: ")
+    published = publish(dataset)
+    assert published.returncode == 1
+    assert re.fullmatch(
+        r"error: room/sphere is not valid: views: exr/view_0009f.exr: is missing; "
+        r"images: exr/view_0005f.exr: .+; files: stray: is no file of this dataset: "
+        r"see the page\n",
+        published.stderr,
+    )
+    assert not (dataset / "sha256sums.txt").exists()
+    # A run that misses them validates again.
+    assert not sums_of(dataset).exists()
 
 
 # ---- Cycles ---------------------------------------------------------------------------------

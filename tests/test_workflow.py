@@ -14,7 +14,11 @@ import zipfile
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from lightfield.core.files import sha256, write_json
+from lightfield.imaging import images
 
 ROOT = Path(__file__).resolve().parents[1]
 SNAKEMAKE = Path(sys.executable).with_name("snakemake")
@@ -37,11 +41,21 @@ def checkout(tmp_path_factory):
 
 
 def snakemake(folder, *arguments):
-    result = subprocess.run(
-        [SNAKEMAKE, *arguments], cwd=folder, capture_output=True, text=True, check=False
-    )
+    result = run_snakemake(folder, *arguments)
     assert result.returncode == 0, result.stdout + result.stderr
     return result.stdout + result.stderr
+
+
+def failing_snakemake(folder, *arguments):
+    result = run_snakemake(folder, *arguments)
+    assert result.returncode == 1, result.stdout + result.stderr
+    return result.stdout + result.stderr
+
+
+def run_snakemake(folder, *arguments):
+    return subprocess.run(
+        [SNAKEMAKE, *arguments], cwd=folder, capture_output=True, text=True, check=False
+    )
 
 
 @pytest.fixture(scope="session")
@@ -145,6 +159,53 @@ def test_what_was_changed_beside_a_missing_file_is_made_again_alone(smoke, tmp_p
     again = rendered(folder) - before
     assert sorted(name for _, name in again.elements()) == ["view_b0000f", "view_u0000f"]
     assert_same_bytes(smoke, folder)
+
+
+def test_an_invalid_dataset_gets_its_page_and_no_checksums_until_it_is_mended(smoke, tmp_path):
+    folder = tmp_path / "copy"
+    shutil.copytree(smoke, folder)
+    dataset = folder / CUBOID
+    view = dataset / "exr/view_b0000f.exr"
+    image = images.read_image(view)
+    kept = {key: value for key, value in image.attributes.items() if key.startswith("plenoforge:")}
+    channels = {name: pixels.copy() for name, pixels in image.channels.items()}
+    channels["G"][20:24, 30:40] = np.nan
+    images.write_exr(view, channels, kept)
+    # As if it had been rendered so.
+    (record,) = (folder / "work" / CUBOID.relative_to("results") / "render").glob("*-*.json")
+    content = json.loads(record.read_text())
+    content["files"]["exr/view_b0000f.exr"] = {
+        "bytes": view.stat().st_size,
+        "sha256": sha256(view),
+    }
+    write_json(record, content)
+    stray = dataset / "notes.txt"
+    stray.touch()
+
+    nan = "colour: exr/view_b0000f.exr: 40 values are not a number"
+    unknown = "files: notes.txt: is no file of this dataset"
+    pages = f"see {CUBOID}/report/index.html"
+    archive = "results/smoke/smoke_LFCuboid_1x1x1.tar"
+    for causes in (f"{nan}; {unknown}", unknown):
+        terminal = failing_snakemake(folder, "--cores", "2", "smoke", archive)
+        assert terminal.splitlines()[-2:] == [
+            f"checksums failed: error: smoke/{CUBOID.name} is not valid: {causes}: {pages}",
+            f"  log: work/logs/smoke/{CUBOID.name}/checksums.log",
+        ]
+        assert json.loads((dataset / "validation.json").read_text())["valid"] is False
+        assert not (dataset / "sha256sums.txt").exists()
+        assert not (folder / archive).exists()
+        page = (dataset / "report/index.html").read_text()
+        assert "This dataset failed its validation" in page
+        assert ('alt="Colour of view_b0000f.exr"' in page) == (nan in causes)
+        assert "sha256sums.txt" not in page
+        view.unlink(missing_ok=True)
+    stray.unlink()
+    snakemake(folder, "--cores", "2", "smoke", archive)
+    (folder / archive).unlink()
+    assert_same_bytes(smoke, folder)
+    assert "This dataset failed" not in (dataset / "report/index.html").read_text()
+    assert "Nothing to be done" in snakemake(folder, "--cores", "2", "smoke")
 
 
 def test_snakemakes_own_report_holds_the_figures_and_their_captions(smoke, tmp_path):

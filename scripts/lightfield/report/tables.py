@@ -14,7 +14,7 @@ from lightfield.report import page
 # Of the stability table, so many of the cases that use most of their bound are shown at once.
 WORST_CASES = 12
 
-CHECK_KEYS = ("passed", "detail", "problems", "warnings", "figures")
+CHECK_KEYS = ("passed", "detail", "views", "problems", "warnings", "figures")
 # The tables of error_vs_time that are shown at once, in this order, by their names there.
 ERROR_TABLES = {
     "slopes": "Slope of the error, both axes logarithmic; plain path tracing's is −1 in theory",

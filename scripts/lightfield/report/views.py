@@ -1,7 +1,7 @@
 """What a dataset's page shows of the views themselves, packed to be looked at in a browser."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -61,11 +61,13 @@ class Looks:
     row_shown: int
 
 
-def collect(folder: Path, lightfield: LightField, rig: Rig) -> Looks:
+def collect(
+    folder: Path, lightfield: LightField, rig: Rig, unreadable: Collection[str] = ()
+) -> Looks:
     """Read the views that the page shows and pack them.
 
-    ``folder`` holds the views of ``lightfield``, and ``rig`` holds its cameras. Raises
-    `UserError` for a view that cannot be read.
+    ``folder`` holds the views of ``lightfield``, and ``rig`` holds its cameras. The views known to
+    be ``unreadable`` are black; raises `UserError` for any other that cannot be read.
     """
     names = [view.name for view in lightfield.views]
     matrices, lens, meaning = lightfield.matrices, lightfield.lens, lightfield.depth
@@ -73,7 +75,12 @@ def collect(folder: Path, lightfield: LightField, rig: Rig) -> Looks:
     side = SIDE if len(shown) <= MANY_VIEWS else SMALLER_SIDE
     small = _fitted(lens, side)
 
-    loaded = [read(folder / f"{names[i]}.exr", small, meaning) for i in shown]
+    def load(view: int, lens: Lens) -> View:
+        if names[view] in unreadable:
+            return _black(lens, meaning)
+        return read(folder / f"{names[view]}.exr", lens, meaning)
+
+    loaded = [load(view, small) for view in shown]
     light = np.stack([view.colour for view in loaded])
     found = [view.depth for view in loaded if view.depth is not None]
     depths = np.stack(found) if found else None
@@ -118,7 +125,7 @@ def collect(folder: Path, lightfield: LightField, rig: Rig) -> Looks:
     kept: list[int] = []
     if row:
         kept = epipolar.thinned(row.views, MOST_ROWS)
-        data["row"] = _epipolar_images(folder, names, matrices, lens, meaning, row, kept, limits)
+        data["row"] = _epipolar_images(load, matrices, lens, meaning, row, kept, limits)
     return Looks(
         data,
         len(shown),
@@ -146,6 +153,13 @@ def read(path: Path, small: Lens, meaning: str | None) -> View:
         columns = (np.arange(small.width) + 0.5) * width / small.width
         depth = channels["Z"][np.ix_(rows.astype(int), columns.astype(int))].astype(np.float32)
     return View(colour, depth, float(np.median(known)) if known.size else math.nan)
+
+
+def _black(lens: Lens, meaning: str | None) -> View:
+    """Return a view in which nothing is seen, in place of one that cannot be read."""
+    shape = (lens.height, lens.width)
+    depth = np.full(shape, np.nan, np.float32) if meaning else None
+    return View(np.zeros((*shape, 3), np.float32), depth, math.nan)
 
 
 def _middle(length: int) -> slice:
@@ -188,8 +202,7 @@ def _depth_scale(
 
 
 def _epipolar_images(
-    folder: Path,
-    names: Sequence[str],
+    load: Callable[[int, Lens], View],
     matrices: Array,
     lens: Lens,
     meaning: str | None,
@@ -205,7 +218,7 @@ def _epipolar_images(
     depth = np.full((len(epipolar.TILTS), count, columns), np.nan)
     for place, position in enumerate(kept):
         number = row.views[position]
-        view = read(folder / f"{names[number]}.exr", fitted, meaning)
+        view = load(number, fitted)
         for tilted, tilt in enumerate(epipolar.TILTS):
             rays = epipolar.directions(row, tilt, columns)
             light[tilted, place], depth[tilted, place] = epipolar.sample(

@@ -34,7 +34,10 @@ from lightfield.validation.examination import Examiner, Facts, File, ImageSet
 IMAGES = "exr"
 """The folder of a dataset's own views."""
 
-OUTPUTS = ("validation.json", "sha256sums.txt")
+SUMS = "sha256sums.txt"
+"""The checksums in a dataset: only a valid one has them."""
+
+OUTPUTS = ("validation.json", SUMS)
 """The files in a dataset that say what came out of its validation."""
 
 REPORT = "report"

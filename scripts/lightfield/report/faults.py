@@ -1,0 +1,88 @@
+"""Pictures of the views that validation found fault with."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from numpy.typing import NDArray
+
+from lightfield.core.errors import UserError
+from lightfield.imaging import images, pictures
+from lightfield.report.packing import webp
+
+Array = NDArray[Any]
+
+# Of each check so many views are shown, their longer side at most so many pixels.
+MOST, SIDE = 6, 256
+WRONG = (255, 0, 255)
+"""The colour of pixels that hold no value, or one that cannot be."""
+MISS = (176, 176, 176)
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One view: colour and depth as data URIs; None where the file has no depth."""
+
+    name: str
+    colour: str
+    depth: str | None
+
+
+def collect(folder: Path, views: Sequence[str]) -> list[Fault]:
+    """Return pictures of the first of the ``views`` in ``folder``, but not of what is no image."""
+    found = (_fault(folder, view) for view in views[:MOST])
+    return [fault for fault in found if fault]
+
+
+def _fault(folder: Path, view: str) -> Fault | None:
+    exr, png = folder / f"{view}.exr", folder / f"{view}.png"
+    path = exr if exr.is_file() or not png.is_file() else png
+    try:
+        channels = images.read_image(path).channels
+        colour = np.stack([channels[name] for name in "RGB"], axis=-1)
+    except (UserError, LookupError):
+        return None
+    depth = webp(_depth(channels["Z"])) if "Z" in channels else None
+    return Fault(path.name, webp(colour if path == png else _colour(colour)), depth)
+
+
+def _colour(colour: Array) -> Array:
+    """Return (height, width, 3) scene-linear colour developed and thinned, marked where wrong."""
+    wrong = ~np.isfinite(colour).all(axis=-1)
+    right = np.where(wrong[..., None], 0, colour).clip(min=0).astype(np.float32)
+    step = _step(wrong)
+    shown = pictures.develop(right[::step, ::step], pictures.exposure_for(right))
+    return _marked(shown, wrong)
+
+
+def _depth(depth: Array) -> Array:
+    """Return (height, width) metres from near (light) to far (dark), marked where wrong."""
+    wrong = np.isneginf(depth) | (depth <= 0)
+    hit = np.isfinite(depth) & ~wrong
+    thinned = depth[:: _step(wrong), :: _step(wrong)]
+    low, high = np.log(np.percentile(depth[hit], [2, 98])) if hit.any() else (0.0, 1.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        place = (np.log(thinned.astype(np.float64)) - low) / max(high - low, 1e-6)
+    coloured = matplotlib.colormaps["viridis_r"](
+        np.nan_to_num(place, posinf=0.0, neginf=0.0), bytes=True
+    )[..., :3]
+    hidden = ~np.isfinite(thinned)[..., None]
+    shown: Array = np.where(hidden, np.array(MISS, np.uint8), coloured)
+    return _marked(shown, wrong)
+
+
+def _step(pixels: Array) -> int:
+    return math.ceil(max(pixels.shape) / SIDE)
+
+
+def _marked(shown: Array, wrong: Array) -> Array:
+    """Return thinned pixels, each marked if any of those that it stands for is ``wrong``."""
+    step = _step(wrong)
+    for axis in (0, 1):
+        wrong = np.logical_or.reduceat(wrong, range(0, wrong.shape[axis], step), axis=axis)
+    marked: Array = np.where(wrong[..., None], np.array(WRONG, np.uint8), shown)
+    return marked
