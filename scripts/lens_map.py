@@ -13,19 +13,14 @@ from lightfield.reprojection import lens_map
 from lightfield.reprojection.lens_arguments import add_geometry_flags, geometry, joined
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of the program's command line."""
-    p = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    p.add_argument("file", type=Path, metavar="FILE", help="lens map to write, .npy")
-    add_geometry_flags(p)
-    return p
-
-
 def main() -> None:
     """Run the program on the command line's arguments."""
-    arguments = parser().parse_args(joined(sys.argv[1:]))
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("file", type=Path, metavar="FILE", help="lens map to write, .npy")
+    add_geometry_flags(parser)
+    arguments = parser.parse_args(joined(sys.argv[1:]))
     work = geometry(arguments)
     path: Path = arguments.file
     for target in work.targets:

@@ -18,13 +18,13 @@ from lightfield.core.cli import run
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import rigs
 from lightfield.imaging import images
+from lightfield.imaging.pictures import luminance
 from lightfield.measurement import noise
 from lightfield.report.plots import BLUE, GREY, plot
 
 # From where the rig is looked at: degrees round it from −Y, and above the ground.
 AZIMUTH, ELEVATION = 30.0, 24.0
 MISS = "#b0b0b0"
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 # The noise map has about this many blocks across.
 NOISE_BLOCKS = 128
 
@@ -38,10 +38,10 @@ def main() -> None:
     arguments = parser.parse_args()
     poses = LightField.read(arguments.lightfield).matrices
     draw_rig(arguments.output / "rig", rigs.from_settings(arguments.rig), poses)
-    panorama = images.read_image(arguments.panorama).channels
-    colour = np.stack([panorama[name] for name in "RGB"], axis=-1, dtype=np.float32)
+    panorama = images.read_image(arguments.panorama)
+    colour = panorama.colour
     # Without depth the map is grey: the workflow's plan names the same pictures for every dataset.
-    depth = panorama.get("Z", np.full(colour.shape[:2], np.nan))
+    depth = panorama.channels.get("Z", np.full(colour.shape[:2], np.nan))
     draw_depth(arguments.output / "depth_panorama", depth.astype(np.float32))
     draw_noise(arguments.output / "noise", colour)
 
@@ -111,7 +111,7 @@ def draw_depth(stem: Path, distance: np.ndarray) -> None:
 def draw_noise(stem: Path, colour: np.ndarray) -> None:
     """Draw the panorama's relative noise in percent."""
     block = max(noise.SMALLEST_BLOCK, colour.shape[1] // NOISE_BLOCKS)
-    percent = 100 * noise.relative_noise(colour @ LUMINANCE, block)
+    percent = 100 * noise.relative_noise(luminance(colour), block)
     known = percent[np.isfinite(percent) & (percent > 0)]
     low, high = np.percentile(known, [2, 99]) if known.size else (1.0, 2.0)
     draw_map(

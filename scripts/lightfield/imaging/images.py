@@ -39,6 +39,11 @@ class Image:
     channels: dict[str, np.ndarray[Any, Any]]
     attributes: dict[str, Attribute]
 
+    @property
+    def colour(self) -> np.ndarray[Any, Any]:
+        """The channels R, G and B as (height, width, 3) float32."""
+        return np.stack([self.channels[name] for name in "RGB"], axis=-1, dtype=np.float32)
+
 
 @dataclass(frozen=True)
 class Header:

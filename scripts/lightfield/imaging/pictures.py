@@ -21,8 +21,13 @@ MOST_VIEWS = 120
 
 def read_colour(path: Path) -> Array:
     """Read an image's scene-linear colour as (height, width, 3) float32."""
-    channels = images.read_image(path, "RGB").channels
-    return np.stack([channels[name] for name in "RGB"], axis=-1, dtype=np.float32)
+    return images.read_image(path, "RGB").colour
+
+
+def luminance(colour: Array) -> Array:
+    """Return the luminance (...) of linear (..., 3) float32 colour. Source: ITU-R BT.709."""
+    weights = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+    return np.asarray(colour @ weights)
 
 
 def exposure_for(colour: Array) -> float:
@@ -31,8 +36,8 @@ def exposure_for(colour: Array) -> float:
     Typical is the geometric mean of the luminance (Reinhard et al. 2002, equation 1) over pixels
     that are not black, so that what lies outside an image circle does not count.
     """
-    luminance = colour @ np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
-    lit = luminance[np.isfinite(luminance) & (luminance > 1e-6)]
+    light = luminance(colour)
+    lit = light[np.isfinite(light) & (light > 1e-6)]
     return float(np.log2(MIDDLE_GREY / np.exp(np.log(lit).mean()))) if lit.size else 0.0
 
 

@@ -106,7 +106,7 @@ class Trials:
             self._render(probe, settings, path, key)
         image = images.read_image(path)
         return Trial(
-            colour=np.stack([image.channels[c] for c in "RGB"], axis=-1),
+            colour=image.colour,
             depth=image.channels.get("Z"),
             samples=float(image.attributes[SAMPLES_ATTRIBUTE]),
             seconds=float(image.attributes[SECONDS_ATTRIBUTE]),

@@ -37,7 +37,6 @@ EPIPOLAR_SIDE = 512
 MOST_ROWS = 48
 # A view's noise is measured in its middle.
 NOISE_SIDE = 512
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 
 
 @dataclass(frozen=True)
@@ -138,12 +137,11 @@ def collect(
 
 def read(path: Path, small: Lens, meaning: str | None) -> View:
     """Read a view at the resolution of ``small``: colour averaged, depth that of one pixel."""
-    channels = images.read_image(path, "RGBZ" if meaning else "RGB").channels
-    colour = np.stack([channels[name] for name in "RGB"], axis=-1, dtype=np.float32)
-    colour = np.where(np.isfinite(colour), colour, 0).astype(np.float32)
+    image = images.read_image(path, "RGBZ" if meaning else "RGB")
+    colour = np.nan_to_num(image.colour, posinf=0, neginf=0)
     height, width = colour.shape[:2]
     middle = colour[_middle(height), _middle(width)]
-    ratio = relative_noise(middle @ LUMINANCE)
+    ratio = relative_noise(pictures.luminance(middle))
     known = ratio[np.isfinite(ratio)]
     if (width, height) != (small.width, small.height):
         colour = pictures.shrunk(colour, small.width, small.height)
@@ -151,7 +149,9 @@ def read(path: Path, small: Lens, meaning: str | None) -> View:
     if meaning:
         rows = (np.arange(small.height) + 0.5) * height / small.height
         columns = (np.arange(small.width) + 0.5) * width / small.width
-        depth = channels["Z"][np.ix_(rows.astype(int), columns.astype(int))].astype(np.float32)
+        depth = image.channels["Z"][np.ix_(rows.astype(int), columns.astype(int))].astype(
+            np.float32
+        )
     return View(colour, depth, float(np.median(known)) if known.size else math.nan)
 
 

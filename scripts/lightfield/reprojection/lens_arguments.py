@@ -16,7 +16,8 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
-from lightfield.geometry.lenses import LENSES, Array, Lens, from_camera, from_lightfield
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry.lenses import LENSES, Array, Lens, from_camera
 from lightfield.geometry.lenses.base import named_numbers
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.reprojection import lens_map
@@ -103,9 +104,9 @@ class Target:
 
 @dataclass(frozen=True)
 class Geometry:
-    """What the command line says of a reprojection's geometry; ``config`` is the input's."""
+    """What the command line says of a reprojection's geometry; ``lightfield`` is the input's."""
 
-    config: dict[str, Any]
+    lightfield: LightField
     source: Lens
     targets: list[Target]
     filter: str
@@ -128,9 +129,9 @@ def geometry(arguments: argparse.Namespace) -> Geometry:
     """Read the flags of `add_geometry_flags`; a `UserError` names the one that is wrong."""
     if arguments.samples < 1:
         raise UserError(f"--samples {arguments.samples}: must be at least 1")
-    config, source = _source(arguments)
+    lightfield, source = _source(arguments)
     return Geometry(
-        config=config,
+        lightfield=lightfield,
         source=source,
         targets=_targets(arguments, source),
         # The adaptive filter covers the pixel by itself; samples are those of SILVR's default.
@@ -139,7 +140,7 @@ def geometry(arguments: argparse.Namespace) -> Geometry:
     )
 
 
-def _source(arguments: argparse.Namespace) -> tuple[dict[str, Any], Lens]:
+def _source(arguments: argparse.Namespace) -> tuple[LightField, Lens]:
     if arguments.no_configs:
         if arguments.input_cfg:
             raise UserError("--no-configs: excludes --input-cfg")
@@ -147,18 +148,18 @@ def _source(arguments: argparse.Namespace) -> tuple[dict[str, Any], Lens]:
         lens = _lens(arguments, "i-", width, height)
         if lens is None:
             raise UserError("--no-configs: needs the input lens, one of the flags --i-…")
-        return {}, lens
+        return LightField(lens.to_lightfield(), ()), lens
     if _lens(arguments, "i-", 6, 1) is not None:
         raise UserError("--i-…: the input lens comes from --input-cfg; or give --no-configs")
     if not arguments.input_cfg:
         raise UserError("--input-cfg: is missing; without one, give --no-configs and --i-…")
-    config = read_json(arguments.input_cfg)
-    if not isinstance(config, dict):
-        raise UserError(f"{arguments.input_cfg}: must hold a mapping")
-    try:
-        return config, from_lightfield(config)
-    except UserError as error:
-        raise UserError(f"{arguments.input_cfg}: {error}") from None
+    path: Path = arguments.input_cfg
+    content = read_json(path)
+    if isinstance(content, dict) and "frames" not in content:
+        lightfield = LightField(content, (), path)
+    else:
+        lightfield = LightField.read(path)
+    return lightfield, lightfield.lens
 
 
 def _targets(arguments: argparse.Namespace, source: Lens) -> list[Target]:

@@ -1,0 +1,94 @@
+"""Runs a reprojection: each view once, only what is missing, and a record of what was made."""
+
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+import OpenImageIO as oiio
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import sha256
+from lightfield.core.progress import Progress
+from lightfield.imaging.images import KEY_ATTRIBUTE, read_header
+from lightfield.reprojection import lens_map
+from lightfield.reprojection.job import Job, SourceView
+from lightfield.reprojection.lens_arguments import Target
+from lightfield.reprojection.pixels import Source, write
+
+
+def run(job: Job) -> None:
+    """Do all that the command line asks for; a `UserError` says how many views failed."""
+    arguments = job.arguments
+    views = [] if arguments.dry_run else job.views()
+    if arguments.output_cfg:
+        job.output_lightfield().write(arguments.output_cfg)
+    if arguments.dry_run:
+        return
+    # One view is one thread's work: the libraries shall not add theirs.
+    oiio.attribute("threads", 1)
+    for made in job.maps:
+        lens_map.report(made)
+    label = f"reproject to {arguments.output_dir} {arguments.views or ''}".rstrip()
+    progress = Progress(len(views), label)
+    paths: list[Path] = []
+    failed = 0
+    for view, result in _results(job, views):
+        if isinstance(result, UserError | OSError):
+            failed += 1
+            print(f"error: {_named(view, result)}", file=sys.stderr, flush=True)
+        else:
+            paths += result
+        progress.done()
+    if failed:
+        raise UserError(f"{failed} of {len(views)} views could not be reprojected")
+    job.record.write(sorted(paths), counts={"views": len(views), "files": len(paths)})
+
+
+def _results(job: Job, views: list[SourceView]) -> Iterator[tuple[SourceView, Any]]:
+    """Yield each view with its files, or with the error that it ended in."""
+    with ThreadPoolExecutor(max(1, job.arguments.parallel)) as pool:
+        futures = {pool.submit(reproject_view, job, view): view for view in views}
+        for future in as_completed(futures):
+            error = future.exception()
+            if error is not None and not isinstance(error, UserError | OSError):
+                raise error
+            yield futures[future], error or future.result()
+
+
+def reproject_view(job: Job, view: SourceView) -> list[Path]:
+    """Make a view's files, but for those that are there and up to date; return them all."""
+    arguments = job.arguments
+    made: list[Path] = []
+    todo: list[tuple[int, Target, dict[str, Path], str]] = []
+    identity = ""
+    for index, target in enumerate(job.targets):
+        outputs = job.outputs(view, target)
+        made += outputs.values()
+        if arguments.skip_if_exists and all(path.exists() for path in outputs.values()):
+            continue
+        identity = identity or _identity(view)
+        key = job.key(target, identity)
+        if not all(job.record.is_finished(path, key) for path in outputs.values()):
+            todo.append((index, target, outputs, key))
+    if todo:
+        source = Source(job, view, [job.maps[index].window for index, *_ in todo])
+        for index, target, outputs, key in todo:
+            write(job, target, job.maps[index], source, outputs, key)
+    return made
+
+
+def _identity(view: SourceView) -> str:
+    """Return what stands for the source's content: its render key, or else its checksum."""
+    parts = []
+    for path in view.paths:
+        is_exr = path.suffix.lower() == ".exr"
+        key = read_header(path).attributes.get(KEY_ATTRIBUTE) if is_exr else None
+        parts.append(str(key or sha256(path)))
+    return " ".join(parts)
+
+
+def _named(view: SourceView, error: Exception) -> str:
+    text = str(error)
+    return text if str(view.paths[0].parent) in text else f"{view.paths[0]}: {text}"

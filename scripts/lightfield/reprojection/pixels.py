@@ -1,0 +1,184 @@
+"""A view's pixels in and out: read as linear light, resampled, and written as asked for."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from lightfield.core.errors import UserError
+from lightfield.geometry.lenses import Array
+from lightfield.geometry.lenses.cube_map import CubeMap
+from lightfield.imaging.halves import narrow, widen
+from lightfield.imaging.images import (
+    DEPTH_ATTRIBUTE,
+    KEY_ATTRIBUTE,
+    Attribute,
+    read_header,
+    read_image,
+    write_exr,
+    write_png,
+)
+from lightfield.imaging.tonemap import decode_srgb, to_8_bit, tone_map
+from lightfield.reprojection.colour import colour_strips
+from lightfield.reprojection.depth import resample_depth
+from lightfield.reprojection.job import Job, SourceView, usual_depth
+from lightfield.reprojection.lens_arguments import Target
+from lightfield.reprojection.lens_map import LensMap
+
+# A seventh of the time that zlib's own level and the choice of a filter for each row take, and
+# files as small: level 4, and libpng's PNG_FILTER_AVG for every row.
+PNG_OPTIONS = {"png:compressionLevel": 4, "png:filter": 64}
+
+
+class Source:
+    """The part of a view's pixels that its targets need, linear and in float32."""
+
+    def __init__(
+        self, job: Job, view: SourceView, windows: list[tuple[int, int, int, int]]
+    ) -> None:
+        low, high = np.min(windows, axis=0), np.max(windows, axis=0)
+        self.rows, self.columns = (int(low[0]), int(high[1])), (int(low[2]), int(high[3]))
+        faces = [self._read(job, path) for path in view.paths]
+        self.colour = _side_by_side([face[0] for face in faces])
+        depths = [face[1] for face in faces if face[1] is not None]
+        self.depth = _side_by_side(depths) if len(depths) == len(faces) else None
+        self.has_alpha = faces[0][2]
+        # The file knows best; the configuration may be another program's.
+        meaning = faces[0][3] or job.lightfield.depth or usual_depth(job.source)
+        self.is_z = meaning == "z"
+
+    def _read(self, job: Job, path: Path) -> tuple[Array, Array | None, bool, Attribute | None]:
+        lens = job.source.face if isinstance(job.source, CubeMap) else job.source
+        header = read_header(path)
+        if (header.width, header.height) != (lens.width, lens.height):
+            raise UserError(
+                f"{path}: has {header.width} × {header.height} pixels; "
+                f"the lens expects {lens.width} × {lens.height}"
+            )
+        names = header.channels
+        colours = "RGB" if {"R", "G", "B"} <= set(names) else "YYY"
+        if colours[0] not in names:
+            raise UserError(f"{path}: has no colour: its channels are {', '.join(names)}")
+        wanted = {*colours, "A", "Z"} if job.depth_wanted else {*colours, "A"}
+        image = read_image(path, [name for name in names if name in wanted], self.rows)
+        columns = slice(*self.columns)
+        channels = {name: array[:, columns] for name, array in image.channels.items()}
+        alpha, depth = channels.get("A"), channels.get("Z")
+        colour = _linear([channels[name] for name in colours], alpha)
+        if depth is not None and depth.dtype != np.float16:
+            depth = depth.astype(np.float32, copy=False)
+        return colour, depth, alpha is not None, image.attributes.get(DEPTH_ATTRIBUTE)
+
+    def window(self, made: LensMap) -> tuple[Array, Array | None]:
+        """Return the colour and depth that a lens map reads."""
+        row, end_row, column, end_column = made.window
+        rows = slice(row - self.rows[0], end_row - self.rows[0])
+        columns = slice(column - self.columns[0], end_column - self.columns[0])
+        colour = np.ascontiguousarray(self.colour[rows, columns])
+        return colour, None if self.depth is None else self.depth[rows, columns]
+
+
+def _side_by_side(faces: list[Array]) -> Array:
+    """Return a cube map's faces as one strip; the one image of another lens as it is."""
+    return faces[0] if len(faces) == 1 else np.concatenate(faces, axis=1)
+
+
+def _linear(planes: list[Array], alpha: Array | None) -> Array:
+    """Return pixels as (h, w, 4) float32 linear R G B A, colour associated with alpha."""
+    if planes[0].dtype.kind == "u":
+        largest = np.iinfo(planes[0].dtype).max
+        table = decode_srgb(np.arange(largest + 1) / largest).astype(np.float32)
+        planes = [table[plane] for plane in planes]
+        if alpha is not None:
+            alpha = alpha.astype(np.float32) / np.float32(largest)
+            planes = [plane * alpha for plane in planes]
+    red, green, blue = planes
+    colour = widen(red, green, blue, alpha)
+    if alpha is not None:
+        # What is wholly transparent is no sample.
+        colour[alpha == 0] = np.nan
+    return colour
+
+
+def write(
+    job: Job,
+    target: Target,
+    made: LensMap,
+    source: Source,
+    outputs: Mapping[str, Path],
+    key: str,
+) -> None:
+    """Resample a view through one lens map and write its files."""
+    arguments = job.arguments
+    as_z = target.lens.has_z_depth
+    strips, depth = _resampled(job, made, source, as_z)
+    size = made.target_cos.shape
+    empty = np.empty(size, bool)
+    half = np.empty((3, *size), np.float16)
+    pixels = np.empty((*size, 3), np.uint8)
+    for rows, strip in strips:
+        empty[rows] = np.isnan(strip[:, :, 0])
+        if source.has_alpha:
+            with np.errstate(invalid="ignore", divide="ignore"):
+                strip[:, :, :3] /= strip[:, :, 3:]
+        strip = tone_map(strip[:, :, :3], arguments.exposure, arguments.reinhard)
+        if "exr" in outputs:
+            half[:, rows] = narrow(strip, 3)
+        if "png" in outputs:
+            pixels[rows] = to_8_bit(strip)
+    marked = bool(empty.any())
+    if marked:
+        half[:, empty] = 0
+        if depth is not None:
+            depth[empty] = np.nan
+    attributes = {KEY_ATTRIBUTE: key}
+    for kind, path in outputs.items():
+        match kind:
+            case "exr":
+                channels = dict(zip("RGB", half, strict=True))
+                if depth is not None:
+                    channels["Z"] = depth
+                    attributes = attributes | {DEPTH_ATTRIBUTE: "z" if as_z else "distance"}
+                elif marked:
+                    channels["A"] = (~empty).astype(np.float16)
+                write_exr(path, channels, attributes)
+            case "png":
+                if marked:
+                    pixels = np.dstack([pixels, np.where(empty, 0, 255).astype(np.uint8)])
+                write_png(path, pixels, {KEY_ATTRIBUTE: key, **PNG_OPTIONS})
+            case "depth":
+                if depth is None:
+                    raise UserError("--depth-png: the image has no channel Z")
+                with np.errstate(invalid="ignore"):
+                    scaled = np.rint(depth.astype(np.float64) * arguments.depth_png)
+                    known = np.isfinite(scaled) & (scaled <= 65535)
+                write_png(path, np.where(known, scaled, 0).astype(np.uint16), {KEY_ATTRIBUTE: key})
+            case "mask":
+                write_png(path, np.where(empty, 255, 0).astype(np.uint8), {KEY_ATTRIBUTE: key})
+        job.record.add(path, key)
+
+
+def _resampled(
+    job: Job, made: LensMap, source: Source, as_z: bool
+) -> tuple[Iterable[tuple[slice, Array]], Array | None]:
+    """Return the target's colour, in strips, and its depth in the source's dtype."""
+    colour, depth = source.window(made)
+    if job.copies and source.is_z == as_z:
+        row, end_row, column, end_column = made.window
+        outside = np.isnan(made.target_cos[row:end_row, column:end_column])
+        colour = np.where(outside[:, :, None], np.float32(np.nan), colour)
+        copy = None if depth is None else _in_frame(depth, made)
+        return [(np.s_[:], _in_frame(colour, made))], copy
+    if depth is not None:
+        found = resample_depth(depth, source.is_z, as_z, made)
+        with np.errstate(over="ignore"):
+            depth = found.astype(depth.dtype, copy=False)
+    return colour_strips(colour, made), depth
+
+
+def _in_frame(window: Array, made: LensMap) -> Array:
+    """Return the window's pixels in their place in the whole image, NaN around them."""
+    out = np.full((*made.target_cos.shape, *window.shape[2:]), np.nan, window.dtype)
+    row, end_row, column, end_column = made.window
+    out[row:end_row, column:end_column] = window
+    return out
