@@ -110,8 +110,7 @@ def make_scene(task: tuple[str, str, float, Path]) -> dict[str, Any]:
 
     import bpy
 
-    import inventory
-    from lightfield.rendering import blender
+    from lightfield.rendering import blender, inventory
 
     source = config.load_scene(scene)["scene"]
     blender.new_scene()
@@ -249,7 +248,7 @@ renderer: Renderer
 def begin(task: Task) -> float:
     """Set this process up and render its first view; return the CPU seconds that it took."""
     global renderer
-    import inventory  # noqa: F401  (imports what the renderer does, before the clock starts)
+    from lightfield.rendering import inventory  # noqa: F401  (imports what the renderer does, before the clock starts)
 
     began = time.process_time()
     renderer = Renderer(task)

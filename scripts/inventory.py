@@ -5,9 +5,7 @@ Missing textures and linked libraries are errors here, before anything is render
 
 import argparse
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import bpy
 
@@ -15,34 +13,7 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.rendering import blender, pruning
-
-# Shader nodes by the feature that they give a material; the Principled BSDF by its inputs.
-SHADERS = {
-    "ShaderNodeBsdfGlass": "transmission",
-    "ShaderNodeBsdfRefraction": "transmission",
-    "ShaderNodeBsdfTranslucent": "transmission",
-    "ShaderNodeSubsurfaceScattering": "subsurface",
-    "ShaderNodeBsdfHair": "hair",
-    "ShaderNodeBsdfHairPrincipled": "hair",
-    "ShaderNodeEmission": "emission",
-    "ShaderNodeBsdfTransparent": "transparency",
-}
-PRINCIPLED_INPUTS = {
-    "Transmission Weight": ("transmission", 0.0),
-    "Subsurface Weight": ("subsurface", 0.0),
-    "Emission Strength": ("emission", 0.0),
-    "Alpha": ("transparency", 1.0),
-}
-OUTPUT_INPUTS = {"Volume": "volumes", "Displacement": "displacement"}
-FEATURES = sorted(
-    {*SHADERS.values(), *OUTPUT_INPUTS.values(), *(name for name, _ in PRINCIPLED_INPUTS.values())}
-)
-IMAGE_NODES = ("ShaderNodeTexImage", "ShaderNodeTexEnvironment")
-# Modifiers whose result depends on time by itself.
-SIMULATIONS = {
-    *("CLOTH", "DYNAMIC_PAINT", "EXPLODE", "FLUID", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "OCEAN"),
-    *("PARTICLE_INSTANCE", "PARTICLE_SYSTEM", "SOFT_BODY", "WAVE", "BUILD"),
-}
+from lightfield.rendering.inventory import FEATURES, inventory
 
 
 def main() -> None:
@@ -80,151 +51,6 @@ def main() -> None:
     )
     for name in leave_out:
         print(f"left out: {name}: {pruning.REASONS[name]}")
-
-
-def inventory() -> dict[str, Any]:
-    """Return what the open scene contains; it is left without its hidden objects."""
-    scene = bpy.context.scene
-    hidden = blender.removable_objects()
-    blender.remove_objects(hidden)
-    objects = list(bpy.data.objects)
-    materials = sorted(
-        {slot.material for thing in objects for slot in thing.material_slots if slot.material},
-        key=lambda material: material.name_full,
-    )
-    lights = {thing.data for thing in objects if thing.type == "LIGHT"}
-    features: dict[str, set[str]] = {name: set() for name in FEATURES}
-    images = set()
-    for shader in (*materials, *([scene.world] if scene.world else []), *lights):
-        for feature, image in surface_features(shader):
-            # A light emits by nature, whether it has nodes (as each has since Blender 5.2) or not.
-            if feature and shader not in lights:
-                features[feature].add(shader.name_full)
-            if image:
-                images.add(image)
-    if any(thing.type == "CURVES" for thing in objects) or any(
-        system.settings.type == "HAIR" for thing in objects for system in thing.particle_systems
-    ):
-        features["hair"].add("objects")
-    features["volumes"] |= {thing.name_full for thing in objects if thing.type == "VOLUME"}
-    external = sorted(
-        {str(Path(path).resolve()) for path in bpy.utils.blend_paths(absolute=True, packed=False)}
-    )
-    return {
-        **triangles(),
-        "lights": len(lights),
-        **{name: sorted(features[name]) for name in FEATURES},
-        "textures": sorted(image.name_full for image in images),
-        "hidden": hidden,
-        "animated": sorted(owner.name_full for owner, _ in blender.animated()),
-        "moving": moving(objects),
-        "motion_blur": bool(scene.render.use_motion_blur),
-        "external_files": external,
-        "missing": missing_files(images),
-    }
-
-
-def triangles() -> dict[str, int]:
-    """Count objects and triangles, as the viewport's levels of detail have them."""
-    for thing in bpy.context.scene.objects:
-        thing.hide_viewport = False
-    meshes: dict[Any, int] = {}
-    total = count = 0
-    for instance in bpy.context.evaluated_depsgraph_get().object_instances:
-        if instance.object.type != "MESH":
-            continue
-        mesh = instance.object.data
-        meshes[mesh] = len(mesh.loops) - 2 * len(mesh.polygons)
-        total += meshes[mesh]
-        count += 1
-    return {
-        "objects": count,
-        "triangles": sum(meshes.values()),
-        "triangles_with_instances": total,
-    }
-
-
-def surface_features(shader: Any) -> Iterator[tuple[str | None, Any]]:
-    """Yield each feature that a material, world or light has, and each image that it reads."""
-    tree = shader.node_tree
-    output = tree.get_output_node("CYCLES") if tree else None
-    if output is None:
-        return
-    for name, feature in OUTPUT_INPUTS.items():
-        if name in output.inputs and output.inputs[name].is_linked:
-            yield feature, None
-    for node in contributing(output):
-        if node.bl_idname in SHADERS:
-            yield SHADERS[node.bl_idname], None
-        elif node.bl_idname == "ShaderNodeBackground":
-            yield "emission", None
-        elif node.bl_idname in IMAGE_NODES and node.image:
-            yield None, node.image
-        elif node.bl_idname == "ShaderNodeBsdfPrincipled":
-            for name, (feature, without) in PRINCIPLED_INPUTS.items():
-                socket = node.inputs[name]
-                if socket.is_linked or socket.default_value != without:
-                    yield feature, None
-
-
-def contributing(node: Any) -> Iterator[Any]:
-    """Yield every node whose result can reach ``node``, those inside groups too."""
-    seen = set()
-    waiting = [node]
-    while waiting:
-        node = waiting.pop()
-        if node in seen:
-            continue
-        seen.add(node)
-        yield node
-        waiting += [link.from_node for socket in node.inputs for link in socket.links]
-        if getattr(node, "node_tree", None):
-            waiting += [n for n in node.node_tree.nodes if n.bl_idname == "NodeGroupOutput"]
-
-
-def moving(objects: list[Any]) -> list[str]:
-    """Return what may change its shape or place with time."""
-    shading = (bpy.types.Material, bpy.types.World, bpy.types.Light, bpy.types.ShaderNodeTree)
-    found = {owner.name_full for owner, _ in blender.animated() if not isinstance(owner, shading)}
-    for thing in objects:
-        if thing.rigid_body or any(
-            modifier.type in SIMULATIONS or (modifier.type == "NODES" and keeps_time(modifier))
-            for modifier in thing.modifiers
-        ):
-            found.add(thing.name_full)
-    return sorted(found)
-
-
-def keeps_time(modifier: Any) -> bool:
-    """Tell whether a geometry nodes modifier asks for the time or simulates."""
-    timed = ("GeometryNodeInputSceneTime", "GeometryNodeSimulationOutput")
-    return modifier.node_group is not None and any(
-        node.bl_idname in timed
-        for node in modifier.node_group.nodes
-        for node in (contributing(node) if node.bl_idname == "NodeGroupOutput" else ())
-    )
-
-
-def missing_files(images: set[Any]) -> list[str]:
-    """Return the textures and libraries that the scene needs and that are not there."""
-    missing = [
-        f"the library {library.name_full} at {blender.path_of(library)}"
-        for library in bpy.data.libraries
-        if not library.packed_file and not blender.path_of(library).is_file()
-    ]
-    missing += [
-        f"the texture {image.name_full} at {blender.path_of(image)}"
-        for image in images
-        if image.source in ("FILE", "SEQUENCE", "MOVIE")
-        and not image.packed_files
-        and not blender.path_of(image).is_file()
-    ]
-    missing += [
-        f"the volume {volume.name_full} at {blender.path_of(volume)}"
-        for volume in bpy.data.volumes
-        if volume.users and not volume.packed_file and not blender.path_of(volume).is_file()
-    ]
-    return sorted(missing)
 
 
 if __name__ == "__main__":

@@ -11,10 +11,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-import inventory
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.rendering import blender, pruning
+from lightfield.rendering import blender, inventory, pruning
 from scenes import test_room
 
 RENDER = {"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0}
