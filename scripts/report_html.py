@@ -17,7 +17,7 @@ from lightfield.geometry import rigs
 from lightfield.report import faults, page
 from lightfield.report import tables as report_tables
 from lightfield.report import views as report_views
-from lightfield.validation.validation import IMAGES, REPORT, SUMS
+from lightfield.validation.files import IMAGES, REPORT, SUMS
 
 PICTURES = ("panorama", "contact_sheet")
 PLOTS = ("rig", "depth_panorama", "noise")

@@ -12,7 +12,7 @@ from lightfield.core.cli import run
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.report import page
 from lightfield.report import tables as report_tables
-from lightfield.validation.validation import REPORT
+from lightfield.validation.files import REPORT
 
 THUMBNAIL = 480
 

@@ -11,64 +11,40 @@ import sys
 from pathlib import Path
 
 from lightfield.core.cli import run
-from lightfield.core.files import atomic_path, sha256, write_json
-from lightfield.validation.validation import REPORT, SUMS, validate
-
-# A check that fails in more places than this is told by its first ones; validation.json has all.
-_LINES_A_CHECK = 20
+from lightfield.core.files import write_json
+from lightfield.export import MANIFESTS
+from lightfield.validation.files import remove_leftovers, write_sums
+from lightfield.validation.validate import validate
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--dataset", required=True, type=Path, help="folder of the dataset")
-    parser.add_argument("--output", required=True, type=Path, help="validation.json to write")
-    parser.add_argument("--sums", required=True, type=Path, help="checksums to write")
-    parser.add_argument(
-        "--records",
-        type=Path,
-        nargs="*",
-        default=[],
-        help="JSON of the sizes and checksums with which images were written",
-    )
-    parser.add_argument("--clearance", type=Path, help="JSON of what surrounds each camera")
-    parser.add_argument(
-        "--reprojection",
-        action="extend",
-        nargs="+",
-        default=[],
-        metavar="NAME",
-        help="folders of the dataset that hold a reprojection",
-    )
-    parser.add_argument("--processes", type=int, default=1, help="worker processes (default: 1)")
+    add = parser.add_argument
+    add("--dataset", required=True, type=Path, help="folder of the dataset")
+    add("--output", required=True, type=Path, help="validation.json to write")
+    add("--sums", required=True, type=Path, help="checksums to write")
+    records = "JSON of the sizes and checksums with which images were written"
+    add("--records", type=Path, nargs="*", default=[], help=records)
+    add("--clearance", type=Path, help="JSON of what surrounds each camera")
+    folders = "folders of the dataset that hold a reprojection"
+    add("--reprojection", action="extend", nargs="+", default=[], metavar="NAME", help=folders)
+    add("--processes", type=int, default=1, help="worker processes (default: 1)")
     arguments = parser.parse_args()
 
-    dataset: Path = arguments.dataset
-    for leftover in dataset.rglob(".*.tmp.*"):
-        if leftover.relative_to(dataset).parts[0] != REPORT:
-            leftover.unlink()
-    (dataset / SUMS).unlink(missing_ok=True)
+    remove_leftovers(arguments.dataset)
     result = validate(
-        dataset,
+        arguments.dataset,
         arguments.reprojection,
         arguments.records,
         arguments.clearance,
         arguments.processes,
+        MANIFESTS,
     )
     write_json(arguments.output, result.to_json())
     print(result.summary())
-    for check in result.checks:
-        lines = check.problems[:_LINES_A_CHECK]
-        if len(check.problems) > len(lines):
-            lines.append(f"… and {len(check.problems) - len(lines)} more")
-        for line in lines:
-            print(f"{result.dataset}: {check.name}: {line}", file=sys.stderr)
-    sums = dict(result.checksums)
-    if arguments.output.resolve().is_relative_to(dataset.resolve()):
-        inside = arguments.output.resolve().relative_to(dataset.resolve()).as_posix()
-        sums[inside] = sha256(arguments.output)
-    with atomic_path(arguments.sums) as temporary:
-        text = "".join(f"{digest}  {path}\n" for path, digest in sorted(sums.items()))
-        temporary.write_text(text, encoding="utf-8")
+    for line in result.failures():
+        print(line, file=sys.stderr)
+    write_sums(arguments.sums, result.checksums, arguments.dataset, arguments.output)
 
 
 if __name__ == "__main__":

@@ -397,7 +397,7 @@ def test_what_cannot_be_exported_is_an_error(
 def test_views_of_another_size_or_of_unknown_depth_are_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    content = written(tmp_path, FISHEYE)
+    content = written(tmp_path, FISHEYE, depth=None)
     small = np.zeros((8, 8), np.float16)
     for frame in content["frames"]:
         images.write_exr(tmp_path / f"{frame['name']}.exr", dict.fromkeys("RGBZ", small))

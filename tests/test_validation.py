@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,14 @@ import pytest
 
 from lightfield.core.files import sha256, write_json
 from lightfield.dataset.lightfield import LightField
+from lightfield.export import MANIFESTS
 from lightfield.geometry import lenses, rotations
 from lightfield.imaging import images
-from lightfield.validation import validation
+from lightfield.validation import geometry
+from lightfield.validation import validate as validation
+from lightfield.validation.result import Check, Result
+
+validate = partial(validation.validate, manifests=MANIFESTS)
 
 SCRIPTS = Path(__file__).parents[1] / "scripts"
 CYCLES_ROOM = Path(__file__).parent / "cycles_room.py"
@@ -128,11 +134,11 @@ def small_dataset(right_small_dataset: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(right_small_dataset, tmp_path / "room" / "plane"))
 
 
-def check(result: validation.Result, name: str) -> validation.Check:
+def check(result: Result, name: str) -> Check:
     return next(check for check in result.checks if check.name == name)
 
 
-def failed(result: validation.Result) -> list[str]:
+def failed(result: Result) -> list[str]:
     return [check.name for check in result.checks if check.passed is False]
 
 
@@ -235,17 +241,17 @@ RIGHT = {
 
 @pytest.mark.parametrize("case", RIGHT)
 def test_right_dataset_is_valid_with_margin(case: str, tmp_path: Path) -> None:
-    result = validation.validate(make_dataset(tmp_path / "room" / "rig", *RIGHT[case]))
+    result = validate(make_dataset(tmp_path / "room" / "rig", *RIGHT[case]))
     assert failed(result) == []
-    geometry = check(result, "geometry")
-    assert geometry.passed
-    assert not geometry.warnings
-    figures = geometry.figures
-    assert figures["worst_contradiction"] < validation.CONTRADICTIONS_LIMIT / 3
-    assert figures["worst_displacement_pixels"] < validation.DISPLACEMENT_LIMIT / 1.5
+    found = check(result, "geometry")
+    assert found.passed
+    assert not found.warnings
+    figures = found.figures
+    assert figures["worst_contradiction"] < geometry.CONTRADICTIONS_LIMIT / 3
+    assert figures["worst_displacement_pixels"] < geometry.DISPLACEMENT_LIMIT / 1.5
     for what in ("angle", "depth"):
-        if figures.get(f"{what}_scale_deviation", 1) < validation.SCALE_DEVIATION_LIMIT:
-            assert abs(figures[f"{what}_scale_error"]) < validation.SCALE_LIMIT / 2
+        if figures.get(f"{what}_scale_deviation", 1) < geometry.SCALE_DEVIATION_LIMIT:
+            assert abs(figures[f"{what}_scale_error"]) < geometry.SCALE_LIMIT / 2
 
 
 # ---- wrong geometry fails -------------------------------------------------------------------
@@ -327,7 +333,7 @@ WRONG_VIEWS: dict[str, Spoil] = {
 @pytest.mark.parametrize("case", WRONG_SETS)
 def test_wrong_set_fails_its_geometry(case: str, dataset: Path) -> None:
     WRONG_SETS[case](dataset)
-    result = validation.validate(dataset)
+    result = validate(dataset)
     assert failed(result) == ["geometry"]
     assert len(check(result, "geometry").views) > len(ALL) / 2
 
@@ -335,11 +341,11 @@ def test_wrong_set_fails_its_geometry(case: str, dataset: Path) -> None:
 @pytest.mark.parametrize("case", WRONG_VIEWS)
 def test_wrong_view_is_named_and_no_other(case: str, dataset: Path) -> None:
     WRONG_VIEWS[case](dataset)
-    result = validation.validate(dataset)
+    result = validate(dataset)
     assert failed(result) == ["geometry"]
-    geometry = check(result, "geometry")
-    assert geometry.views == [names(dataset)[BAD]]
-    assert [problem.split(": ")[0] for problem in geometry.problems] == [
+    found = check(result, "geometry")
+    assert found.views == [names(dataset)[BAD]]
+    assert [problem.split(": ")[0] for problem in found.problems] == [
         f"exr/{names(dataset)[BAD]}.exr"
     ]
 
@@ -347,7 +353,7 @@ def test_wrong_view_is_named_and_no_other(case: str, dataset: Path) -> None:
 def test_swapped_views_are_both_named(dataset: Path) -> None:
     right_names = names(dataset)
     relist(dataset, swap(2, 7))
-    result = validation.validate(dataset)
+    result = validate(dataset)
     assert failed(result) == ["geometry"]
     assert sorted(check(result, "geometry").views) == [right_names[2], right_names[7]]
 
@@ -358,19 +364,19 @@ def test_small_error_of_the_lens_shows_in_all_pairs_together(fov: float, tmp_pat
     rig = {"type": "plane", "cameras": [3, 3], "size": 0.5}
     dataset = make_dataset(tmp_path / "room" / "plane", rig, FISHEYE, "distance")
     relist(dataset, recamera({"fov": fov}))
-    geometry = check(validation.validate(dataset), "geometry")
-    assert geometry.passed is False
-    assert geometry.views == []
-    assert len(geometry.problems) == 1
-    assert "all angles" in geometry.problems[0]
+    found = check(validate(dataset), "geometry")
+    assert found.passed is False
+    assert found.views == []
+    assert len(found.problems) == 1
+    assert "all angles" in found.problems[0]
 
 
 def test_two_views_that_disagree_are_both_named(tmp_path: Path) -> None:
     rig = {"type": "plane", "cameras": [2, 1], "size": 0.5}
     dataset = make_dataset(tmp_path / "room" / "pair", rig, FISHEYE)
-    assert validation.validate(dataset).valid
+    assert validate(dataset).valid
     relist(dataset, move(0, (0, 0.1, 0)))
-    assert check(validation.validate(dataset), "geometry").views == names(dataset)
+    assert check(validate(dataset), "geometry").views == names(dataset)
 
 
 # ---- what cannot be checked is said ---------------------------------------------------------
@@ -390,11 +396,11 @@ UNCHECKED = {
 @pytest.mark.parametrize("case", UNCHECKED)
 def test_what_cannot_be_checked_is_no_pass(case: str, tmp_path: Path) -> None:
     *made, reason = UNCHECKED[case]
-    result = validation.validate(make_dataset(tmp_path / "room" / "rig", *made))
+    result = validate(make_dataset(tmp_path / "room" / "rig", *made))
     assert result.valid
-    geometry = check(result, "geometry")
-    assert geometry.passed is None
-    assert reason in geometry.detail
+    found = check(result, "geometry")
+    assert found.passed is None
+    assert reason in found.detail
     assert re.search("not applicable: .*geometry", result.summary())
 
 
@@ -501,7 +507,7 @@ BROKEN_VIEWS: dict[str, tuple[Spoil, str, str]] = {
 def test_broken_view_is_named(case: str, small_dataset: Path) -> None:
     spoil, name, text = BROKEN_VIEWS[case]
     spoil(small_dataset)
-    result = validation.validate(small_dataset)
+    result = validate(small_dataset)
     assert failed(result) == [name]
     found = check(result, name)
     assert found.views == [names(small_dataset)[BAD]]
@@ -513,7 +519,7 @@ def test_broken_view_is_named(case: str, small_dataset: Path) -> None:
 
 def test_clamped_values_are_a_warning(small_dataset: Path) -> None:
     headed(images.CLAMPED_ATTRIBUTE, 9)(small_dataset)
-    result = validation.validate(small_dataset)
+    result = validate(small_dataset)
     assert result.valid
     assert "9 values in 1 views were clamped" in result.summary()
 
@@ -546,7 +552,7 @@ BROKEN_LISTS: dict[str, tuple[Spoil, str]] = {
 def test_broken_lightfield_json_fails(case: str, small_dataset: Path) -> None:
     spoil, text = BROKEN_LISTS[case]
     spoil(small_dataset)
-    result = validation.validate(small_dataset)
+    result = validate(small_dataset)
     assert "lightfield" in failed(result)
     problems = check(result, "lightfield").problems
     assert problems[0].startswith("lightfield.json: ")
@@ -560,7 +566,7 @@ def test_stray_files_fail(small_dataset: Path) -> None:
     (small_dataset / "old" / "notes.txt").write_text("?")
     (small_dataset / "report").mkdir()
     (small_dataset / "report" / "index.html").write_text("not published")
-    result = validation.validate(small_dataset)
+    result = validate(small_dataset)
     assert failed(result) == ["files"]
     assert check(result, "files").problems == [
         "exr/view_9999f.exr: is no file of this dataset",
@@ -588,11 +594,9 @@ def test_records_must_agree(small_dataset: Path, tmp_path: Path) -> None:
     record["files"]["exr/view_0003f.exr"]["bytes"] += 1
     record["files"]["exr/gone.exr"] = record["files"]["exr/view_0003f.exr"]
     write_json(tmp_path / "changed.json", record)
-    first = validation.validate(small_dataset, records=[tmp_path / "record.json"])
+    first = validate(small_dataset, records=[tmp_path / "record.json"])
     assert check(first, "checksums").views == [names(small_dataset)[BAD]]
-    second = check(
-        validation.validate(small_dataset, records=[tmp_path / "changed.json"]), "checksums"
-    )
+    second = check(validate(small_dataset, records=[tmp_path / "changed.json"]), "checksums")
     assert second.passed is False
     assert second.views == ["gone", "view_0002f", "view_0003f", names(small_dataset)[BAD]]
 
@@ -601,13 +605,13 @@ def test_camera_inside_geometry_fails(small_dataset: Path, tmp_path: Path) -> No
     around = {name: {"distance": None, "inside": False} for name in names(small_dataset)}
     around["view_0001f"] = {"distance": 0.25, "inside": False}
     write_json(tmp_path / "clearance.json", {"views": around})
-    right = validation.validate(small_dataset, clearance=tmp_path / "clearance.json")
+    right = validate(small_dataset, clearance=tmp_path / "clearance.json")
     assert check(right, "cameras").passed
     assert check(right, "cameras").figures == {"nearest_metres": 0.25}
     around[names(small_dataset)[BAD]] = {"distance": 0.0, "inside": True}
     del around["view_0004f"]
     write_json(tmp_path / "clearance.json", {"views": around})
-    wrong = validation.validate(small_dataset, clearance=tmp_path / "clearance.json")
+    wrong = validate(small_dataset, clearance=tmp_path / "clearance.json")
     assert failed(wrong) == ["cameras"]
     assert sorted(check(wrong, "cameras").views) == ["view_0004f", names(small_dataset)[BAD]]
 
@@ -618,7 +622,7 @@ def test_exports_own_what_they_list(small_dataset: Path) -> None:
     images.write_png(small_dataset / "pictures" / "one.png", picture)
     frames = [{"file_path": "pictures/one.png"}, {"file_path": "exr/view_0000f.exr"}]
     write_json(small_dataset / "transforms.json", {"frames": frames})
-    result = validation.validate(small_dataset)
+    result = validate(small_dataset)
     assert result.valid
     assert check(result, "exports").passed
     assert {"pictures/one.png", "transforms.json"} <= result.checksums.keys()
@@ -626,9 +630,9 @@ def test_exports_own_what_they_list(small_dataset: Path) -> None:
         small_dataset / "transforms_test.json", {"frames": [{"file_path": "pictures/two.png"}]}
     )
     images.write_png(small_dataset / "pictures" / "one.png", picture[:10])
-    problems = check(validation.validate(small_dataset), "exports").problems
+    problems = check(validate(small_dataset), "exports").problems
     assert problems == [
-        "transforms_test.json: frames: pictures/two.png is no file of the dataset",
+        "transforms_test.json: pictures/two.png is no file of the dataset",
         "pictures/one.png: is 64 × 10; must be 64 × 64",
     ]
 
@@ -660,13 +664,13 @@ def add_panoramas(dataset: Path, spoil: Callable[[dict[str, np.ndarray]], Any] =
 
 def test_right_reprojection_is_valid(small_dataset: Path) -> None:
     add_panoramas(small_dataset)
-    result = validation.validate(small_dataset, ["panorama"])
+    result = validate(small_dataset, ["panorama"])
     assert failed(result) == []
     assert check(result, "panorama/geometry").passed
     assert check(result, "panorama/marks").passed
     assert check(result, "panorama/views").detail == "12 of 12 images are there"
     assert "panorama/dynamic_mask_view_0003f.png" in result.checksums
-    assert failed(validation.validate(small_dataset)) == ["files"]
+    assert failed(validate(small_dataset)) == ["files"]
 
 
 WRONG_REPROJECTIONS: dict[str, tuple[Callable[[dict[str, np.ndarray]], Any], str]] = {
@@ -691,7 +695,7 @@ WRONG_REPROJECTIONS: dict[str, tuple[Callable[[dict[str, np.ndarray]], Any], str
 def test_wrong_reprojection_fails(case: str, small_dataset: Path) -> None:
     spoil, name = WRONG_REPROJECTIONS[case]
     add_panoramas(small_dataset, spoil)
-    result = validation.validate(small_dataset, ["panorama"])
+    result = validate(small_dataset, ["panorama"])
     assert f"panorama/{name}" in failed(result)
     assert all(check.startswith("panorama/") for check in failed(result))
 
@@ -699,7 +703,7 @@ def test_wrong_reprojection_fails(case: str, small_dataset: Path) -> None:
 def test_missing_picture_of_a_reprojection_is_named(small_dataset: Path) -> None:
     add_panoramas(small_dataset)
     (small_dataset / "panorama" / "view_0004f.png").unlink()
-    result = validation.validate(small_dataset, ["panorama"])
+    result = validate(small_dataset, ["panorama"])
     assert failed(result) == ["panorama/views"]
     assert check(result, "panorama/views").problems == ["panorama/view_0004f.png: is missing"]
 
@@ -806,12 +810,12 @@ def cycles_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_cycles_dataset_is_valid_with_margin(cycles_dataset: Path) -> None:
-    result = validation.validate(cycles_dataset)
+    result = validate(cycles_dataset)
     assert failed(result) == []
     figures = check(result, "geometry").figures
     assert figures["points"] > 3000
-    assert figures["worst_contradiction"] < validation.CONTRADICTIONS_LIMIT / 3
-    assert figures["worst_displacement_pixels"] < validation.DISPLACEMENT_LIMIT / 2
+    assert figures["worst_contradiction"] < geometry.CONTRADICTIONS_LIMIT / 3
+    assert figures["worst_displacement_pixels"] < geometry.DISPLACEMENT_LIMIT / 2
 
 
 @pytest.mark.parametrize("change", [move(BAD, (0, 0.05, 0)), turn([BAD], degrees(0, 1))])
@@ -820,4 +824,4 @@ def test_cycles_view_off_its_pose_is_named(
 ) -> None:
     dataset = Path(shutil.copytree(cycles_dataset, tmp_path / "yard" / "sphere"))
     relist(dataset, change)
-    assert check(validation.validate(dataset), "geometry").views == [names(dataset)[BAD]]
+    assert check(validate(dataset), "geometry").views == [names(dataset)[BAD]]

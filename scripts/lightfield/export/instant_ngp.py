@@ -1,13 +1,28 @@
-"""What instant-ngp's loader reads: transforms.json, masks, depth maps, and EXR files it accepts.
+"""transforms.json, with which instant-ngp opens a dataset, and the masks and copies that it needs.
 
-The loader's reading (instant-ngp, ``src/nerf_loader.cu`` and ``common_device.cuh``): it negates
-the Y and Z axes of each camera, maps a position p to p · ``scale`` + ``offset`` and cycles the
-axes (x, y, z) to (y, z, x). World points are given to it in SILVR's orientation: (x, y, z)
-becomes (y, −x, z). Training happens in the cube of side ``aabb_scale`` around (½, ½, ½).
+Frames come in the order and, with --scale and --offset, with the numbers of SILVR's
+generate_NERF_transforms.py. Perspective views, fisheye views and full panoramas go as they are.
+
+instant-ngp does not hide the pixels outside a fisheye's image circle by itself: for PNG views
+this writes dynamic_mask_<name>.png beside each view that has such pixels. It refuses EXR files
+whose channels differ in type (half colour beside float depth), and hides pixels of an EXR only by
+negative colour: EXR views are therefore copied to --exr-dir as R, G, B alone.
+
+Give instant-ngp the transforms.json itself: of a folder it opens every .json, and lightfield.json
+is not for it.
 """
 
+# The loader's reading (instant-ngp, ``src/nerf_loader.cu`` and ``common_device.cuh``): it negates
+# the Y and Z axes of each camera, maps a position p to p · ``scale`` + ``offset`` and cycles the
+# axes (x, y, z) to (y, z, x). World points are given to it in SILVR's orientation: (x, y, z)
+# becomes (y, −x, z). Training happens in the cube of side ``aabb_scale`` around (½, ½, ½).
+
+import argparse
 import math
-from collections.abc import Sequence
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,10 +30,15 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import read_json, write_json
+from lightfield.core.progress import Progress
+from lightfield.dataset.lightfield import LightField, View
 from lightfield.geometry.depth import distance_from_z, z_from_distance
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
-from lightfield.geometry.rigs import Pose
+from lightfield.geometry.rotations import euler_to_matrix
+from lightfield.imaging import images
+from lightfield.validation.files import Manifest
 
 Floats = NDArray[np.float64]
 
@@ -28,17 +48,244 @@ TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 DEPTH_UNIT = 0.001
 """Metres of one step of a 16-bit depth map; what lies beyond 65.535 m has no depth there."""
 
-RIG_SHARE = 0.2
+RIG_PART = 0.2
 """Part of the unit cube's side that the rig takes where nothing else is known of the scene."""
+
+MASK = "dynamic_mask_{view}.png"
+"""Beside a PNG view: the loader trains on no pixel where this is above 0."""
 
 _FIT_LIMIT = 0.25  # pixels by which the loader's polynomial may miss a fisheye's ray
 
+# Enough views to know how far the scene reaches, and pixels of each.
+_BOUNDS_VIEWS = 64
+_BOUNDS_PIXELS = 64
 
-def transform_matrix(pose: Pose) -> Floats:
-    """Return the (4, 4) camera-to-world matrix of a pose in NeRF coordinates."""
-    turn = np.eye(4)
+
+def _pictures(path: Path) -> list[str]:
+    """Return the images that a transforms.json names, views and depth maps."""
+    try:
+        frames = read_json(path)["frames"]
+        depths = [frame["depth_path"] for frame in frames if "depth_path" in frame]
+        return [str(frame["file_path"]) for frame in frames] + depths
+    except (UserError, LookupError, TypeError):
+        raise UserError(f"{path}: is no JSON with frames, each with a file_path") from None
+
+
+MANIFEST = Manifest("transforms*.json", _pictures, (MASK,))
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the words of this export to a command line."""
+    add = parser.add_argument
+    add("--input-cfg", type=Path, required=True, help="the lightfield.json")
+    add("--output", type=Path, required=True, help="the transforms.json to write")
+    add("--image-dir", type=Path, help="folder of the views (default: that of --input-cfg)")
+    add("--image-suffix", choices=[".png", ".exr"], default=".png")
+    add(
+        "--exr-dir",
+        type=Path,
+        help="folder for the copies of EXR views (default: instant_ngp beside --output)",
+    )
+    add(
+        "--depth-dir",
+        type=Path,
+        help="write 16-bit depth PNGs there, in millimetres, from channel Z of the .exr views",
+    )
+    add("--scale", type=float, help="metres to unit cubes (default: fitted to the scene)")
+    add(
+        "--offset",
+        type=float,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="where the mean camera lies in the unit cube, with --scale (default: 0.5 0.5 0.5)",
+    )
+    add(
+        "--depth-bounds",
+        action="store_true",
+        help="fit to what channel Z of the .exr views sees: cameras and nine tenths of the points "
+        "fill the unit cube (default: the rig fills a fifth of it)",
+    )
+    add(
+        "--aabb-scale",
+        type=int,
+        choices=[1, 2, 4, 8, 16, 32, 64, 128],
+        help="side of the training volume in unit cubes (instant-ngp's default: 1)",
+    )
+    add(
+        "--render-aabb",
+        type=float,
+        nargs=6,
+        metavar=("X0", "Y0", "Z0", "X1", "Y1", "Z1"),
+        help="the part of the unit cube that instant-ngp shows",
+    )
+    add(
+        "--split",
+        action="store_true",
+        help="also write <output>_train.json and <output>_test.json by the frames' split",
+    )
+
+
+def export(arguments: argparse.Namespace) -> None:
+    """Write a dataset's transforms.json and what it names, as the command line says."""
+    if arguments.scale is None and arguments.offset is not None:
+        raise UserError("--offset: goes with --scale; without it both are fitted")
+    if arguments.scale is not None and not arguments.scale > 0:
+        raise UserError(f"--scale: is {arguments.scale}; must be above 0")
+    writer = _Writer(arguments, LightField.read(arguments.input_cfg))
+    scale, offset = writer.placement()
+    common = writer.lens_keys | {"scale": scale, "offset": offset}
+    if arguments.aabb_scale:
+        common["aabb_scale"] = arguments.aabb_scale
+    if arguments.render_aabb:
+        common["render_aabb"] = [arguments.render_aabb[:3], arguments.render_aabb[3:]]
+    if arguments.depth_dir:
+        common["integer_depth_scale"] = DEPTH_UNIT
+    frames = writer.frames()
+    write_json(arguments.output, common | {"frames": frames})
+    print(f"{arguments.output}: {len(frames)} frames, scale {scale:.6g}, offset {offset}")
+    for part in ("train", "test") if arguments.split else ():
+        pairs = zip(frames, writer.lightfield.views, strict=True)
+        chosen = [frame for frame, view in pairs if view.split == part]
+        if not chosen:
+            raise UserError(f"{arguments.input_cfg}: frames: none has the split {part!r}")
+        path = arguments.output.with_stem(f"{arguments.output.stem}_{part}")
+        write_json(path, common | {"frames": chosen})
+        print(f"{path}: {len(chosen)} frames")
+
+
+class _Writer:
+    """Writes what a transforms.json names, view by view."""
+
+    def __init__(self, arguments: argparse.Namespace, lightfield: LightField) -> None:
+        self.arguments = arguments
+        self.lightfield = lightfield
+        self.lens = lightfield.lens
+        try:
+            self.lens_keys = lens_keys(self.lens)
+        except UserError as error:
+            raise UserError(f"{lightfield.path}: {error}") from None
+        self.rays = self.lens.pixel_rays()
+        self.blind = blind_pixels(self.lens)
+        self.image_dir: Path = arguments.image_dir or lightfield.folder
+        self.exr_dir: Path = arguments.exr_dir or arguments.output.parent / "instant_ngp"
+
+    def placement(self) -> tuple[float, list[float]]:
+        """Return scale and offset: as given, or fitted to what the views see, or to the rig."""
+        cameras = np.array([view.position for view in self.lightfield.views])
+        if self.arguments.scale is not None:
+            offset = self.arguments.offset or (0.5, 0.5, 0.5)
+            return self.arguments.scale, placed(cameras, self.arguments.scale, offset)
+        if not self.arguments.depth_bounds:
+            return fitted_to_rig(cameras)
+        points = np.concatenate(list(self.seen_points()))
+        if not len(points):
+            raise UserError(f"{self.image_dir}: no view sees anything at a finite depth")
+        return fitted(*scene_bounds(cameras, points))
+
+    def seen_points(self) -> Iterator[Floats]:
+        """Yield world points (n, 3) seen by views spread over the rig."""
+        views = self.lightfield.views
+        count = min(_BOUNDS_VIEWS, len(views))
+        step = max(1, max(self.lens.width, self.lens.height) // _BOUNDS_PIXELS)
+        part = np.s_[step // 2 :: step, step // 2 :: step]
+        for index in np.unique(np.linspace(0, len(views) - 1, count).round().astype(int)):
+            depth, meaning = self.depth(views[index])
+            yield world_points(depth[part], meaning, self.rays[part], views[index])
+
+    def frames(self) -> list[dict[str, Any]]:
+        """Write every view's files and return the frames that name them."""
+        progress = Progress(len(self.lightfield.views), "export")
+        frames = []
+        missing = []
+        for view in self.lightfield.views:
+            image = self.image_dir / f"{view.name}{self.arguments.image_suffix}"
+            if self.arguments.image_suffix == ".exr":
+                image = self.copied_exr(image)
+            else:
+                missing += [] if image.is_file() else [image]
+                self.write_mask(view, image)
+            frame: dict[str, Any] = {
+                "file_path": self.relative(image),
+                "transform_matrix": transform_matrix(view).tolist(),
+            }
+            if self.arguments.depth_dir:
+                path = self.arguments.depth_dir / f"{view.name}.png"
+                images.write_png(path, depth_map(*self.depth(view), self.lens, self.rays))
+                frame["depth_path"] = self.relative(path)
+            frames.append(frame)
+            progress.done()
+        if missing:
+            print(
+                f"warning: {len(missing)} images are not there, the first is {missing[0]}",
+                file=sys.stderr,
+            )
+        return frames
+
+    def relative(self, path: Path) -> str:
+        """Return a path as seen from the transforms.json."""
+        start = self.arguments.output.parent.resolve()
+        return Path(os.path.relpath(path.resolve(), start)).as_posix()
+
+    def depth(self, view: View) -> tuple[NDArray[Any], str]:
+        """Return a view's channel Z and whether it is "z" or "distance"."""
+        path = self.image_dir / f"{view.name}.exr"
+        image = images.read_image(path, ["Z"])
+        self.check_size(path, image.channels["Z"])
+        meaning = image.attributes.get(images.DEPTH_ATTRIBUTE, self.lightfield.depth)
+        if meaning not in ("z", "distance"):
+            raise UserError(
+                f"{self.lightfield.path}: depth: is {meaning!r}; must be z or distance "
+                "to say what channel Z of the views holds"
+            )
+        return image.channels["Z"], str(meaning)
+
+    def check_size(self, path: Path, pixels: NDArray[Any]) -> None:
+        height, width = pixels.shape[:2]
+        if (width, height) != (self.lens.width, self.lens.height):
+            raise UserError(
+                f"{path}: is {width} × {height}, but {self.lightfield.path} says "
+                f"{self.lens.width} × {self.lens.height}"
+            )
+
+    def copied_exr(self, source: Path) -> Path:
+        """Copy R, G, B as half floats, with −1 in pixels that instant-ngp must not train on."""
+        channels = images.read_image(source).channels
+        missing = [name for name in "RGB" if name not in channels]
+        if missing:
+            raise UserError(f"{source}: has no channel {missing[0]}")
+        self.check_size(source, channels["R"])
+        hidden = self.blind | np.isnan(channels.get("Z", np.zeros(1)))
+        target = self.exr_dir / source.name
+        images.write_exr(
+            target,
+            {name: np.where(hidden, -1, channels[name]).astype(np.float16) for name in "RGB"},
+        )
+        return target
+
+    def write_mask(self, view: View, image: Path) -> None:
+        """Write the mask of a PNG view if it has pixels without a ray or without a source."""
+        hidden = self.blind
+        if image.is_file():
+            channels = images.read_image(image).channels
+            self.check_size(image, next(iter(channels.values())))
+            if "A" in channels:
+                hidden = hidden | (channels["A"] == 0)
+        if hidden.any():
+            mask = np.where(hidden, 255, 0).astype(np.uint8)
+            images.write_png(image.with_name(MASK.format(view=view.name)), mask)
+
+
+def transform_matrix(view: View) -> Floats:
+    """Return the (4, 4) camera-to-world matrix of a view in NeRF coordinates.
+
+    It follows from the angles, as in all files published so far; ``world_matrix`` is rounded, and
+    differs from it by 1e-12.
+    """
+    turn, matrix = np.eye(4), np.eye(4)
     turn[:3, :3] = TURN
-    return turn @ pose.matrix()
+    matrix[:3, :3] = euler_to_matrix(view.rotation)
+    matrix[:3, 3] = view.position
+    return turn @ matrix
 
 
 def lens_keys(lens: Lens) -> dict[str, Any]:
@@ -73,14 +320,6 @@ def lens_keys(lens: Lens) -> dict[str, Any]:
     return {"fl_x": focal, "fl_y": focal, **keys, **named}
 
 
-def reads_z_depth(lens: Lens) -> bool:
-    """Whether the loader takes depth along the axis: it scales it by its ray's length.
-
-    A perspective ray has length 1 along the axis, all other rays have length 1 themselves.
-    """
-    return isinstance(lens, Rectilinear)
-
-
 def blind_pixels(lens: Lens) -> NDArray[np.bool_]:
     """Return (height, width) flags of pixels without a ray, in the lens or in the loader.
 
@@ -96,30 +335,34 @@ def blind_pixels(lens: Lens) -> NDArray[np.bool_]:
     return blind
 
 
-def depth_map(depth: NDArray[Any], meaning: str, rays: NDArray[Any], as_z: bool) -> Any:
-    """Return a (height, width) uint16 depth map in steps of `DEPTH_UNIT`, 0 where there is none.
+def depth_map(
+    depth: NDArray[Any], meaning: str, lens: Lens, rays: NDArray[Any]
+) -> NDArray[np.uint16]:
+    """Return a (height, width) depth map in steps of `DEPTH_UNIT`, 0 where there is none.
 
-    ``meaning`` of ``depth`` is "z" or "distance", ``rays`` are the pixels' unit rays. A depth
-    of 0 is no depth to the loader; misses, unknown and farther points become that.
+    ``meaning`` of ``depth`` is "z" or "distance", ``rays`` are the pixels' unit rays. The loader
+    scales a depth by its ray's length, which is 1 along the axis for perspective rays (so it reads
+    Z-depth), and 1 itself for all others. A depth of 0 is no depth to it; misses, unknown and
+    farther points become that.
     """
     values = depth.astype(np.float64)
-    if as_z and meaning == "distance":
+    reads_z = isinstance(lens, Rectilinear)
+    if reads_z and meaning == "distance":
         values = z_from_distance(values, rays)
-    elif not as_z and meaning == "z":
+    elif not reads_z and meaning == "z":
         values = distance_from_z(values, rays)
     steps = np.round(values / DEPTH_UNIT)
     valid = np.isfinite(steps) & (steps >= 1) & (steps <= np.iinfo(np.uint16).max)
     return np.where(valid, steps, 0).astype(np.uint16)
 
 
-def world_points(depth: NDArray[Any], meaning: str, rays: NDArray[Any], pose: Pose) -> Floats:
+def world_points(depth: NDArray[Any], meaning: str, rays: NDArray[Any], view: View) -> Floats:
     """Return the (n, 3) world points, in metres, that the pixels of one view have seen."""
     distance = depth.astype(np.float64)
     if meaning == "z":
         distance = distance_from_z(distance, rays)
     points = (rays * distance[..., None])[np.isfinite(distance)]
-    matrix = pose.matrix()
-    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
+    return np.asarray(points @ view.matrix[:3, :3].T + view.matrix[:3, 3])
 
 
 def scene_bounds(cameras: Floats, points: Floats) -> tuple[Floats, Floats]:
@@ -142,9 +385,9 @@ def fitted(low: Floats, high: Floats) -> tuple[float, list[float]]:
 
 
 def fitted_to_rig(cameras: Floats) -> tuple[float, list[float]]:
-    """Return the scale and offset that put the rig in the cube's middle, `RIG_SHARE` wide."""
+    """Return the scale and offset that put the rig in the cube's middle, `RIG_PART` wide."""
     center = (cameras.min(axis=0) + cameras.max(axis=0)) / 2
-    half = (cameras.max(axis=0) - cameras.min(axis=0)) / 2 / RIG_SHARE
+    half = (cameras.max(axis=0) - cameras.min(axis=0)) / 2 / RIG_PART
     return fitted(center - half, center + half)
 
 

@@ -19,7 +19,7 @@ distances (Chen and Medioni 1992).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 from statistics import fmean
 from typing import Any
 
@@ -49,6 +49,9 @@ FEWEST_POINTS = 30
 NEIGHBOURS = 6
 # Among so many of the nearest views are the farther neighbours.
 NEIGHBOURHOOD = 48
+
+# Residuals beyond this many footprints are another surface, not a slightly wrong view.
+SAME_SURFACE = 1.0
 
 UNKNOWN, AGREE, OCCLUDED, CONTRADICT = 0, 1, 2, 3
 
@@ -106,7 +109,7 @@ class Patches:
         return len(self.points)
 
     def __getitem__(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> "Patches":
-        return Patches(*(getattr(self, field.name)[which] for field in fields(self)))
+        return Patches(*(getattr(self, each.name)[which] for each in fields(self)))
 
 
 def _patches(
@@ -186,6 +189,13 @@ class Comparison:
     residual: Array
     footprint: Array
 
+    def measuring(self) -> "Comparison | None":
+        """Return the part that says how far the surfaces are apart; None if it is too small."""
+        used = self.fine & (np.abs(self.residual) < SAME_SURFACE)
+        if used.sum() < FEWEST_POINTS:
+            return None
+        return Comparison(*(getattr(self, each.name)[used] for each in fields(self)))
+
 
 def _looks_for(asked: Patches, camera: Camera) -> tuple[NDArray[np.bool_], Array]:
     """Return which patches turn towards a view and lie in it, and at which pixels (n, 2)."""
@@ -247,27 +257,19 @@ def _recorded_range(
     return distance.min(axis=1), distance.max(axis=1)
 
 
-# Residuals beyond this many footprints are another surface, not a slightly wrong view.
-_SAME_SURFACE = 1.0
-
-
-def displacement(comparison: Comparison, camera: Camera) -> float | None:
+def displacement(measured: Comparison, camera: Camera) -> float:
     """Return by how many pixels the asked patches must move to lie on the found ones.
 
     The rigid motion about ``camera``, which found them, that makes the residuals least, in the
     directions that they determine; its root mean square over the points, in pixel footprints.
-    None: too few residuals.
     """
-    used = comparison.fine & (np.abs(comparison.residual) < _SAME_SURFACE)
-    if used.sum() < FEWEST_POINTS:
-        return None
-    residual, found = comparison.residual[used], comparison.found[used]
-    points, footprint = comparison.asked.points[used], comparison.footprint[used, np.newaxis]
-    arms = (points - camera.position) / footprint
+    residual, normals = measured.residual, measured.found.normals
+    footprint = measured.footprint[:, np.newaxis]
+    arms = (measured.asked.points - camera.position) / footprint
     # Unknowns of like size: both in pixels, the rotation as seen at the median distance.
     arms /= np.median(np.linalg.norm(arms, axis=1))
     size = np.median(footprint)
-    rows = np.hstack([found.normals * size / footprint, np.cross(arms, found.normals)])
+    rows = np.hstack([normals * size / footprint, np.cross(arms, normals)])
     motion = np.zeros(6)
     for _ in range(5):
         root = np.sqrt(_huber(residual + rows @ motion))
@@ -283,45 +285,22 @@ def _huber(residual: Array) -> Array:
     return weights
 
 
-@dataclass(frozen=True)
-class ScaleTerms:
-    """What one comparison adds to the least squares of `scales`."""
+def scale_moments(measured: Comparison, asking: Camera, answering: Camera) -> Array:
+    """Return what one comparison adds to the least squares of `scales`: moments (3, 3).
 
-    squares: Array
-    products: Array
-    residual: float
-    count: int
-
-    def __add__(self, other: "ScaleTerms") -> "ScaleTerms":
-        return ScaleTerms(
-            self.squares + other.squares,
-            self.products + other.products,
-            self.residual + other.residual,
-            self.count + other.count,
-        )
-
-
-def scale_terms(comparison: Comparison, asking: Camera, answering: Camera) -> ScaleTerms:
-    """Return the terms of one comparison's residuals for `scales`."""
-    used = comparison.fine & (np.abs(comparison.residual) < _SAME_SURFACE)
-    if used.sum() < FEWEST_POINTS:
-        return ScaleTerms(np.zeros((2, 2)), np.zeros(2), 0.0, 0)
-    residual, footprint = comparison.residual[used], comparison.footprint[used]
-    asked, found = comparison.asked[used], comparison.found[used]
+    They are the weighted sums of products of how the residual grows with the scale of all angles,
+    how with that of all depths, and minus the residual itself.
+    """
+    asked, found = measured.asked, measured.found
     # Where the two surfaces go when every angle from the axis, or every depth, grows.
     by_angle = _outwards(asking, asked.points) - _outwards(answering, found.points)
     by_depth = answering.position - asking.position
-    rows = np.stack(
+    grows = np.stack(
         [np.einsum("ij,ij->i", found.normals, by_angle), found.normals @ by_depth], axis=1
     )
-    rows /= footprint[:, np.newaxis]
-    weights = _huber(residual)
-    return ScaleTerms(
-        (rows * weights[:, np.newaxis]).T @ rows,
-        -(rows * weights[:, np.newaxis]).T @ residual,
-        float((weights * residual**2).sum()),
-        int(used.sum()),
-    )
+    columns = np.column_stack([grows / measured.footprint[:, np.newaxis], -measured.residual])
+    moments: Array = (columns * _huber(measured.residual)[:, np.newaxis]).T @ columns
+    return moments
 
 
 def _outwards(camera: Camera, points: Array) -> Array:
@@ -334,19 +313,6 @@ def _outwards(camera: Camera, points: Array) -> Array:
     tangent = (arms * cosine - axis * distance) / np.maximum(sine, 1e-12)
     outwards: Array = np.arctan2(sine, cosine) * tangent
     return outwards
-
-
-def scales(terms: ScaleTerms) -> tuple[Array, Array]:
-    """Return by which part all angles from the axis and all depths must grow, and their deviation.
-
-    Two arrays (2,): angle and depth. A deviation is inf where the residuals do not determine it.
-    """
-    if terms.count < FEWEST_POINTS or np.linalg.cond(terms.squares) > 1e9:
-        return np.zeros(2), np.full(2, np.inf)
-    inverse = np.linalg.inv(terms.squares)
-    found = inverse @ terms.products
-    left = max(terms.residual - float(found @ terms.products), 0.0)
-    return found, np.sqrt(np.diagonal(inverse) * left / terms.count)
 
 
 def neighbours(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tuple[int, int]]:
@@ -383,14 +349,16 @@ def neighbours(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tu
 class Answer:
     """What one view says of another's patches, or two of each other's, in a few numbers.
 
-    Counts of points by verdict; ``displacement`` as that function gives it, in pixels, or None.
+    Counts of points by verdict; ``displacement`` as that function gives it, in pixels, or None;
+    ``moments`` (3, 3) of the ``measured`` points that `scales` uses.
     """
 
-    agree: int
-    occluded: int
-    contradict: int
-    displacement: float | None
-    terms: ScaleTerms
+    agree: int = 0
+    occluded: int = 0
+    contradict: int = 0
+    displacement: float | None = None
+    moments: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    measured: int = 0
 
     @property
     def contradiction(self) -> float | None:
@@ -405,22 +373,40 @@ class Answer:
             self.occluded + other.occluded,
             self.contradict + other.contradict,
             fmean(known) if known else None,
-            self.terms + other.terms,
+            self.moments + other.moments,
+            self.measured + other.measured,
         )
+
+
+NOTHING = Answer()
+"""The sum of no answers."""
 
 
 def ask(patches: Patches, asking: Camera, answering: Camera, depth: NDArray[Any]) -> Answer:
     """Look for the ``patches`` of one view in another, whose ``depth`` is (height, width)."""
     comparison = compare(patches, answering, depth)
     counts = np.bincount(comparison.verdict, minlength=4)
-    return Answer(
-        int(counts[AGREE]),
-        int(counts[OCCLUDED]),
-        int(counts[CONTRADICT]),
-        displacement(comparison, answering),
-        scale_terms(comparison, asking, answering),
+    answer = Answer(int(counts[AGREE]), int(counts[OCCLUDED]), int(counts[CONTRADICT]))
+    measured = comparison.measuring()
+    if measured is None:
+        return answer
+    return replace(
+        answer,
+        displacement=displacement(measured, answering),
+        moments=scale_moments(measured, asking, answering),
+        measured=len(measured.residual),
     )
 
 
-NOTHING = Answer(0, 0, 0, None, ScaleTerms(np.zeros((2, 2)), np.zeros(2), 0.0, 0))
-"""The sum of no answers."""
+def scales(answers: Answer) -> tuple[Array, Array]:
+    """Return by which part all angles from the axis and all depths must grow, and their deviation.
+
+    Two arrays (2,): angle and depth. A deviation is inf where the residuals do not determine it.
+    """
+    squares, products = answers.moments[:2, :2], answers.moments[:2, 2]
+    if answers.measured < FEWEST_POINTS or np.linalg.cond(squares) > 1e9:
+        return np.zeros(2), np.full(2, np.inf)
+    inverse = np.linalg.inv(squares)
+    found = inverse @ products
+    left = max(float(answers.moments[2, 2] - found @ products), 0.0)
+    return found, np.sqrt(np.diagonal(inverse) * left / answers.measured)

@@ -1,7 +1,7 @@
-"""What each image of a dataset tells by itself: is it whole, and does it hold what it must?"""
+"""What each image of a dataset shows by itself: is it whole, and does it hold what it must?"""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,9 @@ from lightfield.core.files import sha256
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.imaging import images
 from lightfield.validation import consistency
-from lightfield.validation.consistency import Answer, Camera, Patches
+from lightfield.validation.consistency import Answer, Patches
+from lightfield.validation.files import File, ImageSet, rendered
+from lightfield.validation.result import Check
 
 Bools = NDArray[np.bool_]
 
@@ -30,49 +32,9 @@ MOST_LIT_OUTSIDE, FAINT = 0.05, 0.001
 MOST_REGIONS = 16
 
 
-@dataclass(frozen=True)
-class ImageSet:
-    """The views of one lightfield.json: the dataset's own (``name`` "") or a reprojection's.
-
-    ``folder`` holds the images, relative to the dataset; ``depth`` is what channel Z means, or
-    None; ``matrices`` (n, 4, 4) are camera-to-world; ``grain`` is the angle in radians between the
-    pixels at the centre of the views from which these were reprojected, 0 for rendered views.
-    """
-
-    name: str
-    folder: str
-    lens: Lens
-    depth: str | None
-    views: list[str]
-    matrices: NDArray[np.float64]
-    grain: float = 0.0
-
-    @property
-    def prefix(self) -> str:
-        """What its files' paths and its checks' names begin with."""
-        return f"{self.name}/" if self.name else ""
-
-    def camera(self, view: int) -> Camera:
-        assert self.depth is not None
-        return Camera(self.lens, self.matrices[view], self.depth, self.grain)
-
-
-@dataclass(frozen=True)
-class File:
-    """An image file: ``path`` relative to the dataset, and the set and view that it is of.
-
-    What is no view (a mask, a depth map, a picture for a trainer) has ``view`` −1, and has only to
-    be readable and of its set's size.
-    """
-
-    path: str
-    set: int
-    view: int = -1
-
-
 @dataclass
 class Facts:
-    """What one file tells by itself; ``problems`` by the check to which they belong.
+    """What one file shows by itself; ``problems`` by the check to which they belong.
 
     ``clamped`` and ``nan`` are the renderer's counts, ``marked`` whether the pixels without a
     source could be compared, ``constant`` whether a reprojected view has one colour (as a piece of
@@ -98,10 +60,11 @@ class Examiner:
         self.regions: dict[Any, tuple[Bools, Bools]] = {}
 
     def examine(self, file: File) -> Facts:
-        """Read an image file whole and tell everything that it tells by itself."""
+        """Read an image file whole and find out what it shows by itself."""
         path = self.dataset / file.path
         facts = Facts(sha256(path), path.stat().st_size)
         image_set = self.sets[file.set]
+        lens = image_set.lightfield.lens
         try:
             image = images.read_image(path)
         except UserError as error:
@@ -109,9 +72,9 @@ class Examiner:
             facts.problems["images"] = text.replace(str(path), file.path)
             return facts
         height, width = next(iter(image.channels.values())).shape
-        if (width, height) != (image_set.lens.width, image_set.lens.height):
+        if (width, height) != (lens.width, lens.height):
             facts.problems["images"] = (
-                f"is {width} × {height}; must be {image_set.lens.width} × {image_set.lens.height}"
+                f"is {width} × {height}; must be {lens.width} × {lens.height}"
             )
         elif file.view >= 0:
             problem = _format_problem(file, image_set, image)
@@ -133,20 +96,21 @@ class Examiner:
 
     def _examine_view(self, file: File, image: images.Image, facts: Facts) -> None:
         image_set = self.sets[file.set]
-        rendered = not image_set.name
-        seen, outside = self._of_lens(image_set.lens)
+        lens, meaning = image_set.lightfield.lens, image_set.lightfield.depth
+        is_rendered = not image_set.name
+        seen, outside = self._of_lens(lens)
         depth = image.channels.get("Z")
         empty = depth is not None and bool(np.isposinf(depth).all())
         colour = [image.channels[name] for name in "RGB"]
-        middle = (image_set.lens.height // 2, image_set.lens.width // 2)
+        middle = (lens.height // 2, lens.width // 2)
         others = max(int(((channel != channel[middle]) & seen).sum()) for channel in colour)
         constant = others <= FEW * int(seen.sum())
-        facts.constant = constant and not rendered
+        facts.constant = constant and not is_rendered
         problems = _colour_problems(colour)
-        if constant and rendered and not empty:
+        if constant and is_rendered and not empty:
             problems.append("has one colour everywhere")
         # Cycles leaves a few values of 1e-6 there, and its denoiser a little more.
-        if rendered and outside.any():
+        if is_rendered and outside.any():
             lit = np.mean([channel[outside] > FAINT for channel in colour])
             if lit > MOST_LIT_OUTSIDE:
                 problems.append("has colour where the lens sees nothing")
@@ -154,13 +118,13 @@ class Examiner:
             facts.problems["colour"] = ", ".join(problems)
         if depth is not None:
             problems = []
-            meaning = image.attributes.get(images.DEPTH_ATTRIBUTE, image_set.depth)
-            if meaning != image_set.depth:
-                problems.append(f"is {meaning!r} by its header, {image_set.depth!r} by its list")
+            header = image.attributes.get(images.DEPTH_ATTRIBUTE, meaning)
+            if header != meaning:
+                problems.append(f"is {header!r} by its header, {meaning!r} by its list")
             unknown = int(np.isnan(depth).sum())
-            if rendered and unknown:
+            if is_rendered and unknown:
                 problems.append(f"{unknown} depths are not a number")
-            if rendered and not np.isposinf(depth[outside]).all():
+            if is_rendered and not np.isposinf(depth[outside]).all():
                 problems.append("has depth where the lens sees nothing")
             wrong = int((depth <= 0).sum())
             problems += [f"{wrong} depths are not positive"] if wrong else []
@@ -168,7 +132,7 @@ class Examiner:
                 facts.problems["depth"] = ", ".join(problems)
             camera = image_set.camera(file.view)
             facts.patches = consistency.sample(camera, depth, RAYS_A_VIEW)
-        if not rendered:
+        if not is_rendered:
             self._compare_marks(file, image, facts)
         elif images.NAN_ATTRIBUTE in image.attributes:
             facts.nan = int(image.attributes[images.NAN_ATTRIBUTE])
@@ -213,27 +177,79 @@ class Examiner:
 
         None: the dataset has no view of the same name at the same place.
         """
-        target, source = self.sets[file.set], self.sets[0]
+        target, source = self.sets[file.set], rendered(self.sets)
+        views = source.views if source else []
         name = target.views[file.view]
-        if name not in source.views:  # a face of a cube map is named for its view, and itself
+        if name not in views:  # a face of a cube map is named for its view, and itself
             name = name.rpartition("_")[0]
-        if source.name or name not in source.views:
+        if source is None or name not in views:
             return None
-        to_world, from_world = target.matrices[file.view], source.matrices[source.views.index(name)]
+        lens, from_lens = target.lightfield.lens, source.lightfield.lens
+        to_world = target.lightfield.matrices[file.view]
+        from_world = source.lightfield.matrices[views.index(name)]
         if np.abs(to_world[:3, 3] - from_world[:3, 3]).max() > 1e-5:
             return None
         # Rounded, and free of −0, so that views turned alike share one answer.
         turn = np.round(from_world[:3, :3].T @ to_world[:3, :3], 5).astype(np.float32) + 0
-        key = (target.lens, turn.tobytes())
+        key = (lens, turn.tobytes())
         if key not in self.regions:
-            pixels = source.lens.pixels(target.lens.pixel_rays(np.float32) @ turn.T)
-            frame = np.array([source.lens.width, source.lens.height], np.float32)
+            pixels = from_lens.pixels(lens.pixel_rays(np.float32) @ turn.T)
+            frame = np.array([from_lens.width, from_lens.height], np.float32)
             with np.errstate(invalid="ignore"):
                 seen = ((pixels >= 0) & (pixels <= frame)).all(axis=-1)
             if len(self.regions) > MOST_REGIONS:
                 self.regions.clear()
             self.regions[key] = _inner(seen), _inner(~seen)
         return self.regions[key]
+
+
+def checks(image_set: ImageSet, own: Mapping[File, Facts]) -> list[Check]:
+    """Return the checks that each image of a set passes or fails by itself."""
+    readable = {file: fact for file, fact in own.items() if "images" not in fact.problems}
+    checks = [
+        _outcome(image_set, "images", own, "are whole, of the right size and channels"),
+        _outcome(image_set, "colour", readable, "have finite colours, and are not black"),
+    ]
+    deep = {file: fact for file, fact in readable.items() if fact.patches is not None}
+    checks.append(_outcome(image_set, "depth", deep, "have positive depths, misses +inf"))
+    constant = sum(fact.constant for fact in readable.values())
+    if constant:
+        checks[1].warnings.append(f"{constant} images in {image_set.folder} have one colour")
+    if image_set.name:
+        marked = {file: fact for file, fact in readable.items() if fact.marked}
+        text = "mark the pixels that their source cannot see"
+        return [*checks, _outcome(image_set, "marks", marked, text)]
+    counted = {file: fact for file, fact in readable.items() if fact.nan is not None}
+    check = _outcome(image_set, "counts", counted, "have their renderer's counts, without NaN")
+    clamped = [fact.clamped for fact in counted.values() if fact.clamped]
+    if clamped:
+        text = f"{sum(clamped)} values in {len(clamped)} views were clamped to the half range"
+        check.warnings.append(text)
+    check.figures["clamped"] = sum(clamped)
+    return [*checks, check]
+
+
+def _outcome(image_set: ImageSet, name: str, own: Mapping[File, Facts], claim: str) -> Check:
+    """Return a check of what the facts say about ``name``."""
+    bad = [file for file, fact in own.items() if name in fact.problems]
+    return Check(
+        f"{image_set.prefix}{name}",
+        not bad if own else None,
+        f"{len(own) - len(bad)} of {len(own)} {claim}"
+        if own
+        else f"no image to see if they {claim}",
+        sorted({image_set.views[file.view] for file in bad}),
+        [f"{file.path}: {own[file].problems[name]}" for file in bad],
+    )
+
+
+def with_extras(exports: Check, extras: Mapping[File, Facts]) -> Check:
+    """Return the check of what was made for trainers, with the pictures that cannot be read."""
+    problems = [
+        f"{file.path}: {text}" for file, fact in extras.items() for text in fact.problems.values()
+    ]
+    passed = False if problems else exports.passed
+    return replace(exports, passed=passed, problems=exports.problems + problems)
 
 
 def _inner(region: Bools) -> Bools:
@@ -250,7 +266,7 @@ def _format_problem(file: File, image_set: ImageSet, image: images.Image) -> str
         wanted = dict.fromkeys(colour, "uint16" if found.get("R") == "uint16" else "uint8")
     else:
         wanted = dict.fromkeys(colour, "float16")
-        if image_set.depth:
+        if image_set.lightfield.depth:
             wanted["Z"] = "float16" if found.get("Z") == "float16" else "float32"
     if found == wanted:
         return None

@@ -1,0 +1,336 @@
+"""Which files a dataset has: every one of its own is there, and none that is not.
+
+A dataset is a folder with lightfield.json, exr/<view>.exr, and reprojections, each a folder with
+its own lightfield.json and images.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import atomic_path, read_json, sha256
+from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.geometry import rotations
+from lightfield.geometry.lenses import Lens
+from lightfield.validation.consistency import Camera
+from lightfield.validation.result import Check
+
+IMAGES = "exr"
+"""The folder of a dataset's own views."""
+
+SUMS = "sha256sums.txt"
+"""The checksums in a dataset: only a valid one has them."""
+
+OUTPUTS = ("validation.json", SUMS)
+"""The files in a dataset that say what came out of its validation."""
+
+REPORT = "report"
+"""The folder in a dataset that is not published with it."""
+
+BESIDE = "{view}_depth.png"
+"""The picture beside a view that scripts/reproject.py makes with --depth-png."""
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """How one export's files are recognised, and so published and checked.
+
+    ``lists`` is a pattern for files beside a lightfield.json, and ``pictures`` reads one of them:
+    it returns the paths, relative to that file, of images that have the size of the views, and
+    raises `UserError` for what is no such list. ``beside`` are the names of images of that size
+    that a ``{view}`` may have in the folders of those pictures and of the views.
+    """
+
+    lists: str
+    pictures: Callable[[Path], Sequence[str]]
+    beside: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class ImageSet:
+    """The views of one lightfield.json: the dataset's own (``name`` "") or a reprojection's.
+
+    ``grain`` is the angle in radians between the pixels at the centre of the views from which these
+    were reprojected, 0 for rendered views.
+    """
+
+    name: str
+    lightfield: LightField
+    grain: float = 0.0
+
+    @property
+    def folder(self) -> str:
+        """The folder of its images, relative to the dataset."""
+        return self.name or IMAGES
+
+    @property
+    def prefix(self) -> str:
+        """What its files' paths and its checks' names begin with."""
+        return f"{self.name}/" if self.name else ""
+
+    @cached_property
+    def views(self) -> list[str]:
+        return [view.name for view in self.lightfield.views]
+
+    def camera(self, view: int) -> Camera:
+        depth = self.lightfield.depth
+        assert depth is not None
+        return Camera(self.lightfield.lens, self.lightfield.matrices[view], depth, self.grain)
+
+
+@dataclass(frozen=True)
+class File:
+    """An image file: ``path`` relative to the dataset, and the set and view that it is of.
+
+    What is no view (a mask, a depth map, a picture for a trainer) has ``view`` −1, and has only to
+    be readable and of its set's size.
+    """
+
+    path: str
+    set: int
+    view: int = -1
+
+
+def read_sets(dataset: Path, reprojections: Iterable[str]) -> tuple[list[ImageSet], list[Check]]:
+    """Read every lightfield.json; return what could be understood, and a check of each."""
+    sets: list[ImageSet] = []
+    checks = []
+    for name in ("", *reprojections):
+        path = dataset / name / NAME
+        try:
+            lightfield = LightField.read(path)
+        except UserError as error:
+            problem = str(error).replace(f"{dataset}/", "")
+            check = f"{name}/lightfield".removeprefix("/")
+            checks.append(Check(check, False, "cannot be understood", problems=[problem]))
+            continue
+        source = rendered(sets)
+        sets.append(
+            ImageSet(name, lightfield, _central_angle(source.lightfield.lens) if source else 0.0)
+        )
+        checks.append(_poses(sets[-1]))
+    return sets, checks
+
+
+def rendered(sets: Sequence[ImageSet]) -> ImageSet | None:
+    """Return the set of the dataset's own views, if it was understood."""
+    return sets[0] if sets and not sets[0].name else None
+
+
+def _poses(image_set: ImageSet) -> Check:
+    """Check that each pose is a rigid one and the same in both forms."""
+    views = image_set.lightfield.views
+    # Blender keeps poses in float32.
+    near = 1e-5 * (1 + max(np.abs(view.position).max() for view in views))
+    faults = []
+    for view in views:
+        difference = (
+            np.abs(rotations.euler_to_matrix(view.rotation) - view.matrix[:3, :3]).max()
+            + np.abs(view.position - view.matrix[:3, 3]).max()
+            + np.abs(view.matrix[3] - (0, 0, 0, 1)).max()
+        )
+        if not difference < near:
+            faults.append(view.name)
+    path, fault = (
+        f"{image_set.prefix}{NAME}",
+        "world_matrix: is not that of its position and rotation",
+    )
+    return Check(
+        f"{image_set.prefix}lightfield",
+        not faults,
+        f"{len(views)} views",
+        faults,
+        [f"{path}: frames: {view}: {fault}" for view in faults],
+    )
+
+
+def _central_angle(lens: Lens) -> float:
+    """Return the angle in radians between two pixels in the middle of the image."""
+    x = np.array([lens.width - 1, lens.width + 1]) / 2
+    one, other = lens.rays(x, np.full(2, lens.height / 2))
+    return float(np.arccos(np.clip(one @ other, -1.0, 1.0)))
+
+
+def of_views(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[Check]]:
+    """Return the views' files that are there, and for each set a check that none is missing.
+
+    A reprojection is EXR, PNG or both: a format of which it has one view, it must have whole.
+    """
+    files: list[File] = []
+    checks = []
+    for number, image_set in enumerate(sets):
+        present = {path.name for path in (dataset / image_set.folder).glob("*")}
+        formats = [
+            suffix
+            for suffix in ((".exr", ".png") if image_set.name else (".exr",))
+            if any(view + suffix in present for view in image_set.views)
+        ]
+        missing = []
+        own = len(files)
+        for suffix in formats or [".exr"]:
+            for view, name in enumerate(image_set.views):
+                path = f"{image_set.folder}/{name}{suffix}"
+                if name + suffix in present:
+                    files.append(File(path, number, view))
+                else:
+                    missing.append(path)
+        own = len(files) - own
+        checks.append(
+            Check(
+                f"{image_set.prefix}views",
+                not missing,
+                f"{own} of {own + len(missing)} images are there",
+                sorted({Path(path).stem for path in missing}),
+                [f"{path}: is missing" for path in missing],
+            )
+        )
+    return files, checks
+
+
+def of_exports(
+    dataset: Path, sets: Sequence[ImageSet], views: Iterable[File], manifests: Sequence[Manifest]
+) -> tuple[list[File], list[str], Check]:
+    """Return the pictures beside the views, the lists of such pictures, and a check of these."""
+    found: dict[str, File] = {}
+    lists: list[str] = []
+    problems: list[str] = []
+    for number, image_set in enumerate(sets):
+        folders = {image_set.folder}
+        for manifest in manifests:
+            for path in sorted((dataset / image_set.name).glob(manifest.lists)):
+                lists.append(path.relative_to(dataset).as_posix())
+                try:
+                    named = manifest.pictures(path)
+                except UserError as error:
+                    problems.append(str(error).replace(f"{dataset}/", ""))
+                    continue
+                for name in named:
+                    target = (path.parent / name).resolve()
+                    if target.is_file() and target.is_relative_to(dataset):
+                        relative = target.relative_to(dataset)
+                        found[relative.as_posix()] = File(relative.as_posix(), number)
+                        folders.add(relative.parent.as_posix())
+                    else:
+                        problems.append(f"{lists[-1]}: {name} is no file of the dataset")
+        patterns = [BESIDE, *(name for manifest in manifests for name in manifest.beside)]
+        for folder in sorted(folders):
+            present = {path.name for path in (dataset / folder).glob("*")}
+            for view in image_set.views:
+                for name in (pattern.format(view=view) for pattern in patterns):
+                    if name in present:
+                        found[f"{folder}/{name}"] = File(f"{folder}/{name}", number)
+    for file in views:
+        found.pop(file.path, None)
+    files = [file for _, file in sorted(found.items())]
+    passed = not problems if lists or files else None
+    detail = f"{len(lists)} lists of frames, {len(files)} pictures beside the views"
+    return files, lists, Check("exports", passed, detail, problems=problems)
+
+
+def listing(
+    dataset: Path, sets: Sequence[ImageSet], known: Iterable[str]
+) -> tuple[list[str], Check]:
+    """Return every file that the dataset publishes, and fail on those that are not its own."""
+    own = {*known, *(f"{image_set.prefix}{NAME}" for image_set in sets)}
+    paths = [path.relative_to(dataset) for path in dataset.rglob("*") if path.is_file()]
+    present = sorted(path.as_posix() for path in paths if path.parts[0] != REPORT)
+    strays = [path for path in present if path not in own and path not in OUTPUTS]
+    published = [path for path in present if path in own]
+    problems = [f"{path}: is no file of this dataset" for path in strays]
+    return published, Check("files", not strays, f"{len(published)} files", problems=problems)
+
+
+def checksums(
+    records: Sequence[Path], found: Mapping[str, tuple[int, str]], sets: Sequence[ImageSet]
+) -> Check:
+    """Compare the images' sizes and SHA-256, by path, with the records of those who wrote them."""
+    if not records:
+        return Check("checksums", None, "no record was given")
+    recorded: dict[str, tuple[int, str]] = {}
+    for record in records:
+        content = read_json(record)
+        try:
+            recorded |= {
+                path: (entry["bytes"], entry["sha256"]) for path, entry in content["files"].items()
+            }
+        except (LookupError, TypeError, AttributeError):
+            raise UserError(f"{record}: files: must map paths to bytes and sha256") from None
+    problems = []
+    for path, (size, digest) in sorted(recorded.items()):
+        if path not in found:
+            problems.append(f"{path}: is recorded but is no image of this dataset")
+        elif size != found[path][0]:
+            problems.append(f"{path}: has {found[path][0]} bytes, but its record says {size}")
+        elif digest != found[path][1]:
+            problems.append(
+                f"{path}: has the sha256 {found[path][1]}, but its record says {digest}"
+            )
+    # Masks and pictures for trainers are not the renderer's.
+    own = rendered(sets)
+    problems += [
+        f"{path}: has no record"
+        for path in sorted(f"{IMAGES}/{view}.exr" for view in (own.views if own else []))
+        if path in found and path not in recorded
+    ]
+    return Check(
+        "checksums",
+        not problems,
+        f"{len(recorded)} of {len(found)} images have a record",
+        sorted({Path(problem.split(":")[0]).stem for problem in problems}),
+        problems,
+    )
+
+
+def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:
+    """Check that no camera of the dataset is inside geometry."""
+    if path is None:
+        return Check("cameras", None, "no clearance was given")
+    content = read_json(path)
+    try:
+        around = {
+            str(name): (float(entry["distance"] or math.inf), bool(entry["inside"]))
+            for name, entry in content["views"].items()
+        }
+    except (LookupError, TypeError, ValueError, AttributeError):
+        raise UserError(f"{path}: views: must map names to distance and inside") from None
+    own = rendered(sets)
+    views = own.views if own else []
+    problems = {view: "its clearance was not measured" for view in views if view not in around}
+    problems |= {
+        view: "its camera is inside geometry" for view in views if around.get(view, (0, 0))[1]
+    }
+    nearest = min((around[view][0] for view in views if view in around), default=math.inf)
+    known = math.isfinite(nearest)
+    return Check(
+        "cameras",
+        not problems,
+        f"nothing is nearer to a camera than {nearest:.3g} m"
+        if known
+        else "nothing is near a camera",
+        list(problems),
+        [f"{IMAGES}/{view}.exr: {text}" for view, text in problems.items()],
+        figures={"nearest_metres": round(nearest, 4)} if known else {},
+    )
+
+
+def remove_leftovers(dataset: Path) -> None:
+    """Remove what killed programs left half-written, and the sums of an earlier validation."""
+    (dataset / SUMS).unlink(missing_ok=True)
+    for leftover in dataset.rglob(".*.tmp.*"):
+        if leftover.relative_to(dataset).parts[0] != REPORT:
+            leftover.unlink()
+
+
+def write_sums(path: Path, checksums: Mapping[str, str], dataset: Path, result: Path) -> None:
+    """Write as sha256sum does: ``checksums`` by path, and ``result``'s if the dataset holds it."""
+    sums = dict(checksums)
+    if result.resolve().is_relative_to(dataset.resolve()):
+        sums[result.resolve().relative_to(dataset.resolve()).as_posix()] = sha256(result)
+    with atomic_path(path) as temporary:
+        text = "".join(f"{digest}  {name}\n" for name, digest in sorted(sums.items()))
+        temporary.write_text(text, encoding="utf-8")

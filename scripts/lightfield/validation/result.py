@@ -1,0 +1,72 @@
+"""What a validation found: a list of checks, and one line of them for a person."""
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+# Of a check that fails in more places than this, the first are printed; validation.json has all.
+_LINES_A_CHECK = 20
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check's outcome: ``passed`` is None where it does not apply, which ``detail`` explains.
+
+    ``views`` are those that failed; ``problems`` are whole lines, each naming a file;
+    ``warnings`` what is allowed but worth a look; ``figures`` what was measured.
+    """
+
+    name: str
+    passed: bool | None
+    detail: str
+    views: list[str] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    figures: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Result:
+    """A dataset's checks, and the SHA-256 of every file that it publishes by relative path."""
+
+    dataset: str
+    views: int
+    checks: list[Check]
+    checksums: dict[str, str]
+
+    @property
+    def valid(self) -> bool:
+        return all(check.passed is not False for check in self.checks)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the content of validation.json."""
+        return {
+            "dataset": self.dataset,
+            "valid": self.valid,
+            "summary": self.summary(),
+            "checks": [asdict(check) for check in self.checks],
+        }
+
+    def summary(self) -> str:
+        """Return one line for a person."""
+        parts = [f"{self.views} views"]
+        parts += [
+            check.name.removesuffix("geometry").replace("/", " ") + check.detail
+            for check in self.checks
+            if check.name.endswith("geometry") and check.figures
+        ]
+        for title, passed in (("failed", False), ("not applicable", None)):
+            names = [check.name for check in self.checks if check.passed is passed]
+            parts += [f"{title}: {', '.join(names)}"] if names else []
+        warnings = [warning for check in self.checks for warning in check.warnings]
+        parts += [f"warning: {'; '.join(warnings)}"] if warnings else []
+        return f"{self.dataset}: {'valid' if self.valid else 'INVALID'}: {'; '.join(parts)}"
+
+    def failures(self) -> list[str]:
+        """Return one line for each thing that is wrong, the first ones of each check."""
+        lines = []
+        for check in self.checks:
+            found = check.problems[:_LINES_A_CHECK]
+            if len(check.problems) > len(found):
+                found.append(f"… and {len(check.problems) - len(found)} more")
+            lines += [f"{self.dataset}: {check.name}: {line}" for line in found]
+        return lines

@@ -1,0 +1,107 @@
+"""Is a finished dataset whole and right? Every file is read, and every claim about it is tried.
+
+`validate` reads every image once, in as many processes as it is given, for what one file can tell
+(`pixels`); the views with depth are read once more for what only several views together can tell
+(`geometry`). Memory holds a few hundred points a view.
+
+The result is a list of checks, each passed, failed, or not applicable and why: what could not be
+checked is said, never counted as right.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import OpenImageIO as oiio
+
+from lightfield.core.files import sha256
+from lightfield.core.progress import Progress
+from lightfield.validation import files, geometry, pixels
+from lightfield.validation.consistency import Answer
+from lightfield.validation.files import File, Manifest
+from lightfield.validation.pixels import Examiner, Facts
+from lightfield.validation.result import Check, Result
+
+
+def validate(
+    dataset: Path,
+    reprojections: Sequence[str] = (),
+    records: Sequence[Path] = (),
+    clearance: Path | None = None,
+    processes: int = 1,
+    manifests: Sequence[Manifest] = (),
+) -> Result:
+    """Check a dataset's files, and what its pixels must satisfy.
+
+    ``reprojections`` are folders in the dataset; ``records`` JSON files of what was rendered
+    (``files``: relative path: ``bytes``, ``sha256``); ``clearance`` a JSON file of what surrounds
+    each camera (``views``: name: ``distance`` in metres, ``inside``); ``manifests`` those of the
+    exports that it may hold. Raises `UserError` where one of these cannot be read; whatever is
+    wrong with the dataset is in the result.
+    """
+    dataset = dataset.resolve()
+    sets, checks = files.read_sets(dataset, reprojections)
+    views, presence = files.of_views(dataset, sets)
+    extras, lists, exports = files.of_exports(dataset, sets, views, manifests)
+    facts: dict[File, Facts] = {}
+    with _workers(Examiner(dataset, sets), processes) as mapped:
+        progress = Progress(len(views + extras), f"validate {dataset.name}", "files")
+        for file, fact in mapped(_examine, views + extras):
+            facts[file] = fact
+            progress.done()
+        for number, image_set in enumerate(sets):
+            own = {file: facts[file] for file in views if file.set == number}
+            seen = {file: fact.patches for file, fact in own.items() if fact.patches is not None}
+            checks += [presence[number], *pixels.checks(image_set, own)]
+            checks.append(geometry.check(image_set, seen, lambda asked: mapped(_answer, asked)))
+    checks.append(pixels.with_extras(exports, {file: facts[file] for file in extras}))
+    found = {file.path: (fact.bytes, fact.checksum) for file, fact in facts.items()}
+    published, listing = files.listing(dataset, sets, {*lists, *found})
+    if len(sets) <= len(reprojections):
+        listing = Check("files", None, "a lightfield.json that cannot be understood lists no files")
+    checks += [listing, files.checksums(records, found, sets), files.clearance(clearance, sets)]
+    rendered = files.rendered(sets)
+    return Result(
+        f"{dataset.parent.name}/{dataset.name}",
+        len(rendered.views) if rendered else 0,
+        checks,
+        {path: found[path][1] if path in found else sha256(dataset / path) for path in published},
+    )
+
+
+Mapped = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
+
+
+@contextmanager
+def _workers(examiner: Examiner, processes: int) -> Iterator[Mapped]:
+    """Yield a `map` over worker processes that hold the examiner; one process is this one."""
+    if processes == 1:
+        _start_worker(examiner)
+        yield map
+        return
+    # Spawned, because OpenImageIO has threads, which do not survive a fork.
+    with ProcessPoolExecutor(
+        processes, get_context("spawn"), initializer=_start_worker, initargs=(examiner,)
+    ) as pool:
+        yield pool.map
+
+
+_examiner: Examiner
+
+
+def _start_worker(examiner: Examiner) -> None:
+    global _examiner
+    _examiner = examiner
+    oiio.attribute("threads", 1)
+    oiio.attribute("exr_threads", 1)
+
+
+def _examine(file: File) -> tuple[File, Facts]:
+    return file, _examiner.examine(file)
+
+
+def _answer(question: geometry.Question) -> list[Answer]:
+    return _examiner.answer(*question)
