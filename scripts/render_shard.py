@@ -7,8 +7,10 @@ line a rendered view, tells what was done and how fast.
 """
 
 import argparse
+import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +68,7 @@ def main() -> None:
             view_path(arguments.output, view), keys.render_key(lightfield, view)
         )
     ]
+    warn_of_other_versions(view_path(arguments.output, view) for view in missing)
     # The dataset's folder says which scene and rig it is, and in a sequence which frame.
     label = f"render {arguments.output.parent}"
     if arguments.views != ":":
@@ -90,6 +93,17 @@ def parse_slice(text: str) -> slice:
 def view_path(folder: Path, view: View) -> Path:
     """Return the path of a view's EXR in the folder of the views."""
     return folder / f"{view.name}.exr"
+
+
+def warn_of_other_versions(paths: Iterable[Path]) -> None:
+    """Warn if there are views that another version of bpy rendered, which are rendered again."""
+    versions = [images.attribute(path, images.BPY_ATTRIBUTE) for path in paths]
+    for other in sorted({str(found) for found in versions if found} - {version("bpy")}):
+        print(
+            f"warning: views rendered by bpy {other}, which bpy {version('bpy')} renders again: "
+            f"{versions.count(other)}",
+            file=sys.stderr,
+        )
 
 
 class Finished:
@@ -188,7 +202,8 @@ def render_views(
         raw = blender.render_view(view.matrix, seed)
         channels, attributes = view_channels(raw, lightfield, to_depth)
         path, key = view_path(arguments.output, view), keys.render_key(lightfield, view)
-        images.write_exr(path, channels, attributes | {images.KEY_ATTRIBUTE: key})
+        attributes |= {images.KEY_ATTRIBUTE: key, images.BPY_ATTRIBUTE: version("bpy")}
+        images.write_exr(path, channels, attributes)
         record.add(path, key)
         journal.append(
             {

@@ -1,6 +1,7 @@
 """Rendered views: where each pixel looks, what its depth is, and what is kept and made anew."""
 
 import json
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -212,6 +213,24 @@ def test_bytes_do_not_depend_on_order_threads_or_neighbours(shard):
     assert {path.name: sha256(path) for path in shard.views.iterdir()} == together
 
 
+def test_views_that_another_bpy_rendered_are_rendered_again_and_reported(shard):
+    shard("--views", "0:2")
+    first, second = sorted(shard.views.iterdir())
+    right = sha256(first)
+    image = images.read_image(first)
+    others = {images.KEY_ATTRIBUTE: "another", images.BPY_ATTRIBUTE: "4.2.0"}
+    images.write_exr(first, image.channels, others)
+    # Other settings alone are no reason for it.
+    image = images.read_image(second)
+    others[images.BPY_ATTRIBUTE] = version("bpy")
+    images.write_exr(second, image.channels, others)
+    told = shard("--views", "0:2").stderr.splitlines()
+    assert [line for line in told if line.startswith("warning: ")] == [
+        f"warning: views rendered by bpy 4.2.0, which bpy {version('bpy')} renders again: 1"
+    ]
+    assert sha256(first) == right
+
+
 def test_views_hold_what_design_asks_for(shard):
     shard("--views", "0:1")
     image = images.read_image(next(shard.views.iterdir()))
@@ -221,6 +240,7 @@ def test_views_hold_what_design_asks_for(shard):
     assert image.attributes[images.NAN_ATTRIBUTE] == 0
     assert image.attributes[images.CLAMPED_ATTRIBUTE] == 0
     assert len(str(image.attributes[images.KEY_ATTRIBUTE])) == 64
+    assert image.attributes[images.BPY_ATTRIBUTE] == version("bpy")
     assert not image.attributes.get("DateTime")
 
 

@@ -15,7 +15,7 @@ from lightfield.dataset.config import BUILDERS
 from lightfield.dataset.lightfield import LightField, View
 
 # Raised when the program that renders changes what it writes for the same settings.
-RENDER_VERSION = 1
+RENDER_VERSION = 2
 
 
 def scene_fingerprint(source: Mapping[str, Any]) -> str:

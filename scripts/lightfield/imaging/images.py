@@ -20,10 +20,12 @@ from lightfield.core.files import atomic_path
 
 Attribute = str | int | float
 
-# In a view's EXR header: what channel Z means, the key of the settings that made the pixels, and
-# how many values had to be clamped to the half range or were not a number.
+# In a view's EXR header: what channel Z means, the key of the settings that made the pixels, the
+# version of bpy that did, and how many values had to be clamped to the half range or were not a
+# number.
 DEPTH_ATTRIBUTE = "plenoforge:depth"
 KEY_ATTRIBUTE = "plenoforge:key"
+BPY_ATTRIBUTE = "plenoforge:bpy"
 CLAMPED_ATTRIBUTE = "plenoforge:clamped"
 NAN_ATTRIBUTE = "plenoforge:nan"
 
@@ -103,12 +105,17 @@ def read_image(
     return Image(found, attributes)
 
 
+def attribute(path: Path, name: str) -> Attribute | None:
+    """Return an attribute of a file's header; None if it has no such, or is missing or no image."""
+    try:
+        return read_header(path).attributes.get(name)
+    except UserError:
+        return None
+
+
 def has_key(path: Path, key: str) -> bool:
     """Tell by its header alone whether a file is there and made by the settings of ``key``."""
-    try:
-        return path.exists() and read_header(path).attributes.get(KEY_ATTRIBUTE) == key
-    except UserError:
-        return False
+    return attribute(path, KEY_ATTRIBUTE) == key
 
 
 def is_finished(path: Path, key: str) -> bool:
