@@ -1,7 +1,10 @@
-"""Which Python `make` takes: the first that runs, and else what uv downloads."""
+"""Which Python `make` takes (the first that runs, else what uv downloads), and what it installs."""
 
+import os
+import runpy
 import shutil
 import subprocess
+import sys
 
 import pytest
 from checkouts import ROOT
@@ -88,3 +91,36 @@ def test_a_named_python_must_run_and_be_of_a_supported_version(machine):
         result = machine.find(wrong)
         assert result.returncode == 1
         assert result.stderr.startswith(f"error: PYTHON is {wrong}, which is not Python 3.13 or")
+
+
+@pytest.fixture
+def check_system(machine, monkeypatch):
+    """Look for a browser where there is none, and an apt-get that writes down what it does."""
+    installs = 'echo "$@" >> "$0.log"; [[ $2 != install ]] || > "${0%/*}/chromium"'
+    machine.add("apt-get", f'{installs}; {shutil.which("chmod")} -f +x "${{0%/*}}/chromium"')
+    monkeypatch.setenv("PATH", str(machine.programs))
+    monkeypatch.setattr(sys, "argv", ["check_system.py", "--browser"])
+
+    def check(user):
+        monkeypatch.setattr(os, "geteuid", lambda: user)
+        runpy.run_path(str(ROOT / "envs/check_system.py"), run_name="__main__")
+
+    check.log = machine.programs / "apt-get.log"
+    return check
+
+
+def test_root_installs_what_is_missing(check_system):
+    check_system(0)
+    assert check_system.log.read_text().splitlines() == [
+        "--quiet=2 update",
+        "--quiet=2 install --yes chromium",
+    ]
+    # Once is enough.
+    check_system(0)
+    assert len(check_system.log.read_text().splitlines()) == 2
+
+
+def test_others_are_given_the_line_that_installs_it(check_system):
+    with pytest.raises(SystemExit, match=r"^error: .*: sudo apt-get install chromium$"):
+        check_system(1000)
+    assert not check_system.log.exists()
