@@ -1,6 +1,10 @@
 # Plenoforge: scene YAMLs in configs/scenes/ become light-field datasets in results/.
 
 
+# What the command line says; config.yaml fills in the rest.
+GIVEN = set(config)
+
+
 configfile: "config.yaml"
 
 
@@ -24,9 +28,7 @@ include: "rules/error.smk"
 
 onstart:
     try:
-        write_json(
-            RUN, {f"{RESULTS}/{d.scene}/{d.rig}": d.view_count for d in CHOSEN}
-        )
+        write_json(RUN, {dataset.folder: dataset.view_count for dataset in CHOSEN})
     except UserError as error:
         sys.exit(f"error: {error}")
 
@@ -41,21 +43,21 @@ onerror:
 rule all:
     default_target: True
     input:
-        [dataset_files(dataset) for dataset in CHOSEN],
+        [dataset.files for dataset in CHOSEN],
         f"{RESULTS}/index.html",
 
 
 rule report_html:
     input:
-        [page_of(dataset) for dataset in CHOSEN],
+        [dataset.page for dataset in CHOSEN],
         f"{RESULTS}/index.html",
 
 
 rule smoke:
     input:
-        [dataset_files(dataset) for dataset in SMOKE],
+        [dataset.files for dataset in SMOKE],
 
 
 rule package_all:
     input:
-        [package_file(dataset) for dataset in CHOSEN],
+        [dataset.package for dataset in CHOSEN],

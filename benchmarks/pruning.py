@@ -112,10 +112,10 @@ def make_scene(task: tuple[str, str, float, Path]) -> dict[str, Any]:
 
     from lightfield.rendering import blender, inventory
 
-    source = config.load_scene(scene)["scene"]
+    source = config.load_scene(scene).scene
     blender.new_scene()
-    builder = importlib.import_module(f"scenes.{source['builder']}")
-    builder.build({**source["parameters"], "detail": detail})
+    builder = importlib.import_module(f"scenes.{source.builder}")
+    builder.build({**source.parameters.model_dump(), "detail": detail})
     if variant == "as artists leave it":
         bpy.context.scene.render.use_motion_blur = True
         bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=9, location=(0, 0, -50))

@@ -12,7 +12,7 @@ rule reprojection_benchmark:
             caption="../report/reprojection_benchmark.rst",
         ),
     log:
-        f"{WORK}/logs/reprojection_benchmark.log",
+        log_of("reprojection_benchmark"),
     conda:
         ENVIRONMENT
     # Alone on the machine, so that nothing else is in the figures.
@@ -34,7 +34,7 @@ rule stability:
             caption="../report/stability.rst",
         ),
     log:
-        f"{WORK}/logs/stability.log",
+        log_of("stability"),
     conda:
         ENVIRONMENT
     params:
@@ -49,7 +49,7 @@ rule render_overhead:
     output:
         f"{MEASURED}/render_overhead.md",
     log:
-        f"{WORK}/logs/render_overhead.log",
+        log_of("render_overhead"),
     conda:
         ENVIRONMENT
     threads: lambda wildcards: workflow.cores

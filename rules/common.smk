@@ -17,48 +17,42 @@ shell.prefix(
     f" export PATH={shlex.quote(str(Path(sys.executable).parent))}:$PATH; "
 )
 
-from lightfield.dataset.config import VIEWS, load_config, load_datasets, scene_datasets
 from lightfield.core.errors import UserError
 from lightfield.core.failures import failure_report
 from lightfield.core.files import write_json
-from lightfield.dataset.keys import scene_fingerprint
+from lightfield.dataset.config import load_config
+from lightfield.dataset.dataset import STILLS, load_datasets, scene_datasets
+
+# The rigs that config.yaml names are those of the scene that it names.
+if "scenes" in GIVEN and "rigs" not in GIVEN:
+    config["rigs"] = "all"
 
 try:
     SETTINGS = load_config(config)
     CHOSEN = load_datasets(SETTINGS)
-    SMOKE = scene_datasets("smoke", "full", {})
+    SMOKE = scene_datasets("smoke", settings=SETTINGS)
 except UserError as error:
     sys.exit(f"error: {error}")
 
-RESULTS = SETTINGS["results"]
-WORK = SETTINGS["work"]
-LIMITS = {"smoke": {}} | {
-    dataset.scene: SETTINGS["presets"][SETTINGS["preset"]] for dataset in CHOSEN
+RESULTS = SETTINGS.results
+WORK = SETTINGS.work
+DATASETS = {
+    (dataset.scene_folder, dataset.rig_folder): dataset for dataset in [*SMOKE, *CHOSEN]
 }
-DATASETS = {(dataset.scene, dataset.rig): dataset for dataset in [*SMOKE, *CHOSEN]}
-
-# For planning only, measured on one core of a 2-core x86-64 machine: path tracing of one sample of
-# one pixel, and start-up (bpy, the scene, and Cycles' acceleration structures).
-SECONDS_PER_SAMPLE = 6e-6
-START_UP_SECONDS = 3.0
-# A pixel's samples where a target error is given instead of them: an estimate for planning.
-GUESSED_SAMPLES = 256
-# Start-up is kept under this share of a shard's time.
-START_UP_SHARE = 0.05
-# More shards of one dataset than this only make the plan long: no machine renders them all at once.
-MOST_SHARDS = 64
+# Any dataset of each scene YAML: all of them have the same .blend.
+SCENES = {dataset.scene_name: dataset for dataset in DATASETS.values()}
 
 # Snakemake sets this up by itself if it is run with --software-deployment-method conda.
 ENVIRONMENT = "../envs/environment.yaml"
 
+# `folder` and `work` of a Dataset, with wildcards.
 DATASET = f"{RESULTS}/{{scene}}/{{rig}}"
 MADE = f"{WORK}/{{scene}}/{{rig}}"
 PANORAMA = f"{MADE}/panorama"
-# Pictures of a report that are drawn together, each as .svg and .png.
-STILLS = ("rig", "depth_panorama", "noise")
 REPROJECTED = f"{DATASET}/{{reprojection}}"
 # Which datasets are being built, for the progress lines of each shard.
 RUN = f"{WORK}/run.json"
+GPUS = 0 if SETTINGS.device in ("auto", "cpu") else 1
 
 
 wildcard_constraints:
@@ -93,136 +87,124 @@ localrules:
     status,
 
 
+def log_of(job):
+    """Return the log of a job; ``job`` is its path, with wildcards."""
+    return f"{WORK}/logs/{job}.log"
+
+
+def times_of(job):
+    """Return where Snakemake notes what a job has taken."""
+    return f"{WORK}/benchmarks/{job}.tsv"
+
+
 def dataset_of(wildcards):
     """Return the dataset that a job's wildcards mean."""
     return DATASETS[wildcards.scene, wildcards.rig]
 
 
-def view_seconds(dataset):
-    """Estimate how long one core path-traces one view."""
-    width, height = dataset.cameras["camera"]["resolution"]
-    return width * height * planned_samples(dataset) * SECONDS_PER_SAMPLE
+def of_dataset(attribute):
+    """Return the function by which a rule asks for an attribute of its dataset."""
+    return lambda wildcards: getattr(dataset_of(wildcards), attribute)
 
 
-def planned_samples(dataset):
-    """Return a pixel's samples; with a target error a guess, the same before and after calibration.
+def stage_of(wildcards):
+    """Return the stage at which a job makes or reads views."""
+    return wildcards.get("reprojection", "render")
 
-    Shards follow from it, whose bounds must follow from the configuration alone.
+
+def records(wildcards):
+    """Return the records of the shards whose views a job reads."""
+    return dataset_of(wildcards).records(stage_of(wildcards))
+
+
+def made_anew(path):
+    """Let a file be made anew that is there, but no longer says what is true.
+
+    Snakemake itself only sees whether it is there, and how old it is. Nothing is removed before
+    its job runs: a dry run shows the job and leaves the file.
     """
-    limit = dataset.render.get("most_samples", GUESSED_SAMPLES)
-    return dataset.render.get("samples", min(limit, GUESSED_SAMPLES))
+    workflow.dag.forcefiles.add(path)
 
 
-def expected_samples(dataset):
-    """Return a pixel's samples as well as they are known: as the calibration has it, if it is."""
-    record = Path(WORK, dataset.scene, "calibration.json")
-    if "target_error" in dataset.render and record.exists():
-        return json.loads(record.read_text())["cost_samples"]
-    return planned_samples(dataset)
+def renewal(wildcards):
+    """Return no input, but let a shard's record be made anew if its files are not on disk."""
+    dataset = dataset_of(wildcards)
+    record = dataset.record(stage_of(wildcards), wildcards.first, wildcards.end)
+    if dataset.is_false(record):
+        made_anew(record)
+    return []
 
 
-def shards(dataset):
-    """Split a dataset's views into runs (first, end) of nearly equal length.
-
-    Automatically, a run is as short as it can be without start-up taking more than its share: the
-    shorter, the more processes can work at once.
-    """
-    wanted = SETTINGS["views_per_shard"]
-    if wanted == "auto":
-        wanted = math.ceil(START_UP_SECONDS / START_UP_SHARE / view_seconds(dataset))
-        wanted = max(wanted, math.ceil(dataset.view_count / MOST_SHARDS))
-    count = math.ceil(dataset.view_count / wanted)
-    bounds = [dataset.view_count * number // count for number in range(count + 1)]
-    return list(zip(bounds, bounds[1:]))
+def checked_blend(wildcards):
+    """Return a scene's .blend, which is checked again if it is another file than it was."""
+    dataset = SCENES[wildcards.name]
+    if dataset.blend_changed:
+        made_anew(dataset.blend_check)
+    return dataset.blend
 
 
-def shard_threads(wildcards, *others):
+def shard_threads(wildcards):
     """Give each shard one core, or more where there are fewer shards than cores."""
-    total = sum(len(shards(dataset)) for dataset in CHOSEN)
+    total = sum(len(dataset.shards) for dataset in CHOSEN)
     return max(1, workflow.cores // total) if workflow.cores else 1
 
 
-def scene_file(wildcards):
-    """Return the .blend of a dataset: what a builder makes, or what the user brought."""
-    return blend_of(dataset_of(wildcards).name)
+def shard_minutes(wildcards):
+    """Allow a shard several times its estimated time, and never less than half an hour."""
+    views = int(wildcards.end) - int(wildcards.first)
+    seconds = views * dataset_of(wildcards).expected_view_seconds
+    return 30 + math.ceil(5 * seconds / 60)
 
 
-def blend_of(name):
-    """Return the .blend of a scene YAML, as `scene_file` does."""
-    return source_of(name).get("blend", f"{WORK}/{name}/scene.blend")
+@cache
+def full_datasets(name):
+    """Return a scene YAML's datasets at full size, by rig."""
+    return {dataset.rig_folder: dataset for dataset in scene_datasets(name)}
 
 
-def scene_check(wildcards):
-    """Return the proof that the user's own .blend is the one meant; a built one needs none."""
-    return check_of(dataset_of(wildcards).name)
+def full_size(wildcards):
+    """Return what the scene YAML says of a dataset's size, whatever the preset, as JSON.
+
+    Samples and denoise are null where the YAML has a target error instead.
+    """
+    full = full_datasets(dataset_of(wildcards).scene_name)[wildcards.rig]
+    return json.dumps(
+        {
+            "views": full.view_count,
+            "resolution": full.rig.camera.resolution,
+            "samples": full.render.get("samples"),
+            "denoise": full.render.get("denoise"),
+        }
+    )
 
 
-def check_of(name):
-    """Return the proof of a scene YAML's .blend, as `scene_check` does."""
-    return f"{WORK}/{name}/blend.json" if "blend" in source_of(name) else []
+def status_words():
+    """Return the words that name each chosen dataset to scripts/status.py."""
+    words = []
+    for dataset in CHOSEN:
+        reprojections = ",".join(dataset.reprojections)
+        words += ["--dataset", dataset.name, str(dataset.view_count), reprojections]
+    return shlex.join(words)
 
 
-def scene_inventory(wildcards):
-    """Return the list of what a dataset's scene contains."""
-    return f"{WORK}/{dataset_of(wildcards).name}/inventory.json"
-
-
-def records(dataset, stage):
-    """Return the records of a dataset's shards at a stage: `render`, or a reprojection's name."""
+def packed_sums(wildcards):
+    """Return the checksums that say that everything in an archive is finished."""
     return [
-        f"{WORK}/{dataset.scene}/{dataset.rig}/{stage}/{first}-{end}.json"
-        for first, end in shards(dataset)
+        f"{dataset.folder}/sha256sums.txt"
+        for dataset in DATASETS.values()
+        if (dataset.scene_folder, dataset.rig_name) == (wildcards.scene, wildcards.rig)
     ]
 
 
-def all_records(dataset):
-    """Return the records of every stage that makes a dataset's images."""
+def probes():
+    """Return name, number of frames, and probe of each chosen rig: a sequence's first frame's."""
+    frames = {}
+    for dataset in CHOSEN:
+        frames.setdefault((dataset.scene_folder, dataset.rig_name), []).append(dataset)
     return [
-        record
-        for stage in ["render", *dataset.reprojections]
-        for record in records(dataset, stage)
+        (f"{scene}/{rig}", len(datasets), f"{datasets[0].work}/probe.json")
+        for (scene, rig), datasets in frames.items()
     ]
-
-
-def transforms(dataset):
-    """Return the files that a dataset exports for instant-ngp."""
-    folder = f"{RESULTS}/{dataset.scene}/{dataset.rig}"
-    return [
-        (
-            f"{folder}/transforms.json"
-            if source == VIEWS
-            else f"{folder}/{source}/transforms.json"
-        )
-        for source in dataset.exports.get("instant_ngp", {}).get("sources", [])
-    ]
-
-
-def lightfields(dataset):
-    """Return the lightfield.json of a dataset and of each of its reprojections."""
-    folder = f"{RESULTS}/{dataset.scene}/{dataset.rig}"
-    return [
-        f"{folder}/lightfield.json",
-        *(f"{folder}/{name}/lightfield.json" for name in dataset.reprojections),
-    ]
-
-
-def published(dataset):
-    """Return the files of a dataset that a job makes one by one, its views aside."""
-    return [*lightfields(dataset), *transforms(dataset)]
-
-
-def pictures(dataset):
-    """Return the pictures of a dataset's report."""
-    folder = f"{RESULTS}/{dataset.scene}/{dataset.rig}/report"
-    stills = [
-        f"{folder}/{name}{suffix}" for name in STILLS for suffix in (".svg", ".png")
-    ]
-    return [f"{folder}/contact_sheet.png", f"{folder}/panorama.png", *stills]
-
-
-def page_of(dataset):
-    """Return the page that shows a dataset."""
-    return f"{RESULTS}/{dataset.scene}/{dataset.rig}/report/index.html"
 
 
 def measurements(wildcards):
@@ -230,7 +212,7 @@ def measurements(wildcards):
 
     They are no input, for a page must never start a measurement: that takes an hour.
     """
-    name = dataset_of(wildcards).name
+    name = dataset_of(wildcards).scene_name
     stems = ["reprojection", "stability", f"error_vs_time/{name}"]
     files = [
         Path(RESULTS, "benchmarks", f"{stem}{suffix}")
@@ -245,203 +227,40 @@ def measurement_times(wildcards):
     return [file.stat().st_mtime_ns for file in measurements(wildcards)]
 
 
-def dataset_files(dataset):
-    """Return all that a finished dataset consists of, as a target rule asks for it.
+@cache
+def first_dataset(folder):
+    """Return the dataset of a scene's first rig, whose views are its probes.
 
-    The records are named although later files follow from them, because Snakemake makes a missing
-    file anew only if a target rule names it.
+    A folder that is not being built is a scene's name, which means the scene at full size.
     """
-    folder = f"{RESULTS}/{dataset.scene}/{dataset.rig}"
-    return [
-        f"{folder}/validation.json",
-        f"{folder}/sha256sums.txt",
-        *published(dataset),
-        *pictures(dataset),
-        f"{folder}/report/costs.json",
-        page_of(dataset),
-        *all_records(dataset),
-    ]
+    for dataset in DATASETS.values():
+        if dataset.scene_folder == folder:
+            name, preset = dataset.scene_name, dataset.preset
+            return scene_datasets(name, preset, dataset.limits, SETTINGS)[0]
+    return scene_datasets(folder, settings=SETTINGS)[0]
 
 
-def probes():
-    """Return name, number of frames, and probe of each chosen rig: a sequence's first frame's."""
-    frames = {}
-    for dataset in CHOSEN:
-        frames.setdefault((dataset.scene, dataset.rig_name), []).append(dataset.rig)
-    return [
-        (f"{scene}/{rig}", len(folders), f"{WORK}/{scene}/{folders[0]}/probe.json")
-        for (scene, rig), folders in frames.items()
-    ]
-
-
-def status_words():
-    """Return the words that tell scripts/status.py of each chosen dataset."""
-    return [
-        word
-        for dataset in CHOSEN
-        for word in (
-            "--dataset",
-            f"{dataset.scene}/{dataset.rig}",
-            str(dataset.view_count),
-            ",".join(dataset.reprojections),
-        )
-    ]
-
-
-def package_file(dataset):
-    """Return a rig's dataset as one archive, all frames of a sequence in it, named as SILVR's are."""
-    return f"{RESULTS}/{dataset.scene}/{dataset.scene}_{dataset.rig_name}.tar"
-
-
-def packed_sums(wildcards):
-    """Return the checksums that say that everything in an archive is finished."""
-    return [
-        f"{RESULTS}/{dataset.scene}/{dataset.rig}/sha256sums.txt"
-        for dataset in DATASETS.values()
-        if (dataset.scene, dataset.rig_name) == (wildcards.scene, wildcards.rig)
-    ]
-
-
-def source_of(name):
-    """Return the `scene` block of a scene YAML that is being built."""
-    return next(d.source for d in DATASETS.values() if d.name == name)
-
-
-def fingerprint(wildcards):
-    """Return what changes when a builder does; a user's .blend is an input, which is checked."""
-    return fingerprint_of(dataset_of(wildcards))
-
-
-def fingerprint_of(dataset):
-    """Return the fingerprint of a dataset, as `fingerprint` does."""
-    source = dataset.source
-    return scene_fingerprint(source) if "builder" in source else None
-
-
-def scene_name(wildcards):
-    """Return the scene YAML's name that `scene` means: it may have a preset's name behind it."""
-    known = {dataset.scene: dataset.name for dataset in DATASETS.values()}
-    return known.get(wildcards.scene, wildcards.scene)
-
-
-def scene_limits(wildcards):
-    """Return the limits of `scene`; without a preset's name it is at full size."""
-    return LIMITS.get(wildcards.scene, {})
-
-
-def first_dataset(wildcards):
-    """Return the dataset of a scene's first rig, whose views are its probes."""
-    name = scene_name(wildcards)
-    preset = "full" if wildcards.scene == name else SETTINGS["preset"]
-    return scene_datasets(name, preset, scene_limits(wildcards))[0]
-
-
-def calibration_of(dataset):
-    """Return the record of what was chosen for a scene's target error; none is needed without."""
-    if "target_error" not in dataset.render:
-        return []
-    return f"{WORK}/{dataset.scene}/calibration.json"
-
-
-def calibration(wildcards):
-    """Return the record of a dataset's calibration, as `calibration_of` does."""
-    return calibration_of(dataset_of(wildcards))
+def of_first(attribute):
+    """Return the function by which a rule asks for an attribute of that dataset."""
+    return lambda wildcards: getattr(first_dataset(wildcards.scene), attribute)
 
 
 def calibration_words(wildcards, input):
-    """Return the words that tell a program of a calibration, if there is one."""
+    """Return the words that name a calibration to a program, if there is one."""
     return f"--calibration {input.calibration}" if input.calibration else ""
 
 
-def shard_minutes(wildcards):
-    """Allow a shard several times its estimated time, and never less than half an hour."""
-    dataset = dataset_of(wildcards)
-    count = int(wildcards.end) - int(wildcards.first)
-    seconds = (
-        view_seconds(dataset) * expected_samples(dataset) / planned_samples(dataset)
+def of_reprojection(attribute):
+    """Return the function by which a rule asks for an attribute of its reprojection."""
+    return lambda wildcards: getattr(
+        dataset_of(wildcards).reprojections[wildcards.reprojection], attribute
     )
-    return 30 + math.ceil(5 * count * seconds / 60)
-
-
-def reprojection_of(wildcards):
-    """Return a reprojection's settings, defaults filled in."""
-    return dataset_of(wildcards).reprojections[wildcards.reprojection]
-
-
-def optics(wildcards):
-    """Return the words that tell scripts/reproject.py where each pixel comes from."""
-    settings = reprojection_of(wildcards)
-    words = ["--camera", json.dumps(settings["camera"]), "--filter", settings["filter"]]
-    if settings["samples"] > 1:
-        words += ["--samples", str(settings["samples"])]
-    if any(settings["rotation"]):
-        words += ["--rotation", ",".join(map(str, settings["rotation"]))]
-    return shlex.join(words)
-
-
-def development(wildcards):
-    """Return the words that tell scripts/reproject.py what to write."""
-    settings = reprojection_of(wildcards)
-    words = [f"--{settings['format']}", "--exposure", str(settings["exposure"])]
-    if "reinhard" in settings:
-        words += ["--reinhard", str(settings["reinhard"])]
-    return shlex.join(words)
-
-
-def placement(wildcards):
-    """Return the words that place a dataset in instant-ngp's unit cube."""
-    export = dataset_of(wildcards).exports["instant_ngp"]
-    words = []
-    if "scale" in export:
-        words += [
-            "--scale",
-            str(export["scale"]),
-            "--offset",
-            *map(str, export["offset"]),
-        ]
-    if "aabb_scale" in export:
-        words += ["--aabb-scale", str(export["aabb_scale"])]
-    if "evaluation_split" in dataset_of(wildcards).cameras:
-        words.append("--split")
-    return shlex.join(words)
-
-
-@cache
-def full_datasets(name):
-    """Return a scene YAML's datasets at full size, by rig."""
-    return {dataset.rig: dataset for dataset in scene_datasets(name, "full", {})}
-
-
-def full_size(wildcards):
-    """Return what the scene YAML says of a dataset's size, whatever the preset, as JSON.
-
-    Samples and denoise are null where the YAML has a target error instead.
-    """
-    full = full_datasets(dataset_of(wildcards).name)[wildcards.rig]
-    return json.dumps(
-        {
-            "views": full.view_count,
-            "resolution": full.cameras["camera"]["resolution"],
-            "samples": full.render.get("samples"),
-            "denoise": full.render.get("denoise"),
-        }
-    )
-
-
-def suffix(wildcards):
-    """Return the suffix of a reprojection's images."""
-    return f".{dataset_of(wildcards).reprojections[wildcards.reprojection]['format']}"
 
 
 def reprojection_words(wildcards):
     """Return the words that name a dataset's reprojections."""
     words = [f"--reprojection {name}" for name in dataset_of(wildcards).reprojections]
     return " ".join(words)
-
-
-def panorama_width(wildcards):
-    """Give the panorama twice a 180 degree fisheye view's angular resolution, within 4096 pixels."""
-    return min(4 * dataset_of(wildcards).cameras["camera"]["resolution"][0], 4096)
 
 
 def failed_jobs():
@@ -455,50 +274,3 @@ def failed_jobs():
         if Path(job.log[0]).exists() and not all(map(os.path.exists, job.output))
     ]
     return sorted((job.rule.name, Path(job.log[0])) for job in failed)
-
-
-def drop_false_records():
-    """Remove the record of every shard whose files are no longer those that it describes.
-
-    Snakemake sees only whether a record is there. A view that was deleted or cut short shows in
-    its size; its shard then runs again and makes what is missing. By the log of checksums beside the
-    record it finds every other file that is not as it was made.
-    """
-    for dataset in DATASETS.values():
-        folder = Path(RESULTS, dataset.scene, dataset.rig)
-        for record in map(Path, all_records(dataset)):
-            try:
-                files = json.loads(record.read_text())["files"]
-                whole = all(
-                    (folder / name).stat().st_size == file["bytes"]
-                    for name, file in files.items()
-                )
-            except FileNotFoundError:
-                whole = not record.exists()
-            except (ValueError, KeyError):
-                whole = False
-            if not whole:
-                record.unlink()
-
-
-def drop_false_checks():
-    """Remove the proof of every .blend that is no longer the file that was checked."""
-    for dataset in DATASETS.values():
-        proof = Path(WORK, dataset.name, "blend.json")
-        if "blend" not in dataset.source or not proof.exists():
-            continue
-        checked = json.loads(proof.read_text())
-        try:
-            found = Path(dataset.source["blend"]).stat()
-        except FileNotFoundError:
-            continue
-        if (found.st_size, found.st_mtime_ns) != (
-            checked["bytes"],
-            checked["mtime_ns"],
-        ):
-            proof.unlink()
-
-
-if workflow.is_main_process:
-    drop_false_records()
-    drop_false_checks()

@@ -4,14 +4,14 @@
 rule costs:
     input:
         validation=f"{DATASET}/validation.json",
-        records=lambda wildcards: all_records(dataset_of(wildcards)),
-        published=lambda wildcards: published(dataset_of(wildcards)),
-        pictures=lambda wildcards: pictures(dataset_of(wildcards)),
-        blend=scene_file,
+        records=of_dataset("all_records"),
+        published=of_dataset("published"),
+        pictures=of_dataset("pictures"),
+        blend=of_dataset("blend"),
     output:
         f"{DATASET}/report/costs.json",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/costs.log",
+        log_of("{scene}/{rig}/costs"),
     conda:
         ENVIRONMENT
     params:
@@ -22,9 +22,12 @@ rule costs:
         # A calibration belongs to the preset, the scene itself to all of them.
         scene_benchmarks=lambda wildcards: [
             f"{WORK}/benchmarks/{folder}"
-            for folder in {dataset_of(wildcards).name: None, wildcards.scene: None}
+            for folder in {
+                dataset_of(wildcards).scene_name: None,
+                wildcards.scene: None,
+            }
         ],
-        energy=json.dumps(SETTINGS["energy"]),
+        energy=SETTINGS.energy.model_dump_json(),
         full=full_size,
         reprojections=reprojection_words,
     message:
@@ -39,13 +42,13 @@ rule costs:
 # Without input and output, so that it can be asked at any time; with --nolock while a build runs.
 rule status:
     log:
-        f"{WORK}/logs/status.log",
+        log_of("status"),
     conda:
         ENVIRONMENT
     params:
         results=RESULTS,
         work=WORK,
-        datasets=shlex.join(status_words()),
+        datasets=status_words(),
     message:
         "Looking how far the chosen datasets are"
     shell:

@@ -4,20 +4,20 @@
 
 rule probe_cameras:
     input:
-        check=lambda wildcards: check_of(scene_name(wildcards)),
+        check=of_first("blend_check"),
     output:
         f"{WORK}/{{scene}}/probes.json",
     log:
-        f"{WORK}/logs/{{scene}}/probe_cameras.log",
+        log_of("{scene}/probe_cameras"),
     conda:
         ENVIRONMENT
     params:
-        name=scene_name,
-        limits=lambda wildcards: json.dumps(scene_limits(wildcards)),
+        name=of_first("scene_name"),
+        limits=of_first("limits_json"),
         # Not in the command: when what the YAML says changes, so does the file.
-        cameras=lambda wildcards: first_dataset(wildcards).cameras,
-        render=lambda wildcards: first_dataset(wildcards).render,
-        fingerprint=lambda wildcards: fingerprint_of(first_dataset(wildcards)),
+        rig=of_first("rig_json"),
+        render=of_first("render"),
+        fingerprint=of_first("builder_fingerprint"),
     message:
         "Placing the probe cameras of {wildcards.scene}"
     shell:
@@ -28,26 +28,26 @@ rule probe_cameras:
 # Only scenes with a target error ask for it. Its output is the same each time but for --seconds.
 rule calibrate:
     input:
-        check=lambda wildcards: check_of(scene_name(wildcards)),
-        blend=lambda wildcards: blend_of(scene_name(wildcards)),
-        inventory=lambda wildcards: f"{WORK}/{scene_name(wildcards)}/inventory.json",
+        check=of_first("blend_check"),
+        blend=of_first("blend"),
+        inventory=of_first("inventory"),
         lightfield=f"{WORK}/{{scene}}/probes.json",
     output:
         f"{WORK}/{{scene}}/calibration.json",
     log:
-        f"{WORK}/logs/{{scene}}/calibrate.log",
+        log_of("{scene}/calibrate"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/calibrate.tsv"
+        times_of("{scene}/calibrate")
     conda:
         ENVIRONMENT
     threads: lambda wildcards: workflow.cores or 1
     resources:
         mem_mb=6000,
         runtime=240,
-        gpu=0 if SETTINGS["device"] in ("auto", "cpu") else 1,
+        gpu=GPUS,
     params:
-        device=SETTINGS["device"],
-        cache=lambda wildcards: f"{WORK}/{scene_name(wildcards)}/trials",
+        device=SETTINGS.device,
+        cache=of_first("trials"),
         seconds=f"{WORK}/{{scene}}/calibration_seconds.json",
     message:
         "Choosing the settings that reach the target error of {wildcards.scene}"
@@ -59,11 +59,11 @@ rule calibrate:
 
 rule measure_error:
     input:
-        check=lambda wildcards: check_of(scene_name(wildcards)),
-        blend=lambda wildcards: blend_of(scene_name(wildcards)),
-        inventory=lambda wildcards: f"{WORK}/{scene_name(wildcards)}/inventory.json",
+        check=of_first("blend_check"),
+        blend=of_first("blend"),
+        inventory=of_first("inventory"),
         lightfield=f"{WORK}/{{scene}}/probes.json",
-        calibration=lambda wildcards: calibration_of(first_dataset(wildcards)),
+        calibration=of_first("calibration"),
     output:
         multiext(
             f"{RESULTS}/benchmarks/error_vs_time/{{scene}}",
@@ -73,7 +73,7 @@ rule measure_error:
             ".png",
         ),
     log:
-        f"{WORK}/logs/{{scene}}/error_vs_time.log",
+        log_of("{scene}/error_vs_time"),
     conda:
         ENVIRONMENT
     # Alone on the machine, and on one core of it, so that nothing else is in the times.
@@ -81,10 +81,10 @@ rule measure_error:
     resources:
         mem_mb=6000,
         runtime=240,
-        gpu=0 if SETTINGS["device"] in ("auto", "cpu") else 1,
+        gpu=GPUS,
     params:
-        device=SETTINGS["device"],
-        cache=lambda wildcards: f"{WORK}/{scene_name(wildcards)}/trials",
+        device=SETTINGS.device,
+        cache=of_first("trials"),
         calibration=calibration_words,
         stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
     message:
@@ -99,5 +99,5 @@ rule error_vs_time:
     input:
         [
             f"{RESULTS}/benchmarks/error_vs_time/{name}.json"
-            for name in dict.fromkeys(dataset.name for dataset in CHOSEN)
+            for name in dict.fromkeys(dataset.scene_name for dataset in CHOSEN)
         ],

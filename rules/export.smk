@@ -3,19 +3,19 @@
 
 rule export_views_to_instant_ngp:
     input:
-        records=lambda wildcards: records(dataset_of(wildcards), "render"),
+        records=records,
         lightfield=f"{DATASET}/lightfield.json",
     output:
         f"{DATASET}/transforms.json",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/export_instant_ngp.log",
+        log_of("{scene}/{rig}/export_instant_ngp"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/{{rig}}/export/views.tsv"
+        times_of("{scene}/{rig}/export/views")
     conda:
         ENVIRONMENT
     params:
         views=f"{DATASET}/exr",
-        placement=placement,
+        placement=of_dataset("placement"),
     message:
         "Exporting {wildcards.scene}/{wildcards.rig} for instant-ngp"
     shell:
@@ -26,19 +26,19 @@ rule export_views_to_instant_ngp:
 
 rule export_reprojection_to_instant_ngp:
     input:
-        records=lambda wildcards: records(dataset_of(wildcards), wildcards.reprojection),
+        records=records,
         lightfield=f"{REPROJECTED}/lightfield.json",
     output:
         f"{REPROJECTED}/transforms.json",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/{{reprojection}}/export_instant_ngp.log",
+        log_of("{scene}/{rig}/{reprojection}/export_instant_ngp"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/{{rig}}/export/{{reprojection}}.tsv"
+        times_of("{scene}/{rig}/export/{reprojection}")
     conda:
         ENVIRONMENT
     params:
-        suffix=suffix,
-        placement=placement,
+        suffix=of_reprojection("suffix"),
+        placement=of_dataset("placement"),
     message:
         "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection} for instant-ngp"
     shell:

@@ -7,7 +7,7 @@ rule package:
     output:
         f"{RESULTS}/{{scene}}/{{scene}}_{{rig}}.tar",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/package.log",
+        log_of("{scene}/{rig}/package"),
     conda:
         ENVIRONMENT
     params:
@@ -20,4 +20,5 @@ rule package:
         "tar --create --file {output} --directory {params.folder} --sort=name --mtime=@0"
         " --owner=0 --group=0 --numeric-owner --mode=u=rwX,go=rX"
         " --exclude='{wildcards.rig}/report' --exclude='{wildcards.rig}/f*/report'"
+        " --transform='s,^,{wildcards.scene}_,'"
         " {wildcards.rig} 2>&1 | tee {log}"

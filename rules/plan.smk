@@ -1,44 +1,45 @@
 # Before anything is rendered: what the camera setups are, and what rendering them will take.
 
 
+# Without output: it is asked for to be read.
 rule rig_tables:
     input:
         [
             f"configs/scenes/{name}.yaml"
-            for name in dict.fromkeys(d.name for d in CHOSEN)
+            for name in dict.fromkeys(d.scene_name for d in CHOSEN)
         ],
-    output:
-        markdown=f"{RESULTS}/tables/rigs.md",
-        csv=f"{RESULTS}/tables/rigs.csv",
     log:
-        f"{WORK}/logs/rig_tables.log",
+        log_of("rig_tables"),
     conda:
         ENVIRONMENT
+    params:
+        table=f"{RESULTS}/tables/rigs.md",
+        figures=f"{RESULTS}/tables/rigs.csv",
     message:
         "Tabulating the camera setups"
     shell:
-        "python scripts/rig_table.py {input} --markdown {output.markdown} --csv {output.csv}"
+        "python scripts/rig_table.py {input} --markdown {params.table} --csv {params.figures}"
         " 2>&1 | tee {log}"
 
 
 rule probe:
     input:
-        check=scene_check,
-        blend=scene_file,
-        inventory=scene_inventory,
+        check=of_dataset("blend_check"),
+        blend=of_dataset("blend"),
+        inventory=of_dataset("inventory"),
         lightfield=f"{DATASET}/lightfield.json",
     output:
         f"{MADE}/probe.json",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/probe.log",
+        log_of("{scene}/{rig}/probe"),
     conda:
         ENVIRONMENT
     resources:
         mem_mb=6000,
         runtime=60,
-        gpu=0 if SETTINGS["device"] in ("auto", "cpu") else 1,
+        gpu=GPUS,
     params:
-        device=SETTINGS["device"],
+        device=SETTINGS.device,
     message:
         "Measuring what the views of {wildcards.scene}/{wildcards.rig} cost"
     shell:
@@ -52,7 +53,7 @@ rule plan:
     input:
         [probe for _, _, probe in probes()],
     log:
-        f"{WORK}/logs/plan.log",
+        log_of("plan"),
     conda:
         ENVIRONMENT
     params:

@@ -3,28 +3,29 @@
 
 rule render:
     input:
-        check=scene_check,
-        blend=scene_file,
-        inventory=scene_inventory,
+        check=of_dataset("blend_check"),
+        blend=of_dataset("blend"),
+        inventory=of_dataset("inventory"),
         lightfield=f"{DATASET}/lightfield.json",
         cameras=f"{MADE}/cameras.json",
+        renewal=renewal,
     output:
         f"{MADE}/render/{{first}}-{{end}}.json",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/render/{{first}}-{{end}}.log",
+        log_of("{scene}/{rig}/render/{first}-{end}"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/{{rig}}/render/{{first}}-{{end}}.tsv"
+        times_of("{scene}/{rig}/render/{first}-{end}")
     conda:
         ENVIRONMENT
     threads: shard_threads
     resources:
         mem_mb=6000,
-        runtime=lambda wildcards: shard_minutes(wildcards),
-        gpu=0 if SETTINGS["device"] in ("auto", "cpu") else 1,
+        runtime=shard_minutes,
+        gpu=GPUS,
     params:
         folder=f"{DATASET}/exr",
         journal=f"{MADE}/render/{{first}}-{{end}}.journal.jsonl",
-        device=SETTINGS["device"],
+        device=SETTINGS.device,
         run=RUN,
     message:
         "Rendering views {wildcards.first} to {wildcards.end} of {wildcards.scene}/{wildcards.rig}"

@@ -3,24 +3,24 @@
 
 rule panorama_lightfield:
     input:
-        check=scene_check,
-        calibration=calibration,
+        check=of_dataset("blend_check"),
+        calibration=of_dataset("calibration"),
     output:
         f"{PANORAMA}/lightfield.json",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/panorama/lightfield.log",
+        log_of("{scene}/{rig}/panorama/lightfield"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/{{rig}}/panorama/lightfield.tsv"
+        times_of("{scene}/{rig}/panorama/lightfield")
     conda:
         ENVIRONMENT
     params:
-        name=lambda wildcards: dataset_of(wildcards).name,
-        limits=lambda wildcards: json.dumps(LIMITS[wildcards.scene]),
-        width=panorama_width,
+        name=of_dataset("scene_name"),
+        limits=of_dataset("limits_json"),
+        width=of_dataset("panorama_width"),
         calibration=calibration_words,
-        render=lambda wildcards: dataset_of(wildcards).render,
-        center=lambda wildcards: dataset_of(wildcards).cameras["center"],
-        fingerprint=fingerprint,
+        render=of_dataset("render"),
+        center=lambda wildcards: dataset_of(wildcards).rig.center,
+        fingerprint=of_dataset("builder_fingerprint"),
     message:
         "Placing the panorama of {wildcards.scene}/{wildcards.rig}"
     shell:
@@ -31,25 +31,25 @@ rule panorama_lightfield:
 
 rule render_panorama:
     input:
-        check=scene_check,
-        blend=scene_file,
-        inventory=scene_inventory,
+        check=of_dataset("blend_check"),
+        blend=of_dataset("blend"),
+        inventory=of_dataset("inventory"),
         lightfield=f"{PANORAMA}/lightfield.json",
     output:
         f"{PANORAMA}/exr/view_0000f.exr",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/panorama/render.log",
+        log_of("{scene}/{rig}/panorama/render"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/{{rig}}/panorama/render.tsv"
+        times_of("{scene}/{rig}/panorama/render")
     conda:
         ENVIRONMENT
     resources:
         mem_mb=6000,
         runtime=120,
-        gpu=0 if SETTINGS["device"] in ("auto", "cpu") else 1,
+        gpu=GPUS,
     params:
         folder=f"{PANORAMA}/exr",
-        device=SETTINGS["device"],
+        device=SETTINGS.device,
     message:
         "Rendering the panorama of {wildcards.scene}/{wildcards.rig}"
     shell:
@@ -69,9 +69,9 @@ rule panorama:
             caption="../report/panorama.rst",
         ),
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/panorama/develop.log",
+        log_of("{scene}/{rig}/panorama/develop"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/{{rig}}/panorama/develop.tsv"
+        times_of("{scene}/{rig}/panorama/develop")
     conda:
         ENVIRONMENT
     message:
@@ -82,7 +82,7 @@ rule panorama:
 
 rule contact_sheet:
     input:
-        records=lambda wildcards: records(dataset_of(wildcards), "render"),
+        records=records,
         lightfield=f"{DATASET}/lightfield.json",
     output:
         report(
@@ -92,9 +92,9 @@ rule contact_sheet:
             caption="../report/contact_sheet.rst",
         ),
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/contact_sheet.log",
+        log_of("{scene}/{rig}/contact_sheet"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/{{rig}}/report/contact_sheet.tsv"
+        times_of("{scene}/{rig}/report/contact_sheet")
     conda:
         ENVIRONMENT
     params:
@@ -122,13 +122,13 @@ rule figures:
             for still in STILLS
         ],
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/figures.log",
+        log_of("{scene}/{rig}/figures"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/{{rig}}/report/figures.tsv"
+        times_of("{scene}/{rig}/report/figures")
     conda:
         ENVIRONMENT
     params:
-        rig=lambda wildcards: json.dumps(dataset_of(wildcards).cameras),
+        rig=of_dataset("rig_json"),
         folder=lambda wildcards, output: str(Path(output[0]).parent),
     message:
         "Drawing the rig, depth and noise of {wildcards.scene}/{wildcards.rig}"
@@ -139,22 +139,22 @@ rule figures:
 
 rule page:
     input:
-        records=lambda wildcards: all_records(dataset_of(wildcards)),
-        published=lambda wildcards: published(dataset_of(wildcards)),
-        pictures=lambda wildcards: pictures(dataset_of(wildcards)),
+        records=of_dataset("all_records"),
+        published=of_dataset("published"),
+        pictures=of_dataset("pictures"),
         validation=f"{DATASET}/validation.json",
         costs=f"{DATASET}/report/costs.json",
     output:
         f"{DATASET}/report/index.html",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/page.log",
+        log_of("{scene}/{rig}/page"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/{{rig}}/report/page.tsv"
+        times_of("{scene}/{rig}/report/page")
     conda:
         ENVIRONMENT
     params:
         dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
-        rig=lambda wildcards: json.dumps(dataset_of(wildcards).cameras),
+        rig=of_dataset("rig_json"),
         measurements=measurements,
         # Not in the command: when a measurement was made anew, so is the page.
         measured=measurement_times,
@@ -168,11 +168,11 @@ rule page:
 
 rule index:
     input:
-        [page_of(dataset) for dataset in CHOSEN],
+        [dataset.page for dataset in CHOSEN],
     output:
         f"{RESULTS}/index.html",
     log:
-        f"{WORK}/logs/index.log",
+        log_of("index"),
     conda:
         ENVIRONMENT
     params:

@@ -7,16 +7,16 @@ rule reprojected_lightfield:
     output:
         f"{REPROJECTED}/lightfield.json",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/{{reprojection}}/lightfield.log",
+        log_of("{scene}/{rig}/{reprojection}/lightfield"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/{{rig}}/{{reprojection}}/lightfield.tsv"
+        times_of("{scene}/{rig}/{reprojection}/lightfield")
     conda:
         ENVIRONMENT
     params:
         views=f"{DATASET}/exr",
         folder=REPROJECTED,
-        optics=optics,
-        development=development,
+        optics=of_reprojection("optics"),
+        development=of_reprojection("development"),
     message:
         "Writing the lens of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
@@ -31,13 +31,13 @@ rule lens_map:
     output:
         f"{MADE}/{{reprojection}}/lens_map.npy",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/{{reprojection}}/lens_map.log",
+        log_of("{scene}/{rig}/{reprojection}/lens_map"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/{{rig}}/{{reprojection}}/lens_map.tsv"
+        times_of("{scene}/{rig}/{reprojection}/lens_map")
     conda:
         ENVIRONMENT
     params:
-        optics=optics,
+        optics=of_reprojection("optics"),
     message:
         "Computing the lens map of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
@@ -49,12 +49,13 @@ rule reproject:
         record=f"{MADE}/render/{{first}}-{{end}}.json",
         lightfield=f"{DATASET}/lightfield.json",
         lens_map=f"{MADE}/{{reprojection}}/lens_map.npy",
+        renewal=renewal,
     output:
         f"{MADE}/{{reprojection}}/{{first}}-{{end}}.json",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/{{reprojection}}/{{first}}-{{end}}.log",
+        log_of("{scene}/{rig}/{reprojection}/{first}-{end}"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/{{rig}}/{{reprojection}}/{{first}}-{{end}}.tsv"
+        times_of("{scene}/{rig}/{reprojection}/{first}-{end}")
     conda:
         ENVIRONMENT
     resources:
@@ -62,8 +63,8 @@ rule reproject:
     params:
         views=f"{DATASET}/exr",
         folder=REPROJECTED,
-        optics=optics,
-        development=development,
+        optics=of_reprojection("optics"),
+        development=of_reprojection("development"),
     message:
         "Reprojecting views {wildcards.first} to {wildcards.end} of"
         " {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"

@@ -3,24 +3,24 @@
 
 rule lightfield:
     input:
-        check=scene_check,
-        calibration=calibration,
+        check=of_dataset("blend_check"),
+        calibration=of_dataset("calibration"),
     output:
         f"{DATASET}/lightfield.json",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/lightfield.log",
+        log_of("{scene}/{rig}/lightfield"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/{{rig}}/cameras/lightfield.tsv"
+        times_of("{scene}/{rig}/cameras/lightfield")
     conda:
         ENVIRONMENT
     params:
-        name=lambda wildcards: dataset_of(wildcards).name,
-        limits=lambda wildcards: json.dumps(LIMITS[wildcards.scene]),
+        name=of_dataset("scene_name"),
+        limits=of_dataset("limits_json"),
         calibration=calibration_words,
         # Not in the command: when what the YAML says of this dataset changes, so does the file.
-        cameras=lambda wildcards: dataset_of(wildcards).cameras,
-        render=lambda wildcards: dataset_of(wildcards).render,
-        fingerprint=fingerprint,
+        rig=of_dataset("rig_json"),
+        render=of_dataset("render"),
+        fingerprint=of_dataset("builder_fingerprint"),
     message:
         "Placing the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
@@ -30,15 +30,15 @@ rule lightfield:
 
 rule check_cameras:
     input:
-        check=scene_check,
-        blend=scene_file,
+        check=of_dataset("blend_check"),
+        blend=of_dataset("blend"),
         lightfield=f"{DATASET}/lightfield.json",
     output:
         f"{MADE}/cameras.json",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/check_cameras.log",
+        log_of("{scene}/{rig}/check_cameras"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/{{rig}}/cameras/check_cameras.tsv"
+        times_of("{scene}/{rig}/cameras/check_cameras")
     conda:
         ENVIRONMENT
     resources:

@@ -5,19 +5,21 @@ rule build_scene:
     output:
         f"{WORK}/{{name}}/scene.blend",
     log:
-        f"{WORK}/logs/{{name}}/build_scene.log",
+        log_of("{name}/build_scene"),
     benchmark:
-        f"{WORK}/benchmarks/{{name}}/build_scene.tsv"
+        times_of("{name}/build_scene")
     conda:
         ENVIRONMENT
     resources:
         mem_mb=8000,
         runtime=30,
     params:
-        builder=lambda wildcards: source_of(wildcards.name)["builder"],
-        parameters=lambda wildcards: json.dumps(source_of(wildcards.name)["parameters"]),
+        builder=lambda wildcards: SCENES[wildcards.name].source.builder,
+        parameters=lambda wildcards: SCENES[
+            wildcards.name
+        ].source.parameters.model_dump_json(),
         # Not in the command: a changed builder makes the scene, and then its views, anew.
-        fingerprint=lambda wildcards: scene_fingerprint(source_of(wildcards.name)),
+        fingerprint=lambda wildcards: SCENES[wildcards.name].fingerprint,
     message:
         "Building the scene {wildcards.name}"
     shell:
@@ -27,13 +29,13 @@ rule build_scene:
 
 rule check_blend:
     input:
-        lambda wildcards: source_of(wildcards.name)["blend"],
+        checked_blend,
     output:
         f"{WORK}/{{name}}/blend.json",
     log:
-        f"{WORK}/logs/{{name}}/check_blend.log",
+        log_of("{name}/check_blend"),
     benchmark:
-        f"{WORK}/benchmarks/{{name}}/check_blend.tsv"
+        times_of("{name}/check_blend")
     conda:
         ENVIRONMENT
     params:
@@ -48,14 +50,14 @@ rule check_blend:
 
 rule inventory:
     input:
-        check=lambda wildcards: check_of(wildcards.name),
-        blend=lambda wildcards: blend_of(wildcards.name),
+        check=lambda wildcards: SCENES[wildcards.name].blend_check,
+        blend=lambda wildcards: SCENES[wildcards.name].blend,
     output:
         f"{WORK}/{{name}}/inventory.json",
     log:
-        f"{WORK}/logs/{{name}}/inventory.log",
+        log_of("{name}/inventory"),
     benchmark:
-        f"{WORK}/benchmarks/{{name}}/inventory.tsv"
+        times_of("{name}/inventory")
     conda:
         ENVIRONMENT
     resources:
@@ -68,19 +70,17 @@ rule inventory:
 
 
 # Only where a scene YAML says from where, and the user has not brought the file.
-for name, source in {
-    dataset.name: dataset.source
-    for dataset in DATASETS.values()
-    if "url" in dataset.source
-}.items():
+for name, dataset in SCENES.items():
+    if not dataset.source.url:
+        continue
 
     rule:
         name:
             f"fetch_{name}"
         output:
-            source["blend"],
+            dataset.blend,
         log:
-            f"{WORK}/logs/{name}/fetch_blend.log",
+            log_of(f"{name}/fetch_blend"),
         # Where Snakemake runs: a cluster's nodes may not reach the Internet.
         localrule: True
         conda:

@@ -4,16 +4,16 @@
 # An invalid dataset is an outcome too: it gets its validation.json and its page, and fails below.
 rule validate:
     input:
-        records=lambda wildcards: all_records(dataset_of(wildcards)),
-        published=lambda wildcards: published(dataset_of(wildcards)),
+        records=of_dataset("all_records"),
+        published=of_dataset("published"),
         cameras=f"{MADE}/cameras.json",
     output:
         validation=f"{DATASET}/validation.json",
         sums=f"{MADE}/checksums.txt",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/validate.log",
+        log_of("{scene}/{rig}/validate"),
     benchmark:
-        f"{WORK}/benchmarks/{{scene}}/{{rig}}/validate.tsv"
+        times_of("{scene}/{rig}/validate")
     conda:
         ENVIRONMENT
     threads: 2
@@ -40,7 +40,7 @@ rule checksums:
     output:
         f"{DATASET}/sha256sums.txt",
     log:
-        f"{WORK}/logs/{{scene}}/{{rig}}/checksums.log",
+        log_of("{scene}/{rig}/checksums"),
     conda:
         ENVIRONMENT
     message:

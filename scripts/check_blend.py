@@ -24,7 +24,9 @@ def main() -> None:
     arguments = parser.parse_args()
     status = arguments.blend.stat()
     found = sha256(arguments.blend)
-    expected, origin = config.blend_sha256(arguments.scene)
+    expected, origin = config.blend_sha256(
+        arguments.scene, config.load_scene(arguments.scene).scene
+    )
     if expected is None:
         write_json(origin, {"blend": arguments.blend.name, "sha256": found})
         print(f"{arguments.blend}: its sha256 {found} is now recorded in {origin}")

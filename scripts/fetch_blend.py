@@ -17,11 +17,11 @@ def main() -> None:
     parser.add_argument("--scene", required=True, help="name of a file in configs/scenes/")
     parser.add_argument("--output", required=True, type=Path, help=".blend to write")
     arguments = parser.parse_args()
-    source = config.load_scene(arguments.scene)["scene"]
-    if "url" not in source:
+    source = config.load_scene(arguments.scene).scene
+    if source.url is None:
         raise UserError(f"configs/scenes/{arguments.scene}.yaml: scene: is missing the key url")
-    expected, origin = config.blend_sha256(arguments.scene)
-    download.fetch(source["url"], arguments.output, expected, str(origin))
+    expected, origin = config.blend_sha256(arguments.scene, source)
+    download.fetch(source.url, arguments.output, expected, str(origin))
 
 
 if __name__ == "__main__":

@@ -2,20 +2,23 @@
 
 import argparse
 import json
-from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+
+from pydantic import TypeAdapter
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
-from lightfield.dataset import config, keys
+from lightfield.core.settings import checked
+from lightfield.dataset.config import Preset
+from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.lightfield import LightField
-from lightfield.geometry import lenses
+from lightfield.geometry import rigs
 from lightfield.measurement.calibration import calibrated
 
 # What of a scene YAML's `scene` block is written down: not where a file came from, nor where it is.
-SOURCE_KEYS = ("builder", "parameters", "frame")
+SOURCE_KEYS = {"builder", "parameters", "frame"}
 
 
 def main() -> None:
@@ -46,39 +49,41 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="lightfield.json to write")
     arguments = parser.parse_args()
 
-    datasets = config.scene_datasets(arguments.scene, "full", arguments.limits)
-    dataset = next((d for d in datasets if arguments.rig in (None, d.rig)), None)
+    limits = checked(TypeAdapter(Preset), arguments.limits, "--limits")
+    datasets = scene_datasets(arguments.scene, limits=limits)
+    dataset = next((d for d in datasets if arguments.rig in (None, d.rig_folder)), None)
     if dataset is None:
-        known = ", ".join(d.rig for d in datasets)
+        known = ", ".join(d.rig_folder for d in datasets)
         raise UserError(f"--rig: is {arguments.rig!r}; must be one of {known}")
-    cameras = dataset.cameras
     if arguments.panorama:
-        cameras = panorama_rig(cameras, arguments.panorama)
-    render = dict(dataset.render)
+        dataset = replace(dataset, rig=panorama_rig(dataset.rig, arguments.panorama))
+    render = dataset.render
     if arguments.calibration:
         render = calibrated(render, read_json(arguments.calibration))
     LightField.from_rig(
-        cameras,
-        lenses.from_camera(cameras["camera"]),
-        depth=config.depth_meaning(render["depth"], cameras["camera"]),
-        frame=dataset.source["frame"],
+        dataset.rig,
+        dataset.rig.camera.make(),
+        depth=dataset.depth,
+        frame=dataset.source.frame,
         scene={
-            "name": arguments.scene,
-            **{key: dataset.source[key] for key in SOURCE_KEYS if key in dataset.source},
-            "fingerprint": keys.scene_fingerprint(dataset.source),
+            "name": dataset.scene_name,
+            **dataset.source.model_dump(include=SOURCE_KEYS, exclude_none=True),
+            "fingerprint": dataset.fingerprint,
         },
         render=render,
     ).write(arguments.output)
 
 
-def panorama_rig(cameras: Mapping[str, Any], width: int) -> dict[str, Any]:
-    """Return a rig of one full equirectangular view, level, at the centre of ``cameras``."""
-    return {
-        "type": "lattice",
-        "cameras": [1, 1, 1],
-        "center": cameras["center"],
-        "camera": {"lens": "equirectangular", "resolution": [width, width // 2]},
-    }
+def panorama_rig(rig: rigs.Rig, width: int) -> rigs.Rig:
+    """Return a rig of one full equirectangular view, level, at the centre of ``rig``."""
+    return rigs.from_settings(
+        {
+            "type": "lattice",
+            "cameras": [1, 1, 1],
+            "center": rig.center,
+            "camera": {"lens": "equirectangular", "resolution": [width, width // 2]},
+        }
+    )
 
 
 if __name__ == "__main__":

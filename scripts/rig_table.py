@@ -66,12 +66,14 @@ def main() -> None:
     parser.add_argument("--csv", type=Path, required=True, help="the same figures, unrounded")
     arguments = parser.parse_args()
     rows = [
-        row(path.stem, name, rigs.from_settings(rig))
+        row(path.stem, name, rig)
         for path in arguments.scenes
-        for name, rig in config.read_scene(path)["rigs"].items()
+        for name, rig in config.read_scene(path).rigs.items()
     ]
+    text = markdown(rows)
+    print(text, end="")
     with atomic_path(arguments.markdown) as temporary:
-        temporary.write_text(markdown(rows), encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8")
     with (
         atomic_path(arguments.csv) as temporary,
         temporary.open("w", encoding="utf-8", newline="") as file,

@@ -13,6 +13,7 @@ from checkouts import checkout, planned, snakemake
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.dataset import config, download
+from lightfield.dataset.dataset import load_datasets, scene_datasets
 
 CONTENT = bytes(range(256)) * 12345
 SUM = hashlib.sha256(CONTENT).hexdigest()
@@ -174,11 +175,11 @@ def check(monkeypatch, blend):
 def test_the_first_file_used_is_recorded_and_every_later_one_checked(scene, monkeypatch):
     blend = scene()
     blend.write_bytes(CONTENT)
-    assert config.scene_datasets("own", "full", {})[0].source.get("sha256") is None
+    assert scene_datasets("own")[0].source.sha256 is None
     assert check(monkeypatch, blend)["sha256"] == SUM
     lock = blend.with_name("own.lock.json")
     assert json.loads(lock.read_text())["sha256"] == SUM
-    assert config.scene_datasets("own", "full", {})[0].source["sha256"] == SUM
+    assert scene_datasets("own")[0].source.sha256 == SUM
     check(monkeypatch, blend)
     blend.write_bytes(CONTENT[1:])
     with pytest.raises(UserError) as caught:
@@ -203,20 +204,23 @@ def test_a_missing_file_gives_the_page_and_the_place(scene):
     content = {"scenes": ["own"], "preset": "full", "presets": {"full": {}}}
     settings = config.load_config(content)
     with pytest.raises(UserError) as caught:
-        config.load_datasets(settings)
+        load_datasets(settings)
     assert "there is no file blends/mine.blend" in str(caught.value)
     assert "get it from https://example.org/scenes and put it there" in str(caught.value)
     # What can be downloaded may be missing.
     scene(more=", url: 'https://example.org/mine.blend'", blend="blends/mine.blend")
-    assert len(config.load_datasets(settings)) == 1
+    assert len(load_datasets(settings)) == 1
+
+
+# What an original has of its own.
+OWN = {"scene", "description"}
 
 
 @pytest.mark.parametrize("name", ["garden", "lone_monk", "barbershop"])
 def test_an_original_has_the_rigs_of_the_scene_that_stands_in_for_it(name):
     built, original = (config.load_scene(scene) for scene in (name, f"{name}_original"))
-    assert original["scene"]["page"].startswith("https://")
-    for key in ("render", "rigs", "reprojections", "exports"):
-        assert original[key] == built[key]
+    assert original.scene.page.startswith("https://")
+    assert original.model_dump(exclude=OWN) == built.model_dump(exclude=OWN)
 
 
 TRAPS = """

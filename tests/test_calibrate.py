@@ -9,6 +9,7 @@ from checkouts import checkout, planned, snakemake
 import calibrate
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
+from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 
@@ -145,7 +146,7 @@ def test_what_was_chosen_is_what_is_rendered_and_shards_stay(tmp_path):
     assert written["render"]["target_error"] == 0.05
 
 
-LIMITS = {"samples": 12, "denoise": True}
+LIMITS = config.Preset(samples=12, denoise=True)
 
 
 def test_a_scene_has_samples_or_a_target(tmp_path):
@@ -154,12 +155,12 @@ def test_a_scene_has_samples_or_a_target(tmp_path):
         path.write_text(SCENE.format(render=render))
         return config.read_scene(path)
 
-    assert read("target_error: 0.01")["render"]["target_error"] == 0.01
+    assert read("target_error: 0.01").render.target_error == 0.01
     for render, told in {
         "seed: 1": "render: is missing the key samples (or target_error)",
         "samples: 4, target_error: 0.1": "render.samples: goes without target_error",
         "denoise: true, target_error: 0.1": "render.denoise: goes without target_error",
-        "target_error: 0": "render.target_error: is 0; must be a number above 0 and at most 1",
+        "target_error: 0": "render.target_error: is 0; must be above 0",
         "target_eror: 0.1": "render.target_eror: unknown key; did you mean target_error?",
     }.items():
         with pytest.raises(UserError) as caught:
@@ -170,7 +171,7 @@ def test_a_scene_has_samples_or_a_target(tmp_path):
 def test_presets_limit_what_a_calibration_may_choose(monkeypatch, tmp_path):
     monkeypatch.setattr(config, "SCENES", tmp_path)
     Path(tmp_path, "aimed.yaml").write_text(SCENE.format(render="target_error: 0.05"))
-    full = config.scene_datasets("aimed", "full", {})[0].render
+    full = scene_datasets("aimed")[0].render
     assert not {"samples", "denoise", "adaptive_threshold", "most_samples"} & set(full)
-    preview = config.scene_datasets("aimed", "preview", LIMITS)[0].render
+    preview = scene_datasets("aimed", "preview", LIMITS)[0].render
     assert (preview["most_samples"], preview["denoise"]) == (12, True)

@@ -1,15 +1,21 @@
 """The configuration: what is right is resolved, what is wrong is told in one line."""
 
 import copy
+import json
+import re
 import subprocess
 import sys
 from pathlib import Path
 
+import jsonschema
 import pytest
 import yaml
 
+import schema
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
+from lightfield.dataset.config import Preset
+from lightfield.dataset.dataset import scene_datasets
 
 RIGHT = {
     "scene": {"builder": "test_room"},
@@ -36,6 +42,7 @@ RIGHT = {
 }
 
 REMOVE = object()
+SNAKEMAKE = Path(sys.executable).with_name("snakemake")
 
 
 def changed(path, value):
@@ -56,11 +63,14 @@ BROKEN = {
     # key path: (value, what the message must hold beside the key path)
     "no samples": ("render.samples", REMOVE, "render: is missing the key samples"),
     "text for number": ("render.samples", "many", 'render.samples: is "many"; must be a whole'),
+    "true for number": ("render.samples", True, "render.samples: is true; must be a whole number"),
+    "text of a number": ("render.clamp_indirect", "10", 'clamp_indirect: is "10"; must be a'),
+    "no number": ("render.clamp_indirect", float("inf"), "clamp_indirect: is Infinity; must be a"),
     "fraction": ("render.samples", 1.5, "render.samples: is 1.5; must be a whole number"),
     "zero samples": (
         "render.samples",
         0,
-        "render.samples: is 0; must be a whole number at least 1",
+        "render.samples: is 0; must be at least 1",
     ),
     "misspelt key": ("render.sample", 4, "render.sample: unknown key; did you mean samples?"),
     "unknown key": ("render.xyzzy", 4, "render.xyzzy: unknown key; allowed here: samples, "),
@@ -74,32 +84,36 @@ BROKEN = {
     "bad sum": (
         "scene",
         {"blend": "a.blend", "sha256": "123"},
-        'scene.sha256: is "123"; must be a text of the form',
+        'scene.sha256: is "123"; must be of the form ^[0-9a-f]',
     ),
     "unknown rig type": (
         "rigs.LFSphere.type",
         "ball",
-        'rigs.LFSphere.type: is "ball"; must be one of plane, cuboid,',
+        "rigs.LFSphere.type: is \"ball\"; must be one of 'plane', 'cuboid',",
     ),
     "too many subdivisions": (
         "rigs.LFSphere.subdivisions",
         12,
-        "rigs.LFSphere.subdivisions: is 12; must be a whole number at least 1 and at most 7",
+        "rigs.LFSphere.subdivisions: is 12; must be at most 7",
     ),
-    "wrong placement": ("rigs.LFSphere.cameras", [3, 3], "does not go with a rig of type sphere"),
+    "wrong placement": (
+        "rigs.LFSphere.cameras",
+        [3, 3],
+        "rigs.LFSphere.cameras: unknown key; did you mean camera?",
+    ),
     "cameras of a cuboid": (
         "rigs.LFCuboid.cameras",
         [3, 3],
-        "rigs.LFCuboid.cameras: is [3, 3]; must be 3 whole numbers",
+        "rigs.LFCuboid.cameras: is [3, 3]; must be a list of 3 values",
     ),
-    "negative size": ("rigs.LFCuboid.size", -1, "rigs.LFCuboid.size: is -1; must be a number at"),
+    "negative size": ("rigs.LFCuboid.size", -1, "rigs.LFCuboid.size: is -1; must be at least 0"),
     "centre of two": ("rigs.LFCuboid.center", [0, 1], "rigs.LFCuboid.center: is [0, 1]; must be a"),
-    "no rigs": ("rigs", {}, "rigs: is {}; must be a mapping with at least one key"),
+    "no rigs": ("rigs", {}, "rigs: is {}; must have at least 1 item"),
     "rig name": ("rigs", {"../out": RIGHT["rigs"]["LFSphere"]}, "rigs: '../out' is no name"),
     "fov beyond the lens": (
         "reprojections.perspective.camera",
         {"lens": "rectilinear", "fov": 180, "resolution": [9, 9]},
-        "reprojections.perspective.camera.fov: is 180; must be below 180 degrees",
+        "reprojections.perspective.camera.fov: is 180; must be below 180",
     ),
     "fisheye without fov": (
         "rigs.LFSphere.camera",
@@ -169,8 +183,8 @@ def test_text_that_is_no_scene_is_told_so(text, expected, tmp_path):
 def test_defaults_and_limits_are_applied(tmp_path, monkeypatch):
     (tmp_path / "right.yaml").write_text(yaml.safe_dump(RIGHT, sort_keys=False))
     monkeypatch.setattr(config, "SCENES", tmp_path)
-    full = config.scene_datasets("right", "full", {})
-    assert [(d.scene, d.rig, d.view_count) for d in full] == [
+    full = scene_datasets("right")
+    assert [(d.scene_folder, d.rig_folder, d.view_count) for d in full] == [
         ("right", "LFSphere", 642),
         ("right", "LFCuboid", 1400),
     ]
@@ -179,13 +193,15 @@ def test_defaults_and_limits_are_applied(tmp_path, monkeypatch):
     assert full[1].depth == "distance"
     assert list(full[0].reprojections) == ["perspective"]
     assert list(full[1].reprojections) == []
-    small = config.scene_datasets(
-        "right", "small", {"resolution": 100, "samples": 8, "views": 50, "denoise": True}
-    )
-    assert [(d.scene, d.view_count) for d in small] == [("right_small", 42), ("right_small", 48)]
-    assert small[0].cameras["camera"]["resolution"] == [100, 100]
-    assert small[1].cameras["camera"]["resolution"] == [100, 50]
-    assert small[0].reprojections["perspective"]["camera"]["resolution"] == [100, 100]
+    limits = Preset(resolution=100, samples=8, views=50, denoise=True)
+    small = scene_datasets("right", "small", limits)
+    assert [(d.scene_folder, d.view_count) for d in small] == [
+        ("right_small", 42),
+        ("right_small", 48),
+    ]
+    assert small[0].rig.camera.resolution == [100, 100]
+    assert small[1].rig.camera.resolution == [100, 50]
+    assert small[0].reprojections["perspective"].camera.resolution == [100, 100]
     assert small[0].render["samples"] == 8
     assert small[0].render["denoise"] is True
 
@@ -195,21 +211,71 @@ def test_every_scene_of_the_repository_is_right():
         config.read_scene(path)
 
 
+@pytest.mark.parametrize("name", schema.MODELS)
+def test_the_schemas_for_editors_say_what_the_models_say(name):
+    path = schema.FOLDER / f"{name}.schema.json"
+    assert path.read_text() == schema.schema(name), "run scripts/schema.py"
+
+
+def test_editors_take_every_scene_and_find_its_mistakes():
+    validator = jsonschema.Draft202012Validator(json.loads(schema.schema("scene")))
+    for path in config.SCENES.glob("*.yaml"):
+        validator.validate(yaml.safe_load(path.read_text()))
+    for path, value in (
+        ("render.sample", 4),
+        ("rigs.LFSphere.subdivisions", 12),
+        ("rigs.LFSphere.type", "cuboid"),
+        ("rigs.LFSphere.camera", REMOVE),
+        ("rigs.LFSphere.camera.lens", "rectiliner"),
+    ):
+        assert not validator.is_valid(changed(path, value)), path
+
+
+def test_a_bare_word_is_a_list_of_one():
+    content = {"preset": "full", "presets": {"full": {}}, "scenes": "artist"}
+    assert config.load_config(content).scenes == ["artist"]
+    assert config.load_config(content).rigs == "all"
+    assert config.load_config({**content, "rigs": "LFSphere"}).rigs == ["LFSphere"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "rigs"),
+    [
+        ([], {"LFSphere_e100cm_d170cm"}),
+        (["scenes=garden", "rigs=LFCuboid_8panos"], {"LFCuboid_8panos"}),
+        (["scenes=smoke"], {"LFCuboid_1x1x1", "LFPlane_3x2_equisolid", "LFLattice_2panos"}),
+    ],
+)
+def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
+    folders = (f"results={tmp_path}/results", f"work={tmp_path}/work")
+    plan = subprocess.run(
+        [SNAKEMAKE, "--cores", "1", "--dry-run", "--config", *folders, *arguments],
+        cwd=config.ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert set(re.findall(r"--rig (\w+) ", plan.stdout + plan.stderr)) == rigs
+
+
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
         (["preset=best"], "preset: is 'best'; must be one of tiny, preview, full"),
         (["scenes=[gardn]"], "there is no scene 'gardn'"),
         (["rigs=[LFSpher]"], "rigs: 'LFSpher' is in none of the scenes garden"),
-        (["scenes=[garden, lone_monk]"], "none of LFSphere_e100cm_d170cm is in lone_monk; it has "),
-        (["device=quantum"], 'device: is "quantum"; must be one of auto, cpu, optix,'),
-        (["views_per_shard=0"], "views_per_shard: is 0; must be auto or a whole number"),
+        (
+            ["scenes=[garden, lone_monk]", "rigs=LFSphere_e100cm_d170cm"],
+            "none of LFSphere_e100cm_d170cm is in lone_monk; it has ",
+        ),
+        (["device=quantum"], "device: is \"quantum\"; must be 'auto', 'cpu', 'optix',"),
+        (["views_per_shard=0"], "views_per_shard: is 0; must be 'auto' or at least 1"),
         (["results=."], "results: is '.'; must be a folder of its own"),
     ],
 )
 def test_snakemake_ends_with_one_line_and_no_job(arguments, expected, tmp_path):
     result = subprocess.run(
-        [Path(sys.executable).with_name("snakemake"), "--cores", "1", "--config", *arguments],
+        [SNAKEMAKE, "--cores", "1", "--config", *arguments],
         cwd=config.ROOT,
         capture_output=True,
         text=True,

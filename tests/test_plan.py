@@ -6,22 +6,22 @@ import re
 import pytest
 
 import plan
-from lightfield.dataset import config
+from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.lightfield import LightField
-from lightfield.geometry import lenses, rigs
+from lightfield.geometry import lenses
 
 SILVR = ("garden", "lone_monk", "barbershop")
 
 
 def test_the_rigs_are_those_that_silvr_published():
     counts = {
-        (dataset.scene, dataset.rig): (
+        (dataset.scene_folder, dataset.rig_folder): (
             dataset.view_count,
-            dataset.cameras["camera"]["lens"],
-            dataset.cameras["camera"]["resolution"],
+            dataset.rig.camera.lens,
+            dataset.rig.camera.resolution,
         )
         for scene in SILVR
-        for dataset in config.scene_datasets(scene, "full", {})
+        for dataset in scene_datasets(scene)
     }
     fisheye = ("equidistant", [2048, 2048])
     evaluation = (42, "rectilinear", [2048, 2048])
@@ -45,12 +45,12 @@ def test_the_rigs_are_those_that_silvr_published():
 
 @pytest.mark.parametrize("scene", SILVR)
 def test_a_spheres_name_tells_its_elevation_and_diameter_in_centimetres(scene):
-    spheres = [d for d in config.scene_datasets(scene, "full", {}) if "LFSphere" in d.rig]
+    spheres = [d for d in scene_datasets(scene) if "LFSphere" in d.rig_name]
     assert len(spheres) == 2
     for dataset in spheres:
-        heights = [pose.position[2] for pose in rigs.from_settings(dataset.cameras).poses()]
+        heights = [pose.position[2] for pose in dataset.rig.poses()]
         elevation, diameter = map(
-            int, re.fullmatch(r"LFSphere_e(\d+)cm_d(\d+)cm", dataset.rig).groups()
+            int, re.fullmatch(r"LFSphere_e(\d+)cm_d(\d+)cm", dataset.rig_name).groups()
         )
         assert (max(heights) + min(heights)) / 2 == pytest.approx(elevation / 100)
         assert max(heights) - min(heights) == pytest.approx(diameter / 100)

@@ -9,6 +9,7 @@ from checkouts import checkout, planned
 
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
+from lightfield.dataset.dataset import load_datasets, scene_datasets
 from lightfield.imaging import images
 
 SCENE = """
@@ -40,15 +41,15 @@ def moving(tmp_path, monkeypatch):
 
 
 def test_each_frame_is_a_dataset_in_the_rigs_folder(moving):
-    datasets = config.scene_datasets("moving", "full", {})
-    assert [(d.rig, d.source["frame"]) for d in datasets] == [
+    datasets = scene_datasets("moving")
+    assert [(d.rig_folder, d.source.frame) for d in datasets] == [
         ("LFStill", 5),
         *zip(FRAMES, (1, 9, 17), strict=True),
     ]
     assert {dataset.rig_name for dataset in datasets} == {"LFStill", "LFSequence"}
     settings = {"scenes": ["moving"], "preset": "full", "presets": {"full": {}}}
-    chosen = config.load_datasets({**settings, "rigs": ["LFSequence"]})
-    assert [dataset.rig for dataset in chosen] == FRAMES
+    chosen = load_datasets(config.load_config({**settings, "rigs": ["LFSequence"]}))
+    assert [dataset.rig_folder for dataset in chosen] == FRAMES
 
 
 @pytest.mark.parametrize(
@@ -56,7 +57,7 @@ def test_each_frame_is_a_dataset_in_the_rigs_folder(moving):
     [
         ({"frames": {"first": 3, "last": 2}}, "LFSequence.frames: first is 3; must be at most"),
         ({"frames": {"first": 1}}, "LFSequence.frames: is missing the key last"),
-        ({"frames": {"first": 1, "last": 2, "step": 0}}, "frames.step: is 0; must be a whole"),
+        ({"frames": {"first": 1, "last": 2, "step": 0}}, "frames.step: is 0; must be at least 1"),
         ({"frames": 3}, "LFSequence.frames: is 3; must be a mapping"),
     ],
 )

@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tarfile
 import time
 import zipfile
 from collections import Counter
@@ -96,6 +97,12 @@ def rendered(folder):
     return counts
 
 
+def files(folder):
+    """Return when each file was made: a dry run makes and removes none."""
+    found = [path for name in ("results", "work") for path in (folder / name).rglob("*")]
+    return {path: path.stat().st_mtime_ns for path in found if path.is_file()}
+
+
 def test_every_dataset_is_valid_and_its_checksums_hold(smoke):
     datasets = [path.parent for path in smoke.glob("results/smoke/*/validation.json")]
     assert len(datasets) >= 3
@@ -132,6 +139,9 @@ def test_a_deleted_and_a_truncated_view_are_made_again_alone(smoke, checkout, tm
     os.truncate(half, half.stat().st_size // 2)
     image = folder / CUBOID / "perspective/view_l0000f.png"
     os.truncate(image, image.stat().st_size // 2)
+    found = files(folder)
+    assert re.search(r"^render +1$", snakemake(folder, "-n", "--cores", "2", "smoke"), re.M)
+    assert files(folder) == found
     snakemake(folder, "--cores", "2", "smoke")
     again = rendered(folder) - before
     assert sorted(name for _, name in again.elements()) == ["view_b0000f", "view_u0000f"]
@@ -155,6 +165,9 @@ def test_what_was_changed_beside_a_missing_file_is_made_again_alone(smoke, tmp_p
     (folder / CUBOID / "perspective/view_l0000f.png").unlink()
     one = folder / CUBOID / "perspective/view_f0000f.png"
     one.write_bytes((folder / CUBOID / "perspective/view_r0000f.png").read_bytes())
+    found = files(folder)
+    assert re.search(r"^render +1$", snakemake(folder, "-n", "--cores", "2", "smoke"), re.M)
+    assert files(folder) == found
     snakemake(folder, "--cores", "2", "smoke")
     again = rendered(folder) - before
     assert sorted(name for _, name in again.elements()) == ["view_b0000f", "view_u0000f"]
@@ -206,6 +219,24 @@ def test_an_invalid_dataset_gets_its_page_and_no_checksums_until_it_is_mended(sm
     assert_same_bytes(smoke, folder)
     assert "This dataset failed" not in (dataset / "report/index.html").read_text()
     assert "Nothing to be done" in snakemake(folder, "--cores", "2", "smoke")
+
+
+def test_a_package_unfolds_to_one_folder_named_after_scene_and_rig(smoke):
+    package = smoke / "results/smoke/smoke_LFCuboid_1x1x1.tar"
+    snakemake(smoke, "--cores", "1", package.relative_to(smoke))
+    with tarfile.open(package) as file:
+        names = {Path(name) for name in file.getnames()}
+    package.unlink()
+    assert {name.parts[0] for name in names} == {"smoke_LFCuboid_1x1x1"}
+    assert Path("smoke_LFCuboid_1x1x1/exr/view_b0000f.exr") in names
+    assert not any("report" in name.parts for name in names)
+
+
+def test_rig_tables_are_printed_each_time(checkout):
+    folder = checkout("tables")
+    for _ in range(2):
+        told = snakemake(folder, "--cores", "1", "rig_tables", "--config", "scenes=smoke")
+        assert "| smoke | LFLattice_2panos | 2 (–) |" in told
 
 
 def test_snakemakes_own_report_holds_the_figures_and_their_captions(smoke, tmp_path):

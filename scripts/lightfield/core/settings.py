@@ -17,6 +17,7 @@ from pydantic import (
     model_validator,
 )
 from pydantic_core import ErrorDetails
+from typing_extensions import TypeAliasType
 
 from lightfield.core.errors import UserError
 
@@ -62,7 +63,8 @@ def _unchanged(value: Any, check: Callable[[Any], Any]) -> Any:
 # Beside a number that a dataset's identity follows from: 10 stays 10, and does not become 10.0.
 AS_WRITTEN = WrapValidator(_unchanged)
 
-Vector = Annotated[tuple[float, float, float], as_list(3)]
+# Named, so that the JSON schema has it once.
+Vector = TypeAliasType("Vector", Annotated[tuple[float, float, float], as_list(3)])
 # Of a folder that a key names.
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
 
@@ -126,6 +128,9 @@ def _find(error: ErrorDetails, content: Any) -> tuple[tuple[int | str, ...], Any
     return tuple(path), content
 
 
+_BOUNDS = {"ge": "at least", "gt": "above", "le": "at most", "lt": "below"}
+
+
 def _allowed(error: ErrorDetails) -> str:
     """Return what pydantic allows, to follow after ``must``."""
     match error["type"]:
@@ -139,7 +144,12 @@ def _allowed(error: ErrorDetails) -> str:
             return "be a text"
         case "bool_type":
             return "be true or false"
+        case "string_pattern_mismatch":
+            return f"be of the form {error['ctx']['pattern']}"
         case "list_type":
             return "be a list"
+    for bound, words in _BOUNDS.items():
+        if bound in error.get("ctx", {}):
+            return f"be {words} {error['ctx'][bound]:g}"
     text = re.sub(r"^\w+ should ", "", error["msg"])
     return re.sub(r" after validation, not .*", "", text)

@@ -1,200 +1,333 @@
-"""The scene YAML and the top-level configuration: read, checked, and resolved into datasets.
+"""The scene YAML and the top-level configuration, as typed models: what each key may be.
 
-The two JSON schemas in configs/schema/ hold what each key may be and its default; what they cannot
-say (which key goes with which) is checked here. Nothing else in the project reads a scene YAML.
+From these models scripts/schema.py makes the JSON schemas in configs/schema/, by which editors
+complete and check the files. Nothing else in the project reads a scene YAML.
 """
 
-import copy
-import difflib
-import json
 import re
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from functools import cache
+import shlex
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, Self
 
-import jsonschema
 import yaml
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    model_validator,
+)
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
-from lightfield.geometry import rigs
+from lightfield.core.settings import AS_WRITTEN, Name, Settings, Vector, checked, suggestion
+from lightfield.dataset.exports import VIEWS, Exports
+from lightfield.geometry.lenses import LENSES, CameraSettings
+from lightfield.geometry.rigs import AnyRig, Poses, Rig
+from lightfield.geometry.rigs.rig import Frame
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENES = ROOT / "configs" / "scenes"
 BUILDERS = ROOT / "scripts" / "scenes"
-SCHEMAS = ROOT / "configs" / "schema"
 
 # Folders of a dataset that a reprojection may not take.
 RESERVED_NAMES = ("exr", "report")
 # Folders of a sequence's frames.
 FRAME_FOLDER = re.compile(r"f\d{5,7}")
-# In `exports: … sources:`, the rendered views themselves.
-VIEWS = "views"
 
 
-@dataclass(frozen=True)
-class Dataset:
-    """One scene seen by one rig, with every default filled in and the preset applied.
+def _listed(value: Any) -> Any:
+    return [value] if isinstance(value, str) else value
 
-    ``scene`` names the folder in the results: the scene YAML's name, followed by the preset's
-    unless that is ``full``, so that presets never overwrite each other. ``rig`` names the folder
-    in it: the rig's name, followed in a sequence by the frame's folder, as in LFSphere/f00001.
-    """
 
-    name: str
-    scene: str
-    rig: str
-    source: Mapping[str, Any]
-    render: Mapping[str, Any]
-    cameras: Mapping[str, Any]
-    reprojections: Mapping[str, Mapping[str, Any]]
-    exports: Mapping[str, Mapping[str, Any]]
+def _unique(names: list[str]) -> list[str]:
+    if not names or len(set(names)) < len(names):
+        raise ValueError("must be a list of one or more names, each once")
+    return names
+
+
+# A bare word on the command line is a list of one.
+Names = Annotated[
+    list[Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]],
+    BeforeValidator(_listed),
+    AfterValidator(_unique),
+]
+Auto = Literal["auto"]
+Address = Annotated[str, Field(pattern=r"^https?://")]
+AtLeastOne = Annotated[int, Field(ge=1)]
+
+
+class Preset(Settings):
+    """Upper limits put on what a scene YAML says; one that is not given limits nothing."""
+
+    resolution: AtLeastOne | None = Field(None, description="Pixels along an image's longer side.")
+    samples: AtLeastOne | None = Field(None, description="Paths a pixel.")
+    views: AtLeastOne | None = Field(None, description="Views of a rig.")
+    denoise: bool | None = Field(None, description="Denoise even where the scene does not.")
+
+
+class Energy(Settings):
+    """From which report/costs.json has energy and price."""
+
+    watts: float = Field(65, ge=0, description="Of a machine, while all its cores work.")
+    cores: Auto | AtLeastOne = Field(
+        "auto",
+        description="How many that machine has; auto is those of the machine that adds up.",
+    )
+    price_per_kwh: float = Field(0.32, ge=0)
+    currency: str = "EUR"
+
+
+class Configuration(Settings):
+    """Which scenes to build, how well, and where."""
+
+    scenes: Names = Field(description="Names of files in configs/scenes/, without .yaml.")
+    rigs: Literal["all"] | Names = Field(
+        "all", description="all, or the names of the rigs to build."
+    )
+    preset: str = Field(description="One of the presets below.")
+    presets: dict[Annotated[str, Field(pattern="^[a-z][a-z0-9]*$")], Preset]
+    results: str = Field("results", description="Folder of the datasets.")
+    work: str = Field(
+        "work",
+        description="Folder of what is made on the way: scenes, lens maps, records, timings.",
+    )
+    device: Literal["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"] = Field(
+        "auto", description="What Cycles renders on."
+    )
+    views_per_shard: Auto | AtLeastOne = Field(
+        "auto", description="auto, or how many views one render job makes."
+    )
+    energy: Energy = Energy()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.preset not in self.presets:
+            known = ", ".join(self.presets)
+            raise ValueError(f"preset: is {self.preset!r}; must be one of {known}")
+        for key in ("results", "work"):
+            folder = getattr(self, key)
+            if Path(folder).resolve() in (ROOT, *ROOT.parents):
+                raise ValueError(f"{key}: is {folder!r}; must be a folder of its own")
+        return self
+
+
+class Parameters(Settings):
+    """What a builder is given: seed, detail and its own."""
+
+    model_config = ConfigDict(extra="allow")
+
+    seed: int = Field(0, ge=0)
+    detail: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] = Field(1.0, description="1 is full.")
+
+
+class Source(Settings):
+    """Where the scene comes from: a builder, or a .blend file."""
+
+    builder: str | None = Field(
+        None,
+        pattern="^[a-z][a-z0-9_]*$",
+        description="The builder's file in scripts/scenes/, without .py.",
+    )
+    parameters: Parameters = Parameters()
+    blend: str | None = Field(
+        None,
+        pattern=r"\.blend$",
+        description="The user's own .blend file, relative to the scene YAML's repository.",
+    )
+    frame: Frame = Field(1, description="Of the animation, the frame that is rendered.")
+    sha256: str | None = Field(
+        None,
+        pattern="^[0-9a-f]{64}$",
+        description="The .blend file's SHA-256, as sha256sum prints it; "
+        "without it, the one recorded at first use.",
+    )
+    url: Address | None = Field(
+        None, description="Where the .blend file is downloaded from if it is not there."
+    )
+    page: Address | None = Field(
+        None, description="The page on which a person finds the .blend file."
+    )
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Self:
+        if (self.builder is None) == (self.blend is None):
+            raise ValueError("must have one of builder and blend")
+        if self.builder is not None:
+            known = builders()
+            if self.builder not in known:
+                raise ValueError(f"builder: is {self.builder!r}; must be one of {', '.join(known)}")
+            for name in ("sha256", "url", "page"):
+                if getattr(self, name) is not None:
+                    raise ValueError(f"{name}: goes with blend, not with builder")
+        return self
+
+
+# What a calibration chooses for a target error.
+CHOSEN = ("samples", "adaptive_threshold", "denoise")
+
+
+class Render(Settings):
+    """What Cycles is asked for; what is not given here stays as the .blend has it."""
+
+    samples: AtLeastOne | None = Field(None, description="Paths a pixel.")
+    target_error: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] | None = Field(
+        None,
+        description="Instead of samples: relative mean squared error, (x - r)^2 / (r^2 + 0.01) "
+        "with middle grey at 0.18, for which samples, adaptive_threshold and denoise are chosen "
+        "on probe views.",
+    )
+    max_bounces: int | None = Field(
+        None, ge=0, le=1024, description="Bounces of a path, of any kind."
+    )
+    clamp_indirect: Annotated[float, Field(ge=0), AS_WRITTEN] | None = Field(
+        None, description="Largest value of one indirect sample; 0 does not clamp."
+    )
+    filter_width: Annotated[float, Field(ge=0.01, le=10), AS_WRITTEN] | None = Field(
+        None, description="Width of the pixel filter, in pixels."
+    )
+    adaptive_threshold: Annotated[float, Field(ge=0, le=1), AS_WRITTEN] = Field(
+        0, description="Noise at which adaptive sampling stops early; 0 takes every sample."
+    )
+    denoise: bool = Field(False, description="Denoise each view with OpenImageDenoise.")
+    seed: int = Field(0, ge=0, description="From this and its name each view has its own seed.")
+    depth: Literal["auto", "z", "distance", "none"] = Field(
+        "auto",
+        description="Meaning of channel Z: auto is z up to 180 degrees and distance beyond.",
+    )
+    depth_precision: Literal["float", "half"] = Field(
+        "float", description="float has 32 bits, half has 16."
+    )
+
+    @model_validator(mode="after")
+    def _samples_or_target(self) -> Self:
+        if self.target_error is None and self.samples is None:
+            raise ValueError("is missing the key samples (or target_error)")
+        for name in CHOSEN:
+            if self.target_error is not None and name in self.model_fields_set:
+                raise ValueError(f"{name}: goes without target_error, for which it is chosen")
+        return self
+
+
+class Reprojection(Settings):
+    """The same views through another lens."""
+
+    rigs: list[str] | None = Field(
+        None, min_length=1, description="The rigs it is made for; without it, every one of them."
+    )
+    camera: CameraSettings
+    rotation: Vector = Field((0, 0, 0), description="Pan, pitch and roll in degrees.")
+    format: Literal["png", "exr"] = Field("png", description="EXR has depth.")
+    filter: Literal["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp"] = Field(
+        "adaptive", description="How colour is resampled."
+    )
+    samples: int = Field(1, ge=1, le=64, description="n x n samples a pixel.")
+    exposure: float = Field(0, description="In stops.")
+    reinhard: Annotated[float, Field(gt=0)] | None = Field(
+        None, description="Reinhard tone mapping with this maximum."
+    )
 
     @property
-    def rig_name(self) -> str:
-        """The rig's name in the scene YAML."""
-        return self.rig.partition("/")[0]
+    def suffix(self) -> str:
+        """Of the images' names."""
+        return f".{self.format}"
 
     @property
-    def view_count(self) -> int:
-        """Number of views of the rig."""
-        return rigs.from_settings(self.cameras).view_count
+    def optics(self) -> str:
+        """The words that say to scripts/reproject.py where each pixel comes from."""
+        camera = self.camera.model_dump_json(exclude_unset=True)
+        words = ["--camera", camera, "--filter", self.filter]
+        if self.samples > 1:
+            words += ["--samples", str(self.samples)]
+        if any(self.rotation):
+            words += ["--rotation", ",".join(map(str, self.rotation))]
+        return shlex.join(words)
 
     @property
-    def depth(self) -> str | None:
-        """What channel Z of the rendered views means: ``z``, ``distance``, or None for no depth."""
-        return depth_meaning(self.render["depth"], self.cameras["camera"])
+    def development(self) -> str:
+        """The words that say to scripts/reproject.py what to write."""
+        words = [f"--{self.format}", "--exposure", str(self.exposure)]
+        if self.reinhard is not None:
+            words += ["--reinhard", str(self.reinhard)]
+        return shlex.join(words)
 
 
-def depth_meaning(wanted: str, camera: Mapping[str, Any]) -> str | None:
-    """Resolve ``render.depth``: Z-depth is unusable for lenses that see beyond 180 degrees."""
-    if wanted == "none":
-        return None
-    if wanted == "auto":
-        return "distance" if _sees_behind(camera) else "z"
-    return wanted
+class Scene(Settings):
+    """One scene: where it is from, how it is rendered, by which rigs, and what the views become."""
 
+    description: str | None = Field(None, description="One line about the scene.")
+    scene: Source
+    render: Render
+    rigs: dict[Name, AnyRig] = Field(
+        min_length=1, description="The camera setups, by the names of their folders."
+    )
+    reprojections: dict[Name, Reprojection] = Field(
+        {}, description="The same views through other lenses, by the names of their folders."
+    )
+    exports: Exports = Field(Exports(), description="Files for trainers.")
 
-def load_config(content: Mapping[str, Any], file: str = "config.yaml") -> dict[str, Any]:
-    """Check the top-level configuration and fill in its defaults; raises `UserError`."""
-    config = _validated(content, "config", file)
-    if config["preset"] not in config["presets"]:
-        known = ", ".join(config["presets"])
-        raise UserError(f"{file}: preset: is {config['preset']!r}; must be one of {known}")
-    for key in ("results", "work"):
-        if Path(config[key]).resolve() in (ROOT, *ROOT.parents):
-            raise UserError(f"{file}: {key}: is {config[key]!r}; must be a folder of its own")
-    return config
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for name, rig in self.rigs.items():
+            self._check_rig(f"rigs.{name}", rig)
+        for name, reprojection in self.reprojections.items():
+            key = f"reprojections.{name}"
+            if name in RESERVED_NAMES or FRAME_FOLDER.fullmatch(name):
+                raise ValueError(f"{key}: the name {name} is taken; choose another")
+            for rig_name in reprojection.rigs or ():
+                if rig_name not in self.rigs:
+                    hint = suggestion(rig_name, self.rigs)
+                    raise ValueError(f"{key}.rigs: there is no rig {rig_name!r}{hint}")
+        known = [VIEWS, *self.reprojections]
+        for name, export in self.exports:
+            for source in export.sources if export else ():
+                if source not in known:
+                    raise ValueError(
+                        f"exports.{name}.sources: is {source!r}; must be of {', '.join(known)}"
+                    )
+        return self
 
-
-def load_datasets(config: Mapping[str, Any]) -> list[Dataset]:
-    """Read the scene YAMLs that a checked configuration chooses and resolve their datasets.
-
-    Raises `UserError` for a scene that is not there, not right, or without the rigs asked for.
-    """
-    found: list[Dataset] = []
-    for scene in config["scenes"]:
-        found += scene_datasets(scene, config["preset"], config["presets"][config["preset"]])
-        _check_presence(scene, found[-1].source)
-    if config["rigs"] == "all":
-        return found
-    known = {dataset.rig_name for dataset in found}
-    for rig in config["rigs"]:
-        if rig not in known:
-            raise UserError(
-                f"config.yaml: rigs: {rig!r} is in none of the scenes {', '.join(config['scenes'])}"
-                f"; must be all or some of {', '.join(sorted(known))}"
+    def _check_rig(self, key: str, rig: Rig) -> None:
+        """Check what of a rig depends on its camera, its file and the depth."""
+        camera = rig.camera
+        if camera is None:
+            raise ValueError(f"{key}: is missing the key camera")
+        if isinstance(rig, Poses) and not (ROOT / rig.file).is_file():
+            raise ValueError(f"{key}.file: is {rig.file!r}; there is no such file")
+        if not LENSES[camera.lens].in_cycles:
+            known = ", ".join(name for name, lens in LENSES.items() if lens.in_cycles)
+            raise ValueError(
+                f"{key}.camera.lens: is {camera.lens!r}, which Cycles does not have; "
+                f"must be one of {known} (reproject for the others)"
             )
-    for scene in config["scenes"]:
-        # A sequence has a dataset for each frame.
-        own = dict.fromkeys(dataset.rig_name for dataset in found if dataset.name == scene)
-        if not own.keys() & set(config["rigs"]):
-            raise UserError(
-                f"config.yaml: rigs: none of {', '.join(config['rigs'])} is in {scene}; "
-                f"it has {', '.join(own)}; all takes them all"
+        lens = camera.make()
+        if self.render.depth == "z" and not lens.has_z_depth:
+            raise ValueError(
+                f"render.depth: is 'z', but {key}.camera sees beyond 180 degrees; "
+                "must be auto, distance or none"
             )
-    return [dataset for dataset in found if dataset.rig_name in config["rigs"]]
-
-
-def scene_datasets(scene: str, preset: str, limits: Mapping[str, Any]) -> list[Dataset]:
-    """Resolve every dataset of one scene YAML under a preset's upper ``limits``."""
-    settings = load_scene(scene)
-    label = scene if preset == "full" else f"{scene}_{preset}"
-    source = settings["scene"]
-    if "blend" in source:
-        checksum = blend_sha256(scene)[0]
-        source = {**source, **({"sha256": checksum} if checksum else {})}
-    render = _limited_render(settings["render"], limits)
-    found = []
-    for name, rig in settings["rigs"].items():
-        cameras = _located(rig)
-        if "views" in limits:
-            thinned = rigs.from_settings(cameras).thinned(limits["views"])
-            counts = thinned.model_dump(include={"cameras", "subdivisions", "max_views"})
-            cameras = {**cameras, **{k: v for k, v in counts.items() if v is not None}}
-        cameras = {**cameras, "camera": _limited(rig["camera"], limits)}
-        reprojections = {
-            key: {**reprojection, "camera": _limited(reprojection["camera"], limits)}
-            for key, reprojection in settings["reprojections"].items()
-            if name in reprojection.get("rigs", settings["rigs"])
-        }
-        exports = {}
-        for key, export in settings["exports"].items():
-            sources = [s for s in export["sources"] if s == VIEWS or s in reprojections]
-            exports[key] = {**export, "sources": sources}
-        for folder, frame in _frames(name, rig, source):
-            found.append(
-                Dataset(
-                    name=scene,
-                    scene=label,
-                    rig=folder,
-                    source={**source, "frame": frame},
-                    render=render,
-                    cameras=cameras,
-                    reprojections=reprojections,
-                    exports=exports,
-                )
+        if rig.cube_map and (camera.lens, getattr(camera, "fov", None)) != ("rectilinear", 90):
+            raise ValueError(
+                f"{key}.camera: must be rectilinear with fov 90 for a rig with cube_map"
             )
-    return found
+        if rig.cube_map and lens.width != lens.height:
+            raise ValueError(
+                f"{key}.camera.resolution: is {camera.resolution}; "
+                "must be square for a rig with cube_map"
+            )
 
 
-def blend_sha256(scene: str) -> tuple[str | None, Path]:
-    """Return the SHA-256 that a scene's .blend must have, or None if no one knows it yet.
-
-    The second value is the file that says so, or that shall: the scene YAML or its lock file.
-    """
-    source = load_scene(scene)["scene"]
-    if "sha256" in source:
-        return source["sha256"], SCENES / f"{scene}.yaml"
-    lock = SCENES / f"{scene}.lock.json"
-    return (str(read_json(lock)["sha256"]) if lock.exists() else None), lock
+_CONFIGURATION = TypeAdapter(Configuration)
+_SCENE = TypeAdapter(Scene)
 
 
-def _check_presence(scene: str, source: Mapping[str, Any]) -> None:
-    """Check that the user's .blend is where the scene YAML says, or can be downloaded."""
-    if "blend" in source and "url" not in source and not (ROOT / source["blend"]).is_file():
-        page = f"get it from {source['page']} and " if "page" in source else ""
-        raise UserError(
-            f"configs/scenes/{scene}.yaml: scene.blend: there is no file {source['blend']}; "
-            f"{page}put it there"
-        )
+def load_config(content: Any, file: str = "config.yaml") -> Configuration:
+    """Return the top-level configuration; raises `UserError`."""
+    return checked(_CONFIGURATION, content, file)
 
 
-def _frames(
-    name: str, rig: Mapping[str, Any], source: Mapping[str, Any]
-) -> Iterator[tuple[str, int]]:
-    """Yield the folder and the frame number of each dataset of a rig."""
-    if "frames" not in rig:
-        yield name, source["frame"]
-        return
-    frames = rig["frames"]
-    for frame in range(frames["first"], frames["last"] + 1, frames["step"]):
-        yield f"{name}/f{frame:05d}", frame
-
-
-def load_scene(scene: str) -> dict[str, Any]:
+def load_scene(scene: str) -> Scene:
     """Read and check one scene YAML; raises `UserError` with file, key, value and what is right."""
     path = SCENES / f"{scene}.yaml"
     if not path.is_file():
@@ -203,152 +336,10 @@ def load_scene(scene: str) -> dict[str, Any]:
     return read_scene(path)
 
 
-def read_scene(path: Path) -> dict[str, Any]:
+def read_scene(path: Path) -> Scene:
     """Read and check the scene YAML at ``path``, as `load_scene` does by name."""
     file = str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else str(path)
-    content = read_yaml(path, file)
-    settings = _validated(content, "scene", file)
-
-    def fail(key: str, problem: str) -> None:
-        raise UserError(f"{file}: {key}: {problem}")
-
-    _check_source(settings["scene"], fail)
-    _check_render(content["render"], fail)
-    for name, rig in settings["rigs"].items():
-        _check_rig(f"rigs.{name}", rig, settings["render"]["depth"], fail)
-    for name, reprojection in settings["reprojections"].items():
-        key = f"reprojections.{name}"
-        if name in RESERVED_NAMES or FRAME_FOLDER.fullmatch(name):
-            fail(key, f"the name {name} is taken; choose another")
-        _check_camera(f"{key}.camera", reprojection["camera"], fail)
-        for rig in reprojection.get("rigs", []):
-            if rig not in settings["rigs"]:
-                fail(f"{key}.rigs", f"there is no rig {rig!r}{_suggestion(rig, settings['rigs'])}")
-    for name, export in settings["exports"].items():
-        known = [VIEWS, *settings["reprojections"]]
-        for source in export["sources"]:
-            if source not in known:
-                fail(f"exports.{name}.sources", f"is {source!r}; must be of {', '.join(known)}")
-    return settings
-
-
-# What each kind of rig is placed by, beside the keys that all of them have.
-_RIG_KEYS: dict[str, dict[str, int | None]] = {
-    "plane": {"cameras": 2},
-    "cylinder": {"cameras": 2},
-    "cuboid": {"cameras": 3},
-    "lattice": {"cameras": 3},
-    "sphere": {"subdivisions": None},
-    "poses": {"file": None},
-}
-
-# What each lens needs and may have, beside resolution and principal_point; fov's upper limit in
-# degrees, where the mapping of DESIGN's table has one.
-_LENS_NEEDS: dict[str, tuple[set[str], set[str], float]] = {
-    "equidistant": ({"fov"}, {"sensor_size"}, 360),
-    "equisolid": ({"fov", "focal_length"}, {"sensor_size"}, 360),
-    "stereographic": ({"fov"}, {"sensor_size"}, 359.9),
-    "orthographic": ({"fov"}, {"sensor_size"}, 180),
-    "polynomial": ({"coefficients", "fov"}, {"sensor_size"}, 360),
-    "kannala_brandt": ({"coefficients", "focal_length"}, {"sensor_size", "fov"}, 360),
-    "equirectangular": (set(), {"longitude", "latitude"}, 0),
-}
-
-# Lenses that Cycles has; any other is reached by reprojection.
-_RENDERED = ("rectilinear", "equidistant", "equisolid", "polynomial", "equirectangular")
-
-_Fail = Callable[[str, str], None]
-
-
-def _check_source(source: Mapping[str, Any], fail: _Fail) -> None:
-    if ("builder" in source) == ("blend" in source):
-        fail("scene", "must have one of builder and blend")
-    if "builder" in source:
-        known = builders()
-        if source["builder"] not in known:
-            fail("scene.builder", f"is {source['builder']!r}; must be one of {', '.join(known)}")
-        for name in ("sha256", "url", "page"):
-            if name in source:
-                fail(f"scene.{name}", "goes with blend, not with builder")
-
-
-# What a calibration chooses for a target error.
-_CHOSEN = ("samples", "adaptive_threshold", "denoise")
-
-
-def _check_render(render: Mapping[str, Any], fail: _Fail) -> None:
-    """Check a ``render`` block as it was written, before any default is filled in."""
-    if "target_error" in render:
-        for name in _CHOSEN:
-            if name in render:
-                fail(f"render.{name}", "goes without target_error, for which it is chosen")
-    elif "samples" not in render:
-        fail("render", "is missing the key samples (or target_error)")
-
-
-def _check_rig(key: str, rig: Mapping[str, Any], depth: str, fail: _Fail) -> None:
-    wanted = _RIG_KEYS[rig["type"]]
-    for name in ("cameras", "subdivisions", "file"):
-        if name in wanted and name not in rig:
-            fail(key, f"is missing the key {name}, which a rig of type {rig['type']} needs")
-        if name in rig and name not in wanted:
-            fail(f"{key}.{name}", f"does not go with a rig of type {rig['type']}")
-    count = wanted.get("cameras")
-    if count and len(rig["cameras"]) != count:
-        fail(
-            f"{key}.cameras",
-            f"is {rig['cameras']}; must be {count} whole numbers for a rig of type {rig['type']}",
-        )
-    if "frames" in rig and rig["frames"]["first"] > rig["frames"]["last"]:
-        fail(f"{key}.frames", f"first is {rig['frames']['first']}; must be at most last")
-    if rig["type"] == "poses" and not (ROOT / rig["file"]).is_file():
-        fail(f"{key}.file", f"is {rig['file']!r}; there is no such file")
-    camera = rig["camera"]
-    _check_camera(f"{key}.camera", camera, fail)
-    if camera["lens"] not in _RENDERED:
-        fail(
-            f"{key}.camera.lens",
-            f"is {camera['lens']!r}, which Cycles does not have; must be one of "
-            f"{', '.join(_RENDERED)} (reproject for the others)",
-        )
-    if depth == "z" and _sees_behind(camera):
-        fail(
-            "render.depth",
-            f"is 'z', but {key}.camera sees beyond 180 degrees; must be auto, distance or none",
-        )
-    if rig["cube_map"] and (camera["lens"], camera.get("fov")) != ("rectilinear", 90):
-        fail(f"{key}.camera", "must be rectilinear with fov 90 for a rig with cube_map")
-    if rig["cube_map"] and camera["resolution"][0] != camera["resolution"][1]:
-        fail(
-            f"{key}.camera.resolution",
-            f"is {camera['resolution']}; must be square for a rig with cube_map",
-        )
-
-
-def _check_camera(key: str, camera: Mapping[str, Any], fail: _Fail) -> None:
-    lens = camera["lens"]
-    given = camera.keys() - {"lens", "resolution", "principal_point"}
-    if lens == "rectilinear":
-        # Either the field of view, or focal length and sensor.
-        fov, focal = {"fov"}, {"focal_length"}
-        needs, may, limit = (fov, set(), 180.0) if "fov" in given else (focal, {"sensor_size"}, 180)
-    else:
-        needs, may, limit = _LENS_NEEDS[lens]
-    for name in sorted(needs - given):
-        other = " (or fov)" if lens == "rectilinear" else ""
-        fail(key, f"is missing the key {name}{other}, which the {lens} lens needs")
-    for name in sorted(given - needs - may):
-        beside = " beside fov" if lens == "rectilinear" and "fov" in given else ""
-        fail(f"{key}.{name}", f"does not go with the {lens} lens{beside}")
-    fov = camera.get("fov", 0)
-    if fov > limit or (lens == "rectilinear" and fov == limit):
-        bound = "below" if lens == "rectilinear" else "at most"
-        fail(f"{key}.fov", f"is {fov}; must be {bound} {limit:g} degrees for the {lens} lens")
-    if lens == "equirectangular" and "principal_point" in camera:
-        fail(f"{key}.principal_point", "does not go with the equirectangular lens; use its ranges")
-    for name in ("longitude", "latitude"):
-        if name in camera and camera[name][0] >= camera[name][1]:
-            fail(f"{key}.{name}", f"is {camera[name]}; the smaller value must come first")
+    return checked(_SCENE, read_yaml(path, file), file)
 
 
 def builders() -> list[str]:
@@ -356,43 +347,15 @@ def builders() -> list[str]:
     return sorted(file.stem for file in BUILDERS.glob("[a-z]*.py") if file.stem != "common")
 
 
-def _sees_behind(camera: Mapping[str, Any]) -> bool:
-    return bool(camera["lens"] == "equirectangular" or camera.get("fov", 0) > 180)
+def blend_sha256(scene: str, source: Source) -> tuple[str | None, Path]:
+    """Return the SHA-256 that a scene's .blend must have, or None if no one knows it yet.
 
-
-def _located(rig: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the rig with the path of its poses made independent of the current folder."""
-    return {**rig, "file": str(ROOT / rig["file"])} if "file" in rig else rig
-
-
-def _limited_render(render: Mapping[str, Any], limits: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the ``render`` block under a preset's ``limits``.
-
-    With a ``target_error``, samples, threshold and denoising are not known before the calibration;
-    what the preset says of them limits its choice: at most ``most_samples``, and ``denoise``.
+    The second value is the file that says so, or that shall: the scene YAML or its lock file.
     """
-    if "target_error" not in render:
-        samples = min(render["samples"], limits.get("samples", render["samples"]))
-        return {**render, "samples": samples, "denoise": limits.get("denoise", render["denoise"])}
-    kept = {key: render[key] for key in render if key not in _CHOSEN}
-    if "samples" in limits:
-        kept["most_samples"] = limits["samples"]
-    if "denoise" in limits:
-        kept["denoise"] = limits["denoise"]
-    return kept
-
-
-def _limited(camera: Mapping[str, Any], limits: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the camera with its image's longer side at most ``limits["resolution"]`` pixels."""
-    width, height = camera["resolution"]
-    scale = min(1.0, limits.get("resolution", max(width, height)) / max(width, height))
-    limited = {
-        **camera,
-        "resolution": [max(1, round(width * scale)), max(1, round(height * scale))],
-    }
-    if "principal_point" in camera:
-        limited["principal_point"] = [value * scale for value in camera["principal_point"]]
-    return limited
+    if source.sha256:
+        return source.sha256, SCENES / f"{scene}.yaml"
+    lock = SCENES / f"{scene}.lock.json"
+    return (str(read_json(lock)["sha256"]) if lock.exists() else None), lock
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):
@@ -421,110 +384,3 @@ def read_yaml(path: Path, file: str) -> Any:
         raise UserError(f"{file}: {where}{error.problem}") from None
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise UserError(f"{file}: cannot be read as YAML: {error}") from None
-
-
-@cache
-def _schema(name: str) -> dict[str, Any]:
-    schema: dict[str, Any] = json.loads((SCHEMAS / f"{name}.schema.json").read_text("utf-8"))
-    return schema
-
-
-def _validated(content: Any, schema_name: str, file: str) -> dict[str, Any]:
-    """Check ``content`` against a schema and return a copy with the schema's defaults filled in."""
-    schema = _schema(schema_name)
-    validator = jsonschema.Draft202012Validator(schema)
-    errors = sorted(validator.iter_errors(content), key=lambda error: list(map(str, error.path)))
-    if errors:
-        raise UserError(f"{file}: {_describe(errors[0])}")
-    filled: dict[str, Any] = copy.deepcopy(dict(content))
-    _fill_defaults(filled, schema, schema)
-    return filled
-
-
-def _fill_defaults(content: Any, schema: Mapping[str, Any], root: Mapping[str, Any]) -> None:
-    if not isinstance(content, dict):
-        return
-    for key, part in _resolved(schema, root).get("properties", {}).items():
-        if "default" in part:
-            content.setdefault(key, copy.deepcopy(part["default"]))
-    for key, value in content.items():
-        part = _resolved(schema, root)
-        part = part.get("properties", {}).get(key, part.get("additionalProperties"))
-        if isinstance(part, Mapping):
-            _fill_defaults(value, part, root)
-
-
-def _resolved(schema: Mapping[str, Any], root: Mapping[str, Any]) -> Mapping[str, Any]:
-    if "$ref" in schema:
-        definition: Mapping[str, Any] = root["$defs"][schema["$ref"].rsplit("/", 1)[-1]]
-        return {**definition, **schema}
-    return schema
-
-
-def _describe(error: jsonschema.ValidationError) -> str:
-    """Say in one line which key is wrong, its value, and what is allowed."""
-    path = ".".join(_key_parts(error.absolute_path))
-    prefix = f"{path}: " if path else ""
-    schema: Any = error.schema
-    value: Any = error.instance
-    if error.validator == "required":
-        missing = next(key for key in schema["required"] if key not in value)
-        return f"{prefix}is missing the key {missing}"
-    if error.validator == "additionalProperties":
-        known = schema.get("properties", {})
-        unknown = next(key for key in value if key not in known)
-        full = f"{path}.{unknown}" if path else str(unknown)
-        hint = _suggestion(str(unknown), known) or f"; allowed here: {', '.join(known)}"
-        return f"{full}: unknown key{hint}"
-    if "propertyNames" in map(str, error.absolute_schema_path):
-        return (
-            f"{prefix}{value!r} is no name; use letters, digits and . _ - , "
-            "with a letter or digit first"
-        )
-    text = json.dumps(value, default=str)
-    text = text if len(text) <= 60 else f"{text[:57]}..."
-    return f"{prefix}is {text}; must be {_allowed(schema)}"
-
-
-def _key_parts(path: Any) -> Iterator[str]:
-    yield from (f"[{part}]" if isinstance(part, int) else str(part) for part in path)
-
-
-def _allowed(schema: Mapping[str, Any]) -> str:
-    """Say in words what a schema allows."""
-    if "const" in schema:
-        return str(schema["const"])
-    if "enum" in schema:
-        return "one of " + ", ".join(map(str, schema["enum"]))
-    if "anyOf" in schema:
-        return " or ".join(_allowed(part) for part in schema["anyOf"])
-    kinds = {
-        "integer": "a whole number",
-        "number": "a number",
-        "string": "a text",
-        "boolean": "true or false",
-        "object": "a mapping of keys to values",
-    }
-    kind = schema.get("type")
-    if kind == "array":
-        low, high = schema.get("minItems", 0), schema.get("maxItems")
-        count = f"{low}" if low == high else f"{low} to {high}" if high else f"at least {low}"
-        each = _allowed(schema["items"]) if "items" in schema else "values"
-        return f"a list of {count} values, each {each}"
-    if kind == "object" and schema.get("minProperties"):
-        return "a mapping with at least one key"
-    parts = [kinds[kind]] if kind in kinds else []
-    bounds = {
-        "minimum": "at least {}",
-        "exclusiveMinimum": "above {}",
-        "maximum": "at most {}",
-        "exclusiveMaximum": "below {}",
-        "pattern": "of the form {}",
-    }
-    parts += [text.format(schema[key]) for key, text in bounds.items() if key in schema]
-    return " ".join(parts[:1]) + ("" if len(parts) < 2 else " " + " and ".join(parts[1:]))
-
-
-def _suggestion(name: str, known: Any) -> str:
-    close = difflib.get_close_matches(name, list(known), n=1)
-    return f"; did you mean {close[0]}?" if close else ""

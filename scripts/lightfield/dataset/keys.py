@@ -7,28 +7,30 @@ leaves out changes no byte (see `lightfield.rendering.pruning`) and is therefore
 
 import hashlib
 import json
-from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any
 
-from lightfield.dataset.config import BUILDERS
+from lightfield.core.errors import UserError
+from lightfield.dataset.config import BUILDERS, Source
 from lightfield.dataset.lightfield import LightField, View
 
 # Raised when the program that renders changes what it writes for the same settings.
 RENDER_VERSION = 2
 
 
-def scene_fingerprint(source: Mapping[str, Any]) -> str:
+def scene_fingerprint(source: Source) -> str:
     """Return what identifies a scene YAML's ``scene`` block: 64 hexadecimal digits.
 
-    A .blend is identified by its bytes; raises KeyError while their SHA-256 is not known. A built
-    one differs from build to build (it holds memory addresses), so it is identified by the
+    A .blend is identified by its bytes; raises `UserError` while their SHA-256 is not known. A
+    built one differs from build to build (it holds memory addresses), so it is identified by the
     builder's text, its parameters, and bpy's version.
     """
-    if "blend" in source:
-        return str(source["sha256"])
-    texts = [(BUILDERS / f"{name}.py").read_bytes() for name in ("common", source["builder"])]
-    return _digest([*map(_hash, texts), source["parameters"], version("bpy")])
+    if source.blend:
+        if source.sha256 is None:
+            raise UserError(f"{source.blend}: its sha256 is not known; check_blend.py records it")
+        return source.sha256
+    texts = [(BUILDERS / f"{name}.py").read_bytes() for name in ("common", source.builder)]
+    return _digest([*map(_hash, texts), source.parameters.model_dump(), version("bpy")])
 
 
 def render_key(lightfield: LightField, view: View) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Union
 
 from pydantic import ConfigDict, Field, TypeAdapter
+from typing_extensions import TypeAliasType
 
 from lightfield.core.errors import UserError
 from lightfield.core.settings import checked
@@ -19,10 +20,12 @@ for _module in pkgutil.iter_modules(__path__):
 if TYPE_CHECKING:
     CameraSettings = LensSettings
 else:
-    CameraSettings = Annotated[
-        Union[tuple(lens.Settings for lens in LENSES.values() if lens.Settings)],  # noqa: UP007
-        Field(discriminator="lens"),
-    ]
+    _MODELS = tuple(lens.Settings for lens in LENSES.values() if lens.Settings)
+    # Named, so that the JSON schema has it once.
+    CameraSettings = TypeAliasType(
+        "CameraSettings",
+        Annotated[Union[_MODELS], Field(discriminator="lens")],  # noqa: UP007
+    )
 """A scene YAML's ``camera``: the settings of any lens, which its key ``lens`` chooses."""
 _SETTINGS: TypeAdapter[LensSettings] = TypeAdapter(
     CameraSettings, config=ConfigDict(defer_build=True)

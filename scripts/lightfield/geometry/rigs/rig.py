@@ -10,7 +10,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
+from typing_extensions import TypeAliasType
 
 from lightfield.core.errors import UserError
 from lightfield.core.settings import Settings, Vector, as_list
@@ -19,6 +20,7 @@ from lightfield.geometry.lenses.cube_map import CUBE_FACE_ANGLES
 from lightfield.geometry.rotations import Floats, euler_to_matrix, matrix_to_euler
 
 Side = Annotated[float, Field(ge=0)]
+Size = TypeAliasType("Size", Side | Annotated[tuple[Side, Side, Side], as_list(3)])
 Frame = Annotated[int, Field(ge=0, le=1048574)]
 
 
@@ -78,6 +80,10 @@ class Frames(Settings):
         return self
 
 
+def _require_camera(schema: dict[str, Any]) -> None:
+    schema["required"] = [*schema.get("required", ()), "camera"]
+
+
 class Rig(Settings):
     """The keys of every rig; a type of rig adds its own, and says where its cameras are.
 
@@ -90,10 +96,10 @@ class Rig(Settings):
     # Of what the cameras stand on, in the unit box; None where it is open.
     unit_volume: ClassVar[float | None] = None
 
+    model_config = ConfigDict(json_schema_extra=_require_camera)
+
     type: str
-    size: Side | Annotated[tuple[Side, Side, Side], as_list(3)] = Field(
-        1, description="Metres, along every axis or along x, y and z."
-    )
+    size: Size = Field(1, description="Metres, along every axis or along x, y and z.")
     center: Vector = Field((0, 0, 0), description="Metres.")
     rotation: Vector = Field(
         (0, 0, 0), description="Of the whole rig: XYZ Euler angles in degrees."
@@ -108,6 +114,7 @@ class Rig(Settings):
         None, description="odd: the views with odd sequence numbers are for evaluation."
     )
     # A scene YAML's rigs all have one; where a rig's places alone matter there may be none.
+    # A scene YAML's rigs all have one; where the places alone matter there may be none.
     camera: CameraSettings = None  # type: ignore[assignment]
 
     @property

@@ -1,0 +1,447 @@
+"""One scene seen by one rig: what is built of it, where its files lie, and what it will take."""
+
+import json
+import math
+import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Literal
+
+from lightfield.core.errors import UserError
+from lightfield.dataset import config
+from lightfield.dataset.config import CHOSEN, ROOT, Configuration, Preset, Render, Source
+from lightfield.dataset.exports import VIEWS, Exports
+from lightfield.dataset.keys import scene_fingerprint
+from lightfield.geometry.lenses import CameraSettings
+from lightfield.geometry.rigs import Poses, Rig
+
+# For planning only, measured on one core of a 2-core x86-64 machine: path tracing of one sample of
+# one pixel, and start-up (bpy, the scene, and Cycles' acceleration structures).
+SECONDS_PER_SAMPLE = 6e-6
+START_UP_SECONDS = 3.0
+# A pixel's samples where a target error is given instead of them: an estimate for planning.
+GUESSED_SAMPLES = 256
+# Start-up is kept under this part of a shard's time.
+START_UP_PART = 0.05
+# More shards of one dataset than this only make the plan long: no machine renders them all at once.
+MOST_SHARDS = 64
+
+# Pictures of a report that are drawn together, each as .svg and .png.
+STILLS = ("rig", "depth_panorama", "noise")
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """One scene seen by one rig, with every default filled in and the preset applied.
+
+    ``scene_name`` is the scene YAML's name. ``rig_folder`` is the rig's name, in a sequence
+    followed by the frame's folder, as in LFSphere/f00001. ``render`` is what lightfield.json holds.
+    """
+
+    scene_name: str
+    preset: str
+    rig_name: str
+    rig_folder: str
+    source: Source
+    render: dict[str, Any]
+    rig: Rig
+    reprojections: dict[str, config.Reprojection]
+    exports: Exports
+    limits: Preset
+    results_root: str = "results"
+    work_root: str = "work"
+    views_per_shard: int | Literal["auto"] = "auto"
+
+    @property
+    def scene_folder(self) -> str:
+        """The scene's name and the preset's unless it is ``full``: presets keep to themselves."""
+        full = self.preset == "full"
+        return self.scene_name if full else f"{self.scene_name}_{self.preset}"
+
+    @cached_property
+    def view_count(self) -> int:
+        """Number of views of the rig."""
+        return self.rig.view_count
+
+    @property
+    def depth(self) -> str | None:
+        """What channel Z of the rendered views means: ``z``, ``distance``, or None for no depth.
+
+        Z-depth is unusable for lenses that see beyond 180 degrees.
+        """
+        match self.render["depth"]:
+            case "none":
+                return None
+            case "auto":
+                return "z" if self.rig.camera.make().has_z_depth else "distance"
+            case meaning:
+                return str(meaning)
+
+    @property
+    def name(self) -> str:
+        """Scene and rig, as in garden_tiny/LFSphere."""
+        return f"{self.scene_folder}/{self.rig_folder}"
+
+    @property
+    def fingerprint(self) -> str:
+        """What the scene is identified by: see `scene_fingerprint`."""
+        return scene_fingerprint(self.source)
+
+    @property
+    def builder_fingerprint(self) -> str | None:
+        """What changes when a builder does; a user's .blend is a file, which is checked."""
+        return self.fingerprint if self.source.builder else None
+
+    @property
+    def limits_json(self) -> str:
+        """The preset's limits, as scripts/make_lightfield.py takes them."""
+        return self.limits.model_dump_json(exclude_none=True)
+
+    @property
+    def rig_json(self) -> str:
+        """The rig, as the programs take it that make a report."""
+        return self.rig.model_dump_json(exclude_unset=True)
+
+    @property
+    def panorama_width(self) -> int:
+        """Twice a 180 degree fisheye view's angular resolution, within 4096 pixels."""
+        return min(4 * self.rig.camera.resolution[0], 4096)
+
+    @property
+    def placement(self) -> str:
+        """The words that say to scripts/export_instant_ngp.py what the scene YAML asks for."""
+        words = self.exports.instant_ngp.words() if self.exports.instant_ngp else []
+        return shlex.join([*words, *(["--split"] if self.rig.evaluation_split else [])])
+
+    # The scene's files, which all rigs and presets have in common.
+
+    @property
+    def scene_work(self) -> str:
+        return f"{self.work_root}/{self.scene_name}"
+
+    @property
+    def blend(self) -> str:
+        """The .blend: what a builder makes, or what the user brought."""
+        return self.source.blend or f"{self.scene_work}/scene.blend"
+
+    @property
+    def blend_check(self) -> str | list[str]:
+        """The proof that the user's own .blend is the one meant; a built one needs none."""
+        return f"{self.scene_work}/blend.json" if self.source.blend else []
+
+    @property
+    def inventory(self) -> str:
+        """The list of what the scene contains."""
+        return f"{self.scene_work}/inventory.json"
+
+    @property
+    def trials(self) -> str:
+        """Where trial renders are kept."""
+        return f"{self.scene_work}/trials"
+
+    @property
+    def calibration(self) -> str | list[str]:
+        """What was chosen for the scene's target error under the preset; none without one."""
+        if "target_error" not in self.render:
+            return []
+        return f"{self.work_root}/{self.scene_folder}/calibration.json"
+
+    # The dataset's own files.
+
+    @property
+    def folder(self) -> str:
+        return f"{self.results_root}/{self.name}"
+
+    @property
+    def work(self) -> str:
+        return f"{self.work_root}/{self.name}"
+
+    @property
+    def lightfields(self) -> list[str]:
+        """The lightfield.json of the dataset and of each of its reprojections."""
+        folders = [self.folder, *(f"{self.folder}/{name}" for name in self.reprojections)]
+        return [f"{folder}/lightfield.json" for folder in folders]
+
+    @property
+    def exported(self) -> list[str]:
+        """The files that are made for trainers."""
+        export = self.exports.instant_ngp
+        folders = [
+            self.folder if source == VIEWS else f"{self.folder}/{source}"
+            for source in (export.sources if export else ())
+        ]
+        return [f"{folder}/transforms.json" for folder in folders]
+
+    @property
+    def published(self) -> list[str]:
+        """The files that a job makes one by one, the views aside."""
+        return [*self.lightfields, *self.exported]
+
+    @property
+    def pictures(self) -> list[str]:
+        stills = [f"{name}{suffix}" for name in STILLS for suffix in (".svg", ".png")]
+        return [
+            f"{self.folder}/report/{name}"
+            for name in ("contact_sheet.png", "panorama.png", *stills)
+        ]
+
+    @property
+    def costs(self) -> str:
+        return f"{self.folder}/report/costs.json"
+
+    @property
+    def page(self) -> str:
+        """The page that shows the dataset."""
+        return f"{self.folder}/report/index.html"
+
+    def record(self, stage: str, first: int, end: int) -> str:
+        """The record of a shard at a stage: ``render``, or a reprojection's name."""
+        return f"{self.work}/{stage}/{first}-{end}.json"
+
+    def records(self, stage: str) -> list[str]:
+        return [self.record(stage, first, end) for first, end in self.shards]
+
+    @property
+    def all_records(self) -> list[str]:
+        """The records of every stage that makes the dataset's images."""
+        return [file for stage in ("render", *self.reprojections) for file in self.records(stage)]
+
+    @property
+    def files(self) -> list[str]:
+        """All that the finished dataset consists of, as a target rule asks for it.
+
+        The records are named although later files follow from them, because Snakemake makes a
+        missing file anew only if a target rule names it.
+        """
+        return [
+            f"{self.folder}/validation.json",
+            f"{self.folder}/sha256sums.txt",
+            *self.published,
+            *self.pictures,
+            self.costs,
+            self.page,
+            *self.all_records,
+        ]
+
+    @property
+    def package(self) -> str:
+        """A rig's dataset as one archive, all frames of a sequence in it, named as SILVR's are."""
+        return f"{self.results_root}/{self.scene_folder}/{self.scene_folder}_{self.rig_name}.tar"
+
+    def is_false(self, record: str) -> bool:
+        """Whether the files on disk are no longer those that a record describes.
+
+        A view that was deleted or cut short shows in its size. Its shard then runs again, makes
+        what is missing, and by the log of checksums finds every other file that is not as it was.
+        """
+        try:
+            files = json.loads(Path(record).read_text())["files"]
+            return any(
+                Path(self.folder, name).stat().st_size != file["bytes"]
+                for name, file in files.items()
+            )
+        except FileNotFoundError:
+            return Path(record).exists()
+        except (ValueError, KeyError):
+            return True
+
+    @property
+    def blend_changed(self) -> bool:
+        """Whether the user's .blend is no longer the file that was checked."""
+        if not self.source.blend:
+            return False
+        proof, blend = Path(f"{self.scene_work}/blend.json"), Path(self.source.blend)
+        if not (proof.exists() and blend.exists()):
+            return False
+        checked, found = json.loads(proof.read_text()), blend.stat()
+        return (found.st_size, found.st_mtime_ns) != (checked["bytes"], checked["mtime_ns"])
+
+    # What it will take.
+
+    @property
+    def planned_samples(self) -> int:
+        """A pixel's samples; with a target error a guess, the same before and after calibration.
+
+        Shards follow from it, whose bounds must follow from the configuration alone.
+        """
+        limit = self.render.get("most_samples", GUESSED_SAMPLES)
+        return int(self.render.get("samples", min(limit, GUESSED_SAMPLES)))
+
+    @property
+    def planned_view_seconds(self) -> float:
+        """Estimate of how long one core path-traces one view."""
+        width, height = self.rig.camera.resolution
+        return width * height * self.planned_samples * SECONDS_PER_SAMPLE
+
+    @property
+    def expected_view_seconds(self) -> float:
+        """The same with the samples that the calibration has found, if it has."""
+        record = Path(self.calibration) if isinstance(self.calibration, str) else None
+        if record is None or not record.exists():
+            return self.planned_view_seconds
+        samples = json.loads(record.read_text())["cost_samples"]
+        return float(self.planned_view_seconds * samples / self.planned_samples)
+
+    @cached_property
+    def shards(self) -> list[tuple[int, int]]:
+        """The views in runs (first, end) of nearly equal length.
+
+        Automatically, a run is as short as it can be without start-up taking more than its part:
+        the shorter, the more processes can work at once.
+        """
+        if self.views_per_shard == "auto":
+            length = math.ceil(START_UP_SECONDS / START_UP_PART / self.planned_view_seconds)
+            length = max(length, math.ceil(self.view_count / MOST_SHARDS))
+        else:
+            length = self.views_per_shard
+        count = math.ceil(self.view_count / length)
+        bounds = [self.view_count * number // count for number in range(count + 1)]
+        return list(pairwise(bounds))
+
+
+def load_datasets(settings: Configuration) -> list[Dataset]:
+    """Read the scene YAMLs that a configuration chooses and resolve their datasets.
+
+    Raises `UserError` for a scene that is not there, not right, or without the rigs asked for.
+    """
+    found: list[Dataset] = []
+    for scene in settings.scenes:
+        limits = settings.presets[settings.preset]
+        found += scene_datasets(scene, settings.preset, limits, settings)
+        _check_presence(found[-1])
+    if settings.rigs == "all":
+        return found
+    known = {dataset.rig_name for dataset in found}
+    for rig in settings.rigs:
+        if rig not in known:
+            raise UserError(
+                f"config.yaml: rigs: {rig!r} is in none of the scenes {', '.join(settings.scenes)}"
+                f"; must be all or some of {', '.join(sorted(known))}"
+            )
+    for scene in settings.scenes:
+        # A sequence has a dataset for each frame.
+        own = dict.fromkeys(dataset.rig_name for dataset in found if dataset.scene_name == scene)
+        if not own.keys() & set(settings.rigs):
+            raise UserError(
+                f"config.yaml: rigs: none of {', '.join(settings.rigs)} is in {scene}; "
+                f"it has {', '.join(own)}; all takes them all"
+            )
+    return [dataset for dataset in found if dataset.rig_name in settings.rigs]
+
+
+def scene_datasets(
+    scene: str,
+    preset: str = "full",
+    limits: Preset | None = None,
+    settings: Configuration | None = None,
+) -> list[Dataset]:
+    """Resolve every dataset of one scene YAML under the ``limits`` of a preset.
+
+    Of the ``settings``, folders and length of shards count.
+    """
+    limits = limits or Preset()
+    written = config.load_scene(scene)
+    source = written.scene
+    if source.blend:
+        checksum = config.blend_sha256(scene, source)[0]
+        source = source.model_copy(update={"sha256": checksum})
+    found = []
+    for name, rig in written.rigs.items():
+        reprojections = {
+            key: reprojection.model_copy(update={"camera": _limited(reprojection.camera, limits)})
+            for key, reprojection in written.reprojections.items()
+            if name in (reprojection.rigs or written.rigs)
+        }
+        exports = {
+            key: export.model_copy(
+                update={"sources": [s for s in export.sources if s in (VIEWS, *reprojections)]}
+            )
+            for key, export in written.exports
+            if export
+        }
+        for folder, frame in _frames(name, rig, source.frame):
+            found.append(
+                Dataset(
+                    scene_name=scene,
+                    preset=preset,
+                    rig_name=name,
+                    rig_folder=folder,
+                    source=source.model_copy(update={"frame": frame}),
+                    render=_limited_render(written.render, limits),
+                    rig=_limited_rig(rig, limits),
+                    reprojections=reprojections,
+                    exports=written.exports.model_copy(update=exports),
+                    limits=limits,
+                )
+            )
+    if settings is None:
+        return found
+    return [
+        replace(
+            dataset,
+            results_root=settings.results,
+            work_root=settings.work,
+            views_per_shard=settings.views_per_shard,
+        )
+        for dataset in found
+    ]
+
+
+def _check_presence(dataset: Dataset) -> None:
+    """Check that the user's .blend is where the scene YAML says, or can be downloaded."""
+    source = dataset.source
+    if source.blend and not source.url and not (ROOT / source.blend).is_file():
+        page = f"get it from {source.page} and " if source.page else ""
+        raise UserError(
+            f"configs/scenes/{dataset.scene_name}.yaml: scene.blend: "
+            f"there is no file {source.blend}; {page}put it there"
+        )
+
+
+def _frames(name: str, rig: Rig, frame: int) -> Iterator[tuple[str, int]]:
+    """Yield the folder and the frame number of each dataset of a rig."""
+    if rig.frames is None:
+        yield name, frame
+        return
+    for number in range(rig.frames.first, rig.frames.last + 1, rig.frames.step):
+        yield f"{name}/f{number:05d}", number
+
+
+def _limited_rig(rig: Rig, limits: Preset) -> Rig:
+    """Return a rig of as many views at most, with a file of poses found from any folder."""
+    if isinstance(rig, Poses):
+        rig = rig.model_copy(update={"file": str(ROOT / rig.file)})
+    if limits.views:
+        rig = rig.thinned(limits.views)
+    return rig.model_copy(update={"camera": _limited(rig.camera, limits)})
+
+
+def _limited_render(render: Render, limits: Preset) -> dict[str, Any]:
+    """Return the ``render`` block under a preset's ``limits``.
+
+    With a ``target_error``, samples, threshold and denoising are not known before the calibration;
+    what the preset says of them limits its choice: at most ``most_samples``, and ``denoise``.
+    """
+    content = render.model_dump(exclude_none=True)
+    denoise = {} if limits.denoise is None else {"denoise": limits.denoise}
+    if render.samples is not None:
+        samples = min(render.samples, limits.samples or render.samples)
+        return {**content, "samples": samples, **denoise}
+    most = {"most_samples": limits.samples} if limits.samples else {}
+    kept = {key: value for key, value in content.items() if key not in CHOSEN}
+    return {**kept, **most, **denoise}
+
+
+def _limited(camera: CameraSettings, limits: Preset) -> CameraSettings:
+    """Return the camera with its image's longer side at most ``limits.resolution`` pixels."""
+    width, height = camera.resolution
+    scale = min(1.0, (limits.resolution or max(width, height)) / max(width, height))
+    update: dict[str, Any] = {
+        "resolution": [max(1, round(width * scale)), max(1, round(height * scale))]
+    }
+    if camera.principal_point:
+        update["principal_point"] = [value * scale for value in camera.principal_point]
+    return camera.model_copy(update=update)
