@@ -41,7 +41,7 @@ from lightfield.geometry.lenses.equidistant import Equidistant  # noqa: E402
 from lightfield.geometry.lenses.rectilinear import Rectilinear  # noqa: E402
 from lightfield.imaging import images  # noqa: E402
 from lightfield.imaging.halves import narrow, widen  # noqa: E402
-from lightfield.report.plots import (  # noqa: E402
+from lightfield.imaging.plots import (  # noqa: E402
     BLUE,
     GREEN,
     GREY,

@@ -42,7 +42,7 @@ rule stability:
     message:
         "Taking every pair of lenses to its extremes"
     shell:
-        "python scripts/stability.py --output {params.folder} 2>&1 | tee {log}"
+        "python benchmarks/stability.py --output {params.folder} 2>&1 | tee {log}"
 
 
 rule render_overhead:

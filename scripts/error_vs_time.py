@@ -27,9 +27,9 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, read_json, write_json
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import LightField
+from lightfield.imaging import plots
 from lightfield.measurement import metrics, trials
 from lightfield.measurement.calibration import calibrated
-from lightfield.report import plots
 
 PLAIN, ADAPTIVE, DENOISED = "plain", "adaptive", "denoised"
 BOTH, GUIDED, OWN = "adaptive + denoised", "path guiding", "this scene's settings"

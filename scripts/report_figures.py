@@ -19,8 +19,8 @@ from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import rigs
 from lightfield.imaging import images
 from lightfield.imaging.pictures import luminance
+from lightfield.imaging.plots import BLUE, GREY, plot
 from lightfield.measurement import noise
-from lightfield.report.plots import BLUE, GREY, plot
 
 # From where the rig is looked at: degrees round it from −Y, and above the ground.
 AZIMUTH, ELEVATION = 30.0, 24.0

@@ -13,9 +13,9 @@ from lightfield.core.errors import UserError
 from lightfield.dataset.journal import Journal
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.rectilinear import Rectilinear
-from lightfield.imaging import images
+from lightfield.imaging import images, plots
 from lightfield.rendering import blender
-from lightfield.report import page, plots
+from lightfield.report import page
 from lightfield.reprojection import lens_map
 
 BLOCK = os.sysconf("SC_PAGE_SIZE")

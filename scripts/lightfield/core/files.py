@@ -1,10 +1,11 @@
 """Files that are either whole or absent, and their checksums."""
 
+import csv
 import hashlib
 import json
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -56,11 +57,23 @@ def sha256(path: Path | str) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def write_json(path: Path | str, content: Any) -> None:
-    """Write ``content`` as JSON, atomically; NaN and infinities are refused (ValueError)."""
-    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
+def write_text(path: Path | str, text: str) -> None:
+    """Write ``text`` in UTF-8, atomically."""
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path | str, content: Any) -> None:
+    """Write ``content`` as JSON, atomically; NaN and infinities are refused (ValueError)."""
+    write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
+def write_csv(path: Path | str, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write rows of the same columns as CSV, atomically, the first line their names."""
+    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        table = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
 
 
 def append_json_line(path: Path, entry: Mapping[str, Any]) -> None:

@@ -1,0 +1,631 @@
+"""Measure how steady the geometry is: every lens pair over extremes, against mpmath.
+
+One row a case: its condition number, its error against a reference of 50 digits, its round-trip
+error, the bound that the condition number implies, and a verdict. Writes stability.csv (all rows),
+stability.md (a summary) and stability.svg and .png (error over condition number) into --output,
+and fails where a case is outside its bound.
+
+The bound. A chain of correctly rounded steps is off by about as much as its exact answer moves
+when each of its data moves by one rounding. The data of pixel → ray → pixel are the pixel (which
+moves by eps · (|x| + |principal point|)), the three components of the ray (each by eps times
+itself) and the answer. The sum of the exact answer's moves, in units of eps and relative to the
+size of the image, is the condition number; a case passes within ROUNDINGS of these moves, and as
+"ill-conditioned" where they let an answer be off by more than half a pixel. Where the
+answer is not unique (a pole, a seam, the rim of a 360° lens, a border between cube faces) the two
+answers are compared as rays.
+"""
+
+import argparse
+import collections
+import functools
+import math
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+from mpmath import asin, atan, atan2, cos, hypot, mpf, pi, sin, tan
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
+
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_csv, write_text
+from lightfield.core.progress import Progress
+from lightfield.geometry.lenses import LENSES, Array, Lens
+from lightfield.geometry.lenses.base import CircleFisheye
+from lightfield.imaging.plots import BLUE, VERMILION, plot
+
+ROUNDINGS = 16  # roundings, each of one eps, in the longest chain of operations of one step
+RIM = 32  # a point this many eps from the rim may count as inside or outside
+VAGUE = 0.5  # pixels of bound beyond which a case passes as ill-conditioned only
+ILL_CONDITIONED = "ok, ill-conditioned"
+DIGITS = 50
+# Of differences: far below eps, so that a jump (a seam, a border) shows as an infinite derivative.
+STEP = mpf(10) ** -20
+# What mpmath's roots are exact to, and more.
+TINY = mpf(10) ** -25
+INF = mpf("inf")
+
+Vector = Sequence[mpf]
+
+
+# The reference: every lens by its definition, in mpmath. An answer is None where there is none.
+
+
+def half_fov(lens: Any) -> mpf:
+    return min(mpf(lens.fov) / 2, pi)
+
+
+def angles(lens: Any) -> tuple[int, list[mpf]]:
+    """Return the sign of a polynomial lens's θ, and the coefficients of |θ| over r."""
+    sign = -1 if next(k for k in lens.coefficients[1:] if k) > 0 else 1
+    return sign, [-sign * mpf(k) for k in lens.coefficients]
+
+
+def radii(lens: Any) -> list[mpf]:
+    """Return the coefficients of a Kannala–Brandt lens's r / f over θ."""
+    return [mpf(c) for k in (1, *lens.coefficients) for c in (0, k)]
+
+
+def value(coefficients: Sequence[mpf], t: mpf) -> mpf:
+    return mpmath.polyval(coefficients, t, asc=True)
+
+
+def positive_roots(coefficients: Sequence[mpf]) -> list[mpf]:
+    trimmed = list(np.trim_zeros(list(coefficients), "b"))
+    roots = mpmath.polyroots(trimmed, maxsteps=500, extraprec=300, asc=True)
+    return [r.real for r in roots if abs(r.imag) < TINY < r.real]
+
+
+@functools.cache
+def rise(lens: Any) -> mpf:
+    """Return where a lens's polynomial stops increasing, or its θ reaches π."""
+    blenders = lens.name == "polynomial"
+    coefficients = angles(lens)[1] if blenders else radii(lens)
+    ends = positive_roots([i * c for i, c in enumerate(coefficients)][1:])
+    if blenders:
+        return min(ends + positive_roots([coefficients[0] - pi, *coefficients[1:]]))
+    return min([*ends, +pi])
+
+
+def inverse(coefficients: Sequence[mpf], goal: mpf, end: mpf) -> mpf | None:
+    """Return t in [0, end] at which an increasing polynomial is ``goal``."""
+    first, last = coefficients[0], value(coefficients, end)
+    if first == goal or last == goal:
+        return mpf(0) if first == goal else end
+    if not first < goal < last:
+        return None
+    solver = {"solver": "anderson", "maxsteps": 300, "verify": False}
+    return mpmath.findroot(lambda t: value(coefficients, t) - goal, (mpf(0), end), **solver)
+
+
+def polynomial_radius(lens: Any, theta: mpf) -> mpf | None:
+    sign, coefficients = angles(lens)
+    if 0 <= theta < coefficients[0] < max(pixel_size(lens)) * coefficients[1]:
+        return mpf(0)  # the hole around the axis, smaller than a pixel
+    r = inverse(coefficients, theta, rise(lens))
+    return None if r is None else sign * r
+
+
+# θ at r, and r at θ, each None where there is none; r as in the lenses' own definitions.
+RADIAL: dict[str, tuple[Callable[[Any, mpf], mpf | None], Callable[[Any, mpf], mpf | None]]] = {
+    "rectilinear": (
+        lambda lens, r: atan(r / lens.focal_length),
+        lambda lens, t: lens.focal_length * tan(t) if t < pi / 2 else None,
+    ),
+    "equidistant": (
+        lambda lens, r: r * half_fov(lens),
+        lambda lens, t: t / half_fov(lens),
+    ),
+    "equisolid": (
+        lambda lens, r: 2 * asin(s) if (s := r / (2 * mpf(lens.focal_length))) <= 1 else None,
+        lambda lens, t: 2 * lens.focal_length * sin(t / 2),
+    ),
+    "stereographic": (
+        lambda lens, r: 2 * atan(r * tan(half_fov(lens) / 2)),
+        lambda lens, t: tan(t / 2) / tan(half_fov(lens) / 2),
+    ),
+    "orthographic": (
+        lambda lens, r: asin(s) if (s := r * sin(half_fov(lens))) <= 1 else None,
+        lambda lens, t: sin(t) / sin(half_fov(lens)) if t <= pi / 2 else None,
+    ),
+    "polynomial": (
+        lambda lens, r: angles(lens)[0] * value(angles(lens)[1], r),
+        polynomial_radius,
+    ),
+    "kannala_brandt": (
+        lambda lens, r: inverse(radii(lens), r / lens.focal_length, rise(lens)),
+        lambda lens, t: lens.focal_length * value(radii(lens), t) if t <= rise(lens) else None,
+    ),
+}
+
+
+@functools.cache
+def pixel_size(lens: Lens) -> tuple[mpf, mpf]:
+    """Return what one pixel is, across and down, in the unit of the lens's r."""
+    sides = (2, 2) if isinstance(lens, CircleFisheye) else lens.sensor
+    return mpf(sides[0]) / lens.width, mpf(sides[1]) / lens.height
+
+
+@functools.cache
+def largest_radius(lens: Any) -> mpf:
+    if lens.name == "rectilinear":
+        return INF
+    last = half_fov(lens)
+    if lens.name == "polynomial":
+        last = min(last, value(angles(lens)[1], rise(lens)))
+    elif lens.name == "kannala_brandt":
+        last = min(last, rise(lens))
+    return abs(RADIAL[lens.name][1](lens, last))
+
+
+# The right, up and forward axes of faces f b l r u d.
+CUBE = (
+    ((1, 0, 0), (0, 1, 0), (0, 0, -1)),
+    ((-1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    ((0, 0, -1), (0, 1, 0), (-1, 0, 0)),
+    ((0, 0, 1), (0, 1, 0), (1, 0, 0)),
+    ((1, 0, 0), (0, 0, 1), (0, 1, 0)),
+    ((1, 0, 0), (0, 0, -1), (0, -1, 0)),
+)
+
+
+@functools.cache
+def ray_and_excess(lens: Any, x: mpf, y: mpf) -> tuple[Vector | None, mpf]:
+    """Return the exact ray of a pixel, and how far outside the lens it is (negative: inside)."""
+    if lens.name == "cube_map":
+        face = min(int(x // lens.height), 5)
+        u = 2 * (x - face * lens.height) / lens.height - 1
+        v = 1 - 2 * y / lens.height
+        ray = [u * right + v * up + ahead for right, up, ahead in zip(*CUBE[face], strict=True)]
+        return tuple(c / mpmath.norm(ray) for c in ray), mpf(-1)
+    if lens.name == "equirectangular":
+        (west, east), (south, north) = lens.longitude, lens.latitude
+        longitude = west + (mpf(east) - west) * x / lens.width
+        latitude = north - (mpf(north) - south) * y / lens.height
+        across = cos(latitude)
+        ray = (across * sin(longitude), sin(latitude), -across * cos(longitude))
+        return ray, abs(latitude) / (pi / 2) - 1
+    u, v = (x - lens.center[0]) * pixel_size(lens)[0], (lens.center[1] - y) * pixel_size(lens)[1]
+    r = hypot(u, v)
+    theta = RADIAL[lens.name][0](lens, r)
+    excess = r / largest_radius(lens) - 1
+    if theta is None:
+        return None, excess
+    right, up = (u / r, v / r) if r else (mpf(0), mpf(1))
+    return (sin(theta) * right, sin(theta) * up, -cos(theta)), excess
+
+
+def pixel_and_excess(lens: Any, ray: Vector) -> tuple[Vector | None, mpf]:
+    """Return the exact pixel of a ray, and how far outside the lens it is (negative: inside)."""
+    if lens.name == "cube_map":
+        faces = [[mpmath.fdot(axis, ray) for axis in axes] for axes in CUBE]
+        face = max(range(6), key=lambda i: faces[i][2])
+        u, v, side = faces[face]
+        half = mpf(lens.height) / 2
+        return (half * (1 + u / side) + face * lens.height, half * (1 - v / side)), mpf(-1)
+    if lens.name == "equirectangular":
+        (west, east), (south, north) = lens.longitude, lens.latitude
+        longitude = atan2(ray[0], -ray[2]) if ray[0] or ray[2] else mpf(0)
+        latitude = atan2(ray[1], hypot(ray[0], ray[2]))
+        middle = (mpf(west) + east) / 2
+        longitude -= 2 * pi * mpmath.floor((longitude - middle) / (2 * pi) + 0.5)
+        x = (longitude - west) / (mpf(east) - west) * lens.width
+        return (x, (north - latitude) / (mpf(north) - south) * lens.height), mpf(-1)
+    side = hypot(ray[0], ray[1])
+    r = RADIAL[lens.name][1](lens, atan2(side, -ray[2]))
+    if r is None:
+        return None, mpf(1)
+    right, up = (ray[0] / side, ray[1] / side) if side else (mpf(0), mpf(0))
+    x = lens.center[0] + r * right / pixel_size(lens)[0]
+    y = lens.center[1] - r * up / pixel_size(lens)[1]
+    return (x, y), abs(r) / largest_radius(lens) - 1
+
+
+def exact_ray(lens: Lens, pixel: Vector) -> Vector | None:
+    return ray_and_excess(lens, *pixel)[0]
+
+
+def exact_pixel(lens: Lens, ray: Vector) -> Vector | None:
+    return pixel_and_excess(lens, ray)[0]
+
+
+def exact_pair(source: Lens, target: Lens, pixel: Vector) -> Vector | None:
+    """Return the target's pixel of the source's."""
+    ray = exact_ray(source, pixel)
+    return None if ray is None else exact_pixel(target, ray)
+
+
+def ray_within(lens: Lens, pixel: Vector, eps: mpf) -> Vector | None:
+    """Return the exact ray of a pixel, which rounding may have carried beyond the lens's rim."""
+    ray = exact_ray(lens, pixel)
+    if ray is not None:
+        return ray
+    offset = [c - m for c, m in zip(pixel, lens.center, strict=True)]
+    shrink = max(1 - ROUNDINGS * eps * extent(lens, pixel) / mpmath.norm(offset), mpf(0))
+    return exact_ray(lens, [m + shrink * o for m, o in zip(lens.center, offset, strict=True)])
+
+
+def distance(a: Vector, b: Vector) -> mpf:
+    """Return the angle between two unit rays."""
+    return 2 * asin(min(mpmath.norm([p - q for p, q in zip(a, b, strict=True)]) / 2, 1))
+
+
+# How far the exact answers move with their data.
+
+
+def moves(answer: Callable[[Vector], Vector | None], data: Vector, sizes: Vector) -> mpf:
+    """Return the sum of the answer's largest moves with each datum, per eps of the datum's size.
+
+    Infinite where there is no answer.
+    """
+    total = mpf(0)
+    for i, size in enumerate(sizes):
+        step = [STEP * size * (i == j) for j in range(len(data))]
+        if not size:
+            continue
+        ends = [answer(tuple(d + sign * s for d, s in zip(data, step, strict=True)))
+                for sign in (1, -1)]  # fmt: skip
+        if None in ends:
+            return INF
+        total += max(abs(a - b) for a, b in zip(*ends, strict=True)) / (2 * STEP)
+    return total
+
+
+def extent(lens: Lens, pixel: Vector) -> mpf:
+    """Return the size of the numbers that a pixel coordinate is computed from and with."""
+    return max(abs(c) + abs(m) for c, m in zip(pixel, lens.center, strict=True))
+
+
+def ray_moves(lens: Lens, pixel: Vector) -> mpf:
+    """Return the moves of a pixel's ray with its coordinates, in radians per eps."""
+    return moves(functools.partial(exact_ray, lens), pixel, [extent(lens, pixel)] * 2)
+
+
+def pixel_moves(lens: Lens, ray: Vector) -> mpf:
+    """Return the moves of a ray's pixel with its components, in pixels per eps."""
+    return moves(functools.partial(exact_pixel, lens), ray, ray)
+
+
+def pair_moves(source: Lens, target: Lens, pixel: Vector) -> mpf:
+    """Return the moves of the target's pixel with the source's, in pixels per eps."""
+    return moves(functools.partial(exact_pair, source, target), pixel, [extent(source, pixel)] * 2)
+
+
+# Cases: mappings of what a row of the table says, errors and bounds in pixels.
+
+Case = dict[str, Any]
+
+
+class Worst:
+    """The largest error relative to its bound among the points of a case, and how they are held."""
+
+    def __init__(self) -> None:
+        self.error, self.bound = mpf(0), mpf(0)
+        self.vague = False
+        self.as_rays = self.wrong = 0
+
+    def add(self, error: mpf, bound: mpf) -> None:
+        self.vague |= bool(bound > VAGUE)
+        if self.bound == 0 or error * self.bound > self.error * bound:
+            self.error, self.bound = error, bound
+
+    def hold(
+        self,
+        lens: Lens,
+        found: Vector,
+        answer: Vector,
+        bound: mpf,
+        ray: Vector,
+        moves: mpf,
+        eps: mpf,
+    ) -> bool:
+        """Hold a pixel that was ``found`` against its bound; return whether it is within.
+
+        The bound of an answer that eps moves by more than the image says nothing: such an answer,
+        and a twin of the right one, must have the ``ray`` to within its ``moves`` and the pixel's.
+        """
+        error = max(abs(a - b) for a, b in zip(found, answer, strict=True))
+        if error <= bound < max(lens.width, lens.height):
+            self.add(error, bound)
+            return True
+        self.as_rays += 1
+        seen = ray_within(lens, found, eps)
+        if seen is None or distance(seen, ray) > ROUNDINGS * eps * moves:
+            self.wrong += 1
+            self.add(error, bound)
+        return False
+
+
+class Point:
+    """Exact answers for one point of a lens pair; both dtypes are held against them."""
+
+    def __init__(self, source: Lens, target: Lens, pixel: Vector) -> None:
+        self.source, self.target, self.pixel = source, target, pixel
+        self.ray, self.excess = ray_and_excess(source, *pixel)
+        self.answer, self.answer_excess = None, mpf(1)
+        if self.ray is None:
+            return
+        self.answer, self.answer_excess = pixel_and_excess(target, self.ray)
+        self.ray_moves = ray_moves(source, pixel) + 1
+        if self.answer is not None:
+            self.moves = (
+                pair_moves(source, target, pixel)
+                + pixel_moves(target, self.ray)
+                + extent(target, self.answer)
+            )
+
+    @property
+    def is_seen(self) -> bool:
+        return self.answer is not None and self.excess <= 0 and self.answer_excess <= 0
+
+    def is_at_the_rim(self, eps: mpf) -> bool:
+        return bool(min(abs(self.excess), abs(self.answer_excess)) <= RIM * eps)
+
+    def check(
+        self, found: Vector, returned: Sequence[float], eps: mpf, forward: Worst, back: Worst
+    ) -> mpf:
+        """Hold the target's pixel that was ``found`` and the way back from it.
+
+        Returns the condition number, relative to the image; 0 where only rays were compared.
+        """
+        source, target = self.source, self.target
+        bound = ROUNDINGS * eps * self.moves
+        moved = ray_moves(target, found)
+        within = forward.hold(
+            target, found, self.answer, bound, self.ray, self.ray_moves + moved, eps
+        )
+        ray = exact_ray(target, found)
+        if ray is not None:
+            per_eps = pair_moves(target, source, found)
+            size = extent(source, self.pixel)
+            before, bound = bound, ROUNDINGS * eps * (per_eps + pixel_moves(source, ray) + size)
+            bound += per_eps / extent(target, found) * before
+            if not math.isnan(returned[0]):
+                again = [mpf(float(c)) for c in returned]
+                moved += 2 * self.ray_moves
+                back.hold(source, again, self.pixel, bound, self.ray, moved, eps)
+            # The way back may end outside only where the rim is within the bound.
+            elif abs(self.excess) * size <= bound or abs(self.answer_excess) <= RIM * eps:
+                back.as_rays += 1
+            else:
+                back.add(INF, bound)
+        return self.moves / extent(target, self.answer) if within else mpf(0)
+
+
+def measure(lenses: dict[str, Lens]) -> Iterator[Case]:
+    """Every lens as source and as target: pixel → ray → pixel, and back again."""
+    mpmath.mp.dps = DIGITS
+    progress = Progress(len(lenses) ** 2, "stability", "lens pairs")
+    for source_name, source in lenses.items():
+        pixels = places(source)
+        for target_name, target in lenses.items():
+            exact = [Point(source, target, (mpf(float(x)), mpf(float(y)))) for x, y in pixels]
+            for dtype in (np.float32, np.float64):
+                yield case(f"{source_name} → {target_name}", pixels, exact, dtype)
+            progress.done()
+
+
+def case(name: str, pixels: Array, exact: Sequence[Point], dtype: type) -> Case:
+    eps = mpf(float(np.finfo(dtype).eps))
+    source, target = exact[0].source, exact[0].target
+    answers = target.pixels(source.rays(*pixels.T.astype(dtype)))
+    back = source.pixels(target.rays(*answers.T))
+    forward, round_trip = Worst(), Worst()
+    conditions = [mpf(0)]
+    misses = wrong = 0
+    for point, got, returned in zip(exact, answers, back, strict=True):
+        missed = np.isnan(got).all()
+        if point.is_seen and not missed:
+            found = [mpf(float(c)) for c in got]
+            conditions.append(point.check(found, returned, eps, forward, round_trip))
+        else:
+            # A miss has to be marked in both coordinates, and to be one.
+            misses += 1
+            wrong += not (missed and not point.is_seen) and not point.is_at_the_rim(eps)
+    passes = all(worst.error <= worst.bound for worst in (forward, round_trip))
+    passes = passes and not wrong and not forward.wrong
+    vague = forward.vague or round_trip.vague
+    return {
+        "group": "lens pair",
+        "case": name,
+        "source": type(source).__name__,
+        "target": type(target).__name__,
+        "dtype": np.dtype(dtype).name,
+        "points": len(pixels),
+        "misses": misses,
+        "as_rays": forward.as_rays + round_trip.as_rays,
+        "condition": float(max(conditions)),
+        "error": float(forward.error),
+        "error_bound": float(forward.bound),
+        "round_trip_error": float(round_trip.error),
+        "round_trip_bound": float(round_trip.bound),
+        "unit": "px",
+        "verdict": "FAIL" if not passes else ILL_CONDITIONED if vague else "ok",
+    }
+
+
+def extreme_lenses() -> dict[str, Lens]:
+    """Return the lenses of the cases, by name."""
+    odd, wide = {"width": 65, "height": 33}, {"width": 2048, "height": 1536}
+    one = {"width": 1, "height": 1}
+    shifted = {**wide, "principal_point": (-300.25, 2000.5)}
+    # The arguments of the lens that each name begins with; a field of view is in degrees.
+    arguments: dict[str, dict[str, Any]] = {
+        "rectilinear 0.01°": wide | focal(0.01),
+        "rectilinear 90° odd": odd | focal(90),
+        "rectilinear 179.9°": wide | focal(179.9),
+        "rectilinear 1e-6 mm": wide | {"focal_length": 1e-6},
+        "rectilinear 1e6 mm": wide | {"focal_length": 1e6},
+        "rectilinear 1×1 px": one | {"focal_length": 18},
+        "rectilinear shifted": shifted | {"focal_length": 18, "sensor_size": (36, 20)},
+        "equidistant 0.01°": wide | {"fov": 0.01},
+        "equidistant 180° odd": odd | {"fov": 180},
+        "equidistant 180° 1×1 px": one | {"fov": 180},
+        "equidistant 220° shifted": shifted | {"fov": 220},
+        "equidistant 360°": wide | {"fov": 360},
+        "equisolid 180° 1e-6 mm": wide | {"focal_length": 1e-6, "fov": 180},
+        "equisolid 180° 1e6 mm": wide | {"focal_length": 1e6, "fov": 180},
+        "equisolid 220° odd": odd | {"focal_length": 10.5, "fov": 220},
+        "equisolid 360°": wide | {"focal_length": 9, "fov": 360},
+        "stereographic 0.01°": wide | {"fov": 0.01},
+        "stereographic 180° odd": odd | {"fov": 180},
+        "stereographic 359.9999°": wide | {"fov": 359.9999},
+        "orthographic 0.01°": wide | {"fov": 0.01},
+        "orthographic 180°": wide | {"fov": 180},
+        "polynomial Blender's": odd | {"coefficients": BLENDERS, "fov": 180},
+        "polynomial turning": wide | {"coefficients": (0, -0.1, 0, 4e-4, 0), "fov": 360},
+        "polynomial turned 220°": wide | {"coefficients": (0, 0.08, 1e-4, 1e-5, 0), "fov": 220},
+        "kannala_brandt 360°": wide | {"coefficients": (0.01, -0.002, 3e-4, 0), "focal_length": 6},
+        "kannala_brandt turning": odd | {"coefficients": (-0.3, 0, 0, 0), "focal_length": 12},
+        "equirectangular": wide,
+        "equirectangular odd": odd,
+        "equirectangular 0.01°": wide | dict.fromkeys(("longitude", "latitude"), CORNER),
+        "cube map": {"width": 6 * 1024, "height": 1024},
+        "cube map 1 px": {"width": 6, "height": 1},
+    }
+    lenses = {}
+    for name, settings in arguments.items():
+        if "fov" in settings:
+            settings = {**settings, "fov": math.radians(settings["fov"])}
+        kind = name.replace("cube map", "cube_map").split()[0]
+        lenses[name] = LENSES[kind](**settings)
+    return lenses
+
+
+BLENDERS = (-1.1735144e-05, -0.01998874, -3.3525323e-06, 3.0992753e-06, -2.6064646e-08)
+CORNER = (0, math.radians(0.01))
+
+
+def focal(fov: float) -> dict[str, float]:
+    return {"focal_length": 18 / math.tan(math.radians(fov) / 2)}
+
+
+def places(lens: Lens) -> Array:
+    """Return pixel coordinates (n, 2) in float32 that a lens is tried at.
+
+    The exact centre and beside it, the frame's corner, the middles of its edges (the rim of an
+    image circle, the seam and the poles of a panorama), just inside the rim, and in between; for
+    a lens that turns, at and beside its turning point.
+    """
+    width, height = lens.width, lens.height
+    x, y = lens.center
+    points = [
+        (x, y),
+        (x * (1 + 1e-6), y * (1 - 1e-6)),
+        (0.5, 0.5),
+        (width, height / 2),
+        (width / 2, 0),
+        (x + width / 2 * 0.99999, y),
+        (0.3 * width, 0.6 * height),
+        (0.77 * width, 0.21 * height),
+        (0, 0.4 * height),
+    ]
+    if lens.name in ("polynomial", "kannala_brandt"):
+        end = float(largest_radius(lens) / pixel_size(lens)[0])
+        points += [
+            (x + end, y),
+            (x + end * (1 - 1e-4), y),
+            (x, y - end * height / width * (1 - 1e-6)),
+        ]
+    return np.array(points, np.float32)
+
+
+def used(case: Case) -> float:
+    """Return the part of its bound that a case uses."""
+    pairs = (
+        (case["error"], case["error_bound"]),
+        (case["round_trip_error"], case["round_trip_bound"]),
+    )
+    return max(error / bound if bound else (math.inf if error else 0) for error, bound in pairs)
+
+
+# What is written.
+
+
+def summary(cases: Sequence[Case]) -> str:
+    """Return one line a source lens and dtype, and what is outside its bound."""
+    groups = collections.defaultdict(list)
+    for each in cases:
+        groups[each["source"], each["dtype"]].append(each)
+    failed = [each for each in cases if each["verdict"] == "FAIL"]
+    lines = [
+        f"{len(cases)} cases, {len(failed)} outside their bounds. Errors of lenses are in pixels; "
+        "the last number is the largest part of its bound that any case uses.",
+        "",
+        "| cases | dtype | number | largest condition | largest round-trip error | of the bound "
+        "| verdict |",
+        "| --- | --- | ---: | ---: | ---: | ---: | --- |",
+    ]
+    for (source, dtype), members in groups.items():
+        counts = collections.Counter(each["verdict"] for each in members)
+        verdicts = ", ".join(f"{counts[verdict]} {verdict}" for verdict in sorted(counts))
+        lines.append(
+            f"| {source} → any lens | {dtype} | {len(members)} "
+            f"| {max(each['condition'] for each in members):.1e} "
+            f"| {max(each['round_trip_error'] for each in members):.1e} "
+            f"| {max(used(each) for each in members):.2f} | {verdicts} |"
+        )
+    for dtype in ("float32", "float64"):
+        own = (e for e in cases if e["dtype"] == dtype and len(set(e["case"].split(" → "))) == 1)
+        largest = max((each["round_trip_error"] for each in own), default=0)
+        lines.append(f"\nFrom a lens to itself and back, {dtype}: off by at most {largest:.1e} px.")
+    lines += [f"\nOutside its bound: {each['case']} ({each['dtype']})." for each in failed]
+    return "\n".join(lines) + "\n"
+
+
+def draw(stem: Path, cases: Sequence[Case]) -> None:
+    """Plot every lens pair's round-trip error over the condition of its round trip."""
+    with plot(stem, size=(8, 5.5)) as axes:
+        for dtype, colour, marker in (("float32", VERMILION, "o"), ("float64", BLUE, "s")):
+            eps = float(np.finfo(dtype).eps)
+            chosen = [
+                e for e in cases if e["dtype"] == dtype and 0 < e["round_trip_bound"] < math.inf
+            ]
+            condition = np.array([each["round_trip_bound"] / (ROUNDINGS * eps) for each in chosen])
+            errors = np.array([each["round_trip_error"] for each in chosen])
+            # A round trip without any error is shown at the bottom.
+            axes.scatter(
+                condition, np.maximum(errors, eps / 100), s=10, c=colour, marker=marker, alpha=0.5,
+                linewidths=0, label=f"{dtype} ({len(chosen)} lens pairs)",
+            )  # fmt: skip
+            if chosen:
+                line = np.array([condition.min(), condition.max()])
+                axes.plot(line, ROUNDINGS * eps * line, c=colour, label=f"bound of {dtype}")
+        axes.set(
+            xscale="log",
+            yscale="log",
+            xlabel="absolute condition number of the round trip "
+            "/ px per unit relative perturbation",
+            ylabel="round-trip error / px (exact ones at the bottom)",
+            title="Round trips of every lens pair over the extremes",
+        )
+        axes.legend()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--output", required=True, type=Path, help="folder for the results")
+    folder = parser.parse_args().output
+    cases = list(measure(extreme_lenses()))
+    write_csv(
+        folder / "stability.csv",
+        [{k: f"{v:.3e}" if isinstance(v, float) else v for k, v in row.items()} for row in cases],
+    )
+    write_text(folder / "stability.md", summary(cases))
+    draw(folder / "stability", cases)
+    failed = [each for each in cases if each["verdict"] == "FAIL"]
+    print(f"{len(cases)} cases, {len(failed)} outside their bounds", file=sys.stderr)
+    if failed:
+        raise UserError(
+            f"{len(failed)} of {len(cases)} cases are outside the bound that their condition "
+            f"number implies, the first: {failed[0]['case']} ({failed[0]['dtype']}); "
+            f"all are in {folder / 'stability.csv'}"
+        )
+
+
+if __name__ == "__main__":
+    run(main)
