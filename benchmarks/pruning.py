@@ -58,6 +58,7 @@ class Task:
 
     blend: Path
     left_out: tuple[str, ...] = ()
+    hidden: tuple[str, ...] = ()
     passes: bool = False
     depth: bool = True
     tweak: str = ""
@@ -110,18 +111,18 @@ def make_scene(task: tuple[str, str, float, Path]) -> dict[str, Any]:
 
     import bpy
 
-    from lightfield.rendering import blender, inventory
+    from lightfield.rendering import blend_file, inventory
 
     source = config.load_scene(scene).scene
-    blender.new_scene()
+    blend_file.new_scene()
     builder = importlib.import_module(f"scenes.{source.builder}")
     builder.build({**source.parameters.model_dump(), "detail": detail})
     if variant == "as artists leave it":
         bpy.context.scene.render.use_motion_blur = True
         bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=9, location=(0, 0, -50))
         bpy.context.object.hide_render = True
-    blender.save_scene(path)
-    blender.open_scene(path)
+    blend_file.save_scene(path)
+    blend_file.open_scene(path)
     return inventory.inventory()
 
 
@@ -129,7 +130,7 @@ def measured(blend: Path, found: dict[str, Any], repeats: int) -> Iterator[dict[
     """Yield a row for each thing that can be left out of a scene, alone, and for all together."""
     names = tuple(pruning.left_out(found))
     artists = blend.stem.endswith("as artists leave it")
-    whole = Task(blend, passes=artists)
+    whole = Task(blend, hidden=tuple(found["hidden"]), passes=artists)
     kept = replace(whole, left_out=names, passes=False)
     # What is left out, why, from what and with what effect.
     compared = [("nothing", "the scene as it is", whole, whole)]
@@ -195,21 +196,18 @@ class Renderer:
     def __init__(self, task: Task) -> None:
         import bpy
 
-        from lightfield.rendering import blender
+        from lightfield.rendering import cycles
 
         lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [96, 96]})
         rig = {"type": "lattice", "cameras": [VIEWS, 1, 1], "size": 0.3, "center": [0, 0, 1.1]}
         settings = {"samples": 4, "adaptive_threshold": 0, "denoise": False}
         depth = "z" if task.depth else None
-        lightfield = LightField.from_rig(rig, lens, depth=depth, frame=1)
+        lightfield = LightField.from_rig(rig, lens, depth=depth, frame=1, render=settings)
         self.poses = lightfield.matrices
         self.digest = hashlib.sha256()
         self.sizes: list[int] = []
-        blender.open_scene(task.blend)
-        if "hidden_objects" in task.left_out:
-            blender.remove_objects(blender.removable_objects())
-        blender.set_up_render(settings, lightfield, "cpu", 1)
-        blender.leave_out(task.left_out)
+        inventory = {"left_out": task.left_out, "hidden": task.hidden}
+        cycles.set_up(task.blend, inventory, lightfield, "cpu", 1)
         scene = bpy.context.scene
         if task.passes:
             layer = scene.view_layers[0]
@@ -227,10 +225,10 @@ class Renderer:
         import numpy as np
 
         from lightfield.imaging import images
-        from lightfield.rendering import blender
+        from lightfield.rendering.view import render_view
 
         began = time.process_time()
-        raw = blender.render_view(np.array(self.poses[number]), 1)
+        raw = render_view(np.array(self.poses[number]), 1)
         seconds = time.process_time() - began
         self.digest.update(raw.colour.tobytes())
         channels = {c: raw.colour[:, :, i].astype(np.float16) for i, c in enumerate("RGB")}

@@ -9,7 +9,7 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path
 from lightfield.dataset import config
-from lightfield.rendering import blender
+from lightfield.rendering import blend_file
 
 
 def main() -> None:
@@ -28,10 +28,10 @@ def main() -> None:
         raise UserError(f"--parameters: is not JSON: {error}") from None
 
     builder = importlib.import_module(f"scenes.{arguments.builder}")
-    blender.new_scene()
+    blend_file.new_scene()
     builder.build(parameters)
     with atomic_path(arguments.output) as temporary:
-        blender.save_scene(temporary)
+        blend_file.save_scene(temporary)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField
-from lightfield.rendering import blender
+from lightfield.rendering import blend_file
 from lightfield.rendering.clearance import REACH, TOUCHING, clearances, enclosing_objects
 
 
@@ -24,7 +24,7 @@ def main() -> None:
     lightfield = LightField.read(arguments.lightfield)
     names = [view.name for view in lightfield.views]
     positions = np.array([view.position for view in lightfield.views])
-    blender.open_scene(arguments.blend)
+    blend_file.open_scene(arguments.blend)
     bpy.context.scene.frame_set(lightfield.frame)
     distances = clearances(positions)
     inside = enclosing_objects(positions)

@@ -12,7 +12,7 @@ import bpy
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.rendering import blender, pruning
+from lightfield.rendering import blend_file, pruning
 from lightfield.rendering.inventory import FEATURES, inventory
 
 
@@ -22,7 +22,7 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 
-    blender.open_scene(arguments.blend)
+    blend_file.open_scene(arguments.blend)
     if bpy.app.autoexec_fail:
         print(
             f"warning: {arguments.blend}: holds scripts or scripted drivers, which are not run: "

@@ -13,7 +13,8 @@ import numpy as np
 
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.rendering import blender, inventory, pruning
+from lightfield.rendering import blend_file, cycles, inventory, pruning
+from lightfield.rendering.view import render_view
 from scenes import test_room
 
 RENDER = {"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0}
@@ -135,16 +136,13 @@ def rendered(path, found=None):
     """Return the colours and depths of a view of a scene, pruned if its inventory is given."""
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
     rig = {"type": "lattice", "cameras": [1, 1, 1], "center": [0.2, 0.1, 1.4]}
-    lightfield = LightField.from_rig(rig, lens, depth="distance", frame=FRAME)
-    names = pruning.left_out(found) if found else []
-    blender.open_scene(path)
-    if "hidden_objects" in names:
-        blender.remove_objects(found["hidden"])
-    blender.set_up_render(RENDER, lightfield, "cpu", 1)
-    blender.leave_out(names)
+    lightfield = LightField.from_rig(rig, lens, depth="distance", frame=FRAME, render=RENDER)
+    if found:
+        found = found | {"left_out": pruning.left_out(found)}
+    cycles.set_up(path, found, lightfield, "cpu", 1)
     pose = lightfield.views[0].matrix
     # The second view shows what the first may have changed.
-    views = [blender.render_view(pose, seed) for seed in (1, 2)]
+    views = [render_view(pose, seed) for seed in (1, 2)]
     return np.stack([np.dstack([view.colour, view.depth]) for view in views])
 
 
@@ -153,11 +151,11 @@ def main():
     results = {}
     for make in (plain, left_behind, animated, blurred, features):
         path = folder / f"{make.__name__}.blend"
-        blender.new_scene()
+        blend_file.new_scene()
         test_room.build({})
         make()
-        blender.save_scene(path)
-        blender.open_scene(path)
+        blend_file.save_scene(path)
+        blend_file.open_scene(path)
         found = inventory.inventory()
         whole, pruned = rendered(path), rendered(path, found)
         results[make.__name__] = {
@@ -166,7 +164,7 @@ def main():
             "same": bool(np.array_equal(whole, pruned, equal_nan=True)),
             "objects": len(bpy.data.objects),
             "materials": [material.name for material in bpy.data.materials],
-            "animated": [owner.name for owner, _ in blender.animated()],
+            "animated": [owner.name for owner, _ in pruning.animated()],
         }
     (folder / "results.json").write_text(json.dumps(results))
 

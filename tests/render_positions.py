@@ -13,23 +13,19 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-import render_shard
 from lightfield.dataset.lightfield import LightField
 from lightfield.imaging import images
-from lightfield.rendering import blender
+from lightfield.rendering import cycles, shard, view
 
 
 def main(blend: Path, output: Path, cases: Path) -> None:
     results = {}
     for name, content in json.loads(cases.read_text()).items():
         lightfield = LightField.from_json(content)
-        blender.open_scene(blend)
-        blender.set_up_render(lightfield.render, lightfield, "cpu", 1)
+        cycles.set_up(blend, None, lightfield, "cpu", 1)
         scene = bpy.context.scene
-        raw = blender.render_view(lightfield.views[0].matrix, 0)
-        channels, _ = render_shard.view_channels(
-            raw, lightfield, render_shard.depth_factors(lightfield)
-        )
+        raw = view.render_view(lightfield.views[0].matrix, 0)
+        channels, _ = shard.view_channels(raw, lightfield, shard.depth_rays(lightfield))
         results[f"{name}.z"] = channels["Z"].astype(np.float64)
         scene.view_layers[0].use_pass_position = True
         scene.render.filepath = str(output.with_suffix(".exr"))
@@ -37,7 +33,7 @@ def main(blend: Path, output: Path, cases: Path) -> None:
         passes = images.read_image(scene.render.filepath).channels
         layer = scene.view_layers[0].name
         points = np.stack([passes[f"{layer}.Position.{c}"] for c in "XYZ"], axis=-1)
-        missed = passes[f"{layer}.Depth.Z"] >= blender.CYCLES_MISS
+        missed = passes[f"{layer}.Depth.Z"] >= view.CYCLES_MISS
         results[f"{name}.points"] = np.where(missed[..., None], np.nan, points)
     np.savez(output, **results)
 

@@ -254,8 +254,8 @@ bpy.context.scene.frame_set(3)
 print("trusted:", *sorted(path.name for path in folder.iterdir()))
 for name in ("script", "driver"):
     (folder / name).unlink(missing_ok=True)
-from lightfield.rendering import blender
-blender.open_scene(folder / "trap.blend")
+from lightfield.rendering import blend_file
+blend_file.open_scene(folder / "trap.blend")
 bpy.context.scene.frame_set(2)
 bpy.context.scene.frame_set(3)
 print("ours:", *sorted(path.name for path in folder.iterdir()))

@@ -14,7 +14,7 @@ from lightfield.dataset.journal import Journal
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images, plots
-from lightfield.rendering import blender
+from lightfield.rendering import blend_file
 from lightfield.report import page
 from lightfield.reprojection import lens_map
 
@@ -72,10 +72,10 @@ def write_lens_map(path, seed):
 
 
 def write_blend(path, seed):
-    blender.new_scene()
-    blender.bpy.context.scene.frame_end = 100 + seed
+    blend_file.new_scene()
+    blend_file.bpy.context.scene.frame_end = 100 + seed
     with files.atomic_path(path) as temporary:
-        blender.save_scene(temporary)
+        blend_file.save_scene(temporary)
 
 
 # A .blend holds memory addresses: written again it may be somewhat smaller.

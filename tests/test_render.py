@@ -11,6 +11,7 @@ from lightfield.core.files import sha256
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
+from lightfield.rendering import shard as shards
 
 RENDER = {
     "samples": 1,
@@ -245,15 +246,13 @@ def test_views_hold_what_design_asks_for(shard):
 
 
 def test_colour_beyond_half_is_clamped_and_counted():
-    import render_shard
-
     class Raw:
         colour = np.array([[[1e6, 2.0, -1e6], [np.nan, np.inf, 0.5]]], dtype=np.float32)
         depth = np.array([[3.0, np.inf]], dtype=np.float32)
 
     camera = {"lens": "equirectangular", "resolution": [2, 1]}
     content = lightfield(camera, {"depth_precision": "half"})
-    channels, attributes = render_shard.view_channels(Raw, content, None)
+    channels, attributes = shards.view_channels(Raw, content, None)
     assert attributes[images.CLAMPED_ATTRIBUTE] == 3
     assert attributes[images.NAN_ATTRIBUTE] == 1
     assert channels["R"][0, 0] == 65504

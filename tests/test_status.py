@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from checkouts import ROOT, snakemake
 
-import render_shard
 import status
 from lightfield.core import progress
 from lightfield.dataset import keys
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.dataset.run_progress import RunProgress
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 
@@ -182,22 +182,22 @@ def test_progress_begins_at_once_and_reads_in_a_log(capsys, monkeypatch):
 
 def test_a_shard_tells_of_the_views_that_others_finished(dataset):
     dataset.render("a")
-    others = render_shard.Others(2, dataset.content, dataset.folder / "exr", None)
+    others = RunProgress(2, dataset.content, dataset.folder / "exr", None)
     assert others() == "; of the whole dataset 1 of 4"
     dataset.render("c", "d")
     assert others() == "; of the whole dataset 3 of 4"
     # Alone it would only say the same again.
-    assert render_shard.Others(4, dataset.content, dataset.folder / "exr", None)() == ""
+    assert RunProgress(4, dataset.content, dataset.folder / "exr", None)() == ""
 
 
 def test_a_shard_tells_how_far_the_run_is(dataset, tmp_path, monkeypatch):
     now = [100.0]
-    monkeypatch.setattr(render_shard.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
     later = tmp_path / "later"
     run = tmp_path / "run.json"
     run.write_text(json.dumps({str(dataset.folder): 4, str(later): 6}))
     dataset.render("a")
-    others = render_shard.Others(4, dataset.content, dataset.folder / "exr", run)
+    others = RunProgress(4, dataset.content, dataset.folder / "exr", run)
     assert others() == "; of the run 1 of 10"
     dataset.render("b", "c")
     now[0] += 30

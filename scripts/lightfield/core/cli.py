@@ -1,4 +1,4 @@
-"""How every program in scripts/ ends: normally, or with one line that the user can act on."""
+"""What programs in scripts/ have in common: how they end, and which views they are to take."""
 
 import os
 import sys
@@ -19,3 +19,16 @@ def run(main: Callable[[], None]) -> None:
         # The reader of our output left (as `head` does): say nothing more, not even at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+
+
+def view_slice(text: str, count: int) -> slice:
+    """Read ``--views FIRST:END``, either of which may be left out, as a slice of ``count`` views.
+
+    Raises `UserError` where that chooses none, or one that there is not.
+    """
+    first, colon, end = text.partition(":")
+    if colon and (first + end or "0").isdecimal():
+        chosen = slice(int(first or 0), int(end or count))
+        if chosen.start < chosen.stop <= count:
+            return chosen
+    raise UserError(f"--views {text}: must be FIRST:END with 0 ≤ FIRST < END ≤ {count}")

@@ -157,14 +157,15 @@ class Trials:
 
     def _render(self, probe: Probe, settings: Mapping[str, Any], path: Path, key: str) -> None:
         with processors.only(self._threads):
-            from lightfield.rendering import blender
+            from lightfield.rendering import cycles
+            from lightfield.rendering.view import render_view
 
         if not self._started:
             self._start(settings)
-        blender.set_sampling(settings)
-        blender.set_window(probe.x, probe.y, probe.width, probe.height)
+        cycles.set_sampling(settings)
+        cycles.set_window(probe.x, probe.y, probe.width, probe.height)
         seed = keys.view_seed(settings["seed"], probe.view.name)
-        raw = blender.render_view(probe.view.matrix, seed)
+        raw = render_view(probe.view.matrix, seed)
         assert raw.samples is not None and raw.worked_seconds is not None
         seconds = raw.worked_seconds if self._on == "CPU" else raw.render_seconds
         channels = {name: raw.colour[:, :, index] for index, name in enumerate("RGB")}
@@ -182,19 +183,20 @@ class Trials:
         )
 
     def _start(self, settings: Mapping[str, Any]) -> None:
-        from lightfield.rendering import blender
+        from lightfield.rendering import cycles, view
 
-        left_out = read_json(self._inventory)
-        blender.open_scene(self._blend)
-        if "hidden_objects" in left_out["left_out"]:
-            blender.remove_objects(left_out["hidden"])
-        self._on = blender.set_up_render(settings, self.lightfield, self._device, self._threads)
-        blender.leave_out(left_out["left_out"])
-        blender.watch_samples()
+        self._on = cycles.set_up(
+            self._blend,
+            read_json(self._inventory),
+            self.lightfield.changed(render=settings),
+            self._device,
+            self._threads,
+        )
+        view.watch_samples()
         # The first render also loads what all others use; it is not timed.
-        blender.set_sampling({**settings, "samples": 1, "denoise": True})
-        blender.set_window(0, 0, min(64, self.lens.width), min(64, self.lens.height))
-        blender.render_view(self.lightfield.views[0].matrix, 0)
+        cycles.set_sampling({**settings, "samples": 1, "denoise": True})
+        cycles.set_window(0, 0, min(64, self.lens.width), min(64, self.lens.height))
+        view.render_view(self.lightfield.views[0].matrix, 0)
         self._started = True
 
 

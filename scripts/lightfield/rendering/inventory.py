@@ -6,7 +6,8 @@ from typing import Any
 
 import bpy
 
-from lightfield.rendering import blender
+from lightfield.rendering import pruning
+from lightfield.rendering.blend_file import path_of
 
 # Shader nodes by the feature that they give a material; the Principled BSDF by its inputs.
 SHADERS = {
@@ -40,8 +41,8 @@ SIMULATIONS = {
 def inventory() -> dict[str, Any]:
     """Return what the open scene contains; it is left without its hidden objects."""
     scene = bpy.context.scene
-    hidden = blender.removable_objects()
-    blender.remove_objects(hidden)
+    hidden = pruning.removable_objects()
+    pruning.remove_objects(hidden)
     objects = list(bpy.data.objects)
     materials = sorted(
         {slot.material for thing in objects for slot in thing.material_slots if slot.material},
@@ -71,7 +72,7 @@ def inventory() -> dict[str, Any]:
         **{name: sorted(features[name]) for name in FEATURES},
         "textures": sorted(image.name_full for image in images),
         "hidden": hidden,
-        "animated": sorted(owner.name_full for owner, _ in blender.animated()),
+        "animated": sorted(owner.name_full for owner, _ in pruning.animated()),
         "moving": moving(objects),
         "motion_blur": bool(scene.render.use_motion_blur),
         "external_files": external,
@@ -140,7 +141,7 @@ def contributing(node: Any) -> Iterator[Any]:
 def moving(objects: list[Any]) -> list[str]:
     """Return what may change its shape or place with time."""
     shading = (bpy.types.Material, bpy.types.World, bpy.types.Light, bpy.types.ShaderNodeTree)
-    found = {owner.name_full for owner, _ in blender.animated() if not isinstance(owner, shading)}
+    found = {owner.name_full for owner, _ in pruning.animated() if not isinstance(owner, shading)}
     for thing in objects:
         if thing.rigid_body or any(
             modifier.type in SIMULATIONS or (modifier.type == "NODES" and keeps_time(modifier))
@@ -163,20 +164,20 @@ def keeps_time(modifier: Any) -> bool:
 def missing_files(images: set[Any]) -> list[str]:
     """Return the textures and libraries that the scene needs and that are not there."""
     missing = [
-        f"the library {library.name_full} at {blender.path_of(library)}"
+        f"the library {library.name_full} at {path_of(library)}"
         for library in bpy.data.libraries
-        if not library.packed_file and not blender.path_of(library).is_file()
+        if not library.packed_file and not path_of(library).is_file()
     ]
     missing += [
-        f"the texture {image.name_full} at {blender.path_of(image)}"
+        f"the texture {image.name_full} at {path_of(image)}"
         for image in images
         if image.source in ("FILE", "SEQUENCE", "MOVIE")
         and not image.packed_files
-        and not blender.path_of(image).is_file()
+        and not path_of(image).is_file()
     ]
     missing += [
-        f"the volume {volume.name_full} at {blender.path_of(volume)}"
+        f"the volume {volume.name_full} at {path_of(volume)}"
         for volume in bpy.data.volumes
-        if volume.users and not volume.packed_file and not blender.path_of(volume).is_file()
+        if volume.users and not volume.packed_file and not path_of(volume).is_file()
     ]
     return sorted(missing)

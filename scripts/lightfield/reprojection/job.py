@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
 from lightfield.dataset import lightfield
 from lightfield.dataset.lightfield import LightField
@@ -201,17 +202,8 @@ class Job:
 
     def _chosen_names(self) -> list[str]:
         names = [view.name for view in self.lightfield.views]
-        first, separator, end = self.arguments.views.partition(":")
-        try:
-            start, stop = int(first), int(end)
-        except ValueError:
-            start, stop = -1, -1
-        if not separator or not 0 <= start < stop <= len(names):
-            raise UserError(
-                f"--views {self.arguments.views}: must be FIRST:END with "
-                f"0 ≤ FIRST < END ≤ {len(names)}"
-            )
-        return [name for name in names[start:stop] if self._passes(name, ".exr")]
+        chosen = names[view_slice(self.arguments.views, len(names))]
+        return [name for name in chosen if self._passes(name, ".exr")]
 
     def _passes(self, name: str, suffix: str) -> bool:
         """Whether a name passes the filters; theirs may have ``suffix`` or not."""

@@ -1,0 +1,189 @@
+"""Cycles, set up once for all views of a light field: sampling, device, camera, passes."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from lightfield.core.errors import UserError
+from lightfield.dataset.lightfield import LightField
+from lightfield.rendering import blend_file, pruning
+
+# In the order in which `auto` tries them.
+GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
+
+CAMERA_NAME = "plenoforge_camera"
+
+
+def set_up(
+    blend: Path,
+    inventory: Mapping[str, Any] | None,
+    lightfield: LightField,
+    device: str,
+    threads: int,
+) -> str:
+    """Open a scene and set it up for the views of a light field; returns what it renders on.
+
+    That is CPU or GPU. What the scene's ``inventory`` has found that no pixel depends on is left
+    out. Raises `UserError` if the scene cannot be opened or the ``device`` is not there.
+    """
+    left_out = inventory["left_out"] if inventory else []
+    blend_file.open_scene(blend)
+    if inventory and "hidden_objects" in left_out:
+        pruning.remove_objects(inventory["hidden"])
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    _set_quality(lightfield.render)
+    _set_output(scene, lightfield, threads)
+    _set_passes(scene, lightfield)
+    _use_device(scene, device)
+    _set_camera(scene, lightfield.content)
+    scene.frame_set(lightfield.frame)
+    pruning.leave_out(left_out)
+    return str(scene.cycles.device)
+
+
+def _set_quality(settings: Mapping[str, Any]) -> None:
+    """Set what a scene YAML's ``render`` block says; what it does not stays as in the .blend."""
+    set_sampling(settings)
+    cycles = bpy.context.scene.cycles
+    cycles.use_animated_seed = False
+    cycles.time_limit = 0
+    if "max_bounces" in settings:
+        cycles.max_bounces = settings["max_bounces"]
+    if "clamp_indirect" in settings:
+        cycles.sample_clamp_indirect = settings["clamp_indirect"]
+    if "filter_width" in settings:
+        cycles.filter_width = settings["filter_width"]
+
+
+def _set_output(scene: Any, lightfield: LightField, threads: int) -> None:
+    """Let Cycles keep the scene in memory and write all passes, whole and in 32-bit floats."""
+    render = scene.render
+    render.use_persistent_data = True
+    render.threads_mode = "FIXED"
+    render.threads = threads
+    render.resolution_x = lightfield.lens.width
+    render.resolution_y = lightfield.lens.height
+    render.resolution_percentage = 100
+    render.pixel_aspect_x = render.pixel_aspect_y = 1
+    render.use_border = False
+    render.use_multiview = False
+    render.use_compositing = False
+    render.use_sequencer = False
+    render.use_overwrite = True
+    output = render.image_settings
+    output.media_type = "MULTI_LAYER_IMAGE"
+    output.file_format = "OPEN_EXR_MULTILAYER"
+    output.color_depth = "32"
+    output.exr_codec = "NONE"
+
+
+def _set_passes(scene: Any, lightfield: LightField) -> None:
+    """Make colour, and depth where it is wanted, and nothing that the artist had on."""
+    layer = view_layer(scene)
+    for name in dir(layer):
+        if name.startswith("use_pass_"):
+            setattr(layer, name, False)
+    layer.use_pass_combined = True
+    layer.use_pass_z = lightfield.depth is not None
+    layer.cycles.denoising_store_passes = False
+    layer.cycles.pass_debug_sample_count = False
+    # Passes of the artist's own, and those of light groups.
+    for group in (layer.aovs, layer.lightgroups):
+        for entry in list(group):
+            group.remove(entry)
+
+
+def set_sampling(settings: Mapping[str, Any]) -> None:
+    """Set how many samples a pixel takes and what is made of them, as ``render`` blocks have it.
+
+    ``guiding`` turns path guiding on or off; without that key it stays as the .blend has it.
+    """
+    cycles = bpy.context.scene.cycles
+    cycles.samples = settings["samples"]
+    cycles.use_adaptive_sampling = settings["adaptive_threshold"] > 0
+    cycles.adaptive_threshold = settings["adaptive_threshold"]
+    cycles.use_denoising = settings["denoise"]
+    cycles.denoiser = "OPENIMAGEDENOISE"
+    # Guided by the surfaces' albedo and normals, which are denoised themselves first.
+    cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
+    cycles.denoising_prefilter = "ACCURATE"
+    cycles.denoising_quality = "HIGH"
+    if "guiding" in settings:
+        cycles.use_guiding = settings["guiding"]
+
+
+def set_window(x: int, y: int, width: int, height: int) -> None:
+    """Let every view that follows consist of these pixels alone, (0, 0) being the top left one."""
+    render = bpy.context.scene.render
+    render.use_border = render.use_crop_to_border = True
+    across, down = render.resolution_x, render.resolution_y
+    render.border_min_x, render.border_max_x = x / across, (x + width) / across
+    render.border_min_y, render.border_max_y = 1 - (y + height) / down, 1 - y / down
+
+
+def _use_device(scene: Any, device: str) -> None:
+    """Choose what Cycles renders on; a device that is asked for by name must be there."""
+    if device == "cpu":
+        scene.cycles.device = "CPU"
+        return
+    preferences = bpy.context.preferences.addons["cycles"].preferences
+    for name in GPU_DEVICES if device == "auto" else (device,):
+        try:
+            found = list(preferences.get_devices_for_type(name.upper()) or ())
+        except (TypeError, ValueError):
+            found = []
+        gpus = [entry for entry in found if entry.type == name.upper()]
+        if gpus:
+            preferences.compute_device_type = name.upper()
+            for entry in preferences.devices:
+                entry.use = entry.type == name.upper()
+            scene.cycles.device = "GPU"
+            return
+    if device != "auto":
+        raise UserError(
+            f"device: this machine has no {device} device that Cycles can use; "
+            "use device=cpu, or device=auto to take what there is"
+        )
+    scene.cycles.device = "CPU"
+
+
+def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
+    """Make the camera of a lightfield.json's ``camera``, ``resolution`` and ``sensor_size``."""
+    intrinsics = lightfield["camera"]
+    camera = bpy.data.cameras.new(CAMERA_NAME)
+    camera.type = intrinsics["type"]
+    sensor_width, sensor_height = lightfield["sensor_size"]
+    camera.sensor_fit = "HORIZONTAL" if sensor_width >= sensor_height else "VERTICAL"
+    camera.sensor_width, camera.sensor_height = sensor_width, sensor_height
+    if "principal_point" in intrinsics:
+        width, height = lightfield["resolution"]
+        # Blender counts a perspective camera's shift in sides of the image that sensor_fit names,
+        # and a panoramic one's in widths and heights.
+        side = width if sensor_width >= sensor_height else height
+        across, up = (side, side) if intrinsics["type"] == "PERSP" else (width, height)
+        x, y = intrinsics["principal_point"]
+        camera.shift_x, camera.shift_y = (width / 2 - x) / across, (y - height / 2) / up
+    # Cycles clips a perspective view between these; nothing of a scene shall be cut away.
+    camera.clip_start, camera.clip_end = 1e-4, 1e9
+    if intrinsics["type"] == "PERSP":
+        camera.lens_unit = "MILLIMETERS"
+        camera.lens = intrinsics["focal_length"]
+    else:
+        for name, value in intrinsics.items():
+            if hasattr(camera, name) and name not in ("type", "lens"):
+                setattr(camera, name, value)
+    camera_object = bpy.data.objects.new(CAMERA_NAME, camera)
+    camera_object.rotation_mode = "XYZ"
+    scene.collection.objects.link(camera_object)
+    scene.camera = camera_object
+
+
+def view_layer(scene: Any) -> Any:
+    """Return the one view layer that is rendered: the first that the .blend has in use."""
+    layer = next((layer for layer in scene.view_layers if layer.use), scene.view_layers[0])
+    for other in scene.view_layers:
+        other.use = other == layer
+    return layer

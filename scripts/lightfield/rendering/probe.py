@@ -1,0 +1,57 @@
+"""Probes: what a dataset's views will cost, from a few of them, small, with all their samples.
+
+The time of a sample hardly depends on the resolution, so the time of a full view follows from the
+number of pixels. So does the size of its file, as an upper estimate: smaller views show more
+detail a pixel, and compress worse.
+"""
+
+import math
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from lightfield.dataset import journal
+from lightfield.dataset.lightfield import LightField
+from lightfield.rendering import shard
+
+
+def measure(
+    lightfield: LightField, count: int, size: int, blend: Path, inventory: Path, device: str
+) -> dict[str, Any]:
+    """Render ``count`` probes with a longer side of ``size`` pixels on one core, or on the device.
+
+    Returns the dataset's ``views``, ``resolution`` and ``samples``, the ``device``, CPU or GPU, and
+    for each probe what its view would take: ``view_seconds`` and ``view_bytes``.
+    """
+    views, lens = lightfield.views, lightfield.lens
+    scale = min(1.0, size / max(lens.width, lens.height))
+    small = [max(1, round(side * scale)) for side in (lens.width, lens.height)]
+    # The first view's time holds some of the start-up, so it is rendered and not counted.
+    step = max(1, len(views) // (count + 1))
+    probes = lightfield.changed(lens=lens.resized(*small), views=views[::step][: count + 1])
+    with tempfile.TemporaryDirectory() as name:
+        folder, log = Path(name, "exr"), Path(name, "journal.jsonl")
+        shard.render(
+            probes,
+            ":",
+            folder,
+            blend=blend,
+            inventory=inventory,
+            device=device,
+            threads=1,
+            journal=log,
+        )
+        (run,) = journal.read(log)
+        rendered = run.views[1:]
+        sizes = [(folder / f"{view['view']}.exr").stat().st_size for view in rendered]
+    # On a processor the time that it worked, whatever else it did meanwhile.
+    busy = "cpu_seconds" if run.start["device"] == "CPU" else "render_seconds"
+    factor = lens.width * lens.height / math.prod(small)
+    return {
+        "views": len(views),
+        "resolution": [lens.width, lens.height],
+        "samples": lightfield.render["samples"],
+        "device": run.start["device"],
+        "view_seconds": [view[busy] * factor for view in rendered],
+        "view_bytes": [size * factor for size in sizes],
+    }

@@ -1,0 +1,173 @@
+"""A shard: views of a dataset that one process renders, keeping every one that is already right.
+
+Each view is written, and its checksum logged beside the record, the moment it is done. A view whose
+file has the bytes that were logged for the render key that its settings give is left as it is, so
+that a shard, killed and started again, renders only what is missing. Its journal, one JSON line a
+rendered view, says what was done and how fast.
+"""
+
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import psutil
+
+from lightfield.core import processors
+from lightfield.core.cli import view_slice
+from lightfield.core.files import read_json
+from lightfield.core.progress import Progress
+from lightfield.dataset import keys
+from lightfield.dataset.journal import Journal
+from lightfield.dataset.lightfield import LightField, View
+from lightfield.dataset.records import ShardRecord
+from lightfield.dataset.run_progress import RunProgress
+from lightfield.geometry import depth
+from lightfield.imaging import images
+
+if TYPE_CHECKING:
+    from lightfield.rendering.view import Raw
+
+Array = np.ndarray[Any, Any]
+
+
+def render(
+    lightfield: LightField,
+    views: str,
+    folder: Path,
+    *,
+    blend: Path,
+    inventory: Path | None,
+    device: str,
+    threads: int | None,
+    record: Path | None = None,
+    journal: Path | None = None,
+    run: Path | None = None,
+) -> None:
+    """Render into ``folder`` those of the ``views``, FIRST:END, that are missing there.
+
+    ``blend`` is the scene and ``inventory`` a JSON of what it contains; ``threads`` None are all.
+    ``record``, ``journal`` and ``run``, a JSON of each dataset's views by its folder, may be None.
+    Raises `UserError` where the scene cannot be opened, the ``device`` is not there, or a file
+    cannot be written.
+    """
+    log, sums = Journal(journal), ShardRecord(record, folder)
+    chosen = lightfield.views[view_slice(views, len(lightfield.views))]
+    paths = [folder / f"{view.name}.exr" for view in chosen]
+    missing = [
+        view
+        for view, path in zip(chosen, paths, strict=True)
+        if not sums.is_finished(path, keys.render_key(lightfield, view))
+    ]
+    _warn_of_other_versions(folder / f"{view.name}.exr" for view in missing)
+    # The dataset's folder says which scene and rig it is, and in a sequence which frame.
+    label = f"render {folder.parent}" + (f" {views}" if views != ":" else "")
+    # A shard that is finished has no line to end, and need not look at any other's files.
+    note = RunProgress(len(chosen), lightfield, folder, run) if missing else str
+    progress = Progress(len(missing), label, already=len(chosen) - len(missing), note=note)
+    if missing:
+        threads = threads or processors.available()
+        # Only now, because it takes a second and a shard that is finished does not need it.
+        with processors.only(threads):
+            from lightfield.rendering import cycles
+        found = read_json(inventory) if inventory else None
+        used = cycles.set_up(blend, found, lightfield, device, threads)
+        log.append(
+            {
+                "start_up_seconds": round(time.time() - log.started, 4),
+                "start_up_cpu_seconds": round(time.process_time(), 4),
+                "device": used,
+                "threads": threads,
+            }
+        )
+        _render_views(missing, lightfield, folder, sums, log, progress)
+    sums.write(paths)
+    log.end()
+
+
+def _warn_of_other_versions(paths: Iterable[Path]) -> None:
+    """Warn if there are views that another version of bpy rendered, which are rendered again."""
+    versions = [images.attribute(path, images.BPY_ATTRIBUTE) for path in paths]
+    for other in sorted({str(found) for found in versions if found} - {version("bpy")}):
+        print(
+            f"warning: views rendered by bpy {other}, which bpy {version('bpy')} renders again: "
+            f"{versions.count(other)}",
+            file=sys.stderr,
+        )
+
+
+def _render_views(
+    views: Sequence[View],
+    lightfield: LightField,
+    folder: Path,
+    record: ShardRecord,
+    journal: Journal,
+    progress: Progress,
+) -> None:
+    """Render ``views`` one after the other, in the scene that is set up for them."""
+    from lightfield.rendering.view import render_view
+
+    rays = depth_rays(lightfield)
+    process = psutil.Process()
+    progress.begin()
+    for view in views:
+        began, began_cpu = time.perf_counter(), time.process_time()
+        raw = render_view(view.matrix, keys.view_seed(lightfield.render["seed"], view.name))
+        channels, attributes = view_channels(raw, lightfield, rays)
+        path, key = folder / f"{view.name}.exr", keys.render_key(lightfield, view)
+        attributes |= {images.KEY_ATTRIBUTE: key, images.BPY_ATTRIBUTE: version("bpy")}
+        images.write_exr(path, channels, attributes)
+        record.add(path, key)
+        journal.append(
+            {
+                "view": view.name,
+                "finished": round(time.time(), 3),
+                "wall_seconds": round(time.perf_counter() - began, 4),
+                "cpu_seconds": round(time.process_time() - began_cpu, 4),
+                "render_seconds": raw.render_seconds,
+                "synchronization_seconds": raw.synchronization_seconds,
+                "memory_bytes": process.memory_info().rss,
+            },
+        )
+        progress.done()
+
+
+def depth_rays(lightfield: LightField) -> Array | None:
+    """Return the unit rays that turn Cycles' depth into the dataset's, or None if it is that."""
+    if lightfield.depth in (None, lightfield.cycles_depth):
+        return None
+    return lightfield.lens.pixel_rays()
+
+
+def view_channels(
+    raw: "Raw", lightfield: LightField, rays: Array | None
+) -> tuple[dict[str, Array], dict[str, images.Attribute]]:
+    """Turn what Cycles made into the channels and attributes of a view's EXR.
+
+    Colour beyond the half range is clamped and counted; what is not a number is counted and kept,
+    so that validation finds it.
+    """
+    nan = int(np.isnan(raw.colour).sum())
+    clamped = int((np.abs(raw.colour) > images.HALF_MAX).sum())
+    colour = np.clip(raw.colour, -images.HALF_MAX, images.HALF_MAX).astype(np.float16)
+    channels: dict[str, Array] = {name: colour[:, :, index] for index, name in enumerate("RGB")}
+    attributes: dict[str, images.Attribute] = {
+        images.CLAMPED_ATTRIBUTE: clamped,
+        images.NAN_ATTRIBUTE: nan,
+    }
+    if raw.depth is not None:
+        z = raw.depth
+        if rays is not None and lightfield.depth == "z":
+            z = depth.z_from_distance(z, rays)
+        elif rays is not None:
+            z = depth.distance_from_z(z, rays)
+        # Outside the image circle there is no ray; nothing was hit there.
+        z = np.where(np.isnan(z), np.inf, z)
+        half = lightfield.render["depth_precision"] == "half"
+        with np.errstate(over="ignore"):
+            channels["Z"] = z.astype(np.float16 if half else np.float32)
+        attributes[images.DEPTH_ATTRIBUTE] = lightfield.depth or ""
+    return channels, attributes
