@@ -55,7 +55,10 @@ def test_no_distance_where_a_z_depth_says_nothing() -> None:
     assert np.isnan(distance_from_z(np.array(0.0), beside))
     assert np.isnan(distance_from_z(np.array(2.0), beside))
     assert np.isnan(distance_from_z(np.array(2.0), behind))
-    assert np.isnan(distance_from_z(np.array(-2.0), ahead))
+    # However little the point lies on the other side; in the camera itself it is no distance away.
+    for z, ray in ((-2.0, ahead), (-0.5, ahead), (-1e-9, ahead), (0.5, behind), (1e-9, behind)):
+        assert np.isnan(distance_from_z(np.array(z), ray))
+    assert distance_from_z(np.array(0.0), ahead) == 0
     assert z_from_distance(np.array(2.0), behind) == -2
     assert distance_from_z(np.array(-2.0), behind) == 2
 

@@ -1,18 +1,18 @@
 """The export for instant-ngp, read back as its loader reads it (nerf_loader.cu), in float32."""
 
+import argparse
 import json
 import math
 import re
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-import export_instant_ngp
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField
+from lightfield.export import instant_ngp
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 
@@ -36,20 +36,49 @@ WIDE = {"lens": "equidistant", "resolution": [65, 65], "fov": 220}
 PANORAMA = {"lens": "equirectangular", "resolution": [64, 32]}
 
 
-def written(tmp_path: Path, camera: Any, rig: Any = RIG, **extra: Any) -> dict[str, Any]:
-    lens = lenses.from_camera(camera)
-    content = LightField.from_rig(rig, lens, **extra).to_json()
-    (tmp_path / "lightfield.json").write_text(json.dumps(content))
-    return content
+class Dataset:
+    """A folder with a lightfield.json and what is exported of it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def write(self, camera: Any, rig: Any = RIG, **keys: Any) -> dict[str, Any]:
+        lightfield = LightField.from_rig(rig, lenses.from_camera(camera), **keys)
+        lightfield.write(self.folder / "lightfield.json")
+        return lightfield.to_json()
+
+    def export(self, *words: Any) -> dict[str, Any]:
+        """Return the transforms.json that the program writes on these words."""
+        parser = argparse.ArgumentParser()
+        instant_ngp.add_arguments(parser)
+        paths = ["--input-cfg", self.folder / "lightfield.json"]
+        paths += ["--output", self.folder / "transforms.json"]
+        instant_ngp.export(parser.parse_args([*map(str, [*paths, *words])]))
+        return self.read("transforms.json")
+
+    def read(self, name: str) -> dict[str, Any]:
+        result: dict[str, Any] = json.loads((self.folder / name).read_text())
+        return result
+
+    def render(
+        self, content: dict[str, Any], camera: Any, meaning: str | None, distance: float
+    ) -> None:
+        """Write EXR views of a sphere around each camera: pixels with a ray at one distance."""
+        cosine = -lenses.from_camera(camera).pixel_rays()[..., 2]
+        depth = distance * cosine if meaning == "z" else np.full_like(cosine, distance)
+        depth = np.where(np.isnan(cosine), np.inf, depth).astype(np.float32)
+        colour = np.full(depth.shape, 0.25, np.float16)
+        for frame in content["frames"]:
+            images.write_exr(
+                self.folder / f"{frame['name']}.exr",
+                {"R": colour, "G": colour, "B": colour, "Z": depth},
+                {images.DEPTH_ATTRIBUTE: meaning} if meaning else {},
+            )
 
 
-def export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *arguments: Any) -> dict[str, Any]:
-    paths = ["--input-cfg", tmp_path / "lightfield.json", "--output", tmp_path / "transforms.json"]
-    command = ["export_instant_ngp.py", *map(str, [*paths, *arguments])]
-    monkeypatch.setattr(sys, "argv", command)
-    export_instant_ngp.main()
-    result: dict[str, Any] = json.loads((tmp_path / "transforms.json").read_text())
-    return result
+@pytest.fixture
+def dataset(tmp_path: Path) -> Dataset:
+    return Dataset(tmp_path)
 
 
 class Loader:
@@ -129,10 +158,10 @@ def angle_between(a: Any, b: Any) -> float:
 
 @pytest.mark.parametrize("camera", [PERSPECTIVE, FISHEYE, WIDE, PANORAMA])
 def test_the_loaders_ray_of_a_pixel_meets_the_point_seen_there(
-    camera: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    camera: Any, dataset: Dataset
 ) -> None:
-    content = written(tmp_path, camera)
-    transforms = export(tmp_path, monkeypatch, "--scale", 0.1, "--offset", 0.5, 0.75, 0.4)
+    content = dataset.write(camera)
+    transforms = dataset.export("--scale", 0.1, "--offset", 0.5, 0.75, 0.4)
     loader = Loader(transforms)
     widest = {"rectilinear": 0.8, "equidistant": 1.55, "equirectangular": 3.1}[camera["lens"]]
     random = np.random.default_rng(7)
@@ -151,13 +180,13 @@ def test_the_loaders_ray_of_a_pixel_meets_the_point_seen_there(
             assert angle_between(direction, target - origin) < 1e-4
 
 
-def test_a_camera_worked_by_hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_camera_worked_by_hand(dataset: Dataset) -> None:
     """A level camera at (1, 2, 3) looking along +Y, and one at (3, 2, 3) looking straight down."""
     rows = ["name,x,y,z,rx,ry,rz", f"a,1,2,3,{math.pi / 2},0,0", "b,3,2,3,0,0,0"]
-    (tmp_path / "poses.csv").write_text("\n".join(rows))
-    rig = {"type": "poses", "file": str(tmp_path / "poses.csv")}
-    written(tmp_path, {"lens": "rectilinear", "resolution": [256, 256], "focal_length": 18}, rig)
-    transforms = export(tmp_path, monkeypatch, "--scale", 0.1, "--offset", 0.5, 0.5, 0.2)
+    (dataset.folder / "poses.csv").write_text("\n".join(rows))
+    rig = {"type": "poses", "file": str(dataset.folder / "poses.csv")}
+    dataset.write({"lens": "rectilinear", "resolution": [256, 256], "focal_length": 18}, rig)
+    transforms = dataset.export("--scale", 0.1, "--offset", 0.5, 0.5, 0.2)
     level, down = (frame["transform_matrix"] for frame in transforms["frames"])
     np.testing.assert_allclose(
         level, [[0, 0, -1, 2], [-1, 0, 0, -1], [0, 1, 0, 3], [0, 0, 0, 1]], atol=1e-9
@@ -172,14 +201,12 @@ def test_a_camera_worked_by_hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert (transforms["fl_x"], transforms["cx"], transforms["w"]) == (128, 128, 256)
 
 
-def test_frames_keep_the_views_order_which_natural_sorting_leaves_alone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_frames_keep_the_views_order_which_natural_sorting_leaves_alone(dataset: Dataset) -> None:
     rig = {"type": "plane", "cameras": [1001, 10]}
-    content = written(tmp_path, {**FISHEYE, "resolution": [1, 1]}, rig)
+    content = dataset.write({**FISHEYE, "resolution": [1, 1]}, rig)
     content["frames"] = [*content["frames"][:12], *content["frames"][9990:]]
-    (tmp_path / "lightfield.json").write_text(json.dumps(content))
-    transforms = export(tmp_path, monkeypatch)
+    (dataset.folder / "lightfield.json").write_text(json.dumps(content))
+    transforms = dataset.export()
     paths = [frame["file_path"] for frame in transforms["frames"]]
     assert paths == [f"{frame['name']}.png" for frame in content["frames"]]
 
@@ -189,15 +216,13 @@ def test_frames_keep_the_views_order_which_natural_sorting_leaves_alone(
     assert sorted(paths, key=natural) == paths
 
 
-def test_fisheye_beyond_ninety_degrees_and_the_exact_centre_are_hidden(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    content = written(tmp_path, WIDE)
+def test_fisheye_beyond_ninety_degrees_and_the_exact_centre_are_hidden(dataset: Dataset) -> None:
+    content = dataset.write(WIDE)
     for frame in content["frames"]:
-        images.write_png(tmp_path / f"{frame['name']}.png", np.ones((65, 65, 3), np.uint8))
-    loader = Loader(export(tmp_path, monkeypatch))
+        images.write_png(dataset.folder / f"{frame['name']}.png", np.ones((65, 65, 3), np.uint8))
+    loader = Loader(dataset.export())
     for frame in content["frames"]:
-        mask = images.read_image(tmp_path / f"dynamic_mask_{frame['name']}.png").channels["Y"]
+        mask = images.read_image(dataset.folder / f"dynamic_mask_{frame['name']}.png").channels["Y"]
         for y in range(0, 65, 4):
             for x in range(0, 65, 4):
                 _, direction = loader.ray(0, x + 0.5, y + 0.5)
@@ -205,54 +230,32 @@ def test_fisheye_beyond_ninety_degrees_and_the_exact_centre_are_hidden(
     assert mask[32, 32] == 255
 
 
-def test_pixels_without_a_source_are_hidden(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    content = written(tmp_path, PERSPECTIVE)
+def test_pixels_without_a_source_are_hidden(dataset: Dataset) -> None:
+    content = dataset.write(PERSPECTIVE)
     pixels = np.full((48, 64, 4), 200, np.uint8)
     pixels[:5, :7, 3] = 0
     for frame in content["frames"][1:]:
-        images.write_png(tmp_path / f"{frame['name']}.png", pixels[:, :, :3])
-    images.write_png(tmp_path / "view_0000f.png", pixels)
-    export(tmp_path, monkeypatch)
-    assert [path.name for path in tmp_path.glob("dynamic_mask_*")] == [
+        images.write_png(dataset.folder / f"{frame['name']}.png", pixels[:, :, :3])
+    images.write_png(dataset.folder / "view_0000f.png", pixels)
+    dataset.export()
+    assert [path.name for path in dataset.folder.glob("dynamic_mask_*")] == [
         "dynamic_mask_view_0000f.png"
     ]
-    mask = images.read_image(tmp_path / "dynamic_mask_view_0000f.png").channels["Y"]
+    mask = images.read_image(dataset.folder / "dynamic_mask_view_0000f.png").channels["Y"]
     np.testing.assert_array_equal(mask == 255, pixels[:, :, 3] == 0)
-
-
-def rendered(
-    tmp_path: Path, content: dict[str, Any], camera: Any, meaning: str, distance: float
-) -> None:
-    """Write EXR views of a sphere around each camera: every pixel with a ray at one distance."""
-    lens = lenses.from_camera(camera)
-    width, height = content["resolution"]
-    cosine = -lens.pixel_rays()[..., 2]
-    depth = distance * cosine if meaning == "z" else np.full_like(cosine, distance)
-    depth = np.where(np.isnan(cosine), np.inf, depth).astype(np.float32)
-    colour = np.full((height, width), 0.25, np.float16)
-    for frame in content["frames"]:
-        images.write_exr(
-            tmp_path / f"{frame['name']}.exr",
-            {"R": colour, "G": colour, "B": colour, "Z": depth},
-            {images.DEPTH_ATTRIBUTE: meaning},
-        )
 
 
 @pytest.mark.parametrize("meaning", ["z", "distance"])
 @pytest.mark.parametrize("camera", [PERSPECTIVE, FISHEYE])
 def test_the_loaders_depth_is_the_true_distance(
-    camera: Any, meaning: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    camera: Any, meaning: str, dataset: Dataset
 ) -> None:
-    content = written(tmp_path, camera, depth=meaning)
-    rendered(tmp_path, content, camera, meaning, 3.25)
-    transforms = export(
-        tmp_path, monkeypatch, "--image-suffix", ".exr", "--depth-dir", tmp_path / "depth"
-    )
+    content = dataset.write(camera, depth=meaning)
+    dataset.render(content, camera, meaning, 3.25)
+    transforms = dataset.export("--image-suffix", ".exr", "--depth-dir", dataset.folder / "depth")
     loader = Loader(transforms)
     frame = transforms["frames"][1]
-    depth = images.read_image(tmp_path / frame["depth_path"]).channels["Y"]
+    depth = images.read_image(dataset.folder / frame["depth_path"]).channels["Y"]
     assert depth.dtype == np.uint16
     width, height = content["resolution"]
     for x, y in ((5, 40), (30, 20), (50, 11), (32, 2)):
@@ -264,19 +267,17 @@ def test_the_loaders_depth_is_the_true_distance(
         assert depth[0, 0] == depth[height - 1, width - 1] == 0
 
 
-def test_exr_views_become_files_that_the_loader_accepts(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    content = written(tmp_path, FISHEYE)
-    rendered(tmp_path, content, FISHEYE, "z", 2.0)
-    transforms = export(tmp_path, monkeypatch, "--image-suffix", ".exr")
+def test_exr_views_become_files_that_the_loader_accepts(dataset: Dataset) -> None:
+    content = dataset.write(FISHEYE)
+    dataset.render(content, FISHEYE, "z", 2.0)
+    transforms = dataset.export("--image-suffix", ".exr")
     assert [frame["file_path"] for frame in transforms["frames"]] == [
         f"instant_ngp/{frame['name']}.exr" for frame in content["frames"]
     ]
     y, x = np.mgrid[:64, :64] + 0.5
     outside = np.hypot(x - 32, y - 32) > 32
     for frame in transforms["frames"]:
-        channels = images.read_image(tmp_path / frame["file_path"]).channels
+        channels = images.read_image(dataset.folder / frame["file_path"]).channels
         assert {name: pixels.dtype for name, pixels in channels.items()} == dict.fromkeys(
             "RGB", np.dtype(np.float16)
         )
@@ -290,11 +291,9 @@ def in_unit_cube(loader: Loader, points: Any) -> bool:
     )
 
 
-def test_fitted_to_the_rig_its_box_is_a_fifth_of_the_cube_and_centred(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    content = written(tmp_path, FISHEYE, {"type": "sphere", "subdivisions": 2, "center": [5, 6, 7]})
-    loader = Loader(export(tmp_path, monkeypatch))
+def test_fitted_to_the_rig_its_box_is_a_fifth_of_the_cube_and_centred(dataset: Dataset) -> None:
+    content = dataset.write(FISHEYE, {"type": "sphere", "subdivisions": 2, "center": [5, 6, 7]})
+    loader = Loader(dataset.export())
     positions = np.array(
         [loader.position(silvr_orientation(frame["position"])) for frame in content["frames"]]
     )
@@ -302,13 +301,11 @@ def test_fitted_to_the_rig_its_box_is_a_fifth_of_the_cube_and_centred(
     assert np.ptp(positions, axis=0).max() == pytest.approx(0.2, abs=1e-6)
 
 
-def test_fitted_to_depth_the_scene_is_within_the_cube(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_fitted_to_depth_the_scene_is_within_the_cube(dataset: Dataset) -> None:
     rig = {"type": "sphere", "subdivisions": 1, "size": 0.02, "center": [1, -2, 3]}
-    content = written(tmp_path, FISHEYE, rig, depth="distance")
-    rendered(tmp_path, content, FISHEYE, "distance", 4.0)
-    transforms = export(tmp_path, monkeypatch, "--depth-bounds")
+    content = dataset.write(FISHEYE, rig, depth="distance")
+    dataset.render(content, FISHEYE, "distance", 4.0)
+    transforms = dataset.export("--depth-bounds")
     loader = Loader(transforms)
     assert in_unit_cube(loader, [frame["position"] for frame in content["frames"]])
     # Of a sphere seen evenly from its centre, nine tenths lie within ±0.9 radii along any axis.
@@ -317,14 +314,12 @@ def test_fitted_to_depth_the_scene_is_within_the_cube(
     assert in_unit_cube(loader, [1, -2, 3] + 0.85 * 4.0 * corners)
 
 
-def test_split_gives_odd_sequence_numbers_to_the_test_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    written(tmp_path, FISHEYE)
-    everything = export(tmp_path, monkeypatch, "--split")
+def test_split_gives_odd_sequence_numbers_to_the_test_file(dataset: Dataset) -> None:
+    dataset.write(FISHEYE)
+    everything = dataset.export("--split")
     parts = {}
     for part in ("train", "test"):
-        parts[part] = json.loads((tmp_path / f"transforms_{part}.json").read_text())
+        parts[part] = dataset.read(f"transforms_{part}.json")
         assert parts[part] | {"frames": 0} == everything | {"frames": 0}
     names = [Path(frame["file_path"]).stem for frame in parts["test"]["frames"]]
     assert names == ["view_0001f", "view_0003f", "view_0005f"]
@@ -332,24 +327,22 @@ def test_split_gives_odd_sequence_numbers_to_the_test_file(
     assert len(everything["frames"]) == 6
 
 
-def test_boxes_and_scales_are_passed_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    written(tmp_path, FISHEYE)
-    transforms = export(
-        tmp_path, monkeypatch, "--aabb-scale", 16, "--render-aabb", *[0.1, 0.2, 0.3, 0.7, 0.8, 0.9]
+def test_boxes_and_scales_are_passed_on(dataset: Dataset) -> None:
+    dataset.write(FISHEYE)
+    transforms = dataset.export(
+        "--aabb-scale", 16, "--render-aabb", *[0.1, 0.2, 0.3, 0.7, 0.8, 0.9]
     )
     assert transforms["aabb_scale"] == 16
     assert transforms["render_aabb"] == [[0.1, 0.2, 0.3], [0.7, 0.8, 0.9]]
 
 
 @pytest.mark.parametrize("lens", ["equisolid", "stereographic"])
-def test_other_fisheyes_are_followed_to_a_quarter_of_a_pixel(
-    lens: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_other_fisheyes_are_followed_to_a_quarter_of_a_pixel(lens: str, dataset: Dataset) -> None:
     camera: dict[str, Any] = {"lens": lens, "resolution": [512, 512], "fov": 180}
     if lens == "equisolid":
         camera |= {"focal_length": 36 / 2 / 2 / math.sin(math.pi / 4)}
-    written(tmp_path, camera)
-    loader = Loader(export(tmp_path, monkeypatch))
+    dataset.write(camera)
+    loader = Loader(dataset.export())
     for x in np.linspace(258, 509, 40):
         radius = (x - 256) / 256
         if lens == "equisolid":
@@ -385,34 +378,40 @@ def test_what_cannot_be_exported_is_an_error(
     camera: Any,
     arguments: list[Any],
     message: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    dataset: Dataset,
 ) -> None:
-    written(tmp_path, camera)
+    dataset.write(camera)
     with pytest.raises(UserError, match=message):
-        export(tmp_path, monkeypatch, *arguments)
-    assert not (tmp_path / "transforms.json").exists()
+        dataset.export(*arguments)
+    assert not (dataset.folder / "transforms.json").exists()
 
 
-def test_views_of_another_size_or_of_unknown_depth_are_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    content = written(tmp_path, FISHEYE, depth=None)
+def test_views_of_another_size_or_of_unknown_depth_are_named(dataset: Dataset) -> None:
+    content = dataset.write(FISHEYE, depth=None)
     small = np.zeros((8, 8), np.float16)
     for frame in content["frames"]:
-        images.write_exr(tmp_path / f"{frame['name']}.exr", dict.fromkeys("RGBZ", small))
+        images.write_exr(dataset.folder / f"{frame['name']}.exr", dict.fromkeys("RGBZ", small))
     with pytest.raises(UserError, match=r"view_0000f.exr: is 8 × 8, but .* says 64 × 64"):
-        export(tmp_path, monkeypatch, "--image-suffix", ".exr")
+        dataset.export("--image-suffix", ".exr")
     black = np.zeros((64, 64), np.float16)
     for frame in content["frames"]:
-        images.write_exr(tmp_path / f"{frame['name']}.exr", dict.fromkeys("RGBZ", black))
+        images.write_exr(dataset.folder / f"{frame['name']}.exr", dict.fromkeys("RGBZ", black))
     with pytest.raises(UserError, match="depth: is None; must be z or distance"):
-        export(tmp_path, monkeypatch, "--depth-bounds")
+        dataset.export("--depth-bounds")
 
 
-def test_a_split_that_the_rig_does_not_have_is_an_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    written(tmp_path, FISHEYE, {"type": "plane", "cameras": [3, 1]})
+def test_a_split_that_the_rig_does_not_have_is_an_error(dataset: Dataset) -> None:
+    dataset.write(FISHEYE, {"type": "plane", "cameras": [3, 1]})
     with pytest.raises(UserError, match="none has the split 'train'"):
-        export(tmp_path, monkeypatch, "--split")
+        dataset.export("--split")
+
+
+def test_the_program_names_what_is_wrong_in_a_line(dataset: Dataset, run_program: Any) -> None:
+    words = ("--input-cfg", dataset.folder / "lightfield.json")
+    words += ("--output", dataset.folder / "transforms.json")
+    result = run_program("export_instant_ngp.py", *words, check=False)
+    assert result.returncode == 1
+    assert result.stderr.startswith("error: ") and result.stderr.count("\n") == 1
+    dataset.write(FISHEYE)
+    run_program("export_instant_ngp.py", *words)
+    assert len(dataset.read("transforms.json")["frames"]) == 6

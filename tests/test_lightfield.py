@@ -1,5 +1,6 @@
 """lightfield.json: written as it was, read strictly, and what it says resolved in one place."""
 
+import hashlib
 import json
 import math
 from pathlib import Path
@@ -85,8 +86,14 @@ def test_a_view_is_placed_by_its_matrix_or_by_its_angles(tmp_path: Path) -> None
     for found in (by_matrix, by_angles):
         np.testing.assert_allclose(found.matrices, whole.matrices, atol=1e-11)
         for view, same in zip(found.views, whole.views, strict=True):
+            assert view.position.shape == view.rotation.shape == (3,)
             np.testing.assert_allclose(view.position, same.position, atol=1e-11)
             np.testing.assert_allclose(view.rotation, same.rotation, atol=1e-11)
+    view = View.placed("x", whole.views[1].matrix, {"split": "test"})
+    assert (view.position.shape, view.split) == ((3,), "test")
+    np.testing.assert_allclose(view.position, whole.views[1].position, atol=1e-11)
+    np.testing.assert_allclose(view.rotation, whole.views[1].rotation, atol=1e-11)
+    assert View.placed("x", view.matrix).split is None
     # Both there: the matrix decides.
     held = content()
     held["frames"][0]["world_matrix"][0][3] = 5
@@ -241,8 +248,26 @@ def test_a_views_key_follows_from_nothing_else(tmp_path: Path) -> None:
     assert keys.render_key(first, other_split) == key
 
 
-def test_a_views_seed_is_its_own_and_one_that_cycles_takes() -> None:
+def test_a_views_seed_is_its_own_and_stays_what_it_was() -> None:
     seeds = [keys.view_seed(seed, name) for seed in (0, 1) for name in ("a", "b")]
     assert len(set(seeds)) == 4
-    assert all(0 <= keys.view_seed(0, str(n)) < 2**31 for n in range(200))
-    assert keys.view_seed(0, "a") == seeds[0]
+    assert all(0 <= keys.view_seed(0, str(number)) < 2**31 for number in range(200))
+    # Finished views keep their pixels: the seed is 31 bits of the SHA-256 of this JSON.
+    digest = hashlib.sha256(b'[5, "view_0001f"]').hexdigest()
+    assert keys.view_seed(5, "view_0001f") == int(digest, 16) >> (256 - 32) & (2**31 - 1)
+
+
+def test_a_scenes_fingerprint_is_its_files_or_its_builders(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert keys.scene_fingerprint({"blend": "a.blend", "sha256": "ab"}) == "ab"
+    with pytest.raises(KeyError):
+        keys.scene_fingerprint({"blend": "a.blend"})
+    monkeypatch.setattr(keys, "BUILDERS", tmp_path)
+    source: dict[str, Any] = {"builder": "yard", "parameters": {"seed": 1}}
+    found = set()
+    for common, own, seed in (("a", "b", 1), ("c", "b", 1), ("a", "d", 1), ("a", "b", 2)):
+        (tmp_path / "common.py").write_text(common)
+        (tmp_path / "yard.py").write_text(own)
+        found.add(keys.scene_fingerprint(source | {"parameters": {"seed": seed}}))
+    assert len(found) == 4 and all(len(key) == 64 for key in found)
