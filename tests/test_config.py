@@ -89,7 +89,7 @@ BROKEN = {
     "unknown rig type": (
         "rigs.LFSphere.type",
         "ball",
-        "rigs.LFSphere.type: is \"ball\"; must be one of plane, cuboid,",
+        'rigs.LFSphere.type: is "ball"; must be one of plane, cuboid,',
     ),
     "too many subdivisions": (
         "rigs.LFSphere.subdivisions",

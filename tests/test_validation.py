@@ -9,7 +9,6 @@ import math
 import re
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -18,8 +17,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lightfield.core.files import sha256, write_json
-from lightfield.dataset.lightfield import LightField
+from lightfield.core.files import read_json, sha256, write_json
+from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.export import MANIFESTS
 from lightfield.geometry import lenses, rotations
 from lightfield.imaging import images
@@ -29,7 +28,6 @@ from lightfield.validation.result import Check, Result
 
 validate = partial(validation.validate, manifests=MANIFESTS)
 
-SCRIPTS = Path(__file__).parents[1] / "scripts"
 CYCLES_ROOM = Path(__file__).parent / "cycles_room.py"
 
 SPHERE = {"type": "sphere", "subdivisions": 1, "size": 1.7}
@@ -99,15 +97,15 @@ def make_dataset(
     folder: Path, rig: Mapping[str, Any], camera: Mapping[str, Any], depth: str | None = "z"
 ) -> Path:
     lens = lenses.from_camera(camera)
-    content = LightField.from_rig(rig, lens, depth=depth).to_json()
+    lightfield = LightField.from_rig(rig, lens, depth=depth)
     rng = np.random.default_rng(1)
-    for frame in content["frames"]:
+    for view in lightfield.views:
         attributes = {images.NAN_ATTRIBUTE: 0, images.CLAMPED_ATTRIBUTE: 0}
         if depth:
             attributes[images.DEPTH_ATTRIBUTE] = depth
-        channels = render(lens, np.array(frame["world_matrix"]), depth, rng)
-        images.write_exr(folder / "exr" / f"{frame['name']}.exr", channels, attributes)
-    write_json(folder / "lightfield.json", content)
+        channels = render(lens, view.matrix, depth, rng)
+        images.write_exr(folder / "exr" / f"{view.name}.exr", channels, attributes)
+    lightfield.write(folder / NAME)
     return folder
 
 
@@ -143,29 +141,35 @@ def failed(result: Result) -> list[str]:
 
 
 def names(dataset: Path) -> list[str]:
-    content = json.loads((dataset / "lightfield.json").read_text())
-    return [frame["name"] for frame in content["frames"]]
+    return [view.name for view in LightField.read(dataset / NAME).views]
+
+
+def rewrite(dataset: Path, change: Callable[[dict[str, Any]], None]) -> None:
+    """Change the content of lightfield.json."""
+    content = read_json(dataset / NAME)
+    change(content)
+    write_json(dataset / NAME, content)
 
 
 def relist(dataset: Path, change: Callable[[dict[str, Any]], None]) -> None:
     """Change lightfield.json; positions and rotations then follow the matrices."""
-    content = json.loads((dataset / "lightfield.json").read_text())
-    change(content)
-    for frame in content["frames"]:
-        matrix = np.array(frame["world_matrix"])
-        frame["position"] = matrix[:3, 3].tolist()
-        frame["rotation"] = rotations.matrix_to_euler(matrix[:3, :3]).tolist()
-    write_json(dataset / "lightfield.json", content)
+    rewrite(dataset, change)
+    lightfield = LightField.read(dataset / NAME)
+    views = [View.placed(view.name, view.matrix, view.others) for view in lightfield.views]
+    lightfield.changed(views=views).write(dataset / NAME)
 
 
 def repaint(
-    dataset: Path, name: str, change: Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
+    dataset: Path,
+    name: str,
+    change: Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]] = dict,
+    header: Mapping[str, Any] | None = None,
 ) -> None:
-    """Change the channels of one view, keeping its header."""
+    """Change the channels of one view and its header."""
     path = dataset / "exr" / f"{name}.exr"
     image = images.read_image(path)
     kept = {key: value for key, value in image.attributes.items() if key.startswith("plenoforge:")}
-    images.write_exr(path, change(dict(image.channels)), kept)
+    images.write_exr(path, change(dict(image.channels)), kept | dict(header or {}))
 
 
 def recamera(camera: Mapping[str, Any]) -> Callable[[dict[str, Any]], None]:
@@ -417,13 +421,7 @@ def pixel(channel: str, value: float) -> Spoil:
 
 
 def headed(key: str, value: Any) -> Spoil:
-    def spoil(dataset: Path) -> None:
-        path = dataset / "exr" / f"{names(dataset)[BAD]}.exr"
-        image = images.read_image(path)
-        kept = {k: v for k, v in image.attributes.items() if k.startswith("plenoforge:")}
-        images.write_exr(path, image.channels, kept | {key: value})
-
-    return spoil
+    return lambda dataset: repaint(dataset, names(dataset)[BAD], header={key: value})
 
 
 def on_file(change: Callable[[Path], Any]) -> Spoil:
@@ -457,12 +455,7 @@ def small(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def bad_frame(key: str, value: Any) -> Spoil:
-    def spoil(dataset: Path) -> None:
-        content = json.loads((dataset / "lightfield.json").read_text())
-        content["frames"][BAD][key] = value
-        write_json(dataset / "lightfield.json", content)
-
-    return spoil
+    return lambda dataset: rewrite(dataset, lambda held: held["frames"][BAD].update({key: value}))
 
 
 BROKEN_VIEWS: dict[str, tuple[Spoil, str, str]] = {
@@ -533,7 +526,10 @@ BROKEN_LISTS: dict[str, tuple[Spoil, str]] = {
         lambda small_dataset: (small_dataset / "lightfield.json").write_text("{"),
         "is not JSON",
     ),
-    "no frames": (listed(lambda content: content["frames"].clear()), "frames: is empty"),
+    "no frames": (
+        lambda small_dataset: rewrite(small_dataset, lambda held: held["frames"].clear()),
+        "frames: is empty",
+    ),
     "no camera": (
         lambda small_dataset: write_json(small_dataset / "lightfield.json", {"frames": []}),
         "camera: is missing",
@@ -544,7 +540,10 @@ BROKEN_LISTS: dict[str, tuple[Spoil, str]] = {
         listed(turn([BAD], np.diag([-1.0, 1.0, 1.0]))),
         "view_0005f: world_matrix: is not that of its position and rotation",
     ),
-    "Z-depth beyond 180 degrees": (listed(recamera({"fov": 190})), "depth: is 'z'"),
+    "Z-depth beyond 180 degrees": (
+        lambda small_dataset: rewrite(small_dataset, recamera({"fov": 190})),
+        "depth: is 'z'",
+    ),
 }
 
 
@@ -644,22 +643,19 @@ def add_panoramas(dataset: Path, spoil: Callable[[dict[str, np.ndarray]], Any] =
     """Add what the fisheyes see as equirectangular panoramas: all that lies before the camera."""
     folder = dataset / "panorama"
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [96, 48]})
-    content = json.loads((dataset / "lightfield.json").read_text())
-    content |= lens.to_lightfield() | {"depth": "distance"}
+    lightfield = LightField.read(dataset / NAME).changed(lens=lens, depth="distance")
     behind = np.abs(np.mgrid[:48, :96][1] + 0.5 - 48) > 24
-    for frame in content["frames"]:
-        channels = render(
-            lens, np.array(frame["world_matrix"]), "distance", np.random.default_rng(2)
-        )
+    for view in lightfield.views:
+        channels = render(lens, view.matrix, "distance", np.random.default_rng(2))
         channels = {name: np.where(behind, 0, pixels) for name, pixels in channels.items()}
         channels["Z"] = np.where(behind, np.float32(np.nan), channels["Z"])
         channels = spoil(channels)
-        images.write_exr(folder / f"{frame['name']}.exr", channels)
+        images.write_exr(folder / f"{view.name}.exr", channels)
         eight_bit = [(channels[name] * np.float16(255)).astype(np.uint8) for name in "RGB"]
         alpha = np.where(np.isnan(channels["Z"]), 0, 255).astype(np.uint8)
-        images.write_png(folder / f"{frame['name']}.png", np.dstack([*eight_bit, alpha]))
-        images.write_png(folder / f"dynamic_mask_{frame['name']}.png", 255 - alpha)
-    write_json(folder / "lightfield.json", content)
+        images.write_png(folder / f"{view.name}.png", np.dstack([*eight_bit, alpha]))
+        images.write_png(folder / f"dynamic_mask_{view.name}.png", 255 - alpha)
+    lightfield.write(folder / NAME)
 
 
 def test_right_reprojection_is_valid(small_dataset: Path) -> None:
@@ -711,44 +707,26 @@ def test_missing_picture_of_a_reprojection_is_named(small_dataset: Path) -> None
 # ---- the program ----------------------------------------------------------------------------
 
 
-def run(dataset: Path, *more: str) -> subprocess.CompletedProcess[str]:
-    return program(
-        *("validate.py", "--dataset", str(dataset)),
-        *("--output", str(dataset / "validation.json"), "--sums", str(sums_of(dataset)), *more),
-    )
+def run(run_program: Any, dataset: Path, *more: Any) -> Any:
+    words = ("--dataset", dataset, "--output", dataset / "validation.json")
+    return run_program("validate.py", *words, "--sums", dataset.with_suffix(".sums"), *more)
 
 
-def publish(dataset: Path) -> subprocess.CompletedProcess[str]:
-    return program(
-        *("publish_checksums.py", "--validation", str(dataset / "validation.json")),
-        *("--page", "the page", "--sums", str(sums_of(dataset))),
-        *("--output", str(dataset / "sha256sums.txt")),
-    )
-
-
-def sums_of(dataset: Path) -> Path:
-    return dataset.with_suffix(".sums")
-
-
-def program(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, str(SCRIPTS / name), *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def publish(run_program: Any, dataset: Path) -> Any:
+    words = ("--validation", dataset / "validation.json", "--page", "the page")
+    words += ("--sums", dataset.with_suffix(".sums"), "--output", dataset / "sha256sums.txt")
+    return run_program("publish_checksums.py", *words, check=False)
 
 
 def test_program_writes_the_same_bytes_each_time_and_sums_that_hold(
-    dataset: Path, tmp_path: Path
+    dataset: Path, tmp_path: Path, run_program: Any
 ) -> None:
     write_json(tmp_path / "record.json", record_of(dataset))
     leftover = dataset / "exr" / ".view_0000f.123.tmp.exr"
     leftover.write_bytes(b"half a view")
     other = Path(shutil.copytree(dataset, tmp_path / "elsewhere" / "room" / "sphere"))
-    first = run(dataset, "--records", str(tmp_path / "record.json"))
-    second = run(other, "--records", str(tmp_path / "record.json"), "--processes", "2")
-    assert (first.returncode, second.returncode) == (0, 0), first.stderr + second.stderr
+    first = run(run_program, dataset, "--records", tmp_path / "record.json")
+    second = run(run_program, other, "--records", tmp_path / "record.json", "--processes", 2)
     assert first.stdout == second.stdout
     assert re.fullmatch(
         r"room/sphere: valid: 12 views; 12 views × [\d.]+ neighbours agree 9\d.\d % .*\n",
@@ -756,7 +734,7 @@ def test_program_writes_the_same_bytes_each_time_and_sums_that_hold(
     )
     assert not leftover.exists()
     for folder in (dataset, other):
-        published = publish(folder)
+        published = publish(run_program, folder)
         assert published.returncode == 0, published.stderr
     for name in ("validation.json", "sha256sums.txt"):
         assert (dataset / name).read_bytes() == (other / name).read_bytes()
@@ -767,13 +745,12 @@ def test_program_writes_the_same_bytes_each_time_and_sums_that_hold(
     subprocess.run(["sha256sum", "-c", "--strict", "sha256sums.txt"], cwd=dataset, check=True)
 
 
-def test_program_names_what_is_wrong_and_publishes_no_sums(dataset: Path) -> None:
+def test_program_names_what_is_wrong_and_publishes_no_sums(dataset: Path, run_program: Any) -> None:
     (dataset / "sha256sums.txt").write_text("of an earlier validation")
     on_file(truncate)(dataset)
     (dataset / "exr" / "view_0009f.exr").unlink()
     (dataset / "stray").touch()
-    result = run(dataset)
-    assert result.returncode == 0
+    result = run(run_program, dataset)
     assert not (dataset / "sha256sums.txt").exists()
     content = json.loads((dataset / "validation.json").read_text())
     assert content["valid"] is False
@@ -781,7 +758,7 @@ def test_program_names_what_is_wrong_and_publishes_no_sums(dataset: Path) -> Non
     assert re.search(r"^room/sphere: images: exr/view_0005f.exr: .+$", result.stderr, re.M)
     assert "room/sphere: views: exr/view_0009f.exr: is missing\n" in result.stderr
     assert result.stdout.startswith("room/sphere: INVALID: ")
-    published = publish(dataset)
+    published = publish(run_program, dataset)
     assert published.returncode == 1
     assert re.fullmatch(
         r"error: room/sphere is not valid: views: exr/view_0009f.exr: is missing; "
@@ -791,21 +768,20 @@ def test_program_names_what_is_wrong_and_publishes_no_sums(dataset: Path) -> Non
     )
     assert not (dataset / "sha256sums.txt").exists()
     # A run that misses them validates again.
-    assert not sums_of(dataset).exists()
+    assert not dataset.with_suffix(".sums").exists()
 
 
 # ---- Cycles ---------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="session")
-def cycles_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def cycles_dataset(tmp_path_factory: pytest.TempPathFactory, run_program: Any) -> Path:
     """A dataset that Cycles renders: thin stalks and leaves, a fence, spheres, a wall, open sky."""
     dataset = tmp_path_factory.mktemp("cycles") / "yard" / "sphere"
     lens = lenses.from_camera({**FISHEYE, "resolution": [96, 96]})
     rig = {**SPHERE, "center": [0, 0, 1.2]}
-    content = LightField.from_rig(rig, lens, depth="z").to_json()
-    write_json(dataset / "lightfield.json", content)
-    subprocess.run([sys.executable, str(CYCLES_ROOM), str(dataset)], check=True)
+    LightField.from_rig(rig, lens, depth="z").write(dataset / NAME)
+    run_program(CYCLES_ROOM, dataset)
     return dataset
 
 

@@ -170,25 +170,16 @@ def of_views(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[
             for suffix in ((".exr", ".png") if image_set.name else (".exr",))
             if any(view + suffix in present for view in image_set.views)
         ]
-        missing = []
-        own = len(files)
-        for suffix in formats or [".exr"]:
-            for view, name in enumerate(image_set.views):
-                path = f"{image_set.folder}/{name}{suffix}"
-                if name + suffix in present:
-                    files.append(File(path, number, view))
-                else:
-                    missing.append(path)
-        own = len(files) - own
-        checks.append(
-            Check(
-                f"{image_set.prefix}views",
-                not missing,
-                f"{own} of {own + len(missing)} images are there",
-                sorted({Path(path).stem for path in missing}),
-                [f"{path}: is missing" for path in missing],
-            )
-        )
+        paths = [
+            (view, f"{image_set.folder}/{name}{suffix}")
+            for suffix in formats or [".exr"]
+            for view, name in enumerate(image_set.views)
+        ]
+        own = [File(path, number, view) for view, path in paths if Path(path).name in present]
+        missing = {path: "is missing" for _, path in paths if Path(path).name not in present}
+        detail = f"{len(own)} of {len(paths)} images are there"
+        checks.append(Check.of_files(f"{image_set.prefix}views", missing, detail))
+        files += own
     return files, checks
 
 
@@ -260,30 +251,21 @@ def checksums(
             }
         except (LookupError, TypeError, AttributeError):
             raise UserError(f"{record}: files: must map paths to bytes and sha256") from None
-    problems = []
+    faults = {}
     for path, (size, digest) in sorted(recorded.items()):
         if path not in found:
-            problems.append(f"{path}: is recorded but is no image of this dataset")
+            faults[path] = "is recorded but is no image of this dataset"
         elif size != found[path][0]:
-            problems.append(f"{path}: has {found[path][0]} bytes, but its record says {size}")
+            faults[path] = f"has {found[path][0]} bytes, but its record says {size}"
         elif digest != found[path][1]:
-            problems.append(
-                f"{path}: has the sha256 {found[path][1]}, but its record says {digest}"
-            )
+            faults[path] = f"has the sha256 {found[path][1]}, but its record says {digest}"
     # Masks and pictures for trainers are not the renderer's.
     own = rendered(sets)
-    problems += [
-        f"{path}: has no record"
-        for path in sorted(f"{IMAGES}/{view}.exr" for view in (own.views if own else []))
-        if path in found and path not in recorded
-    ]
-    return Check(
-        "checksums",
-        not problems,
-        f"{len(recorded)} of {len(found)} images have a record",
-        sorted({Path(problem.split(":")[0]).stem for problem in problems}),
-        problems,
-    )
+    for path in sorted(f"{IMAGES}/{view}.exr" for view in (own.views if own else [])):
+        if path in found and path not in recorded:
+            faults[path] = "has no record"
+    detail = f"{len(recorded)} of {len(found)} images have a record"
+    return Check.of_files("checksums", faults, detail)
 
 
 def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:
@@ -300,22 +282,18 @@ def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:
         raise UserError(f"{path}: views: must map names to distance and inside") from None
     own = rendered(sets)
     views = own.views if own else []
-    problems = {view: "its clearance was not measured" for view in views if view not in around}
-    problems |= {
-        view: "its camera is inside geometry" for view in views if around.get(view, (0, 0))[1]
-    }
+    faults = {}
+    for view in views:
+        if view not in around:
+            faults[f"{IMAGES}/{view}.exr"] = "its clearance was not measured"
+        elif around[view][1]:
+            faults[f"{IMAGES}/{view}.exr"] = "its camera is inside geometry"
     nearest = min((around[view][0] for view in views if view in around), default=math.inf)
-    known = math.isfinite(nearest)
-    return Check(
-        "cameras",
-        not problems,
-        f"nothing is nearer to a camera than {nearest:.3g} m"
-        if known
-        else "nothing is near a camera",
-        list(problems),
-        [f"{IMAGES}/{view}.exr: {text}" for view, text in problems.items()],
-        figures={"nearest_metres": round(nearest, 4)} if known else {},
-    )
+    if math.isinf(nearest):
+        return Check.of_files("cameras", faults, "nothing is near a camera")
+    detail = f"nothing is nearer to a camera than {nearest:.3g} m"
+    figures = {"nearest_metres": round(nearest, 4)}
+    return Check.of_files("cameras", faults, detail, figures=figures)
 
 
 def remove_leftovers(dataset: Path) -> None:

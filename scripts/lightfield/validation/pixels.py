@@ -11,7 +11,7 @@ from scipy.ndimage import binary_erosion
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.geometry.lenses import Array, Lens
+from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.validation import consistency
 from lightfield.validation.consistency import Answer, Patches
@@ -34,7 +34,7 @@ MOST_REGIONS = 16
 
 @dataclass
 class Facts:
-    """What one file shows by itself; ``problems`` by the check to which they belong.
+    """What one file shows by itself; ``faults`` by the check to which they belong.
 
     ``clamped`` and ``nan`` are the renderer's counts, ``marked`` whether the pixels without a
     source could be compared, ``constant`` whether a reprojected view has one colour (as a piece of
@@ -43,12 +43,17 @@ class Facts:
 
     checksum: str
     bytes: int
-    problems: dict[str, str] = field(default_factory=dict)
+    faults: dict[str, list[str]] = field(default_factory=dict)
     clamped: int | None = None
     nan: int | None = None
     marked: bool = False
     constant: bool = False
     patches: Patches | None = None
+
+    def fault(self, check: str, text: str, found: bool | int = True) -> None:
+        """Note what a check finds wrong, if it was ``found`` at all."""
+        if found:
+            self.faults.setdefault(check, []).append(text)
 
 
 class Examiner:
@@ -69,17 +74,16 @@ class Examiner:
             image = images.read_image(path)
         except UserError as error:
             text = " ".join(str(error).split()).replace(f"{path}: ", "")
-            facts.problems["images"] = text.replace(str(path), file.path)
+            facts.fault("images", text.replace(str(path), file.path))
             return facts
         height, width = next(iter(image.channels.values())).shape
         if (width, height) != (lens.width, lens.height):
-            facts.problems["images"] = (
-                f"is {width} × {height}; must be {lens.width} × {lens.height}"
-            )
+            text = f"is {width} × {height}; must be {lens.width} × {lens.height}"
+            facts.fault("images", text)
         elif file.view >= 0:
             problem = _format_problem(file, image_set, image)
             if problem:
-                facts.problems["images"] = problem
+                facts.fault("images", problem)
             else:
                 self._examine_view(file, image, facts)
         return facts
@@ -96,49 +100,44 @@ class Examiner:
 
     def _examine_view(self, file: File, image: images.Image, facts: Facts) -> None:
         image_set = self.sets[file.set]
-        lens, meaning = image_set.lightfield.lens, image_set.lightfield.depth
         is_rendered = not image_set.name
-        seen, outside = self._of_lens(lens)
+        seen, outside = self._of_lens(image_set.lightfield.lens)
         depth = image.channels.get("Z")
         empty = depth is not None and bool(np.isposinf(depth).all())
-        colour = [image.channels[name] for name in "RGB"]
-        middle = (lens.height // 2, lens.width // 2)
-        others = max(int(((channel != channel[middle]) & seen).sum()) for channel in colour)
-        constant = others <= FEW * int(seen.sum())
+        colour = np.stack([image.channels[name] for name in "RGB"])
+        nan = int(np.isnan(colour).sum())
+        facts.fault("colour", f"{nan} values are not a number", nan)
+        infinite = int(np.isinf(colour).sum())
+        facts.fault("colour", f"{infinite} values are infinite", infinite)
+        facts.fault("colour", "is black", not colour.any())
+        middle = colour[:, colour.shape[1] // 2, colour.shape[2] // 2]
+        others = ((colour != middle[:, np.newaxis, np.newaxis]) & seen).sum(axis=(1, 2)).max()
+        constant = bool(others <= FEW * seen.sum())
         facts.constant = constant and not is_rendered
-        problems = _colour_problems(colour)
-        if constant and is_rendered and not empty:
-            problems.append("has one colour everywhere")
+        facts.fault("colour", "has one colour everywhere", constant and is_rendered and not empty)
         # Cycles leaves a few values of 1e-6 there, and its denoiser a little more.
         if is_rendered and outside.any():
-            lit = np.mean([channel[outside] > FAINT for channel in colour])
-            if lit > MOST_LIT_OUTSIDE:
-                problems.append("has colour where the lens sees nothing")
-        if problems:
-            facts.problems["colour"] = ", ".join(problems)
+            lit = (colour[:, outside] > FAINT).mean() > MOST_LIT_OUTSIDE
+            facts.fault("colour", "has colour where the lens sees nothing", lit)
         if depth is not None:
-            problems = []
+            meaning = image_set.lightfield.depth
             header = image.attributes.get(images.DEPTH_ATTRIBUTE, meaning)
-            if header != meaning:
-                problems.append(f"is {header!r} by its header, {meaning!r} by its list")
-            unknown = int(np.isnan(depth).sum())
-            if is_rendered and unknown:
-                problems.append(f"{unknown} depths are not a number")
-            if is_rendered and not np.isposinf(depth[outside]).all():
-                problems.append("has depth where the lens sees nothing")
+            text = f"is {header!r} by its header, {meaning!r} by its list"
+            facts.fault("depth", text, header != meaning)
+            if is_rendered:
+                unknown = int(np.isnan(depth).sum())
+                facts.fault("depth", f"{unknown} depths are not a number", unknown)
+                filled = not np.isposinf(depth[outside]).all()
+                facts.fault("depth", "has depth where the lens sees nothing", filled)
             wrong = int((depth <= 0).sum())
-            problems += [f"{wrong} depths are not positive"] if wrong else []
-            if problems:
-                facts.problems["depth"] = ", ".join(problems)
-            camera = image_set.camera(file.view)
-            facts.patches = consistency.sample(camera, depth, RAYS_A_VIEW)
+            facts.fault("depth", f"{wrong} depths are not positive", wrong)
+            facts.patches = consistency.sample(image_set.camera(file.view), depth, RAYS_A_VIEW)
         if not is_rendered:
             self._compare_marks(file, image, facts)
         elif images.NAN_ATTRIBUTE in image.attributes:
             facts.nan = int(image.attributes[images.NAN_ATTRIBUTE])
             facts.clamped = int(image.attributes.get(images.CLAMPED_ATTRIBUTE, 0))
-            if facts.nan:
-                facts.problems["counts"] = f"{facts.nan} rendered values were not a number"
+            facts.fault("counts", f"{facts.nan} rendered values were not a number", facts.nan)
 
     def _compare_marks(self, file: File, image: images.Image, facts: Facts) -> None:
         """Compare the pixels that are marked as without source with what the two lenses say."""
@@ -153,17 +152,11 @@ class Examiner:
         else:
             marked = np.zeros(without.shape, bool)
         facts.marked = True
-        problems = []
-        for region, text in (
-            (without & ~marked, "pixels without a source are not marked"),
-            (with_source & marked, "pixels with a source are marked as without"),
-        ):
-            count = int(region.sum())
-            problems += [f"{count} {text}"] if count else []
-        if any(image.channels[name][without].any() for name in "RGB"):
-            problems.append("has colour in pixels without a source")
-        if problems:
-            facts.problems["marks"] = ", ".join(problems)
+        missing, wrong = int((without & ~marked).sum()), int((with_source & marked).sum())
+        facts.fault("marks", f"{missing} pixels without a source are not marked", missing)
+        facts.fault("marks", f"{wrong} pixels with a source are marked as without", wrong)
+        coloured = any(image.channels[name][without].any() for name in "RGB")
+        facts.fault("marks", "has colour in pixels without a source", coloured)
 
     def _of_lens(self, lens: Lens) -> tuple[Bools, Bools]:
         """Return where the lens has a ray, and where it has none, less the rim."""
@@ -205,7 +198,7 @@ class Examiner:
 
 def checks(image_set: ImageSet, own: Mapping[File, Facts]) -> list[Check]:
     """Return the checks that each image of a set passes or fails by itself."""
-    readable = {file: fact for file, fact in own.items() if "images" not in fact.problems}
+    readable = {file: fact for file, fact in own.items() if "images" not in fact.faults}
     checks = [
         _outcome(image_set, "images", own, "are whole, of the right size and channels"),
         _outcome(image_set, "colour", readable, "have finite colours, and are not black"),
@@ -231,22 +224,22 @@ def checks(image_set: ImageSet, own: Mapping[File, Facts]) -> list[Check]:
 
 def _outcome(image_set: ImageSet, name: str, own: Mapping[File, Facts], claim: str) -> Check:
     """Return a check of what the facts say about ``name``."""
-    bad = [file for file, fact in own.items() if name in fact.problems]
-    return Check(
-        f"{image_set.prefix}{name}",
-        not bad if own else None,
-        f"{len(own) - len(bad)} of {len(own)} {claim}"
-        if own
-        else f"no image to see if they {claim}",
-        sorted({image_set.views[file.view] for file in bad}),
-        [f"{file.path}: {own[file].problems[name]}" for file in bad],
-    )
+    if not own:
+        return Check(f"{image_set.prefix}{name}", None, f"no image to see if they {claim}")
+    faults = {
+        file.path: ", ".join(fact.faults[name]) for file, fact in own.items() if name in fact.faults
+    }
+    detail = f"{len(own) - len(faults)} of {len(own)} {claim}"
+    return Check.of_files(f"{image_set.prefix}{name}", faults, detail)
 
 
 def with_extras(exports: Check, extras: Mapping[File, Facts]) -> Check:
     """Return the check of what was made for trainers, with the pictures that cannot be read."""
     problems = [
-        f"{file.path}: {text}" for file, fact in extras.items() for text in fact.problems.values()
+        f"{file.path}: {text}"
+        for file, fact in extras.items()
+        for texts in fact.faults.values()
+        for text in texts
     ]
     passed = False if problems else exports.passed
     return replace(exports, passed=passed, problems=exports.problems + problems)
@@ -275,18 +268,3 @@ def _format_problem(file: File, image_set: ImageSet, image: images.Image) -> str
         for channels in (found, wanted)
     ]
     return f"has the channels {texts[0]}; must have {texts[1]}"
-
-
-def _colour_problems(channels: list[Array]) -> list[str]:
-    """Say which colours are no finite numbers, or that all are black."""
-    problems = []
-    finite = [np.isfinite(channel) for channel in channels]
-    if not all(part.all() for part in finite):
-        bad = [channel[~part] for channel, part in zip(channels, finite, strict=True)]
-        nan = sum(int(np.isnan(values).sum()) for values in bad)
-        infinite = sum(len(values) for values in bad) - nan
-        problems += [f"{nan} values are not a number"] if nan else []
-        problems += [f"{infinite} values are infinite"] if infinite else []
-    if not any(channel.any() for channel in channels):
-        problems.append("is black")
-    return problems

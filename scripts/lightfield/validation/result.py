@@ -1,6 +1,8 @@
 """What a validation found: a list of checks, and one line of them for a person."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 # Of a check that fails in more places than this, the first are printed; validation.json has all.
@@ -22,6 +24,13 @@ class Check:
     problems: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     figures: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of_files(cls, name: str, faults: Mapping[str, str], detail: str, **more: Any) -> "Check":
+        """Return a check that fails where a view's file, by its path, has a fault."""
+        views = sorted({Path(path).stem for path in faults})
+        problems = [f"{path}: {fault}" for path, fault in faults.items()]
+        return cls(name, not faults, detail, views, problems, **more)
 
 
 @dataclass(frozen=True)
