@@ -30,7 +30,9 @@ class Settings(BaseModel):
     A model's validator raises ``ValueError("key: what is wrong")``; the key may be dotted.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True
+    )
 
     @model_validator(mode="before")
     @classmethod
