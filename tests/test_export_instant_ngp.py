@@ -1,6 +1,7 @@
 """The export for instant-ngp, read back as its loader reads it (nerf_loader.cu), in float32."""
 
 import argparse
+import itertools
 import json
 import math
 import re
@@ -33,6 +34,7 @@ PERSPECTIVE = {
 }
 FISHEYE = {"lens": "equidistant", "resolution": [64, 64], "fov": 180}
 WIDE = {"lens": "equidistant", "resolution": [65, 65], "fov": 220}
+ORTHOGRAPHIC = {"lens": "orthographic", "resolution": [512, 512], "fov": 180}
 PANORAMA = {"lens": "equirectangular", "resolution": [64, 32]}
 
 
@@ -180,6 +182,15 @@ def test_the_loaders_ray_of_a_pixel_meets_the_point_seen_there(
             assert angle_between(direction, target - origin) < 1e-4
 
 
+def test_a_perspective_lens_is_named_by_its_angles_and_focal_lengths(dataset: Dataset) -> None:
+    dataset.write(PERSPECTIVE)
+    transforms = dataset.export()
+    expected = {"fl_x": 64 * 20 / 36, "fl_y": 48 * 20 / 30, "cx": 29.5, "cy": 26.25}
+    expected |= {"camera_angle_x": 2 * math.atan(18 / 20), "w": 64, "h": 48}
+    expected |= {"camera_angle_y": 2 * math.atan(15 / 20)}
+    assert {key: transforms[key] for key in expected} == pytest.approx(expected)
+
+
 def test_a_camera_worked_by_hand(dataset: Dataset) -> None:
     """A level camera at (1, 2, 3) looking along +Y, and one at (3, 2, 3) looking straight down."""
     rows = ["name,x,y,z,rx,ry,rz", f"a,1,2,3,{math.pi / 2},0,0", "b,3,2,3,0,0,0"]
@@ -234,6 +245,7 @@ def test_pixels_without_a_source_are_hidden(dataset: Dataset) -> None:
     content = dataset.write(PERSPECTIVE)
     pixels = np.full((48, 64, 4), 200, np.uint8)
     pixels[:5, :7, 3] = 0
+    pixels[5, 5, 3] = 1
     for frame in content["frames"][1:]:
         images.write_png(dataset.folder / f"{frame['name']}.png", pixels[:, :, :3])
     images.write_png(dataset.folder / "view_0000f.png", pixels)
@@ -282,6 +294,33 @@ def test_exr_views_become_files_that_the_loader_accepts(dataset: Dataset) -> Non
             "RGB", np.dtype(np.float16)
         )
         np.testing.assert_array_equal(channels["R"], np.where(outside, -1, 0.25))
+
+
+def test_a_depth_map_counts_millimetres_and_is_0_where_there_is_none() -> None:
+    ahead = np.broadcast_to([0.0, 0.0, -1.0], (7, 3))
+    aslant = np.broadcast_to([0.0, 0.6, -0.8], (7, 3))
+    depth = np.array([2.0, 0.001, 0.0004, 65.535, 65.5361, np.inf, np.nan], np.float32)
+    fisheye, perspective = lenses.from_camera(FISHEYE), lenses.from_camera(PERSPECTIVE)
+    for lens, meaning in itertools.product((fisheye, perspective), ("z", "distance")):
+        steps = instant_ngp.depth_map(depth, meaning, lens, ahead)
+        assert steps.tolist() == [2000, 1, 0, 65535, 0, 0, 0]
+    # Perspective rays are 1 long along the axis, all others are 1 long themselves.
+    for lens, meaning, metres in (
+        *((fisheye, "z", 2.5), (fisheye, "distance", 2)),
+        *((perspective, "z", 2), (perspective, "distance", 1.6)),
+    ):
+        assert instant_ngp.depth_map(depth, meaning, lens, aslant)[0] == 1000 * metres
+
+
+def test_the_scenes_box_holds_all_cameras_and_nine_tenths_of_the_points() -> None:
+    points = np.linspace([0, 10, 20], [100, 110, 120], 101)
+    low, high = instant_ngp.scene_bounds(np.array([[50.0, 2, 60], [200, 60, 70]]), points)
+    np.testing.assert_allclose((low, high), [[5, 2, 25], [200, 105, 115]])
+    scale, offset = instant_ngp.fitted(low, high)
+    assert scale == 1 / 195
+    loader = Loader({"scale": scale, "offset": offset})
+    middle = loader.position(silvr_orientation((low + high) / 2))
+    np.testing.assert_allclose(middle, 0.5, atol=1e-6)
 
 
 def in_unit_cube(loader: Loader, points: Any) -> bool:
@@ -358,16 +397,11 @@ def test_other_fisheyes_are_followed_to_a_quarter_of_a_pixel(lens: str, dataset:
 @pytest.mark.parametrize(
     ("camera", "arguments", "message"),
     [
-        (
-            {"lens": "orthographic", "resolution": [512, 512], "fov": 180},
-            [],
-            "lightfield.json: camera: instant-ngp cannot follow",
-        ),
-        (
-            {"lens": "equirectangular", "resolution": [64, 32], "latitude": [-45, 45]},
-            [],
-            "instant-ngp cannot follow",
-        ),
+        (ORTHOGRAPHIC, [], r"lightfield.json: camera: instant-ngp cannot .* by 3.3 pixels"),
+        (ORTHOGRAPHIC | {"resolution": [64, 64]}, [], "misses it by 0.41 pixels"),
+        (PANORAMA | {"latitude": [-45, 45]}, [], "instant-ngp cannot follow"),
+        (PANORAMA | {"longitude": [-180, 170]}, [], "instant-ngp cannot follow"),
+        (FISHEYE, ["--split"], "none has the split 'train'"),
         (FISHEYE, ["--offset", 0, 0, 0], "--offset: goes with --scale"),
         (FISHEYE, ["--scale", 0], "--scale: is 0"),
         (FISHEYE, ["--image-suffix", ".exr"], "view_0000f.exr: no such file"),
@@ -375,15 +409,21 @@ def test_other_fisheyes_are_followed_to_a_quarter_of_a_pixel(lens: str, dataset:
     ],
 )
 def test_what_cannot_be_exported_is_an_error(
-    camera: Any,
-    arguments: list[Any],
-    message: str,
-    dataset: Dataset,
+    camera: Any, arguments: list[Any], message: str, dataset: Dataset
 ) -> None:
-    dataset.write(camera)
+    dataset.write(camera, {"type": "plane", "cameras": [3, 1]})
     with pytest.raises(UserError, match=message):
         dataset.export(*arguments)
-    assert not (dataset.folder / "transforms.json").exists()
+    assert [path.name for path in dataset.folder.iterdir()] == ["lightfield.json"]
+
+
+def test_one_camera_has_no_extent_to_fit(dataset: Dataset) -> None:
+    dataset.write(FISHEYE, {"type": "plane", "cameras": [1, 1], "center": [1, 2, 3]})
+    with pytest.raises(UserError, match="extent is zero"):
+        dataset.export()
+    # Where it is given, the mean camera lies in the middle.
+    transforms = dataset.export("--scale", 2)
+    np.testing.assert_allclose(Loader(transforms).camera(0)[1], 0.5)
 
 
 def test_views_of_another_size_or_of_unknown_depth_are_named(dataset: Dataset) -> None:
@@ -398,12 +438,6 @@ def test_views_of_another_size_or_of_unknown_depth_are_named(dataset: Dataset) -
         images.write_exr(dataset.folder / f"{frame['name']}.exr", dict.fromkeys("RGBZ", black))
     with pytest.raises(UserError, match="depth: is None; must be z or distance"):
         dataset.export("--depth-bounds")
-
-
-def test_a_split_that_the_rig_does_not_have_is_an_error(dataset: Dataset) -> None:
-    dataset.write(FISHEYE, {"type": "plane", "cameras": [3, 1]})
-    with pytest.raises(UserError, match="none has the split 'train'"):
-        dataset.export("--split")
 
 
 def test_the_program_names_what_is_wrong_in_a_line(dataset: Dataset, run_program: Any) -> None:

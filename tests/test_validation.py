@@ -619,19 +619,26 @@ def test_exports_own_what_they_list(small_dataset: Path) -> None:
     picture = np.zeros((64, 64, 3), np.uint8)
     images.write_png(small_dataset / "exr" / "dynamic_mask_view_0001f.png", picture[..., 0])
     images.write_png(small_dataset / "pictures" / "one.png", picture)
-    frames = [{"file_path": "pictures/one.png"}, {"file_path": "exr/view_0000f.exr"}]
+    images.write_png(small_dataset / "depth.png", picture[..., 0].astype(np.uint16))
+    frames = [
+        {"file_path": "pictures/one.png", "depth_path": "depth.png"},
+        {"file_path": "exr/view_0000f.exr"},
+    ]
     write_json(small_dataset / "transforms.json", {"frames": frames})
     result = validate(small_dataset)
     assert result.valid
     assert check(result, "exports").passed
-    assert {"pictures/one.png", "transforms.json"} <= result.checksums.keys()
+    assert {"depth.png", "pictures/one.png", "transforms.json"} <= result.checksums.keys()
+    assert check(result, "exports").detail == "1 lists of frames, 3 pictures beside the views"
     write_json(
         small_dataset / "transforms_test.json", {"frames": [{"file_path": "pictures/two.png"}]}
     )
+    (small_dataset / "transforms_train.json").write_text('{"frames": [{}]}')
     images.write_png(small_dataset / "pictures" / "one.png", picture[:10])
     problems = check(validate(small_dataset), "exports").problems
     assert problems == [
         "transforms_test.json: pictures/two.png is no file of the dataset",
+        "transforms_train.json: is no JSON with frames, each with a file_path",
         "pictures/one.png: is 64 × 10; must be 64 × 64",
     ]
 

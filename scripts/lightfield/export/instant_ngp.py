@@ -35,6 +35,7 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.geometry.depth import distance_from_z, z_from_distance
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.imaging import images
@@ -131,7 +132,14 @@ def export(arguments: argparse.Namespace) -> None:
         raise UserError("--offset: goes with --scale; without it both are fitted")
     if arguments.scale is not None and not arguments.scale > 0:
         raise UserError(f"--scale: is {arguments.scale}; must be above 0")
-    writer = _Writer(arguments, LightField.read(arguments.input_cfg))
+    lightfield = LightField.read(arguments.input_cfg)
+    parts = {arguments.output: [view.name for view in lightfield.views]}
+    for part in ("train", "test") if arguments.split else ():
+        path = arguments.output.with_stem(f"{arguments.output.stem}_{part}")
+        parts[path] = [view.name for view in lightfield.views if view.split == part]
+        if not parts[path]:
+            raise UserError(f"{lightfield.path}: frames: none has the split {part!r}")
+    writer = _Writer(arguments, lightfield)
     scale, offset = writer.placement()
     common = writer.lens_keys | {"scale": scale, "offset": offset}
     if arguments.aabb_scale:
@@ -141,16 +149,9 @@ def export(arguments: argparse.Namespace) -> None:
     if arguments.depth_dir:
         common["integer_depth_scale"] = DEPTH_UNIT
     frames = writer.frames()
-    write_json(arguments.output, common | {"frames": frames})
-    print(f"{arguments.output}: {len(frames)} frames, scale {scale:.6g}, offset {offset}")
-    for part in ("train", "test") if arguments.split else ():
-        pairs = zip(frames, writer.lightfield.views, strict=True)
-        chosen = [frame for frame, view in pairs if view.split == part]
-        if not chosen:
-            raise UserError(f"{arguments.input_cfg}: frames: none has the split {part!r}")
-        path = arguments.output.with_stem(f"{arguments.output.stem}_{part}")
-        write_json(path, common | {"frames": chosen})
-        print(f"{path}: {len(chosen)} frames")
+    for path, names in parts.items():
+        write_json(path, common | {"frames": [frames[name] for name in names]})
+        print(f"{path}: {len(names)} frames, scale {scale:.6g}, offset {offset}")
 
 
 class _Writer:
@@ -192,10 +193,10 @@ class _Writer:
             depth, meaning = self.depth(views[index])
             yield world_points(depth[part], meaning, self.rays[part], views[index])
 
-    def frames(self) -> list[dict[str, Any]]:
-        """Write every view's files and return the frames that name them."""
+    def frames(self) -> dict[str, dict[str, Any]]:
+        """Write every view's files and return the frames that name them, by the view's name."""
         progress = Progress(len(self.lightfield.views), "export")
-        frames = []
+        frames = {}
         missing = []
         for view in self.lightfield.views:
             image = self.image_dir / f"{view.name}{self.arguments.image_suffix}"
@@ -212,7 +213,7 @@ class _Writer:
                 path = self.arguments.depth_dir / f"{view.name}.png"
                 images.write_png(path, depth_map(*self.depth(view), self.lens, self.rays))
                 frame["depth_path"] = self.relative(path)
-            frames.append(frame)
+            frames[view.name] = frame
             progress.done()
         if missing:
             print(
@@ -405,18 +406,8 @@ def _axis_pixels(lens: Lens, tangent: float) -> tuple[float, float]:
 
 def _is_full_panorama(lens: Lens) -> bool:
     """Whether the lens's rays are those of the loader's ``latlong``."""
-    u, v = np.meshgrid(np.linspace(0.05, 0.95, 7), np.linspace(0.05, 0.95, 7))
-    longitude, latitude = (u - 0.5) * 2 * math.pi, (0.5 - v) * math.pi
-    expected = np.stack(
-        [
-            np.cos(latitude) * np.sin(longitude),
-            np.sin(latitude),
-            -np.cos(latitude) * np.cos(longitude),
-        ],
-        axis=-1,
-    )
-    rays = lens.rays(u * lens.width, v * lens.height)
-    return bool(np.all(np.abs(rays - expected) < 1e-5))
+    full = ((-math.pi, math.pi), (-math.pi / 2, math.pi / 2))
+    return isinstance(lens, Equirectangular) and np.allclose((lens.longitude, lens.latitude), full)
 
 
 def _ftheta(lens: Lens) -> list[float]:
