@@ -22,6 +22,7 @@ from lightfield.core.failures import failure_report
 from lightfield.core.files import write_json
 from lightfield.dataset.config import load_config
 from lightfield.dataset.dataset import STILLS, load_datasets, scene_datasets
+from lightfield.dataset.exports import MANIFEST, VIEWS
 
 # The rigs that config.yaml names are those of the scene that it names.
 if "scenes" in GIVEN and "rigs" not in GIVEN:
@@ -61,6 +62,9 @@ wildcard_constraints:
     # A sequence's datasets lie a folder deeper, one for each frame.
     rig=r"[A-Za-z0-9_.-]+(/f\d{5,7})?",
     reprojection=r"(?!f\d{5,7}/)[A-Za-z0-9_.-]+",
+    # Of an export: nothing for the views, or a reprojection's name and a slash.
+    source=r"((?!f\d{5,7}/)[A-Za-z0-9_.-]+/)?",
+    format="[a-z_]+",
     first=r"\d+",
     end=r"\d+",
 
@@ -109,7 +113,8 @@ def of_dataset(attribute):
 
 def stage_of(wildcards):
     """Return the stage at which a job makes or reads views."""
-    return wildcards.get("reprojection", "render")
+    source = wildcards.get("source", "").rstrip("/")
+    return wildcards.get("reprojection", source or "render")
 
 
 def records(wildcards):
@@ -261,6 +266,18 @@ def reprojection_words(wildcards):
     """Return the words that name a dataset's reprojections."""
     words = [f"--reprojection {name}" for name in dataset_of(wildcards).reprojections]
     return " ".join(words)
+
+
+def export_words(wildcards):
+    """Return the words that say to scripts/export.py from what it exports, and how."""
+    dataset = dataset_of(wildcards)
+    name = wildcards.source.rstrip("/")
+    suffix = dataset.reprojections[name].suffix if name else ".exr"
+    options = dataset.exports.wanted[wildcards.format].model_dump_json(
+        exclude_unset=True, exclude={"sources"}
+    )
+    words = ["--source", name or VIEWS, "--suffix", suffix, "--options", options]
+    return shlex.join(words)
 
 
 def failed_jobs():

@@ -44,3 +44,32 @@ rule export_reprojection_to_instant_ngp:
     shell:
         "python scripts/export_instant_ngp.py --input-cfg {input.lightfield}"
         " --image-suffix {params.suffix} {params.placement} --output {output} 2>&1 | tee {log}"
+
+
+rule export:
+    input:
+        # Points are lifted from the depth of the rendered views, whatever the source.
+        rendered=lambda wildcards: dataset_of(wildcards).records("render"),
+        records=records,
+        lightfield=f"{DATASET}/{{source}}lightfield.json",
+        dataset=f"{DATASET}/lightfield.json",
+    output:
+        f"{DATASET}/{{source}}exports/{{format}}/{MANIFEST}",
+    log:
+        log_of("{scene}/{rig}/{source}export_{format}"),
+    benchmark:
+        times_of("{scene}/{rig}/export/{source}{format}")
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=4000,
+        runtime=120,
+    params:
+        dataset=DATASET,
+        words=export_words,
+        folder=subpath(output[0], parent=True),
+    message:
+        "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for {wildcards.format}"
+    shell:
+        "python scripts/export.py {wildcards.format} --dataset {params.dataset} {params.words}"
+        " --output {params.folder} 2>&1 | tee {log}"

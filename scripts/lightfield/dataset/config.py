@@ -22,7 +22,7 @@ from pydantic import (
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.core.settings import AS_WRITTEN, Name, Settings, Vector, checked, suggestion
-from lightfield.dataset.exports import VIEWS, Exports
+from lightfield.dataset.exports import VIEWS, Export, Exports
 from lightfield.geometry.lenses import LENSES, CameraSettings
 from lightfield.geometry.rigs import AnyRig, Poses, Rig
 from lightfield.geometry.rigs.rig import Frame
@@ -32,7 +32,7 @@ SCENES = ROOT / "configs" / "scenes"
 BUILDERS = ROOT / "scripts" / "scenes"
 
 # Folders of a dataset that a reprojection may not take.
-RESERVED_NAMES = ("exr", "report")
+RESERVED_NAMES = ("exr", "exports", "report")
 # Folders of a sequence's frames.
 FRAME_FOLDER = re.compile(r"f\d{5,7}")
 
@@ -279,14 +279,26 @@ class Scene(Settings):
                 if rig_name not in self.rigs:
                     hint = suggestion(rig_name, self.rigs)
                     raise ValueError(f"{key}.rigs: there is no rig {rig_name!r}{hint}")
-        known = [VIEWS, *self.reprojections]
-        for name, export in self.exports:
-            for source in export.sources if export else ():
-                if source not in known:
-                    raise ValueError(
-                        f"exports.{name}.sources: is {source!r}; must be of {', '.join(known)}"
-                    )
+        for name, export in self.exports.wanted.items():
+            self._check_export(f"exports.{name}.sources", export)
         return self
+
+    def _check_export(self, key: str, export: Export) -> None:
+        """Check that the sources are there, and that the consumer can take them."""
+        known = [VIEWS, *self.reprojections]
+        for source in export.sources:
+            if source not in known:
+                raise ValueError(f"{key}: is {source!r}; must be of {', '.join(known)}")
+            has_depth = self.render.depth != "none"
+            if source == VIEWS:
+                cameras = {rig.camera for rig in self.rigs.values()}
+            else:
+                cameras = {self.reprojections[source].camera}
+                has_depth &= self.reprojections[source].format == "exr"
+            for camera in cameras:
+                refusal = export.refusal(camera.make(), has_depth)
+                if refusal:
+                    raise ValueError(f"{key}: {source} {refusal}")
 
     def _check_rig(self, key: str, rig: Rig) -> None:
         """Check what of a rig depends on its camera, its file and the depth."""

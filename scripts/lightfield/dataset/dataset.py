@@ -13,7 +13,7 @@ from typing import Any, Literal
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
 from lightfield.dataset.config import CHOSEN, ROOT, Configuration, Preset, Render, Source
-from lightfield.dataset.exports import VIEWS, Exports
+from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
 from lightfield.dataset.keys import scene_fingerprint
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.rigs import Poses, Rig
@@ -167,13 +167,13 @@ class Dataset:
 
     @property
     def exported(self) -> list[str]:
-        """The files that are made for trainers."""
-        export = self.exports.instant_ngp
-        folders = [
-            self.folder if source == VIEWS else f"{self.folder}/{source}"
-            for source in (export.sources if export else ())
+        """The files by which each export for each of its sources is known to be there."""
+        return [
+            f"{self.folder}/{'' if source == VIEWS else f'{source}/'}"
+            + ("transforms.json" if name == "instant_ngp" else f"exports/{name}/{MANIFEST}")
+            for name, export in self.exports.wanted.items()
+            for source in export.sources
         ]
-        return [f"{folder}/transforms.json" for folder in folders]
 
     @property
     def published(self) -> list[str]:
@@ -359,8 +359,7 @@ def scene_datasets(
             key: export.model_copy(
                 update={"sources": [s for s in export.sources if s in (VIEWS, *reprojections)]}
             )
-            for key, export in written.exports
-            if export
+            for key, export in written.exports.wanted.items()
         }
         for folder, frame in _frames(name, rig, source.frame):
             found.append(

@@ -1,20 +1,56 @@
-"""What a scene YAML's `exports` may ask of each exporter, one model an exporter."""
+"""What a scene YAML's `exports` may ask of each exporter, and what each consumer can take.
 
-from typing import Annotated, Literal
+One model an exporter: its options, and `refusal`, which says when a YAML is read what its consumer
+cannot open and how it can be had. What the options do is written in `lightfield.export`.
+"""
+
+import math
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field
 
 from lightfield.core.settings import Settings, Vector
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
+from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 # In `sources`, the rendered views themselves.
 VIEWS = "views"
+# Written last into an export's folder: its files.
+MANIFEST = "export.json"
+
+TO_RECTILINEAR = "reproject to rectilinear"
 
 
 class Export(Settings):
+    """``exposure`` and ``reinhard`` are for EXR sources: a PNG is developed already."""
+
     sources: list[str] = Field(
         min_length=1,
         description=f"Names of reprojections; `{VIEWS}` stands for the rendered views.",
     )
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        """Say why the consumer cannot take views of a lens, and what to do; None if it can.
+
+        ``has_depth`` is whether the source itself holds depth: EXR does and PNG does not.
+        """
+        return None
+
+
+class Developed(Export):
+    """An export of 8-bit pictures."""
+
+    exposure: float = Field(0.0, description="Of EXR sources, in stops.")
+    reinhard: float = Field(
+        1.0, gt=0, description="Of EXR sources: the value that becomes white; 1 is none."
+    )
+
+
+PointCount = Annotated[int, Field(ge=1)]
+NO_DEPTH = "holds no depth; give it format: exr"
 
 
 class InstantNgp(Export):
@@ -40,5 +76,82 @@ class InstantNgp(Export):
         return words
 
 
+class Colmap(Developed):
+    """A COLMAP model, for gsplat, 3DGRUT, the original 3D Gaussian splatting."""
+
+    format: Literal["binary", "text"] = "binary"
+    points: PointCount = Field(50000, description="Points lifted from depth, at most.")
+    depth: bool = Field(False, description="Depth maps too, from sources with depth.")
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if isinstance(lens, Equidistant | KannalaBrandt):
+            # COLMAP projects points before the camera only.
+            if lens.fov >= math.pi:
+                return "sees 180 degrees, where COLMAP's fisheye ends; give it a smaller fov"
+        elif not isinstance(lens, Rectilinear):
+            return f"has a lens that COLMAP lacks; {TO_RECTILINEAR}, or equidistant below 180°"
+        return NO_DEPTH if self.depth and not has_depth else None
+
+
+class Nerfstudio(Developed):
+    """A nerfstudio dataset."""
+
+    points: PointCount = Field(50000, description="Points of the point cloud, at most.")
+    depth: bool = Field(False, description="Depth maps too, from sources with depth.")
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if isinstance(lens, Equidistant | KannalaBrandt):
+            middle = lens.center[0] % 1 == 0.5 and lens.center[1] % 1 == 0.5
+            if middle:
+                return "has a pixel on its optical axis, which is NaN to nerfstudio; use even sizes"
+        elif isinstance(lens, Equirectangular):
+            if not lens.is_full:
+                return f"is a part of a panorama; nerfstudio takes whole ones; {TO_RECTILINEAR}"
+        elif not isinstance(lens, Rectilinear):
+            return f"has a lens that nerfstudio lacks; {TO_RECTILINEAR}, equidistant or a panorama"
+        return NO_DEPTH if self.depth and not has_depth else None
+
+
+class NerfSynthetic(Developed):
+    """The layout of NeRF's synthetic scenes: RGBA, three lists."""
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if not isinstance(lens, Rectilinear):
+            return f"is no pinhole camera, which this layout knows alone; {TO_RECTILINEAR}"
+        square = math.isclose(
+            lens.sensor[0] / lens.width, lens.sensor[1] / lens.height, rel_tol=1e-6
+        )
+        if lens.center != (lens.width / 2, lens.height / 2) or not square:
+            return "has its axis off centre or oblong pixels, which this layout cannot say"
+        return None
+
+
+class PosesCsv(Export):
+    """A table of poses: name, position, rotation."""
+
+
+class PointCloud(Developed):
+    """A .ply of all surfaces that the views see."""
+
+    voxel: float = Field(0.01, gt=0, description="Metres; one point is kept in each.")
+
+
 class Exports(Settings):
     instant_ngp: InstantNgp | None = None
+    colmap: Colmap | None = None
+    nerfstudio: Nerfstudio | None = None
+    nerf_synthetic: NerfSynthetic | None = None
+    poses_csv: PosesCsv | None = None
+    point_cloud: PointCloud | None = None
+
+    @property
+    def wanted(self) -> dict[str, Export]:
+        """The exports that are asked for, by name."""
+        return {name: export for name, export in self if export}
+
+
+def settings_of(name: str) -> type[Export]:
+    """Return the model of an exporter's options."""
+    annotation = Exports.model_fields[name].annotation
+    model: type[Export] = next(kind for kind in get_args(annotation) if kind is not type(None))
+    return model

@@ -1,10 +1,55 @@
-"""The files with which each trainer opens a dataset: one module a format, registered here.
+"""The files with which each consumer opens a dataset: one module a format.
 
-Each module has a ``MANIFEST`` of the files that it writes, which validation checks.
+An exporter has ``export(source, settings, folder)``: it writes the views of a `source.Source` into
+a folder of its own, as its settings in `lightfield.dataset.exports` ask. `run` finds it by its
+name and lists what it wrote in the folder's export.json, which validation checks. instant-ngp's
+files lie beside the views, with a program of their own.
 """
 
+import importlib
+import shutil
+from pathlib import Path
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json, sha256, write_json
+from lightfield.dataset.exports import MANIFEST, Export
 from lightfield.export import instant_ngp
+from lightfield.export.source import Source
+from lightfield.validation.files import Manifest
 
-EXPORTERS = {"instant_ngp": instant_ngp}
 
-MANIFESTS = [exporter.MANIFEST for exporter in EXPORTERS.values()]
+def run(name: str, source: Source, settings: Export, folder: Path) -> dict[str, str]:
+    """Write an export into ``folder``, in place of an earlier one; return its files' SHA-256.
+
+    Nothing is left of an export that fails.
+    """
+    shutil.rmtree(folder, ignore_errors=True)
+    try:
+        importlib.import_module(f"lightfield.export.{name}").export(source, settings, folder)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    paths = sorted(path for path in folder.rglob("*") if path.is_file())
+    files = {path.relative_to(folder).as_posix(): sha256(path) for path in paths}
+    options = settings.model_dump(mode="json", exclude={"sources"})
+    write_json(folder / MANIFEST, {"format": name, "options": options, "files": files})
+    return files
+
+
+def _files(path: Path) -> dict[str, str]:
+    """Return the files that an export.json lists, with their SHA-256."""
+    try:
+        files = read_json(path)["files"]
+        return {str(name): str(digest) for name, digest in files.items()}
+    except (UserError, LookupError, TypeError, AttributeError):
+        raise UserError(f"{path}: is no JSON with files and their sha256") from None
+
+
+def _pictures(path: Path) -> list[str]:
+    return [name for name in _files(path) if name.endswith(".png")]
+
+
+MANIFESTS = [
+    instant_ngp.MANIFEST,
+    Manifest(f"exports/*/{MANIFEST}", _pictures, files=_files),
+]

@@ -43,12 +43,14 @@ class Manifest:
     ``lists`` is a pattern for files beside a lightfield.json, and ``pictures`` reads one of them:
     it returns the paths, relative to that file, of images that have the size of the views, and
     raises `UserError` for what is no such list. ``beside`` are the names of images of that size
-    that a ``{view}`` may have in the folders of those pictures and of the views.
+    that a ``{view}`` may have in the folders of those pictures and of the views. ``files`` reads
+    the SHA-256 of every file of the export, pictures or not, where its list has them.
     """
 
     lists: str
     pictures: Callable[[Path], Sequence[str]]
     beside: tuple[str, ...] = ()
+    files: Callable[[Path], Mapping[str, str]] = lambda _: {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,9 +188,10 @@ def of_views(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[
 def of_exports(
     dataset: Path, sets: Sequence[ImageSet], views: Iterable[File], manifests: Sequence[Manifest]
 ) -> tuple[list[File], list[str], Check]:
-    """Return the pictures beside the views, the lists of such pictures, and a check of these."""
+    """Return the pictures beside the views, the exports' other files, and a check of these."""
     found: dict[str, File] = {}
     lists: list[str] = []
+    others: list[str] = []
     problems: list[str] = []
     for number, image_set in enumerate(sets):
         folders = {image_set.folder}
@@ -197,6 +200,7 @@ def of_exports(
                 lists.append(path.relative_to(dataset).as_posix())
                 try:
                     named = manifest.pictures(path)
+                    sums = manifest.files(path)
                 except UserError as error:
                     problems.append(str(error).replace(f"{dataset}/", ""))
                     continue
@@ -208,6 +212,14 @@ def of_exports(
                         folders.add(relative.parent.as_posix())
                     else:
                         problems.append(f"{lists[-1]}: {name} is no file of the dataset")
+                for name, digest in sums.items():
+                    target = path.parent / name
+                    if not target.resolve().is_relative_to(dataset) or not target.is_file():
+                        problems.append(f"{lists[-1]}: {name} is no file of the dataset")
+                    elif sha256(target) != digest:
+                        problems.append(f"{target.relative_to(dataset)}: is not as it was exported")
+                    else:
+                        others.append(target.relative_to(dataset).as_posix())
         patterns = [BESIDE, *(name for manifest in manifests for name in manifest.beside)]
         for folder in sorted(folders):
             present = {path.name for path in (dataset / folder).glob("*")}
@@ -220,7 +232,7 @@ def of_exports(
     files = [file for _, file in sorted(found.items())]
     passed = not problems if lists or files else None
     detail = f"{len(lists)} lists of frames, {len(files)} pictures beside the views"
-    return files, lists, Check("exports", passed, detail, problems=problems)
+    return files, [*lists, *others], Check("exports", passed, detail, problems=problems)
 
 
 def listing(

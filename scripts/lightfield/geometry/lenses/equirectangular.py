@@ -69,6 +69,15 @@ class Equirectangular(Lens):
         if self.longitude[1] - self.longitude[0] > 2 * math.pi + 2 * ANGLE_SLACK:
             raise UserError("longitude: the range is more than 360 degrees")
 
+    @property
+    def is_full(self) -> bool:
+        """Whether it sees the whole sphere, the optical axis in its middle."""
+        given, full = (
+            (*self.longitude, *self.latitude),
+            (-math.pi, math.pi, -math.pi / 2, math.pi / 2),
+        )
+        return all(abs(a - b) <= ANGLE_SLACK for a, b in zip(given, full, strict=True))
+
     def _rays(self, x: Array, y: Array) -> Array:
         (west, east), (south, north) = self.longitude, self.latitude
         longitude = west + (east - west) * (x / self.width)

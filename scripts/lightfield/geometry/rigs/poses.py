@@ -16,6 +16,7 @@ from lightfield.core.files import read_json
 from lightfield.geometry.rigs.rig import Rig, UnitPoses
 from lightfield.geometry.rotations import Floats
 
+CSV_HEADER = ["name", "x", "y", "z", "rx", "ry", "rz"]
 LF_TYPES = ("PLANE", "CUBOID", "CYLINDER", "SPHERE")
 
 
@@ -88,7 +89,7 @@ def _number(path: Path, where: str, value: Any) -> float:
 
 def _csv_rows(path: Path) -> Iterator[Any]:
     """Yield lf_type, then (where, name, [(key, value)]) of each row; angles in radians."""
-    keys = ["name", "x", "y", "z", "rx", "ry", "rz"]
+    keys = CSV_HEADER
     yield Poses.shape
     try:
         with path.open(encoding="utf-8", newline="") as file:

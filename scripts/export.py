@@ -1,0 +1,43 @@
+"""Export a dataset's views for a consumer: COLMAP, nerfstudio, NeRF-synthetic, and others.
+
+The options are those of the scene YAML's `exports`, as JSON; configs/schema/scene.schema.json
+describes them. An earlier export in the same folder is replaced.
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+from pydantic import TypeAdapter
+
+from lightfield import export
+from lightfield.core.cli import run
+from lightfield.core.settings import checked
+from lightfield.dataset.exports import VIEWS, Exports, settings_of
+from lightfield.export.source import Source
+
+
+def main() -> None:
+    formats = [name for name in Exports.model_fields if name != "instant_ngp"]
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("format", choices=formats)
+    parser.add_argument("--dataset", type=Path, required=True, help="the dataset's folder")
+    parser.add_argument("--source", default=VIEWS, help=f"a reprojection's name (default: {VIEWS})")
+    parser.add_argument("--suffix", choices=[".png", ".exr"], default=".exr", help="of the views")
+    parser.add_argument("--options", default="{}", help="JSON of the export's options")
+    parser.add_argument("--output", type=Path, required=True, help="folder to write")
+    arguments = parser.parse_args()
+
+    options = {"sources": [arguments.source]} | json.loads(arguments.options)
+    settings = checked(TypeAdapter(settings_of(arguments.format)), options, "--options")
+    name = "" if arguments.source == VIEWS else arguments.source
+    development = {
+        key: getattr(settings, key) for key in ("exposure", "reinhard") if hasattr(settings, key)
+    }
+    source = Source(arguments.dataset, name, arguments.suffix, **development)
+    files = export.run(arguments.format, source, settings, arguments.output)
+    print(f"{arguments.output}: {len(source.lightfield.views)} views in {len(files)} files")
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,172 @@
+"""A COLMAP model, from which gsplat, 3DGRUT and the original 3D Gaussian splatting start.
+
+``sparse/0/`` holds cameras, images and points3D, in binary or as text, ``images/`` the views as
+8-bit PNG, ``masks/<image>.png`` (0 is ignored) of views with pixels that show nothing, and on
+demand ``stereo/depth_maps/<image>.geometric.bin``, Z-depth in metres. Poses are world to camera,
+with x right, y down and z forward. Points are lifted from depth; each has the views that see it.
+Source: COLMAP's format.rst and scene/reconstruction_io.
+"""
+
+import struct
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from lightfield.core.files import atomic_path
+from lightfield.core.progress import Progress
+from lightfield.dataset.exports import Colmap
+from lightfield.dataset.lightfield import View
+from lightfield.export import cameras
+from lightfield.export.points import Observations, Points, lift, observations
+from lightfield.export.source import Source
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.imaging import images
+
+PINHOLE, OPENCV_FISHEYE = (1, "PINHOLE"), (5, "OPENCV_FISHEYE")
+
+# From Blender's camera (y up, looks along −z) to COLMAP's (y down, looks along z).
+FLIP = np.diag([1.0, -1.0, -1.0])
+
+
+def export(source: Source, settings: Colmap, folder: Path) -> None:
+    """Write the model of a source's views into ``folder``."""
+    points = lift(source, count=settings.points)
+    seen = observations(source, points)
+    # A track has two views at least.
+    counts = np.bincount(np.concatenate([o.indices for o in seen]), minlength=len(points.positions))
+    model = _Model(source, points, seen, np.flatnonzero(counts >= 2))
+    write = model.write_binary if settings.format == "binary" else model.write_text
+    write(folder / "sparse" / "0")
+    progress = Progress(len(source.lightfield.views), "colmap", "views")
+    for view in source.lightfield.views:
+        name = f"{view.name}.png"
+        source.write_image(view, folder / "images" / name)
+        valid = source.valid(view)
+        if not valid.all():
+            images.write_png(folder / "masks" / f"{name}.png", valid.astype(np.uint8) * 255)
+        if settings.depth:
+            _write_depth(folder / "stereo" / "depth_maps" / f"{name}.geometric.bin", source, view)
+        progress.done()
+
+
+def camera(lens: Lens) -> tuple[tuple[int, str], list[float]]:
+    """Return COLMAP's model (id, name) of a lens, and its parameters in pixels."""
+    if isinstance(lens, Rectilinear):
+        return PINHOLE, [*cameras.focal_pixels(lens), *lens.center]
+    fx, fy, *distortion = cameras.opencv_fisheye(lens)
+    return OPENCV_FISHEYE, [fx, fy, *lens.center, *distortion]
+
+
+def pose(view: View) -> tuple[list[float], list[float]]:
+    """Return a view's world-to-camera rotation as a quaternion (w, x, y, z), and translation."""
+    turn = FLIP @ view.matrix[:3, :3].T
+    x, y, z, w = Rotation.from_matrix(turn).as_quat()
+    return [w, x, y, z], (-turn @ view.matrix[:3, 3]).tolist()
+
+
+class _Model:
+    """The points that are kept, numbered from 1, and who sees them: images from 1, in order."""
+
+    def __init__(
+        self,
+        source: Source,
+        points: Points,
+        seen: Sequence[Observations],
+        kept: NDArray[np.intp],
+    ) -> None:
+        self.lens = source.lens
+        self.views = source.lightfield.views
+        self.points = points.chosen(kept)
+        number = np.zeros(len(points.positions), np.int64)
+        number[kept] = np.arange(1, len(kept) + 1)
+        self.seen = [
+            Observations(number[o.indices][known], o.pixels[known])
+            for o in seen
+            for known in [number[o.indices] > 0]
+        ]
+
+    def tracks(self) -> Iterator[list[tuple[int, int]]]:
+        """Yield each point's (image, index among the image's points)."""
+        sizes = [len(o.indices) for o in self.seen]
+        image = np.repeat(np.arange(1, len(sizes) + 1), sizes)
+        place = np.concatenate([np.arange(size) for size in sizes])
+        point = np.concatenate([o.indices for o in self.seen])
+        order = np.argsort(point, kind="stable")
+        bounds = np.searchsorted(point[order], np.arange(1, len(self.points.positions) + 2))
+        for start, end in pairwise(bounds):
+            rows = order[start:end]
+            yield list(zip(image[rows].tolist(), place[rows].tolist(), strict=True))
+
+    def rows(self) -> Iterator[tuple[int, list[float], tuple[int, ...], list[tuple[int, int]]]]:
+        """Yield number, position, colour and track of each point."""
+        for index, track in enumerate(self.tracks()):
+            position = self.points.positions[index].tolist()
+            yield index + 1, position, tuple(self.points.colours[index].tolist()), track
+
+    def write_binary(self, folder: Path) -> None:
+        (model, _), parameters = camera(self.lens)
+        size = (self.lens.width, self.lens.height)
+        _write(
+            folder / "cameras.bin",
+            [struct.pack(f"<QiiQQ{len(parameters)}d", 1, 1, model, *size, *parameters)],
+        )
+        _write(folder / "images.bin", self._binary_images())
+        _write(folder / "points3D.bin", self._binary_points())
+
+    def _binary_images(self) -> Iterator[bytes]:
+        yield struct.pack("<Q", len(self.views))
+        for number, (view, seen) in enumerate(zip(self.views, self.seen, strict=True), 1):
+            quaternion, translation = pose(view)
+            yield struct.pack("<i7di", number, *quaternion, *translation, 1)
+            yield f"{view.name}.png".encode() + b"\0" + struct.pack("<Q", len(seen.indices))
+            table = np.empty(len(seen.indices), [("pixel", "<f8", 2), ("point", "<i8")])
+            table["pixel"], table["point"] = seen.pixels, seen.indices
+            yield table.tobytes()
+
+    def _binary_points(self) -> Iterator[bytes]:
+        yield struct.pack("<Q", len(self.points.positions))
+        for number, position, colour, track in self.rows():
+            yield struct.pack("<Q3d3BdQ", number, *position, *colour, 0.0, len(track))
+            yield struct.pack(f"<{2 * len(track)}i", *(part for pair in track for part in pair))
+
+    def write_text(self, folder: Path) -> None:
+        (_, model), parameters = camera(self.lens)
+        size = f"{self.lens.width} {self.lens.height}"
+        _write(folder / "cameras.txt", [f"1 {model} {size} {_words(parameters)}\n".encode()])
+        _write(folder / "images.txt", self._text_images())
+        _write(
+            folder / "points3D.txt",
+            (
+                f"{number} {_words(position)} {_words(colour)} 0 "
+                f"{_words(part for pair in track for part in pair)}\n".encode()
+                for number, position, colour, track in self.rows()
+            ),
+        )
+
+    def _text_images(self) -> Iterator[bytes]:
+        for number, (view, seen) in enumerate(zip(self.views, self.seen, strict=True), 1):
+            quaternion, translation = pose(view)
+            yield f"{number} {_words(quaternion + translation)} 1 {view.name}.png\n".encode()
+            points = zip(seen.pixels.tolist(), seen.indices.tolist(), strict=True)
+            yield (" ".join(f"{x!r} {y!r} {index}" for (x, y), index in points) + "\n").encode()
+
+
+def _words(numbers: Iterable[float]) -> str:
+    return " ".join(map(repr, numbers))
+
+
+def _write(path: Path, parts: Iterable[bytes]) -> None:
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        file.writelines(parts)
+
+
+def _write_depth(path: Path, source: Source, view: View) -> None:
+    depth = source.depth(view, "z")
+    known = np.where(np.isfinite(depth), depth, 0).astype("<f4")
+    height, width = known.shape
+    _write(path, [f"{width}&{height}&1&".encode(), known.tobytes()])

@@ -1,0 +1,92 @@
+"""A nerfstudio dataset: perspective views, fisheyes past 180 degrees too, and full panoramas.
+
+``transforms.json`` with camera-to-world matrices as they are (OpenGL axes, Z up), ``images/``,
+``masks/`` (0 is ignored; on all frames or on none), on demand ``depths/`` in 16-bit millimetres (Z
+for perspective views, distance for the others, whose rays have unit length there), a point cloud,
+and three lists of file names. Splatfacto takes every camera for a pinhole: give it perspective
+views. Source: nerfstudio's nerfstudio_dataparser.py and cameras.py.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightfield.core.files import write_json
+from lightfield.core.progress import Progress
+from lightfield.dataset.exports import Nerfstudio
+from lightfield.export import cameras
+from lightfield.export.points import lift, write_ply
+from lightfield.export.source import Floats, Source
+from lightfield.export.splits import splits
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.imaging import images
+
+POINT_CLOUD = "points.ply"
+# The parser's own unit: metres of one step of a depth map. 0 is unknown there.
+DEPTH_UNIT = 0.001
+
+
+def export(source: Source, settings: Nerfstudio, folder: Path) -> None:
+    """Write a source's views into ``folder``."""
+    views = source.lightfield.views
+    meaning = "z" if isinstance(source.lens, Rectilinear) else "distance"
+    masked = any(not source.valid(view).all() for view in views)
+    frames = []
+    progress = Progress(len(views), "nerfstudio", "views")
+    for view in views:
+        name = f"{view.name}.png"
+        frame: dict[str, Any] = {
+            "file_path": f"images/{name}",
+            "transform_matrix": view.matrix.tolist(),
+        }
+        source.write_image(view, folder / "images" / name)
+        if masked:
+            frame["mask_path"] = f"masks/{name}"
+            mask = source.valid(view).astype(np.uint8) * 255
+            images.write_png(folder / "masks" / name, mask)
+        if settings.depth:
+            frame["depth_file_path"] = f"depths/{name}"
+            images.write_png(folder / "depths" / name, millimetres(source.depth(view, meaning)))
+        frames.append(frame)
+        progress.done()
+    write_ply(folder / POINT_CLOUD, lift(source, count=settings.points))
+    train, test = splits(source.lightfield)
+    paths = {view.name: frame["file_path"] for view, frame in zip(views, frames, strict=True)}
+    lists = {"train": train, "val": test, "test": test}
+    content = {
+        **camera(source.lens),
+        "applied_transform": np.eye(4)[:3].tolist(),
+        "ply_file_path": POINT_CLOUD,
+        **{f"{part}_filenames": [paths[view.name] for view in own] for part, own in lists.items()},
+        "frames": frames,
+    }
+    write_json(folder / "transforms.json", content)
+
+
+def camera(lens: Lens) -> dict[str, Any]:
+    """Return the keys by which nerfstudio knows a lens."""
+    size = {"w": lens.width, "h": lens.height}
+    if isinstance(lens, Equirectangular):
+        focal = {"fl_x": lens.width / 2, "fl_y": float(lens.height)}
+        return {"camera_model": "EQUIRECTANGULAR", **focal, **_center(lens), **size}
+    if isinstance(lens, Rectilinear):
+        fx, fy = cameras.focal_pixels(lens)
+        return {"camera_model": "PINHOLE", "fl_x": fx, "fl_y": fy, **_center(lens), **size}
+    fx, fy, *distortion = cameras.opencv_fisheye(lens)
+    named = {f"k{number}": value for number, value in enumerate(distortion, 1)}
+    focal = {"fl_x": fx, "fl_y": fy}
+    return {"camera_model": "OPENCV_FISHEYE", **focal, **_center(lens), **size, **named}
+
+
+def _center(lens: Lens) -> dict[str, float]:
+    return {"cx": lens.center[0], "cy": lens.center[1]}
+
+
+def millimetres(depth: Floats) -> np.ndarray[Any, np.dtype[np.uint16]]:
+    """Return depth (h, w) in metres as 16-bit steps of `DEPTH_UNIT`; 0 is none, or beyond 65 m."""
+    steps = np.round(depth / DEPTH_UNIT)
+    valid = np.isfinite(steps) & (steps >= 1) & (steps <= np.iinfo(np.uint16).max)
+    return np.where(valid, steps, 0).astype(np.uint16)

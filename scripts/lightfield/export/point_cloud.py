@@ -1,0 +1,12 @@
+"""One point cloud of all surfaces that the views see, with colours and normals, as a binary PLY."""
+
+from pathlib import Path
+
+from lightfield.dataset.exports import PointCloud
+from lightfield.export.points import lift, write_ply
+from lightfield.export.source import Source
+
+
+def export(source: Source, settings: PointCloud, folder: Path) -> None:
+    """Write ``points.ply`` into ``folder``."""
+    write_ply(folder / "points.ply", lift(source, voxel=settings.voxel))

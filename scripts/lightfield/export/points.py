@@ -1,0 +1,121 @@
+"""World points on the surfaces that a dataset's views see, evenly spread, and who sees them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lightfield.core.files import atomic_path
+from lightfield.core.progress import Progress
+from lightfield.export.source import Floats, Source, pixel_indices
+
+# Candidates for each point that is wanted, of which an even selection is taken.
+_CANDIDATES = 8
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points (n, 3) in metres, sRGB colours (n, 3) uint8, and normals (n, 3), NaN if unknown."""
+
+    positions: Floats
+    colours: NDArray[np.uint8]
+    normals: Floats
+
+    def chosen(self, which: NDArray[np.generic]) -> "Points":
+        return Points(self.positions[which], self.colours[which], self.normals[which])
+
+
+@dataclass(frozen=True)
+class Observations:
+    """Where one view sees points: their indices (m,) and their pixel coordinates (m, 2)."""
+
+    indices: NDArray[np.intp]
+    pixels: Floats
+
+
+def lift(source: Source, count: int | None = None, voxel: float | None = None) -> Points:
+    """Lift points from the depth of all views: about ``count``, or one in each ``voxel`` metres.
+
+    Each has the colour that the view it was lifted from shows there.
+    """
+    views = source.lightfield.views
+    size = source.rendered.lens.width * source.rendered.lens.height
+    wanted = _CANDIDATES * count / len(views) if count else size
+    step = max(1, int((size / wanted) ** 0.5))
+    progress = Progress(len(views), "points", "views")
+    kept: Points | None = None
+    for view, surface in source.surfaces():
+        positions, normals = surface.points(step)
+        local = (positions - view.matrix[:3, 3]) @ view.matrix[:3, :3]
+        column, row, inside = pixel_indices(source.lens, local)
+        inside &= source.valid(view)[row, column]
+        found = Points(positions, source.colour(view)[row, column], normals).chosen(inside)
+        # With a voxel, memory stays that of the cloud, however many views there are.
+        kept = _joined([kept, found]) if kept else found
+        if voxel:
+            kept = kept.chosen(_one_a_voxel(kept.positions, voxel))
+        progress.done()
+    assert kept
+    if count and len(kept.positions) > count:
+        kept = kept.chosen(_one_a_voxel(kept.positions, _voxel_for(kept.positions, count)))
+    return kept
+
+
+def observations(source: Source, points: Points) -> list[Observations]:
+    """Return what each view sees of the points: those in its frame that no surface hides."""
+    found = []
+    progress = Progress(len(source.lightfield.views), "tracks", "views")
+    for view, surface in source.surfaces():
+        local = (points.positions - view.matrix[:3, 3]) @ view.matrix[:3, :3]
+        column, row, inside = pixel_indices(source.lens, local)
+        inside &= source.valid(view)[row, column] & surface.sees(points.positions)
+        indices = np.flatnonzero(inside)
+        found.append(Observations(indices, source.lens.pixels(local[indices])))
+        progress.done()
+    return found
+
+
+def write_ply(path: Path, points: Points) -> None:
+    """Write a binary PLY with positions, normals (0 if unknown) and colours."""
+    kinds = [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")]
+    kinds += [(name, "u1") for name in ("red", "green", "blue")]
+    vertices = np.empty(len(points.positions), kinds)
+    columns = np.hstack([points.positions, np.nan_to_num(points.normals), points.colours])
+    for name, values in zip(vertices.dtype.names or (), columns.T, strict=True):
+        vertices[name] = values
+    types = {"<f4": "float", "u1": "uchar"}
+    properties = "".join(f"property {types[kind]} {name}\n" for name, kind in kinds)
+    header = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n"
+        f"{properties}end_header\n"
+    )
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(header.encode() + vertices.tobytes())
+
+
+def _joined(parts: Sequence[Points]) -> Points:
+    return Points(
+        np.concatenate([part.positions for part in parts]),
+        np.concatenate([part.colours for part in parts]),
+        np.concatenate([part.normals for part in parts]),
+    )
+
+
+def _one_a_voxel(positions: Floats, voxel: float) -> NDArray[np.intp]:
+    """Return the index of the first point in each cube of side ``voxel``."""
+    cells = np.floor(positions / voxel)
+    return np.sort(np.unique(cells, axis=0, return_index=True)[1])
+
+
+def _voxel_for(positions: Floats, count: int) -> float:
+    """Return the side of voxels of which at most ``count`` hold points, to a percent."""
+    low, high = 0.0, float(np.ptp(positions, axis=0).max())
+    while high - low > 0.01 * high:
+        middle = (low + high) / 2
+        if len(_one_a_voxel(positions, middle)) > count:
+            low = middle
+        else:
+            high = middle
+    return high

@@ -1,0 +1,183 @@
+"""What an exporter writes from: the views of a lightfield.json, and the surfaces they see."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import atomic_path
+from lightfield.dataset.lightfield import NAME, LightField, View
+from lightfield.geometry.depth import distance_from_z, z_from_distance
+from lightfield.geometry.lenses import Lens
+from lightfield.imaging import images
+from lightfield.imaging.tonemap import to_8_bit, tone_map
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+# Two distances of one surface differ by less than this part: the one is of a pixel's centre, the
+# other of a point somewhere in the pixel.
+SAME_SURFACE = 0.01
+
+
+@dataclass(frozen=True)
+class Source:
+    """The views of a dataset folder: the rendered ones (``name`` "") or those of a reprojection.
+
+    EXR views are developed with ``exposure`` (stops) and ``reinhard`` (the value that becomes
+    white; 1 leaves light as it is); PNG views are taken as they are.
+    """
+
+    dataset: Path
+    name: str
+    suffix: str
+    exposure: float = 0.0
+    reinhard: float = 1.0
+
+    @cached_property
+    def lightfield(self) -> LightField:
+        return LightField.read(self.dataset / self.name / NAME)
+
+    @cached_property
+    def rendered(self) -> LightField:
+        """The rendered views, which hold the depth of every surface."""
+        return LightField.read(self.dataset / NAME)
+
+    @property
+    def lens(self) -> Lens:
+        return self.lightfield.lens
+
+    def path(self, view: View) -> Path:
+        return self.dataset / (self.name or "exr") / f"{view.name}{self.suffix}"
+
+    def colour(self, view: View) -> NDArray[np.uint8]:
+        """Return a view's sRGB pixels, (height, width, 3)."""
+        image = images.read_image(self.path(view))
+        if self.suffix == ".png":
+            return np.stack([image.channels[name] for name in "RGB"], axis=-1)
+        return to_8_bit(tone_map(image.colour, self.exposure, self.reinhard))
+
+    def valid(self, view: View) -> Bools:
+        """Return which pixels (height, width) hold light: the lens has a ray there and a source."""
+        inside: Bools = np.isfinite(self._rays[..., 0])
+        if self.name:
+            channels = images.read_image(self.path(view)).channels
+            if "A" in channels:
+                inside = inside & (channels["A"] > 0)
+            elif "Z" in channels:
+                inside = inside & ~np.isnan(channels["Z"])
+        return inside
+
+    def depth(self, view: View, meaning: str) -> Floats:
+        """Return depth in metres, (height, width): "z" or "distance"; inf for a miss, NaN for none.
+
+        Raises `UserError` where the views have no depth.
+        """
+        if self.suffix != ".exr" or self.lightfield.depth is None:
+            raise UserError(f"{self.path(view)}: has no depth; reproject with format: exr")
+        return _depth_of(self.path(view), self.lightfield, self._rays, meaning)
+
+    def write_image(self, view: View, target: Path) -> None:
+        """Write a view as an 8-bit PNG; one that is a PNG becomes a second name of that file."""
+        if self.suffix == ".png":
+            _second_name(self.path(view), target)
+        else:
+            images.write_png(target, self.colour(view))
+
+    @cached_property
+    def _rays(self) -> Floats:
+        return self.lens.pixel_rays()
+
+    def surfaces(self) -> Iterator[tuple[View, "Surface"]]:
+        """Yield each view with the surface that it sees, as the rendered view beneath it has it."""
+        if self.rendered.depth is None:
+            raise UserError(
+                f"{self.rendered.path}: depth: is null; points need it (render.depth in the YAML)"
+            )
+        by_name = {view.name: view for view in self.rendered.views}
+        rays = self.rendered.lens.pixel_rays()
+        for view in self.lightfield.views:
+            # A face of a cube map is named after its view: view_0000f_l.
+            below = by_name.get(view.name) or by_name[view.name.rpartition("_")[0]]
+            path = self.dataset / "exr" / f"{below.name}.exr"
+            distance = _depth_of(path, self.rendered, rays, "distance")
+            yield view, Surface(self.rendered.lens, below, rays, distance)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The first surface around a camera: ``distance`` (h, w) in metres along ``rays`` (h, w, 3)."""
+
+    lens: Lens
+    view: View
+    rays: Floats
+    distance: Floats
+
+    def points(self, step: int) -> tuple[Floats, Floats]:
+        """Return the world points (n, 3) at every ``step``-th pixel, and their normals (n, 3).
+
+        A normal is that of the plane through a point's neighbours to the right and below, turned
+        to the camera; NaN at the rim and where these are on another surface.
+        """
+        first = step // 2
+        part = np.s_[first::step, first::step]
+        world = self.rays * self.distance[..., None] @ self.view.matrix[:3, :3].T
+        right, below = np.full_like(world, np.nan), np.full_like(world, np.nan)
+        with np.errstate(invalid="ignore"):
+            right[:, :-1] = world[:, 1:] - world[:, :-1]
+            below[:-1] = world[1:] - world[:-1]
+            normal = np.cross(below, right)
+            near = np.maximum(np.linalg.norm(right, axis=-1), np.linalg.norm(below, axis=-1))
+            normal[~(near < 0.1 * self.distance)] = np.nan
+            normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+            normal *= -np.sign((normal * world).sum(axis=-1, keepdims=True))
+        seen = np.isfinite(self.distance[part]) & (self.distance[part] > 0)
+        return world[part][seen] + self.view.matrix[:3, 3], normal[part][seen]
+
+    def sees(self, points: Floats) -> Bools:
+        """Return which world points (n, 3) are on this surface, and not hidden behind it."""
+        local = (points - self.view.matrix[:3, 3]) @ self.view.matrix[:3, :3]
+        expected = np.linalg.norm(local, axis=1)
+        column, row, inside = pixel_indices(self.lens, local)
+        found = np.where(inside, self.distance[row, column], np.nan)
+        with np.errstate(invalid="ignore"):
+            same: Bools = np.abs(found - expected) < SAME_SURFACE * expected
+        return same
+
+
+def pixel_indices(lens: Lens, rays: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp], Bools]:
+    """Return column and row of the pixel that each ray (n, 3) meets, and whether it is in frame.
+
+    Outside the frame the indices are 0.
+    """
+    x, y = np.floor(lens.pixels(rays)).T
+    with np.errstate(invalid="ignore"):
+        inside = (x >= 0) & (x < lens.width) & (y >= 0) & (y < lens.height)
+    column, row = (np.where(inside, value, 0).astype(np.intp) for value in (x, y))
+    return column, row, inside
+
+
+def _depth_of(path: Path, lightfield: LightField, rays: Floats, meaning: str) -> Floats:
+    image = images.read_image(path, ["Z"])
+    depth = image.channels["Z"].astype(np.float64)
+    held = image.attributes.get(images.DEPTH_ATTRIBUTE, lightfield.depth)
+    if held == meaning:
+        # A pixel without a ray saw nothing.
+        return np.where(np.isnan(rays[..., 2]), np.nan, depth)
+    convert = z_from_distance if meaning == "z" else distance_from_z
+    return convert(depth, rays)
+
+
+def _second_name(file: Path, target: Path) -> None:
+    """Make ``target`` a hard link to a file, or a copy where the file system has no links."""
+    with atomic_path(target) as temporary:
+        try:
+            os.link(file, temporary)
+        except OSError:
+            shutil.copyfile(file, temporary)

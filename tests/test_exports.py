@@ -1,0 +1,451 @@
+"""Exports, read back as their consumers read them, of a scene whose every point is known.
+
+The scene is the inside of a sphere around the origin; its colour follows from the place.
+"""
+
+import csv
+import json
+import math
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from pydantic import TypeAdapter, ValidationError
+from scipy.spatial.transform import Rotation
+
+from lightfield import export
+from lightfield.core.errors import UserError
+from lightfield.core.files import sha256
+from lightfield.dataset.config import Scene
+from lightfield.dataset.exports import settings_of
+from lightfield.dataset.lightfield import LightField
+from lightfield.export.source import Source
+from lightfield.geometry import lenses, rigs
+from lightfield.geometry.depth import z_from_distance
+from lightfield.imaging import images
+from lightfield.imaging.tonemap import decode_srgb, to_8_bit
+from lightfield.validation import files as validation_files
+
+RADIUS = 3.0
+RIG = {"type": "plane", "cameras": [4, 3], "size": 1.2, "center": [0.3, -0.2, 0.1]}
+VIEWS = {"lens": "equidistant", "fov": 180, "resolution": [96, 96]}
+LENSES = {
+    "perspective": {"lens": "rectilinear", "fov": 70, "resolution": [64, 48]},
+    "shifted": {
+        "lens": "rectilinear",
+        "focal_length": 20,
+        "sensor_size": [36, 30],
+        "principal_point": [29.5, 26.25],
+        "resolution": [64, 48],
+    },
+    "fisheye": {"lens": "equidistant", "fov": 170, "resolution": [64, 60]},
+    "opencv": {
+        "lens": "kannala_brandt",
+        "focal_length": 9,
+        "coefficients": [0.02, -0.01, 0.003, -0.001],
+        "fov": 150,
+        "resolution": [64, 64],
+    },
+    "wide": {"lens": "equidistant", "fov": 220, "resolution": [64, 64]},
+    "panorama": {"lens": "equirectangular", "resolution": [64, 32]},
+}
+
+
+def colour_of(points):
+    """The sRGB colour, 0 to 255, of places on the sphere."""
+    return 40 + 175 * (points / RADIUS / 2 + 0.5)
+
+
+def look(lens, matrix):
+    """Return linear colour, and distance, of what a camera inside the sphere sees."""
+    rays = lens.pixel_rays() @ matrix[:3, :3].T
+    along = (rays * matrix[:3, 3]).sum(axis=-1)
+    distance = -along + np.sqrt(along**2 + RADIUS**2 - matrix[:3, 3] @ matrix[:3, 3])
+    colour = decode_srgb(colour_of(matrix[:3, 3] + rays * distance[..., None]) / 255)
+    return np.nan_to_num(colour), distance
+
+
+def write_views(folder, camera, rig, suffix=".exr"):
+    lens = lenses.from_camera(camera)
+    depth = "z" if lens.has_z_depth else "distance"
+    lightfield = LightField.from_rig(rig, lens, depth=depth)
+    images_folder = folder / "exr" if folder.name == "dataset" else folder
+    images_folder.mkdir(parents=True)
+    lightfield.write(folder / "lightfield.json")
+    for view in lightfield.views:
+        colour, distance = look(lens, view.matrix)
+        z = z_from_distance(distance, lens.pixel_rays()) if depth == "z" else distance
+        channels = {name: colour[..., i].astype(np.float16) for i, name in enumerate("RGB")}
+        if suffix == ".png":
+            alpha = np.isfinite(distance).astype(np.uint8)[..., None] * 255
+            pixels = np.concatenate([to_8_bit(colour.astype(np.float32)), alpha], axis=-1)
+            images.write_png(images_folder / f"{view.name}.png", pixels)
+        else:
+            attributes = {images.DEPTH_ATTRIBUTE: depth}
+            channels["Z"] = z.astype(np.float32)
+            images.write_exr(images_folder / f"{view.name}.exr", channels, attributes)
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("exports") / "dataset"
+    write_views(folder, VIEWS, RIG)
+    for name, camera in LENSES.items():
+        write_views(folder / name, camera, RIG)
+    write_views(folder / "png", LENSES["perspective"], RIG, ".png")
+    write_views(folder / "split", LENSES["perspective"], RIG | {"evaluation_split": "odd"})
+    return folder
+
+
+def exported(dataset, name, source, tmp_path, **options):
+    model = settings_of(name)
+    settings = TypeAdapter(model).validate_python({"sources": [source], **options})
+    suffix = ".png" if source == "png" else ".exr"
+    folder = tmp_path / name / source
+    views = "" if source == "views" else source
+    export.run(name, Source(dataset, views, suffix), settings, folder)
+    return folder
+
+
+def matrices(dataset, source):
+    views = LightField.read(dataset / source / "lightfield.json").views
+    return {view.name: view.matrix for view in views}
+
+
+def on_sphere(points, tolerance):
+    np.testing.assert_allclose(np.linalg.norm(points, axis=-1), RADIUS, rtol=0, atol=tolerance)
+
+
+class Colmap:
+    """A model as text, by COLMAP's format.rst."""
+
+    def __init__(self, folder):
+        def lines(name):
+            return [line.split() for line in (folder / name).read_text().splitlines()]
+
+        ((_, self.model, *self.size_and_parameters),) = lines("cameras.txt")
+        self.parameters = list(map(float, self.size_and_parameters[2:]))
+        self.images, self.seen = {}, {}
+        rows = lines("images.txt")
+        for head, body in zip(rows[::2], rows[1::2], strict=True):
+            quaternion = np.array(head[1:5], float)[[1, 2, 3, 0]]
+            turn, shift = Rotation.from_quat(quaternion).as_matrix(), np.array(head[5:8], float)
+            self.images[int(head[0])] = (head[9], turn, shift)
+            self.seen[int(head[0])] = np.array(body, float).reshape(-1, 3)
+        points = lines("points3D.txt")
+        self.positions = {int(row[0]): np.array(row[1:4], float) for row in points}
+        self.colours = {int(row[0]): np.array(row[4:7], int) for row in points}
+        self.tracks = {int(row[0]): np.array(row[8:], int).reshape(-1, 2) for row in points}
+
+    def project(self, points, turn, shift):
+        """Project world points with OpenCV, whose pixel centres are whole numbers."""
+        vector = cv2.Rodrigues(turn)[0]
+        if self.model == "PINHOLE":
+            fx, fy, cx, cy = self.parameters
+            matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+            return cv2.projectPoints(points, vector, shift, matrix, None)[0][:, 0]
+        assert self.model == "OPENCV_FISHEYE"
+        fx, fy, cx, cy, *distortion = self.parameters
+        matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+        return cv2.fisheye.projectPoints(
+            points[:, None], vector, shift[:, None], matrix, np.array(distortion)
+        )[0][:, 0]
+
+
+@pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "opencv", "png"])
+def test_colmap_model_projects_its_points_to_where_the_views_see_them(dataset, tmp_path, source):
+    folder = exported(dataset, "colmap", source, tmp_path, format="text", points=400)
+    model = Colmap(folder / "sparse" / "0")
+    assert 100 < len(model.positions) <= 400
+    on_sphere(np.array([*model.positions.values()]), 1e-5)
+    for number, place in model.positions.items():
+        np.testing.assert_allclose(model.colours[number], colour_of(place), atol=6)
+        assert len({image for image, _ in model.tracks[number]}) == len(model.tracks[number]) >= 2
+        for image, index in model.tracks[number]:
+            assert model.seen[image][index, 2] == number
+    found = 0
+    for name, turn, shift in model.images.values():
+        camera = -turn.T @ shift
+        np.testing.assert_allclose(camera, matrices(dataset, source)[name[:-4]][:3, 3], atol=1e-12)
+        assert (folder / "images" / name).is_file()
+    for image, rows in model.seen.items():
+        places = np.array([model.positions[int(number)] for number in rows[:, 2]])
+        expected = model.project(places, *model.images[image][1:])
+        np.testing.assert_allclose(rows[:, :2], expected, atol=1e-6)
+        found += len(rows)
+    # Nothing hides anything inside a sphere: every view in whose image a point lies sees it.
+    every = 0
+    for name, turn, shift in model.images.values():
+        places = np.array([*model.positions.values()])
+        local = places @ turn.T + shift
+        x, y = model.project(places, turn, shift).T
+        width, height = map(int, model.size_and_parameters[:2])
+        inside = (local[:, 2] > 0) & (x > 0) & (x < width) & (y > 0) & (y < height)
+        mask = folder / "masks" / f"{name}.png"
+        if mask.exists():
+            valid = images.read_image(mask).channels["Y"]
+            column, row = np.where(inside, x, 0).astype(int), np.where(inside, y, 0).astype(int)
+            # A pixel at the rim of an image circle is valid, but not all of it is seen.
+            angle = np.degrees(np.arctan2(np.hypot(*local.T[:2]), local[:, 2]))
+            inside &= (valid[row, column] > 0) & (angle <= LENSES[source]["fov"] / 2)
+        every += inside.sum()
+    assert found == every
+
+
+def test_colmap_binary_says_what_its_text_says(dataset, tmp_path):
+    text = exported(dataset, "colmap", "fisheye", tmp_path / "text", format="text", points=50)
+    binary = exported(dataset, "colmap", "fisheye", tmp_path / "binary", points=50)
+    model, folder = Colmap(text / "sparse" / "0"), binary / "sparse" / "0"
+    cameras = (folder / "cameras.bin").read_bytes()
+    assert np.frombuffer(cameras, "<u8", 1)[0] == 1
+    assert np.frombuffer(cameras, "<i4", 2, 8).tolist() == [1, 5]
+    assert np.frombuffer(cameras, "<u8", 2, 16).tolist() == [64, 60]
+    assert np.frombuffer(cameras, "<f8", -1, 32).tolist() == model.parameters
+    content, place = (folder / "images.bin").read_bytes(), 8
+    assert np.frombuffer(content, "<u8", 1)[0] == len(model.images)
+    for number, (name, turn, shift) in model.images.items():
+        assert np.frombuffer(content, "<i4", 1, place)[0] == number
+        values = np.frombuffer(content, "<f8", 7, place + 4)
+        np.testing.assert_allclose(
+            Rotation.from_quat(values[[1, 2, 3, 0]]).as_matrix(), turn, atol=1e-12
+        )
+        np.testing.assert_array_equal(values[4:], shift)
+        end = content.index(b"\0", place + 64)
+        assert content[place + 64 : end].decode() == name
+        count = int(np.frombuffer(content, "<u8", 1, end + 1)[0])
+        row = np.dtype([("pixel", "<f8", 2), ("point", "<i8")])
+        rows = np.frombuffer(content, row, count, end + 9)
+        np.testing.assert_array_equal(rows["pixel"], model.seen[number][:, :2])
+        np.testing.assert_array_equal(rows["point"], model.seen[number][:, 2])
+        place = end + 9 + count * row.itemsize
+    assert place == len(content)
+    content, place = (folder / "points3D.bin").read_bytes(), 8
+    assert np.frombuffer(content, "<u8", 1)[0] == len(model.positions)
+    for number, position in model.positions.items():
+        assert np.frombuffer(content, "<u8", 1, place)[0] == number
+        np.testing.assert_array_equal(np.frombuffer(content, "<f8", 3, place + 8), position)
+        assert list(content[place + 32 : place + 35]) == model.colours[number].tolist()
+        count = int(np.frombuffer(content, "<u8", 1, place + 43)[0])
+        track = np.frombuffer(content, "<i4", 2 * count, place + 51).reshape(-1, 2)
+        np.testing.assert_array_equal(track, model.tracks[number])
+        place += 51 + 8 * count
+    assert place == len(content)
+
+
+def test_colmap_depth_maps_are_z_in_metres(dataset, tmp_path):
+    folder = exported(dataset, "colmap", "perspective", tmp_path, depth=True, points=50)
+    for name, matrix in matrices(dataset, "perspective").items():
+        content = (folder / "stereo/depth_maps" / f"{name}.png.geometric.bin").read_bytes()
+        assert content.startswith(b"64&48&1&")
+        z = np.frombuffer(content[8:], "<f4").reshape(48, 64)
+        focal = 32 / math.tan(math.radians(35))
+        y, x = np.mgrid[:48, :64] + 0.5
+        local = np.stack([(x - 32) / focal * z, -(y - 24) / focal * z, -z], axis=-1)
+        on_sphere(local @ matrix[:3, :3].T + matrix[:3, 3], 1e-5)
+
+
+def nerfstudio_rays(content):
+    """Directions as nerfstudio's Cameras.generate_rays has them, in the camera's frame."""
+    y, x = np.mgrid[: content["h"], : content["w"]] + 0.5
+    x, y = (x - content["cx"]) / content["fl_x"], -(y - content["cy"]) / content["fl_y"]
+    if content["camera_model"] == "PINHOLE":
+        return np.stack([x, y, -np.ones_like(x)], axis=-1)
+    if content["camera_model"] == "OPENCV_FISHEYE":
+        assert [content[f"k{i}"] for i in range(1, 5)] == [0, 0, 0, 0]
+        theta = np.clip(np.hypot(x, y), 0, math.pi)
+        sine = np.sin(theta) / np.hypot(x, y)
+        return np.stack([x * sine, y * sine, -np.cos(theta)], axis=-1)
+    assert content["camera_model"] == "EQUIRECTANGULAR"
+    theta, phi = -math.pi * x, math.pi * (0.5 - y)
+    return np.stack(
+        [-np.sin(theta) * np.sin(phi), np.cos(phi), -np.cos(theta) * np.sin(phi)], axis=-1
+    )
+
+
+@pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "wide", "panorama"])
+def test_nerfstudio_lifts_its_depth_to_the_scene(dataset, tmp_path, source):
+    folder = exported(dataset, "nerfstudio", source, tmp_path, depth=True, points=100)
+    content = json.loads((folder / "transforms.json").read_text())
+    rays = nerfstudio_rays(content)
+    expected = matrices(dataset, source)
+    assert len(content["frames"]) == len(expected) == 12
+    for frame in content["frames"]:
+        matrix = np.array(frame["transform_matrix"])
+        np.testing.assert_array_equal(matrix, expected[Path(frame["file_path"]).stem])
+        depth = images.read_image(folder / frame["depth_file_path"]).channels["Y"]
+        assert depth.dtype == np.uint16
+        known = depth > 0
+        if "mask_path" in frame:
+            mask = images.read_image(folder / frame["mask_path"]).channels["Y"]
+            np.testing.assert_array_equal(mask > 0, known)
+            assert set(np.unique(mask)) == {0, 255}
+        else:
+            assert known.all()
+        world = rays * (depth / 1000)[..., None] @ matrix[:3, :3].T + matrix[:3, 3]
+        on_sphere(world[known], 2e-3)
+        picture = images.read_image(folder / frame["file_path"]).channels
+        rgb = np.stack([picture[name] for name in "RGB"], axis=-1)
+        np.testing.assert_allclose(rgb[known], colour_of(world[known]), atol=1)
+    assert ("mask_path" in content["frames"][0]) == (source in ("fisheye", "wide"))
+    vertices, _ = ply(folder / content["ply_file_path"])
+    on_sphere(np.stack([vertices[name] for name in "xyz"], axis=-1), 1e-5)
+    assert np.array_equal(content["applied_transform"], np.eye(4)[:3])
+
+
+def test_splits_have_no_view_in_two_and_follow_the_rig(dataset, tmp_path):
+    for source, expected in (("perspective", 2), ("split", 6)):
+        folder = exported(dataset, "nerfstudio", source, tmp_path, points=50)
+        content = json.loads((folder / "transforms.json").read_text())
+        train, test = content["train_filenames"], content["test_filenames"]
+        assert content["val_filenames"] == test
+        assert len(test) == expected
+        assert sorted(train + test) == sorted(f["file_path"] for f in content["frames"])
+    assert all(int(Path(name).stem[5:9]) % 2 for name in test)
+
+
+def test_nerf_synthetic_is_read_by_its_own_recipe(dataset, tmp_path):
+    folder = exported(dataset, "nerf_synthetic", "perspective", tmp_path)
+    names = set()
+    for part, count in (("train", 10), ("val", 2), ("test", 2)):
+        content = json.loads((folder / f"transforms_{part}.json").read_text())
+        assert len(content["frames"]) == count
+        focal = 64 / 2 / math.tan(content["camera_angle_x"] / 2)
+        for frame in content["frames"]:
+            picture = images.read_image(folder / f"{frame['file_path']}.png").channels
+            assert (picture["A"] == 255).all()
+            names.add(Path(frame["file_path"]).name)
+            i, j = np.meshgrid(np.arange(64) + 0.5, np.arange(48) + 0.5)
+            matrix = np.array(frame["transform_matrix"])
+            rays = np.stack([(i - 32) / focal, -(j - 24) / focal, -np.ones_like(i)], axis=-1)
+            rays = rays @ matrix[:3, :3].T
+            rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+            along = rays @ matrix[:3, 3]
+            reach = -along + np.sqrt(along**2 + RADIUS**2 - matrix[:3, 3] @ matrix[:3, 3])
+            rgb = np.stack([picture[name] for name in "RGB"], axis=-1)
+            world = matrix[:3, 3] + rays * reach[..., None]
+            np.testing.assert_allclose(rgb, colour_of(world), atol=1)
+    assert len(names) == 12
+
+
+def ply(path):
+    head, _, body = path.read_bytes().partition(b"end_header\n")
+    kinds = {"float": "<f4", "uchar": "u1"}
+    properties = [line.split()[1:] for line in head.decode().splitlines() if "property" in line]
+    vertices = np.frombuffer(body, [(name, kinds[kind]) for kind, name in properties])
+    assert f"element vertex {len(vertices)}\n" in head.decode()
+    return vertices, head
+
+
+def test_point_cloud_has_one_coloured_point_a_voxel_with_normals_to_the_cameras(dataset, tmp_path):
+    folder = exported(dataset, "point_cloud", "views", tmp_path, voxel=0.1)
+    vertices, _ = ply(folder / "points.ply")
+    places = np.stack([vertices[name] for name in "xyz"], axis=-1).astype(float)
+    on_sphere(places, 1e-5)
+    assert len(np.unique(np.floor(places / 0.1), axis=0)) == len(places) > 2000
+    colours = np.stack([vertices[name] for name in ("red", "green", "blue")], axis=-1)
+    np.testing.assert_allclose(colours, colour_of(places), atol=1)
+    normals = np.stack([vertices[f"n{name}"] for name in "xyz"], axis=-1)
+    known = np.linalg.norm(normals, axis=-1) > 0.5
+    assert known.mean() > 0.9
+    inward = -places[known] / RADIUS
+    assert np.degrees(np.arccos((normals[known] * inward).sum(axis=-1).clip(-1, 1))).max() < 5
+
+
+def test_poses_csv_is_a_rig_again(dataset, tmp_path):
+    folder = exported(dataset, "poses_csv", "perspective", tmp_path)
+    with (folder / "poses.csv").open() as file:
+        assert next(csv.reader(file)) == ["name", "x", "y", "z", "rx", "ry", "rz"]
+    rig = {"type": "poses", "file": str(folder / "poses.csv")}
+    again = LightField.from_rig(rig, lenses.from_camera(LENSES["perspective"]))
+    for name, matrix in matrices(dataset, "perspective").items():
+        found = next(view for view in again.views if view.name == name)
+        np.testing.assert_allclose(found.matrix, matrix, atol=1e-11)
+    assert rigs.from_settings(rig).view_count == 12
+
+
+def test_a_surface_in_front_hides_points_behind_it(dataset, tmp_path):
+    shutil.copytree(dataset, tmp_path / "dataset")
+    # The first view looks at a wall right before it: nothing of the sphere is seen from there.
+    path = tmp_path / "dataset" / "exr" / "view_0000f.exr"
+    image = images.read_image(path)
+    wall = {**image.channels, "Z": np.full_like(image.channels["Z"], 0.01)}
+    images.write_exr(path, wall, {images.DEPTH_ATTRIBUTE: "z"})
+    folder = exported(tmp_path / "dataset", "colmap", "perspective", tmp_path, format="text")
+    model = Colmap(folder / "sparse" / "0")
+    number = next(key for key, (name, *_) in model.images.items() if name == "view_0000f.png")
+    assert len(model.seen[number]) == 0
+    assert all(len(rows) for key, rows in model.seen.items() if key != number)
+
+
+def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(dataset, tmp_path):
+    one = exported(dataset, "colmap", "fisheye", tmp_path / "one", points=50)
+    two = exported(dataset, "colmap", "fisheye", tmp_path / "two", points=50)
+    files = json.loads((one / "export.json").read_text())["files"]
+    assert files == {
+        path.relative_to(two).as_posix(): sha256(path)
+        for path in two.rglob("*")
+        if path.is_file() and path.name != "export.json"
+    }
+    assert (one / "export.json").read_bytes() == (two / "export.json").read_bytes()
+    shutil.copytree(dataset, tmp_path / "dataset")
+    target = tmp_path / "dataset" / "fisheye" / "exports" / "colmap"
+    shutil.copytree(one, target)
+    sets, _ = validation_files.read_sets(tmp_path / "dataset", ["fisheye"])
+
+    def checked():
+        return validation_files.of_exports(tmp_path / "dataset", sets, [], export.MANIFESTS)
+
+    found, others, check = checked()
+    assert check.passed
+    assert {*others, *(file.path for file in found)} >= {
+        f"fisheye/exports/colmap/{name}" for name in (*files, "export.json")
+    }
+    points = target / "sparse" / "0" / "points3D.bin"
+    content = bytearray(points.read_bytes())
+    content[100] ^= 1
+    points.write_bytes(content)
+    assert not checked()[2].passed
+    points.unlink()
+    assert "is no file of the dataset" in checked()[2].problems[0]
+
+
+def test_a_failed_export_leaves_nothing(dataset, tmp_path):
+    with pytest.raises(UserError, match="has no depth; reproject with format: exr"):
+        exported(dataset, "colmap", "png", tmp_path, depth=True, points=50)
+    assert not (tmp_path / "colmap" / "png").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "source", "camera", "options", "problem"),
+    [
+        ("colmap", "views", VIEWS, {}, "sees 180 degrees"),
+        ("colmap", "views", LENSES["panorama"], {}, "has a lens that COLMAP lacks; reproject"),
+        ("colmap", "again", VIEWS, {"depth": True}, "holds no depth; give it format: exr"),
+        ("nerfstudio", "views", VIEWS | {"resolution": [65, 65]}, {}, "use even sizes"),
+        (
+            "nerfstudio",
+            "views",
+            LENSES["panorama"] | {"latitude": [0, 90]},
+            {},
+            "is a part of a panorama",
+        ),
+        ("nerf_synthetic", "views", VIEWS, {}, "is no pinhole camera"),
+        ("nerf_synthetic", "views", LENSES["shifted"], {}, "off centre"),
+        ("poses_csv", "elsewhere", VIEWS, {}, "is 'elsewhere'; must be of views, again"),
+    ],
+)
+def test_what_a_consumer_cannot_take_is_refused_when_the_yaml_is_read(
+    name, source, camera, options, problem
+):
+    content = {
+        "scene": {"blend": "a.blend"},
+        "render": {"samples": 1},
+        "rigs": {"LF": RIG | {"camera": camera}},
+        "reprojections": {"again": {"camera": LENSES["perspective"]}},
+        "exports": {name: {"sources": [source], **options}},
+    }
+    with pytest.raises(ValidationError, match=problem) as caught:
+        TypeAdapter(Scene).validate_python(content)
+    assert f"exports.{name}.sources: " in str(caught.value)
