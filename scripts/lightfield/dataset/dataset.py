@@ -76,7 +76,7 @@ class Dataset:
             case "none":
                 return None
             case "auto":
-                return "z" if self.rig.camera.make().has_z_depth else "distance"
+                return self.rig.camera.make().usual_depth
             case meaning:
                 return str(meaning)
 

@@ -82,7 +82,7 @@ class LightField:
             self.lens = lenses.from_lightfield(self.content)
         except UserError as error:
             raise UserError(f"{self.path}: {error}") from None
-        usual = "z" if self.lens.has_z_depth else "distance"
+        usual = self.lens.usual_depth
         self.depth = self.content.get("depth", usual)
         if self.depth not in (None, "distance", usual):
             raise UserError(

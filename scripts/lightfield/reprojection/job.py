@@ -158,7 +158,7 @@ class Job:
     def output_lightfield(self) -> LightField:
         """Return the input's lightfield.json with lens, depth and poses of what is written."""
         lens = self.targets[0].lens
-        depth = usual_depth(lens) if self.depth_wanted and self.lightfield.depth else None
+        depth = lens.usual_depth if self.depth_wanted and self.lightfield.depth else None
         views = [
             _turned(view, target)
             for view in self.lightfield.views
@@ -211,11 +211,6 @@ class Job:
         return name.startswith(self.arguments.filter_prefix) and (
             name.endswith(end) or (name + suffix).endswith(end)
         )
-
-
-def usual_depth(lens: Lens) -> str:
-    """Return what depth is written as: "z" where the lens can have that, or else "distance"."""
-    return "z" if lens.has_z_depth else "distance"
 
 
 def _find(folder: Path, name: str, lens: Lens) -> tuple[Path, ...]:

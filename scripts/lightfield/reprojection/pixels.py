@@ -21,7 +21,7 @@ from lightfield.imaging.images import (
 from lightfield.imaging.tonemap import decode_srgb, to_8_bit, tone_map
 from lightfield.reprojection.colour import colour_strips
 from lightfield.reprojection.depth import resample_depth
-from lightfield.reprojection.job import Job, SourceView, usual_depth
+from lightfield.reprojection.job import Job, SourceView
 from lightfield.reprojection.lens_arguments import Target
 from lightfield.reprojection.lens_map import LensMap
 
@@ -44,7 +44,7 @@ class Source:
         self.depth = _side_by_side(depths) if len(depths) == len(faces) else None
         self.has_alpha = faces[0][2]
         # The file knows best; the configuration may be another program's.
-        meaning = faces[0][3] or job.lightfield.depth or usual_depth(job.source)
+        meaning = faces[0][3] or job.lightfield.depth or job.source.usual_depth
         self.is_z = meaning == "z"
 
     def _read(self, job: Job, path: Path) -> tuple[Array, Array | None, bool, Attribute | None]:

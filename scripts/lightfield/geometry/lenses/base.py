@@ -155,6 +155,11 @@ class Lens(ABC):
     def has_z_depth(self) -> bool:
         """Whether every ray has cos θ ≥ 0, so that Z-depth can hold its depth."""
 
+    @property
+    def usual_depth(self) -> str:
+        """What depth is written as: "z" where the lens can have that, or else "distance"."""
+        return "z" if self.has_z_depth else "distance"
+
     def rays(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Array:
         """Return unit rays (..., 3) of the pixel coordinates ``x``, ``y`` (...).
 
