@@ -12,6 +12,7 @@ import pytest
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import keys
+from lightfield.dataset.config import Source
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.geometry import lenses, rigs, rotations
 
@@ -260,14 +261,14 @@ def test_a_views_seed_is_its_own_and_stays_what_it_was() -> None:
 def test_a_scenes_fingerprint_is_its_files_or_its_builders(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert keys.scene_fingerprint({"blend": "a.blend", "sha256": "ab"}) == "ab"
-    with pytest.raises(KeyError):
-        keys.scene_fingerprint({"blend": "a.blend"})
+    blend = Source(blend="a.blend", sha256="ab" * 32)
+    assert keys.scene_fingerprint(blend) == "ab" * 32
+    with pytest.raises(UserError, match=r"a.blend: its sha256 is not known"):
+        keys.scene_fingerprint(blend.model_copy(update={"sha256": None}))
     monkeypatch.setattr(keys, "BUILDERS", tmp_path)
-    source: dict[str, Any] = {"builder": "yard", "parameters": {"seed": 1}}
     found = set()
     for common, own, seed in (("a", "b", 1), ("c", "b", 1), ("a", "d", 1), ("a", "b", 2)):
         (tmp_path / "common.py").write_text(common)
-        (tmp_path / "yard.py").write_text(own)
-        found.add(keys.scene_fingerprint(source | {"parameters": {"seed": seed}}))
+        (tmp_path / "test_room.py").write_text(own)
+        found.add(keys.scene_fingerprint(Source(builder="test_room", parameters={"seed": seed})))
     assert len(found) == 4 and all(len(key) == 64 for key in found)
