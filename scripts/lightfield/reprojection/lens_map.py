@@ -7,22 +7,22 @@ view. It is computed once in float64, kept in float32, and applied to every view
 import json
 import math
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.reprojection.filters import DEFAULT_FILTER, FILTERS
-from lightfield.reprojection.kernels import CAREFUL, INSIDE, NOTHING, Topology
+from lightfield.reprojection.footprints import bounds, distance_to_missing, mark, measure
+from lightfield.reprojection.kernels import Topology
 
-_STRIP = 64  # rows computed at a time, so that the temporary arrays stay in the caches
-_MOST_SAMPLES = 256  # each way, of a footprint that meets a pole
+_STRIP = 2**16  # pixels computed at a time, so that the temporary arrays stay in the caches
 _HEADER = 65536  # bytes kept for the description in a file
 
 
@@ -123,67 +123,69 @@ def compute(
         raise UserError(
             f"samples: the {filter_name} filter covers the whole pixel already; leave 1"
         )
+    reach, covers = FILTERS[filter_name].reach, FILTERS[filter_name].cover is not None
     wraps, _, _ = _topology(source)
-    # One pixel more on every side, for central differences at the border too.
-    padded = _coordinates(
-        source,
-        target,
-        rotation,
-        np.arange(-1, target.width + 1) + 0.5,
-        np.arange(-1, target.height + 1) + 0.5,
-    )
-    jacobian = _jacobian(padded, source, wraps)
-    reach = np.asarray(FILTERS[filter_name].reach)
-    footprints, counts = None, None
-    if FILTERS[filter_name].cover:
-        footprints, counts = _footprints(jacobian, source)
-        if counts.max() == 1:
-            footprints, counts = None, None
-        else:
-            extent = np.abs(footprints * (counts[..., None, :] - 1)).sum(axis=-1) / 2
-            reach = reach + np.ceil(extent.max(axis=-1))
-    border = 0
-    if isinstance(source, CubeMap):
-        # Depth reads two pixels on each side of the one that the ray falls in.
-        border = max(int(reach.max()) + 1, 2)
-    centers = _framed(padded[1:-1, 1:-1], source, border)
-    points = centers
-    if samples > 1:
-        x = (np.arange(target.width * samples) + 0.5) / samples
-        y = _strips((np.arange(target.height * samples) + 0.5) / samples)
-        # In float32 from the start: they are n² times as many as the pixels.
-        points = np.concatenate(
-            [
-                _framed(_coordinates(source, target, rotation, x, rows), source, border).astype(
-                    np.float32
-                )
-                for rows in y
-            ]
+    shape = (target.height, target.width)
+    # In float64 until they count from the window's corner, which is not known before.
+    points = np.empty((*shape, 2))
+    target_cos, scale = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    # Zeros take no memory as long as nothing else is written.
+    footprints = np.zeros((*shape, 2, 2) if covers else (0, 0, 2, 2), np.float32)
+    counts = np.zeros((*shape, 2) if covers else (0, 0, 2), np.uint16)
+    most, areas = 1, []
+    for rows in _strips(*shape):
+        # One pixel more on every side, for central differences at the border too.
+        x = np.arange(-1, target.width + 1) + 0.5
+        y = np.arange(rows.start - 1, rows.stop + 1) + 0.5
+        rays = target.rays(x[None, :], y[:, None])
+        target_cos[rows] = -rays[1:-1, 1:-1, 2]
+        padded = source.pixels(rays @ rotation.T)
+        found = measure(
+            padded[1:-1, 1:-1],
+            *_neighbours(padded, source),
+            (source.width, source.height),
+            source.width if wraps else 0.0,
+            _widest(source),
+            points[rows],
+            scale[rows],
+            footprints[rows],
+            counts[rows],
         )
+        most = max(most, found)
+        areas.append(bounds(points[rows], reach + 1, footprints[rows], counts[rows]))
+    fine = points
+    if samples > 1:
+        fine, areas = _samples(source, target, rotation, samples, reach)
     strip = None
     if isinstance(source, CubeMap):
+        border = _border(reach + max(area[4] for area in areas))
+        points = _on_strip(points, source, border)
         strip = _strip_with_borders(source, border)
         source_cos = _face_cosines(source, border)
-        window, corner = (0, source.height, 0, source.width), np.zeros(2, points.dtype)
+        window, corner = (0, source.height, 0, source.width), (0, 0)
     else:
-        source_cos = _cosines(source)
-        window = _window(points, source, reach, wraps)
-        corner = np.array([window[2], window[0]], points.dtype)
-    centers32 = (centers - corner).astype(np.float32)
-    nothing = np.isnan(centers[..., 0])
-    scale = np.where(nothing, np.nan, magnification(jacobian))
+        window = _window(areas, source, wraps)
+        source_cos = _cosines(source, window)
+        corner = (window[2], window[0])
+    centers = _placed(points, corner)
+    coordinates = centers if samples == 1 else _placed(fine, corner)
+    del points, fine
+    distance = np.empty(source_cos.shape, np.int32)
+    distance_to_missing(source_cos, distance)
+    flags = np.empty(coordinates.shape[:2], np.uint8)
+    mark(coordinates, distance, reach, footprints, counts, flags)
     lens_map = LensMap(
         settings=settings(source, target, rotation, filter_name, samples),
         summary=_summary(scale),
         window=window,
-        centers=centers32,
-        coordinates=centers32 if samples == 1 else (points - corner).astype(np.float32),
-        flags=_flags(points, ~np.isnan(source_cos), reach),
-        source_cos=source_cos if strip is not None else _cut(source_cos, window),
-        target_cos=_cosines(target),
-        magnification=scale.astype(np.float32),
-        footprints=footprints,
-        counts=counts,
+        centers=centers,
+        coordinates=coordinates,
+        flags=flags,
+        source_cos=source_cos,
+        target_cos=target_cos,
+        magnification=scale,
+        footprints=footprints if most > 1 else None,
+        counts=counts if most > 1 else None,
         strip=strip,
     )
     # Read-only, as `load` gives them, so that both use the same compiled kernels.
@@ -278,17 +280,6 @@ def report(lens_map: LensMap) -> None:
         print(f"warning: {warning}", file=sys.stderr)
 
 
-def magnification(jacobian: npt.ArrayLike) -> Array:
-    """Return the local linear magnification (...) of jacobians (..., 2, 2): target per source px.
-
-    1 / √|det J|: above 1 the target has more pixels than the source, below 1 it has fewer.
-    """
-    j = np.asarray(jacobian)
-    area = np.abs(j[..., 0, 0] * j[..., 1, 1] - j[..., 0, 1] * j[..., 1, 0])
-    with np.errstate(divide="ignore"):
-        return np.asarray(1 / np.sqrt(area))
-
-
 def _summary(scale: Array) -> dict[str, float]:
     seen = scale[np.isfinite(scale)]
     if not seen.size:
@@ -314,17 +305,22 @@ def _topology(source: Lens) -> Topology:
     return wraps, top, bottom
 
 
-def _cosines(lens: Lens) -> Array:
-    """Return cos θ (height, width) float32 at the pixels' centres; NaN where there is no ray."""
-    x = np.arange(lens.width) + 0.5
-    strips = _strips(np.arange(lens.height) + 0.5)
-    return np.concatenate(
-        [-lens.rays(x[None, :], y[:, None])[..., 2].astype(np.float32) for y in strips]
-    )
+def _strips(height: int, width: int) -> Iterator[slice]:
+    """Yield the rows of an image, as many at a time as the caches hold."""
+    step = max(_STRIP // width, 4)
+    for first in range(0, height, step):
+        yield slice(first, min(first + step, height))
 
 
-def _cut(pixels: Array, window: tuple[int, int, int, int]) -> Array:
-    return np.ascontiguousarray(pixels[window[0] : window[1], window[2] : window[3]])
+def _cosines(lens: Lens, window: tuple[int, int, int, int]) -> Array:
+    """Return cos θ (h, w) float32 at a window's pixel centres; NaN where there is no ray."""
+    row, end_row, column, end_column = window
+    out = np.empty((end_row - row, end_column - column), np.float32)
+    x = np.arange(column, end_column) + 0.5
+    for rows in _strips(*out.shape):
+        y = np.arange(row + rows.start, row + rows.stop) + 0.5
+        out[rows] = -lens.rays(x[None, :], y[:, None])[..., 2]
+    return out
 
 
 def _strip_with_borders(source: CubeMap, border: int) -> Array:
@@ -342,122 +338,92 @@ def _face_cosines(source: CubeMap, border: int) -> Array:
     return np.asarray(np.tile(np.pad(cosines.astype(np.float32), border, mode="edge"), 6))
 
 
-def _strips(values: Array) -> list[Array]:
-    return np.array_split(values, max(1, len(values) // _STRIP))
+def _samples(
+    source: Lens, target: Lens, rotation: Array, samples: int, reach: int
+) -> tuple[Array, list[Any]]:
+    """Return the coordinates of n × n samples a pixel in the source, and their bounds.
 
-
-def _coordinates(source: Lens, target: Lens, rotation: Array, x: Array, y: Array) -> Array:
-    """Return the (len(y), len(x), 2) source coordinates of a grid of target coordinates."""
-    parts = []
-    for rows in _strips(y):
-        rays = target.rays(x[None, :], rows[:, None])
-        parts.append(source.pixels(rays @ rotation.T))
-    return np.concatenate(parts)
-
-
-def _framed(coordinates: Array, source: Lens, border: int) -> Array:
-    """Return the coordinates with NaN in place of those outside the source's frame.
-
-    Those in a cube map's strip become those in its strip of faces with a ``border``.
+    In float32 from the start: they are n² times as many as the pixels.
     """
-    inside = (coordinates >= 0) & (coordinates <= [source.width, source.height])
-    shift = np.zeros_like(coordinates)
-    if border:
-        face = np.floor(coordinates[..., 0] / source.height)
-        shift[..., 0], shift[..., 1] = (2 * face + 1) * border, border
-    return np.where(inside.all(axis=-1, keepdims=True), coordinates + shift, np.nan)
-
-
-def _jacobian(padded: Array, source: Lens, wraps: bool) -> Array:
-    """Return central differences (H, W, 2, 2) of (H + 2, W + 2, 2) source coordinates.
-
-    Where one neighbour has no coordinates the difference is one-sided, and 0 where neither has.
-    """
-    out = np.empty((padded.shape[0] - 2, padded.shape[1] - 2, 2, 2))
-    middle = padded[1:-1, 1:-1]
-    neighbours = (
-        (padded[1:-1, :-2], padded[1:-1, 2:]),
-        (padded[:-2, 1:-1], padded[2:, 1:-1]),
-    )
-    for axis, (before, after) in enumerate(neighbours):
+    height, width = target.height * samples, target.width * samples
+    fine = np.empty((height, width, 2), np.float32)
+    x = (np.arange(width) + 0.5) / samples
+    none = np.zeros((0, 0, 2, 2), np.float32), np.zeros((0, 0, 2), np.uint16)
+    areas = []
+    for rows in _strips(height, width):
+        y = (np.arange(rows.start, rows.stop) + 0.5) / samples
+        pixels = source.pixels(target.rays(x[None, :], y[:, None]) @ rotation.T)
+        inside = (pixels >= 0) & (pixels <= [source.width, source.height])
         if isinstance(source, CubeMap):
-            before, after = (_on_face_of(source, c, middle) for c in (before, after))
-        backward, forward = middle - before, after - middle
-        if wraps:
-            for difference in (backward, forward):
-                difference[..., 0] -= source.width * np.round(difference[..., 0] / source.width)
-        lacks = np.isnan(forward), np.isnan(backward)
-        forward = np.where(lacks[0], backward, forward)
-        backward = np.where(lacks[1], forward, backward)
-        # A grazing ray moves beyond all bounds: as good as beyond every image.
-        out[..., axis] = np.clip(np.nan_to_num((forward + backward) / 2), -1e9, 1e9)
+            pixels = _on_strip(pixels, source, _border(reach))
+        fine[rows] = np.where(inside.all(axis=-1, keepdims=True), pixels, np.nan)
+        areas.append(bounds(fine[rows], reach + 1, *none))
+    return fine, areas
+
+
+def _placed(points: Array, corner: tuple[int, int]) -> Array:
+    """Return the points in float32, counted from the window's ``corner``."""
+    out = np.empty(points.shape, np.float32)
+    for axis, first in enumerate(corner):
+        np.subtract(points[..., axis], first, out=out[..., axis], casting="same_kind")
     return out
+
+
+def _border(reach: int) -> int:
+    """Return how far faces are continued; depth reads two pixels on each side of a ray's own."""
+    return max(reach + 1, 2)
+
+
+def _on_strip(pixels: Array, source: CubeMap, border: int) -> Array:
+    """Return the coordinates among faces with a ``border`` of those among faces without."""
+    face = np.floor(pixels[..., 0] / source.height)
+    shift = np.stack([(2 * face + 1) * border, np.full_like(face, border)], axis=-1)
+    return np.asarray(pixels + shift)
+
+
+def _neighbours(padded: Array, source: Lens) -> tuple[Array, Array, Array, Array]:
+    """Return the coordinates left, right, above and below of those within a border of one pixel.
+
+    Neighbours on another face of a cube map are continued onto the plane of the pixel's own.
+    """
+    left, right = padded[1:-1, :-2], padded[1:-1, 2:]
+    above, below = padded[:-2, 1:-1], padded[2:, 1:-1]
+    if not isinstance(source, CubeMap):
+        return left, right, above, below
+    middle = padded[1:-1, 1:-1]
+    return (
+        _on_face_of(source, left, middle),
+        _on_face_of(source, right, middle),
+        _on_face_of(source, above, middle),
+        _on_face_of(source, below, middle),
+    )
 
 
 def _on_face_of(source: CubeMap, coordinates: Array, middle: Array) -> Array:
     """Return the coordinates, those on another face than ``middle`` continued onto its plane."""
     out = coordinates.copy()
     here, there = (np.floor(c[..., 0] / source.height) for c in (middle, coordinates))
-    for index, rotation in enumerate(CUBE_FACES.values()):
+    for index, turn in enumerate(CUBE_FACES.values()):
         other = (here == index) & (there != index)
-        rays = source.rays(out[other, 0], out[other, 1]) @ rotation
+        rays = source.rays(out[other, 0], out[other, 1]) @ turn
         out[other] = source.face.pixels(rays) + np.array([index * source.height, 0])
     return out
 
 
-def _footprints(jacobian: Array, source: Lens) -> tuple[Array, Array]:
-    """Return the adaptive filter's steps from sample to sample, and how many samples each way.
-
-    A pixel is a mean over its area, in the source too, so what is missing to a target pixel that
-    spans s source pixels is a box of width √(s² − 1), by the variances. n samples at distance d
-    have the variance of a box of width d √(n² − 1), so that gives d; n is as small as the bicubic
-    kernel, under which d may exceed a pixel, allows. Where s is little above 1 or below it, one
-    sample is all: magnifying does not blur. A face of a cube map continues in its plane no further
-    than its own width.
-    """
-    span = np.hypot(jacobian[..., 0, :], jacobian[..., 1, :])
-    box = np.sqrt(np.maximum(span * span - 1, 0))
-    if isinstance(source, CubeMap):
-        box = np.minimum(box, source.height)
-    counts = np.where(box > 0.5, np.clip(np.ceil(0.75 * box), 2, _MOST_SAMPLES), 1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        scale = np.where(counts > 1, box / span / np.sqrt(counts * counts - 1), 0)
-    return (jacobian * scale[..., None, :]).astype(np.float32), counts.astype(np.uint16)
+def _widest(source: Lens) -> float:
+    """Return the widest box that a pixel may cover: a cube map's faces continue only so far."""
+    return float(source.height) if isinstance(source, CubeMap) else math.inf
 
 
-def _flags(points: Array, valid: Array, reach: Array) -> Array:
-    """Return NOTHING, INSIDE or CAREFUL for each of the ``points``."""
-    # Imported here because applying a map, which is most of the work, does without.
-    from scipy.ndimage import distance_transform_cdt
-
-    depth = distance_transform_cdt(np.pad(valid, 1), metric="chessboard")[1:-1, 1:-1]
-    flags = np.empty(points.shape[:2], np.uint8)
-    for rows in _strips(np.arange(len(points))):
-        strip = points[rows]
-        nothing = np.isnan(strip[..., 0])
-        row, column = (
-            np.minimum(np.where(nothing, 0, strip[..., axis]).astype(np.int32), limit - 1)
-            for axis, limit in ((1, valid.shape[0]), (0, valid.shape[1]))
-        )
-        inside = depth[row, column] > (reach[rows] if reach.ndim else reach)
-        flags[rows] = np.where(nothing, NOTHING, np.where(inside, INSIDE, CAREFUL))
-    return flags
-
-
-def _window(points: Array, source: Lens, reach: Array, wraps: bool) -> tuple[int, int, int, int]:
+def _window(areas: list[Any], source: Lens, wraps: bool) -> tuple[int, int, int, int]:
     """Return the rows and columns [row, end) × [column, end) that the filter may read.
 
     All columns if the source ``wraps`` around.
     """
-    if np.isnan(points[..., 0]).all():
+    found = np.array([area[:4] for area in areas])
+    low, high = found[:, :2].min(axis=0), found[:, 2:].max(axis=0)
+    if np.isinf(low).any():
         return 0, 1, 0, 1
-    margin = reach + 1
-    if margin.ndim:
-        low = np.nanmin(points - margin[..., None], axis=(0, 1))
-        high = np.nanmax(points + margin[..., None], axis=(0, 1))
-    else:
-        low = np.fmin.reduce(points, axis=(0, 1)) - margin
-        high = np.fmax.reduce(points, axis=(0, 1)) + margin
     size = np.array([source.width, source.height])
     left, top = (int(start) for start in np.clip(np.floor(low), 0, size - 1))
     right, bottom = (int(end) for end in np.clip(np.ceil(high), 1, size))

@@ -177,7 +177,7 @@ class Lens(ABC):
         """
         (array,) = _as_float(rays)
         pixels = self._pixels(np.atleast_2d(array)).astype(array.dtype, copy=False)
-        pixels[~np.isfinite(pixels).all(axis=-1)] = np.nan
+        pixels[~np.isfinite(pixels[..., 0] + pixels[..., 1])] = np.nan
         return pixels.reshape(*array.shape[:-1], 2)
 
     def pixel_rays(self, dtype: npt.DTypeLike = np.float64) -> Array:
@@ -291,7 +291,8 @@ class RadialLens(Lens):
     def _pixels(self, rays: Array) -> Array:
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             # Scaled by the largest component: no overflow, and NaN for a ray of zero or inf.
-            rays = rays / np.abs(rays).max(axis=-1, keepdims=True)
+            x, y, z = (np.abs(rays[..., axis]) for axis in range(3))
+            rays = rays / np.maximum(np.maximum(x, y), z)[..., None]
             side = np.hypot(rays[..., 0], rays[..., 1])
             length = np.hypot(side, rays[..., 2])
             r = self._radius(side / length, -rays[..., 2] / length)
