@@ -368,3 +368,73 @@ def test_thin_takes_an_even_subset_of_a_pose_file(tmp_path: Path) -> None:
 def test_thin_says_when_no_such_rig_is_small_enough(label: str) -> None:
     with pytest.raises(UserError, match="cannot have as few as 5 views"):
         RIGS[label][1].thinned(5)
+
+
+ORBITS = {
+    "hemisphere": {"type": "hemisphere", "count": 100, "elevation": [10, 80]},
+    "rings": {"type": "hemisphere", "count": 100, "elevation": [10, 80], "pattern": "rings"},
+    "ring": {"type": "ring", "count": 12, "elevation": -20},
+    "spiral": {"type": "spiral", "count": 50, "turns": 3, "elevation": [5, 75]},
+}
+
+
+@pytest.mark.parametrize("name", ORBITS)
+def test_orbits_look_at_the_middle_from_where_they_are_said_to_be(name):
+    settings = {**ORBITS[name], "size": 4, "center": [1, -2, 0.5]}
+    rig = rigs.from_settings(settings)
+    matrices = np.array([pose.matrix() for pose in rig.poses()])
+    assert len(matrices) == rig.view_count == settings["count"]
+    places = matrices[:, :3, 3] - (1, -2, 0.5)
+    np.testing.assert_allclose(np.linalg.norm(places, axis=1), 2, atol=1e-9)
+    np.testing.assert_allclose(-matrices[:, :3, 2] * 2, -places, atol=1e-9)
+    # Upright: +X is level, and +Y points up.
+    np.testing.assert_allclose(matrices[:, 2, 0], 0, atol=1e-9)
+    assert (matrices[:, 2, 1] > 0).all()
+    elevation = np.degrees(np.arcsin(places[:, 2] / 2))
+    low, high = np.broadcast_to(settings["elevation"], 2)
+    assert elevation.min() >= low - 1e-9 and elevation.max() <= high + 1e-9
+    thinner = rig.thinned(7)
+    assert len(thinner.poses()) == thinner.view_count == 7
+
+
+def test_a_hemisphere_is_evenly_covered():
+    for name in ("hemisphere", "rings"):
+        places = np.array([p.position for p in rigs.from_settings(ORBITS[name]).poses()]) * 2
+        apart = np.linalg.norm(places[:, None] - places, axis=-1)
+        np.fill_diagonal(apart, np.inf)
+        nearest = apart.min(axis=1)
+        area = 2 * math.pi * (math.sin(math.radians(80)) - math.sin(math.radians(10)))
+        even = math.sqrt(area / 100)
+        assert nearest.min() > 0.5 * even and nearest.max() < 1.6 * even, name
+
+
+def test_spiral_rises_evenly_round_and_round():
+    places = np.array([p.position for p in rigs.from_settings(ORBITS["spiral"]).poses()]) * 2
+    azimuth = np.unwrap(np.arctan2(places[:, 0], places[:, 1]))
+    np.testing.assert_allclose(np.diff(azimuth), 2 * math.pi * 3 / 49, atol=1e-9)
+    elevation = np.degrees(np.arcsin(places[:, 2]))
+    np.testing.assert_allclose(elevation, np.linspace(5, 75, 50), atol=1e-6)
+
+
+def test_every_rig_can_look_at_a_point():
+    target = np.array([0.2, 3.0, -1.0])
+    plane = {"type": "plane", "cameras": [3, 2], "size": 2, "look_at": target.tolist()}
+    for pose in rigs.from_settings(plane).poses():
+        matrix = pose.matrix()
+        toward = target - matrix[:3, 3]
+        np.testing.assert_allclose(-matrix[:3, 2], toward / np.linalg.norm(toward), atol=1e-9)
+    # Straight above and below there is no "up": +X stays the world's.
+    for height, up in ((5.0, 1.0), (-5.0, -1.0)):
+        one = {"type": "plane", "cameras": [1, 1], "center": [0, 0, height], "look_at": [0, 0, 0]}
+        (pose,) = rigs.from_settings(one).poses()
+        np.testing.assert_allclose(pose.matrix()[:3, 0], (1, 0, 0), atol=1e-9)
+        np.testing.assert_allclose(pose.matrix()[:3, 1], (0, up, 0), atol=1e-9)
+    with pytest.raises(UserError, match="a camera stands at"):
+        rigs.from_settings({**one, "look_at": one["center"]}).poses()
+    with pytest.raises(UserError, match="look_at: goes without face_inside"):
+        rigs.from_settings({**plane, "face_inside": True})
+
+
+def test_elevations_must_grow():
+    with pytest.raises(UserError, match="must have the smaller value first"):
+        rigs.from_settings({"type": "spiral", "count": 5, "elevation": [50, 10]})

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from lightfield.core.errors import UserError
+
 Floats = NDArray[np.float64]
 
 
@@ -47,3 +49,22 @@ def matrix_to_euler(matrix: Floats) -> Floats:
     first, second = angles(1.0), angles(-1.0)
     smaller = np.abs(second).sum(-1) < np.abs(first).sum(-1) - 1e-12
     return np.where((smaller & ~locked)[..., None], second, first)
+
+
+def looking_at(positions: Floats, target: Floats) -> Floats:
+    """Return the rotations (n, 3, 3) of cameras at ``positions`` (n, 3) that look at a point (3,).
+
+    +Y is as near to the world's +Z as can be; a camera straight above or below the point has its
+    +X along the world's +X. Raises `UserError` for a camera at the point itself.
+    """
+    back = positions - target
+    length = np.linalg.norm(back, axis=-1, keepdims=True)
+    if not (length > 0).all():
+        raise UserError(f"look_at: a camera stands at {target.tolist()}, so it cannot look there")
+    back = back / length
+    right = np.cross([0.0, 0.0, 1.0], back)
+    upright = np.linalg.norm(right, axis=-1) <= 1e-4
+    right[upright] = np.cross([0.0, 1.0, 0.0], back[upright]) * np.sign(back[upright, 2:])
+    right /= np.linalg.norm(right, axis=-1, keepdims=True)
+    matrices: Floats = np.stack([right, np.cross(back, right), back], axis=-1)
+    return matrices

@@ -14,11 +14,14 @@ from lightfield.core.settings import checked
 from lightfield.geometry.rigs.cuboid import Cuboid
 from lightfield.geometry.rigs.cylinder import Cylinder
 from lightfield.geometry.rigs.grid import Grid
+from lightfield.geometry.rigs.hemisphere import Hemisphere
 from lightfield.geometry.rigs.lattice import Lattice
 from lightfield.geometry.rigs.plane import Plane
 from lightfield.geometry.rigs.poses import Poses
 from lightfield.geometry.rigs.rig import Pose, Rig
+from lightfield.geometry.rigs.ring import Ring
 from lightfield.geometry.rigs.sphere import Sphere
+from lightfield.geometry.rigs.spiral import Spiral
 
 __all__ = [
     "AnyRig",
@@ -31,7 +34,8 @@ __all__ = [
 ]
 
 AnyRig = Annotated[
-    Plane | Cuboid | Cylinder | Sphere | Lattice | Poses, Field(discriminator="type")
+    Plane | Cuboid | Cylinder | Sphere | Lattice | Hemisphere | Ring | Spiral | Poses,
+    Field(discriminator="type"),
 ]
 _SETTINGS: TypeAdapter[Rig] = TypeAdapter(AnyRig, config=ConfigDict(defer_build=True))
 

@@ -17,7 +17,12 @@ from lightfield.core.errors import UserError
 from lightfield.core.settings import Settings, Vector, as_list
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.cube_map import CUBE_FACE_ANGLES
-from lightfield.geometry.rotations import Floats, euler_to_matrix, matrix_to_euler
+from lightfield.geometry.rotations import (
+    Floats,
+    euler_to_matrix,
+    looking_at,
+    matrix_to_euler,
+)
 
 Side = Annotated[float, Field(ge=0)]
 Size = TypeAliasType("Size", Side | Annotated[tuple[Side, Side, Side], as_list(3)])
@@ -105,6 +110,9 @@ class Rig(Settings):
         (0, 0, 0), description="Of the whole rig: XYZ Euler angles in degrees."
     )
     face_inside: bool = Field(False, description="Turn every camera round.")
+    look_at: Vector | None = Field(
+        None, description="Where every camera looks, in the world, metres; instead of its own view."
+    )
     cube_map: bool = Field(False, description="Six 90 degree views at each position.")
     frames: Frames | None = Field(
         None,
@@ -113,9 +121,14 @@ class Rig(Settings):
     evaluation_split: Literal["odd"] | None = Field(
         None, description="odd: the views with odd sequence numbers are for evaluation."
     )
-    # A scene YAML's rigs all have one; where a rig's places alone matter there may be none.
     # A scene YAML's rigs all have one; where the places alone matter there may be none.
     camera: CameraSettings = None  # type: ignore[assignment]
+
+    @model_validator(mode="after")
+    def _looks_one_way(self) -> Self:
+        if self.look_at is not None and (self.face_inside or self.cube_map):
+            raise ValueError("look_at: goes without face_inside and cube_map")
+        return self
 
     @property
     def positions(self) -> int:
@@ -180,7 +193,9 @@ class Rig(Settings):
         names, numbers, rotations = unit.names, unit.numbers, unit.rotations
         positions = self.to_world(unit.positions)
         turn = self.turn
-        if self.face_inside or self.cube_map or np.any(turn != np.eye(3)):
+        if self.look_at is not None:
+            rotations = matrix_to_euler(looking_at(positions, np.array(self.look_at, float)))
+        elif self.face_inside or self.cube_map or np.any(turn != np.eye(3)):
             matrices = turn @ euler_to_matrix(rotations)
             if self.face_inside:
                 matrices = matrices @ np.diag([-1.0, 1.0, -1.0])  # half a turn about its own up

@@ -1,0 +1,39 @@
+"""A hemisphere around an object: cameras spread evenly over elevations, looking at the middle."""
+
+import math
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from lightfield.geometry.rigs.orbit import Elevations, Orbit, heights, on_sphere
+from lightfield.geometry.rotations import Floats
+
+GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
+
+
+class Hemisphere(Orbit):
+    type: Literal["hemisphere"]
+    elevation: Elevations = Field(
+        (0.0, 90.0), description="Of the lowest and the highest camera, degrees."
+    )
+    pattern: Literal["fibonacci", "rings"] = Field(
+        "fibonacci", description="A spiral by the golden angle, or rings of equal spacing."
+    )
+
+    def directions(self) -> Floats:
+        low, high = heights(self.elevation)
+        if self.pattern == "fibonacci":
+            # Equal steps of height are equal areas. Source: Gonzalez 2010, "Measurement of areas on
+            # a sphere using Fibonacci and latitude-longitude lattices".
+            number = np.arange(self.count)
+            height = low + (high - low) * (number + 0.5) / self.count
+            return on_sphere(GOLDEN_ANGLE * number, height)
+        levels = [math.radians(angle) for angle in self.elevation]
+        rows = max(1, round(math.sqrt(self.count * (levels[1] - levels[0]) / (2 * math.pi))))
+        elevations = np.linspace(*levels, 2 * rows + 1)[1::2]
+        # As many cameras in each ring as its length asks for; rounding keeps their sum.
+        ends = np.round(self.count * np.cumsum(np.cos(elevations)) / np.cos(elevations).sum())
+        counts = np.diff(ends, prepend=0).astype(int)
+        azimuth = np.concatenate([2 * np.pi * np.arange(n) / n for n in counts if n])
+        return on_sphere(azimuth, np.repeat(np.sin(elevations), counts))

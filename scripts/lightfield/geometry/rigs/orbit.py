@@ -1,0 +1,63 @@
+"""What rigs around an object have in common: cameras on a sphere that look at its middle."""
+
+import math
+from abc import abstractmethod
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import AfterValidator, Field
+
+from lightfield.core.settings import as_list
+from lightfield.geometry.rigs.rig import Rig, UnitPoses, circle, stack
+from lightfield.geometry.rotations import Floats, looking_at, matrix_to_euler
+
+Elevation = Annotated[float, Field(ge=-90, le=90)]
+
+
+def _growing(limits: tuple[float, float]) -> tuple[float, float]:
+    if limits[0] > limits[1]:
+        raise ValueError(f"must have the smaller value first, not {list(limits)}")
+    return limits
+
+
+Elevations = Annotated[tuple[Elevation, Elevation], as_list(2), AfterValidator(_growing)]
+
+
+class Orbit(Rig):
+    """``size`` is the sphere's diameter; ``face_inside`` lets the cameras look outward."""
+
+    shape = "SPHERE"
+    is_round = True
+
+    count: int = Field(ge=1, le=100000, description="Cameras.")
+
+    @property
+    def positions(self) -> int:
+        return self.count
+
+    @abstractmethod
+    def directions(self) -> Floats:
+        """Return the cameras' places on the sphere of radius 1, (count, 3)."""
+
+    def unit_poses(self) -> UnitPoses:
+        places = self.directions() / 2
+        return UnitPoses.of_sides(("", places, matrix_to_euler(looking_at(places, np.zeros(3)))))
+
+    def _thinned_to(self, positions: int) -> Self | None:
+        return self.model_copy(update={"count": positions}) if positions else None
+
+    def unit_outline(self) -> list[Floats]:
+        cosine, sine = circle()
+        return [stack(cosine, sine, 0.0), stack(cosine, 0.0, sine), stack(0.0, cosine, sine)]
+
+
+def on_sphere(azimuth: Floats, height: Floats) -> Floats:
+    """Return points (n, 3) of the sphere of radius 1 at azimuths (radians) and heights (−1 to 1)."""
+    around = np.sqrt(np.maximum(1 - height**2, 0))
+    return stack(around * np.sin(azimuth), around * np.cos(azimuth), height)
+
+
+def heights(limits: tuple[float, float]) -> tuple[float, float]:
+    """Return the heights, on the sphere of radius 1, of two elevations in degrees."""
+    low, high = (math.sin(math.radians(angle)) for angle in limits)
+    return low, high

@@ -1,0 +1,19 @@
+"""A ring around an object: cameras at one elevation, evenly round it, looking at the middle."""
+
+import math
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from lightfield.geometry.rigs.orbit import Elevation, Orbit, on_sphere
+from lightfield.geometry.rotations import Floats
+
+
+class Ring(Orbit):
+    type: Literal["ring"]
+    elevation: Elevation = Field(0.0, description="Of every camera, degrees.")
+
+    def directions(self) -> Floats:
+        azimuth = 2 * np.pi * np.arange(self.count) / self.count
+        return on_sphere(azimuth, np.full(self.count, math.sin(math.radians(self.elevation))))

@@ -1,0 +1,22 @@
+"""A spiral around an object: cameras that rise while they go round it, looking at the middle."""
+
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from lightfield.geometry.rigs.orbit import Elevations, Orbit, on_sphere
+from lightfield.geometry.rotations import Floats
+
+
+class Spiral(Orbit):
+    type: Literal["spiral"]
+    turns: float = Field(2.0, gt=0, le=1000, description="Times round the object.")
+    elevation: Elevations = Field(
+        (0.0, 60.0), description="Of the first and the last camera, degrees."
+    )
+
+    def directions(self) -> Floats:
+        along = np.linspace(0, 1, self.count)
+        low, high = np.radians(self.elevation)
+        return on_sphere(2 * np.pi * self.turns * along, np.sin(low + (high - low) * along))
