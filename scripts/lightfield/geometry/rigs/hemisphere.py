@@ -29,9 +29,9 @@ class Hemisphere(Orbit):
             number = np.arange(self.count)
             height = low + (high - low) * (number + 0.5) / self.count
             return on_sphere(GOLDEN_ANGLE * number, height)
-        levels = [math.radians(angle) for angle in self.elevation]
-        rows = max(1, round(math.sqrt(self.count * (levels[1] - levels[0]) / (2 * math.pi))))
-        elevations = np.linspace(*levels, 2 * rows + 1)[1::2]
+        lowest, highest = np.radians(self.elevation)
+        rows = max(1, round(math.sqrt(self.count * (highest - lowest) / (2 * math.pi))))
+        elevations = np.linspace(lowest, highest, 2 * rows + 1)[1::2]
         # As many cameras in each ring as its length asks for; rounding keeps their sum.
         ends = np.round(self.count * np.cumsum(np.cos(elevations)) / np.cos(elevations).sum())
         counts = np.diff(ends, prepend=0).astype(int)

@@ -5,7 +5,7 @@ from abc import abstractmethod
 from typing import Annotated, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from lightfield.core.settings import as_list
 from lightfield.geometry.rigs.rig import Rig, UnitPoses, circle, stack
@@ -24,12 +24,18 @@ Elevations = Annotated[tuple[Elevation, Elevation], as_list(2), AfterValidator(_
 
 
 class Orbit(Rig):
-    """``size`` is the sphere's diameter; ``face_inside`` lets the cameras look outward."""
+    """``size`` is the sphere's diameter."""
 
     shape = "SPHERE"
     is_round = True
 
     count: int = Field(ge=1, le=100000, description="Cameras.")
+
+    @model_validator(mode="after")
+    def _faces_inside_already(self) -> Self:
+        if self.face_inside:
+            raise ValueError(f"face_inside: goes without type {self.type}, which looks inside")
+        return self
 
     @property
     def positions(self) -> int:
@@ -52,7 +58,7 @@ class Orbit(Rig):
 
 
 def on_sphere(azimuth: Floats, height: Floats) -> Floats:
-    """Return points (n, 3) of the sphere of radius 1 at azimuths (radians) and heights (−1 to 1)."""
+    """Return points (n, 3) of the sphere of radius 1 at azimuths in radians and heights."""
     around = np.sqrt(np.maximum(1 - height**2, 0))
     return stack(around * np.sin(azimuth), around * np.cos(azimuth), height)
 
