@@ -160,7 +160,7 @@ def test_a_scene_has_samples_or_a_target(tmp_path):
         "seed: 1": "render: is missing the key samples (or target_error)",
         "samples: 4, target_error: 0.1": "render.samples: goes without target_error",
         "denoise: true, target_error: 0.1": "render.denoise: goes without target_error",
-        "target_error: 0": "render.target_error: is 0; must be above 0",
+        "target_error: 0": "render.target_error: is 0; must be a number above 0",
         "target_eror: 0.1": "render.target_eror: unknown key; did you mean target_error?",
     }.items():
         with pytest.raises(UserError) as caught:

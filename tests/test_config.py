@@ -70,7 +70,7 @@ BROKEN = {
     "zero samples": (
         "render.samples",
         0,
-        "render.samples: is 0; must be at least 1",
+        "render.samples: is 0; must be a whole number at least 1",
     ),
     "misspelt key": ("render.sample", 4, "render.sample: unknown key; did you mean samples?"),
     "unknown key": ("render.xyzzy", 4, "render.xyzzy: unknown key; allowed here: samples, "),
@@ -94,7 +94,7 @@ BROKEN = {
     "too many subdivisions": (
         "rigs.LFSphere.subdivisions",
         12,
-        "rigs.LFSphere.subdivisions: is 12; must be at most 7",
+        "rigs.LFSphere.subdivisions: is 12; must be a whole number at most 7",
     ),
     "wrong placement": (
         "rigs.LFSphere.cameras",
@@ -106,14 +106,18 @@ BROKEN = {
         [3, 3],
         "rigs.LFCuboid.cameras: is [3, 3]; must be a list of 3 values",
     ),
-    "negative size": ("rigs.LFCuboid.size", -1, "rigs.LFCuboid.size: is -1; must be at least 0"),
+    "negative size": (
+        "rigs.LFCuboid.size",
+        -1,
+        "rigs.LFCuboid.size: is -1; must be a number at least 0",
+    ),
     "centre of two": ("rigs.LFCuboid.center", [0, 1], "rigs.LFCuboid.center: is [0, 1]; must be a"),
     "no rigs": ("rigs", {}, "rigs: is {}; must have at least 1 item"),
     "rig name": ("rigs", {"../out": RIGHT["rigs"]["LFSphere"]}, "rigs: '../out' is no name"),
     "fov beyond the lens": (
         "reprojections.perspective.camera",
         {"lens": "rectilinear", "fov": 180, "resolution": [9, 9]},
-        "reprojections.perspective.camera.fov: is 180; must be below 180",
+        "reprojections.perspective.camera.fov: is 180; must be a number below 180",
     ),
     "fisheye without fov": (
         "rigs.LFSphere.camera",
@@ -268,8 +272,8 @@ def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
             ["scenes=[garden, lone_monk]", "rigs=LFSphere_e100cm_d170cm"],
             "none of LFSphere_e100cm_d170cm is in lone_monk; it has ",
         ),
-        (["device=quantum"], "device: is \"quantum\"; must be 'auto', 'cpu', 'optix',"),
-        (["views_per_shard=0"], "views_per_shard: is 0; must be 'auto' or at least 1"),
+        (["device=quantum"], 'device: is "quantum"; must be auto, cpu, optix,'),
+        (["views_per_shard=0"], "views_per_shard: is 0; must be auto or a whole number at least 1"),
         (["results=."], "results: is '.'; must be a folder of its own"),
     ],
 )

@@ -57,7 +57,10 @@ def test_each_frame_is_a_dataset_in_the_rigs_folder(moving):
     [
         ({"frames": {"first": 3, "last": 2}}, "LFSequence.frames: first is 3; must be at most"),
         ({"frames": {"first": 1}}, "LFSequence.frames: is missing the key last"),
-        ({"frames": {"first": 1, "last": 2, "step": 0}}, "frames.step: is 0; must be at least 1"),
+        (
+            {"frames": {"first": 1, "last": 2, "step": 0}},
+            "frames.step: is 0; must be a whole number at least",
+        ),
         ({"frames": 3}, "LFSequence.frames: is 3; must be a mapping"),
     ],
 )

@@ -150,8 +150,12 @@ def _allowed(error: ErrorDetails) -> str:
             return f"be of the form {error['ctx']['pattern']}"
         case "list_type":
             return "be a list"
-    for bound, words in _BOUNDS.items():
-        if bound in error.get("ctx", {}):
-            return f"be {words} {error['ctx'][bound]:g}"
+        case "literal_error":
+            return f"be {error['ctx']['expected']}".replace("'", "")
+    for name, words in _BOUNDS.items():
+        if name in error.get("ctx", {}):
+            bound = error["ctx"][name]
+            kind = "a whole number" if isinstance(bound, int) else "a number"
+            return f"be {kind} {words} {bound:g}"
     text = re.sub(r"^\w+ should ", "", error["msg"])
     return re.sub(r" after validation, not .*", "", text)
