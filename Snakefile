@@ -1,11 +1,17 @@
 # Plenoforge: scene YAMLs in configs/scenes/ become light-field datasets in results/.
-
+from pathlib import Path
 
 # What the command line says; config.yaml fills in the rest.
 GIVEN = set(config)
 
 
-configfile: "config.yaml"
+# The defaults, and what a user's own folder says instead.
+configfile: f"{workflow.basedir}/config.yaml"
+
+
+if Path("config.yaml").exists():
+
+    configfile: "config.yaml"
 
 
 report: "report/workflow.rst"

@@ -9,7 +9,9 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-sys.path.insert(0, str(Path(workflow.basedir) / "scripts"))
+# From the folder that Snakemake works in, which may be a user's own.
+SCRIPTS = os.path.relpath(Path(workflow.current_basedir).parent / "scripts")
+sys.path.insert(0, os.path.abspath(SCRIPTS))
 # A prefix takes the place of Snakemake's own, whose strict mode keeps the exit status of a program
 # before `| tee`. The rules call `python`: let that be the one that runs Snakemake.
 shell.prefix(

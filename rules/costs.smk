@@ -33,7 +33,7 @@ rule costs:
     message:
         "Adding up what {wildcards.scene}/{wildcards.rig} has cost"
     shell:
-        "python scripts/costs.py --dataset {params.dataset} --journals {params.journals}"
+        "python {SCRIPTS}/costs.py --dataset {params.dataset} --journals {params.journals}"
         " --benchmarks {params.benchmarks} --scene-benchmarks {params.scene_benchmarks}"
         " --blend {input.blend:q} --energy {params.energy:q} --full {params.full:q}"
         " {params.reprojections} --output {output} 2>&1 | tee {log}"
@@ -52,5 +52,5 @@ rule status:
     message:
         "Looking how far the chosen datasets are"
     shell:
-        "python scripts/status.py --results {params.results} --work {params.work}"
+        "python {SCRIPTS}/status.py --results {params.results} --work {params.work}"
         " {params.datasets} 2>&1 | tee {log}"

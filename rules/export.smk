@@ -19,7 +19,7 @@ rule export_views_to_instant_ngp:
     message:
         "Exporting {wildcards.scene}/{wildcards.rig} for instant-ngp"
     shell:
-        "python scripts/export_instant_ngp.py --input-cfg {input.lightfield}"
+        "python {SCRIPTS}/export_instant_ngp.py --input-cfg {input.lightfield}"
         " --image-dir {params.views} --image-suffix .exr {params.placement} --output {output}"
         " 2>&1 | tee {log}"
 
@@ -42,7 +42,7 @@ rule export_reprojection_to_instant_ngp:
     message:
         "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection} for instant-ngp"
     shell:
-        "python scripts/export_instant_ngp.py --input-cfg {input.lightfield}"
+        "python {SCRIPTS}/export_instant_ngp.py --input-cfg {input.lightfield}"
         " --image-suffix {params.suffix} {params.placement} --output {output} 2>&1 | tee {log}"
 
 
@@ -71,5 +71,5 @@ rule export:
     message:
         "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for {wildcards.format}"
     shell:
-        "python scripts/export.py {wildcards.format} --dataset {params.dataset} {params.words}"
+        "python {SCRIPTS}/export.py {wildcards.format} --dataset {params.dataset} {params.words}"
         " --output {params.folder} 2>&1 | tee {log}"

@@ -18,7 +18,7 @@ rule rig_tables:
     message:
         "Tabulating the camera setups"
     shell:
-        "python scripts/rig_table.py {input} --markdown {params.table} --csv {params.figures}"
+        "python {SCRIPTS}/rig_table.py {input} --markdown {params.table} --csv {params.figures}"
         " 2>&1 | tee {log}"
 
 
@@ -43,7 +43,7 @@ rule probe:
     message:
         "Measuring what the views of {wildcards.scene}/{wildcards.rig} cost"
     shell:
-        "python scripts/probe.py --blend {input.blend:q} --inventory {input.inventory}"
+        "python {SCRIPTS}/probe.py --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} --device {params.device} --output {output}"
         " 2>&1 | tee {log}"
 
@@ -64,4 +64,4 @@ rule plan:
     message:
         "Adding up what the chosen datasets will take"
     shell:
-        "python scripts/plan.py {params.datasets} --output {params.table} 2>&1 | tee {log}"
+        "python {SCRIPTS}/plan.py {params.datasets} --output {params.table} 2>&1 | tee {log}"

@@ -20,7 +20,7 @@ rule reprojected_lightfield:
     message:
         "Writing the lens of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
-        "python scripts/reproject.py --dry-run {params.optics} {params.development}"
+        "python {SCRIPTS}/reproject.py --dry-run {params.optics} {params.development}"
         " --input-cfg {input} --output-cfg {output} --input-dir {params.views}"
         " --output-dir {params.folder} 2>&1 | tee {log}"
 
@@ -41,7 +41,7 @@ rule lens_map:
     message:
         "Computing the lens map of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
-        "python scripts/lens_map.py {output} {params.optics} --input-cfg {input} 2>&1 | tee {log}"
+        "python {SCRIPTS}/lens_map.py {output} {params.optics} --input-cfg {input} 2>&1 | tee {log}"
 
 
 rule reproject:
@@ -69,7 +69,7 @@ rule reproject:
         "Reprojecting views {wildcards.first} to {wildcards.end} of"
         " {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
-        "python scripts/reproject.py {params.optics} {params.development}"
+        "python {SCRIPTS}/reproject.py {params.optics} {params.development}"
         " --lens-map {input.lens_map} --input-cfg {input.lightfield} --input-dir {params.views}"
         " --views {wildcards.first}:{wildcards.end} --output-dir {params.folder}"
         " --record {output} 2>&1 | tee {log}"

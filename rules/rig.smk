@@ -24,7 +24,7 @@ rule lightfield:
     message:
         "Placing the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
-        "python scripts/make_lightfield.py --scene {params.name} --rig {wildcards.rig}"
+        "python {SCRIPTS}/make_lightfield.py --scene {params.name} --rig {wildcards.rig}"
         " --limits {params.limits:q} {params.calibration} --output {output} 2>&1 | tee {log}"
 
 
@@ -47,5 +47,5 @@ rule check_cameras:
     message:
         "Looking for cameras of {wildcards.scene}/{wildcards.rig} inside geometry"
     shell:
-        "python scripts/check_cameras.py --blend {input.blend:q} --lightfield {input.lightfield}"
+        "python {SCRIPTS}/check_cameras.py --blend {input.blend:q} --lightfield {input.lightfield}"
         " --output {output} 2>&1 | tee {log}"

@@ -23,7 +23,7 @@ rule build_scene:
     message:
         "Building the scene {wildcards.name}"
     shell:
-        "python scripts/build_scene.py --builder {params.builder}"
+        "python {SCRIPTS}/build_scene.py --builder {params.builder}"
         " --parameters {params.parameters:q} --output {output} 2>&1 | tee {log}"
 
 
@@ -44,7 +44,7 @@ rule check_blend:
     message:
         "Checking {input}"
     shell:
-        "python scripts/check_blend.py --scene {wildcards.name} --blend {input:q}"
+        "python {SCRIPTS}/check_blend.py --scene {wildcards.name} --blend {input:q}"
         " --output {output} 2>&1 | tee {log}"
 
 
@@ -66,7 +66,7 @@ rule inventory:
     message:
         "Listing what the scene {wildcards.name} contains"
     shell:
-        "python scripts/inventory.py --blend {input.blend:q} --output {output} 2>&1 | tee {log}"
+        "python {SCRIPTS}/inventory.py --blend {input.blend:q} --output {output} 2>&1 | tee {log}"
 
 
 # Only where a scene YAML says from where, and the user has not brought the file.
@@ -90,5 +90,5 @@ for name, dataset in SCENES.items():
         message:
             "Downloading {output}"
         shell:
-            "python scripts/fetch_blend.py --scene {params.name} --output {output:q}"
+            "python {SCRIPTS}/fetch_blend.py --scene {params.name} --output {output:q}"
             " 2>&1 | tee {log}"

@@ -26,7 +26,7 @@ rule validate:
     message:
         "Validating {wildcards.scene}/{wildcards.rig}"
     shell:
-        "python scripts/validate.py --dataset {params.dataset} {params.reprojections}"
+        "python {SCRIPTS}/validate.py --dataset {params.dataset} {params.reprojections}"
         " --records {input.records} --clearance {input.cameras} --processes {threads}"
         " --output {output.validation} --sums {output.sums} 2>&1 | tee {log}"
 
@@ -46,5 +46,5 @@ rule checksums:
     message:
         "Publishing the checksums of {wildcards.scene}/{wildcards.rig}"
     shell:
-        "python scripts/publish_checksums.py --validation {input.validation} --page {input.page}"
+        "python {SCRIPTS}/publish_checksums.py --validation {input.validation} --page {input.page}"
         " --sums {input.sums} --output {output} 2>&1 | tee {log}"

@@ -151,7 +151,7 @@ def test_a_server_that_is_not_there_is_told(tmp_path):
 @pytest.fixture
 def scene(tmp_path, monkeypatch):
     """Return a function that writes a scene YAML with a .blend where the library looks for it."""
-    monkeypatch.setattr(config, "ROOT", tmp_path)
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(config, "SCENES", tmp_path)
 
     def write(more="", blend="brought.blend"):

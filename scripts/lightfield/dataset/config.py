@@ -29,6 +29,8 @@ from lightfield.geometry.rigs.rig import Frame
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENES = ROOT / "configs" / "scenes"
+# A user's own, in the folder that Snakemake works in.
+OWN_SCENES = Path("configs", "scenes")
 BUILDERS = ROOT / "scripts" / "scenes"
 
 # Folders of a dataset that a reprojection may not take.
@@ -108,7 +110,7 @@ class Configuration(Settings):
             raise ValueError(f"preset: is {self.preset!r}; must be one of {known}")
         for key in ("results", "work"):
             folder = getattr(self, key)
-            if Path(folder).resolve() in (ROOT, *ROOT.parents):
+            if Path(folder).resolve() in (Path.cwd(), ROOT, *ROOT.parents):
                 raise ValueError(f"{key}: is {folder!r}; must be a folder of its own")
         return self
 
@@ -305,7 +307,7 @@ class Scene(Settings):
         camera = rig.camera
         if camera is None:
             raise ValueError(f"{key}: is missing the key camera")
-        if isinstance(rig, Poses) and not (ROOT / rig.file).is_file():
+        if isinstance(rig, Poses) and not Path(rig.file).is_file():
             raise ValueError(f"{key}.file: is {rig.file!r}; there is no such file")
         if not LENSES[camera.lens].in_cycles:
             known = ", ".join(name for name, lens in LENSES.items() if lens.in_cycles)
@@ -341,11 +343,19 @@ def load_config(content: Any, file: str = "config.yaml") -> Configuration:
 
 def load_scene(scene: str) -> Scene:
     """Read and check one scene YAML; raises `UserError` with file, key, value and what is right."""
-    path = SCENES / f"{scene}.yaml"
+    path = scene_path(scene)
     if not path.is_file():
-        known = ", ".join(sorted(file.stem for file in SCENES.glob("*.yaml")))
+        files = {*SCENES.glob("*.yaml"), *OWN_SCENES.glob("*.yaml")}
+        known = ", ".join(sorted({file.stem for file in files}))
         raise UserError(f"config.yaml: scenes: there is no scene {scene!r}; there are {known}")
     return read_scene(path)
+
+
+def scene_path(scene: str) -> Path:
+    """Return the scene YAML of a name: the user's own, or else the repository's."""
+    own = OWN_SCENES / f"{scene}.yaml"
+    repository = OWN_SCENES.resolve() == ROOT / OWN_SCENES
+    return own if own.is_file() and not repository else SCENES / own.name
 
 
 def read_scene(path: Path) -> Scene:
@@ -365,8 +375,8 @@ def blend_sha256(scene: str, source: Source) -> tuple[str | None, Path]:
     The second value is the file that says so, or that shall: the scene YAML or its lock file.
     """
     if source.sha256:
-        return source.sha256, SCENES / f"{scene}.yaml"
-    lock = SCENES / f"{scene}.lock.json"
+        return source.sha256, scene_path(scene)
+    lock = scene_path(scene).with_suffix(".lock.json")
     return (str(read_json(lock)["sha256"]) if lock.exists() else None), lock
 
 

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
-from lightfield.dataset.config import CHOSEN, ROOT, Configuration, Preset, Render, Source
+from lightfield.dataset.config import CHOSEN, Configuration, Preset, Render, Source
 from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
 from lightfield.dataset.keys import scene_fingerprint
 from lightfield.geometry.lenses import CameraSettings
@@ -392,10 +392,10 @@ def scene_datasets(
 def _check_presence(dataset: Dataset) -> None:
     """Check that the user's .blend is where the scene YAML says, or can be downloaded."""
     source = dataset.source
-    if source.blend and not source.url and not (ROOT / source.blend).is_file():
+    if source.blend and not source.url and not Path(source.blend).is_file():
         page = f"get it from {source.page} and " if source.page else ""
         raise UserError(
-            f"configs/scenes/{dataset.scene_name}.yaml: scene.blend: "
+            f"{config.OWN_SCENES}/{dataset.scene_name}.yaml: scene.blend: "
             f"there is no file {source.blend}; {page}put it there"
         )
 
@@ -412,7 +412,7 @@ def _frames(name: str, rig: Rig, frame: int) -> Iterator[tuple[str, int]]:
 def _limited_rig(rig: Rig, limits: Preset) -> Rig:
     """Return a rig of as many views at most, with a file of poses found from any folder."""
     if isinstance(rig, Poses):
-        rig = rig.model_copy(update={"file": str(ROOT / rig.file)})
+        rig = rig.model_copy(update={"file": str(Path(rig.file).resolve())})
     if limits.views:
         rig = rig.thinned(limits.views)
     return rig.model_copy(update={"camera": _limited(rig.camera, limits)})
