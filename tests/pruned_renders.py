@@ -13,7 +13,7 @@ import numpy as np
 
 import inventory
 from lightfield import blender, lenses, pruning, rigs
-from scenes import test_room
+from scenes import room
 
 RENDER = {"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0}
 FRAME = 7
@@ -154,7 +154,7 @@ def main():
     for make in (plain, left_behind, animated, blurred, features):
         path = folder / f"{make.__name__}.blend"
         blender.new_scene()
-        test_room.build({})
+        room.build({})
         make()
         blender.save_scene(path)
         blender.open_scene(path)

@@ -12,7 +12,7 @@ from lightfield import config
 from lightfield.errors import UserError
 
 RIGHT = {
-    "scene": {"builder": "test_room"},
+    "scene": {"builder": "room"},
     "render": {"samples": 64},
     "rigs": {
         "LFSphere": {

@@ -348,8 +348,9 @@ def _check_camera(key: str, camera: Mapping[str, Any], fail: _Fail) -> None:
 
 
 def builders() -> list[str]:
-    """Names of the scene builders in scripts/scenes/."""
-    return sorted(file.stem for file in BUILDERS.glob("[a-z]*.py") if file.stem != "common")
+    """Names of the scene builders, the folders of scripts/scenes/ that are not their library."""
+    folders = (file.parent.name for file in BUILDERS.glob("*/__init__.py"))
+    return sorted(name for name in folders if name != "library")
 
 
 def _sees_behind(camera: Mapping[str, Any]) -> bool:

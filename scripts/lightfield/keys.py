@@ -22,12 +22,17 @@ def scene_fingerprint(source: Mapping[str, Any]) -> str:
 
     A .blend is identified by its bytes; raises KeyError while their SHA-256 is not known. A built
     one differs from build to build (it holds memory addresses), so it is identified by the
-    builder's text, its parameters, and bpy's version.
+    text of the builder and of the library that all builders share, its parameters, and bpy's
+    version.
     """
     if "blend" in source:
         return str(source["sha256"])
-    texts = [(BUILDERS / f"{name}.py").read_bytes() for name in ("common", source["builder"])]
-    return _digest([*map(_hash, texts), source["parameters"], version("bpy")])
+    files = [
+        [file.relative_to(BUILDERS).as_posix(), _hash(file.read_bytes())]
+        for folder in ("library", source["builder"])
+        for file in sorted((BUILDERS / folder).rglob("*.py"))
+    ]
+    return _digest([files, source["parameters"], version("bpy")])
 
 
 def render_key(lightfield: Mapping[str, Any], frame: Mapping[str, Any]) -> str:

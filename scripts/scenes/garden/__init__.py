@@ -33,7 +33,6 @@ from scenes.common import (
     place,
     plain,
     point_light,
-    prism,
     random_stream,
     scatter,
     sheet,
@@ -42,6 +41,9 @@ from scenes.common import (
     transform,
     tube,
 )
+from scenes.garden.lanterns import floor_lanterns, paper_globes, stone_lanterns
+from scenes.garden.materials import palette
+from scenes.library.scene import Scene
 
 TAU = 2 * np.pi
 
@@ -106,6 +108,7 @@ class Recipe:
 def build(parameters: Mapping[str, Any]) -> None:
     """Fill the empty scene. parameters: `seed` (int), `detail` (1.0 is the full garden)."""
     recipe = Recipe(int(parameters["seed"]), float(parameters["detail"]))
+    scene = Scene(recipe.seed, recipe.detail, palette())
     sky()
     stones = flagstone_layout(recipe)
     terrain(recipe)
@@ -115,8 +118,9 @@ def build(parameters: Mapping[str, Any]) -> None:
     statue(recipe)
     mirror(recipe)
     rocks(recipe)
-    stone_lanterns(recipe)
-    paper_lanterns(recipe)
+    stone_lanterns(scene)
+    paper_globes(scene)
+    floor_lanterns(scene)
     fire(recipe)
     candles(recipe)
     pond(recipe)
@@ -751,128 +755,6 @@ def rocks(recipe: Recipe) -> None:
     )
     places += standing(random, spots, (0.4, 1.5), -0.05)
     scatter("Rock", meshes, places)
-
-
-def paper_material(name: str, tint: Color) -> bpy.types.Material:
-    """Washi paper: half of the light that falls on it comes out at the other side."""
-    made, graph = material(name)
-    fibres = graph.noise(graph.coordinates(), 45.0, 4.0, 0.7, 1.0)
-    color = graph.mix(graph.span(fibres, 0.0, 0.35, 0.4, 0.7), tint, tuple(0.72 * c for c in tint))
-    front = graph.add("ShaderNodeBsdfDiffuse", {"Color": color})
-    through = graph.add("ShaderNodeBsdfTranslucent", {"Color": color})
-    return finish(made, graph, graph.add("ShaderNodeMixShader", {0: 0.55, 1: front, 2: through}))
-
-
-def hexagon(radius: float) -> Array:
-    angle = np.arange(6) * TAU / 6
-    return radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-
-
-def stone_lantern_parts(recipe: Recipe) -> tuple[Shape, Shape]:
-    """A Kasuga lantern, 1.75 m high: its stone, and the six paper panes of its fire box."""
-    stack = [
-        prism(hexagon(0.36), 0.12),
-        lathe([(0.27, 0.12), (0.27, 0.17), (0.18, 0.24), (0.14, 0.27)], 6),
-        lathe(
-            [(0.12, 0.26), (0.115, 0.5), (0.14, 0.53), (0.14, 0.57), (0.115, 0.6), (0.12, 0.86)],
-            recipe.steps(32, 8),
-        ),
-        lathe([(0.13, 0.85), (0.19, 0.9), (0.31, 0.97), (0.31, 1.04), (0.27, 1.05)], 6),
-    ]
-    for x, y in hexagon(0.215):
-        stack.append(box((0.05, 0.05, 0.34), 0.008, 1).moved(x, y, 1.21))
-    stack.append(prism(hexagon(0.25), 0.04).moved(0, 0, 1.36))
-    u = np.linspace(0, 1, recipe.steps(14, 4))
-    angle = np.arange(6 * 8) * TAU / 48
-    side = np.cos(TAU / 12) / np.cos((angle % (TAU / 6)) - TAU / 12)
-    corner = np.clip((side - 0.866) / 0.134, 0, 1) ** 3
-    reach = 0.45 - 0.36 * u**0.72
-    roof = np.empty((len(u), len(angle), 3))
-    roof[..., :2] = reach[:, None, None] * (
-        side[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    )
-    roof[..., 2] = 1.42 + 0.22 * u[:, None] ** 1.3 + 0.09 * corner * (1 - u[:, None]) ** 2
-    under = roof[:1] * (0.45, 0.45, 1) + (0, 0, -0.03)
-    lip = roof[:1] - np.array([0, 0, 0.045])
-    stack.append(sheet(np.concatenate([under, lip, roof]), closed=True))
-    knob = [(0.09, 1.63), (0.12, 1.66), (0.05, 1.69), (0.085, 1.75), (0.075, 1.8), (0.0, 1.88)]
-    stack.append(lathe(knob, recipe.steps(24, 8)))
-    corners = hexagon(0.205)
-    panes = [
-        sheet(np.array([[(*a, 1.05), (*b, 1.05)], [(*a, 1.37), (*b, 1.37)]]))
-        for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)
-    ]
-    return join(stack), join(panes)
-
-
-def stone_lanterns(recipe: Recipe) -> None:
-    """Stone lanterns with paper panes, a light in each."""
-    stone, panes = stone_lantern_parts(recipe)
-    granite = granite_material("Lantern granite", (0.25, 0.24, 0.225), 0.55)
-    stone_mesh = mesh("Lantern stone", stone, granite, smooth=0.6)
-    pane_mesh = mesh(
-        "Lantern panes", panes, paper_material("Pane paper", (0.86, 0.80, 0.66)), smooth=False
-    )
-    for i, (x, y, size) in enumerate(STONE_LANTERNS):
-        z = float(ground_height(np.array(x), np.array(y))) - 0.03
-        spot = transform((x, y, z), (0, 0, 0.4 * i), size)
-        place(f"Lantern stone.{i}", stone_mesh, spot)
-        place(f"Lantern panes.{i}", pane_mesh, spot)
-        point_light(f"Lantern light.{i}", (x, y, z + 1.2 * size), 14.0, CANDLE_COLOR, 0.06)
-
-
-def paper_lanterns(recipe: Recipe) -> None:
-    """A string of paper globes across the path, and two framed floor lanterns beside it."""
-    wood = wood_material()
-    globes = [
-        mesh(f"Globe.{i}", globe(recipe), paper_material(f"Globe paper.{i}", tint))
-        for i, tint in enumerate(((0.88, 0.82, 0.68), (0.78, 0.12, 0.06)))
-    ]
-    ends = np.array([(-1.35, -4.35, 2.55), (2.3, -4.5, 2.6)])
-    t = np.linspace(0, 1, 25)[:, None]
-    rope = ends[0] + t * (ends[1] - ends[0]) - (0, 0, 1.4) * t * (1 - t)
-    dark = plain("Rope", (0.05, 0.04, 0.03), Roughness=0.9)
-    add("Lantern rope", tube(rope, 0.006, 5), dark)
-    for i, (x, y, z) in enumerate(ends):
-        add(
-            f"Lantern pole.{i}", tube([(x, y, -0.1), (x, y, 1.0), (x, y, z + 0.08)], 0.03, 12), wood
-        )
-    for i, k in enumerate((4, 9, 14, 19)):
-        x, y, z = rope[k] - (0, 0, 0.26)
-        place(f"Globe.{i}", globes[i % 2], transform((x, y, z), (0, 0, i)))
-        point_light(f"Globe light.{i}", (x, y, z), 9.0, CANDLE_COLOR, 0.05)
-    width, height = 0.13, 0.52
-    bars = [
-        box((0.022, 0.022, height), 0.004, 1).moved(sx * width, sy * width, height / 2)
-        for sx in (-1, 1)
-        for sy in (-1, 1)
-    ]
-    for z in (0.09, 0.3, height - 0.02):
-        bars += [box((2 * width, 0.016, 0.016)).moved(0, s * width, z) for s in (-1, 1)]
-        bars += [box((0.016, 2 * width, 0.016)).moved(s * width, 0, z) for s in (-1, 1)]
-    frame = mesh("Floor lantern frame", join(bars), wood, smooth=False)
-    w, low, high = width - 0.006, 0.09, height - 0.02
-    ring = np.array([(-w, -w), (w, -w), (w, w), (-w, w)])
-    rows = np.stack([np.column_stack([ring, np.full(4, z)]) for z in (low, high)])
-    panes = mesh(
-        "Floor lantern paper",
-        sheet(rows, closed=True),
-        paper_material("Floor lantern paper", (0.88, 0.80, 0.64)),
-        smooth=False,
-    )
-    for i, (x, y) in enumerate(FLOOR_LANTERNS):
-        spot = transform((x, y, 0.0), (0, 0, 0.2 + i))
-        place(f"Floor lantern frame.{i}", frame, spot)
-        place(f"Floor lantern paper.{i}", panes, spot)
-        point_light(f"Floor lantern light.{i}", (x, y, 0.24), 5.0, CANDLE_COLOR, 0.04)
-
-
-def globe(recipe: Recipe) -> Shape:
-    """A paper globe on hoops of bamboo, 0.4 m across, open above and below."""
-    t = np.linspace(0.12, np.pi - 0.12, recipe.steps(90, 12))
-    radius = 0.20 * np.sin(t) ** 0.8 * (1 - 0.03 * np.abs(np.sin(t * 9)))
-    profile = np.column_stack([radius, -0.19 * np.cos(t)])
-    return lathe(profile, recipe.steps(40, 8), capped=False)
 
 
 # --- Fire and candles -----------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""A small closed room with a few plain shapes: renders in no time, and tests know every wall."""
+"""The small scene of the smoke build: a closed room of plain shapes, rendered in no time."""
 
 import math
 from collections.abc import Mapping

@@ -1,0 +1,130 @@
+"""Where things are in the garden: the court, the pond, the path, and the height of the ground.
+
+The rigs stand in the middle of the court: no geometry comes near x, y in ±1 m, z in 0.5 … 1.5 m.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import ArrayLike
+
+from scenes.library.nodes import Color
+from scenes.library.noise import noise, smoothstep
+from scenes.library.objects import transform
+from scenes.library.points import Array, polar, xyz
+from scenes.library.shapes import frames
+
+TAU = 2 * np.pi
+
+COURT = (-2.7, -3.8, 4.3, 4.9)  # of raked gravel: a rectangle x0, y0, x1, y1
+POND_CENTER, POND_RADIUS, WATER_LEVEL = np.array([-5.5, 0.6]), 2.3, -0.07
+STATUE = (0.0, 3.75)
+FIRE = (3.1, 1.1)
+TORII = (0.2, -8.5)
+MAPLE = (-2.05, -3.0)
+ROCK_ISLANDS = ((2.75, -2.05, 0.75), (-1.85, 2.55, 0.5))  # x, y, radius
+STONE_LANTERNS = ((4.95, 3.1, 1.0), (-1.3, -5.2, 1.1), (-4.6, 4.2, 0.9))  # x, y, scale
+CANDLE_COLOR: Color = (1.0, 0.55, 0.22)  # of the lamps in lanterns and beside candles
+SUN_AZIMUTH, SUN_ELEVATION = np.radians(-174.0), np.radians(35.0)
+
+
+def pond_distance(x: ArrayLike, y: ArrayLike) -> Array:
+    """Distance outside the pond's shore, negative within (about, in metres)."""
+    dx, dy = x - POND_CENTER[0], (y - POND_CENTER[1]) * 0.8
+    angle = np.arctan2(dy, dx)
+    shore = 1 + 0.13 * np.sin(2 * angle + 1.0) + 0.07 * np.sin(3 * angle) + 0.03 * np.sin(7 * angle)
+    return np.hypot(dx, dy) - POND_RADIUS * shore
+
+
+def pond_shore(angle: Array) -> Array:
+    """The pond's outline (n, 2) where `pond_distance` is 0, by angle."""
+    reach = np.full(len(angle), POND_RADIUS)
+    for _ in range(30):
+        points = POND_CENTER + polar(reach, angle)[:, :2]
+        reach = reach - 0.7 * pond_distance(*points.T)
+    return points
+
+
+def court_distance(x: ArrayLike, y: ArrayLike) -> Array:
+    """Distance outside the court's rectangle, negative within."""
+    x0, y0, x1, y1 = COURT
+    dx, dy = np.maximum(x0 - x, x - x1), np.maximum(y0 - y, y - y1)
+    return np.hypot(np.maximum(dx, 0), np.maximum(dy, 0)) + np.minimum(np.maximum(dx, dy), 0)
+
+
+def path_distance(x: ArrayLike, y: ArrayLike) -> Array:
+    """Distance from the middle of the path that leads from the court to the torii and beyond."""
+    middle = TORII[0] * smoothstep(-4.0, -8.0, y) + 0.15 * np.sin(y)
+    return np.where(y < -3.5, np.abs(x - middle), np.hypot(x - middle, y + 3.5))
+
+
+def ground_height(x: ArrayLike, y: ArrayLike) -> Array:
+    """Height of the terrain: flat by the court, mossy mounds around, hills far off."""
+    flat = xyz(x, y)
+    distance = np.hypot(x, y)
+    away = np.minimum(court_distance(x, y), path_distance(x, y) - 0.6)
+    mounds = 0.30 * (noise(flat / 3.1, 11, 2) + 0.45) * smoothstep(0.1, 2.2, away)
+    hills = 2.5 * (noise(flat / 23.0, 12, 2) + 0.3) * smoothstep(9.0, 40.0, distance)
+    height = mounds + hills + 7.0 * smoothstep(25.0, 170.0, distance)
+    shore = pond_distance(x, y)
+    height = WATER_LEVEL + 0.06 + (height - WATER_LEVEL - 0.06) * smoothstep(0.0, 1.3, shore)
+    height -= 0.6 * smoothstep(0.05, -0.9, shore)
+    return np.where(court_distance(x, y) < 0.02, -0.08, height)
+
+
+def clear_of_things(x: Array, y: Array, margin: float) -> Array:
+    """Whether points keep away from what stands in the moss: lanterns, maple, torii's posts."""
+    things = [(lx, ly) for lx, ly, _ in STONE_LANTERNS]
+    things += [MAPLE, (TORII[0] - 1.5, TORII[1]), (TORII[0] + 1.5, TORII[1])]
+    return np.min([np.hypot(x - tx, y - ty) for tx, ty in things], axis=0) > margin
+
+
+def spread(
+    random: np.random.Generator,
+    count: int,
+    corners: tuple[float, float, float, float],
+    spacing: float,
+    allowed: Callable[[Array, Array], Array],
+) -> Array:
+    """Up to `count` points (n, 2) in a rectangle, at least `spacing` apart, where allowed."""
+    chosen = np.empty((0, 2))
+    for _ in range(12):
+        tries = random.uniform(corners[:2], corners[2:], (count, 2))
+        for point in tries[allowed(*tries.T)]:
+            if len(chosen) < count and (np.hypot(*(chosen - point).T) >= spacing).all():
+                chosen = np.vstack([chosen, point])
+    return chosen
+
+
+def standing(
+    random: np.random.Generator,
+    spots: Array,
+    scale: tuple[float, float],
+    sink: float = 0.0,
+    tilt: float = 0.0,
+) -> list[Matrix]:
+    """Upright places on the ground at spots (n, 2), each turned and scaled at random."""
+    matrices = []
+    for (x, y), z in zip(spots, ground_height(*spots.T), strict=True):
+        size = random.uniform(*scale)
+        rotation = (*random.normal(0, tilt, 2), random.uniform(0, TAU))
+        matrices.append(transform((x, y, z - sink * size), rotation, size))
+    return matrices
+
+
+def lying(random: np.random.Generator, spots: Array, scale: tuple[float, float]) -> list[Matrix]:
+    """Places on the ground at spots (n, 2) that follow its slope, turned and scaled at random."""
+    x, y = spots.T
+    step = 0.25
+    slope_x = (ground_height(x + step, y) - ground_height(x - step, y)) / (2 * step)
+    slope_y = (ground_height(x, y + step) - ground_height(x, y - step)) / (2 * step)
+    forward = polar(1, random.uniform(0, TAU, len(spots)))
+    forward[:, 2] = slope_x * forward[:, 0] + slope_y * forward[:, 1]
+    matrices = []
+    for turn, at in zip(
+        frames(forward, xyz(-slope_x, -slope_y, 1)), xyz(x, y, ground_height(x, y)), strict=True
+    ):
+        size = Matrix.Scale(random.uniform(*scale), 4)
+        matrices.append(Matrix.Translation(at) @ Matrix(turn.tolist()).to_4x4() @ size)
+    return matrices
