@@ -5,12 +5,18 @@ import bpy
 from scenes.library import materials
 from scenes.library.materials import bark, foliage, metal, plain, thin, wood
 from scenes.library.nodes import Color, MaterialGraph
+from scenes.library.objects import animate
 
 
 def palette() -> dict[str, bpy.types.Material]:
-    """Every material of the garden but those of the flames; colours are linear."""
+    """Every material of the garden; colours are linear."""
     return materials.by_name(
         [
+            *(moss(), gravel(), wet_stone(), mountain(), fog(), bronze(), vermilion()),
+            *(water(), koi(), bamboo_culm(), embers(), wax(), candle_flame()),
+            flame_gas("Flame gas 0", (1.0, 0.20, 0.025), 6.0),
+            flame_gas("Flame gas 1", (1.0, 0.34, 0.05), 7.0),
+            flame_gas("Flame gas 2", (1.0, 0.52, 0.14), 12.0),
             granite("Kerb granite", (0.23, 0.22, 0.20), 0.35),
             granite("Plinth granite", (0.30, 0.29, 0.275), 0.15),
             granite("Lantern granite", (0.25, 0.24, 0.225), 0.55),
@@ -76,3 +82,190 @@ def paper(name: str, tint: Color) -> bpy.types.Material:
     thick = tuple(0.72 * c for c in tint)
     color = graph.mix(graph.span(fibres, 0.0, 0.35, 0.4, 0.7), tint, thick)
     return graph.finish(thin(graph, color, 0.55))
+
+
+# --- The ground -----------------------------------------------------------------------------------
+
+
+def moss() -> bpy.types.Material:
+    graph = MaterialGraph("Moss")
+    where = graph.coordinates()
+    fine = graph.noise(where, 28.0, 3.0, 0.7)
+    broad = graph.math("MULTIPLY", graph.noise(where, 0.35, 3.0), 0.6)
+    green, bright, dry = (0.045, 0.085, 0.013), (0.095, 0.120, 0.022), (0.110, 0.085, 0.036)
+    stops = [(0.30, (0.016, 0.032, 0.006)), (0.48, green), (0.62, bright), (0.75, dry)]
+    tint = graph.ramp(graph.math("MULTIPLY_ADD", fine, 0.4, broad), stops)
+    surface = graph.diffuse(tint, graph.bump(fine, 0.03))
+    return graph.finish(graph.plain_when_diffuse(surface, (0.065, 0.085, 0.018)))
+
+
+def gravel() -> bpy.types.Material:
+    """Grains of four greys, dark between them."""
+    graph = MaterialGraph("Gravel")
+    grains = graph.voronoi(graph.coordinates(), 130.0)
+    greys = [(0.0, (0.20, 0.185, 0.165)), (0.4, (0.36, 0.345, 0.315))]
+    greys += [(0.8, (0.47, 0.45, 0.41)), (1.0, (0.62, 0.60, 0.56))]
+    tint = graph.ramp(graph.xyz(grains.outputs["Color"])[0], greys)
+    shade = graph.span(grains.outputs["Distance"], 1.0, 0.45, 0.25, 0.75)
+    height = graph.math("SUBTRACT", 1.0, grains.outputs["Distance"])
+    surface = graph.diffuse(graph.mix(1.0, tint, shade, "MULTIPLY"), graph.bump(height, 0.006))
+    return graph.finish(graph.plain_when_diffuse(surface, (0.36, 0.34, 0.31)))
+
+
+def wet_stone() -> bpy.types.Material:
+    """Dark veined stone, a mirror where it is wet."""
+    graph = MaterialGraph("Wet stone")
+    where = graph.coordinates()
+    grain = graph.noise(where, 60.0, 2.0, 0.7)
+    veins = graph.noise(where, 3.2, 5.0, 0.65, 0.8)
+    wet = graph.span(graph.noise(where, 2.1, 2.0), 0.0, 1.0, 0.44, 0.56)
+    greys = [(0.3, (0.075, 0.08, 0.085)), (0.52, (0.13, 0.13, 0.125)), (0.6, (0.2, 0.19, 0.17))]
+    dry = graph.ramp(veins, greys)
+    surface = graph.principled(
+        Base_Color=graph.mix(wet, dry, graph.mix(1.0, dry, (0.42, 0.42, 0.45), "MULTIPLY")),
+        Roughness=graph.math("MULTIPLY_ADD", grain, 0.12, graph.span(wet, 0.34, 0.07)),
+        IOR=1.6,
+        Normal=graph.bump(grain, 0.0012),
+    )
+    return graph.finish(graph.plain_when_diffuse(surface, (0.09, 0.09, 0.09)))
+
+
+def mountain() -> bpy.types.Material:
+    """Forest, rock where it is steep, snow on the tops."""
+    graph = MaterialGraph("Mountain")
+    where = graph.coordinates()
+    forest = graph.noise(where, 0.16, 6.0, 0.75)
+    normal = graph.add("ShaderNodeNewGeometry").outputs["Normal"]
+    level = graph.math("MULTIPLY_ADD", forest, 0.5, graph.xyz(normal)["Z"])
+    greens = [
+        (0.35, (0.020, 0.045, 0.026)),
+        (0.52, (0.045, 0.075, 0.030)),
+        (0.68, (0.12, 0.10, 0.04)),
+    ]
+    trees = graph.ramp(forest, greens)
+    color = graph.mix(graph.span(level, 0.0, 1.0, 0.75, 1.0), (0.16, 0.16, 0.17), trees)
+    high = graph.math("MULTIPLY_ADD", forest, 30.0, graph.xyz(where)["Z"])
+    color = graph.mix(graph.span(high, 0.0, 1.0, 132.0, 146.0), color, (0.75, 0.78, 0.82))
+    return graph.finish(graph.diffuse(color))
+
+
+def fog() -> bpy.types.Material:
+    """Fog that glows with the light it would scatter to the viewer: no noise, hardly any cost."""
+    graph = MaterialGraph("Fog")
+    density = 0.012  # part of the light lost a metre
+    absorption = {"Color": (0.0, 0.0, 0.0), "Density": density}
+    veil = graph.add("ShaderNodeVolumeAbsorption", absorption)
+    glow = graph.emission((0.62, 0.60, 0.62), density)
+    return graph.finish(volume=graph.add("ShaderNodeAddShader", {0: veil, 1: glow}))
+
+
+# --- Things ---------------------------------------------------------------------------------------
+
+
+def bronze() -> bpy.types.Material:
+    """Rough metal: worn bronze with patina, brushed in changing directions."""
+    graph = MaterialGraph("Rough bronze")
+    where = graph.coordinates()
+    broad = graph.noise(where, 2.6, 5.0, 0.6)
+    fine = graph.noise(where, 26.0, 5.0, 0.7)
+    brushed = graph.noise(graph.coordinates("Object", (4.0, 4.0, 160.0)), 1.0, 2.0)
+    patina = graph.span(graph.math("MULTIPLY_ADD", fine, 0.5, broad), 0.0, 1.0, 0.72, 0.95)
+    metal_tint = graph.ramp(fine, [(0.3, (0.36, 0.20, 0.09)), (0.7, (0.62, 0.40, 0.19))])
+    worn = graph.math("MULTIPLY_ADD", fine, 0.16, graph.span(broad, 0.16, 0.46, 0.3, 0.7))
+    surface = graph.principled(
+        Base_Color=graph.mix(patina, metal_tint, (0.10, 0.19, 0.16)),
+        Metallic=graph.span(patina, 1.0, 0.15),
+        Roughness=graph.math("MULTIPLY_ADD", patina, 0.3, worn),
+        Anisotropic=0.6,
+        Anisotropic_Rotation=graph.noise(where, 1.3, 2.0),
+        Normal=graph.bump(graph.math("MULTIPLY_ADD", brushed, 0.25, fine), 0.003),
+    )
+    return graph.finish(surface)
+
+
+def vermilion() -> bpy.types.Material:
+    """Weathered red paint."""
+    graph = MaterialGraph("Vermilion")
+    worn = graph.noise(graph.coordinates("Object", (3.0, 3.0, 0.6)), 2.0, 5.0, 0.7)
+    reds = [(0.35, (0.20, 0.028, 0.010)), (0.6, (0.46, 0.060, 0.018)), (0.75, (0.52, 0.10, 0.04))]
+    tint, normal = graph.ramp(worn, reds), graph.bump(worn, 0.004)
+    return graph.finish(graph.principled(Base_Color=tint, Roughness=0.45, Normal=normal))
+
+
+def water() -> bpy.types.Material:
+    """Clear water, whose ripples run on with the frames; light passes straight into it."""
+    graph = MaterialGraph("Water")
+    where = graph.add("ShaderNodeTexCoord").outputs["Object"]
+    drift = graph.add("ShaderNodeMapping", {"Vector": where, "Scale": (1.0, 1.6, 1.0)})
+    animate(drift.inputs["Location"], "default_value", 0.012, 0)
+    ripples = graph.noise(drift, 5.0, 3.0, 0.55, 0.0, 0.0)
+    animate(ripples.node.inputs["W"], "default_value", 0.04)
+    normal = graph.bump(ripples, 0.045)
+    reflected = graph.add("ShaderNodeFresnel", {"IOR": 1.33, "Normal": normal})
+    clear = graph.add("ShaderNodeBsdfTransparent", {"Color": (0.62, 0.74, 0.66)})
+    gloss = {"Color": (1.0, 1.0, 1.0), "Roughness": 0.02, "Normal": normal}
+    shine = graph.add("ShaderNodeBsdfAnisotropic", gloss)
+    return graph.finish(graph.mix_shaders(reflected, clear, shine))
+
+
+def koi() -> bpy.types.Material:
+    """White, with patches of orange, red and black that differ from fish to fish."""
+    graph = MaterialGraph("Koi")
+    patches = graph.noise(graph.coordinates(), 5.0, 2.0)
+    white, orange, red = (0.85, 0.80, 0.72), (0.90, 0.22, 0.03), (0.80, 0.10, 0.02)
+    stops = [(0.50, white), (0.56, orange), (0.72, red), (0.76, (0.03, 0.03, 0.03))]
+    tint = graph.ramp(graph.math("MULTIPLY_ADD", graph.object_random(), 0.22, patches), stops)
+    return graph.finish(graph.principled(Base_Color=tint, Roughness=0.3))
+
+
+def bamboo_culm() -> bpy.types.Material:
+    """Green or yellow by culm, paler in long streaks."""
+    graph = MaterialGraph("Bamboo culm")
+    along = graph.noise(graph.coordinates("Object", (6.0, 6.0, 0.8)), 1.0, 4.0)
+    tint = graph.mix(graph.object_random(), (0.10, 0.16, 0.035), (0.24, 0.23, 0.06))
+    tint = graph.mix(graph.span(along, 0.0, 0.6, 0.4, 0.7), tint, (0.26, 0.22, 0.10))
+    return graph.finish(graph.principled(Base_Color=tint, Roughness=0.35))
+
+
+# --- What glows -----------------------------------------------------------------------------------
+
+
+def flame_gas(name: str, color: Color, glow: float) -> bpy.types.Material:
+    """Glowing gas: radiance a metre."""
+    graph = MaterialGraph(name)
+    return graph.finish(volume=graph.emission(color, glow))
+
+
+def embers() -> bpy.types.Material:
+    """Charred wood that glows in patches."""
+    graph = MaterialGraph("Embers")
+    heat = graph.span(graph.noise(graph.coordinates(), 14.0, 4.0, 0.7), 0.0, 1.0, 0.48, 0.66)
+    surface = graph.principled(
+        Base_Color=graph.mix(heat, (0.015, 0.013, 0.012), (0.10, 0.09, 0.085)),
+        Roughness=0.9,
+        Emission_Color=(1.0, 0.16, 0.02),
+        Emission_Strength=graph.math("MULTIPLY", heat, 5.0),
+    )
+    return graph.finish(surface, is_lamp=False)
+
+
+def wax() -> bpy.types.Material:
+    """Wax that glows faintly where the flame shines into it."""
+    graph = MaterialGraph("Wax")
+    warm = graph.span(graph.xyz(graph.coordinates())["Z"], 0.0, 0.9, 0.06, 0.2)
+    surface = graph.principled(
+        Base_Color=(0.82, 0.72, 0.55),
+        Roughness=0.45,
+        Emission_Color=(1.0, 0.36, 0.10),
+        Emission_Strength=graph.math("MULTIPLY", warm, warm),
+    )
+    return graph.finish(surface, is_lamp=False)
+
+
+def candle_flame() -> bpy.types.Material:
+    """A flame, blue at its foot; the lamps beside the candles give its light."""
+    graph = MaterialGraph("Candle flame")
+    height = graph.span(graph.xyz(graph.coordinates())["Z"], 0.0, 1.0, 0.2, 0.252)
+    blue, orange, yellow = (0.15, 0.2, 0.8), (1.0, 0.45, 0.12), (1.0, 0.72, 0.32)
+    stops = [(0.0, blue), (0.2, orange), (0.6, yellow), (1.0, (1.0, 0.4, 0.08))]
+    return graph.finish(graph.emission(graph.ramp(height, stops), 9.0), is_lamp=False)

@@ -88,8 +88,9 @@ class Graph:
         inputs = {0: value, 1: from_min, 2: from_max, 3: to_min, 4: to_max}
         return self.add("ShaderNodeMapRange", inputs).outputs[0]
 
-    def math(self, operation: str, a: Any, b: Any = 0.0) -> bpy.types.NodeSocket:
-        return self.add("ShaderNodeMath", {0: a, 1: b}, operation=operation).outputs[0]
+    def math(self, operation: str, *values: Any) -> bpy.types.NodeSocket:
+        """Arithmetic of one to three values: ADD, MULTIPLY, MULTIPLY_ADD, COSINE, …"""
+        return self.add("ShaderNodeMath", dict(enumerate(values)), operation=operation).outputs[0]
 
     def mix(self, factor: Any, a: Any, b: Any, blend: str = "MIX") -> bpy.types.NodeSocket:
         """Two colours mixed: a at factor 0, b at factor 1."""
