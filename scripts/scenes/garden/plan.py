@@ -3,17 +3,12 @@
 The rigs stand in the middle of the court: no geometry comes near x, y in ±1 m, z in 0.5 … 1.5 m.
 """
 
-from collections.abc import Callable
-
 import numpy as np
-from mathutils import Matrix
 from numpy.typing import ArrayLike
 
 from scenes.library.nodes import Color
 from scenes.library.noise import noise, smoothstep
-from scenes.library.objects import transform
 from scenes.library.points import Array, polar, xyz
-from scenes.library.shapes import frames
 
 TAU = 2 * np.pi
 
@@ -78,53 +73,3 @@ def clear_of_things(x: Array, y: Array, margin: float) -> Array:
     things = [(lx, ly) for lx, ly, _ in STONE_LANTERNS]
     things += [MAPLE, (TORII[0] - 1.5, TORII[1]), (TORII[0] + 1.5, TORII[1])]
     return np.min([np.hypot(x - tx, y - ty) for tx, ty in things], axis=0) > margin
-
-
-def spread(
-    random: np.random.Generator,
-    count: int,
-    corners: tuple[float, float, float, float],
-    spacing: float,
-    allowed: Callable[[Array, Array], Array],
-) -> Array:
-    """Up to `count` points (n, 2) in a rectangle, at least `spacing` apart, where allowed."""
-    chosen = np.empty((0, 2))
-    for _ in range(12):
-        tries = random.uniform(corners[:2], corners[2:], (count, 2))
-        for point in tries[allowed(*tries.T)]:
-            if len(chosen) < count and (np.hypot(*(chosen - point).T) >= spacing).all():
-                chosen = np.vstack([chosen, point])
-    return chosen
-
-
-def standing(
-    random: np.random.Generator,
-    spots: Array,
-    scale: tuple[float, float],
-    sink: float = 0.0,
-    tilt: float = 0.0,
-) -> list[Matrix]:
-    """Upright places on the ground at spots (n, 2), each turned and scaled at random."""
-    matrices = []
-    for (x, y), z in zip(spots, ground_height(*spots.T), strict=True):
-        size = random.uniform(*scale)
-        rotation = (*random.normal(0, tilt, 2), random.uniform(0, TAU))
-        matrices.append(transform((x, y, z - sink * size), rotation, size))
-    return matrices
-
-
-def lying(random: np.random.Generator, spots: Array, scale: tuple[float, float]) -> list[Matrix]:
-    """Places on the ground at spots (n, 2) that follow its slope, turned and scaled at random."""
-    x, y = spots.T
-    step = 0.25
-    slope_x = (ground_height(x + step, y) - ground_height(x - step, y)) / (2 * step)
-    slope_y = (ground_height(x, y + step) - ground_height(x, y - step)) / (2 * step)
-    forward = polar(1, random.uniform(0, TAU, len(spots)))
-    forward[:, 2] = slope_x * forward[:, 0] + slope_y * forward[:, 1]
-    matrices = []
-    for turn, at in zip(
-        frames(forward, xyz(-slope_x, -slope_y, 1)), xyz(x, y, ground_height(x, y)), strict=True
-    ):
-        size = Matrix.Scale(random.uniform(*scale), 4)
-        matrices.append(Matrix.Translation(at) @ Matrix(turn.tolist()).to_4x4() @ size)
-    return matrices

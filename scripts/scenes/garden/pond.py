@@ -3,15 +3,8 @@
 import numpy as np
 from mathutils import Matrix
 
-from scenes.garden.plan import (
-    POND_CENTER,
-    TAU,
-    WATER_LEVEL,
-    pond_distance,
-    pond_shore,
-    spread,
-    standing,
-)
+from scenes.garden.placing import spread, standing
+from scenes.garden.plan import POND_CENTER, TAU, WATER_LEVEL, pond_distance, pond_shore
 from scenes.library.noise import noise
 from scenes.library.objects import scatter, transform
 from scenes.library.plants import blade, tuft

@@ -3,6 +3,7 @@
 import bpy
 import numpy as np
 
+from scenes.garden.placing import spread, standing
 from scenes.garden.plan import (
     POND_CENTER,
     ROCK_ISLANDS,
@@ -10,8 +11,6 @@ from scenes.garden.plan import (
     court_distance,
     path_distance,
     pond_distance,
-    spread,
-    standing,
 )
 from scenes.library.noise import noise
 from scenes.library.objects import scatter, transform

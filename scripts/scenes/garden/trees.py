@@ -2,16 +2,8 @@
 
 import numpy as np
 
-from scenes.garden.plan import (
-    MAPLE,
-    SUN_AZIMUTH,
-    TAU,
-    ground_height,
-    path_distance,
-    pond_distance,
-    spread,
-    standing,
-)
+from scenes.garden.placing import spread, standing
+from scenes.garden.plan import MAPLE, SUN_AZIMUTH, TAU, ground_height, path_distance, pond_distance
 from scenes.library.noise import noise, smoothstep
 from scenes.library.objects import place, scatter, transform
 from scenes.library.plants import Growth, branches, leaves_on, oval_leaf

@@ -5,16 +5,14 @@ from dataclasses import replace
 import numpy as np
 
 from scenes.garden.court import flagstone_layout, raked_height
+from scenes.garden.placing import spread, standing
 from scenes.garden.plan import (
     COURT,
     TAU,
     clear_of_things,
     court_distance,
-    lying,
     path_distance,
     pond_distance,
-    spread,
-    standing,
 )
 from scenes.garden.trees import maple_leaf
 from scenes.library.noise import noise
@@ -74,7 +72,8 @@ def grass(scene: Scene) -> None:
 
     near = spread(random, scene.count(330, 40), (-9.5, -9.5, 9.5, 9.5), 0.66, allowed)
     far = spread(random, scene.count(190, 40), (-22, -22, 22, 22), 1.55, farther)
-    scatter("Grass", meshes, lying(random, near, (0.8, 1.25)) + lying(random, far, (1.8, 2.8)))
+    places = standing(random, near, (0.8, 1.25), sloping=True)
+    scatter("Grass", meshes, places + standing(random, far, (1.8, 2.8), sloping=True))
 
 
 def fallen_leaves(scene: Scene) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scenes.library.noise import noise
 from scenes.library.points import Array, polar, random_directions, unit, xyz
 from scenes.library.scene import Scene
-from scenes.library.shapes import Shape, copies, facets, join, sheet
+from scenes.library.shapes import Shape, copies, facets, join, sheet, tube
 
 TAU = 2 * np.pi
 
@@ -96,7 +96,8 @@ def branches(scene: Scene, random: Generator, growth: Growth) -> tuple[Shape, Ar
         wander, upward = growth.wander, growth.upward[level]
         path = crooked_path(random, start, heading, length, count, wander, upward)
         radii = radius * np.linspace(1, tip, count)
-        parts.append(scene.tube(path, radii, (12, 7, 5, 3, 3)[level], capped=False))
+        sides = scene.segments((12, 7, 5, 3, 3)[level])
+        parts.append(tube(path, radii, sides, capped=False))
         if level == len(growth.lengths) - 1:
             twigs.append(path)
             return
