@@ -61,12 +61,12 @@ def granite(name: str, tint: Color, moss: float) -> bpy.types.Material:
     speckle = graph.noise(where, 90.0, 2.0, 0.8)
     broad = graph.noise(where, 3.0, 4.0, 0.6)
     dark, light = (tuple(factor * c for c in tint) for factor in (0.45, 1.5))
-    stone = graph.ramp(speckle, [(0.36, dark), (0.5, tint), (0.66, light)])
+    stone = graph.ramp(speckle, [(0.36, *dark), (0.5, *tint), (0.66, *light)])
     stone = graph.mix(graph.span(broad, 0.0, 0.5, 0.35, 0.75), stone, (0.10, 0.095, 0.08))
     normal = graph.add("ShaderNodeNewGeometry").outputs["Normal"]
     upwards = graph.math("ADD", graph.xyz(normal)["Z"], graph.math("MULTIPLY", broad, 1.6))
     cover = graph.span(upwards, 0.0, 1.0, 2.05 - moss, 2.25 - moss)
-    green = graph.ramp(speckle, [(0.3, (0.03, 0.05, 0.008)), (0.7, (0.10, 0.13, 0.025))])
+    green = graph.ramp(speckle, "0.3 0.03 0.05 0.008, 0.7 0.10 0.13 0.025")
     surface = graph.principled(
         Base_Color=graph.mix(cover, stone, green),
         Roughness=graph.span(cover, 0.62, 0.95),
@@ -92,9 +92,9 @@ def moss() -> bpy.types.Material:
     where = graph.coordinates()
     fine = graph.noise(where, 28.0, 3.0, 0.7)
     broad = graph.math("MULTIPLY", graph.noise(where, 0.35, 3.0), 0.6)
-    green, bright, dry = (0.045, 0.085, 0.013), (0.095, 0.120, 0.022), (0.110, 0.085, 0.036)
-    stops = [(0.30, (0.016, 0.032, 0.006)), (0.48, green), (0.62, bright), (0.75, dry)]
-    tint = graph.ramp(graph.math("MULTIPLY_ADD", fine, 0.4, broad), stops)
+    greens = """0.30 0.016 0.032 0.006, 0.48 0.045 0.085 0.013
+        0.62 0.095 0.120 0.022, 0.75 0.110 0.085 0.036"""
+    tint = graph.ramp(graph.math("MULTIPLY_ADD", fine, 0.4, broad), greens)
     surface = graph.diffuse(tint, graph.bump(fine, 0.03))
     return graph.finish(graph.plain_when_diffuse(surface, (0.065, 0.085, 0.018)))
 
@@ -103,8 +103,7 @@ def gravel() -> bpy.types.Material:
     """Grains of four greys, dark between them."""
     graph = MaterialGraph("Gravel")
     grains = graph.voronoi(graph.coordinates(), 130.0)
-    greys = [(0.0, (0.20, 0.185, 0.165)), (0.4, (0.36, 0.345, 0.315))]
-    greys += [(0.8, (0.47, 0.45, 0.41)), (1.0, (0.62, 0.60, 0.56))]
+    greys = "0 0.20 0.185 0.165, 0.4 0.36 0.345 0.315, 0.8 0.47 0.45 0.41, 1 0.62 0.60 0.56"
     tint = graph.ramp(graph.xyz(grains.outputs["Color"])[0], greys)
     shade = graph.span(grains.outputs["Distance"], 1.0, 0.45, 0.25, 0.75)
     height = graph.math("SUBTRACT", 1.0, grains.outputs["Distance"])
@@ -119,8 +118,7 @@ def wet_stone() -> bpy.types.Material:
     grain = graph.noise(where, 60.0, 2.0, 0.7)
     veins = graph.noise(where, 3.2, 5.0, 0.65, 0.8)
     wet = graph.span(graph.noise(where, 2.1, 2.0), 0.0, 1.0, 0.44, 0.56)
-    greys = [(0.3, (0.075, 0.08, 0.085)), (0.52, (0.13, 0.13, 0.125)), (0.6, (0.2, 0.19, 0.17))]
-    dry = graph.ramp(veins, greys)
+    dry = graph.ramp(veins, "0.3 0.075 0.08 0.085, 0.52 0.13 0.13 0.125, 0.6 0.2 0.19 0.17")
     surface = graph.principled(
         Base_Color=graph.mix(wet, dry, graph.mix(1.0, dry, (0.42, 0.42, 0.45), "MULTIPLY")),
         Roughness=graph.math("MULTIPLY_ADD", grain, 0.12, graph.span(wet, 0.34, 0.07)),
@@ -137,11 +135,7 @@ def mountain() -> bpy.types.Material:
     forest = graph.noise(where, 0.16, 6.0, 0.75)
     normal = graph.add("ShaderNodeNewGeometry").outputs["Normal"]
     level = graph.math("MULTIPLY_ADD", forest, 0.5, graph.xyz(normal)["Z"])
-    greens = [
-        (0.35, (0.020, 0.045, 0.026)),
-        (0.52, (0.045, 0.075, 0.030)),
-        (0.68, (0.12, 0.10, 0.04)),
-    ]
+    greens = "0.35 0.020 0.045 0.026, 0.52 0.045 0.075 0.030, 0.68 0.12 0.10 0.04"
     trees = graph.ramp(forest, greens)
     color = graph.mix(graph.span(level, 0.0, 1.0, 0.75, 1.0), (0.16, 0.16, 0.17), trees)
     high = graph.math("MULTIPLY_ADD", forest, 30.0, graph.xyz(where)["Z"])
@@ -170,7 +164,7 @@ def bronze() -> bpy.types.Material:
     fine = graph.noise(where, 26.0, 5.0, 0.7)
     brushed = graph.noise(graph.coordinates("Object", (4.0, 4.0, 160.0)), 1.0, 2.0)
     patina = graph.span(graph.math("MULTIPLY_ADD", fine, 0.5, broad), 0.0, 1.0, 0.72, 0.95)
-    metal_tint = graph.ramp(fine, [(0.3, (0.36, 0.20, 0.09)), (0.7, (0.62, 0.40, 0.19))])
+    metal_tint = graph.ramp(fine, "0.3 0.36 0.20 0.09, 0.7 0.62 0.40 0.19")
     worn = graph.math("MULTIPLY_ADD", fine, 0.16, graph.span(broad, 0.16, 0.46, 0.3, 0.7))
     surface = graph.principled(
         Base_Color=graph.mix(patina, metal_tint, (0.10, 0.19, 0.16)),
@@ -187,8 +181,8 @@ def vermilion() -> bpy.types.Material:
     """Weathered red paint."""
     graph = MaterialGraph("Vermilion")
     worn = graph.noise(graph.coordinates("Object", (3.0, 3.0, 0.6)), 2.0, 5.0, 0.7)
-    reds = [(0.35, (0.20, 0.028, 0.010)), (0.6, (0.46, 0.060, 0.018)), (0.75, (0.52, 0.10, 0.04))]
-    tint, normal = graph.ramp(worn, reds), graph.bump(worn, 0.004)
+    tint = graph.ramp(worn, "0.35 0.20 0.028 0.010, 0.6 0.46 0.060 0.018, 0.75 0.52 0.10 0.04")
+    normal = graph.bump(worn, 0.004)
     return graph.finish(graph.principled(Base_Color=tint, Roughness=0.45, Normal=normal))
 
 
@@ -212,9 +206,9 @@ def koi() -> bpy.types.Material:
     """White, with patches of orange, red and black that differ from fish to fish."""
     graph = MaterialGraph("Koi")
     patches = graph.noise(graph.coordinates(), 5.0, 2.0)
-    white, orange, red = (0.85, 0.80, 0.72), (0.90, 0.22, 0.03), (0.80, 0.10, 0.02)
-    stops = [(0.50, white), (0.56, orange), (0.72, red), (0.76, (0.03, 0.03, 0.03))]
-    tint = graph.ramp(graph.math("MULTIPLY_ADD", graph.object_random(), 0.22, patches), stops)
+    patches = graph.math("MULTIPLY_ADD", graph.object_random(), 0.22, patches)
+    stops = "0.50 0.85 0.80 0.72, 0.56 0.90 0.22 0.03, 0.72 0.80 0.10 0.02, 0.76 0.03 0.03 0.03"
+    tint = graph.ramp(patches, stops)
     return graph.finish(graph.principled(Base_Color=tint, Roughness=0.3))
 
 
@@ -266,6 +260,5 @@ def candle_flame() -> bpy.types.Material:
     """A flame, blue at its foot; the lamps beside the candles give its light."""
     graph = MaterialGraph("Candle flame")
     height = graph.span(graph.xyz(graph.coordinates())["Z"], 0.0, 1.0, 0.2, 0.252)
-    blue, orange, yellow = (0.15, 0.2, 0.8), (1.0, 0.45, 0.12), (1.0, 0.72, 0.32)
-    stops = [(0.0, blue), (0.2, orange), (0.6, yellow), (1.0, (1.0, 0.4, 0.08))]
-    return graph.finish(graph.emission(graph.ramp(height, stops), 9.0), is_lamp=False)
+    tint = graph.ramp(height, "0 0.15 0.2 0.8, 0.2 1 0.45 0.12, 0.6 1 0.72 0.32, 1 1 0.4 0.08")
+    return graph.finish(graph.emission(tint, 9.0), is_lamp=False)

@@ -51,7 +51,7 @@ def wood(
     shift = graph.math("MULTIPLY", graph.island_random(), 50.0)
     stretch = tuple(0.06 if axis == along else 1.0 for axis in "XYZ")
     where = graph.add("ShaderNodeVectorMath", {0: graph.coordinates(scale=stretch), 1: shift})
-    color = graph.ramp(graph.noise(where, 24.0, detail=1.0), [(0.3, dark), (0.7, light)])
+    color = graph.ramp(graph.noise(where, 24.0, detail=1.0), [(0.3, *dark), (0.7, *light)])
     return graph.finish(graph.principled(Base_Color=color, Roughness=roughness))
 
 
@@ -60,5 +60,5 @@ def bark(name: str, tint: Color) -> bpy.types.Material:
     graph = MaterialGraph(name)
     cracks = graph.noise(graph.coordinates("Object", (7.0, 7.0, 1.6)), 3.0, 5.0, 0.7, 0.6)
     dark = tuple(0.3 * c for c in tint)
-    color = graph.ramp(cracks, [(0.35, dark), (0.6, tint), (0.75, (0.09, 0.11, 0.06))])
+    color = graph.ramp(cracks, [(0.35, *dark), (0.6, *tint), (0.75, 0.09, 0.11, 0.06)])
     return graph.finish(graph.diffuse(color, graph.bump(cracks, 0.03)))

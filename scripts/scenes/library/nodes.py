@@ -1,9 +1,11 @@
 """Shader node trees, built by expressions."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import bpy
+
+from scenes.library.points import Points, points
 
 Color = tuple[float, float, float]
 """Linear red, green and blue."""
@@ -71,13 +73,13 @@ class Graph:
         inputs = {"Vector": vector, "Scale": scale}
         return self.add("ShaderNodeTexVoronoi", inputs, feature=feature)
 
-    def ramp(self, factor: Any, stops: Sequence[tuple[float, Color]]) -> bpy.types.NodeSocket:
-        """Colours by position: stops are (position 0..1, linear colour)."""
+    def ramp(self, factor: Any, stops: Points) -> bpy.types.NodeSocket:
+        """Colours by position: stops (n, 4) are position 0..1, red, green, blue."""
         node = self.add("ShaderNodeValToRGB", {0: factor})
-        elements = node.color_ramp.elements
-        while len(elements) < len(stops):
+        elements, rows = node.color_ramp.elements, points(stops)
+        while len(elements) < len(rows):
             elements.new(1.0)
-        for element, (position, color) in zip(elements, stops, strict=True):
+        for element, (position, *color) in zip(elements, rows, strict=True):
             element.position, element.color = position, (*color, 1.0)
         return node.outputs[0]
 
