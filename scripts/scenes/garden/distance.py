@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from scenes.garden.plan import SUN_AZIMUTH, SUN_ELEVATION, TAU
+from scenes.garden.plan import SUN_AZIMUTH, TAU
 from scenes.library.lights import hdri_world, sun_light
 from scenes.library.noise import noise, smoothstep
 from scenes.library.objects import place, transform
@@ -18,7 +18,7 @@ FOG_ARCS = 10
 def sky(scene: Scene) -> None:
     """The sunrise that ships with bpy; a sun lamp, higher up, takes the place of its sun."""
     hdri_world("sunrise.exr", 2.0, SUN_AZIMUTH - SKY_SUN_AZIMUTH, brightest=8.0)
-    sun_light("Sun", SUN_AZIMUTH, SUN_ELEVATION, 5.5, (1.0, 0.80, 0.58), np.radians(1.5))
+    sun_light("Sun", SUN_AZIMUTH, np.radians(35.0), 5.5, (1.0, 0.80, 0.58), np.radians(1.5))
 
 
 def mountains(scene: Scene) -> None:

@@ -11,7 +11,7 @@ from scenes.library.points import points, polar, xyz
 from scenes.library.scene import Scene
 from scenes.library.shapes import icosphere, join, tube
 
-FLAME_HEIGHT, FLAME_TONGUES, FLAME_SHELLS = 1.0, 6, (1.0, 0.78, 0.5)
+FLAME_TONGUES, FLAME_SHELLS = 6, (1.0, 0.78, 0.5)
 CANDLES = """-0.62 2.82 0, -0.48 2.9 0, -0.40 2.73 0, 0.47 2.88 0, 0.60 2.76 0, 0.70 2.9 0
     -0.28 3.05 0.14, -0.12 3.05 0.14, 0.05 3.05 0.14, 0.3 3.05 0.14
     -1.30 2.13 0, -1.17 2.27 0, -1.43 1.97 0, -3.95 0.2 -0.08, -4.3 1.25 -0.08
@@ -47,10 +47,10 @@ def fire(scene: Scene) -> None:
 
 
 def flames(scene: Scene, x: float, y: float, z: float) -> None:
-    """Tongues of glowing gas, each a few nested shells, bent by noise that rises with the frames.
+    """Tongues of glowing gas, up to 1 m high, bent by noise that rises with the frames.
 
-    The gas glows evenly within a shell, which Cycles integrates exactly: a flame of procedural
-    density would need a grid of it made anew for each view.
+    Each is a few nested shells of evenly glowing gas, which Cycles integrates exactly: a flame of
+    procedural density would need a grid of it made anew for each view.
     """
     random = scene.random("flames")
     licks = []
@@ -68,13 +68,13 @@ def flames(scene: Scene, x: float, y: float, z: float) -> None:
             reach, height, width = random.uniform((0.09, 0.45, 0.07), (0.17, 0.8, 0.11))
         spot = transform(np.add((x, y, z), polar(reach, angle)), (0, 0, angle))
         for shell, size in enumerate(FLAME_SHELLS):
-            profile = np.column_stack([width * size**1.3 * body, height * FLAME_HEIGHT * size * t])
+            profile = np.column_stack([width * size**1.3 * body, height * size * t])
             gas = scene.lathe(profile, 28)
             tongue = scene.add(f"Flame.{k}.{shell}", gas, f"Flame gas {shell}", matrix=spot)
             tongue.visible_diffuse = tongue.visible_shadow = False
             higher = tongue.vertex_groups.new(name="Height")
             for vertex in tongue.data.vertices:
-                higher.add([vertex.index], min(1.0, vertex.co.z / FLAME_HEIGHT + 0.1), "REPLACE")
+                higher.add([vertex.index], min(1.0, vertex.co.z + 0.1), "REPLACE")
             for axis, texture, carrier in licks:
                 bend = tongue.modifiers.new(f"Lick {axis}", "DISPLACE")
                 bend.texture, bend.vertex_group = texture, higher.name

@@ -21,7 +21,7 @@ MAPLE = (-2.05, -3.0)
 ROCK_ISLANDS = ((2.75, -2.05, 0.75), (-1.85, 2.55, 0.5))  # x, y, radius
 STONE_LANTERNS = ((4.95, 3.1, 1.0), (-1.3, -5.2, 1.1), (-4.6, 4.2, 0.9))  # x, y, scale
 CANDLE_COLOR: Color = (1.0, 0.55, 0.22)  # of the lamps in lanterns and beside candles
-SUN_AZIMUTH, SUN_ELEVATION = np.radians(-174.0), np.radians(35.0)
+SUN_AZIMUTH = np.radians(-174.0)
 
 
 def pond_distance(x: ArrayLike, y: ArrayLike) -> Array:
