@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from lightfield import config, keys
+from scenes.library.architecture import cut
 from scenes.library.noise import noise, smoothstep
 from scenes.library.points import points, polar
 from scenes.library.scene import Scene
@@ -64,6 +65,13 @@ def test_frames_are_rotations():
     turns = frames(random.normal(size=(20, 3)), random.normal(size=(20, 3)))
     assert np.allclose(turns @ turns.transpose(0, 2, 1), np.eye(3))
     assert np.allclose(np.linalg.det(turns), 1)
+
+
+def test_stones_cut_from_a_length_fill_it_and_differ():
+    middle, length = cut(SCENE.random("stones"), -1.0, 3.0, 8)
+    assert (middle - length / 2).tolist() == pytest.approx([-1.0, *(middle + length / 2)[:-1]])
+    assert (middle + length / 2)[-1] == pytest.approx(3.0)
+    assert 0.25 < length.min() < 0.45 and 0.55 < length.max() < 0.75
 
 
 def test_noise_is_smooth_and_differs_by_seed():

@@ -23,6 +23,19 @@ def blocks(centers: Any, sizes: Any, bevel: Any = 0.012) -> Shape:
     )
 
 
+def stones(table: Points, bevel: Any = 0.012) -> Shape:
+    """`blocks` by a table (n, 6) of their centres x, y, z and their width, depth and height."""
+    rows = points(table)
+    return blocks(rows[:, :3], rows[:, 3:], bevel)
+
+
+def cut(random: np.random.Generator, start: float, stop: float, count: int) -> tuple[Array, Array]:
+    """A length cut into pieces not quite alike: the middles (count) and lengths of the stones."""
+    edges = np.linspace(start, stop, count + 1)
+    edges[1:-1] += random.uniform(-0.22, 0.22, count - 1) * (stop - start) / count
+    return (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+
+
 def bent(shape: Shape) -> Shape:
     """A shape bent round the Z axis: its x becomes the angle in radians, its y the radius."""
     angle, radius, z = shape.vertices.T

@@ -27,6 +27,13 @@ def folded_leaf(width: float) -> Shape:
     return facets([(0, 0, 0), (-x, 0.45, z), (0, 1, 0), (x, 0.45, z)], (0, 2, 1), (0, 3, 2))
 
 
+def leaves_at(
+    random: Generator, at: Array, forward: Array, length: ArrayLike, width: float
+) -> Shape:
+    """Folded leaves at places (n, 3) that point forward (n, 3), their faces turned at random."""
+    return copies(folded_leaf(width), at, forward, random_directions(random, len(at)), length)
+
+
 def leaf_cloud(
     random: Generator, count: int, radii: ArrayLike, length: ArrayLike, width: float
 ) -> Shape:
@@ -36,7 +43,7 @@ def leaf_cloud(
     lumps = 1 + 0.10 * noise(out * 2.5, int(random.integers(10**6)))[:, None]
     forward = out + random.normal(0, 0.6, (count, 3))
     spots = out * depth * lumps * np.asarray(radii)
-    return copies(folded_leaf(width), spots, forward, random_directions(random, count), length)
+    return leaves_at(random, spots, forward, length, width)
 
 
 def blade(width: float, rows: int, bow: float) -> Shape:
