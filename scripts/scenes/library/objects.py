@@ -75,8 +75,12 @@ def scatter(
 
 
 def evaluated_shape(thing: bpy.types.Object) -> Shape:
-    """The shape of an object after its modifiers; its faces are quads and triangles."""
-    data = thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    """The shape of an object after its modifiers."""
+    return mesh_shape(thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).data)
+
+
+def mesh_shape(data: bpy.types.Mesh) -> Shape:
+    """The shape of a mesh whose faces are quads and triangles."""
     vertices = np.empty(len(data.vertices) * 3, dtype=np.float32)
     data.vertices.foreach_get("co", vertices)
     corners = np.empty(len(data.loops), dtype=np.int32)

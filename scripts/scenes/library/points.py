@@ -1,5 +1,6 @@
 """Points and directions as numpy arrays, read from text or made of coordinates; outlines, paths."""
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,23 @@ Points = str | ArrayLike
 def points(data: Points) -> Array:
     """Points (n, k) of text such as "0.1 0, 0.2 0.5", a comma or line end after each; or numbers.
 
-    Long profiles stay as compact as a drawing's coordinates, over as many lines as they need.
+    Long profiles stay as compact as a drawing's coordinates, over as many lines as they need. In
+    text, ±0.3 stands for −0.3 and 0.3, and 1..2*5 for five values evenly from 1 to 2; a point
+    that has such values stands for all their combinations.
     """
     if not isinstance(data, str):
         return np.asarray(data, float)
-    rows = data.replace("\n", ",").split(",")
-    return np.array([row.split() for row in rows if row.strip()], float)
+    rows = (row.split() for row in data.replace("\n", ",").split(","))
+    return np.array([point for row in rows if row for point in product(*map(_values, row))])
+
+
+def _values(text: str) -> list[float]:
+    if text.startswith("±"):
+        return [-float(text[1:]), float(text[1:])]
+    if "*" in text:
+        ends, count = text.split("*")
+        return np.linspace(*map(float, ends.split("..")), int(count)).tolist()
+    return [float(text)]
 
 
 def xyz(x: ArrayLike, y: ArrayLike, z: ArrayLike = 0.0) -> Array:
