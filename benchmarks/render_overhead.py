@@ -32,7 +32,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         blend = folder / "room.blend"
-        run("build_scene.py", "--builder", "test_room", "--output", blend)
+        run("build_scene.py", "--builder", "room", "--output", blend)
         small = measure(folder, blend, arguments.views, samples=1)
         one_sample = statistics.median(view["render_seconds"] for view in small)
         samples = max(1, round(SECONDS / max(one_sample, 0.01)))

@@ -34,7 +34,7 @@ def run_program():
 
 @pytest.fixture(scope="session")
 def room(tmp_path_factory, run_program):
-    """The small closed room of scripts/scenes/test_room.py, as a .blend."""
+    """The small closed room of scripts/scenes/room/, as a .blend."""
     path = tmp_path_factory.mktemp("room") / "room.blend"
-    run_program("build_scene.py", "--builder", "test_room", "--output", path)
+    run_program("build_scene.py", "--builder", "room", "--output", path)
     return path

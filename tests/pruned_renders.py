@@ -15,7 +15,7 @@ from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.rendering import blend_file, cycles, inventory, pruning
 from lightfield.rendering.view import render_view
-from scenes import test_room
+from scenes import room
 
 RENDER = {"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0}
 FRAME = 7
@@ -152,7 +152,7 @@ def main():
     for make in (plain, left_behind, animated, blurred, features):
         path = folder / f"{make.__name__}.blend"
         blend_file.new_scene()
-        test_room.build({})
+        room.build({})
         make()
         blend_file.save_scene(path)
         blend_file.open_scene(path)

@@ -227,11 +227,11 @@ TRAPS = """
 import bpy, sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[2])
-from scenes import test_room
+from scenes import room
 
 folder = sys.argv[1]
 bpy.ops.wm.read_factory_settings(use_empty=True)
-test_room.build({})
+room.build({})
 text = bpy.data.texts.new("autorun.py")
 text.write(f"open({folder + '/script'!r}, 'w').close()")
 text.use_module = True
@@ -331,7 +331,7 @@ def test_a_blend_needs_no_builder_and_a_builder_no_blend(server, tmp_path):
         tmp_path,
         brought=BLEND_SCENE.format(blend="mine.blend", more=""),
         fetched=BLEND_SCENE.format(blend="blends/fetched.blend", more=f", url: {server.url}"),
-        built=BLEND_SCENE.replace("blend: {blend}{more}", "builder: test_room").format(),
+        built=BLEND_SCENE.replace("blend: {blend}{more}", "builder: room").format(),
     )
     (folder / "mine.blend").write_bytes(CONTENT)
     chosen = ("--config", "scenes=[brought,fetched,built]", "rigs=all", "preset=full")

@@ -17,7 +17,7 @@ TARGET = 0.02
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [24, 24]}
 RIG = {"type": "sphere", "subdivisions": 1, "size": 0.5, "center": [0, 0, 1.5], "camera": CAMERA}
 SCENE = """
-scene: {{builder: test_room}}
+scene: {{builder: room}}
 render: {{{render}}}
 rigs:
   LFSphere:

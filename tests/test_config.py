@@ -18,7 +18,7 @@ from lightfield.dataset.config import Preset
 from lightfield.dataset.dataset import scene_datasets
 
 RIGHT = {
-    "scene": {"builder": "test_room"},
+    "scene": {"builder": "room"},
     "render": {"samples": 64},
     "rigs": {
         "LFSphere": {

@@ -86,11 +86,11 @@ MISSING = """
 import sys
 sys.path.insert(0, sys.argv[2])
 import bpy
-from scenes import test_room
+from scenes import room
 
 folder = sys.argv[1]
 bpy.ops.wm.read_factory_settings(use_empty=True)
-test_room.build({})
+room.build({})
 image = bpy.data.images.new("bark", 4, 4)
 image.filepath_raw, image.file_format = folder + "/bark.png", "PNG"
 image.save()
@@ -104,7 +104,7 @@ unused.name, unused.filepath_raw, unused.use_fake_user = "unused", folder + "/ne
 bpy.ops.wm.save_as_mainfile(filepath=folder + "/textured.blend", relative_remap=False)
 
 bpy.ops.wm.read_factory_settings(use_empty=True)
-test_room.build({})
+room.build({})
 bpy.data.libraries.write(folder + "/library.blend", {bpy.data.objects["cone"]})
 bpy.ops.wm.read_factory_settings(use_empty=True)
 with bpy.data.libraries.load(folder + "/library.blend", link=True) as (_, wanted):
@@ -136,7 +136,7 @@ def test_missing_textures_and_libraries_are_errors(run_program, tmp_path):
 
 
 MINIMAL = """
-scene: {builder: test_room}
+scene: {builder: room}
 render: {samples: 1, depth: none}
 rigs:
   LFPlane:

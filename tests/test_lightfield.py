@@ -268,7 +268,8 @@ def test_a_scenes_fingerprint_is_its_files_or_its_builders(
     monkeypatch.setattr(keys, "BUILDERS", tmp_path)
     found = set()
     for common, own, seed in (("a", "b", 1), ("c", "b", 1), ("a", "d", 1), ("a", "b", 2)):
-        (tmp_path / "common.py").write_text(common)
-        (tmp_path / "test_room.py").write_text(own)
-        found.add(keys.scene_fingerprint(Source(builder="test_room", parameters={"seed": seed})))
+        for folder, text in (("library", common), ("room", own)):
+            (tmp_path / folder).mkdir(exist_ok=True)
+            (tmp_path / folder / "__init__.py").write_text(text)
+        found.add(keys.scene_fingerprint(Source(builder="room", parameters={"seed": seed})))
     assert len(found) == 4 and all(len(key) == 64 for key in found)

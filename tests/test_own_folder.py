@@ -8,7 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 
 SCENE = """
-scene: {builder: BUILDER}
+scene: {builder: room}
 render: {samples: 1}
 rigs:
   LFOwn:
@@ -20,8 +20,7 @@ rigs:
 
 def test_scenes_poses_results_and_work_are_in_the_users_folder(tmp_path):
     (tmp_path / "configs" / "scenes").mkdir(parents=True)
-    builder = "room" if (ROOT / "scripts/scenes/room").exists() else "test_room"
-    (tmp_path / "configs/scenes/mine.yaml").write_text(SCENE.replace("BUILDER", builder))
+    (tmp_path / "configs/scenes/mine.yaml").write_text(SCENE)
     (tmp_path / "poses").mkdir()
     (tmp_path / "poses/mine.csv").write_text("name,x,y,z,rx,ry,rz\none,1,2,3,0,0,0\n")
     before = set(ROOT.rglob("*.json"))

@@ -13,6 +13,8 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
 from scenes import garden
+from scenes.garden.trees import bamboo_culm
+from scenes.library.scene import Scene
 
 SCRIPTS = Path(__file__).parent.parent / "scripts"
 
@@ -103,7 +105,7 @@ def test_it_has_the_triangles_of_a_full_scene(scene):
 
 def test_two_seeds_give_two_gardens(scene):
     def heights(seed):
-        bamboo = garden.bamboo_culm(garden.Recipe(seed, 0.1), 0)
+        bamboo = bamboo_culm(Scene(seed, 0.1, {}), 0)
         return hashlib.sha256(bamboo.vertices.tobytes()).hexdigest()
 
     assert heights(1) != heights(2)

@@ -365,8 +365,9 @@ def read_scene(path: Path) -> Scene:
 
 
 def builders() -> list[str]:
-    """Names of the scene builders in scripts/scenes/."""
-    return sorted(file.stem for file in BUILDERS.glob("[a-z]*.py") if file.stem != "common")
+    """Names of the scene builders, the folders of scripts/scenes/ that are not their library."""
+    folders = (file.parent.name for file in BUILDERS.glob("*/__init__.py"))
+    return sorted(name for name in folders if name != "library")
 
 
 def blend_sha256(scene: str, source: Source) -> tuple[str | None, Path]:

@@ -23,14 +23,20 @@ def scene_fingerprint(source: Source) -> str:
 
     A .blend is identified by its bytes; raises `UserError` while their SHA-256 is not known. A
     built one differs from build to build (it holds memory addresses), so it is identified by the
-    builder's text, its parameters, and bpy's version.
+    text of the builder and of the library that all builders have in common, its parameters, and
+    bpy's version.
     """
     if source.blend:
         if source.sha256 is None:
             raise UserError(f"{source.blend}: its sha256 is not known; check_blend.py records it")
         return source.sha256
-    texts = [(BUILDERS / f"{name}.py").read_bytes() for name in ("common", source.builder)]
-    return _digest([*map(_hash, texts), source.parameters.model_dump(), version("bpy")])
+    assert source.builder
+    files = [
+        [file.relative_to(BUILDERS).as_posix(), _hash(file.read_bytes())]
+        for folder in ("library", source.builder)
+        for file in sorted((BUILDERS / folder).rglob("*.py"))
+    ]
+    return _digest([files, source.parameters.model_dump(), version("bpy")])
 
 
 def render_key(lightfield: LightField, view: View) -> str:

@@ -1,0 +1,73 @@
+"""Potted plants on the sill, in the corners, and hanging."""
+
+import bpy
+import numpy as np
+
+from scenes.barbershop.goods import Goods, stock
+from scenes.barbershop.plan import put, spot
+from scenes.library.model import Model
+from scenes.library.points import polar, xyz
+from scenes.library.scene import Scene
+from scenes.library.shapes import Shape, sheet
+
+POTTED = {"Fern": ("Terracotta", 44), "Snake plant": ("Navy", 16), "Rubber tree": ("Brass", 26)}
+POT = """{clay}: lathe 0.09 0, 0.10 0.01, 0.125 0.17, 0.14 0.17, 0.14 0.21, 0.125 0.21
+        0.118 0.18, 0 0.18
+    Soil: lathe 0.117 0.18, 0.117 0.186, 0 0.19"""
+HANGER = """
+Plant cord | room -2.24 3.42 1.62 0..240*3
+    Brass: tube 0.003, 0.105 0 0.165, 0 0 0.78
+    Brass: bend 0.003, 0.105 0 0.165, 0.084 0 0, 0 0 -0.01
+Plant hook | room -2.24 3.42 1.62
+    Brass: tube 0.003, 0 0 0.77, 0 0 1.38
+"""
+
+
+def leaf(scene: Scene, length: float, width: float, droop: float) -> Shape:
+    """A leaf that grows along x from the origin, arching down, with a folded midrib."""
+    n = scene.segments(10, 4)
+    t = np.linspace(0, 1, n + 1)
+    half, across = width / 2 * np.sin(np.pi * t**0.8) ** 0.8, np.array([[-1], [0], [1]])
+    angle = droop / n * np.arange(n)
+    x, sunk = np.cumsum([[0, *np.cos(angle)], [0, *np.sin(angle)]], axis=1) * length / n
+    return sheet(xyz(x, half * across, 0.25 * half * np.abs(across) - sunk))
+
+
+def plant(scene: Scene, kind: str) -> bpy.types.Mesh:
+    """A plant about 0.6 m tall with its pot."""
+    random, (clay, count) = scene.random(kind), POTTED[kind]
+    model = Model(scene, POT.format(clay=clay))
+    for k in range(scene.segments(count, 6)):
+        turn = k * 137.508 + random.uniform(-15, 15)
+        if kind == "Fern":
+            at, rise = (0, 0, 0.185), random.uniform(40, 80)
+            blade = leaf(scene, random.uniform(0.24, 0.42), 0.035, np.radians(rise + 35))
+        elif kind == "Snake plant":
+            at = polar(0.07 * np.sqrt((k % 8) / 8), np.radians(turn), 0.18)
+            blade, rise = leaf(scene, random.uniform(0.3, 0.55), 0.06, 0.15), random.uniform(76, 88)
+        else:
+            at, rise = (0, 0, 0.24 + 0.5 * k / count), random.uniform(15, 55)
+            blade = leaf(scene, random.uniform(0.16, 0.24), 0.10, 0.9)
+        model.add(blade, f"Leaf {k % 3}", at, (0, -rise, turn))
+    if kind == "Rubber tree":
+        model.draw("Soil: bend 0.009, 0 0 0.18, 0.01 0 0.4, 0 0.01 0.75")
+    return model.mesh(kind)
+
+
+def plants(scene: Scene, bottles: Goods, pots: Goods) -> None:
+    """Plants on the sill, bottles between them; others in the corners, one hanging."""
+    random, room = scene.random("plants"), spot("room")
+    fern, snake, rubber = (plant(scene, kind) for kind in POTTED)
+    for x, data, size in (
+        (-1.8, fern, 0.6),
+        (-0.95, snake, 0.55),
+        (-0.3, fern, 0.5),
+        (0.35, rubber, 0.6),
+    ):
+        turn = (0, 0, random.uniform(0, 360))
+        put(data, spot(f"front {x} 0.08 1"), degrees=turn, scale=size)
+    for x in (-1.4, -0.63, 0.03):
+        stock(scene, random, bottles, spot(f"front {x} 0.05 1"), 0.34, 0.12)
+    put(rubber, room, (2.18, 3.38, 0), (0, 0, 40), 1.5)
+    put(snake, room, (-2.22, 3.46, 0), (0, 0, 10), 1.3)
+    put(fern, room, (-2.24, 3.42, 1.62), (0, 0, 200), 0.8)

@@ -1,0 +1,121 @@
+"""The ground: mossy terrain, and the court of raked gravel with its flagstones and kerb."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from scenes.garden import plan
+from scenes.garden.plan import COURT, TAU, court_distance, ground_height, pond_distance
+from scenes.library.noise import noise, smoothstep
+from scenes.library.objects import scatter, transform
+from scenes.library.points import Array, points, polar, xyz
+from scenes.library.scene import Scene
+from scenes.library.shapes import Shape, box, grid, sheet
+
+Flagstone = tuple[Array, float]
+"""A stone's outline (n, 2) and its height."""
+
+STEPS = """-0.1 -0.05 0.58, 0.66 -0.62 0.38, -0.72 0.50 0.40, 0.66 0.42 0.42, -0.62 -0.66 0.38
+    0.15 0.98 0.45, -0.05 1.85 0.42, 0.08 2.62 0.40, 0.05 -1.12 0.44, -0.12 -1.98 0.42
+    0.12 -2.80 0.43, 0.0 -3.5 0.38, 1.38 0.10 0.38, 1.32 0.92 0.33, 2.05 0.52 0.36
+    -1.45 0.10 0.36, -2.15 0.35 0.38, 0.85 -4.5 0.3, 0.1 -4.35 0.42, 0.3 -5.2 0.44
+    0.1 -6.05 0.42, 0.35 -6.9 0.46, 0.1 -7.75 0.42, 1.0 2.35 0.34"""  # x, y, radius
+
+
+def terrain(scene: Scene) -> None:
+    """The ground around the court, out to the foot of the mountains."""
+    near = np.linspace(1.5, 12.0, scene.segments(120))
+    radii = np.concatenate([near, np.geomspace(12.0, 420.0, scene.segments(60))[1:]])
+    ground = polar(radii[::-1, None], np.linspace(0, TAU, scene.segments(420), endpoint=False))
+    ground[..., 2] = ground_height(ground[..., 0], ground[..., 1])
+    scene.add("Terrain", sheet(ground, closed=True), "Moss")
+
+
+def flagstone_layout(scene: Scene) -> list[Flagstone]:
+    """Paths of flagstones, polygons of 5 to 7 wavy sides, to the statue, the fire, the torii."""
+    random = scene.random("flagstones")
+    steps = points(STEPS)
+    middles, radii = steps[:, :2], steps[:, 2]
+    apart = np.hypot(*(middles[:, None] - middles).transpose(2, 0, 1))
+    np.fill_diagonal(apart, np.inf)
+    part = radii[:, None] / (radii[:, None] + radii)
+    fitting = ((apart - 0.04) * part).min(axis=1) / 1.14  # what keeps them from touching
+    angles = np.linspace(0, TAU, scene.segments(48, 8), endpoint=False)
+    stones = []
+    for middle, radius in zip(middles, np.minimum(radii, fitting), strict=True):
+        wave, stretch = random.uniform(0, TAU, 2), random.uniform(0.86, 1.1)
+        sides, turn = random.integers(5, 8), random.uniform(0, TAU)
+        nearest = (angles - turn + np.pi / sides) % (TAU / sides) - np.pi / sides
+        polygon = np.cos(np.pi / sides) / np.cos(nearest)
+        reach = radius * (0.35 + 0.65 * polygon + 0.03 * np.sin(3 * angles + wave[0]))
+        reach *= 1 + 0.05 * np.sin(2 * angles + wave[1])
+        outline = polar(reach, angles)[:, :2] * (stretch, 1)
+        stones.append((outline + middle, 0.035 + random.uniform(0, 0.015)))
+    return stones
+
+
+def raked_height(x: Array, y: Array, stones: Sequence[Flagstone]) -> Array:
+    """The gravel's relief: straight furrows, rings around the islands, smoothed by the stones."""
+    period, depth, rings = 0.095, 0.015, 0.62
+    islands = [*plan.ROCK_ISLANDS, (*plan.STATUE, 0.85), (*plan.FIRE, 0.5)]
+    reach = np.min([np.hypot(x - ix, y - iy) - r for ix, iy, r in islands], axis=0)
+    wavy = x + 0.02 * np.sin(2.1 * y)
+    furrows = np.where(reach < rings, np.cos(TAU * reach / period), np.cos(TAU * wavy / period))
+    calm = smoothstep(0.0, -0.15, court_distance(x, y)) * smoothstep(0, 0.05, np.abs(reach - rings))
+    for outline, _ in stones:
+        middle = outline.mean(0)
+        away = np.hypot(x - middle[0], y - middle[1]) - np.hypot(*(outline - middle).T).mean()
+        calm = np.minimum(calm, smoothstep(0.0, 0.22, away))
+    return depth * furrows * calm + 0.004 * noise(xyz(x, y) * 9.0, 21, 2)
+
+
+def gravel(scene: Scene) -> None:
+    """The court's raked gravel, modelled furrow by furrow; its grains are in the shader."""
+    x0, y0, x1, y1 = COURT
+    x = np.linspace(x0, x1, scene.segments((x1 - x0) / 0.024))
+    y = np.linspace(y0, y1, scene.segments((y1 - y0) / 0.020))
+    heights = raked_height(*np.meshgrid(x, y), flagstone_layout(scene))
+    scene.add("Gravel", grid(x, y, heights), "Gravel")
+
+
+def flagstones(scene: Scene) -> None:
+    """Dark polished stones, still wet in places: sharp and blurred reflections side by side."""
+    for i, (outline, height) in enumerate(flagstone_layout(scene)):
+        middle = outline.mean(0)
+        base = 0.0 if court_distance(*middle) < 0 else float(ground_height(*middle))
+        stone = cushion(outline - middle, height + 0.1, 0.03, scene.segments(10, 2), i)
+        spot = transform((*middle, base - 0.1))
+        scene.add(f"Flagstone.{i:02d}", stone, "Wet stone", matrix=spot)
+
+
+def cushion(outline: Array, height: float, rounding: float, rings: int, seed: int) -> Shape:
+    """A flat stone: an outline (n, 2) around the origin, extruded, with a rounded rim."""
+    turns = np.linspace(0, np.pi / 2, 5)
+    reach = np.hypot(*outline.T).min()
+    inset = [0, *rounding * (1 - np.cos(turns)), *np.linspace(rounding, reach, rings + 2)[1:-1]]
+    level = np.array([0, *height - rounding * (1 - np.sin(turns)), *[height] * rings])[:, None]
+    x, y = (1 - np.array(inset)[:, None] / reach) * outline.T[:, None]
+    level = level + 0.004 * noise(xyz(x, y, seed * 3.7) * 5.0, 31, 3) * (level > 0)
+    return sheet(xyz(x, y, level), closed=True, capped=True)
+
+
+def kerb(scene: Scene) -> None:
+    """Granite blocks that hold the gravel in, but for the pond's shore and the path."""
+    random = scene.random("kerb")
+    block = box((0.62, 0.15, 0.26), 0.02, 2)
+    bumps = [0.008 * noise(block.vertices * 6 + i * 9, 41, 2)[:, None] for i in range(3)]
+    blocks = [
+        scene.mesh(f"Kerb.{i}", block.reshaped(block.vertices + bump), "Kerb granite")
+        for i, bump in enumerate(bumps)
+    ]
+    x0, y0, x1, y1 = COURT
+    corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    places = []
+    for side, (start, end) in enumerate(zip(corners, np.roll(corners, -1, axis=0), strict=True)):
+        count = round(np.hypot(*(end - start)) / 0.645)
+        for x, y in start + (end - start) * (np.arange(count)[:, None] + 0.5) / count:
+            if pond_distance(x, y) > 0.1 and (y > y0 + 0.1 or abs(x) > 0.55):
+                dx, dy, dz = random.normal(0, 0.012, 3)
+                turn = (0, 0, side * TAU / 4 + dx)
+                places.append(transform((x + dx, y + dy, dz - 0.03), turn))
+    scatter("Kerb", blocks, places)

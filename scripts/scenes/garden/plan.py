@@ -1,0 +1,75 @@
+"""Where things are in the garden: the court, the pond, the path, and the height of the ground.
+
+The rigs stand in the middle of the court: no geometry comes near x, y in ±1 m, z in 0.5 … 1.5 m.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from scenes.library.nodes import Color
+from scenes.library.noise import noise, smoothstep
+from scenes.library.points import Array, polar, xyz
+
+TAU = 2 * np.pi
+
+COURT = (-2.7, -3.8, 4.3, 4.9)  # of raked gravel: a rectangle x0, y0, x1, y1
+POND_CENTER, POND_RADIUS, WATER_LEVEL = np.array([-5.5, 0.6]), 2.3, -0.07
+STATUE = (0.0, 3.75)
+FIRE = (3.1, 1.1)
+TORII = (0.2, -8.5)
+MAPLE = (-2.05, -3.0)
+ROCK_ISLANDS = ((2.75, -2.05, 0.75), (-1.85, 2.55, 0.5))  # x, y, radius
+STONE_LANTERNS = ((4.95, 3.1, 1.0), (-1.3, -5.2, 1.1), (-4.6, 4.2, 0.9))  # x, y, scale
+CANDLE_COLOR: Color = (1.0, 0.55, 0.22)  # of the lamps in lanterns and beside candles
+SUN_AZIMUTH = np.radians(-174.0)
+
+
+def pond_distance(x: ArrayLike, y: ArrayLike) -> Array:
+    """Distance outside the pond's shore, negative within (about, in metres)."""
+    dx, dy = x - POND_CENTER[0], (y - POND_CENTER[1]) * 0.8
+    angle = np.arctan2(dy, dx)
+    shore = 1 + 0.13 * np.sin(2 * angle + 1.0) + 0.07 * np.sin(3 * angle) + 0.03 * np.sin(7 * angle)
+    return np.hypot(dx, dy) - POND_RADIUS * shore
+
+
+def pond_shore(angle: Array) -> Array:
+    """The pond's outline (n, 2) where `pond_distance` is 0, by angle."""
+    reach = np.full(len(angle), POND_RADIUS)
+    for _ in range(30):
+        points = POND_CENTER + polar(reach, angle)[:, :2]
+        reach = reach - 0.7 * pond_distance(*points.T)
+    return points
+
+
+def court_distance(x: ArrayLike, y: ArrayLike) -> Array:
+    """Distance outside the court's rectangle, negative within."""
+    x0, y0, x1, y1 = COURT
+    dx, dy = np.maximum(x0 - x, x - x1), np.maximum(y0 - y, y - y1)
+    return np.hypot(np.maximum(dx, 0), np.maximum(dy, 0)) + np.minimum(np.maximum(dx, dy), 0)
+
+
+def path_distance(x: ArrayLike, y: ArrayLike) -> Array:
+    """Distance from the middle of the path that leads from the court to the torii and beyond."""
+    middle = TORII[0] * smoothstep(-4.0, -8.0, y) + 0.15 * np.sin(y)
+    return np.where(y < -3.5, np.abs(x - middle), np.hypot(x - middle, y + 3.5))
+
+
+def ground_height(x: ArrayLike, y: ArrayLike) -> Array:
+    """Height of the terrain: flat by the court, mossy mounds around, hills far off."""
+    flat = xyz(x, y)
+    distance = np.hypot(x, y)
+    away = np.minimum(court_distance(x, y), path_distance(x, y) - 0.6)
+    mounds = 0.30 * (noise(flat / 3.1, 11, 2) + 0.45) * smoothstep(0.1, 2.2, away)
+    hills = 2.5 * (noise(flat / 23.0, 12, 2) + 0.3) * smoothstep(9.0, 40.0, distance)
+    height = mounds + hills + 7.0 * smoothstep(25.0, 170.0, distance)
+    shore = pond_distance(x, y)
+    height = WATER_LEVEL + 0.06 + (height - WATER_LEVEL - 0.06) * smoothstep(0.0, 1.3, shore)
+    height -= 0.6 * smoothstep(0.05, -0.9, shore)
+    return np.where(court_distance(x, y) < 0.02, -0.08, height)
+
+
+def clear_of_things(x: Array, y: Array, margin: float) -> Array:
+    """Whether points keep away from what stands in the moss: lanterns, maple, torii's posts."""
+    things = [(lx, ly) for lx, ly, _ in STONE_LANTERNS]
+    things += [MAPLE, (TORII[0] - 1.5, TORII[1]), (TORII[0] + 1.5, TORII[1])]
+    return np.min([np.hypot(x - tx, y - ty) for tx, ty in things], axis=0) > margin

@@ -1,0 +1,146 @@
+"""The statue, a seated bronze figure with a halo, and the mirror beside it."""
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+
+from scenes.garden.plan import STATUE, TAU
+from scenes.library.noise import noise, smoothstep
+from scenes.library.objects import evaluated_shape, place, transform
+from scenes.library.points import Points, points, polar, xyz
+from scenes.library.scene import Scene
+from scenes.library.shapes import Shape, box, copies, icosphere, join, sheet, tube
+
+MIRROR = (1.75, 3.25)
+
+
+def statue(scene: Scene) -> None:
+    """The figure on a lotus seat and a granite plinth, with a halo of polished brass."""
+    x, y = STATUE
+    for i, (width, low, high) in enumerate(points("1.55 -0.1 0.14, 1.32 0.14 0.5, 1.45 0.5 0.58")):
+        block, spot = box((width, width, high - low), 0.02, 3), (x, y, (low + high) / 2)
+        scene.add(f"Plinth.{i}", block, "Plinth granite", matrix=transform(spot))
+    seat = transform((x, y, 0.58), scale=1.05)
+    scene.add("Lotus", lotus(scene), "Rough bronze", matrix=seat)
+    body = join([figure(scene), curls(scene)])
+    spot = transform((x, y, 0.78), scale=0.92)
+    scene.add("Statue", body, "Rough bronze", matrix=spot)
+    scene.add("Halo", halo(scene), "Polished brass", matrix=transform((x, y + 0.2, 2.05)))
+    stem = scene.tube("0 0 0, 0 0.02 0.6, 0 0 1.35", 0.018, 10)
+    scene.add("Halo stem", stem, "Polished brass", matrix=transform((x, y + 0.22, 0.75)))
+
+
+def halo(scene: Scene) -> Shape:
+    """Two rings and 48 rays, in turn short and long, in the XZ plane."""
+    parts = [scene.ring(0.30, 0.016, 96, 12), scene.ring(0.39, 0.008, 96)]
+    for k, angle in enumerate(np.arange(48) * TAU / 48):
+        reach = np.array([0.30, 0.345, 0.414]) + (k % 2) * np.array([0, 0.08, 0.07])
+        parts.append(tube(polar(reach, angle), [0.007, 0.010, 0.0023], 6))
+    return join(parts).transformed(transform(rotation=(np.pi / 2, 0, 0)))
+
+
+def ellipsoid(center: Sequence[float], radii: Sequence[float]) -> Shape:
+    return icosphere(4).transformed(transform(center, scale=radii))
+
+
+def limb(path: Points, radii: Sequence[float]) -> Shape:
+    """A limb: a tube along the points with round ends."""
+    knots = points(path)
+    t = np.linspace(0, len(knots) - 1, 24)
+    middle = np.stack([np.interp(t, np.arange(len(knots)), axis) for axis in knots.T], axis=-1)
+    radius = np.interp(t, np.arange(len(knots)), radii)
+    ends = [ellipsoid(knots[i], (radii[i],) * 3) for i in (0, -1)]
+    return join([tube(middle, radius, 20), *ends])
+
+
+# The parts of the body that are ellipsoids: centre and radii.
+BODY = """0 0.06 0.20 0.38 0.28 0.21, 0 0.06 0.50 0.26 0.20 0.36, 0 0.03 0.80 0.30 0.20 0.23
+    0 -0.01 1.36 0.160 0.180 0.205, 0 -0.10 1.24 0.085 0.075 0.06
+    0 -0.188 1.345 0.024 0.035 0.055, 0 -0.160 1.275 0.055 0.035 0.016
+    0 0.02 1.42 0.172 0.180 0.180, 0 0.03 1.60 0.085 0.085 0.075"""
+# Hand, ear and brow of the left; the right is their mirror image, as it is of arm and leg.
+LEFT = """0.06 -0.35 0.32 0.13 0.075 0.05, 0.165 0 1.31 0.022 0.042 0.11
+    0.065 -0.158 1.385 0.045 0.028 0.018"""
+ARM, ARM_RADII = "0.32 0.03 0.93, 0.43 0 0.56, 0.09 -0.34 0.34", (0.115, 0.092, 0.055)
+LEG, LEG_RADII = "0.2 0.06 0.17, 0.55 -0.18 0.13, -0.10 -0.40 0.13", (0.17, 0.135, 0.09)
+
+
+def figure(scene: Scene) -> Shape:
+    """The seated figure, 1.7 m high, facing −Y: parts melted into one skin, with a folded robe."""
+    parts = [limb("0 0.04 0.95, 0 0.02 1.2", (0.13, 0.095))]
+    parts += [ellipsoid(part[:3], part[3:]) for part in points(BODY)]
+    for mirror in ((-1, 1, 1), (1, 1, 1)):
+        parts += [ellipsoid(part[:3] * mirror, part[3:]) for part in points(LEFT)]
+        parts += [limb(points(ARM) * mirror, ARM_RADII), limb(points(LEG) * mirror, LEG_RADII)]
+    whole = scene.add("Statue parts", join(parts))
+    remesh = whole.modifiers.new("Melt", "REMESH")
+    remesh.mode, remesh.voxel_size = "VOXEL", 0.011 / scene.detail**0.5
+    smooth = whole.modifiers.new("Smooth", "SMOOTH")
+    smooth.factor, smooth.iterations = 0.5, 4
+    skin = evaluated_shape(whole)
+    source = whole.data
+    bpy.data.objects.remove(whole)
+    bpy.data.meshes.remove(source)
+    return folded(skin)
+
+
+def folded(skin: Shape) -> Shape:
+    """Folds of cloth pressed into the robe: over the left shoulder, and around arms and legs."""
+    x, y, z = skin.vertices.T
+    outward = skin.vertices - xyz(0.5 * x, 0.05, np.clip(z, 0.2, 0.8))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    across = z - 0.55 * x + 1.2 * y * y + 0.05 * noise(skin.vertices * 3.0, 51, 2)
+    robe = smoothstep(-0.02, 0.02, x + 0.34 * (z - 0.45) + 0.1) * smoothstep(1.02, 0.95, z)
+    robe = np.maximum(robe, smoothstep(0.42, 0.36, z))
+    hands = smoothstep(0.17, 0.13, np.hypot(x, (z - 0.33) * 1.4)) * smoothstep(-0.22, -0.27, y)
+    folds = (0.010 * np.abs(np.sin(across * 34)) ** 0.7 + 0.008) * robe * (1 - hands)
+    return skin.reshaped(skin.vertices + outward * folds[:, None])
+
+
+def curls(scene: Scene) -> Shape:
+    """The figure's hair: small snail curls on the skull and its knot."""
+    curl, places = icosphere(scene.segments(2, 1)), []
+    for center, radii, count, lowest in (
+        ((0, 0.02, 1.42), (0.172, 0.180, 0.180), 260, -0.35),
+        ((0, 0.03, 1.60), (0.085, 0.085, 0.075), 70, -0.2),
+    ):
+        k = np.arange(count) + 0.5
+        z = 1 - 2 * k / count
+        spiral = polar(np.sqrt(1 - z * z), k * TAU * 0.6180339887, z)
+        hairline = lowest + 0.75 * smoothstep(0.1, -0.7, spiral[:, 1])
+        places.append(center + spiral[z > hairline] * radii)
+    return copies(curl, np.concatenate(places), size=0.021)
+
+
+def lotus(scene: Scene) -> Shape:
+    """The seat: a drum with two crowns of petals."""
+    drum = scene.lathe("0 0, 0.52 0, 0.60 0.05, 0.56 0.12, 0.60 0.2, 0 0.21", 64)
+    u = np.linspace(0, 1, scene.segments(10, 4))[:, None]
+    v = np.linspace(-1, 1, scene.segments(9, 3))
+    width = 0.115 * np.sin(np.pi * (0.15 + 0.85 * u)) ** 0.6
+    bulge = 0.10 * np.sin(np.pi * 0.55 * u) - 0.03 * v**2 + 0.05 * u**4
+    petal, parts = sheet(xyz(width * v, bulge, 0.2 * u)), [drum]
+    for start, radius, base in ((0.0, 0.57, 0.015), (0.5, 0.53, 0.06)):
+        angle = (np.arange(18) + start) * TAU / 18
+        parts.append(copies(petal, polar(radius, angle, base), forward=polar(1, angle)))
+    return join(parts)
+
+
+def mirror(scene: Scene) -> None:
+    """A standing mirror in a dark wooden frame beside the statue, turned towards the viewer."""
+    width, height = 0.82, 1.45
+    parts = [box((width + 0.14, 0.05, 0.07), 0.012).moved(0, 0, z) for z in (0.0, height)]
+    parts.append(box((width + 0.02, 0.012, height)).moved(0, 0.02, height / 2))
+    for side in (-1, 1):
+        inner, outer = side * (width / 2 + 0.035), side * (width / 2 + 0.12)
+        parts += [
+            box((0.07, 0.05, height), 0.012).moved(inner, 0, height / 2),
+            box((0.07, 0.07, 1.3), 0.012).moved(outer, 0.02, 0.43),
+            box((0.09, 0.55, 0.07), 0.015).moved(outer, 0.02, -0.2),
+        ]
+    towards_viewer = -float(np.arctan2(*MIRROR))
+    spot = transform((*MIRROR, 0.24), (np.radians(-3.0), 0, towards_viewer + np.radians(6.0)))
+    scene.add("Mirror frame", join(parts), "Dark wood", matrix=spot, smooth=0.7)
+    pane = sheet(xyz([-width / 2, width / 2], 0.005, [[0], [height]]))
+    place("Mirror", scene.mesh("Mirror", pane, "Mirror", smooth=False), spot)

@@ -1,0 +1,99 @@
+"""What grows and lies on the ground: azaleas, grass, and the maple's fallen leaves."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from scenes.garden.court import flagstone_layout, raked_height
+from scenes.garden.placing import spread, standing
+from scenes.garden.plan import (
+    COURT,
+    TAU,
+    clear_of_things,
+    court_distance,
+    path_distance,
+    pond_distance,
+)
+from scenes.garden.trees import maple_leaf
+from scenes.library.noise import noise
+from scenes.library.objects import scatter
+from scenes.library.plants import blade, oval_leaf, tuft
+from scenes.library.points import Array, polar, xyz
+from scenes.library.scene import Scene
+from scenes.library.shapes import Shape, copies, icosphere, join
+
+
+def shrubs(scene: Scene) -> None:
+    """Azaleas clipped into cushions, some in flower."""
+    random = scene.random("shrubs")
+    used = ("Shrub core", "Azalea leaves", "Azalea flowers")
+    shapes = [azalea(scene, random, 7.0 * i, part) for i, part in enumerate((0.0, 0.12, 0.3))]
+    meshes = [scene.mesh("Shrub", shape, *used) for shape in shapes]
+
+    def allowed(x: Array, y: Array) -> Array:
+        away = (court_distance(x, y) > 0.75) & (pond_distance(x, y) > 0.9)
+        near = (path_distance(x, y) > 1.3) & (np.hypot(x, y) < 14)
+        return away & near & clear_of_things(x, y, 0.6)
+
+    spots = spread(random, 56, (-14, -14, 14, 14), 1.15, allowed)
+    scatter("Shrub", meshes, standing(random, spots, (0.8, 1.9)))
+
+
+def azalea(scene: Scene, random: np.random.Generator, shift: float, flowers: float) -> Shape:
+    """A cushion 1 m across: a core, leaves (slot 1), and flowers (slot 2) for a part of them."""
+    count = scene.count(3600, 60)
+    z = random.uniform(-0.1, 1.0, count)
+    out = polar(np.sqrt(1 - z * z), random.uniform(0, TAU, count), z)
+    lumps = 1 + 0.16 * noise(out * 1.6 + shift, 96, 2)[:, None]
+    spots = out * 0.5 * lumps * random.uniform(0.9, 1.03, (count, 1)) * (1, 1, 0.85)
+    forward, up = random.normal(0, 1, (count, 3)), out + random.normal(0, 0.45, (count, 3))
+    leaf = oval_leaf()
+    leaves = copies(leaf, spots, forward, up, random.uniform(0.035, 0.06, count))
+    slots = np.where(random.random(count) < flowers, 2, 1)
+    leaves = replace(leaves, slots=np.repeat(slots, len(leaf.triangles)).astype(np.int32))
+    core = icosphere(scene.segments(3, 2))
+    inner = 0.42 * (1 + 0.16 * noise(core.vertices * 1.6 + shift, 96, 2))[:, None]
+    return join([core.reshaped(core.vertices * inner * (1, 1, 0.85)), leaves])
+
+
+def grass(scene: Scene) -> None:
+    """Grass in the moss around the court, taller towards the woods."""
+    random, count, leaf = scene.random("grass"), scene.count(760, 30), blade(0.04, 3, 0.5)
+    tufts = [tuft(random, leaf, count, 0.6, (0.05, 0.15)) for _ in range(4)]
+    meshes = [scene.mesh("Grass", each, "Grass") for each in tufts]
+
+    def allowed(x: Array, y: Array) -> Array:
+        patch = noise(xyz(x, y) / 2.2, 97, 2) > -0.12
+        off_path = path_distance(x, y) > 0.95
+        return patch & off_path & (court_distance(x, y) > 0.5) & (pond_distance(x, y) > 0.25)
+
+    def farther(x: Array, y: Array) -> Array:
+        return allowed(x, y) & (np.hypot(x, y) > 9.5)
+
+    near = spread(random, scene.count(330, 40), (-9.5, -9.5, 9.5, 9.5), 0.66, allowed)
+    far = spread(random, scene.count(190, 40), (-22, -22, 22, 22), 1.55, farther)
+    places = standing(random, near, (0.8, 1.25), sloping=True)
+    scatter("Grass", meshes, places + standing(random, far, (1.8, 2.8), sloping=True))
+
+
+def fallen_leaves(scene: Scene) -> None:
+    """Maple leaves on the gravel and the flagstones, thickest under the crown."""
+    random, count = scene.random("fallen leaves"), scene.count(420, 20)
+    under_crown = random.normal((-1.2, -2.0), 1.3, (count, 2))
+    spots = np.vstack([under_crown, random.uniform(COURT[:2], COURT[2:], (count // 3, 2))])
+    spots = spots[court_distance(*spots.T) < -0.2]
+    stones = flagstone_layout(scene)
+    heights = raked_height(*spots.T, stones) + 0.012
+    kept = np.ones(len(spots), dtype=bool)
+    for outline, height in stones:
+        reach = np.hypot(*(spots - outline.mean(0)).T)
+        radius = np.hypot(*(outline - outline.mean(0)).T)
+        on_stone = reach < 0.72 * radius.min()
+        heights[on_stone] = height + 0.008
+        kept &= on_stone | (reach > radius.max() + 0.04)  # none across a stone's rim
+    at = xyz(*spots[kept].T, heights[kept])
+    count = len(at)
+    forward = polar(1, random.uniform(0, TAU, count), random.normal(0, 0.05, count))
+    up = random.normal((0, 0, 1), (0.12, 0.12, 0.0), (count, 3))
+    leaves = copies(maple_leaf(), at, forward, up, random.uniform(0.05, 0.085, count))
+    scene.add("Fallen leaves", leaves, "Fallen maple leaves")

@@ -1,0 +1,126 @@
+"""Masonry and joinery: blocks, rings of stones, arches, walls round an opening, frames."""
+
+from typing import Any
+
+import numpy as np
+
+from scenes.library.objects import transform
+from scenes.library.points import Array, Points, points, polar, rectangle, xyz
+from scenes.library.shapes import Shape, box, join, prism, sheet
+
+
+def blocks(centers: Any, sizes: Any, bevel: Any = 0.012) -> Shape:
+    """Boxes with chamfered edges: centers and sizes (n, 3), bevel a number or one per axis."""
+    centers, sizes = np.broadcast_arrays(np.atleast_2d(centers), np.atleast_2d(sizes))
+    cube = box((1, 1, 1), bevel=0.25, segments=1)
+    inset = (np.abs(cube.vertices) < 0.4) * np.broadcast_to(bevel, 3)
+    vertices = np.sign(cube.vertices) * (sizes[:, None] / 2 - inset) + centers[:, None]
+    offset = (np.arange(len(centers)) * len(cube.vertices))[:, None, None]
+    return Shape(
+        vertices.reshape(-1, 3),
+        (cube.quads + offset).reshape(-1, 4),
+        (cube.triangles + offset).reshape(-1, 3),
+    )
+
+
+def stones(table: Points, bevel: Any = 0.012) -> Shape:
+    """`blocks` by a table (n, 6) of their centres x, y, z and their width, depth and height."""
+    rows = points(table)
+    return blocks(rows[:, :3], rows[:, 3:], bevel)
+
+
+def cut(random: np.random.Generator, start: float, stop: float, count: int) -> tuple[Array, Array]:
+    """A length cut into pieces not quite alike: the middles (count) and lengths of the stones."""
+    edges = np.linspace(start, stop, count + 1)
+    edges[1:-1] += random.uniform(-0.22, 0.22, count - 1) * (stop - start) / count
+    return (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+
+
+def bent(shape: Shape) -> Shape:
+    """A shape bent round the Z axis: its x becomes the angle in radians, its y the radius."""
+    angle, radius, z = shape.vertices.T
+    return shape.reshaped(polar(radius, angle, z))
+
+
+def ring_of_stones(
+    count: int, radius: float, width: float, z: float, height: float, span: float = 2 * np.pi
+) -> Shape:
+    """Wedge-shaped stones side by side round the Z axis, from angle 0 to `span`."""
+    step = span / count
+    angles = (np.arange(count) + 0.5) * step
+    gap = 0.006 / radius
+    bevel = (0.012 / radius, 0.012, 0.012)
+    return bent(blocks(xyz(angles, radius, z), (step - gap, width, height), bevel))
+
+
+def upright(shape: Shape) -> Shape:
+    """A shape drawn in the XY plane put up into the XZ plane; its +Z now faces the court, −Y."""
+    return shape.transformed(transform(rotation=(np.pi / 2, 0, 0)))
+
+
+def arch_outline(
+    half_width: float, sill: float, springing: float, rise: float, segments: int
+) -> Array:
+    """An arched opening (n, 2), counter-clockwise from its lower right corner."""
+    angle = np.linspace(0, np.pi, segments + 1)
+    arc = np.column_stack([half_width * np.cos(angle), springing + rise * np.sin(angle)])
+    if sill >= springing:
+        return arc
+    return np.concatenate([[[half_width, sill]], arc, [[-half_width, sill]]])
+
+
+def panel(width: float, bottom: float, top: float, opening: Array, thickness: float) -> Shape:
+    """A wall round an opening: width along x about 0, front at y = 0, back at y = thickness.
+
+    opening: an outline (n, 2) in x and z, counter-clockwise, that every ray from its middle meets
+    once. It may touch the panel's edge. Both faces and the reveal are made.
+    """
+    middle = np.array([0.0, (opening[:, 1].min() + opening[:, 1].max()) / 2])
+    corners = np.array([[1, bottom], [1, top], [-1, top], [-1, bottom]]) * [width / 2, 1] - middle
+    inner = opening - middle
+    crossings = [_ray_meets(inner, corner) for corner in corners]
+    inner = np.concatenate([inner, crossings])
+    inner = inner[np.argsort(np.arctan2(inner[:, 1], inner[:, 0]), kind="stable")]
+    across = np.abs(inner[:, 0]) / (width / 2)
+    along = inner[:, 1] / (np.where(inner[:, 1] > 0, top, bottom) - middle[1])
+    outer = inner / np.maximum(across, along)[:, None]
+    rings = [
+        xyz((ring + middle)[:, 0], y, (ring + middle)[:, 1])
+        for y in (0, thickness)
+        for ring in (inner, outer)
+    ]
+    faces = [
+        sheet(np.stack([rings[a], rings[b]]), closed=True) for a, b in ((0, 1), (3, 2), (2, 0))
+    ]
+    on_edge = np.isclose(np.maximum(across, along), 1)
+    walled = ~(on_edge & np.roll(on_edge, -1))  # where the opening runs along the panel's edge
+    return join(Shape(face.vertices, face.quads[walled]) for face in faces)
+
+
+def _ray_meets(outline: Array, direction: Array) -> Array:
+    """Where the ray from the origin crosses an outline round it."""
+    start, along = outline, np.roll(outline, -1, axis=0) - outline
+    cross = direction[0] * along[:, 1] - direction[1] * along[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = (start[:, 0] * along[:, 1] - start[:, 1] * along[:, 0]) / cross
+        where = (start[:, 0] * direction[1] - start[:, 1] * direction[0]) / cross
+    hit = (reach > 0) & (where >= -1e-9) & (where <= 1 + 1e-9)
+    return direction * reach[hit][0]
+
+
+def filled(outline: Array, y: float, thickness: float = 0.02) -> Shape:
+    """A board or pane of an outline in x and z, its back at y."""
+    return upright(prism(outline, thickness)).moved(0, y, 0)
+
+
+def arch_stones(radius: float, depth: float, count: int, width: float = 0.2) -> Shape:
+    """The voussoirs of a round arch about the origin, y from −depth / 2 to depth / 2."""
+    return upright(ring_of_stones(count, radius + width / 2, width, 0.0, depth, np.pi))
+
+
+def frame(width: float, height: float, profile: Points) -> Shape:
+    """A mitred frame round an opening, flat, of a profile of (outwards, towards the viewer)."""
+    out, up = points(profile).T[:, :, None]
+    corners = rectangle(width, height)
+    rows = xyz(*(corners.T[:, None] + np.sign(corners).T[:, None] * out), up)
+    return sheet(rows[::-1], closed=True)

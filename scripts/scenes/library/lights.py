@@ -1,0 +1,73 @@
+"""Lamps and skies."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from scenes.library.nodes import Color, Graph
+from scenes.library.objects import place, transform
+
+
+def point_light(
+    name: str, location: Sequence[float], watts: float, color: Color, radius: float
+) -> bpy.types.Object:
+    """A spherical lamp that lights but is not itself seen: give it a flame or bulb to be seen.
+
+    A radius of 0.02 m or more keeps the noise down.
+    """
+    light = bpy.data.lights.new(name, "POINT")
+    light.energy, light.color, light.shadow_soft_size = watts, color, radius
+    lamp = place(name, light, transform(location))
+    lamp.visible_camera = lamp.visible_glossy = lamp.visible_transmission = False
+    return lamp
+
+
+def area_light(
+    name: str, matrix: Matrix, size: tuple[float, float], watts: float, color: Color
+) -> bpy.types.Object:
+    """A rectangular lamp that shines along its −Z."""
+    light = bpy.data.lights.new(name, "AREA")
+    light.shape, light.size, light.size_y = "RECTANGLE", *size
+    light.energy, light.color = watts, color
+    return place(name, light, matrix)
+
+
+def sun_light(
+    name: str, azimuth: float, elevation: float, strength: float, color: Color, angle: float
+) -> bpy.types.Object:
+    """A sun: azimuth from +X towards +Y, elevation above the horizon, angular diameter; radians."""
+    light = bpy.data.lights.new(name, "SUN")
+    light.energy, light.color, light.angle = strength, color, angle
+    return place(name, light, transform(rotation=(np.pi / 2 - elevation, 0, azimuth + np.pi / 2)))
+
+
+def hdri_world(
+    filename: str, strength: float = 1.0, rotation: float = 0.0, brightest: float | None = None
+) -> bpy.types.World:
+    """The scene's world: an environment that ships with bpy, packed into the .blend.
+
+    filename: one of datafiles/studiolights/world, "sunrise.exr" for example. rotation: radians
+    about Z. brightest: the radiance to cut the sun's disc to, so its reflections make no fireflies.
+    """
+    folder = Path(bpy.utils.system_resource("DATAFILES")) / "studiolights" / "world"
+    image = bpy.data.images.load(str(folder / filename))
+    image.pack()
+    image.filepath = f"//{filename}"  # the path on the building machine is nobody's business
+    world = bpy.data.worlds.new("Sky")
+    bpy.context.scene.world = world
+    graph = Graph(world.node_tree)
+    coordinates = graph.add("ShaderNodeTexCoord").outputs["Generated"]
+    turned = graph.add(
+        "ShaderNodeMapping", {"Vector": coordinates, "Rotation": (0.0, 0.0, -rotation)}
+    )
+    color = graph.add("ShaderNodeTexEnvironment", {"Vector": turned}, image=image).outputs["Color"]
+    if brightest is not None:
+        color = graph.add(
+            "ShaderNodeVectorMath", {0: color, 1: (brightest,) * 3}, operation="MINIMUM"
+        ).outputs[0]
+    background = graph.add("ShaderNodeBackground", {"Color": color, "Strength": strength})
+    graph.add("ShaderNodeOutputWorld", {"Surface": background})
+    return world

@@ -1,0 +1,74 @@
+"""Points and directions as numpy arrays, read from text or made of coordinates; outlines, paths."""
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+Array = NDArray[Any]
+Points = str | ArrayLike
+"""Points (n, 2) or (n, 3): numbers, or text that `points` reads."""
+
+
+def points(data: Points) -> Array:
+    """Points (n, k) of text such as "0.1 0, 0.2 0.5", a comma or line end after each; or numbers.
+
+    Long profiles stay as compact as a drawing's coordinates, over as many lines as they need. In
+    text, ±0.3 stands for −0.3 and 0.3, and 1..2*5 for five values evenly from 1 to 2; a point
+    that has such values stands for all their combinations.
+    """
+    if not isinstance(data, str):
+        return np.asarray(data, float)
+    rows = (row.split() for row in data.replace("\n", ",").split(","))
+    return np.array([point for row in rows if row for point in product(*map(_values, row))])
+
+
+def _values(text: str) -> list[float]:
+    if text.startswith("±"):
+        return [-float(text[1:]), float(text[1:])]
+    if "*" in text:
+        ends, count = text.split("*")
+        return np.linspace(*map(float, ends.split("..")), int(count)).tolist()
+    return [float(text)]
+
+
+def xyz(x: ArrayLike, y: ArrayLike, z: ArrayLike = 0.0) -> Array:
+    """Points (…, 3) of coordinates that broadcast against each other."""
+    return np.stack(np.broadcast_arrays(*(np.asarray(v, float) for v in (x, y, z))), axis=-1)
+
+
+def polar(radius: ArrayLike, angle: ArrayLike, z: ArrayLike = 0.0) -> Array:
+    """Points (…, 3) of distance from the Z axis, angle from +X in radians, and height."""
+    r, a = np.asarray(radius, float), np.asarray(angle, float)
+    return xyz(r * np.cos(a), r * np.sin(a), z)
+
+
+def unit(vectors: ArrayLike) -> Array:
+    """Vectors (…, k) scaled to length 1."""
+    v = np.asarray(vectors, float)
+    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9)
+
+
+def random_directions(random: np.random.Generator, count: int) -> Array:
+    """Unit vectors (count, 3), evenly spread over the sphere."""
+    return unit(random.normal(size=(count, 3)))
+
+
+def circle(radius: float, segments: int, start: float = 0.0, stop: float = 2 * np.pi) -> Array:
+    """Points (n, 2) of a circle or, given where it starts and stops, of an arc with both ends."""
+    full = np.isclose(stop - start, 2 * np.pi)
+    return polar(radius, np.linspace(start, stop, segments, endpoint=not full))[:, :2]
+
+
+def rectangle(width: float, height: float) -> Array:
+    """The corners (4, 2) of a rectangle about the origin, counter-clockwise."""
+    return np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (width / 2, height / 2)
+
+
+def smooth_path(path: Points, steps: int) -> Array:
+    """Points (steps + 1, k) of a cubic spline through those given, even in chord length."""
+    p = points(path)
+    chord = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1))])
+    return np.asarray(CubicSpline(chord, p)(np.linspace(0, chord[-1], steps + 1)))

@@ -1,0 +1,132 @@
+"""The arcades: on each side a low wall, twin columns, round arches; and the vaults behind them."""
+
+import numpy as np
+
+from scenes.library.architecture import arch_outline, arch_stones, blocks, cut, panel, stones
+from scenes.library.model import Model
+from scenes.library.points import Points, points, polar, xyz
+from scenes.library.scene import Scene
+from scenes.library.shapes import Shape, copies, grid, join, sheet
+from scenes.lone_monk import plan
+from scenes.lone_monk.plan import ARCADE, ARCADE_WALL, FRONT, SPRINGING, VAULT_RISE, WALK, on_sides
+
+ARCH_RADIUS = 0.92
+# A column's base, shaft and neck, and the bell of its capital: radius and height.
+SHAFT = """0.125 0.115, 0.119 0.116, 0.129 0.122, 0.136 0.133, 0.136 0.147, 0.129 0.158, 0.119 0.164
+    0.112 0.17, 0.104 0.185, 0.106 0.2, 0.113 0.203, 0.116 0.214, 0.113 0.225, 0.098 0.235
+    0.098 0.24, 0.096 0.51, 0.092 0.78, 0.086 1.20, 0.084 1.32
+    0.094 1.324, 0.098 1.335, 0.094 1.346, 0.085 1.35"""
+BELL = "0.085 1.34, 0.087 1.40, 0.092 1.456, 0.103 1.514, 0.119 1.572, 0.14 1.63"
+# Its leaves: how many, where between two the first is, their foot, height, and reach.
+LEAVES = "8 0.5 1.345 0.15 0.035, 4 0 1.40 0.2 0.05, 4 0.5 1.40 0.2 0.08"
+# Plinth and abacus: middle x, y, z and width, depth, height.
+COLUMN_BLOCKS = "0 0 0.088 0.27 0.27 0.06, 0 0 1.665 0.285 0.285 0.07"
+# Masonry of rectangular plan: width, depth, height; the pier's head and top from the springing.
+IMPOST = "0.26 0.50 1.70, 0.36 0.58 1.77, 0.37 0.60 1.77, 0.37 0.60 1.84, 0.35 0.58 1.85"
+PIER_FOOT = "0.80 0.80 -0.03, 0.80 0.80 0.41, 0.76 0.76 0.43, 0.66 0.66 0.50, 0.66 0.66 0.51"
+PIER = "0.66 0.66 -1.95, 0.66 0.66 -0.2, 0.56 0.56 -0.2, 0.56 0.56 1.41"
+PIER_HEAD = "0.66 0.66 -0.22, 0.76 0.76 -0.12, 0.78 0.78 -0.11, 0.78 0.78 -0.01, 0.75 0.75 0"
+# Courses of the low wall: stones, how far they leave the gate open, depth, middle z, and height.
+LOW_WALL = "10 0.9 0.54 0.13 0.246, 10 0.9 0.54 0.38 0.246, 6 0.87 0.66 0.552 0.096"
+
+
+def arcades(scene: Scene) -> None:
+    """Low walls with columns, open at the gates, and piers where two arcades meet."""
+    on_sides("Arcade", [bay(scene).mesh("Arcade bay")], plan.BAY_AXES, ARCADE, SPRINGING)
+    column, pier, long = Model(scene), Model(scene), Model(scene)
+    column.add(twin_column(scene), "Carved stone")
+    on_sides("Column", [column.mesh("Column")], plan.COLUMNS[1:-1], ARCADE, plan.STYLOBATE)
+    pier.add(pillar(PIER_FOOT), "Carved stone")
+    pier.add(pillar(PIER), "Ashlar", (0, 0, SPRINGING))
+    pier.add(pillar(PIER_HEAD), "Carved stone", (0, 0, SPRINGING))
+    on_sides("Pier", [pier.mesh("Pier")], -ARCADE, ARCADE)
+    long.add(low_wall(scene), "Limestone")
+    front = (0, FRONT, plan.ARCADE_TOP)
+    strings = [(0, 0, -0.28, 2 * FRONT, 0.13, 0.06), (0, 0, -0.1, 2 * FRONT, 0.2, 0.07)]
+    dentils = xyz(np.arange(0.12 - FRONT, FRONT - 0.05, 0.2), -0.03, -0.19)
+    long.add(stones(strings), "Limestone", front)
+    long.add(blocks(dentils, (0.09, 0.12, 0.11), 0.008), "Limestone", front)
+    on_sides("Low wall", [long.mesh("Low wall and cornice")])
+
+
+def bay(scene: Scene) -> Model:
+    """The wall over one arch, with voussoirs and hood moulds; its origin is at the springing."""
+    model, n = Model(scene), scene.segments(24)
+    opening = arch_outline(ARCH_RADIUS, 0.0, 0.0, ARCH_RADIUS, n)
+    wall = panel(plan.BAY, 0.0, plan.ARCADE_TOP - SPRINGING, opening, ARCADE_WALL - 0.06)
+    model.add(wall, "Plaster", (0, 0.03 - ARCADE_WALL / 2, 0))
+    model.add(arch_stones(ARCH_RADIUS - 0.015, ARCADE_WALL + 0.02, 15), "Limestone")
+    x, z = arch_outline(plan.BAY / 2 - 0.001, 0.0, 0.0, plan.BAY / 2 - 0.001, n).T
+    hood = scene.tube(xyz(x, 0, z), 0.035)
+    for face in (0.01 - ARCADE_WALL / 2, ARCADE_WALL / 2 - 0.01):
+        model.add(hood, "Limestone", (0, face, 0))
+    return model
+
+
+def pillar(section: Points, chamfer: float = 0.012) -> Shape:
+    """Masonry of rectangular plan with chamfered corners: rows of width, depth and height."""
+    width, depth, z = points(section).T[:, :, None]
+    x, y = points("1 1, 1 1, -1 1, -1 1, -1 -1, -1 -1, 1 -1, 1 -1").T  # two points for each corner
+    inset = chamfer * np.array([0, 1, 1, 0, 0, 1, 1, 0])
+    ring = xyz(x * (width / 2 - inset), y * (depth / 2 - chamfer + inset), z)
+    return sheet(ring, closed=True, capped=True)
+
+
+def twin_column(scene: Scene) -> Shape:
+    """Two slender columns, one behind the other, under one impost; stands on its origin."""
+    one = [scene.lathe(SHAFT, 20), scene.lathe(BELL, 16), stones(COLUMN_BLOCKS, 0.009)]
+    for count, first, foot, height, reach in points(LEAVES):
+        out = polar(1, (np.arange(count) + first) * 2 * np.pi / count)
+        one.append(copies(leaf(scene, height, reach), out * 0 + (0, 0, foot), out))
+    pair = [join(one).moved(0, y, 0) for y in (-0.15, 0.15)]
+    return join([*pair, stones("0 0 0.03 0.32 0.60 0.06"), pillar(IMPOST)])
+
+
+def leaf(scene: Scene, height: float, reach: float) -> Shape:
+    """A carved leaf on a capital's bell that leans out along +Y and curls over at its tip."""
+    t, across = np.linspace(0, 1, scene.segments(7) + 1)[:, None], np.linspace(1, -1, 5)
+    x = across * (0.034 * np.sin(np.pi * (0.25 + 0.75 * t)) ** 0.5 + 0.004)
+    out = 0.088 + 0.05 * t**2.2 + reach * t**3 + 0.006 * (1 - np.abs(across))
+    return sheet(xyz(x, out - 0.3 * np.abs(x), height * (t - 0.42 * t**4)))
+
+
+def low_wall(scene: Scene) -> Shape:
+    """The stones under a side's columns: two courses and a coping."""
+    random, parts = scene.random("low wall"), []
+    for count, gate, depth, z, height in points(LOW_WALL):
+        for sign in (-1, 1):
+            middle, length = cut(random, gate, ARCADE - 0.38, int(count))
+            places, sizes = xyz(sign * middle, ARCADE, z), xyz(length - 0.007, depth, height)
+            parts.append(blocks(places, sizes, 0.016))
+    return join(parts)
+
+
+def vaults(scene: Scene) -> None:
+    """A vault for each bay and each corner of the walks, and the brackets that carry them."""
+    middle, before = plan.WALK_MIDDLE, ARCADE - plan.WALK_MIDDLE - ARCADE_WALL / 2
+    on_sides("Vault", [vault(scene, plan.BAY).mesh("Vault")], plan.BAY_AXES, middle, SPRINGING)
+    corner, corbel = vault(scene, WALK), Model(scene)
+    rise = arch_outline(WALK / 2 - 0.12, 0.0, 0.0, VAULT_RISE - 0.08, scene.segments(20))
+    arch = panel(WALK, 0.0, 1.2, rise, ARCADE_WALL)
+    corner.add(arch, "Limestone", (before, 0, 0), (0, 0, -90))
+    corner.add(arch, "Limestone", (0, before, 0))
+    on_sides("Corner vault", [corner.mesh("Corner vault")], middle, middle, SPRINGING)
+    bell = scene.lathe("0.02 -0.34, 0.05 -0.31, 0.07 -0.2, 0.13 -0.1, 0.14 -0.09", 12)
+    corbel.add(join([bell, stones("0 0 -0.045 0.34 0.34 0.09")]), "Carved stone")
+    on_sides("Corbel", [corbel.mesh("Corbel")], plan.COLUMNS, plan.BACK, SPRINGING)
+
+
+def vault(scene: Scene, length: float) -> Model:
+    """The higher of two crossing elliptic barrels over a bay, with ribs along its groins."""
+    model, n = Model(scene), scene.segments(20, 6) // 2 * 2
+    a, b, t = length / 2, WALK / 2, np.sin(np.linspace(-np.pi / 2, np.pi / 2, n + 1))
+    barrel = VAULT_RISE * np.sqrt(1 - t**2)
+    model.add(grid(a * t, b * t, np.maximum(barrel, barrel[:, None])), "Whitewash")
+    t = np.linspace(-1, 1, 2 * n + 1)
+    rise = VAULT_RISE * np.sqrt(1 - t**2) - 0.02
+    for sign in (-1, 1):
+        model.add(scene.tube(xyz(a * t, sign * b * t, rise), 0.05), "Limestone")
+        model.add(scene.tube(xyz(sign * a, b * t, rise), 0.07), "Limestone")
+    boss = scene.lathe("0.03 -0.1, 0.08 -0.09, 0.12 -0.05, 0.13 0", 16)
+    model.add(boss, "Limestone", (0, 0, VAULT_RISE - 0.02))
+    return model

@@ -1,0 +1,123 @@
+"""The church: its flank over the eastern walk, and the bell tower in the north-east corner."""
+
+import numpy as np
+
+from scenes.library.architecture import arch_outline, blocks, filled, panel, stones, upright
+from scenes.library.model import Model
+from scenes.library.objects import place, transform
+from scenes.library.points import Array, circle, polar, xyz
+from scenes.library.scene import Scene
+from scenes.library.shapes import Shape, join, lathe
+from scenes.lone_monk.plan import BACK, EAST, LEAN_TO_TOP, NORTH, SIDES, on_sides, side
+from scenes.lone_monk.roofs import EXPOSED, PITCH, house, lay_tiles
+from scenes.lone_monk.walls import glaze, wall
+
+TOP, BAYS = 9.4, 7
+WIDTH = 2 * BACK / BAYS
+LANCET = (0.42, 6.2, 7.75, 0.62)  # an arch, as in `walls`
+ROSE = (1.15, 7.3)  # its radius and height
+
+HALF, BELFRY, TOWER_TOP = 2.3, 12.4, 15.6  # half the tower's width, and where its parts begin
+ROOF_HALF, ROOF_SLOPE = HALF + 0.4, np.radians(33)
+ROOF_HEIGHT = ROOF_HALF * np.tan(ROOF_SLOPE)
+BELL = """0.55 -1.15, 0.53 -1.12, 0.44 -0.95, 0.36 -0.7, 0.31 -0.4
+    0.26 -0.22, 0.12 -0.15, 0.05 -0.1"""
+# Of the clock: middle x, y, z and width, depth, height.
+MARK, HOUR_HAND = "0 -0.035 0.58 0.05 0.02 0.14", "0 -0.05 0.13 0.035 0.015 0.36"
+MINUTE_HAND = "0 -0.05 0.22 0.035 0.015 0.54"
+
+
+def church(scene: Scene) -> None:
+    """Seven bays of brick between pilaster strips, with lancets and a rose, under a frieze."""
+    area, hole = (WIDTH, LEAN_TO_TOP, TOP, 0.5), arch_outline(*LANCET, scene.segments(20))
+    lancet = wall(scene, "Brick", area, hole, (0.14, 0.04))
+    lancet.add(stones("0 -0.04 6.12 1.2 0.2 0.1", 0.02), "Limestone")
+    glaze(lancet, hole, 0.3, 2, "Lead")
+    radius, height = ROSE
+    hole = circle(radius, scene.segments(40, 8)) + np.array((0, height))
+    rose = wall(scene, "Brick", area, hole, (0.2, 0.06))
+    rose.add(tracery(scene), "Limestone", (0, 0.16, height))
+    rose.add(filled(hole, 0.3), "Glass")
+    x = np.delete(in_row(BAYS), BAYS // 2)
+    on_sides("Lancet bay", [lancet.mesh("Lancet bay")], x, BACK, sides=[EAST])
+    on_sides("Rose bay", [rose.mesh("Rose bay")], 0, BACK, sides=[EAST])
+    frieze, strip, low = Model(scene), Model(scene), TOP - 0.62
+    arch = arch_outline(0.17, low, TOP - 0.45, 0.17, scene.segments(10))
+    frieze.add(panel(WIDTH / 7, low, TOP - 0.1, arch, 0.14), "Brick")
+    frieze.add(stones([(-WIDTH / 14, 0.04, low - 0.05, 0.1, 0.14, 0.12)], 0.02), "Limestone")
+    on_sides("Frieze", [frieze.mesh("Frieze")], in_row(7 * BAYS) / 7, BACK - 0.13, sides=[EAST])
+    height = TOP - LEAN_TO_TOP - 0.1
+    strip.box((0.42, 0.16, height), "Brick", (0, BACK - 0.06, LEAN_TO_TOP + height / 2))
+    on_sides("Pilaster strip", [strip.mesh("Pilaster strip")], in_row(BAYS + 1), sides=[EAST])
+    house(scene, EAST, (-BACK, BACK + 3.5), TOP, 14, "Brick")
+
+
+def in_row(count: int) -> Array:
+    """The x of things a bay's width apart, symmetric about 0."""
+    return (np.arange(count) - (count - 1) / 2) * WIDTH
+
+
+def tracery(scene: Scene) -> Shape:
+    """The stone spokes and rings of the rose window, about its middle, facing −Y."""
+    parts = [scene.ring(0.3, 0.045), scene.ring(1.12, 0.05)]
+    circlet, foil = scene.ring(0.25, 0.03), scene.ring(0.09, 0.015, 12)
+    for angle in np.arange(8) * np.pi / 4:
+        parts.append(scene.tube(polar([0.3, 1.12], angle), 0.035))
+        parts.append(circlet.moved(*polar(0.84, angle + np.pi / 8)))
+        parts.append(foil.moved(*polar(0.14, angle)))
+    return upright(join(parts))
+
+
+def tower(scene: Scene) -> None:
+    """The tower: four sides alike about one core, under a pyramid of tiles."""
+    at = side(NORTH, (BACK + HALF, BACK + HALF, 0))
+    place("Tower", core(scene).mesh("Tower"), at)
+    opening = arch_outline(0.62, BELFRY + 0.5, TOWER_TOP - 1.3, 0.62, scene.segments(20))
+    belfry = wall(scene, "Brick", (HALF, BELFRY, TOWER_TOP, 0.45), opening, (0.14, 0.05))
+    belfry.add(stones([(0, 0.2, BELFRY + 0.47, 1.5, 0.62, 0.08)], 0.015), "Limestone")
+    bay, trim = belfry.mesh("Belfry bay"), tower_side(scene).mesh("Tower side")
+    x = np.arange(PITCH / 2 - ROOF_HALF, ROOF_HALF, PITCH)
+    rows = np.round((ROOF_HALF - np.abs(x)) / (EXPOSED * np.cos(ROOF_SLOPE)))
+    x, rows = x[rows > 0], rows[rows > 0]
+    for number in SIDES:
+        turned = at @ transform(rotation=(0, 0, number * np.pi / 2))
+        place(f"Tower side.{number}", trim, turned)
+        for end in (-1, 1):
+            place(f"Belfry.{number}.{end}", bay, turned @ transform((end * HALF / 2, -HALF, 0)))
+        slope = turned @ transform((0, -ROOF_HALF, TOWER_TOP + 0.02), (ROOF_SLOPE, 0, 0))
+        lay_tiles(scene, f"Tower tiles {number}", slope, x, 0, rows)
+
+
+def tower_side(scene: Scene) -> Model:
+    """What each side has, facing −Y: strings, quoins, a clock, and the tiles on a hip."""
+    model, clock = Model(scene), (0, -HALF, 11.1)
+    for z, out, height in ((9.9, 0.07, 0.14), (BELFRY, 0.12, 0.2), (TOWER_TOP - 0.1, 0.14, 0.16)):
+        string = [(0, -HALF, z, 2 * HALF + 2 * out, 2 * out, height)]
+        model.add(stones(string, 0.03), "Limestone")
+    z = np.arange(0.2, TOWER_TOP - 0.5, 0.4)
+    size = xyz(*np.where(np.arange(len(z)) % 2, [[0.38], [0.62]], [[0.62], [0.38]]), 0.385)
+    corner = size / 2 - HALF - 0.025
+    model.add(blocks(xyz(corner[:, 0], corner[:, 1], z), size, 0.015), "Limestone")
+    face = scene.lathe("0.8 0, 0.8 0.05, 0.72 0.06, 0.7 0.03", 40)
+    model.add(upright(face), "Limestone", clock)
+    for bar, turn in ((HOUR_HAND, 57), (MINUTE_HAND, 195), *((MARK, 30 * h) for h in range(12))):
+        model.add(stones(bar, 0.002), "Iron", clock, (0, turn, 0))
+    hip = np.linspace((ROOF_HALF, ROOF_HALF, 0.06), (0, 0, ROOF_HEIGHT + 0.1), 16)
+    tiles = scene.tube(hip, 0.085 + 0.02 * (np.arange(16) % 2))
+    model.add(tiles, "Roof tile", (0, 0, TOWER_TOP))
+    return model
+
+
+def core(scene: Scene) -> Model:
+    """What the tower has but once: its shaft, the bell, the roof's boards, and a cross."""
+    model, yoke, summit = Model(scene), (0, 0, BELFRY + 2.3), (0, 0, TOWER_TOP + ROOF_HEIGHT - 0.05)
+    model.box((2 * HALF, 2 * HALF, BELFRY), "Brick", (0, 0, BELFRY / 2))
+    clapper = scene.tube("0 0 -0.5, 0 0 -0.9, 0 0 -1.25", [0.02, 0.03, 0.08])
+    model.add(join([scene.lathe(BELL, 28), clapper]), "Bronze", yoke)
+    model.add(stones("0 0 0.02 4.2 0.22 0.26", 0.03), "Wood", yoke)
+    boards = lathe([(ROOF_HALF * 2**0.5, 0), (0, ROOF_HEIGHT)], 4)
+    model.add(boards, "Wood", (0, 0, TOWER_TOP), (0, 0, 45))
+    ball = scene.lathe("0.16 0, 0.06 0.2, 0.15 0.32, 0.15 0.42, 0.05 0.55", 16)
+    cross = (scene.tube(line, 0.03) for line in ("0 0 0.4, 0 0 1.7", "-0.35 0 1.3, 0.35 0 1.3"))
+    model.add(join([ball, *cross]), "Iron", summit)
+    return model

@@ -1,0 +1,95 @@
+"""The ground of the court: paths of stone, the plaza round the well, and four lawns in kerbs."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import bpy
+import numpy as np
+from numpy.random import Generator
+
+from scenes.library.architecture import blocks, cut, ring_of_stones, stones
+from scenes.library.model import Model
+from scenes.library.noise import noise
+from scenes.library.objects import transform
+from scenes.library.plants import blade, folded_leaf
+from scenes.library.points import polar, xyz
+from scenes.library.scene import Scene
+from scenes.library.shapes import Shape, copies, grid, join
+from scenes.lone_monk.plan import ARCADE, BACK, CROSS_PATH, LAWN, PLAZA, WALK_FLOOR, on_sides
+
+CELLS = 16  # of grass along a lawn's edge
+CELL = (LAWN - CROSS_PATH) / CELLS
+
+
+def paving(scene: Scene) -> None:
+    """The paths by the arcades and to the well, its plaza, the walks' floors, and bare earth."""
+    scene.add("Ground", grid([-120, 120], [-120, 120], -0.03), "Dry earth")
+    random, paths, plaza = scene.random("paving"), Model(scene), Model(scene)
+    coarser, outer = min(1.0, scene.detail) ** -0.5, ARCADE - 0.25
+    slab, tile, far = (0.52 * coarser, 0.41), (0.3 * coarser, 0.3), BACK + 0.1
+    paths.add(slabs(random, (-outer, LAWN, LAWN, outer), slab, 0.015), "Paving")
+    paths.add(slabs(random, (-CROSS_PATH, CROSS_PATH, PLAZA - 0.1, LAWN), slab, 0.015), "Paving")
+    paths.add(slabs(random, (-far, outer, outer, far), tile, WALK_FLOOR), "Terracotta floor")
+    paths.add(stones([(0, outer - 0.15, 0.03, 1.75, 0.34, 0.1)], 0.015), "Paving")
+    for radius in np.linspace(1.0, PLAZA - 0.145, 5):
+        count = max(8, round(2 * np.pi * radius / slab[0]))
+        ring = ring_of_stones(count, radius, 0.28, -0.045, 0.12)
+        plaza.add(ring, "Paving", degrees=(0, 0, random.uniform(0, 60)))
+    on_sides("Paving", [paths.mesh("Paving")])
+    on_sides("Plaza", [plaza.mesh("Plaza")], sides=[0])
+
+
+def slabs(random: Generator, area: Sequence[float], size: Sequence[float], top: float) -> Shape:
+    """Slabs 12 cm thick of about a length and depth, in rows over the rectangle x0, x1, y0, y1.
+
+    Each is a little higher or lower than its neighbours. The plaza is left out.
+    """
+    x0, x1, y0, y1 = area
+    rows = []
+    for low, high in pairwise(np.linspace(y0, y1, round((y1 - y0) / size[1]) + 1)):
+        middle, length = cut(random, x0, x1, max(1, round((x1 - x0) / size[0])))
+        z = top - 0.06 + random.uniform(-0.004, 0.004, len(middle))
+        row = xyz(middle, (low + high) / 2, z), xyz(length - 0.014, high - low - 0.014, 0.12)
+        rows.append(np.concatenate(row, axis=1))
+    laid = np.concatenate(rows)
+    return stones(laid[np.hypot(laid[:, 0], laid[:, 1]) > PLAZA + 0.16])
+
+
+def lawns(scene: Scene) -> None:
+    """Turf and grass; the corner of each lawn next to the well is cut round."""
+    random, lawn, along = scene.random("lawns"), Model(scene), np.linspace(CROSS_PATH, LAWN, 25)
+    x, y = np.meshgrid(along, along)
+    bumps = 0.012 * noise(xyz(x, y) * 1.5, scene.seed) - 0.01
+    lawn.add(grid(along, along, np.where(np.hypot(x, y) < PLAZA - 0.2, -0.1, bumps)), "Turf")
+    lawn.add(kerb(), "Limestone")
+    on_sides("Lawn", [lawn.mesh("Lawn")])
+    patches = [grass_patch(scene, random) for _ in range(6)]
+    x, y = CROSS_PATH + (np.indices((CELLS, CELLS)).reshape(2, -1) + 0.5) * CELL
+    x, y = np.stack([x, y])[:, np.hypot(x, y) > PLAZA + 0.3]
+    turn, size = 90 * random.integers(4, size=len(x)), random.uniform(0.95, 1.15, len(x))
+    on_sides("Grass", patches, x, y, 0, turn, size)
+
+
+def kerb() -> Shape:
+    """Kerb stones round a lawn in the quadrant x, y > 0, and round its cut corner."""
+    corner = np.arcsin(CROSS_PATH / PLAZA)
+    arc = ring_of_stones(5, PLAZA + 0.05, 0.1, 0.0, 0.14, np.pi / 2 - 2 * corner)
+    parts = [arc.transformed(transform(rotation=(0, 0, corner)))]
+    for line, start in ((CROSS_PATH, PLAZA * np.cos(corner)), (LAWN, CROSS_PATH)):
+        length = (LAWN - start) / 9
+        run = start + (np.arange(9) + 0.5) * length
+        parts.append(blocks(xyz(run, line), (length - 0.01, 0.1, 0.14)))
+        parts.append(blocks(xyz(line, run), (0.1, length - 0.01, 0.14)))
+    return join(parts)
+
+
+def grass_patch(scene: Scene, random: Generator) -> bpy.types.Mesh:
+    """A square of grass blades, with a daisy here and there."""
+    count = scene.count(150)
+    foot = xyz(*random.uniform(-CELL / 2, CELL / 2, (2, count)), -0.01)
+    forward, up = random.normal(0, (1, 1, 0), (count, 3)), random.normal((0, 0, 1), 0.3, (count, 3))
+    parts = [copies(blade(0.055, 3, 0.35), foot, forward, up, random.uniform(0.035, 0.085, count))]
+    for _ in range(random.integers(2)):
+        petals, middle = polar(1, np.arange(8) * np.pi / 4, 0.25), foot[0] + (0, 0, 0.08)
+        parts.append(copies(folded_leaf(0.5), middle + 0 * petals, petals, size=0.013).painted(1))
+    return scene.mesh("Grass", join(parts), "Grass", "Daisy", smooth=False)

@@ -1,0 +1,121 @@
+"""Walls with doors and windows: behind the walks, and the storeys above them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from scenes.library.architecture import arch_outline, blocks, filled, panel, stones, upright
+from scenes.library.model import Model
+from scenes.library.objects import transform
+from scenes.library.points import Array, xyz
+from scenes.library.scene import Scene
+from scenes.library.shapes import Shape, box, copies, join, sheet
+from scenes.lone_monk import plan
+from scenes.lone_monk.plan import ARCADE, BACK, BACK_WALL, LEAN_TO_TOP, WALK_FLOOR, on_sides
+from scenes.lone_monk.roofs import house, ridge
+
+# Arched openings: half their width, and the heights of sill, springing, and the arch over it.
+DOORWAY = (0.56, WALK_FLOOR, 1.85, 0.42)
+WINDOW = (0.38, 1.15, 1.80, 0.38)
+UPPER_WINDOW = (0.42, 6.0, 6.62, 0.12)
+WALK_WALL = (plan.BAY, 0.0, LEAN_TO_TOP, BACK_WALL)  # of a bay: width, foot, top, thickness
+# A shutter's frame: middle x, y, z and width, depth, height.
+SHUTTER = """-0.19 0 0 0.05 0.035 0.74, 0.19 0 0 0.05 0.035 0.74
+    0 0 0.34 0.34 0.035 0.06, 0 0 -0.34 0.34 0.035 0.06, 0 0 0 0.34 0.035 0.06"""
+
+
+def wall(
+    scene: Scene, stuff: str, area: Sequence[float], opening: Array, frame: Sequence[float]
+) -> Model:
+    """A wall round an opening that is framed in stone, its front at y = 0.
+
+    area: its width, foot, top and thickness. frame: how wide it is, and how far it stands out.
+    """
+    model, (wide, proud) = Model(scene), frame
+    model.add(panel(*area[:3], opening, area[3]), stuff)
+    middle = (opening.min(0) + opening.max(0)) / 2
+    around = middle + (opening - middle) * (1 + 2 * wide / np.ptp(opening, axis=0))
+    section = ((around, 0.02), (around, -proud), (opening, -proud), (opening, 0.02))
+    rings = [xyz(outline[:, 0], y, outline[:, 1]) for outline, y in section]
+    model.add(sheet(rings, closed=True), "Limestone")
+    return model
+
+
+def glaze(model: Model, opening: Array, y: float, bars: int, stuff: str) -> None:
+    """Put a pane into an opening at depth y, with a lattice before it."""
+    (left, low), (right, high) = opening.min(0), opening.max(0)
+    x, z = np.linspace(left, right, bars + 2)[1:-1], np.arange(low + 0.25, high - 0.1, 0.25)
+    model.add(filled(opening, y), "Glass")
+    posts = blocks(xyz(x, y - 0.03, (low + high) / 2), (0.02, 0.025, high - low), 0.003)
+    model.add(join([posts, blocks(xyz(0, y - 0.03, z), (right - left, 0.025, 0.02), 0.003)]), stuff)
+
+
+def doorway(scene: Scene, y: float) -> Model:
+    """A wall of the walks with a door of planks, iron straps, nails and a ring at depth y."""
+    (half, sill, springing, rise), n = DOORWAY, scene.segments(16)
+    hole = arch_outline(*DOORWAY, n)
+    model = wall(scene, "Whitewash", WALK_WALL, hole, (0.16, 0.05))
+    model.add(filled(hole, y + 0.03), "Wood")
+    edges = np.linspace(-half, half, 8)
+    for x in zip(edges[:-1] + 0.004, edges[1:] - 0.004, strict=True):
+        left, right = springing + rise * np.sqrt(1 - np.square(x) / half**2)
+        plank = [(x[0], sill), (x[1], sill), (x[1], right), (x[0], left)]
+        model.add(filled(np.array(plank), y, 0.05), "Wood")
+    middles = (edges[1:] + edges[:-1]) / 2
+    for z in (0.55, 1.50):
+        model.add(stones([(0, y - 0.055, z, 1.72 * half, 0.012, 0.06)], 0.004), "Iron")
+        model.add(blocks(xyz(middles, y - 0.064, z), (0.022, 0.014, 0.022), 0.006), "Iron")
+    model.add(upright(scene.ring(0.05, 0.008, 16, 6)), "Iron", (0.3, y - 0.075, sill + 0.95))
+    return model
+
+
+def back_walls(scene: Scene) -> None:
+    """The walls behind the walks: whitewashed, with doors and windows by turns."""
+    hole = arch_outline(*WINDOW, scene.segments(16))
+    window = wall(scene, "Whitewash", WALK_WALL, hole, (0.1, 0.03))
+    window.add(stones("0 -0.02 1.11 1.0 0.16 0.08"), "Limestone")
+    glaze(window, hole, 0.3, 3, "Lead")
+    bays = window.mesh("Wall with window"), doorway(scene, 0.22).mesh("Wall with door")
+    for number in plan.SIDES:
+        for i, x in enumerate(plan.BAY_AXES):
+            has_door = i in (3, number * 2 % 7)
+            on_sides(f"Wall.{i}", [bays[has_door]], x, BACK, sides=[number])
+    ends, width, top = Model(scene), BACK - ARCADE, LEAN_TO_TOP
+    for x in (-ARCADE - width / 2, ARCADE + width / 2):
+        ends.box((width, BACK_WALL, top), "Whitewash", (x, BACK + BACK_WALL / 2, top / 2))
+    ends.add(stones([(0, BACK - 0.02, WALK_FLOOR + 0.1, 2 * BACK, 0.06, 0.2)]), "Limestone")
+    on_sides("Wall ends", [ends.mesh("Wall ends")])
+
+
+def upper_storeys(scene: Scene) -> None:
+    """The storeys above the walks in the north and south, with shutters at their windows."""
+    hole, bays = arch_outline(*UPPER_WINDOW, scene.segments(16)), 8
+    width = 2 * BACK / bays
+    for number, top, left in ((plan.NORTH, 7.7, -BACK - 0.5), (plan.SOUTH, 7.2, -BACK)):
+        meshes = []
+        for swing in (21, 7, 7, 7):
+            bay = wall(scene, "Plaster", (width, LEAN_TO_TOP, top, 0.4), hole, (0.1, 0.03))
+            bay.add(stones("0 -0.03 5.95 1.1 0.18 0.1", 0.015), "Limestone")
+            glaze(bay, hole, 0.22, 1, "Wood")
+            for sign in (-1, 1):
+                wing = shutter().moved(0.22 * sign, 0, 0)
+                bay.add(wing, "Wood", (0.53 * sign, -0.05, 6.36), (0, 0, sign * swing))
+            meshes.append(bay.mesh("Upper wall"))
+        x = (np.arange(bays) + 0.5) * width - BACK
+        on_sides("Upper wall", meshes, x, BACK, sides=[number])
+        house(scene, number, (left, left + 2 * BACK + 0.5), top, 12, "Plaster")
+
+
+def shutter() -> Shape:
+    """One wing of a louvred shutter, 0.42 by 0.72 m, about its middle."""
+    slat = box((0.34, 0.01, 0.05)).transformed(transform(rotation=(0.6, 0, 0)))
+    return join([stones(SHUTTER, 0.006), copies(slat, xyz(0, 0, np.linspace(-0.28, 0.28, 14)))])
+
+
+def west_wall(scene: Scene) -> None:
+    """The low western wall, over which the sun comes in, under a row of ridge tiles."""
+    model, y, z = Model(scene), BACK + BACK_WALL / 2, LEAN_TO_TOP + 0.2
+    model.box((2 * BACK + 1, BACK_WALL, 0.4), "Plaster", (0, y, z - 0.1))
+    coping = ridge(scene, (-BACK - 0.3, BACK + 0.3), 0.28)
+    model.add(coping, "Roof tile", (0, y, z + 0.1), scale=(1, 1, 0.55))
+    on_sides("West wall", [model.mesh("West wall")], sides=[plan.WEST])

@@ -1,0 +1,160 @@
+"""What the scene builders share: points from text, closed shapes, random streams, fingerprints."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from lightfield.dataset import config, keys
+from lightfield.dataset.config import Source
+from scenes.library.architecture import cut
+from scenes.library.model import Model
+from scenes.library.noise import noise, smoothstep
+from scenes.library.points import points, polar
+from scenes.library.scene import Scene
+from scenes.library.shapes import box, copies, facets, frames, icosphere, join, lathe, prism, tube
+
+SCENE = Scene(3, 1.0, {})
+
+
+def volume(shape):
+    """The volume that a closed shape encloses: positive where its faces look outwards."""
+    quads = shape.quads
+    triangles = np.concatenate([quads[:, :3], quads[:, [0, 2, 3]], shape.triangles])
+    a, b, c = (shape.vertices[triangles[:, i]] for i in range(3))
+    return np.einsum("ij,ij->", a, np.cross(b, c)) / 6
+
+
+def test_points_are_read_from_text_over_several_lines():
+    text = """0 0.5, 1.25 -2
+        3e-2 4,"""
+    assert points(text).tolist() == [[0.0, 0.5], [1.25, -2.0], [0.03, 4.0]]
+    assert points([(1, 2, 3)]).tolist() == [[1.0, 2.0, 3.0]]
+
+
+def test_a_number_in_text_may_stand_for_several():
+    assert points("±0.5 1, 2 3").tolist() == [[-0.5, 1.0], [0.5, 1.0], [2.0, 3.0]]
+    assert points("-1..2*3 ±4").tolist() == [[x, y] for x in (-1.0, 0.5, 2.0) for y in (-4.0, 4.0)]
+
+
+@pytest.mark.parametrize(
+    ("part", "expected"),
+    [
+        ("Oak: box 1 2 3", 6.0),
+        ("Oak: box 1 1 1 at ±5 0 0 turned 0 90 0 scaled 1 2 3", 12.0),
+        ("Oak: ball 1", 4 * np.pi / 3),
+        ("Oak: ring 1 0.25", 2 * np.pi * 8**0.5 / 16),  # a tube of 8 sides
+        ("Oak: lathe 0.5 0\n 0.5 2\n at 1 1 1", np.pi / 2),
+        ("Oak: tube 0.5, 0 0 0, 1 0 0, 2 0 0", np.pi / 2),
+        ("Oak: bend 0.5, 0 0 0, 1 0 0, 2 0 0", np.pi / 2),
+        ("Oak: prism 2, 0 0, 2 0, 2 1, 1 0.5, 0 1\nOak: box 1 1 1", 4.0),
+        ("Oak: frame 1 1, 0 0, 0 1, 1 1, 1 0, 0 0", 8.0),
+    ],
+)
+def test_parts_are_drawn_from_text(part, expected):
+    model = Model(SCENE, part)
+    assert model.materials == ["Oak"]
+    assert volume(join(model.parts)) == pytest.approx(expected, rel=0.02)
+
+
+def test_words_planes_and_pipes_are_drawn_from_text():
+    word, plane, pipe = (
+        Model(SCENE, part).parts[0].vertices
+        for part in ("Ink: word 2 0.01 I at 0 0 1", "Ink: plane 2 4", "Ink: pipe 1 0, 1 3")
+    )
+    assert np.ptp(word[:, 2]) == pytest.approx(0.01) and 1.0 < np.ptp(word[:, 1]) < 2.0
+    assert np.ptp(plane, axis=0).tolist() == [2.0, 4.0, 0.0]
+    assert np.hypot(*pipe[:, :2].T) == pytest.approx(1.0) and np.ptp(pipe[:, 2]) == 3.0
+    with pytest.raises(ValueError, match="cone"):
+        Model(SCENE, "Oak: cone 1 2")
+
+
+@pytest.mark.parametrize(
+    ("shape", "expected"),
+    [
+        (box((1, 2, 3)), 6.0),
+        (lathe("0.5 0, 0.5 2", 256), np.pi / 2),
+        (tube("0 0 0, 1 0 0, 2 0 0", 0.5, 256), np.pi / 2),
+        (prism("0 0, 2 0, 2 1, 1 0.5, 0 1", 2), 3.0),
+        (icosphere(6, 2.0), 32 * np.pi / 3),
+        (SCENE.ball(1.0, 256), 4 * np.pi / 3),
+        (SCENE.ring(1.0, 0.25, 256, 256), 2 * np.pi**2 / 16),
+    ],
+    ids=["box", "lathe", "tube", "prism", "icosphere", "ball", "ring"],
+)
+def test_solids_are_closed_and_look_outwards(shape, expected):
+    assert volume(shape) == pytest.approx(expected, rel=2e-3)
+    far = shape.moved(3, -4, 5)  # a shape with a hole would change its volume
+    assert volume(far) == pytest.approx(expected, rel=2e-3)
+
+
+def test_copies_point_forward_and_keep_their_slots():
+    leaf = facets("0 0 0, 0.1 0.5 0, 0 1 0, 0 1 1", (0, 1, 2), (0, 1, 2, 3)).painted(2)
+    made = copies(leaf, [(1, 0, 0), (0, 5, 0)], forward=[(0, 0, 2), (-3, 0, 0)], size=[2, 3])
+    assert made.vertices[2] == pytest.approx([1, 0, 2])
+    assert made.vertices[6] == pytest.approx([-3, 5, 0])
+    assert made.vertices[7] == pytest.approx([-3, 5, 3])
+    assert made.quads.tolist() == [[0, 1, 2, 3], [4, 5, 6, 7]]
+    slots = join([leaf.painted(1), made]).face_slots()
+    assert slots.tolist() == [1, 2, 2, 1, 2, 2]  # quads first
+
+
+def test_frames_are_rotations():
+    random = np.random.default_rng(1)
+    turns = frames(random.normal(size=(20, 3)), random.normal(size=(20, 3)))
+    assert np.allclose(turns @ turns.transpose(0, 2, 1), np.eye(3))
+    assert np.allclose(np.linalg.det(turns), 1)
+
+
+def test_stones_cut_from_a_length_fill_it_and_differ():
+    middle, length = cut(SCENE.random("stones"), -1.0, 3.0, 8)
+    assert (middle - length / 2).tolist() == pytest.approx([-1.0, *(middle + length / 2)[:-1]])
+    assert (middle + length / 2)[-1] == pytest.approx(3.0)
+    assert 0.25 < length.min() < 0.45 and 0.55 < length.max() < 0.75
+
+
+def test_noise_is_smooth_and_differs_by_seed():
+    line = polar(np.linspace(0, 30, 3001), 0.3)
+    values = noise(line, 5)
+    assert np.abs(np.diff(values)).max() < 0.05
+    assert 0.15 < values.std() < 0.4 and np.abs(values).max() <= 1.2
+    assert np.corrcoef(values, noise(line, 6))[0, 1] < 0.3
+    assert smoothstep(2.0, 1.0, [0.5, 1.5, 2.5]).tolist() == [1.0, 0.5, 0.0]
+
+
+def test_each_element_has_a_random_stream_of_its_own():
+    assert SCENE.random("maple").random() == SCENE.random("maple").random()
+    others = [SCENE.random("pines"), Scene(4, 1.0, {}).random("maple")]
+    assert SCENE.random("maple").random() not in [other.random() for other in others]
+
+
+def test_less_detail_is_a_part_of_the_triangles():
+    half = Scene(0, 0.25, {})
+    assert (half.segments(40), half.count(40)) == (20, 10)
+    assert (half.segments(2, 8), half.count(2, 8)) == (8, 8)
+
+
+def test_builders_are_the_folders_beside_the_library():
+    assert config.builders() == ["barbershop", "garden", "lone_monk", "room"]
+
+
+@pytest.mark.parametrize(
+    ("file", "changes"),
+    [
+        ("library/shapes.py", True),
+        ("garden/__init__.py", True),
+        ("garden/pond.py", True),
+        ("lone_monk/__init__.py", False),
+    ],
+)
+def test_a_fingerprint_is_of_the_library_and_the_builders_own_files(
+    file, changes, tmp_path, monkeypatch
+):
+    builders = tmp_path / "scenes"
+    shutil.copytree(config.BUILDERS, builders, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(keys, "BUILDERS", builders)
+    source = Source(builder="garden", parameters={"seed": 1})
+    before = keys.scene_fingerprint(source)
+    with (builders / file).open("a") as text:
+        text.write("# changed\n")
+    assert (keys.scene_fingerprint(source) != before) == changes
