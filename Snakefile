@@ -34,6 +34,8 @@ include: "rules/error.smk"
 
 onstart:
     try:
+        for path in BROKEN:
+            set_aside(Path(path), Path(REMOVED))
         write_json(RUN, {dataset.folder: dataset.view_count for dataset in CHOSEN})
     except UserError as error:
         sys.exit(f"error: {error}")
@@ -49,21 +51,25 @@ onerror:
 rule all:
     default_target: True
     input:
-        [dataset.files for dataset in CHOSEN],
+        [[*dataset.files, *dataset.intermediates] for dataset in CHOSEN],
         f"{RESULTS}/index.html",
+        whole(CHOSEN),
 
 
 rule report_html:
     input:
         [dataset.page for dataset in CHOSEN],
         f"{RESULTS}/index.html",
+        whole(CHOSEN),
 
 
 rule smoke:
     input:
-        [dataset.files for dataset in SMOKE],
+        [[*dataset.files, *dataset.intermediates] for dataset in SMOKE],
+        whole(SMOKE),
 
 
 rule package_all:
     input:
         [dataset.package for dataset in CHOSEN],
+        whole(CHOSEN),

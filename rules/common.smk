@@ -21,7 +21,7 @@ shell.prefix(
 
 from lightfield.core.errors import UserError
 from lightfield.core.failures import failure_report
-from lightfield.core.files import write_json
+from lightfield.core.files import set_aside, write_json
 from lightfield.dataset.config import load_config
 from lightfield.dataset.dataset import STILLS, load_datasets, scene_datasets
 from lightfield.dataset.exports import MANIFEST, VIEWS
@@ -55,6 +55,10 @@ PANORAMA = f"{MADE}/panorama"
 REPROJECTED = f"{DATASET}/{{reprojection}}"
 # Which datasets are being built, for the progress lines of each shard.
 RUN = f"{WORK}/run.json"
+# What is not what a program wrote there, and what is wrong with it.
+BROKEN = {}
+# Where that is moved to, for nobody to lose anything.
+REMOVED = f"{WORK}/removed"
 GPUS = 0 if SETTINGS.device in ("auto", "cpu") else 1
 
 
@@ -131,6 +135,24 @@ def made_anew(path):
     its job runs: a dry run shows the job and leaves the file.
     """
     workflow.dag.forcefiles.add(path)
+
+
+def whole(datasets):
+    """Return the input function of a target: no input, but what is broken is made anew.
+
+    That it is broken is said here; it is set aside when the run starts.
+    """
+
+    def input_function(wildcards):
+        for dataset in datasets:
+            for path, problem in dataset.broken():
+                if path not in BROKEN:
+                    print(f"{path}: {problem}; it is made anew", file=sys.stderr)
+                    BROKEN[path] = problem
+                made_anew(path)
+        return []
+
+    return input_function
 
 
 def renewal(wildcards):

@@ -44,6 +44,7 @@ import json
 import math
 import os
 import statistics
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -208,17 +209,27 @@ def job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, Stage]:
     for name, path in found:
         if name == "render":
             continue
-        with path.open(encoding="utf-8", newline="") as file:
-            row = next(csv.DictReader(file, delimiter="\t"))
+        try:
+            wall, cpu, memory = job_times(path)
+        except (OSError, ValueError, LookupError, TypeError, StopIteration):
+            print(f"{path}: is no table of a job's time; the job is left out", file=sys.stderr)
+            continue
         stage = stages.setdefault(name, Stage())
-        wall = float(row["s"])
         stage.jobs += 1
         stage.wall_seconds += wall
-        stage.cpu_seconds += wall if row["cpu_time"] == "NA" else float(row["cpu_time"])
-        if row["max_rss"] != "NA":
-            memory = round(float(row["max_rss"]) * 2**20)
-            stage.peak_memory_bytes = max(stage.peak_memory_bytes, memory)
+        stage.cpu_seconds += cpu
+        stage.peak_memory_bytes = max(stage.peak_memory_bytes, memory)
     return stages
+
+
+def job_times(path: Path) -> tuple[float, float, int]:
+    """Return a job's wall and processor time in seconds, and its memory in bytes, from its TSV."""
+    with path.open(encoding="utf-8", newline="") as file:
+        row = next(csv.DictReader(file, delimiter="\t"))
+    wall = float(row["s"])
+    cpu = wall if row["cpu_time"] == "NA" else float(row["cpu_time"])
+    memory = 0 if row["max_rss"] == "NA" else round(float(row["max_rss"]) * 2**20)
+    return wall, cpu, memory
 
 
 def stage_bytes(stage: str, arguments: argparse.Namespace) -> int:

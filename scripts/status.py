@@ -7,12 +7,14 @@ are left take as long as those, and that as many processes go on working.
 """
 
 import argparse
+import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from lightfield.core.cli import run
-from lightfield.core.files import read_json
+from lightfield.core.errors import UserError
+from lightfield.core.files import broken, read_json
 from lightfield.core.progress import duration
 from lightfield.dataset import journal, keys
 from lightfield.dataset.lightfield import NAME, LightField
@@ -83,7 +85,11 @@ def main() -> None:
 def look(dataset: Dataset, now: float) -> Rendering:
     """Find out how far the rendering of a dataset is at ``now``, in seconds since 1970."""
     path = dataset.folder / NAME
-    lightfield = LightField.read(path) if path.exists() else None
+    try:
+        lightfield = LightField.read(path) if path.exists() else None
+    except UserError as error:
+        print(f"{error}; it is made anew", file=sys.stderr)
+        lightfield = None
     views = lightfield.views if lightfield else []
     finished = {
         view.name
@@ -95,7 +101,8 @@ def look(dataset: Dataset, now: float) -> Rendering:
     running: list[str] = []
     silent: list[str] = []
     killed: list[str] = []
-    for path in sorted((dataset.made / "render").glob("*.journal.jsonl"), key=shard_bounds):
+    journals = (dataset.made / "render").glob("*.journal.jsonl")
+    for path in sorted(filter(Path.is_file, journals), key=shard_bounds):
         runs = journal.read(path)
         if not runs:
             continue
@@ -155,7 +162,9 @@ def validated(dataset: Dataset, finished: set[str]) -> str:
     newest = max((view_file(dataset, name).stat().st_mtime for name in finished), default=0)
     if path.stat().st_mtime < newest:
         return "not since its views were made"
-    return "yes" if read_json(path)["valid"] else f"yes, and it is not valid: see {path}"
+    if problem := broken(path):
+        return f"no: {path} {problem}, and is made anew"
+    return "yes" if read_json(path).get("valid") else f"yes, and it is not valid: see {path}"
 
 
 def lines(dataset: Dataset, rendering: Rendering) -> list[str]:

@@ -22,7 +22,7 @@ from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.export import MANIFESTS
 from lightfield.geometry import lenses, rotations
 from lightfield.imaging import images
-from lightfield.validation import geometry
+from lightfield.validation import files, geometry
 from lightfield.validation import validate as validation
 from lightfield.validation.result import Check, Result
 
@@ -510,6 +510,29 @@ def test_broken_view_is_named(case: str, small_dataset: Path) -> None:
     assert str(small_dataset) not in json.dumps(result.to_json())
 
 
+def test_the_first_view_is_looked_at_too(small_dataset: Path) -> None:
+    first = names(small_dataset)[0]
+    repaint(small_dataset, first, lambda c: {**c, **{n: c[n] * 0 for n in "RGB"}})
+    assert check(validate(small_dataset), "colour").views == [first]
+
+
+def test_a_pose_is_compared_to_the_digits_that_blender_keeps(small_dataset: Path) -> None:
+    """float32 holds a position 1 km away to 0.03 mm; of what is near, 0.1 mm off is a fault."""
+
+    def displaced(by: float, away: float) -> Callable[[dict[str, Any]], None]:
+        def change(content: dict[str, Any]) -> None:
+            for frame in content["frames"]:
+                frame["world_matrix"][0][3] = away
+                frame["position"] = [away, *(row[3] for row in frame["world_matrix"][1:3])]
+            content["frames"][BAD]["position"][0] += by
+
+        return change
+
+    for by, away, passed in ((5e-3, 1e3, True), (2e-2, 1e3, False), (1e-4, 0.0, False)):
+        rewrite(small_dataset, displaced(by, away))
+        assert check(validate(small_dataset), "lightfield").passed is passed
+
+
 def test_clamped_values_are_a_warning(small_dataset: Path) -> None:
     headed(images.CLAMPED_ATTRIBUTE, 9)(small_dataset)
     result = validate(small_dataset)
@@ -673,7 +696,28 @@ def test_right_reprojection_is_valid(small_dataset: Path) -> None:
     assert check(result, "panorama/marks").passed
     assert check(result, "panorama/views").detail == "12 of 12 images are there"
     assert "panorama/dynamic_mask_view_0003f.png" in result.checksums
+    # Masks are there and no list names them.
+    assert check(result, "exports").passed
     assert failed(validate(small_dataset)) == ["files"]
+
+
+def test_reprojected_views_are_as_coarse_as_their_source(small_dataset: Path) -> None:
+    add_panoramas(small_dataset)
+    (own, reprojected), _ = files.read_sets(small_dataset, ["panorama"])
+    assert own.grain == 0
+    assert reprojected.grain == pytest.approx(math.pi / 64)
+
+
+def test_a_reprojected_view_of_one_colour_is_a_warning(small_dataset: Path) -> None:
+    add_panoramas(small_dataset)
+    right = validate(small_dataset, ["panorama"])
+    add_panoramas(
+        small_dataset, lambda c: {**c, **{name: np.full_like(c[name], 0.5) for name in "RGB"}}
+    )
+    one = validate(small_dataset, ["panorama"])
+    for result, warnings in ((right, []), (one, ["12 images in panorama have one colour"])):
+        assert check(result, "panorama/colour").warnings == warnings
+        assert check(result, "colour").warnings == []
 
 
 WRONG_REPROJECTIONS: dict[str, tuple[Callable[[dict[str, np.ndarray]], Any], str]] = {
@@ -731,6 +775,9 @@ def test_program_writes_the_same_bytes_each_time_and_sums_that_hold(
     write_json(tmp_path / "record.json", record_of(dataset))
     leftover = dataset / "exr" / ".view_0000f.123.tmp.exr"
     leftover.write_bytes(b"half a view")
+    of_report = dataset / "report" / ".page.123.tmp.html"
+    of_report.parent.mkdir()
+    of_report.write_bytes(b"half a page, which another job may be writing")
     other = Path(shutil.copytree(dataset, tmp_path / "elsewhere" / "room" / "sphere"))
     first = run(run_program, dataset, "--records", tmp_path / "record.json")
     second = run(run_program, other, "--records", tmp_path / "record.json", "--processes", 2)
@@ -740,6 +787,7 @@ def test_program_writes_the_same_bytes_each_time_and_sums_that_hold(
         first.stdout,
     )
     assert not leftover.exists()
+    assert of_report.exists()
     for folder in (dataset, other):
         published = publish(run_program, folder)
         assert published.returncode == 0, published.stderr

@@ -96,7 +96,11 @@ def append_json_line(path: Path, entry: Mapping[str, Any]) -> None:
 def read_json_lines(path: Path) -> list[dict[str, Any]]:
     """Return the objects of such a file, in their order; what is not one is left out."""
     entries = []
-    for line in path.read_bytes().splitlines():
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+    for line in content.splitlines():
         try:
             entry = json.loads(line)
         except ValueError:
@@ -104,6 +108,44 @@ def read_json_lines(path: Path) -> list[dict[str, Any]]:
         if isinstance(entry, dict):
             entries.append(entry)
     return entries
+
+
+def broken(path: Path) -> str | None:
+    """Say what is wrong with a file that a program wrote; None if nothing is, or it is not there.
+
+    Every JSON of a dataset is a mapping.
+    """
+    if path.is_dir():
+        return "is a folder"
+    try:
+        if not path.stat().st_size:
+            return "is empty"
+        if not os.access(path, os.R_OK):
+            return "cannot be read"
+        if path.suffix == ".json" and not isinstance(content := read_json(path), dict):
+            return f"is a {type(content).__name__}, not a mapping"
+    except FileNotFoundError:
+        return None
+    except UserError as error:
+        return str(error).removeprefix(f"{path}: ")
+    return None
+
+
+def set_aside(path: Path, folder: Path) -> Path:
+    """Move a file or folder into ``folder``, under its own path; return where it is now.
+
+    What lies there already keeps its name, and the new one gets a number behind its own.
+    """
+    inside = path.relative_to(path.anchor) if path.is_absolute() else path
+    target = folder / inside
+    number = 1
+    while target.exists():
+        number += 1
+        target = folder / inside.with_name(f"{path.name}.{number}")
+    with writing(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.move(path, target)
+    return target
 
 
 def read_json(path: Path | str) -> Any:

@@ -2,15 +2,18 @@
 
 import json
 import math
+import os
 import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
+from stat import S_ISREG
 from typing import Any, Literal
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import broken
 from lightfield.dataset import config
 from lightfield.dataset.config import CHOSEN, Configuration, Preset, Render, Source
 from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
@@ -227,6 +230,21 @@ class Dataset:
         ]
 
     @property
+    def intermediates(self) -> list[str]:
+        """What is made on the way to the dataset, named so that a missing one is made anew, too."""
+        blend = self.blend if self.source.builder else str(self.blend_check)
+        return [
+            blend,
+            self.inventory,
+            *([self.calibration] if isinstance(self.calibration, str) else []),
+            f"{self.work}/cameras.json",
+            f"{self.work}/checksums.txt",
+            f"{self.work}/panorama/lightfield.json",
+            f"{self.work}/panorama/exr/view_0000f.exr",
+            *(f"{self.work}/{name}/lens_map.npy" for name in self.reprojections),
+        ]
+
+    @property
     def package(self) -> str:
         """A rig's dataset as one archive, all frames of a sequence in it, named as SILVR's are."""
         return f"{self.results_root}/{self.scene_folder}/{self.scene_folder}_{self.rig_name}.tar"
@@ -238,15 +256,36 @@ class Dataset:
         what is missing, and by the log of checksums finds every other file that is not as it was.
         """
         try:
-            files = json.loads(Path(record).read_text())["files"]
+            files = json.loads(Path(record).read_bytes())["files"]
+            found = [(Path(self.folder, name).stat(), file) for name, file in files.items()]
             return any(
-                Path(self.folder, name).stat().st_size != file["bytes"]
-                for name, file in files.items()
+                not S_ISREG(status.st_mode) or status.st_size != file["bytes"]
+                for status, file in found
             )
         except FileNotFoundError:
             return Path(record).exists()
-        except (ValueError, KeyError):
+        except (OSError, ValueError, LookupError, TypeError, AttributeError):
             return True
+
+    def broken(self) -> Iterator[tuple[str, str]]:
+        """Yield each file that cannot be what a program wrote there, and what is wrong with it.
+
+        Of a view no more is looked at than whether it is a file; `is_false` compares its size.
+        """
+        for path in [*self.files, *self.intermediates]:
+            if problem := broken(Path(path)):
+                yield path, problem
+        views = (
+            view for name in ("exr", *self.reprojections) for view in _entries(self.folder, name)
+        )
+        journals = (
+            journal
+            for stage in ("render", *self.reprojections)
+            for journal in _entries(self.work, stage)
+        )
+        for entry in (*views, *journals):
+            if entry.is_dir() and entry.name.endswith((".exr", ".png", ".jsonl")):
+                yield entry.path, "is a folder"
 
     @property
     def blend_changed(self) -> bool:
@@ -256,8 +295,11 @@ class Dataset:
         proof, blend = Path(f"{self.scene_work}/blend.json"), Path(self.source.blend)
         if not (proof.exists() and blend.exists()):
             return False
-        checked, found = json.loads(proof.read_text()), blend.stat()
-        return (found.st_size, found.st_mtime_ns) != (checked["bytes"], checked["mtime_ns"])
+        try:
+            checked, found = json.loads(proof.read_bytes()), blend.stat()
+            return (found.st_size, found.st_mtime_ns) != (checked["bytes"], checked["mtime_ns"])
+        except (OSError, ValueError, LookupError, TypeError):
+            return True
 
     # What it will take.
 
@@ -279,11 +321,14 @@ class Dataset:
     @property
     def expected_view_seconds(self) -> float:
         """The same with the samples that the calibration has found, if it has."""
-        record = Path(self.calibration) if isinstance(self.calibration, str) else None
-        if record is None or not record.exists():
+        if not isinstance(self.calibration, str):
             return self.planned_view_seconds
-        samples = json.loads(record.read_text())["cost_samples"]
-        return float(self.planned_view_seconds * samples / self.planned_samples)
+        try:
+            samples = json.loads(Path(self.calibration).read_bytes())["cost_samples"]
+            return float(self.planned_view_seconds * samples / self.planned_samples)
+        except (OSError, ValueError, LookupError, TypeError):
+            # Not there yet, or broken, and then it is made anew.
+            return self.planned_view_seconds
 
     @cached_property
     def shards(self) -> list[tuple[int, int]]:
@@ -300,6 +345,15 @@ class Dataset:
         count = math.ceil(self.view_count / length)
         bounds = [self.view_count * number // count for number in range(count + 1)]
         return list(pairwise(bounds))
+
+
+def _entries(folder: str, name: str) -> list[os.DirEntry[str]]:
+    """Return what lies in a folder in ``folder``; nothing where there is none."""
+    try:
+        with os.scandir(Path(folder, name)) as entries:
+            return sorted(entries, key=lambda entry: entry.name)
+    except OSError:
+        return []
 
 
 def load_datasets(settings: Configuration) -> list[Dataset]:

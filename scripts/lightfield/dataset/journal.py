@@ -25,6 +25,20 @@ import psutil
 
 from lightfield.core.files import append_json_line, read_json_lines
 
+# What every line of a kind has, after the key that says which kind it is.
+_LINES: dict[str, dict[str, type]] = {
+    "started": {"started": float, "host": str, "pid": int},
+    "start_up_seconds": {"start_up_seconds": float, "device": str, "threads": int},
+    "ended": {"ended": float, "cpu_seconds": float, "peak_memory_bytes": int},
+    "view": {
+        "view": str,
+        "finished": float,
+        "wall_seconds": float,
+        "cpu_seconds": float,
+        "render_seconds": float,
+    },
+}
+
 
 class Journal:
     """Appends the lines of this process to a journal; with ``path`` None it writes nothing."""
@@ -109,10 +123,13 @@ class Run:
 def read(path: Path) -> list[Run]:
     """Return the runs that a journal tells of, in their order.
 
-    A line that a kill cut short is left out, and so is what stands before the first start.
+    A line that a kill cut short is left out, and so is one that was damaged since, and what stands
+    before the first start.
     """
     runs: list[Run] = []
     for entry in read_json_lines(path):
+        if not _is_sound(entry):
+            continue
         if "started" in entry:
             runs.append(Run(entry))
         elif not runs:
@@ -124,3 +141,12 @@ def read(path: Path) -> list[Run]:
         else:
             runs[-1].views.append(entry)
     return runs
+
+
+def _is_sound(entry: dict[str, Any]) -> bool:
+    """Whether an entry is a journal's line, with all that such a line has."""
+    kind = next((kind for kind in _LINES if kind in entry), None)
+    return kind is not None and all(
+        isinstance(entry.get(key), (int, float) if expected is float else expected)
+        for key, expected in _LINES[kind].items()
+    )

@@ -34,7 +34,7 @@ class ShardRecord:
         """Whether a file has the bytes that it had when it was made by the settings of ``key``."""
         if self._path is None:
             return images.is_finished(file, key)
-        if not file.exists():
+        if not file.is_file():
             return False
         name, sums = self._name(file), _sums(file)
         entry = (name, key, sums["sha256"])

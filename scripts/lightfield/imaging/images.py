@@ -274,8 +274,12 @@ def _runs(spec: Any, wanted: Sequence[int]) -> list[tuple[int, int, str]]:
 
 
 def _attributes(spec: Any) -> dict[str, Attribute]:
-    return {
-        parameter.name: parameter.value
-        for parameter in spec.extra_attribs
-        if isinstance(parameter.value, str | int | float)
-    }
+    found: dict[str, Attribute] = {}
+    for parameter in spec.extra_attribs:
+        try:
+            value = parameter.value
+        except UnicodeDecodeError:
+            continue  # damaged: none of ours, which are ASCII
+        if isinstance(value, str | int | float):
+            found[parameter.name] = value
+    return found

@@ -63,7 +63,7 @@ class ImageSet:
 
     name: str
     lightfield: LightField
-    grain: float = 0.0
+    grain: float
 
     @property
     def folder(self) -> str:

@@ -1,0 +1,82 @@
+"""A build of the smoke scene without a rendered pixel: every file is there, and all are consistent.
+
+Snakemake has nothing to do in it, and what a test spoils in it must be planned again.
+"""
+
+import os
+from pathlib import Path
+
+import numpy as np
+from checkouts import snakemake
+
+from lightfield.core.files import sha256, write_json, write_text
+from lightfield.dataset.dataset import Dataset, scene_datasets
+from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.records import ShardRecord
+from lightfield.imaging import images
+
+WHEN = 1_700_000_000
+
+
+def build(folder: Path) -> list[Dataset]:
+    """Write all files of all datasets of the scene smoke into a checkout."""
+    datasets = scene_datasets("smoke")
+    for number, dataset in enumerate(datasets):
+        _views(folder, dataset)
+        for name in [*dataset.files, *dataset.intermediates]:
+            if not (folder / name).exists():
+                _write(folder / name, number)
+        sums = sorted(
+            (path.relative_to(folder / dataset.folder).as_posix(), sha256(path))
+            for path in (folder / dataset.folder).rglob("*")
+            if path.is_file() and "report" not in path.parts and path.name != "sha256sums.txt"
+        )
+        text = "".join(f"{digest}  {name}\n" for name, digest in sums)
+        write_text(folder / dataset.folder / "sha256sums.txt", text)
+        write_text(folder / dataset.work / "checksums.txt", text)
+    for name in ("results", "work"):
+        for path in (folder / name).rglob("*"):
+            os.utime(path, (WHEN, WHEN))
+    return datasets
+
+
+def planned(folder: Path, *arguments: str) -> set[str]:
+    """Return the files that the next run would make."""
+    result = snakemake(folder, "--summary", *arguments)
+    assert result.returncode == 0, result.stdout + result.stderr
+    rows = [line.split("\t") for line in result.stdout.splitlines()]
+    return {row[0] for row in rows if row[-1] == "update pending"}
+
+
+def _views(folder: Path, dataset: Dataset) -> None:
+    """Write the views and their records, every pixel of another colour."""
+    lightfield = LightField.from_rig(dataset.rig, dataset.rig.camera.make(), depth=dataset.depth)
+    for stage in ("render", *dataset.reprojections):
+        reprojection = dataset.reprojections.get(stage)
+        suffix = reprojection.suffix if reprojection else ".exr"
+        images_folder = folder / dataset.folder / (stage if reprojection else "exr")
+        for first, end in dataset.shards:
+            record = ShardRecord(folder / dataset.record(stage, first, end), images_folder)
+            files = [images_folder / f"{v.name}{suffix}" for v in lightfield.views[first:end]]
+            for number, file in enumerate(files):
+                pixels = np.full((4, 4), number + 10 * len(stage), np.uint8)
+                if suffix == ".png":
+                    images.write_png(file, pixels, {images.KEY_ATTRIBUTE: stage})
+                else:
+                    key = {images.KEY_ATTRIBUTE: stage}
+                    images.write_exr(file, {"R": pixels.astype(np.float16)}, key)
+                record.add(file, stage)
+            record.write(files)
+
+
+def _write(path: Path, number: int) -> None:
+    """Write a file that only needs to be there: a mapping, an image, or some bytes."""
+    match path.suffix:
+        case ".json":
+            write_json(path, {"path": str(path), "number": number, "valid": True})
+        case ".png":
+            images.write_png(path, np.full((4, 4), number, np.uint8))
+        case ".exr":
+            images.write_exr(path, {"R": np.full((4, 4), number, np.float16)})
+        case _:
+            write_text(path, f"{path.name} {number}\n")

@@ -1,0 +1,93 @@
+"""A broken small file is named in one line, set aside, and made again."""
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+import simulated
+from checkouts import checkout, snakemake
+
+from lightfield.core.files import broken, set_aside
+
+
+def folder_of(path):
+    path.unlink()
+    (path / "inside").mkdir(parents=True)
+
+
+def text(content):
+    return lambda path: path.write_bytes(content)
+
+
+FAULTS = [
+    (folder_of, "is a folder"),
+    (text(b'{"half": ['), "is not JSON: "),
+    (text(b"[1, 2]"), "is a list, not a mapping"),
+    (text(b'{"\xff": 1}'), "is not JSON: "),
+    (text(b""), "is empty"),
+    (text(b"null"), "is a NoneType, not a mapping"),
+]
+
+
+@pytest.mark.parametrize(("spoil", "problem"), FAULTS)
+def test_what_cannot_be_read_is_said(spoil, problem, tmp_path):
+    path = tmp_path / "a.json"
+    assert broken(path) is None
+    path.write_text("{}")
+    assert broken(path) is None
+    spoil(path)
+    assert (broken(path) or "").startswith(problem)
+
+
+def test_nothing_that_was_set_aside_is_lost(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for content in "ab":
+        Path("results").mkdir(exist_ok=True)
+        Path("results/a.json").write_text(content)
+        set_aside(Path("results/a.json"), Path("work/removed"))
+    assert Path("work/removed/results/a.json").read_text() == "a"
+    assert Path("work/removed/results/a.json.2").read_text() == "b"
+    assert not Path("results/a.json").exists()
+
+
+def run(folder, *arguments):
+    result = snakemake(folder, *arguments)
+    told = result.stdout + result.stderr
+    assert result.returncode == 0, told
+    assert "Traceback" not in told
+    return told
+
+
+def test_what_is_broken_is_planned_again_and_set_aside(tmp_path):
+    folder = checkout(tmp_path)
+    datasets = simulated.build(folder)
+    assert "Nothing to be done" in run(folder, "-n", "smoke")
+    one, two, three = datasets
+    spoilt = [
+        one.record("render", *one.shards[0]),
+        one.record("perspective", *one.shards[0]),
+        f"{one.work}/cameras.json",
+        one.costs,
+        f"{two.folder}/lightfield.json",
+        f"{two.work}/perspective/lens_map.npy",
+        three.inventory,
+        three.page,
+        f"{three.folder}/validation.json",
+    ]
+    for number, name in enumerate(spoilt):
+        spoil = FAULTS[number % 5][0] if name.endswith(".json") else folder_of
+        spoil(folder / name)
+        os.utime(folder / name, (simulated.WHEN, simulated.WHEN))
+    view = next((folder / three.folder / "exr").iterdir())
+    folder_of(view)
+    told = run(folder, "-n", "smoke")
+    for name in [*spoilt, str(view.relative_to(folder))]:
+        assert len(re.findall(rf"^{re.escape(name)}: .*; it is made anew$", told, re.M)) == 1
+        assert (folder / name).exists()
+    assert {*spoilt, three.record("render", *three.shards[0])} <= simulated.planned(folder, "smoke")
+    # Of the second dataset's cameras alone: the run sets all aside before its first job.
+    run(folder, "--until", "lightfield", "--", "smoke")
+    for name in [*spoilt, str(view.relative_to(folder))]:
+        assert (folder / "work/removed" / name).exists()
+    assert broken(folder / two.folder / "lightfield.json") is None
