@@ -8,7 +8,7 @@ the front wall (+Y) the shop window and the door, the back wall (−Y) the recep
 from collections.abc import Mapping
 from typing import Any
 
-from scenes.barbershop.coats import RACK, coat_rack, umbrellas
+from scenes.barbershop.coats import RACK, coats, umbrellas
 from scenes.barbershop.fittings import FITTINGS, barber_pole, broom_and_bins, clock
 from scenes.barbershop.floor import ON_THE_FLOOR, hair_clippings, medallion, rug, tiles
 from scenes.barbershop.furniture import FURNITURE, desk_things, magazines, stocked_furniture
@@ -19,7 +19,7 @@ from scenes.barbershop.openings import OPENINGS, street, valance
 from scenes.barbershop.plan import furnish
 from scenes.barbershop.plants import HANGER, plants
 from scenes.barbershop.prints import pictures
-from scenes.barbershop.seats import STOOL, barber_chairs, waiting_bench
+from scenes.barbershop.seats import STOOL, barber_chairs, chair_mats, waiting_bench
 from scenes.barbershop.stations import STATION, mirrors, racks, station_goods
 from scenes.barbershop.towels import towel_shelves
 from scenes.barbershop.walls import WALLS, ceiling, metro_tiles, wainscot
@@ -30,8 +30,8 @@ DRAWN = (WALLS, ON_THE_FLOOR, OPENINGS, LAMPS, STATION, FURNITURE, STOOL, RACK, 
 ELEMENTS = (
     *(sky, lights, tiles, medallion, rug, hair_clippings),
     *(metro_tiles, wainscot, ceiling, valance, street),
-    *(barber_chairs, waiting_bench, desk_things, magazines, mirrors, towel_shelves),
-    *(coat_rack, umbrellas, pictures, clock, barber_pole, broom_and_bins),
+    *(barber_chairs, chair_mats, waiting_bench, desk_things, magazines, mirrors, towel_shelves),
+    *(coats, umbrellas, pictures, clock, barber_pole, broom_and_bins),
 )
 WITH_GOODS = (station_goods, racks, stocked_furniture, plants)
 

@@ -20,22 +20,22 @@ Umbrella stand | right 1.49 0.2
     Brass: lathe 0.10 0.01, 0.11 0.02, 0.12 0.5, 0.13 0.52, 0.12 0.52, 0.105 0.03, 0 0.02
     Brass: ring 0.1174 0.006 at 0 0 0.12
     Brass: ring 0.1208 0.006 at 0 0 0.4
+Fedora | right 2.62 0.14 1.94
+    Camel wool: lathe 0.175 0.006, 0.17 0, 0.10 0.012, 0.095 0.05, 0.088 0.105, 0.06 0.125
+        0 0.115 scaled 1 1.15 1 turned -62 0 0
+    Rug red: pipe 0.1005 0.014, 0.0975 0.042 scaled 1 1.15 1 turned -62 0 0
+Bowler hat | right 2.08 0.14 1.95
+    Black: lathe 0.15 0.025, 0.152 0.02, 0.105 0, 0.0996 0.011, 0.095 0.039, 0.085 0.066
+        0.071 0.088, 0.053 0.106, 0.032 0.1185, 0.01 0.1244, 0 0.125
+        scaled 1 1.15 1 turned -68 0 0
 """
-FEDORA = """Camel wool: lathe 0.175 0.006, 0.17 0, 0.10 0.012, 0.095 0.05, 0.088 0.105, 0.06 0.125
-        0 0.115 scaled 1 1.15 1
-    Rug red: pipe 0.1005 0.014, 0.0975 0.042 scaled 1 1.15 1"""
-BOWLER = """Black: lathe 0.15 0.025, 0.152 0.02, 0.105 0, 0.0996 0.011, 0.095 0.039, 0.085 0.066
-        0.071 0.088, 0.053 0.106, 0.032 0.1185, 0.01 0.1244, 0 0.125 scaled 1 1.15 1"""
 BUTTONS = "Ebony: lathe 0.012 0, 0.012 0.004, 0.008 0.005 at 0.02 0.245 1.12..1.36*3 turned -90 0 0"
 
 
-def coat_rack(scene: Scene) -> None:
-    """A board with five brass hooks, two for hats, three for coats; the umbrella stand."""
+def coats(scene: Scene) -> None:
+    """Three coats on the rack's hooks, between two hats."""
     for k, (y, color) in enumerate(((1.81, "Grey"), (2.33, "Camel"), (2.89, "Green"))):
         put(coat(scene, f"{color} wool", k), spot(f"right {y}"))
-    fedora, bowler = Model(scene, FEDORA).mesh("Fedora"), Model(scene, BOWLER).mesh("Bowler hat")
-    put(fedora, spot("right 2.62 0.14 1.94"), degrees=(-62, 0, 0))
-    put(bowler, spot("right 2.08 0.14 1.95"), degrees=(-68, 0, 0))
 
 
 def around(scene: Scene) -> tuple[Array, Array]:

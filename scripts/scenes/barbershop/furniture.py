@@ -149,13 +149,8 @@ def stocked_furniture(scene: Scene, bottles: Goods, pots: Goods) -> None:
     random, wares, board = scene.random("stock"), [*bottles, *pots], shelf(scene, 1.4, 0.16)
     for z in (0.516, 0.89, 1.26, 1.63):
         stock(scene, random, wares, spot(f"right -1.65 0.065 {z}"), 0.84, 0.27)
-    for out, z, goods in (
-        (0.022, 1.25, bottles),
-        (0, 1.6, wares),
-        (0, 1.95, wares),
-        (0, 2.3, wares),
-    ):
-        rack = spot(f"back 1.68 {out} {z}")
+    for z, goods in ((1.25, bottles), (1.6, wares), (1.95, wares), (2.3, wares)):
+        rack = spot(f"back 1.68 {0.022 if z == 1.25 else 0} {z}")  # the lowest clears the rail
         put(board, rack)
         stock(scene, random, goods, rack, 1.36, 0.14)
     stock(scene, random, pots, spot("back 1.7 0.1 0.85"), 0.34, 0.18)

@@ -58,14 +58,10 @@ def plants(scene: Scene, bottles: Goods, pots: Goods) -> None:
     """Plants on the sill, bottles between them; others in the corners, one hanging."""
     random, room = scene.random("plants"), spot("room")
     fern, snake, rubber = (plant(scene, kind) for kind in POTTED)
-    for x, data, size in (
-        (-1.8, fern, 0.6),
-        (-0.95, snake, 0.55),
-        (-0.3, fern, 0.5),
-        (0.35, rubber, 0.6),
-    ):
+    on_sill = ((-1.8, fern), (-0.95, snake), (-0.3, fern), (0.35, rubber))
+    for x, data in on_sill:
         turn = (0, 0, random.uniform(0, 360))
-        put(data, spot(f"front {x} 0.08 1"), degrees=turn, scale=size)
+        put(data, spot(f"front {x} 0.08 1"), degrees=turn, scale=random.uniform(0.5, 0.6))
     for x in (-1.4, -0.63, 0.03):
         stock(scene, random, bottles, spot(f"front {x} 0.05 1"), 0.34, 0.12)
     put(rubber, room, (2.18, 3.38, 0), (0, 0, 40), 1.5)

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenes.barbershop.plan import STATIONS, put, spot
+from scenes.barbershop.plan import STATIONS, put, spot, spots
 from scenes.library.model import Model
-from scenes.library.objects import transform
 from scenes.library.points import rectangle, xyz
 from scenes.library.scene import Scene
 from scenes.library.shapes import Shape, copies, join, prism, sheet
@@ -35,7 +34,6 @@ CHAIR_BACK = """Cream: box 0.48 0.07 0.56 0.03 3 at 0 0 0.27
     Brass: ball 0.012 at ±0.165 -0.036 0.085..0.475*2
     Chrome: tube 0.009, 0 0 0.5, 0 0.01 0.68 at ±0.09 0 0
     Oxblood: box 0.27 0.09 0.13 0.04 3 at 0 0.02 0.72"""
-MAT = """Rubber: lathe 0.60 0.001, 0.60 0.007, 0.575 0.012, 0.56 0.009, 0 0.009"""
 BENCH = """Oxblood: box 2 0.64 0.16 0.02 2 at 0 0.36 0.21
     Oxblood: box 0.95 0.54 0.10 0.04 3 at ±0.49 0.42 0.34
     Oxblood: box 1.9 0.12 0.52 0.05 3 at 0 0.12 0.56 turned 10 0 0
@@ -69,10 +67,10 @@ def cushion(scene: Scene, size: Sequence[float], tufts: Sequence[int]) -> Shape:
     front = sheet(xyz(u * width / 2, v * height / 2, thickness * edge * (0.6 + 0.4 * puff)))
     back = prism(rectangle(width, height), 1e-4).moved(0, 0, -1e-4)
     a, b = np.meshgrid(np.arange(1 - columns, columns), np.arange(1 - rows, rows))
-    spots = xyz(a * width / 2 / columns, b * height / 2 / rows, 0.6 * thickness)
+    places = xyz(a * width / 2 / columns, b * height / 2 / rows, 0.6 * thickness)
     ball = scene.ball(0.009, 8)
     button = ball.reshaped(ball.vertices * (1, 1, 0.6))
-    return join([front, back, copies(button, spots[(a + b) % 2 == 0])])
+    return join([front, back, copies(button, places[(a + b) % 2 == 0])])
 
 
 def barber_chairs(scene: Scene) -> None:
@@ -82,16 +80,20 @@ def barber_chairs(scene: Scene) -> None:
     padding = cushion(scene, (0.46, 0.54, 0.07), (4, 4))
     back.add(padding, "Oxblood", (0, 0.03, 0.28), (90, 0, 180))
     seat_mesh, back_mesh = seat.mesh("Barber chair"), back.mesh("Barber chair back")
-    mat = Model(scene, MAT)
-    for k in range(7):
-        mat.add(scene.ring(0.14 + 0.06 * k, 0.003, 48, 6), "Rubber", (0, 0, 0.009))
-    mat_mesh = mat.mesh("Chair mat")
-    leaning = transform((0, -0.25, 0.58), (np.radians(14), 0, 0))
     for y, turn in zip(STATIONS, (128, 104, 66), strict=True):
         where = spot(f"room -1.38 {y} 0.009 {turn}")
         put(seat_mesh, where)
-        put(back_mesh, where @ leaning)
-        put(mat_mesh, spot(f"room -1.4 {y}"))
+        put(back_mesh, where, (0, -0.25, 0.58), (14, 0, 0))
+
+
+def chair_mats(scene: Scene) -> None:
+    """A ribbed rubber mat below each chair."""
+    mat = Model(scene, "Rubber: lathe 0.60 0.001, 0.60 0.007, 0.575 0.012, 0.56 0.009, 0 0.009")
+    for k in range(7):
+        mat.add(scene.ring(0.14 + 0.06 * k, 0.003, 48, 6), "Rubber", (0, 0, 0.009))
+    data = mat.mesh("Chair mat")
+    for where in spots("room -1.4 -2..2*3"):
+        put(data, where)
 
 
 def waiting_bench(scene: Scene) -> None:
