@@ -15,7 +15,7 @@ from lightfield.dataset.config import Preset
 from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import rigs
-from lightfield.measurement.calibration import calibrated
+from lightfield.measurement.sampling import calibrated
 
 # What of a scene YAML's `scene` block is written down: not where a file came from, nor where it is.
 SOURCE_KEYS = {"builder", "parameters", "frame"}

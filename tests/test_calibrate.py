@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 from checkouts import checkout, planned, snakemake
 
-import calibrate
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
 from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
+from lightfield.measurement.calibration import effort_for
 
 TARGET = 0.02
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [24, 24]}
@@ -102,10 +102,10 @@ def test_a_preset_limits_the_choice(calibrated):
 def test_effort_follows_from_what_lies_on_both_sides_of_the_target():
     # A power law of slope −½ between the points, and 1/N beyond the last.
     points = [(1, 0.8), (4, 0.4), (16, 0.2)]
-    assert calibrate.effort_for(0.4, points) == pytest.approx(4)
-    assert calibrate.effort_for(0.2828427, points) == pytest.approx(8)
-    assert calibrate.effort_for(0.1, points) == pytest.approx(32)
-    assert calibrate.effort_for(0.9, points) == 1
+    assert effort_for(0.4, points) == pytest.approx(4)
+    assert effort_for(0.2828427, points) == pytest.approx(8)
+    assert effort_for(0.1, points) == pytest.approx(32)
+    assert effort_for(0.9, points) == 1
 
 
 def test_only_a_scene_with_a_target_is_calibrated(tmp_path):

@@ -7,11 +7,11 @@ import statistics
 import numpy as np
 import pytest
 
-import costs
 from lightfield.core.errors import UserError
 from lightfield.dataset import config, journal
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.geometry import lenses
+from lightfield.measurement import costs
 
 FULL = {"views": 3, "resolution": [8, 4], "samples": 2, "denoise": False}
 TARIFF = {"watts": 100, "cores": 4, "price_per_kwh": 0.5, "currency": "EUR"}

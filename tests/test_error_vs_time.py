@@ -136,15 +136,15 @@ def trial_maker():
     return trials.Trials("none.blend", "none.json", lightfield(), "cpu", 1, "none")
 
 
-def test_probes_lie_in_the_image_circle_and_in_different_views():
+def test_windows_lie_in_the_image_circle_and_in_different_views():
     maker = trial_maker()
-    probes = maker.probes(16, 4)
-    assert len({probe.view.name for probe in probes}) == 4
-    for probe in probes:
-        assert 0 <= probe.x <= 48 and 0 <= probe.y <= 48
-        assert maker.mask(probe).mean() >= 0.75
+    windows = maker.windows(16, 4)
+    assert len({window.view.name for window in windows}) == 4
+    for window in windows:
+        assert 0 <= window.x <= 48 and 0 <= window.y <= 48
+        assert maker.mask(window).mean() >= 0.75
     # The whole view where that is small: π/4 of it.
-    (whole,) = maker.probes(100, 1)
+    (whole,) = maker.windows(100, 1)
     assert (whole.x, whole.y, whole.width, whole.height) == (0, 0, 64, 64)
     assert maker.mask(whole).mean() == pytest.approx(np.pi / 4, abs=0.01)
 
@@ -156,8 +156,8 @@ def test_the_same_wall_is_found_in_both_views():
     beside = looking.copy()
     beside[0, 3] = 0.4
     views = [View.placed(str(number), matrix) for number, matrix in enumerate((looking, beside))]
-    probes = tuple(trials.Probe(view, 8, 8, 48, 48) for view in views)
-    mask = maker.mask(probes[0])
+    windows = tuple(trials.Window(view, 8, 8, 48, 48) for view in views)
+    mask = maker.mask(windows[0])
     rows, columns = np.mgrid[8:56, 8:56] + 0.5
     rays = maker.lens.rays(columns, rows)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -165,7 +165,7 @@ def test_the_same_wall_is_found_in_both_views():
     zero = np.zeros((48, 48, 3))
     reference = Reference(zero, zero, depth, mask, 0.0)
     cameras = tuple(maker.camera(view) for view in views)
-    here, there = trials.both_see(cameras, probes, (reference, reference))
+    here, there = trials.both_see(cameras, windows, (reference, reference))
     middle = 24 * 48 + 24
     # The pixel right of the optical axis, at 1/32 of 90 degrees, half a pixel on.
     angle = np.radians(90) / 32 * 0.5
@@ -175,4 +175,4 @@ def test_the_same_wall_is_found_in_both_views():
     assert abs(found // 48 - 24) <= 1
     # Nothing is seen where the second depth says that something is in front.
     near = Reference(zero, zero, depth / 2, mask, 0.0)
-    assert not len(trials.both_see(cameras, probes, (reference, near))[0])
+    assert not len(trials.both_see(cameras, windows, (reference, near))[0])

@@ -1,23 +1,306 @@
-"""What ways to render cost, and the record of which reach a scene's target error."""
+"""The cheapest way to render that reaches a scene's target error.
 
-from collections.abc import Mapping
+Cost is counted in samples a pixel, not in seconds, so that a scene makes the same choice each time:
+the bytes of its views follow from it. `lightfield.measurement.metrics` defines the error.
+"""
+
+import math
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from statistics import fmean
 from typing import Any
 
-# What a `render` block with a target error says of its calibration, and not of rendering: the
-# target, and a preset's limits.
-UNCALIBRATED = ("target_error", "most_samples", "denoise")
+from lightfield.measurement import metrics
+from lightfield.measurement.sampling import (
+    DENOISING_SAMPLES,
+    PLAIN,
+    cost_in_samples,
+    standard_error,
+)
+from lightfield.measurement.trials import Trials, Window, nearest_view
 
-# What denoising a pixel costs in samples of it: 18 µs against 6, measured on one core of an EPYC in
-# views of the garden of 256² and more. In the small windows of probes it is up to twice as much.
-DENOISING_SAMPLES = 3
+# A reference takes renders of so many samples until its own error is this part of the target.
+REFERENCE_SAMPLES = 16
+REFERENCE_PART = 0.2
+FEWEST_SEEDS, MOST_SEEDS = 4, 256
+
+PROBE_SEED, HELD_OUT_SEED = 1, 2
+
+# Plain path tracing is measured at these; beyond, its error is inversely proportional to samples.
+PLAIN_SAMPLES = (1, 4, 16, 64)
+# What adaptive sampling may take; of it, the threshold is chosen.
+MOST_ADAPTIVE_SAMPLES = 4096
+FIRST_THRESHOLD, LEAST_THRESHOLD = 0.4, 1e-4
+
+# Within this part of the target a way is as good as on it.
+CLOSE = 0.05
+# Within this part of the target, held-out views confirm the choice.
+CONFIRMED = 0.2
 
 
-def cost_in_samples(samples: float, denoise: bool) -> float:
-    """Return how many samples of a pixel take as long as these and, if so, denoising them."""
-    return samples + DENOISING_SAMPLES * denoise
+@dataclass(frozen=True)
+class Candidate:
+    """One way at one effort, on some windows: means over these.
+
+    ``samples`` are those that a pixel took, ``cost`` adds the denoiser's, and ``error`` is the
+    relative mean squared error. ``seconds`` are those of one core or of the GPU, a megapixel.
+    """
+
+    way: str
+    settings: Mapping[str, Any]
+    samples: float
+    cost: float
+    error: float
+    seconds: float
+
+    def evidence(self) -> dict[str, Any]:
+        """Return what is the same every time."""
+        return {key: value for key, value in asdict(self).items() if key != "seconds"}
 
 
-def calibrated(render: Mapping[str, Any], record: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a ``render`` block with what was chosen for its ``target_error`` in it."""
-    kept = {key: value for key, value in render.items() if key not in UNCALIBRATED}
-    return {**kept, "target_error": record["target_error"], **record["choice"]}
+class Bench:
+    """Some windows, their references, and what is measured on them."""
+
+    def __init__(
+        self,
+        maker: Trials,
+        windows: Sequence[Window],
+        seed: int,
+        target: float,
+        exposure: float | None = None,
+    ) -> None:
+        self.maker, self.windows, self.seed = maker, windows, seed
+        self.seeds = FEWEST_SEEDS
+        while True:
+            self.references = metrics.exposed_alike(self._references(), exposure)
+            self.own_error = fmean(reference.own_error for reference in self.references)
+            if self.own_error <= REFERENCE_PART * target or self.seeds >= MOST_SEEDS:
+                break
+            self.seeds *= 2
+
+    def _references(self) -> list[metrics.Reference]:
+        found = []
+        for number, window in enumerate(self.windows, 1):
+            found.append(self.maker.reference(window, self.seeds, REFERENCE_SAMPLES))
+            _say(f"reference {number} of {len(self.windows)}, {self.seeds * REFERENCE_SAMPLES} spp")
+        return found
+
+    def measure(self, way: str, settings: Mapping[str, Any]) -> tuple[Candidate, list[float]]:
+        """Render every window under ``settings``; also return the error of each."""
+        renders = [self.maker.render(window, self.seed, settings) for window in self.windows]
+        errors = [
+            metrics.relative_mse(render.colour, reference)
+            for render, reference in zip(renders, self.references, strict=True)
+        ]
+        samples = fmean(render.samples for render in renders)
+        megapixels = self.windows[0].width * self.windows[0].height / 1e6
+        found = Candidate(
+            way=way,
+            settings={**PLAIN, **settings},
+            samples=samples,
+            cost=cost_in_samples(samples, settings.get("denoise", False)),
+            error=fmean(errors),
+            seconds=fmean(render.seconds for render in renders) / megapixels,
+        )
+        _say(f"{way} {settings}: error {found.error:.3g} at cost {found.cost:.4g}")
+        return found, errors
+
+
+class Search:
+    """Tries every way on a bench, so that ``measured`` holds what to choose from.
+
+    ``most`` limits a pixel's samples, ``denoise``, unless None, rules out the other half.
+    """
+
+    def __init__(
+        self, bench: Bench, target: float, most: int | None = None, denoise: bool | None = None
+    ) -> None:
+        self.bench, self.target, self.denoise = bench, target, denoise
+        self.limit = math.inf if most is None else most
+        self.measured = [self._measure("plain", {"samples": n}) for n in PLAIN_SAMPLES]
+        self._needed = self.plain_samples(target)
+        _say(f"plain path tracing needs {self._needed:.3g} samples")
+        for denoised, counts, thresholds in (
+            (True, "denoised", "adaptive, denoised"),
+            (False, "plain", "adaptive"),
+        ):
+            if denoise in (None, denoised):
+                also = {"denoise": denoised}
+                if denoised:
+                    self._climb(counts, _counted, also, 1, self.limit)
+                efforts = 1 / FIRST_THRESHOLD, 1 / LEAST_THRESHOLD
+                self._climb(thresholds, self._adaptive, also, *efforts)
+        if not denoise and self._needed <= self._affordable():
+            plain = _counted(min(self._needed, self.limit))
+            self.measured.append(self._measure("plain", plain))
+
+    def _measure(self, way: str, settings: Mapping[str, Any]) -> Candidate:
+        return self.bench.measure(way, settings)[0]
+
+    def _adaptive(self, effort: float) -> dict[str, Any]:
+        threshold = float(f"{1 / effort:.3g}")
+        samples = min(self.limit, MOST_ADAPTIVE_SAMPLES)
+        return {"samples": samples, "adaptive_threshold": threshold}
+
+    def plain_samples(self, error: float) -> float:
+        """Return how many samples plain path tracing needs for an error."""
+        plain = (entry for entry in self.measured if entry.way == "plain")
+        return effort_for(error, sorted((entry.samples, entry.error) for entry in plain))
+
+    def reaches(self, entry: Candidate) -> bool:
+        """Return whether the error is on the target, or below it."""
+        return entry.error <= self.target * (1 + CLOSE)
+
+    def _eligible(self) -> list[Candidate]:
+        """Return what the limits leave to choose from."""
+        return [
+            entry
+            for entry in self.measured
+            if self.denoise in (None, entry.settings["denoise"])
+            and entry.settings["samples"] <= self.limit
+        ]
+
+    def _affordable(self) -> float:
+        """Return the least cost that is known to reach the target."""
+        costs = [entry.cost for entry in self._eligible() if self.reaches(entry)]
+        if not self.denoise and self._needed <= self.limit:
+            costs.append(self._needed)
+        return min(costs, default=math.inf)
+
+    def choose(self) -> Candidate:
+        """Return the cheapest that reaches the target; if none does, that of the least error."""
+        eligible = self._eligible()
+        good = [entry for entry in eligible if self.reaches(entry)]
+        if good:
+            return min(good, key=lambda entry: (entry.cost, entry.error))
+        return min(eligible, key=lambda entry: entry.error)
+
+    def _climb(
+        self,
+        way: str,
+        settings_at: Callable[[float], Mapping[str, Any]],
+        also: Mapping[str, Any],
+        first: float,
+        last: float,
+    ) -> None:
+        """Double a way's effort until it reaches the target, then interpolate to meet it.
+
+        Gives up at effort ``last``, at a cost that another way reaches the target with, or where
+        the last two errors, drawn out, would take more than that.
+        """
+        affordable = self._affordable()
+        points: list[tuple[float, Candidate]] = []
+        effort = first
+        while True:
+            points.append((effort, self._measure(way, {**settings_at(effort), **also})))
+            now = points[-1][1]
+            if self.reaches(now) or effort >= last or now.cost >= affordable:
+                break
+            # Every pixel takes the most that it may.
+            if len(points) > 1 and now.samples == points[-2][1].samples:
+                break
+            if len(points) > 2:
+                slope = math.log(now.error / points[-2][1].error) / math.log(2)
+                more = (self.target / now.error) ** (1 / slope) if slope < 0 else math.inf
+                if now.samples * more > 2 * affordable:
+                    break
+            effort = min(2 * effort, last)
+        measured = [entry for _, entry in points]
+        bracket = points[-2:]
+        while len(bracket) == 2 and self.reaches(bracket[1][1]):
+            if bracket[1][1].error >= self.target * (1 - CLOSE):
+                break
+            effort = effort_for(self.target, [(at, entry.error) for at, entry in bracket])
+            settings = {**PLAIN, **settings_at(effort), **also}
+            if settings in [entry.settings for entry in measured]:
+                break
+            measured.append(self._measure(way, settings))
+            bracket[self.reaches(measured[-1])] = (effort, measured[-1])
+        self.measured += measured
+
+
+def calibrate(
+    maker: Trials, render: Mapping[str, Any], size: int, count: int
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Choose how to render for ``render.target_error``, from ``count`` windows of ``size``².
+
+    Returns the choice with its evidence, which is the same each time, and the seconds that each way
+    took, which are not: those of one core or of the GPU, a megapixel.
+    """
+    target = render["target_error"]
+    windows = maker.windows(size, count)
+    views = [view for view in maker.lightfield.views if view not in [w.view for w in windows]]
+    others = [replace(w, view=nearest_view(views, w.view) or w.view) for w in windows]
+    known = Bench(maker, windows, PROBE_SEED, target)
+    search = Search(known, target, render.get("most_samples"), render.get("denoise"))
+    choice = search.choose()
+    equal = search.plain_samples(choice.error)
+    _, known_errors = known.measure(choice.way, choice.settings)
+    held_out = Bench(maker, others, HELD_OUT_SEED, target, known.references[0].exposure)
+    _, errors = held_out.measure(choice.way, choice.settings)
+    error = fmean(errors)
+    record = {
+        "target_error": target,
+        "metric": "relative mean squared error",
+        "choice": choice.settings,
+        "way": choice.way,
+        "reached": search.reaches(choice),
+        "cost_samples": choice.cost,
+        "probe_error": choice.error,
+        "probe_standard_error": standard_error(known_errors),
+        "held_out_error": error,
+        "held_out_ratio": error / target,
+        "held_out_standard_error": standard_error(errors),
+        "confirmed": abs(error / target - 1) <= CONFIRMED,
+        "plain_samples_at_equal_error": equal,
+        "times_fewer_samples": equal / choice.cost,
+        "denoising_samples": DENOISING_SAMPLES,
+        "size": size,
+        "probes": [window.name for window in windows],
+        "held_out": [
+            {"probe": window.name, "error": value}
+            for window, value in zip(others, errors, strict=True)
+        ],
+        "references": {
+            "samples": [bench.seeds * REFERENCE_SAMPLES for bench in (known, held_out)],
+            "own_error": [bench.own_error for bench in (known, held_out)],
+        },
+        "candidates": [entry.evidence() for entry in search.measured],
+    }
+    plain = max((e for e in search.measured if e.way == "plain"), key=lambda e: e.samples)
+    plain_seconds = plain.seconds * equal / plain.samples
+    seconds = {
+        "choice": choice.seconds,
+        "plain_at_equal_error": plain_seconds,
+        "times_faster": plain_seconds / choice.seconds,
+        "candidates": [
+            {"way": entry.way, "settings": entry.settings, "seconds": entry.seconds}
+            for entry in search.measured
+        ],
+    }
+    return record, seconds
+
+
+def effort_for(target: float, points: Sequence[tuple[float, float]]) -> float:
+    """Return the effort at which the error is ``target``, from (effort, error) in rising order.
+
+    Between points the error is a power of the effort; after the last it is inversely proportional.
+    """
+    below = next((i for i, (_, error) in enumerate(points) if error <= target), None)
+    if below is None:
+        effort, error = points[-1]
+        return effort * error / target
+    if below == 0:
+        return points[0][0]
+    (x0, e0), (x1, e1) = points[below - 1 : below + 1]
+    part = math.log(e0 / target) / math.log(e0 / e1)
+    return float(x0 * (x1 / x0) ** part)
+
+
+def _counted(effort: float) -> dict[str, Any]:
+    return {"samples": math.ceil(effort)}
+
+
+def _say(text: str) -> None:
+    print(f"calibration: {text}", file=sys.stderr, flush=True)

@@ -23,7 +23,8 @@ from typing import Any
 import flip_evaluator
 import numpy as np
 from numpy.typing import NDArray
-from skimage.metrics import structural_similarity
+from scipy.stats import linregress
+from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
 from lightfield.imaging.pictures import WHITE, exposure_for
 from lightfield.imaging.tonemap import encode_srgb, tone_map
@@ -127,7 +128,7 @@ def compare(
         truth.astype(np.float32), shown.astype(np.float32), "LDR", applyMagma=False
     )[0]
     with np.errstate(divide="ignore"):
-        psnr = -10 * np.log10(np.mean((shown - truth)[mask] ** 2, dtype=np.float64))
+        psnr = peak_signal_noise_ratio(truth[mask], shown[mask], data_range=1.0)
     return Errors(
         relative_mse=relative_mse(colour, reference),
         relative_mse_whole=relative_mse(colour, reference, left_out=0),
@@ -194,19 +195,24 @@ def fit(x: Sequence[float], y: Sequence[float]) -> Line | None:
     """Fit a power law by least squares of the logarithms; None for fewer than three different x."""
     if len(set(x)) < 3:
         return None
-    logs = np.log(x), np.log(y)
-    (slope, offset), covariance = np.polyfit(*logs, 1, cov=True)
-    return Line(float(slope), float(np.sqrt(covariance[0, 0])), float(np.exp(offset)))
+    found = linregress(np.log(x), np.log(y))
+    return Line(float(found.slope), float(found.stderr), float(np.exp(found.intercept)))
 
 
-def pareto(cost: Sequence[float], error: Sequence[float]) -> list[int]:
-    """Return the points to which no other is better in one and at least as good in the other."""
-    best, front = np.inf, []
-    for index in sorted(range(len(cost)), key=lambda i: (cost[i], error[i])):
-        if error[index] < best:
-            best = error[index]
-            front.append(index)
-    return front
+def pareto(cost: Sequence[float], error: Sequence[float], same_cost: float = 0.0) -> list[int]:
+    """Return the points to which no other is better in one and at least as good in the other.
+
+    In order of their costs; the first of those that are the same. Costs are as good where they
+    differ by the part ``same_cost``, errors by a millionth.
+    """
+    costs, errors, order = np.array(cost), np.array(error), np.arange(len(cost))
+    own_cost, own_error = costs[:, np.newaxis], errors[:, np.newaxis]
+    better = errors < own_error * (1 - 1e-6), costs < own_cost * (1 - same_cost)
+    as_good = errors <= own_error * (1 + 1e-6), costs <= own_cost * (1 + same_cost)
+    repeats = (errors == own_error) & (costs == own_cost) & (order < order[:, np.newaxis])
+    beaten = (better[0] & as_good[1]) | (as_good[0] & better[1]) | repeats
+    front = order[~beaten.any(axis=1)]
+    return [int(index) for index in front[np.argsort(costs[front], kind="stable")]]
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from skimage.util import view_as_blocks
 
 Array = NDArray[Any]
 
@@ -24,21 +25,15 @@ def relative_noise(luminance: Array, block: int = SMALLEST_BLOCK) -> Array:
     NaN where a block is black, not finite, or cut by the picture's border.
     """
     light = luminance.astype(np.float64)
-    rows = light[:-2] - 2 * light[1:-1] + light[2:]
-    residual = np.abs(rows[:, :-2] - 2 * rows[:, 1:-1] + rows[:, 2:]) / MASK_NORM
-    deviation = np.median(_blocks(residual, block), axis=-1) / MEDIAN_OF_NORMAL
-    mean = np.mean(_blocks(light[1:-1, 1:-1], block), axis=-1)
     with np.errstate(invalid="ignore", divide="ignore"):
+        residual = np.abs(np.diff(np.diff(light, 2, axis=0), 2, axis=1)) / MASK_NORM
+        deviation = np.median(_blocks(residual, block), axis=(-2, -1)) / MEDIAN_OF_NORMAL
+        mean = np.mean(_blocks(light[1:-1, 1:-1], block), axis=(-2, -1))
         ratio = deviation / mean
     return np.where(np.isfinite(ratio) & (mean > 0), ratio, np.nan)
 
 
 def _blocks(values: Array, block: int) -> Array:
-    """Return (rows, columns, block²) of the whole blocks of (height, width)."""
-    rows, columns = values.shape[0] // block, values.shape[1] // block
-    whole = values[: rows * block, : columns * block]
-    return (
-        whole.reshape(rows, block, columns, block)
-        .swapaxes(1, 2)
-        .reshape(rows, columns, block * block)
-    )
+    """Return (rows, columns, block, block) of the whole blocks of (height, width)."""
+    rows, columns = (side // block * block for side in values.shape)
+    return np.asarray(view_as_blocks(np.ascontiguousarray(values[:rows, :columns]), (block, block)))

@@ -1,12 +1,13 @@
 """Windows of a dataset's views, rendered in many ways to learn what each way costs and gives.
 
 Whole views made small would show more detail a pixel than the dataset does, which a denoiser cannot
-tell from noise; so a probe is a part of a view at the view's own resolution.
+tell from noise; so a window is a part of a view at the view's own resolution.
 
 Every render is kept in a folder, under a key of all that it follows from, with the time that it
 took, so that what is interrupted goes on where it was and what is repeated costs nothing.
 """
 
+import argparse
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,17 +22,15 @@ from lightfield.core.files import read_json
 from lightfield.dataset import keys
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.imaging import images
-from lightfield.measurement.calibration import UNCALIBRATED
 from lightfield.measurement.metrics import Mask, Reference, make_reference
+from lightfield.measurement.sampling import PLAIN, without_target
 from lightfield.validation.consistency import Camera
-
-PLAIN = {"adaptive_threshold": 0, "denoise": False}
 
 # Seeds of references begin here, and those of trials at 1: no trial is part of its reference.
 REFERENCE_SEED = 1000
 
 R2 = (0.7548776662466927, 0.5698402909980532)
-# A probe has at least this part of its pixels in the image circle.
+# A window has at least this part of its pixels in the image circle.
 FULL_ENOUGH = 0.75
 
 SECONDS_ATTRIBUTE = "plenoforge:core_seconds"
@@ -40,8 +39,8 @@ DEVICE_ATTRIBUTE = "plenoforge:device"
 
 
 @dataclass(frozen=True)
-class Probe:
-    """A window of one view at its own resolution: its top left pixel, and its size."""
+class Window:
+    """A part of one view at its own resolution: its top left pixel, and its size."""
 
     view: View
     x: int
@@ -51,7 +50,7 @@ class Probe:
 
     @property
     def name(self) -> str:
-        """The view's name and the window's place in it."""
+        """The view's name and the place in it."""
         return f"{self.view.name}+{self.x}+{self.y}"
 
 
@@ -73,7 +72,7 @@ class Trial:
 
 
 class Trials:
-    """Renders probes of the dataset of a lightfield.json, or takes them from ``cache``.
+    """Renders windows of the dataset of a lightfield.json, or takes them from ``cache``.
 
     Blender starts only when something has to be rendered.
     """
@@ -89,21 +88,32 @@ class Trials:
     ) -> None:
         self.lens = lightfield.lens
         # How many samples are taken, and why, is for each trial to say.
-        render = {k: v for k, v in lightfield.render.items() if k not in UNCALIBRATED}
-        self.lightfield = lightfield.changed(render=render)
+        self.lightfield = lightfield.changed(render=without_target(lightfield.render))
         self._blend, self._inventory = blend, inventory
         self._device, self._threads, self._cache = device, threads, cache
         self._started = False
 
-    def render(self, probe: Probe, seed: int, sampling: Mapping[str, Any]) -> Trial:
-        """Render a probe under the render settings that ``sampling`` changes."""
+    @classmethod
+    def of(cls, arguments: argparse.Namespace, lightfield: LightField) -> "Trials":
+        """Return what the arguments of `add_arguments` ask for."""
+        return cls(
+            arguments.blend,
+            arguments.inventory,
+            lightfield,
+            arguments.device,
+            arguments.threads,
+            arguments.cache,
+        )
+
+    def render(self, window: Window, seed: int, sampling: Mapping[str, Any]) -> Trial:
+        """Render a window under the render settings that ``sampling`` changes."""
         settings = {**self.lightfield.render, **PLAIN, **sampling, "seed": seed}
-        window = [probe.x, probe.y, probe.width, probe.height]
-        one = self.lightfield.changed(render=settings, device=self._device, window=window)
-        key = keys.render_key(one, probe.view)
+        place = [window.x, window.y, window.width, window.height]
+        one = self.lightfield.changed(render=settings, device=self._device, window=place)
+        key = keys.render_key(one, window.view)
         path = self._cache / f"{key[:32]}.exr"
         if not images.is_finished(path, key):
-            self._render(probe, settings, path, key)
+            self._render(window, settings, path, key)
         image = images.read_image(path)
         return Trial(
             colour=image.colour,
@@ -113,20 +123,20 @@ class Trials:
             device=str(image.attributes[DEVICE_ATTRIBUTE]),
         )
 
-    def reference(self, probe: Probe, seeds: int, samples: int) -> Reference:
-        """Render a probe with ``seeds`` seeds, ``samples`` samples each, and take their mean."""
+    def reference(self, window: Window, seeds: int, samples: int) -> Reference:
+        """Render a window with ``seeds`` seeds, ``samples`` samples each, and take their mean."""
         renders = [
-            self.render(probe, REFERENCE_SEED + number, {"samples": samples})
+            self.render(window, REFERENCE_SEED + number, {"samples": samples})
             for number in range(seeds)
         ]
         depths = [render.depth for render in renders if render.depth is not None]
         colours = [render.colour for render in renders]
-        return make_reference(colours, depths or None, self.mask(probe))
+        return make_reference(colours, depths or None, self.mask(window))
 
-    def mask(self, probe: Probe) -> Mask:
-        """Return which pixels of a probe the lens has a ray for, (h, w)."""
-        rows, columns = np.mgrid[: probe.height, : probe.width]
-        rays = self.lens.rays(columns + probe.x + 0.5, rows + probe.y + 0.5)
+    def mask(self, window: Window) -> Mask:
+        """Return which pixels of a window the lens has a ray for, (h, w)."""
+        rows, columns = np.mgrid[: window.height, : window.width]
+        rays = self.lens.rays(columns + window.x + 0.5, rows + window.y + 0.5)
         inside: Mask = np.isfinite(rays).all(axis=-1)
         return inside
 
@@ -134,14 +144,14 @@ class Trials:
         """Return where a view looks from, as `lightfield.validation.consistency` wants it."""
         return Camera(self.lens, view.matrix, self.lightfield.cycles_depth)
 
-    def probes(self, size: int, count: int) -> list[Probe]:
+    def windows(self, size: int, count: int) -> list[Window]:
         """Choose ``count`` windows of ``size``², spread evenly over the views and the image.
 
-        A view no larger than a window is a probe as a whole.
+        A view no larger than that is a window as a whole.
         """
         views = self.lightfield.views
         size = min(size, self.lens.width, self.lens.height)
-        found: list[Probe] = []
+        found: list[Window] = []
         point = 0
         while len(found) < count:
             view = views[int((len(found) + 0.5) * len(views) / count)]
@@ -149,13 +159,13 @@ class Trials:
             point += 1
             across, down = (point * step % 1 for step in R2)
             x, y = round(across * (self.lens.width - size)), round(down * (self.lens.height - size))
-            probe = Probe(view, x, y, size, size)
+            window = Window(view, x, y, size, size)
             # In the corners of a fisheye view there is nothing.
-            if self.mask(probe).mean() >= FULL_ENOUGH:
-                found.append(probe)
+            if self.mask(window).mean() >= FULL_ENOUGH:
+                found.append(window)
         return found
 
-    def _render(self, probe: Probe, settings: Mapping[str, Any], path: Path, key: str) -> None:
+    def _render(self, window: Window, settings: Mapping[str, Any], path: Path, key: str) -> None:
         with processors.only(self._threads):
             from lightfield.rendering import cycles
             from lightfield.rendering.view import render_view
@@ -163,9 +173,9 @@ class Trials:
         if not self._started:
             self._start(settings)
         cycles.set_sampling(settings)
-        cycles.set_window(probe.x, probe.y, probe.width, probe.height)
-        seed = keys.view_seed(settings["seed"], probe.view.name)
-        raw = render_view(probe.view.matrix, seed)
+        cycles.set_window(window.x, window.y, window.width, window.height)
+        seed = keys.view_seed(settings["seed"], window.view.name)
+        raw = render_view(window.view.matrix, seed)
         assert raw.samples is not None and raw.worked_seconds is not None
         seconds = raw.worked_seconds if self._on == "CPU" else raw.render_seconds
         channels = {name: raw.colour[:, :, index] for index, name in enumerate("RGB")}
@@ -176,7 +186,7 @@ class Trials:
             channels,
             {
                 images.KEY_ATTRIBUTE: key,
-                SAMPLES_ATTRIBUTE: float(raw.samples[self.mask(probe)].mean()),
+                SAMPLES_ATTRIBUTE: float(raw.samples[self.mask(window)].mean()),
                 SECONDS_ATTRIBUTE: seconds,
                 DEVICE_ATTRIBUTE: self._on,
             },
@@ -200,7 +210,18 @@ class Trials:
         self._started = True
 
 
-def neighbour(views: Sequence[View], view: View) -> View | None:
+def add_arguments(parser: argparse.ArgumentParser, lightfield: str) -> None:
+    """Add what a program that renders windows is asked for; ``lightfield`` says of which file."""
+    parser.add_argument("--blend", required=True, type=Path, help="the scene")
+    parser.add_argument("--inventory", required=True, type=Path, help="what the scene contains")
+    parser.add_argument("--lightfield", required=True, type=Path, help=lightfield)
+    parser.add_argument("--size", type=int, default=64, help="of a window's sides (default: 64)")
+    parser.add_argument("--device", default="auto", help="what Cycles renders on (default: auto)")
+    parser.add_argument("--threads", type=int, default=1, help="CPU threads (default: 1)")
+    parser.add_argument("--cache", required=True, type=Path, help="folder of what was rendered")
+
+
+def nearest_view(views: Sequence[View], view: View) -> View | None:
     """Return the nearest other view that looks the same way to within 70 degrees, if any."""
     alike = math.cos(math.radians(70))
     others = [
@@ -217,28 +238,27 @@ SAME_DEPTH = 0.03
 
 def both_see(
     cameras: tuple[Camera, Camera],
-    probes: tuple[Probe, Probe],
+    windows: tuple[Window, Window],
     references: tuple[Reference, Reference],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Find surfaces that two probes see: flat indices (n,) of pixels of the one and of the other.
+    """Find surfaces that two windows see: flat indices (n,) of pixels of the one and of the other.
 
     The first one's pixels are lifted by depth and looked up in the second; those that its depth
     says are hidden there are left out. Both references need depth.
     """
     first, second = cameras
-    window = probes[1]
+    here, there = windows
     depths = references[0].depth, references[1].depth
     assert depths[0] is not None and depths[1] is not None
     rows, columns = np.nonzero(references[0].mask & np.isfinite(depths[0]))
-    points = first.lift(depths[0][rows, columns], columns + probes[0].x, rows + probes[0].y)
-    x, y = (second.pixels(points) - (window.x, window.y)).T
+    points = first.lift(depths[0][rows, columns], columns + here.x, rows + here.y)
+    x, y = (second.pixels(points) - (there.x, there.y)).T
     with np.errstate(invalid="ignore"):
-        inside = (x >= 0) & (x < window.width) & (y >= 0) & (y < window.height)
+        inside = (x >= 0) & (x < there.width) & (y >= 0) & (y < there.height)
     across, down = (np.where(inside, value, 0).astype(np.int64) for value in (x, y))
     inside &= references[1].mask[down, across]
-    there = second.lift(depths[1][down, across], across + window.x, down + window.y)
+    seen = second.lift(depths[1][down, across], across + there.x, down + there.y)
     with np.errstate(invalid="ignore"):
-        expected, found = (np.linalg.norm(p - second.position, axis=1) for p in (points, there))
+        expected, found = (np.linalg.norm(p - second.position, axis=1) for p in (points, seen))
         same = inside & (np.abs(found / expected - 1) < SAME_DEPTH)
-    here = rows * probes[0].width + columns
-    return here[same], (down * window.width + across)[same]
+    return (rows * here.width + columns)[same], (down * there.width + across)[same]

@@ -1,0 +1,356 @@
+"""Add up what a dataset has cost, and what the full one would: report/costs.json.
+
+Times are seconds, memory and sizes bytes, energy kWh. Wall and processor time of the views come
+from the journals of their shards, which survive kills: all the time that was really spent, also on
+views that were lost or made again. Of any other job the time and memory of its last run count, as
+Snakemake measured them; it looks every half second and after a while every 30 s, so that the
+processor time may be short by as much. A job too short to be looked at counts as busy throughout.
+
+    {
+      "stages": [{"stage", "jobs", "wall_seconds", "cpu_seconds", "peak_memory_bytes", "bytes"}],
+      "shards": [{"shard", "views", "wall_seconds", "cpu_seconds", "peak_memory_bytes",
+                  "path_tracing_seconds",   Cycles' own render time of all its renderings
+                  "overhead_seconds",       the rest of wall_seconds
+                  "views_rendered",         renderings, repeated ones counted
+                  "runs",                   processes that worked on it; killed_runs of them
+                  "killed_runs",            did not end by themselves
+                  "repeated_seconds"}],     spent again: views made again and further start-ups
+      "path_tracing_seconds", "overhead_seconds", "repeated_seconds",   of all shards
+      "device", "cores", "watts", "price_per_kwh", "currency",
+      "energy_kwh", "price", "attribution",
+      "extrapolation": {"views", "resolution", "samples", "core_hours", "core_hours_uncertainty",
+                        "energy_kwh", "energy_kwh_uncertainty", "price", "price_uncertainty",
+                        "gigabytes", "basis"}
+    }
+
+Energy is the machine's wattage, times the wall time, times the part of its cores that was busy;
+that is the processor time divided by the number of cores. While it renders on a graphics card the
+whole machine counts. Waiting and idle time are nobody's.
+
+The extrapolation multiplies each view's path-tracing time by the ratio of pixels and of samples,
+denoising counted in samples as `lightfield.measurement.sampling` does, and takes the mean. That
+the time follows them in proportion is assumed. Its uncertainty is the standard error of that mean
+over the views, with the correction for a finite number of views, sqrt(1 - n / N); null if there is
+only one view. What else each view needs (writing, reprojection, validation) is taken in proportion
+to views and pixels, everything else as it was. The first view of each process, which prepares the
+scene for Cycles, tells of neither. Gigabytes are those of the rendered views, in proportion to
+their pixels: an upper estimate, because larger views compress better. "device" and "extrapolation"
+are null if no journal tells of a rendered view, as when the working folder was deleted and the
+views were kept."""
+
+import csv
+import math
+import os
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from statistics import mean
+from typing import Any
+
+from lightfield.dataset import journal
+from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.measurement.sampling import DENOISING_SAMPLES, cost_in_samples, standard_error
+
+# The stages that every dataset has, in the order of the work; others come between.
+FIRST_STAGES, LAST_STAGES = ("scene", "cameras", "render"), ("export", "validate", "report")
+# What a stage made, where that is not the folder of its name.
+MADE = {
+    "cameras": ("lightfield.json",),
+    "render": ("exr",),
+    "export": ("transforms.json",),
+    "validate": ("validation.json",),
+}
+# Of the report, what differs from build to build is not counted.
+NOT_COUNTED = ("costs.json", "index.html")
+
+
+@dataclass
+class Stage:
+    """What the jobs of one stage took together; the peak is that of the largest."""
+
+    jobs: int = 0
+    wall_seconds: float = 0.0
+    cpu_seconds: float = 0.0
+    peak_memory_bytes: int = 0
+
+
+@dataclass(frozen=True)
+class Tariff:
+    """The wattage of a machine with so many cores, and what a kWh costs."""
+
+    watts: float
+    price_per_kwh: float
+    currency: str
+    cores: int
+
+    @classmethod
+    def read(cls, settings: Mapping[str, Any]) -> "Tariff":
+        """Take config.yaml's `energy`."""
+        here = {"cores": os.cpu_count() or 1} if settings["cores"] == "auto" else {}
+        return cls(**{**settings, **here})
+
+    def kwh(self, machine_seconds: float) -> float:
+        """Return the energy of so many seconds of the whole machine."""
+        return self.watts * machine_seconds / 3.6e6
+
+    def price(self, kwh: float) -> float:
+        """Return what so much energy costs."""
+        return kwh * self.price_per_kwh
+
+
+def shard_costs(name: str, runs: Sequence[journal.Run]) -> dict[str, Any]:
+    """Add up all processes that worked on one shard."""
+    first, end = map(int, name.split("-"))
+    views = [view for run in runs for view in run.views]
+    latest = {view["view"]: view["wall_seconds"] for view in views}
+    wall = sum(run.wall_seconds for run in runs)
+    path_tracing = sum(view["render_seconds"] for view in views)
+    again = sum(view["wall_seconds"] for view in views) - sum(latest.values())
+    return _rounded(
+        {
+            "shard": name,
+            "views": end - first,
+            "wall_seconds": wall,
+            "cpu_seconds": sum(run.cpu_seconds for run in runs),
+            "peak_memory_bytes": max(run.peak_memory_bytes for run in runs),
+            "path_tracing_seconds": path_tracing,
+            "overhead_seconds": wall - path_tracing,
+            "views_rendered": len(views),
+            "runs": len(runs),
+            "killed_runs": sum(run.end is None for run in runs),
+            "repeated_seconds": again
+            + sum(run.start.get("start_up_seconds", 0.0) for run in runs[1:]),
+        }
+    )
+
+
+def _rounded(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return figures whose seconds are rounded to milliseconds."""
+    return {k: round(v, 3) if isinstance(v, float) else v for k, v in figures.items()}
+
+
+def job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, Stage]:
+    """Add up the jobs' TSVs by stage: the folder that a TSV lies in, or else its own name.
+
+    The views' own are left out: they tell only of a shard's last run.
+    """
+    stages: dict[str, Stage] = {}
+    found = [("scene", path) for folder in scene for path in folder.glob("*.tsv")]
+    found += [
+        (path.relative_to(dataset).parts[0].removesuffix(".tsv"), path)
+        for path in dataset.rglob("*.tsv")
+    ]
+    for name, path in found:
+        if name == "render":
+            continue
+        try:
+            wall, cpu, memory = job_times(path)
+        except (OSError, ValueError, LookupError, TypeError, StopIteration):
+            print(f"{path}: is no table of a job's time; the job is left out", file=sys.stderr)
+            continue
+        stage = stages.setdefault(name, Stage())
+        stage.jobs += 1
+        stage.wall_seconds += wall
+        stage.cpu_seconds += cpu
+        stage.peak_memory_bytes = max(stage.peak_memory_bytes, memory)
+    return stages
+
+
+def job_times(path: Path) -> tuple[float, float, int]:
+    """Return a job's wall and processor time in seconds, and its memory in bytes, from its TSV."""
+    with path.open(encoding="utf-8", newline="") as file:
+        row = next(csv.DictReader(file, delimiter="\t"))
+    wall = float(row["s"])
+    cpu = wall if row["cpu_time"] == "NA" else float(row["cpu_time"])
+    memory = 0 if row["max_rss"] == "NA" else round(float(row["max_rss"]) * 2**20)
+    return wall, cpu, memory
+
+
+def stage_bytes(stage: str, dataset: Path, blend: Path) -> int:
+    """Return the size of what a stage left behind, 0 if that is no part of the dataset."""
+    if stage == "scene":
+        return blend.stat().st_size
+    paths = [dataset / name for name in MADE.get(stage, (stage,))]
+    files = [file for path in paths for file in ([path] if path.is_file() else path.rglob("*"))]
+    return sum(
+        file.stat().st_size for file in files if file.is_file() and file.name not in NOT_COUNTED
+    )
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """The time of one view: path tracing and the rest, and when it was finished.
+
+    In seconds of one core; of the whole machine where a graphics card renders.
+    """
+
+    view: str
+    finished: float
+    path_tracing: float
+    rest: float
+    # A process's first view pays for the scene's acceleration structures.
+    first: bool
+
+
+def renderings(run: journal.Run) -> Iterator[Rendering]:
+    """Split the time of each view that a process rendered.
+
+    While Cycles path-traces all the threads are busy, and one is for the rest. In these parts the
+    view's processor time is divided, because wall time holds what other programs took.
+    """
+    for index, view in enumerate(run.views):
+        traced = view["render_seconds"]
+        rest = max(0.0, view["wall_seconds"] - traced)
+        if on_processor(run):
+            busy = run.start["threads"] * traced
+            traced = view["cpu_seconds"] * busy / (busy + rest)
+            rest = view["cpu_seconds"] - traced
+        yield Rendering(view["view"], view["finished"], traced, rest, first=index == 0)
+
+
+def on_processor(run: journal.Run) -> bool:
+    """Return whether a process rendered on the processor's cores."""
+    return bool(run.start["device"] == "CPU")
+
+
+def costs(
+    dataset: Path,
+    blend: Path,
+    journals: Path,
+    benchmarks: Path,
+    scene_benchmarks: Iterable[Path],
+    tariff: Tariff,
+    full: Mapping[str, Any],
+    reprojections: Iterable[str],
+) -> dict[str, Any]:
+    """Return what costs.json says of the dataset in the folder ``dataset``.
+
+    ``journals`` is the folder of its journals, ``benchmarks`` and ``scene_benchmarks`` are those of
+    its jobs' and its scene's TSVs. ``full`` has the ``views``, ``resolution``, ``samples`` and
+    ``denoise`` of the full dataset, null for those of this one.
+    """
+    by_shard = {
+        path.name.removesuffix(".journal.jsonl"): journal.read(path)
+        for path in sorted(journals.glob("*.journal.jsonl"))
+    }
+    runs = [run for part in by_shard.values() for run in part]
+    shards = [shard_costs(name, part) for name, part in by_shard.items()]
+    shards.sort(key=lambda shard: [int(number) for number in shard["shard"].split("-")])
+    stages = job_stages(benchmarks, scene_benchmarks)
+    stages["render"] = Stage(
+        jobs=len(shards),
+        wall_seconds=sum(shard["wall_seconds"] for shard in shards),
+        cpu_seconds=sum(shard["cpu_seconds"] for shard in shards),
+        peak_memory_bytes=max((shard["peak_memory_bytes"] for shard in shards), default=0),
+    )
+    order = [*FIRST_STAGES, *sorted(stages.keys() - {*FIRST_STAGES, *LAST_STAGES}), *LAST_STAGES]
+    stages = {name: stages[name] for name in order if name in stages}
+    sizes = {name: stage_bytes(name, dataset, blend) for name in stages}
+    device = next((run.start["device"] for run in reversed(runs) if run.views), None)
+    # A shard's part of the machine: its cores, or all of it while its graphics card works.
+    machine_seconds = sum(
+        stage.cpu_seconds / tariff.cores for name, stage in stages.items() if name != "render"
+    ) + sum(
+        run.wall_seconds if run.views and not on_processor(run) else run.cpu_seconds / tariff.cores
+        for run in runs
+    )
+    kwh = tariff.kwh(machine_seconds)
+    totals = ("path_tracing_seconds", "overhead_seconds", "repeated_seconds")
+    return {
+        "stages": [
+            {"stage": name, **_rounded(asdict(stage)), "bytes": sizes[name]}
+            for name, stage in stages.items()
+        ],
+        "shards": shards,
+        **{name: round(sum(shard[name] for shard in shards), 3) for name in totals},
+        "device": device,
+        "cores": tariff.cores,
+        "watts": tariff.watts,
+        "price_per_kwh": tariff.price_per_kwh,
+        "currency": tariff.currency,
+        "energy_kwh": kwh,
+        "price": tariff.price(kwh),
+        "attribution": (
+            f"{tariff.watts:g} W, the whole machine's, times wall time, times the share of its "
+            f"{tariff.cores} cores that was busy"
+            + ("; all of it while a graphics card renders" if device not in (None, "CPU") else "")
+        ),
+        "extrapolation": extrapolation(
+            runs,
+            stages,
+            sizes["render"],
+            LightField.read(dataset / NAME),
+            tariff,
+            full,
+            reprojections,
+        ),
+    }
+
+
+def extrapolation(
+    runs: Sequence[journal.Run],
+    stages: Mapping[str, Stage],
+    view_bytes: int,
+    lightfield: LightField,
+    tariff: Tariff,
+    full: Mapping[str, Any],
+    reprojections: Iterable[str],
+) -> dict[str, Any] | None:
+    """Return what the full dataset would cost, from the views of this one."""
+    every = [rendering for run in runs for rendering in renderings(run)]
+    if not every:
+        return None
+    kept = {one.view: one for one in sorted(every, key=lambda one: one.finished)}.values()
+    # First views tell little of the others, and count only where there are none.
+    latest = [rendering for rendering in kept if not rendering.first] or list(kept)
+    here = len(lightfield.views)
+    render = lightfield.render
+    samples, denoise = render["samples"], render["denoise"]
+    wanted = full["samples"] or samples
+    # Where a target error decides, both are unknown until then.
+    denoise_wanted = denoise if full["denoise"] is None else full["denoise"]
+    effort = cost_in_samples(wanted, denoise_wanted) / cost_in_samples(samples, denoise)
+    lens = lightfield.lens
+    pixels = math.prod(full["resolution"]) / (lens.width * lens.height)
+    count = full["views"]
+
+    times = [view.path_tracing * pixels * effort for view in latest]
+    error = None
+    if len(times) > 1:
+        error = count * standard_error(times) * math.sqrt(max(0.0, 1 - len(times) / count))
+    # Processor time beside a graphics card's is a part of the machine's.
+    processor = all(on_processor(run) for run in runs if run.views)
+    part = 1 if processor else 1 / tariff.cores
+    growing = {"validate", *reprojections}
+    each_view = mean(view.rest for view in latest) + part / here * sum(
+        stage.cpu_seconds for name, stage in stages.items() if name in growing
+    )
+    once = sum(rendering.rest for rendering in every if rendering.first) + part * (
+        sum(run.start.get("start_up_cpu_seconds", 0.0) for run in runs)
+        + sum(s.cpu_seconds for name, s in stages.items() if name not in {"render", *growing})
+    )
+    seconds = count * (mean(times) + each_view * pixels) + once
+    machine = seconds / tariff.cores if processor else seconds
+    uncertainty = None if error is None else tariff.kwh(error * machine / seconds)
+    return {
+        "views": count,
+        "resolution": full["resolution"],
+        "samples": wanted,
+        "core_hours": seconds / 3600,
+        "core_hours_uncertainty": None if error is None else error / 3600,
+        "energy_kwh": tariff.kwh(machine),
+        "energy_kwh_uncertainty": uncertainty,
+        "price": tariff.price(tariff.kwh(machine)),
+        "price_uncertainty": None if uncertainty is None else tariff.price(uncertainty),
+        "gigabytes": view_bytes / here * count * pixels / 1e9,
+        "basis": (
+            f"path tracing of {len(times)} views: {lens.width} × {lens.height} pixels, "
+            f"{samples} samples"
+            + (f", and denoising, which counts as {DENOISING_SAMPLES}" if denoise else "")
+            + "; in proportion to pixels and samples; on "
+            + ("the processor" if processor else "a graphics card: hours are the machine's")
+            + "; ± is the standard error over these views; all else as measured, the part that "
+            "every view needs in proportion to views and pixels"
+        ),
+    }

@@ -1,0 +1,330 @@
+"""The error of renders against their time: sampling plain, adaptive, guided, denoised.
+
+Windows of the dataset's views are rendered in every way and compared with references of other seeds
+(`lightfield.measurement.metrics` says how). What is rendered is kept with its time: killed and
+started again, this goes on where it was. The time is Cycles' own for rendering, denoising included,
+of one render the median over its seeds; it is right only where nothing else runs on the same core.
+
+The slope of a method is that of its error over its time, both in logarithms. Plain path tracing's
+is −1 over samples, whether indirect light is clamped or not: samples are clamped, not pixels. Two
+things bend it. Where light is smooth, Cycles' Sobol points converge faster than independent ones
+would; and where paths are rare and bright, leaving out the worst thousandth of pixels hides more of
+them at few samples than at many. So the slope of all pixels is told too, which is −1 there, with
+larger errors. Adaptive sampling and denoising are biased, so theirs are flatter.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from statistics import fmean, median
+from typing import Any
+
+from lightfield.core.files import write_csv, write_json
+from lightfield.core.progress import Progress
+from lightfield.imaging import plots
+from lightfield.measurement import metrics
+from lightfield.measurement.sampling import PLAIN as PLAIN_SAMPLING
+from lightfield.measurement.sampling import standard_error
+from lightfield.measurement.trials import Trial, Trials, Window, both_see, nearest_view
+
+PLAIN, ADAPTIVE, DENOISED = "plain", "adaptive", "denoised"
+BOTH, GUIDED, OWN = "adaptive + denoised", "path guiding", "this scene's settings"
+
+# Above 0.2, the fewest samples that adaptive sampling takes decide.
+THRESHOLDS = (0.2, 0.1, 0.05, 0.02, 0.01)
+
+# A reference's samples are split among so many seeds, whose differences tell its own error.
+REFERENCE_SEEDS = 8
+
+# What says which way a point is of.
+WAY = ("method", "settings")
+
+# The renders of one way, by window and seed.
+Renders = Sequence[Sequence[Trial]]
+
+
+@dataclass(frozen=True)
+class Point:
+    """One way to render, measured: means over windows and seeds.
+
+    ``samples`` is the mean number that a pixel took; ``seconds`` are of one core, or of the GPU, a
+    megapixel; ``standard_error`` is that of ``relative_mse``, over seeds. ``resolved``
+    says whether the error is above the references' own, below which nothing is drawn or fitted.
+    """
+
+    method: str
+    settings: Mapping[str, Any]
+    samples: float
+    seconds: float
+    relative_mse: float
+    relative_mse_whole: float
+    standard_error: float
+    resolved: bool
+    psnr: float
+    ssim: float
+    flip: float
+    depth_error: float | None
+
+
+def measure(
+    maker: Trials,
+    render: Mapping[str, Any],
+    *,
+    size: int,
+    windows: int,
+    octaves: int,
+    reference_samples: int,
+    seeds: int,
+    name: str,
+) -> dict[str, Any]:
+    """Measure every way at so many ``windows`` of ``size``² pixels, and at the first's neighbour's.
+
+    ``render`` is the scene's own. Sample counts are 1 to 2^``octaves``, each rendered with
+    ``seeds`` seeds; ``name`` is for the progress that is printed.
+    """
+    chosen = maker.windows(size, windows)
+    near = nearest_view(maker.lightfield.views, chosen[0].view)
+    if near:
+        chosen.insert(1, replace(chosen[0], view=near))
+    progress = Progress(len(chosen), f"{name}: references")
+    made = []
+    for window in chosen:
+        made.append(maker.reference(window, REFERENCE_SEEDS, reference_samples // REFERENCE_SEEDS))
+        progress.done()
+    references = metrics.exposed_alike(made)
+
+    on_cpu = maker.render(chosen[0], 1, {"samples": 1}).device == "CPU"
+    ways = all_ways(render, octaves, guiding=on_cpu)
+    progress = Progress(len(ways) * len(chosen) * seeds, f"{name}: trials", "renders")
+    points, pairs = [], []
+    for method, settings in ways:
+        renders = []
+        for window in chosen:
+            renders.append([maker.render(window, 1 + seed, settings) for seed in range(seeds)])
+            progress.done(seeds)
+        points.append(compared(method, settings, renders, references))
+        if near and references[0].depth is not None:
+            apart = disagreement(maker, chosen, references, renders)
+            pairs.append({"method": method, "settings": settings, **apart})
+    return {
+        "measured_on": {
+            "probes": [window.name for window in chosen],
+            "size": size,
+            "resolution": [maker.lens.width, maker.lens.height],
+            "seeds": seeds,
+            "reference_samples": reference_samples,
+            "device": "CPU" if on_cpu else "GPU",
+            "path_guiding": "measured" if on_cpu else "Cycles has it only on processors",
+        },
+        **evaluated(points, references),
+        "neighbouring_views": pairs,
+    }
+
+
+def all_ways(
+    render: Mapping[str, Any], octaves: int, guiding: bool
+) -> list[tuple[str, dict[str, Any]]]:
+    """Return (method, settings) of all that is measured; the scene's own settings come last."""
+    counts = [2**octave for octave in range(octaves + 1)]
+    ways: list[tuple[str, dict[str, Any]]] = []
+    for denoise, by_count, by_threshold in ((False, PLAIN, ADAPTIVE), (True, DENOISED, BOTH)):
+        ways += [(by_count, {"samples": n, "denoise": denoise}) for n in counts]
+        ways += [
+            (by_threshold, {"samples": counts[-1], "adaptive_threshold": t, "denoise": denoise})
+            for t in THRESHOLDS
+        ]
+    # Elsewhere guiding stays as the .blend has it, off unless an artist turned it on.
+    if guiding:
+        ways += [(GUIDED, {"samples": n, "guiding": True}) for n in counts]
+    own = {key: render[key] for key in ("samples", "adaptive_threshold", "denoise")}
+    return [*ways, (OWN, own)]
+
+
+def compared(
+    method: str,
+    settings: Mapping[str, Any],
+    renders: Renders,
+    references: Sequence[metrics.Reference],
+) -> Point:
+    """Compare the renders of one way with the windows' references."""
+    errors = [
+        [metrics.compare(render.colour, render.depth, reference) for render in seeds]
+        for seeds, reference in zip(renders, references, strict=True)
+    ]
+    flat = [error for seeds in errors for error in seeds]
+    mean = {
+        name: fmean(getattr(error, name) for error in flat)
+        for name in ("relative_mse", "relative_mse_whole", "psnr", "ssim", "flip")
+    }
+    height, width = references[0].mask.shape
+    depths = [error.depth for error in flat if error.depth is not None]
+    return Point(
+        method=method,
+        settings=settings,
+        samples=fmean(render.samples for seeds in renders for render in seeds),
+        seconds=fmean(median(render.seconds for render in seeds) for seeds in renders)
+        * 1e6
+        / (width * height),
+        **mean,
+        standard_error=standard_error(
+            [fmean(error.relative_mse for error in seed) for seed in zip(*errors, strict=True)]
+        ),
+        resolved=mean["relative_mse"] > own_error(references),
+        depth_error=fmean(depths) if depths else None,
+    )
+
+
+def own_error(references: Sequence[metrics.Reference]) -> float:
+    return fmean(reference.own_error for reference in references)
+
+
+def evaluated(points: Sequence[Point], references: Sequence[metrics.Reference]) -> dict[str, Any]:
+    """Return what follows from the points: slopes, the Pareto front, and what each way saves."""
+    seen = [point for point in points if point.resolved]
+    lines = {
+        method: fitted([point for point in seen if point.method == method])
+        for method in dict.fromkeys(point.method for point in points)
+    }
+    plain, saved = lines[PLAIN], []
+    if plain:
+        saved = [
+            {
+                "method": point.method,
+                "settings": point.settings,
+                "relative_mse": point.relative_mse,
+                "times_faster": plain["over_time"].inverse(point.relative_mse) / point.seconds,
+                "times_fewer_samples": plain["over_samples"].inverse(point.relative_mse)
+                / point.samples,
+            }
+            for point in seen
+            if point.method != PLAIN
+        ]
+    front = metrics.pareto([p.seconds for p in seen], [p.relative_mse for p in seen])
+    return {
+        "reference_error": own_error(references),
+        "slopes": {
+            method: {name: asdict(line) for name, line in found.items()}
+            for method, found in lines.items()
+            if found
+        },
+        "pareto_front": [asdict(seen[index]) for index in front],
+        "against_plain_at_equal_error": saved,
+        "settings": [asdict(point) for point in points if point.method == OWN],
+        "points": [asdict(point) for point in points],
+    }
+
+
+def fitted(points: Sequence[Point]) -> dict[str, metrics.Line]:
+    """Fit the error of some points over time and over samples; nothing if they are too few."""
+    lines: dict[str, metrics.Line] = {}
+    for prefix, error in (("", "relative_mse"), ("of_all_pixels_", "relative_mse_whole")):
+        # Where it is nearly all in a few pixels, it may be below 0 by chance.
+        known = [point for point in points if getattr(point, error) > 0]
+        errors = [getattr(point, error) for point in known]
+        by_time = metrics.fit([point.seconds for point in known], errors)
+        by_samples = metrics.fit([point.samples for point in known], errors)
+        if by_time and by_samples:
+            lines |= {f"{prefix}over_time": by_time, f"{prefix}over_samples": by_samples}
+        elif not prefix:
+            break
+    return lines
+
+
+def disagreement(
+    maker: Trials,
+    windows: Sequence[Window],
+    references: Sequence[metrics.Reference],
+    renders: Renders,
+) -> dict[str, float]:
+    """Return how the first two views disagree, as `metrics.Disagreement`, the mean over seeds."""
+    pair, places = (references[0], references[1]), (windows[0], windows[1])
+    seen = both_see((maker.camera(places[0].view), maker.camera(places[1].view)), places, pair)
+    if not len(seen[0]):
+        return {}
+    found = [
+        asdict(metrics.disagreement((first.colour, second.colour), pair, seen))
+        for first, second in zip(renders[0], renders[1], strict=True)
+    ]
+    return {name: fmean(entry[name] for entry in found) for name in found[0]}
+
+
+def write(stem: Path, content: Mapping[str, Any]) -> None:
+    """Write the points as ``stem``.csv, one row each, a plot as .svg and .png, and all as .json."""
+    rows = []
+    for point in content["points"]:
+        settings = {**PLAIN_SAMPLING, **point["settings"]}
+        limits = {"most_samples": settings["samples"]}
+        limits |= {name: settings[name] for name in ("adaptive_threshold", "denoise")}
+        figures = {name: value for name, value in point.items() if name not in WAY}
+        on_front = point in content["pareto_front"]
+        rows.append({"method": point["method"], **limits, **figures, "pareto": on_front})
+    write_csv(stem.with_name(stem.name + ".csv"), rows)
+    _draw(stem, content)
+    write_json(stem.with_name(stem.name + ".json"), content)
+
+
+def _draw(stem: Path, content: Mapping[str, Any]) -> None:
+    """Draw error over time, with slopes, the Pareto front, and where the scene's settings lie."""
+
+    def figures(name: str, points: Sequence[Mapping[str, Any]]) -> list[float]:
+        return [point[name] for point in points]
+
+    with plots.plot(stem, size=(8, 5.5)) as axes:
+        methods = dict.fromkeys(p["method"] for p in content["points"] if p["method"] != OWN)
+        for method, colour, marker in zip(methods, plots.COLOURS, plots.MARKERS, strict=False):
+            own = [p for p in content["points"] if p["method"] == method and p["resolved"]]
+            axes.errorbar(
+                *(figures(name, own) for name in ("seconds", "relative_mse", "standard_error")),
+                color=colour,
+                marker=marker,
+                linewidth=1,
+                label=method + _slopes(content["slopes"].get(method, {})),
+            )
+        front = content["pareto_front"]
+        axes.plot(
+            *(figures(name, front) for name in ("seconds", "relative_mse")),
+            color=plots.GREY,
+            linewidth=6,
+            alpha=0.3,
+            label="Pareto front",
+        )
+        own = [point for point in content["settings"] if point["resolved"]]
+        if own:
+            axes.plot(
+                *(figures(name, own) for name in ("seconds", "relative_mse")),
+                marker="*",
+                markersize=15,
+                linestyle="none",
+                color="black",
+                markerfacecolor="none",
+                label=OWN,
+            )
+        axes.axhline(
+            content["reference_error"],
+            color="black",
+            linestyle=":",
+            linewidth=1,
+            label="the references' own error (subtracted)",
+        )
+        unit = "core" if content["measured_on"]["device"] == "CPU" else "GPU"
+        axes.set(
+            xscale="log",
+            yscale="log",
+            title=f"{stem.name}: error against render time",
+            xlabel=f"render time, {unit} seconds per megapixel",
+            ylabel="relative mean squared error",
+        )
+        axes.legend(fontsize=8)
+
+
+def _slopes(lines: Mapping[str, Mapping[str, float]]) -> str:
+    """Return the slopes over time, each ± its standard error, as text; nothing without them."""
+    text = ""
+    for name, form in (
+        ("over_time", ", slope {}"),
+        ("of_all_pixels_over_time", " (all pixels {})"),
+    ):
+        if name in lines:
+            slope = f"{lines[name]['slope']:.2f} ± {lines[name]['slope_error']:.2f}"
+            text += form.format(slope.replace("-", "−"))
+    return text

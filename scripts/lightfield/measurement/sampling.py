@@ -1,0 +1,36 @@
+"""How a ``render`` block says that pixels are sampled, and what that costs."""
+
+import math
+import statistics
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+# What a `render` block with a target error says of its calibration, and not of rendering: the
+# target, and a preset's limits.
+UNCALIBRATED = ("target_error", "most_samples", "denoise")
+
+PLAIN = {"adaptive_threshold": 0, "denoise": False}
+
+# What denoising a pixel costs in samples of it: 18 µs against 6, measured on one core of an EPYC in
+# views of the garden of 256² and more. In small windows it is up to twice as much.
+DENOISING_SAMPLES = 3
+
+
+def cost_in_samples(samples: float, denoise: bool) -> float:
+    """Return how many samples of a pixel take as long as these and, if so, denoising them."""
+    return samples + DENOISING_SAMPLES * denoise
+
+
+def calibrated(render: Mapping[str, Any], record: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a ``render`` block with what was chosen for its ``target_error`` in it."""
+    return {**without_target(render), "target_error": record["target_error"], **record["choice"]}
+
+
+def without_target(render: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a ``render`` block says of rendering alone."""
+    return {key: value for key, value in render.items() if key not in UNCALIBRATED}
+
+
+def standard_error(values: Sequence[float]) -> float:
+    """Return the standard error of the mean of ``values``; 0 for a single one."""
+    return statistics.stdev(values) / math.sqrt(len(values)) if len(values) > 1 else 0.0
