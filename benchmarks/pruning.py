@@ -11,7 +11,6 @@ Writes pruning.csv and pruning.md to the output folder.
 """
 
 import argparse
-import csv
 import hashlib
 import math
 import resource
@@ -29,7 +28,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
 from lightfield.core.cli import run
-from lightfield.core.files import atomic_path
+from lightfield.core.files import write_csv, write_text
 from lightfield.dataset import config
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
@@ -264,13 +263,7 @@ def finish() -> tuple[float, float, str]:
 
 
 def write(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
-    with (
-        atomic_path(folder / "pruning.csv") as temporary,
-        temporary.open("w", encoding="utf-8", newline="") as file,
-    ):
-        writer = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    write_csv(folder / "pruning.csv", rows)
     lines = [
         "# What pruning saves",
         "",
@@ -291,8 +284,7 @@ def write(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
             f"| {row['view_bytes'] / 1024:.0f} KiB ({row['bytes_saved'] / 1024:+.0f}) "
             f"| {'yes' if row['same_pixels'] else 'no'} |"
         )
-    with atomic_path(folder / "pruning.md") as temporary:
-        temporary.write_text("\n".join([*lines, ""]), encoding="utf-8")
+    write_text(folder / "pruning.md", "\n".join([*lines, ""]))
 
 
 if __name__ == "__main__":

@@ -14,12 +14,12 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
-sys.path.insert(0, str(SCRIPTS))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
-from lightfield.dataset.lightfield import LightField  # noqa: E402
-from lightfield.geometry import lenses  # noqa: E402
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
 
+SCRIPTS = Path(sys.path[0])
 RESOLUTION = 256
 SECONDS = 2.0
 

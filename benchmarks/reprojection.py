@@ -15,7 +15,6 @@ reprojection.csv, reprojection_batches.csv and reprojection.svg and .png into th
 """
 
 import argparse
-import csv
 import json
 import math
 import resource
@@ -30,51 +29,43 @@ from typing import Any
 
 import numpy as np
 
-SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
-sys.path.insert(0, str(SCRIPTS))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
-from lightfield.core.errors import UserError  # noqa: E402
-from lightfield.core.files import atomic_path  # noqa: E402
-from lightfield.core.kernels import kernel  # noqa: E402
-from lightfield.geometry.lenses import Array, Lens  # noqa: E402
-from lightfield.geometry.lenses.equidistant import Equidistant  # noqa: E402
-from lightfield.geometry.lenses.rectilinear import Rectilinear  # noqa: E402
-from lightfield.imaging import images  # noqa: E402
-from lightfield.imaging.halves import narrow, widen  # noqa: E402
-from lightfield.imaging.plots import (  # noqa: E402
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILION,
-    plot,
-)
-from lightfield.reprojection import lens_map  # noqa: E402
-from lightfield.reprojection.colour import resample_colour  # noqa: E402
-from lightfield.reprojection.filters import DEFAULT_FILTER  # noqa: E402
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_csv
+from lightfield.core.kernels import kernel
+from lightfield.geometry.lenses import Array, Lens
+from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.imaging import images
+from lightfield.imaging.halves import narrow, widen
+from lightfield.imaging.plots import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, plot
+from lightfield.measurement.metrics import pareto
+from lightfield.reprojection import lens_map
+from lightfield.reprojection.colour import resample_colour
+from lightfield.reprojection.filters import DEFAULT_FILTER
 
 try:
     import cv2
 except ImportError:
     cv2 = None
 
+SCRIPTS = Path(sys.path[0])
 SENSOR = 36.0
 # Times that differ by less are equal: repeats differ by as much.
 SAME_TIME = 0.03
 CAMERA = ["--rectilinear", "18,36"]
-STYLES = dict(
-    zip(
-        ["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp", "OpenCV", "peer"],
-        zip(
-            [GREY, SKY, BLUE, GREEN, VERMILION, PURPLE, ORANGE, "black"],
-            ["s", "o", "^", "v", "*", "D", "P", "X"],
-            strict=True,
-        ),
-        strict=True,
-    )
-)
+STYLES = {
+    "nearest": (GREY, "s"),
+    "bilinear": (SKY, "o"),
+    "bicubic": (BLUE, "^"),
+    "lanczos": (GREEN, "v"),
+    "adaptive": (VERMILION, "*"),
+    "st_warp": (PURPLE, "D"),
+    "OpenCV": (ORANGE, "P"),
+    "peer": ("black", "X"),
+}
 
 
 @dataclass(frozen=True)
@@ -123,7 +114,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         results = measure_errors(arguments, Path(folder))
     front = pareto_front(results)
-    write_table(arguments.output / "reprojection.csv", results, front)
+    rows = [{**vars(result), "on_front": result in front} for result in results]
+    write_csv(arguments.output / "reprojection.csv", rows)
     draw(arguments.output / "reprojection", results, front)
     default = [row for row in results if row.method == DEFAULT_FILTER]
     on_front = all(row in front for row in default)
@@ -131,14 +123,7 @@ def main() -> None:
     if arguments.batch:
         with tempfile.TemporaryDirectory() as folder:
             batches = measure_batches(arguments, Path(folder))
-        path = arguments.output / "reprojection_batches.csv"
-        with (
-            atomic_path(path) as temporary,
-            temporary.open("w", newline="", encoding="utf-8") as file,
-        ):
-            writer = csv.writer(file)
-            writer.writerow(["job", "program", "views", "cpu_s_a_view"])
-            writer.writerows(batches)
+        write_csv(arguments.output / "reprojection_batches.csv", batches)
 
 
 # The scene
@@ -333,34 +318,12 @@ def cpu_of(command: Sequence[str]) -> float:
 
 def pareto_front(results: Sequence[Result]) -> list[Result]:
     """Return the rows that no other of their scenario beats in error without costing more time."""
-    return [
-        result
-        for result in results
-        if not any(
-            (
-                other.rms_error < result.rms_error * (1 - 1e-6)
-                and other.view_cpu_s <= result.view_cpu_s * (1 + SAME_TIME)
-            )
-            or (
-                other.rms_error <= result.rms_error * (1 + 1e-6)
-                and other.view_cpu_s < result.view_cpu_s * (1 - SAME_TIME)
-            )
-            for other in results
-            if other.scenario == result.scenario
-        )
-    ]
-
-
-def write_table(path: Path, results: Sequence[Result], front: Sequence[Result]) -> None:
-    """Write the results as CSV, those on the front marked."""
-    with (
-        atomic_path(path) as temporary,
-        temporary.open("w", newline="", encoding="utf-8") as file,
-    ):
-        writer = csv.writer(file)
-        writer.writerow([*Result.__dataclass_fields__, "on_front"])
-        for result in results:
-            writer.writerow([*vars(result).values(), result in front])
+    front = []
+    for name in dict.fromkeys(result.scenario for result in results):
+        rows = [result for result in results if result.scenario == name]
+        costs, errors = [row.view_cpu_s for row in rows], [row.rms_error for row in rows]
+        front += [rows[index] for index in pareto(costs, errors, SAME_TIME)]
+    return front
 
 
 def draw(stem: Path, results: Sequence[Result], front: Sequence[Result]) -> None:
@@ -375,7 +338,7 @@ def draw(stem: Path, results: Sequence[Result], front: Sequence[Result]) -> None
 
 def draw_scenario(panel: Any, rows: Sequence[Result], front: Sequence[Result]) -> None:
     """Draw the results of one scenario, and the front that they have."""
-    best = sorted((r for r in rows if r in front), key=lambda r: r.view_cpu_s)
+    best = [r for r in front if r in rows]
     times, errors = [r.view_cpu_s for r in best], [r.rms_error for r in best]
     panel.plot(times, errors, color="black", linewidth=1, linestyle=":", label="Pareto front")
     for method, (color, marker) in STYLES.items():
@@ -416,8 +379,8 @@ def draw_scenario(panel: Any, rows: Sequence[Result], front: Sequence[Result]) -
 # Batches
 
 
-def measure_batches(arguments: argparse.Namespace, folder: Path) -> list[list[Any]]:
-    """Return rows (job, program, views, CPU seconds a view)."""
+def measure_batches(arguments: argparse.Namespace, folder: Path) -> list[dict[str, Any]]:
+    """Return rows of job, program, views, and CPU seconds a view."""
     size, count = arguments.batch_size, arguments.batch
     write_batch(folder, size, count)
     config = folder / "lightfield.json"
@@ -426,7 +389,7 @@ def measure_batches(arguments: argparse.Namespace, folder: Path) -> list[list[An
         "PNG, an eighth": [*CAMERA, "--scale", "0.125", "--png", "--exposure", "-1",
                            "--reinhard", "5"],
     }  # fmt: skip
-    rows: list[list[Any]] = []
+    rows: list[dict[str, Any]] = []
     for job, flags in jobs.items():
         size_flags = [flag for flag in flags if flag in ("--scale", "0.125")]
 
@@ -440,15 +403,16 @@ def measure_batches(arguments: argparse.Namespace, folder: Path) -> list[list[An
             return run_batch([*program, "--filter", filter_name], folder, flags)
 
         programs = {
-            f"ours, {DEFAULT_FILTER}": lambda run=ours: run(DEFAULT_FILTER),
-            "ours, st_warp": lambda run=ours: run("st_warp"),
+            f"ours, {DEFAULT_FILTER}": lambda ours=ours: ours(DEFAULT_FILTER),
+            "ours, st_warp": lambda ours=ours: ours("st_warp"),
             "bare read and write": lambda small="0.125" in flags: bare(folder, small),
         }
         if arguments.peer:
             programs["peer"] = lambda flags=flags: run_batch([str(arguments.peer)], folder, flags)
-        for program, run in programs.items():
-            cpu = min(run() for _ in range(2)) / count
-            rows.append([job, program, count, round(cpu, 4)])
+        for program, measure in programs.items():
+            cpu = min(measure() for _ in range(2)) / count
+            row = {"job": job, "program": program, "views": count}
+            rows.append({**row, "cpu_s_a_view": round(cpu, 4)})
             print(f"{job}: {program}: {cpu:.3f} CPU-s a view", flush=True)
     return rows
 
@@ -504,6 +468,4 @@ def bare(folder: Path, small: bool) -> float:
 
 
 if __name__ == "__main__":
-    from lightfield.core import cli
-
-    cli.run(main)
+    run(main)

@@ -5,6 +5,7 @@ import math
 import statistics
 
 import numpy as np
+import psutil
 import pytest
 
 from lightfield.core.errors import UserError
@@ -225,6 +226,16 @@ def test_a_line_that_a_kill_cut_short_is_left_out(tmp_path):
     (part,) = journal.read(file)
     assert [line["view"] for line in part.views] == ["a", "b"]
     assert part.end is None
+
+
+def test_a_processes_peak_memory_is_in_bytes(tmp_path):
+    file = tmp_path / "0-1.journal.jsonl"
+    log = journal.Journal(file)
+    now = psutil.Process().memory_info().rss
+    log.end()
+    (run,) = journal.read(file)
+    # The system counts a little behind; a peak is never below what is held now.
+    assert 0.9 * now < run.peak_memory_bytes < psutil.virtual_memory().total
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,6 @@ from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
-from lightfield.measurement import noise
 from lightfield.report import epipolar, faults, packing
 
 RADIUS = 5.0
@@ -478,16 +477,3 @@ def test_light_and_depth_survive_packing():
     assert codes[1] == packing.NO_DEPTH
     back = 2 ** (near + (codes[2:] - 1) / (packing.MISS - 2) * (far - near))
     np.testing.assert_allclose(back, depth[2:], rtol=2e-3)
-
-
-def test_noise_is_measured_and_what_is_smooth_is_none():
-    random = np.random.default_rng(2)
-    y, x = np.mgrid[:256, :256]
-    smooth = 2.0 + 0.01 * x + 0.02 * y
-    assert np.nanmax(noise.relative_noise(smooth, 16)) < 1e-12
-    edge = smooth + 5.0 * (x > 100)
-    noisy = edge * (1 + random.normal(0, 0.03, smooth.shape))
-    measured = noise.relative_noise(noisy, 16)
-    assert np.median(measured) == pytest.approx(0.03, rel=0.04)
-    assert measured.max() < 0.045
-    assert np.isnan(noise.relative_noise(np.zeros((40, 40)), 8)).all()

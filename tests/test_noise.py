@@ -1,0 +1,64 @@
+"""Noise that is estimated from a picture alone, against noise and patterns that are known."""
+
+import numpy as np
+import pytest
+
+from lightfield.measurement import noise
+
+
+def test_noise_is_measured_and_what_is_smooth_is_none():
+    random = np.random.default_rng(2)
+    y, x = np.mgrid[:256, :256]
+    smooth = 2.0 + 0.01 * x + 0.02 * y
+    assert np.nanmax(noise.relative_noise(smooth, 16)) < 1e-12
+    edge = smooth + 5.0 * (x > 100)
+    noisy = edge * (1 + random.normal(0, 0.03, smooth.shape))
+    measured = noise.relative_noise(noisy, 16)
+    assert np.median(measured) == pytest.approx(0.03, rel=0.04)
+    assert measured.max() < 0.045
+    assert np.isnan(noise.relative_noise(np.zeros((40, 40)), 8)).all()
+
+
+@pytest.mark.parametrize(
+    "pattern, expected",
+    [
+        # The mask passes what changes along x and along y at once, 16 times its amplitude here.
+        (lambda x, y: (-1) ** (x + y), 16 / 6 / 0.6745),
+        (lambda x, y: (-1) ** x, 0),
+        (lambda x, y: (-1) ** y, 0),
+        (lambda x, y: x**2, 0),
+        (lambda x, y: x * y, 0),
+        # Both second differences of (x² y²) / 4 are 1 at the same pixel.
+        (lambda x, y: x**2 * y**2 / 4, 1 / 6 / 0.6745),
+    ],
+)
+def test_the_mask_is_immerkaers(pattern, expected):
+    y, x = np.mgrid[:18, :18].astype(float)
+    light = pattern(x, y)
+    measured = noise.relative_noise(light + 1e6)
+    np.testing.assert_allclose(measured * 1e6, expected, atol=1e-2)
+
+
+def test_noise_is_relative_to_the_light_of_its_own_block():
+    random = np.random.default_rng(4)
+    light = np.repeat([1.0, 100.0], 65)[np.newaxis, :] * (1 + random.normal(0, 0.05, (66, 130)))
+    measured = noise.relative_noise(light, 64)
+    assert measured.shape == (1, 2)
+    np.testing.assert_allclose(measured, 0.05, rtol=0.1)
+    np.testing.assert_allclose(noise.relative_noise(light * 7, 64), measured)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_block_with_a_value_that_is_no_number_has_no_noise(bad):
+    light = np.ones((18, 34))
+    light[4, 5] = bad
+    measured = noise.relative_noise(light)
+    assert np.isnan(measured[0, 0])
+    np.testing.assert_array_equal(measured[:, 2:], 0)
+
+
+def test_only_whole_blocks_within_the_border_count():
+    # The border of one pixel has no answer, so 8 × 8 blocks need 10 × 10 pixels.
+    assert noise.relative_noise(np.ones((10, 17))).shape == (1, 1)
+    assert noise.relative_noise(np.ones((26, 18))).shape == (3, 2)
+    assert np.isnan(noise.relative_noise(-np.ones((10, 10)))).all()
