@@ -5,10 +5,10 @@ import re
 
 import pytest
 
-import plan
 from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
+from lightfield.measurement import plan
 
 SILVR = ("garden", "lone_monk", "barbershop")
 

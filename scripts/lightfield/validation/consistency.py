@@ -315,7 +315,7 @@ def _outwards(camera: Camera, points: Array) -> Array:
     return outwards
 
 
-def neighbours(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tuple[int, int]]:
+def view_pairs(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tuple[int, int]]:
     """Return the pairs (i, j), i < j, of views to compare, in order.
 
     To each view the three nearest that can look for enough of its patches, and three farther away,

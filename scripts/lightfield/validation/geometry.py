@@ -39,7 +39,7 @@ def check(
     if len(seen) < 2:
         return Check(name, None, f"{len(seen)} views with depth have no neighbours")
     files, patches = list(seen), list(seen.values())
-    pairs = consistency.neighbours([image_set.camera(file.view) for file in files], patches)
+    pairs = consistency.view_pairs([image_set.camera(file.view) for file in files], patches)
     asking: dict[int, list[int]] = {}
     for one, other in pairs:
         asking.setdefault(one, []).append(other)
