@@ -41,7 +41,12 @@ onstart:
         sys.exit(f"error: {error}")
 
 
+onsuccess:
+    note_sums()
+
+
 onerror:
+    note_sums()
     # Snakemake has something to say after this, too: what failed is repeated when it has.
     atexit.register(
         print, failure_report(failed_jobs()), file=sys.stderr, flush=True
@@ -67,6 +72,21 @@ rule smoke:
     input:
         [[*dataset.files, *dataset.intermediates] for dataset in SMOKE],
         whole(SMOKE),
+
+
+# What its jobs are is not known before: it reads what is there, also of an unfinished build.
+rule verify:
+    log:
+        log_of("verify"),
+    conda:
+        ENVIRONMENT
+    params:
+        folders=shlex.join(dataset.folder for dataset in CHOSEN),
+        work=WORK,
+    message:
+        "Checking every byte of the chosen datasets"
+    shell:
+        "python scripts/verify.py {params.folders} --work {params.work} 2>&1 | tee {log}"
 
 
 rule package_all:

@@ -22,6 +22,7 @@ shell.prefix(
 from lightfield.core.errors import UserError
 from lightfield.core.failures import failure_report
 from lightfield.core.files import set_aside, write_json
+from lightfield.dataset import ledger
 from lightfield.dataset.config import load_config
 from lightfield.dataset.dataset import STILLS, load_datasets, scene_datasets
 from lightfield.dataset.exports import MANIFEST, VIEWS
@@ -59,6 +60,7 @@ RUN = f"{WORK}/run.json"
 BROKEN = {}
 # Where that is moved to, for nobody to lose anything.
 REMOVED = f"{WORK}/removed"
+SUMS = f"{WORK}/{ledger.NAME}"
 GPUS = 0 if SETTINGS.device in ("auto", "cpu") else 1
 
 
@@ -137,6 +139,32 @@ def made_anew(path):
     workflow.dag.forcefiles.add(path)
 
 
+def note_sums():
+    """Note the checksums of what the jobs of this run have made, and of what has none yet.
+
+    Only a run in which a job ran comes to this.
+    """
+    made, others = set(), set()
+    for job in workflow.dag.jobs:
+        files = {*map(str, job.output), *([job.benchmark] if job.benchmark else [])}
+        for path in map(Path, job.output):
+            # A shard's log of checksums and journal lie beside its record.
+            files.update(
+                map(str, path.parent.glob(f"{path.stem}.*.jsonl"))
+                if path.suffix == ".json"
+                else []
+            )
+        (made if workflow.dag.finished(job) else others).update(files)
+    folders = [f"{root}/" for d in DATASETS.values() for root in (d.folder, d.work)]
+    current = {file for d in DATASETS.values() for file in (*d.files, *d.intermediates)}
+    ledger.note(
+        Path(SUMS),
+        made,
+        others,
+        lambda name: name not in current and name.startswith(tuple(folders)),
+    )
+
+
 def whole(datasets):
     """Return the input function of a target: no input, but what is broken is made anew.
 
@@ -150,6 +178,9 @@ def whole(datasets):
                     print(f"{path}: {problem}; it is made anew", file=sys.stderr)
                     BROKEN[path] = problem
                 made_anew(path)
+            # A run without a job would note no checksums.
+            if not Path(SUMS).exists():
+                made_anew(dataset.page)
         return []
 
     return input_function

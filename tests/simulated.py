@@ -3,6 +3,7 @@
 Snakemake has nothing to do in it, and what a test spoils in it must be planned again.
 """
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 from checkouts import snakemake
 
 from lightfield.core.files import sha256, write_json, write_text
+from lightfield.dataset import ledger
 from lightfield.dataset.dataset import Dataset, scene_datasets
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.records import ShardRecord
@@ -34,6 +36,10 @@ def build(folder: Path) -> list[Dataset]:
         text = "".join(f"{digest}  {name}\n" for name, digest in sums)
         write_text(folder / dataset.folder / "sha256sums.txt", text)
         write_text(folder / dataset.work / "checksums.txt", text)
+    names = [name for dataset in datasets for name in (*dataset.files, *dataset.intermediates)]
+    names += [str(path.relative_to(folder)) for path in folder.glob("work/**/*.sums.jsonl")]
+    with contextlib.chdir(folder):
+        ledger.note(Path("work/sums.json"), names, (), lambda _: False)
     for name in ("results", "work"):
         for path in (folder / name).rglob("*"):
             os.utime(path, (WHEN, WHEN))

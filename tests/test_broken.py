@@ -8,7 +8,8 @@ import pytest
 import simulated
 from checkouts import checkout, snakemake
 
-from lightfield.core.files import broken, set_aside
+from lightfield.core.files import broken, set_aside, sha256
+from lightfield.dataset import ledger
 
 
 def folder_of(path):
@@ -63,6 +64,7 @@ def test_what_is_broken_is_planned_again_and_set_aside(tmp_path):
     folder = checkout(tmp_path)
     datasets = simulated.build(folder)
     assert "Nothing to be done" in run(folder, "-n", "smoke")
+    before = ledger.read(folder / "work/sums.json")
     one, two, three = datasets
     spoilt = [
         one.record("render", *one.shards[0]),
@@ -91,3 +93,9 @@ def test_what_is_broken_is_planned_again_and_set_aside(tmp_path):
     for name in [*spoilt, str(view.relative_to(folder))]:
         assert (folder / "work/removed" / name).exists()
     assert broken(folder / two.folder / "lightfield.json") is None
+    # What its job has made is noted, and only that.
+    noted = ledger.read(folder / "work/sums.json")
+    assert noted[f"{two.folder}/lightfield.json"]["sha256"] == sha256(
+        folder / two.folder / "lightfield.json"
+    )
+    assert noted[f"{one.work}/cameras.json"] == before[f"{one.work}/cameras.json"]

@@ -120,15 +120,16 @@ def broken(path: Path) -> str | None:
     try:
         if not path.stat().st_size:
             return "is empty"
-        if not os.access(path, os.R_OK):
-            return "cannot be read"
         if path.suffix == ".json" and not isinstance(content := read_json(path), dict):
             return f"is a {type(content).__name__}, not a mapping"
+        with path.open("rb"):
+            return None
     except FileNotFoundError:
         return None
+    except OSError as error:
+        return f"cannot be read: {error.strerror}"
     except UserError as error:
         return str(error).removeprefix(f"{path}: ")
-    return None
 
 
 def set_aside(path: Path, folder: Path) -> Path:

@@ -1,0 +1,204 @@
+"""Is every byte of a dataset, and of what it was made of, as it was when it was written?
+
+A file's checksum is in the ledger of the workflow if a job declares it, in its shard's record if it
+is a view, and in the dataset's sha256sums.txt if it is published. The first that has it counts; of
+a copy elsewhere there is the last only.
+"""
+
+import os
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import broken, read_json, set_aside, sha256
+from lightfield.dataset import ledger
+from lightfield.dataset.exports import MANIFEST
+from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.validation.files import IMAGES, REPORT, SUMS
+
+# Made as the work went on, and of it alone: nothing can make them again, and no dataset needs them.
+_HISTORY = (".journal.jsonl", ".tsv")
+_LOG = ".sums.jsonl"
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A file that is not as it was written, and what is wrong with it."""
+
+    path: Path
+    problem: str
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.problem}"
+
+
+class Integrity:
+    """Checks the files of the dataset in a folder, and with ``work`` those that it was made of."""
+
+    def __init__(self, dataset: Path, work: Path | None = None) -> None:
+        # The ledger has paths as the configuration gives them, most of them relative.
+        self.dataset = Path(os.path.relpath(dataset))
+        self.work = Path(os.path.relpath(work)) if work else None
+        # A sequence's datasets lie a folder deeper, one for each frame.
+        depth = 3 if re.fullmatch(r"f\d{5,7}", dataset.name) else 2
+        self._name = "/".join(dataset.absolute().parts[-depth:])
+        self._scene = dataset.absolute().parts[-depth]
+
+    def faults(self) -> Iterator[Fault]:
+        """Yield every fault, one for each file."""
+        try:
+            expected = self._expected
+        except UserError as error:
+            name, _, why = str(error).partition(": ")
+            yield Fault(Path(name), why)
+            return
+        if self.work and not self._ledger:
+            missing = "is missing: what is not published has no checksum before the next run"
+            yield Fault(self.work / ledger.NAME, missing)
+        found = {path: self._problem(path, sums) for path, sums in expected.items()}
+        for path, problem in found.items():
+            if problem:
+                yield Fault(path, problem)
+        for path in self._present() if self._published else ():
+            if path not in expected:
+                yield Fault(path, "is no file of this dataset, or has no checksum")
+        wrong = {path for path, problem in found.items() if problem}
+        yield from (fault for fault in self._contents(expected) if fault.path not in wrong)
+
+    def mend(self, fault: Fault) -> None:
+        """Set a faulty file aside, and what the next run must make anew for it to be made again."""
+        assert self.work
+        is_ledger = fault.path == self.work / ledger.NAME
+        for path in (fault.path, *(() if is_ledger else self._followers(fault.path))):
+            if os.path.lexists(path):
+                set_aside(path, self.work / "removed")
+        if fault.path.name.endswith(_HISTORY):
+            path = self.work / ledger.NAME
+            ledger.note(path, (), (), lambda name: os.path.relpath(name) == str(fault.path))
+
+    def _followers(self, path: Path) -> Iterator[Path]:
+        """Yield the file by which the job is known that has made a file, where that is another."""
+        if path.name.endswith(_LOG):
+            yield path.with_name(path.name.replace(_LOG, ".json"))
+        if path in self._published and path not in self._recorded and not self._is_noted(path):
+            # An export's file.
+            for folder in path.relative_to(self.dataset).parents:
+                for name in (MANIFEST, "transforms.json"):
+                    if (self.dataset / folder / name).is_file():
+                        yield self.dataset / folder / name
+                        return
+
+    def _is_sound(self, path: Path) -> bool:
+        """Whether a file is as the ledger says; without one, of a copy, all are taken for that."""
+        entry = self._ledger.get(str(path))
+        if entry is None:
+            return not self._ledger
+        return self._problem(path, (entry["sha256"], "the ledger")) is None
+
+    def _is_noted(self, path: Path) -> bool:
+        return str(path) in self._ledger
+
+    @cached_property
+    def _ledger(self) -> ledger.Sums:
+        files = ledger.read(self.work / ledger.NAME) if self.work else {}
+        return {os.path.relpath(name): sums for name, sums in files.items()}
+
+    @cached_property
+    def _recorded(self) -> dict[Path, str]:
+        """The SHA-256 of each view by its path, from the records that are as they were written."""
+        found: dict[Path, str] = {}
+        for path in map(Path, self._ledger):
+            if self._is_own(path) and re.fullmatch(r"\d+-\d+\.json", path.name):
+                if not self._is_sound(path):
+                    continue
+                for file, entry in read_json(path)["files"].items():
+                    found[self.dataset / file] = entry["sha256"]
+        return found
+
+    @cached_property
+    def _published(self) -> dict[Path, str]:
+        """The SHA-256 of each file in sha256sums.txt, by its path; from its twin if it is damaged.
+
+        Empty where both are.
+        """
+        candidates = [self.dataset / SUMS]
+        if self.work:
+            candidates.append(self.work / self._name / "checksums.txt")
+        sound = (path for path in candidates if self._is_sound(path))
+        try:
+            lines = next(sound).read_text(encoding="utf-8").splitlines()
+        except (StopIteration, OSError, UnicodeDecodeError):
+            return {}
+        return {
+            self.dataset / name: digest
+            for digest, _, name in (line.partition("  ") for line in lines)
+            if name and ".." not in name.split("/") and not name.startswith("/")
+        }
+
+    @cached_property
+    def _expected(self) -> dict[Path, tuple[str, str]]:
+        """The SHA-256 that each file shall have, and what says so."""
+        sums = {path: (digest, SUMS) for path, digest in self._published.items()}
+        sums |= {path: (digest, "its record") for path, digest in self._recorded.items()}
+        for name, entry in self._ledger.items():
+            if self._is_own(Path(name)):
+                sums[Path(name)] = (entry["sha256"], f"{self.work}/{ledger.NAME}")
+        return dict(sorted(sums.items()))
+
+    def _is_own(self, path: Path) -> bool:
+        """Whether a file of the ledger is the dataset's, or its scene's."""
+        if path.is_relative_to(self.dataset):
+            return True
+        if not self.work or not path.is_relative_to(self.work):
+            return False
+        inside = path.relative_to(self.work).as_posix()
+        scene, _, rest = inside.partition("/")
+        of_scene = "/" not in rest and f"{self._scene}_".startswith(f"{scene}_")
+        return of_scene or inside.startswith((f"{self._name}/", f"benchmarks/{self._name}/"))
+
+    def _problem(self, path: Path, expected: tuple[str, str]) -> str | None:
+        digest, source = expected
+        if not os.path.lexists(path):
+            return "is missing"
+        if problem := broken(path):
+            return problem
+        try:
+            found = sha256(path)
+        except OSError as error:
+            return f"cannot be read: {error.strerror}"
+        return None if found == digest else f"its sha256 is {found}, but {source} says {digest}"
+
+    def _present(self) -> Iterator[Path]:
+        """Yield the dataset's files, those of its report only with the ledger, which has them."""
+        for path in sorted(self.dataset.rglob("*")):
+            parts = path.relative_to(self.dataset).parts
+            if not path.is_dir() and parts != (SUMS,) and (self._ledger or parts[0] != REPORT):
+                yield path
+
+    def _contents(self, expected: Mapping[Path, tuple[str, str]]) -> Iterator[Fault]:
+        """Check that the files of sums, validation and views agree on what there is."""
+        sums, validation = self.dataset / SUMS, self.dataset / "validation.json"
+        if self._ledger and not (self._published and sums.exists()):
+            return  # an unfinished build, or both files of sums are damaged, which has been said
+        if not self._published:
+            yield Fault(
+                sums, broken(sums) or ("has no checksum" if sums.exists() else "is missing")
+            )
+            return
+        for path in (validation, self.dataset / NAME):
+            if path not in expected:
+                yield Fault(sums, f"has no checksum of {path.name}")
+                return
+        try:
+            views = LightField.read(self.dataset / NAME).views
+            if not read_json(validation).get("valid"):
+                yield Fault(validation, "says that the dataset is not valid")
+        except UserError:
+            return  # its checksum does not hold, which has been said
+        for view in views:
+            if self.dataset / IMAGES / f"{view.name}.exr" not in self._published:
+                yield Fault(sums, f"has no checksum of {IMAGES}/{view.name}.exr")
+                return

@@ -1,0 +1,49 @@
+"""Check every byte of datasets against the checksums with which they were written.
+
+A line for each file that is not as it was, with what is wrong; then the exit status is 1. Of a copy
+elsewhere DATASET alone says enough; with --work all that it was made of is checked too.
+"""
+
+import argparse
+from pathlib import Path
+
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.validation.integrity import Integrity
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("dataset", nargs="+", type=Path, help="folder of a dataset")
+    parser.add_argument("--work", type=Path, help="the workflow's folder of intermediate files")
+    parser.add_argument(
+        "--mend",
+        action="store_true",
+        help="move what is faulty to WORK/removed, for the next run to make it again",
+    )
+    arguments = parser.parse_args()
+    if arguments.mend and not arguments.work:
+        raise UserError("--mend: needs --work: only where a dataset is built can it be mended")
+
+    found: dict[Path, str] = {}
+    for folder in arguments.dataset:
+        if not folder.is_dir():
+            raise UserError(f"{folder}: no such folder")
+        integrity = Integrity(folder, arguments.work)
+        # A scene's files are those of all its datasets, and are named once.
+        faults = [fault for fault in integrity.faults() if fault.path not in found]
+        found |= {fault.path: fault.problem for fault in faults}
+        for fault in faults:
+            print(fault, flush=True)
+        if arguments.mend:
+            for fault in faults:
+                integrity.mend(fault)
+    names = ", ".join(map(str, arguments.dataset))
+    if found:
+        mended = "; the next run makes them again" if arguments.mend else ""
+        raise UserError(f"{len(found)} faults in {names}{mended}")
+    print(f"no fault in {names}")
+
+
+if __name__ == "__main__":
+    run(main)
