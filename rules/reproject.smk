@@ -72,4 +72,4 @@ rule reproject:
         "python {SCRIPTS}/reproject.py {params.optics} {params.development}"
         " --lens-map {input.lens_map} --input-cfg {input.lightfield} --input-dir {params.views}"
         " --views {wildcards.first}:{wildcards.end} --output-dir {params.folder}"
-        " --record {output} 2>&1 | tee {log}"
+        " --source-record {input.record} --record {output} 2>&1 | tee {log}"

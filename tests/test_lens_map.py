@@ -160,6 +160,18 @@ def test_any_other_file_is_refused(tmp_path):
         lens_map.load(path)
 
 
+def test_a_number_that_was_moved_is_found(tmp_path):
+    path = tmp_path / "map.npy"
+    made = lens_map.compute(FISHEYE, rectilinear(20), IDENTITY)
+    lens_map.save(path, made)
+    whole = path.read_bytes()
+    first = whole.index(made.centers.tobytes())
+    for place in (first, first + made.centers.nbytes // 2, len(whole) - 1):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        with pytest.raises(UserError, match=r"map\.npy: is not .*: it is damaged: its checksum"):
+            lens_map.load(path)
+
+
 def test_settings_that_make_no_sense_are_refused():
     with pytest.raises(UserError, match="samples"):
         lens_map.compute(FISHEYE, rectilinear(4), IDENTITY, "bicubic", 0)

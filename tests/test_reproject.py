@@ -228,6 +228,18 @@ def test_views_of_one_shard_and_their_record(dataset, run):
     assert record.read_bytes() == first
 
 
+def test_a_source_that_is_not_as_it_was_written_is_not_used(dataset, run, capsys):
+    sources = sorted((dataset / "exr").iterdir())
+    record = dataset / "source.json"
+    sums = {f"exr/{path.name}": {"bytes": 1, "sha256": sha256(path)} for path in sources}
+    record.write_text(json.dumps({"files": sums}))
+    write_exr(sources[1], view_channels(FISHEYE, 0.5), {"plenoforge:key": "key 1"})
+    with pytest.raises(UserError, match="1 of 3 views could not be reprojected"):
+        run(*PERSPECTIVE, "--png", "--source-record", str(record))
+    assert f"{sources[1]}: is not as it was written" in capsys.readouterr().err
+    assert names(dataset / "out") == ["lightfield.json", "view_0000f.png", "view_0002f.png"]
+
+
 @pytest.mark.parametrize("views", ["3:4", "1:1", "x", "-1:2", "1"])
 def test_views_that_there_are_not(run, views):
     with pytest.raises(UserError, match="--views"):

@@ -12,7 +12,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from lightfield.core.files import append_json_line, read_json_lines, sha256, write_json
+from lightfield.core.errors import UserError
+from lightfield.core.files import append_json_line, read_json, read_json_lines, sha256, write_json
 from lightfield.imaging import images
 
 _LOG_SUFFIX = ".sums.jsonl"
@@ -73,6 +74,15 @@ class ShardRecord:
     def _logged_elsewhere(self) -> set[tuple[Any, Any, Any]]:
         assert self._path
         return _entries(self._path.parent.glob(f"*{_LOG_SUFFIX}"))
+
+
+def checksums(record: Path) -> dict[str, str]:
+    """Return each file's SHA-256 by its path in the dataset; a `UserError` names the record."""
+    content = read_json(record)
+    try:
+        return {name: entry["sha256"] for name, entry in content["files"].items()}
+    except (LookupError, TypeError, AttributeError):
+        raise UserError(f"{record}: files: must map paths to bytes and sha256") from None
 
 
 def _log(record: Path) -> Path:

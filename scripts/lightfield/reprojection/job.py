@@ -4,6 +4,7 @@ import argparse
 import hashlib
 import itertools
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 
 from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
-from lightfield.dataset import lightfield
+from lightfield.dataset import lightfield, records
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.records import ShardRecord
 from lightfield.geometry.lenses import Lens
@@ -49,6 +50,9 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     )
     files.add_argument(
         "--record", type=Path, metavar="JSON", help="list of the files, written last"
+    )
+    files.add_argument(
+        "--source-record", type=Path, metavar="JSON", help="record that the images must agree with"
     )
     chosen = parser.add_argument_group("Choice of files")
     chosen.add_argument("--filter-prefix", default="", help="only names that start so")
@@ -97,6 +101,12 @@ class Job:
         if arguments.no_configs and arguments.output_cfg:
             raise UserError("--output-cfg: needs --input-cfg, which --no-configs excludes")
         self.record = ShardRecord(arguments.record, arguments.output_dir)
+
+    @cached_property
+    def source_sums(self) -> Mapping[str, str]:
+        """The SHA-256 of each image of --source-record, by its path in the dataset."""
+        record = self.arguments.source_record
+        return records.checksums(record) if record else {}
 
     @cached_property
     def copies(self) -> bool:

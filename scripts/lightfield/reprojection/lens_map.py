@@ -7,7 +7,8 @@ view. It is computed once in float64, kept in float32, and applied to every view
 import json
 import math
 import sys
-from collections.abc import Iterator
+import zlib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -196,16 +197,15 @@ def compute(
 
 def save(path: Path | str, lens_map: LensMap) -> None:
     """Write a lens map as one .npy record that `load` maps into memory; atomic."""
-    description = json.dumps(
-        {
-            "settings": lens_map.settings,
-            "summary": lens_map.summary,
-            "window": lens_map.window,
-        }
-    ).encode()
     fields = _arrays(lens_map)
     if lens_map.coordinates is lens_map.centers:
         del fields["coordinates"]
+    said = {
+        "settings": lens_map.settings,
+        "summary": lens_map.summary,
+        "window": list(lens_map.window),
+    }
+    description = json.dumps(said | {"checksum": _checksum(said, fields)}).encode()
     dtype = np.dtype(
         [("description", f"S{_HEADER}")]
         + [(name, array.dtype, array.shape) for name, array in fields.items()]
@@ -229,6 +229,8 @@ def load(path: Path | str) -> LensMap:
         record = np.load(path, mmap_mode="r")
         description = json.loads(bytes(record["description"][0]))
         arrays = {name: record[name][0] for name in record.dtype.names if name != "description"}
+        if description.pop("checksum") != _checksum(description, arrays):
+            raise ValueError("it is damaged: its checksum does not hold")
         return LensMap(
             settings=description["settings"],
             summary=description["summary"],
@@ -237,6 +239,16 @@ def load(path: Path | str) -> LensMap:
         )
     except (OSError, EOFError, ValueError, KeyError, IndexError, TypeError) as error:
         raise UserError(f"{path}: is not a lens map that can be read: {error}") from None
+
+
+def _checksum(description: Mapping[str, Any], arrays: Mapping[str, Array]) -> int:
+    """Return the CRC-32 of a lens map's description and arrays: what damage changes, cheaply."""
+    checksum = zlib.crc32(json.dumps(description, sort_keys=True).encode())
+    for name in sorted(arrays):
+        checksum = zlib.crc32(
+            np.ascontiguousarray(arrays[name]).reshape(-1).view(np.uint8).data, checksum
+        )
+    return checksum
 
 
 def _arrays(lens_map: LensMap) -> dict[str, Array]:

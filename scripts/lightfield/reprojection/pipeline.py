@@ -73,10 +73,22 @@ def reproject_view(job: Job, view: SourceView) -> list[Path]:
         if not all(job.record.is_finished(path, key) for path in outputs.values()):
             todo.append((index, target, outputs, key))
     if todo:
+        _check(job, view)
         source = Source(job, view, [job.maps[index].window for index, *_ in todo])
         for index, target, outputs, key in todo:
             write(job, target, job.maps[index], source, outputs, key)
     return made
+
+
+def _check(job: Job, view: SourceView) -> None:
+    """Raise `UserError` for a source that is not as the record of those who made it says."""
+    for path in view.paths:
+        expected = job.source_sums.get(f"{path.parent.name}/{path.name}")
+        if expected and sha256(path) != expected:
+            raise UserError(
+                f"{path}: is not as it was written, {job.arguments.source_record} says; "
+                "scripts/verify.py --mend has it made again"
+            )
 
 
 def _identity(view: SourceView) -> str:
