@@ -34,7 +34,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_csv
-from lightfield.core.kernels import kernel
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -147,20 +146,11 @@ class Waves:
         total = np.ones((lens.height, lens.width))
         for v, down in zip(places / 2, weights / 2, strict=True):
             for u, across in zip(places / 2, weights / 2, strict=True):
-                rays = lens.rays(x + u, y + v)
-                _add_waves(rays, self.vectors, self.amplitudes * across * down, self.phases, total)
+                # A row at a time, for there are many waves.
+                for row, rays in zip(total, lens.rays(x + u, y + v), strict=True):
+                    waves = np.cos(rays @ self.vectors.T + self.phases)
+                    row += across * down * (waves @ self.amplitudes)
         return total
-
-
-@kernel
-def _add_waves(rays: Array, vectors: Array, amplitudes: Array, phases: Array, total: Array) -> None:
-    for i in range(rays.shape[0]):
-        for j in range(rays.shape[1]):
-            for k in range(len(phases)):
-                phase = phases[k]
-                for c in range(3):
-                    phase += vectors[k, c] * rays[i, j, c]
-                total[i, j] += amplitudes[k] * math.cos(phase)
 
 
 # Error against run time
