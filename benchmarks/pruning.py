@@ -202,6 +202,7 @@ class Renderer:
         settings = {"samples": 4, "adaptive_threshold": 0, "denoise": False}
         depth = "z" if task.depth else None
         lightfield = LightField.from_rig(rig, lens, depth=depth, frame=1, render=settings)
+        self.depth = task.depth
         self.poses = lightfield.matrices
         self.digest = hashlib.sha256()
         self.sizes: list[int] = []
@@ -224,15 +225,18 @@ class Renderer:
         import numpy as np
 
         from lightfield.imaging import images
-        from lightfield.rendering.view import render_view
+        from lightfield.rendering.colour_pass import render_colour
+        from lightfield.rendering.geometry_pass import render_geometry
 
         began = time.process_time()
-        raw = render_view(np.array(self.poses[number]), 1)
+        pose = np.array(self.poses[number])
+        depth = render_geometry(pose).depth if self.depth else None
+        colour = render_colour(pose, 1).pixels
         seconds = time.process_time() - began
-        self.digest.update(raw.colour.tobytes())
-        channels = {c: raw.colour[:, :, i].astype(np.float16) for i, c in enumerate("RGB")}
-        if raw.depth is not None:
-            channels["Z"] = raw.depth
+        self.digest.update(colour.tobytes())
+        channels = {c: colour[:, :, i].astype(np.float16) for i, c in enumerate("RGB")}
+        if depth is not None:
+            channels["Z"] = depth
         with tempfile.TemporaryDirectory() as folder:
             images.write_exr(Path(folder, "view.exr"), channels)
             self.sizes.append(Path(folder, "view.exr").stat().st_size)

@@ -14,7 +14,9 @@ import numpy as np
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.rendering import blend_file, cycles, inventory, pruning
-from lightfield.rendering.view import render_view
+from lightfield.rendering import blend_file, cycles, inventory, pruning
+from lightfield.rendering.colour_pass import render_colour
+from lightfield.rendering.geometry_pass import render_geometry
 from scenes import room
 
 RENDER = {"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0}
@@ -142,8 +144,8 @@ def rendered(path, found=None):
     cycles.set_up(path, found, lightfield, "cpu", 1)
     pose = lightfield.views[0].matrix
     # The second view shows what the first may have changed.
-    views = [render_view(pose, seed) for seed in (1, 2)]
-    return np.stack([np.dstack([view.colour, view.depth]) for view in views])
+    views = [(render_colour(pose, seed), render_geometry(pose)) for seed in (1, 2)]
+    return np.stack([np.dstack([colour.pixels, geometry.depth]) for colour, geometry in views])
 
 
 def main():

@@ -14,8 +14,8 @@ import bpy
 import numpy as np
 
 from lightfield.dataset.lightfield import LightField
-from lightfield.imaging import images
-from lightfield.rendering import cycles, shard, view
+from lightfield.rendering import cycles, geometry_pass, shard
+from lightfield.rendering.view import render_view
 
 
 def main(blend: Path, output: Path, cases: Path) -> None:
@@ -23,18 +23,15 @@ def main(blend: Path, output: Path, cases: Path) -> None:
     for name, content in json.loads(cases.read_text()).items():
         lightfield = LightField.from_json(content)
         cycles.set_up(blend, None, lightfield, "cpu", 1)
-        scene = bpy.context.scene
-        raw = view.render_view(lightfield.views[0].matrix, 0)
-        channels, _ = shard.view_channels(raw, lightfield, shard.depth_rays(lightfield))
-        results[f"{name}.z"] = channels["Z"].astype(np.float64)
-        scene.view_layers[0].use_pass_position = True
-        scene.render.filepath = str(output.with_suffix(".exr"))
-        bpy.ops.render.render(write_still=True)
-        passes = images.read_image(scene.render.filepath).channels
-        layer = scene.view_layers[0].name
-        points = np.stack([passes[f"{layer}.Position.{c}"] for c in "XYZ"], axis=-1)
-        missed = passes[f"{layer}.Depth.Z"] >= view.CYCLES_MISS
-        results[f"{name}.points"] = np.where(missed[..., None], np.nan, points)
+        pose = lightfield.views[0].matrix
+        depth = geometry_pass.render_geometry(pose).depth
+        z = shard.depth_channel(depth, lightfield, shard.depth_rays(lightfield))
+        results[f"{name}.z"] = z.astype(np.float64)
+        layer = bpy.context.scene.view_layers[0]
+        layer.use_pass_position = layer.use_pass_z = True
+        passes = render_view(pose, 0, {"Position": "XYZ", "Depth": "Z"}).passes
+        missed = passes["Depth"] >= geometry_pass.MISS
+        results[f"{name}.points"] = np.where(missed, np.nan, passes["Position"])
     np.savez(output, **results)
 
 

@@ -246,20 +246,22 @@ def test_views_hold_what_design_asks_for(shard):
 
 
 def test_colour_beyond_half_is_clamped_and_counted():
-    class Raw:
-        colour = np.array([[[1e6, 2.0, -1e6], [np.nan, np.inf, 0.5]]], dtype=np.float32)
-        depth = np.array([[3.0, np.inf]], dtype=np.float32)
-
-    camera = {"lens": "equirectangular", "resolution": [2, 1]}
-    content = lightfield(camera, {"depth_precision": "half"})
-    channels, attributes = shards.view_channels(Raw, content, None)
+    colour = np.array([[[1e6, 2.0, -1e6], [np.nan, np.inf, 0.5]]], dtype=np.float32)
+    channels, attributes = shards.colour_channels(colour)
     assert attributes[images.CLAMPED_ATTRIBUTE] == 3
     assert attributes[images.NAN_ATTRIBUTE] == 1
     assert channels["R"][0, 0] == 65504
     assert channels["B"][0, 0] == -65504
     assert np.isnan(channels["R"][0, 1])
-    assert channels["Z"].dtype == np.float16
-    assert np.isposinf(channels["Z"][0, 1])
+
+
+def test_depth_in_half_keeps_its_misses():
+    camera = {"lens": "equirectangular", "resolution": [2, 1]}
+    content = lightfield(camera, {"depth_precision": "half"})
+    z = shards.depth_channel(np.array([[3.0, np.inf]], dtype=np.float32), content, None)
+    assert z.dtype == np.float16
+    assert z[0, 0] == 3
+    assert np.isposinf(z[0, 1])
 
 
 def test_a_device_that_is_not_there_is_an_error(shard):

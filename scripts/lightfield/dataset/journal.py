@@ -6,7 +6,8 @@ that was really spent. Times of day are seconds since 1970. A process's lines ar
 - ``started``, ``host``, ``pid``: when and where it began;
 - ``start_up_seconds``, ``start_up_cpu_seconds``, ``device``, ``threads``: the scene is open;
 - for each image ``view``, ``finished``, ``wall_seconds``, ``cpu_seconds`` and, of a rendered view,
-  Cycles' own ``render_seconds`` and ``synchronization_seconds``, and ``memory_bytes``;
+  Cycles' own ``render_seconds`` and ``synchronization_seconds``, ``geometry_seconds``, the part of
+  ``wall_seconds`` that depth took, and ``memory_bytes``;
 - ``ended``, ``wall_seconds``, ``cpu_seconds``, ``peak_memory_bytes``: of the whole process. A
   process that was killed lacks this line.
 """

@@ -15,7 +15,7 @@ from lightfield.dataset.config import BUILDERS, Source
 from lightfield.dataset.lightfield import LightField, View
 
 # Raised when the program that renders changes what it writes for the same settings.
-RENDER_VERSION = 2
+RENDER_VERSION = 3
 
 
 def scene_fingerprint(source: Source) -> str:

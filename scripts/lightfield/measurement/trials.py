@@ -168,19 +168,20 @@ class Trials:
     def _render(self, window: Window, settings: Mapping[str, Any], path: Path, key: str) -> None:
         with processors.only(self._threads):
             from lightfield.rendering import cycles
-            from lightfield.rendering.view import render_view
+            from lightfield.rendering.colour_pass import render_colour
+            from lightfield.rendering.geometry_pass import render_geometry
 
         if not self._started:
             self._start(settings)
         cycles.set_sampling(settings)
         cycles.set_window(window.x, window.y, window.width, window.height)
         seed = keys.view_seed(settings["seed"], window.view.name)
-        raw = render_view(window.view.matrix, seed)
+        raw = render_colour(window.view.matrix, seed)
         assert raw.samples is not None and raw.worked_seconds is not None
         seconds = raw.worked_seconds if self._on == "CPU" else raw.render_seconds
-        channels = {name: raw.colour[:, :, index] for index, name in enumerate("RGB")}
-        if raw.depth is not None:
-            channels["Z"] = raw.depth
+        channels = {name: raw.pixels[:, :, index] for index, name in enumerate("RGB")}
+        if self.lightfield.depth:
+            channels["Z"] = render_geometry(window.view.matrix).depth
         images.write_exr(
             path,
             channels,
@@ -193,7 +194,7 @@ class Trials:
         )
 
     def _start(self, settings: Mapping[str, Any]) -> None:
-        from lightfield.rendering import cycles, view
+        from lightfield.rendering import colour_pass, cycles
 
         self._on = cycles.set_up(
             self._blend,
@@ -202,11 +203,11 @@ class Trials:
             self._device,
             self._threads,
         )
-        view.watch_samples()
+        colour_pass.watch_samples()
         # The first render also loads what all others use; it is not timed.
         cycles.set_sampling({**settings, "samples": 1, "denoise": True})
         cycles.set_window(0, 0, min(64, self.lens.width), min(64, self.lens.height))
-        view.render_view(self.lightfield.views[0].matrix, 0)
+        colour_pass.render_colour(self.lightfield.views[0].matrix, 0)
         self._started = True
 
 
@@ -232,7 +233,7 @@ def nearest_view(views: Sequence[View], view: View) -> View | None:
     return views[min(others)[1]] if others else None
 
 
-# Two depths of one surface differ by less than this part: pixels are coarse, and depth is jittered.
+# Two depths of one surface differ by less than this part: pixels are coarse.
 SAME_DEPTH = 0.03
 
 

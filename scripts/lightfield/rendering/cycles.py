@@ -36,7 +36,7 @@ def set_up(
     scene.render.engine = "CYCLES"
     _set_quality(lightfield.render)
     _set_output(scene, lightfield, threads)
-    _set_passes(scene, lightfield)
+    _set_passes(scene)
     _use_device(scene, device)
     _set_camera(scene, lightfield.content)
     scene.frame_set(lightfield.frame)
@@ -80,14 +80,13 @@ def _set_output(scene: Any, lightfield: LightField, threads: int) -> None:
     output.exr_codec = "NONE"
 
 
-def _set_passes(scene: Any, lightfield: LightField) -> None:
-    """Make colour, and depth where it is wanted, and nothing that the artist had on."""
+def _set_passes(scene: Any) -> None:
+    """Make colour, and nothing else that the artist had on."""
     layer = view_layer(scene)
     for name in dir(layer):
         if name.startswith("use_pass_"):
             setattr(layer, name, False)
     layer.use_pass_combined = True
-    layer.use_pass_z = lightfield.depth is not None
     layer.cycles.denoising_store_passes = False
     layer.cycles.pass_debug_sample_count = False
     # Passes of the artist's own, and those of light groups.

@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import psutil
@@ -27,9 +27,6 @@ from lightfield.dataset.records import ShardRecord
 from lightfield.dataset.run_progress import RunProgress
 from lightfield.geometry import depth
 from lightfield.imaging import images
-
-if TYPE_CHECKING:
-    from lightfield.rendering.view import Raw
 
 Array = np.ndarray[Any, Any]
 
@@ -108,15 +105,23 @@ def _render_views(
     progress: Progress,
 ) -> None:
     """Render ``views`` one after the other, in the scene that is set up for them."""
-    from lightfield.rendering.view import render_view
+    from lightfield.rendering.colour_pass import render_colour
+    from lightfield.rendering.geometry_pass import render_geometry
 
     rays = depth_rays(lightfield)
     process = psutil.Process()
     progress.begin()
     for view in views:
         began, began_cpu = time.perf_counter(), time.process_time()
-        raw = render_view(view.matrix, keys.view_seed(lightfield.render["seed"], view.name))
-        channels, attributes = view_channels(raw, lightfield, rays)
+        # Of the same pose one after the other: Cycles keeps the scene as it is.
+        geometry = render_geometry(view.matrix) if lightfield.depth else None
+        geometry_seconds = time.perf_counter() - began
+        colour = render_colour(view.matrix, keys.view_seed(lightfield.render["seed"], view.name))
+        parts = [part for part in (geometry, colour) if part]
+        channels, attributes = colour_channels(colour.pixels)
+        if geometry:
+            channels["Z"] = depth_channel(geometry.depth, lightfield, rays)
+            attributes[images.DEPTH_ATTRIBUTE] = str(lightfield.depth)
         path, key = folder / f"{view.name}.exr", keys.render_key(lightfield, view)
         attributes |= {images.KEY_ATTRIBUTE: key, images.BPY_ATTRIBUTE: version("bpy")}
         images.write_exr(path, channels, attributes)
@@ -127,8 +132,11 @@ def _render_views(
                 "finished": round(time.time(), 3),
                 "wall_seconds": round(time.perf_counter() - began, 4),
                 "cpu_seconds": round(time.process_time() - began_cpu, 4),
-                "render_seconds": raw.render_seconds,
-                "synchronization_seconds": raw.synchronization_seconds,
+                "render_seconds": round(sum(part.render_seconds for part in parts), 4),
+                "synchronization_seconds": round(
+                    sum(part.synchronization_seconds for part in parts), 4
+                ),
+                "geometry_seconds": round(geometry_seconds, 4),
                 "memory_bytes": process.memory_info().rss,
             },
         )
@@ -142,32 +150,31 @@ def depth_rays(lightfield: LightField) -> Array | None:
     return lightfield.lens.pixel_rays()
 
 
-def view_channels(
-    raw: "Raw", lightfield: LightField, rays: Array | None
-) -> tuple[dict[str, Array], dict[str, images.Attribute]]:
-    """Turn what Cycles made into the channels and attributes of a view's EXR.
+def colour_channels(colour: Array) -> tuple[dict[str, Array], dict[str, images.Attribute]]:
+    """Turn colour (height, width, 3) into the channels and attributes of a view's EXR.
 
     Colour beyond the half range is clamped and counted; what is not a number is counted and kept,
     so that validation finds it.
     """
-    nan = int(np.isnan(raw.colour).sum())
-    clamped = int((np.abs(raw.colour) > images.HALF_MAX).sum())
-    colour = np.clip(raw.colour, -images.HALF_MAX, images.HALF_MAX).astype(np.float16)
-    channels: dict[str, Array] = {name: colour[:, :, index] for index, name in enumerate("RGB")}
-    attributes: dict[str, images.Attribute] = {
-        images.CLAMPED_ATTRIBUTE: clamped,
-        images.NAN_ATTRIBUTE: nan,
-    }
-    if raw.depth is not None:
-        z = raw.depth
-        if rays is not None and lightfield.depth == "z":
-            z = depth.z_from_distance(z, rays)
-        elif rays is not None:
-            z = depth.distance_from_z(z, rays)
-        # Outside the image circle there is no ray; nothing was hit there.
-        z = np.where(np.isnan(z), np.inf, z)
-        half = lightfield.render["depth_precision"] == "half"
-        with np.errstate(over="ignore"):
-            channels["Z"] = z.astype(np.float16 if half else np.float32)
-        attributes[images.DEPTH_ATTRIBUTE] = lightfield.depth or ""
-    return channels, attributes
+    nan = int(np.isnan(colour).sum())
+    clamped = int((np.abs(colour) > images.HALF_MAX).sum())
+    half = np.clip(colour, -images.HALF_MAX, images.HALF_MAX).astype(np.float16)
+    channels = {name: half[:, :, index] for index, name in enumerate("RGB")}
+    return channels, {images.CLAMPED_ATTRIBUTE: clamped, images.NAN_ATTRIBUTE: nan}
+
+
+def depth_channel(cycles_depth: Array, lightfield: LightField, rays: Array | None) -> Array:
+    """Turn depth (height, width) as Cycles has it into channel Z of a view's EXR.
+
+    ``rays`` are those of `depth_rays`.
+    """
+    z = cycles_depth
+    if rays is not None and lightfield.depth == "z":
+        z = depth.z_from_distance(z, rays)
+    elif rays is not None:
+        z = depth.distance_from_z(z, rays)
+    # Outside the image circle there is no ray; nothing was hit there.
+    z = np.where(np.isnan(z), np.inf, z)
+    half = lightfield.render["depth_precision"] == "half"
+    with np.errstate(over="ignore"):
+        return z.astype(np.float16 if half else np.float32)

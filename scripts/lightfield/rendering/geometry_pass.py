@@ -1,0 +1,137 @@
+"""The geometry of a view: the first surface that the ray through each pixel's centre meets.
+
+One render of one sample. Cycles takes a pixel's first sample from the middle of the pixel filter,
+and with the narrowest filter that is the pixel's centre. What transparency cuts out is no surface,
+as in the colour; glass is one, and fog, smoke and every other volume is none.
+"""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+
+from lightfield.rendering.cycles import view_layer
+from lightfield.rendering.view import Array, render_view
+
+# Cycles gives this depth to a ray that hits nothing.
+MISS = 1e10
+
+# A surface of less opacity than this is none: it is what transparency has cut out.
+OPACITY = 1e-3
+
+_SAMPLING = {
+    "samples": 1,
+    "use_adaptive_sampling": False,
+    "use_denoising": False,
+    "use_sample_subset": False,
+    "pixel_filter_type": "BLACKMAN_HARRIS",
+    "filter_width": 0.01,
+    "max_bounces": 0,
+}
+_PASSES = {"Depth": "Z", "Normal": "XYZ", "Object Index": "X", "Material Index": "X"}
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """What a view's pixels see at their centres; all of it is of the same surface.
+
+    ``depth``, (height, width) float32 in metres, is inf where nothing is hit: Z-depth for a
+    perspective camera and distance for any other. ``normal``, (height, width, 3) float32, is the
+    shading normal in world space on the camera's side, and 0 where nothing is hit. ``objects`` and
+    ``materials``, (height, width) uint16, are their pass indices. ``render_seconds`` and
+    ``synchronization_seconds`` are Cycles' own.
+    """
+
+    depth: Array
+    normal: Array
+    objects: Array
+    materials: Array
+    render_seconds: float
+    synchronization_seconds: float
+
+
+def render_geometry(world_matrix: Array) -> Geometry:
+    """Render the geometry that a camera at ``world_matrix``, (4, 4) camera-to-world, sees."""
+    with _geometry_settings():
+        found = render_view(world_matrix, 0, _PASSES)
+    depth = found.passes["Depth"][..., 0]
+    return Geometry(
+        np.where(depth >= MISS, np.float32(np.inf), depth),
+        found.passes["Normal"],
+        found.passes["Object Index"][..., 0].astype(np.uint16),
+        found.passes["Material Index"][..., 0].astype(np.uint16),
+        found.render_seconds,
+        found.synchronization_seconds,
+    )
+
+
+@contextmanager
+def _geometry_settings() -> Iterator[None]:
+    """Let Cycles render geometry, and then what it was set up for."""
+    scene = bpy.context.scene
+    layer = view_layer(scene)
+    with ExitStack() as stack:
+        for name, value in _SAMPLING.items():
+            stack.enter_context(_changed(scene.cycles, name, value))
+        stack.enter_context(_changed(scene.render, "use_motion_blur", False))
+        for name in ("z", "normal", "object_index", "material_index"):
+            stack.enter_context(_changed(layer, f"use_pass_{name}", True))
+        stack.enter_context(_changed(layer, "pass_alpha_threshold", OPACITY))
+        stack.enter_context(_changed(layer.cycles, "pass_debug_sample_count", False))
+        for thing in bpy.data.objects:
+            if thing.visible_camera and _is_volume_alone(thing):
+                stack.enter_context(_changed(thing, "visible_camera", False))
+        for shader in (*bpy.data.materials, scene.world):
+            if shader and has_volume(shader) and has_surface(shader):
+                stack.enter_context(_without_volume(shader.node_tree))
+        yield
+
+
+@contextmanager
+def _changed(owner: Any, name: str, value: Any) -> Iterator[None]:
+    """Give a property another value for a while."""
+    before = getattr(owner, name)
+    setattr(owner, name, value)
+    try:
+        yield
+    finally:
+        setattr(owner, name, before)
+
+
+@contextmanager
+def _without_volume(tree: Any) -> Iterator[None]:
+    """Take the volume out of a material's or world's nodes for a while."""
+    socket = tree.get_output_node("CYCLES").inputs["Volume"]
+    (link,) = socket.links
+    source = link.from_socket
+    tree.links.remove(link)
+    try:
+        yield
+    finally:
+        tree.links.new(source, socket)
+
+
+def _is_volume_alone(thing: Any) -> bool:
+    """Whether an object is a volume without any surface."""
+    if thing.type == "VOLUME":
+        return True
+    materials = [slot.material for slot in thing.material_slots if slot.material]
+    return bool(materials) and all(has_volume(m) and not has_surface(m) for m in materials)
+
+
+def has_volume(shader: Any) -> bool:
+    """Whether a material or world has a volume."""
+    return _is_linked(shader, "Volume")
+
+
+def has_surface(shader: Any) -> bool:
+    """Whether a material has a surface; a world is taken to have one."""
+    return _is_linked(shader, "Surface") or isinstance(shader, bpy.types.World)
+
+
+def _is_linked(shader: Any, name: str) -> bool:
+    output = shader.node_tree.get_output_node("CYCLES") if shader.node_tree else None
+    return output is not None and output.inputs[name].is_linked

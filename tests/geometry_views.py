@@ -1,0 +1,153 @@
+"""Program that renders the geometry of scenes of which every surface is known, and of fogs.
+
+Runs in a process of its own, because bpy keeps one global state. Arguments: a folder, and a JSON
+file that maps names to [scene, content of a lightfield.json]. Output, FOLDER/views.npz, of each
+case's first view: "<name>.z" as the dataset would hold it, "<name>.normal" in world space,
+"<name>.objects" and "<name>.materials", "<name>.colour" rendered after it, and "<name>.alone", the
+same colour rendered without any geometry before it.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from lightfield.dataset.lightfield import LightField
+from lightfield.rendering import blend_file, cycles, shard
+from lightfield.rendering.colour_pass import render_colour
+from lightfield.rendering.geometry_pass import render_geometry
+
+
+def material(name, alpha=1.0):
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    shader = made.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Emission Strength"].default_value = 0.5
+    shader.inputs["Alpha"].default_value = alpha
+    made.pass_index = 20 + len(bpy.data.materials)
+    return made
+
+
+def volume(name, surface=None):
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    add_volume(made.node_tree)
+    links, nodes = made.node_tree.links, made.node_tree.nodes
+    nodes.remove(nodes["Principled BSDF"])
+    if surface:
+        links.new(nodes.new(surface).outputs[0], nodes["Material Output"].inputs["Surface"])
+    return made
+
+
+def add_volume(tree):
+    scatter = tree.nodes.new("ShaderNodeVolumeScatter")
+    scatter.inputs["Density"].default_value = 0.5
+    output = next(node for node in tree.nodes if "Output" in node.bl_idname)
+    tree.links.new(scatter.outputs[0], output.inputs["Volume"])
+
+
+def add(kind, index, surface, **settings):
+    getattr(bpy.ops.mesh, f"primitive_{kind}_add")(**settings)
+    thing = bpy.context.object
+    thing.data.materials.append(surface)
+    thing.pass_index = index
+    return thing
+
+
+def known():
+    """A floor z = 0, a wall y = 3, and a sphere of radius 1 about (−1, 1.5, 1.25), a true one."""
+    add("plane", 1, material("floor"), size=20)
+    add("plane", 2, material("wall"), size=20, location=(0, 3, 0), rotation=(np.pi / 2, 0, 0))
+    points = add("plane", 3, material("sphere"))
+    group = bpy.data.node_groups.new("sphere", "GeometryNodeTree")
+    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    point = group.nodes.new("GeometryNodePoints")
+    point.inputs["Position"].default_value = (-1, 1.5, 1.25)
+    point.inputs["Radius"].default_value = 1
+    painted = group.nodes.new("GeometryNodeSetMaterial")
+    painted.inputs["Material"].default_value = points.data.materials[0]
+    group.links.new(point.outputs[0], painted.inputs["Geometry"])
+    group.links.new(painted.outputs[0], group.nodes.new("NodeGroupOutput").inputs[0])
+    points.modifiers.new("sphere", "NODES").node_group = group
+
+
+def curtains():
+    """Before a wall y = 3, at y = 2, squares of opacity 0, 0.3, 0.6 and 1, and one of glass."""
+    wall = material("wall")
+    add("plane", 1, wall, size=20, location=(0, 3, 0), rotation=(np.pi / 2, 0, 0.3))
+    kinds = [material(f"curtain {alpha}", alpha) for alpha in (0.0, 0.3, 0.6, 1.0)]
+    glass = material("glass")
+    glass.node_tree.nodes["Principled BSDF"].inputs["Transmission Weight"].default_value = 1
+    for number, kind in enumerate([*kinds, glass]):
+        where = (number - 2, 2, 0)
+        add("plane", 10 + number, kind, size=0.9, location=where, rotation=(np.pi / 2, 0, 0))
+
+
+def mesh_fog():
+    known()
+    add("cube", 9, volume("fog"), size=8)
+
+
+def clear_surface_fog():
+    known()
+    add("cube", 9, volume("fog", "ShaderNodeBsdfTransparent"), size=8)
+
+
+def volume_object():
+    known()
+    shape = add("cube", 9, material("shape"), size=8)
+    shape.hide_render = True
+    cloud = bpy.data.objects.new("cloud", bpy.data.volumes.new("cloud"))
+    bpy.context.scene.collection.objects.link(cloud)
+    modifier = cloud.modifiers.new("from mesh", "MESH_TO_VOLUME")
+    modifier.object = shape
+    cloud.data.materials.append(volume("cloud"))
+
+
+def world_fog():
+    known()
+    world = bpy.data.worlds.new("world")
+    world.use_nodes = True
+    add_volume(world.node_tree)
+    bpy.context.scene.world = world
+
+
+def moving():
+    """The wall comes nearer while the shutter is open; at frame 2 it is at y = 3."""
+    known()
+    wall = bpy.data.objects["Plane.001"]
+    for frame in (1, 2, 3):
+        wall.location.y = 5 - frame
+        wall.keyframe_insert("location", frame=frame)
+    bpy.context.scene.render.use_motion_blur = True
+
+
+def main(folder: Path, cases: Path) -> None:
+    results = {}
+    for name, (scene, content) in json.loads(cases.read_text()).items():
+        path = folder / f"{scene}.blend"
+        if not path.exists():
+            blend_file.new_scene()
+            globals()[scene]()
+            blend_file.save_scene(path)
+        lightfield = LightField.from_json(content)
+        pose = lightfield.views[0].matrix
+        cycles.set_up(path, None, lightfield, "cpu", 1)
+        results[f"{name}.alone"] = render_colour(pose, 1).pixels
+        # The first of a new session sees what the second finds as the colour has left it.
+        cycles.set_up(path, None, lightfield, "cpu", 1)
+        for _ in range(2):
+            geometry = render_geometry(pose)
+            colour = render_colour(pose, 1)
+        rays = shard.depth_rays(lightfield)
+        results[f"{name}.z"] = shard.depth_channel(geometry.depth, lightfield, rays)
+        results[f"{name}.normal"] = geometry.normal
+        results[f"{name}.objects"] = geometry.objects
+        results[f"{name}.materials"] = geometry.materials
+        results[f"{name}.colour"] = colour.pixels
+    np.savez(folder / "views.npz", **results)
+
+
+main(*map(Path, sys.argv[1:]))
