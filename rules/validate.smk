@@ -7,6 +7,7 @@ rule validate:
         records=of_dataset("all_records"),
         published=of_dataset("published"),
         cameras=f"{MADE}/cameras.json",
+        inventory=of_dataset("inventory"),
     output:
         validation=f"{DATASET}/validation.json",
         sums=f"{MADE}/checksums.txt",
@@ -27,7 +28,8 @@ rule validate:
         "Validating {wildcards.scene}/{wildcards.rig}"
     shell:
         "python {SCRIPTS}/validate.py --dataset {params.dataset} {params.reprojections}"
-        " --records {input.records} --clearance {input.cameras} --processes {threads}"
+        " --records {input.records} --clearance {input.cameras}"
+        " --inventory {input.inventory} --processes {threads}"
         " --output {output.validation} --sums {output.sums} 2>&1 | tee {log}"
 
 

@@ -26,6 +26,7 @@ def main() -> None:
     records = "JSON of the sizes and checksums with which images were written"
     add("--records", type=Path, nargs="*", default=[], help=records)
     add("--clearance", type=Path, help="JSON of what surrounds each camera")
+    add("--inventory", type=Path, help="JSON of what the scene contains")
     folders = "folders of the dataset that hold a reprojection"
     add("--reprojection", action="extend", nargs="+", default=[], metavar="NAME", help=folders)
     add("--processes", type=int, default=1, help="worker processes (default: 1)")
@@ -37,6 +38,7 @@ def main() -> None:
         arguments.reprojection,
         arguments.records,
         arguments.clearance,
+        arguments.inventory,
         arguments.processes,
         MANIFESTS,
     )

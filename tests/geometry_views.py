@@ -102,7 +102,7 @@ def volume_object():
     cloud = bpy.data.objects.new("cloud", bpy.data.volumes.new("cloud"))
     bpy.context.scene.collection.objects.link(cloud)
     modifier = cloud.modifiers.new("from mesh", "MESH_TO_VOLUME")
-    modifier.object = shape
+    modifier.object, modifier.interior_band_width = shape, 10
     cloud.data.materials.append(volume("cloud"))
 
 

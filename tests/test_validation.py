@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_erosion
 
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.dataset.lightfield import NAME, LightField, View
@@ -636,6 +637,33 @@ def test_camera_inside_geometry_fails(small_dataset: Path, tmp_path: Path) -> No
     wrong = validate(small_dataset, clearance=tmp_path / "clearance.json")
     assert failed(wrong) == ["cameras"]
     assert sorted(check(wrong, "cameras").views) == ["view_0004f", names(small_dataset)[BAD]]
+
+
+def test_of_a_scene_with_volumes_the_misses_are_counted(
+    small_dataset: Path, tmp_path: Path
+) -> None:
+    one = small_dataset / "exr" / f"{names(small_dataset)[BAD]}.exr"
+    image = images.read_image(one)
+    attributes = {k: v for k, v in image.attributes.items() if k.startswith("plenoforge:")}
+    depth = image.channels["Z"].copy()
+    depth[20:36, 24:40] = np.inf
+    images.write_exr(one, image.channels | {"Z": depth}, attributes)
+    write_json(tmp_path / "inventory.json", {"volumes": ["Fog", "Smoke"]})
+    result = validate(small_dataset, inventory=tmp_path / "inventory.json")
+    assert result.valid
+    (warning,) = check(result, "depth").warnings
+    part, text = warning.split("% of the depths are inf; ")
+    assert text == "volumes are no surfaces: Fog, Smoke"
+    rays = LightField.read(small_dataset / NAME).lens.pixel_rays()
+    # The rim of what the lens sees is not counted.
+    seen = binary_erosion(np.pad(np.isfinite(rays[..., 0]), 2, "edge"), np.ones((5, 5)))[2:-2, 2:-2]
+    views = [images.read_image(path).channels["Z"] for path in (small_dataset / "exr").iterdir()]
+    missed = np.mean([np.isposinf(depth[seen]).mean() for depth in views])
+    assert missed > 0.01
+    assert float(part) / 100 == pytest.approx(missed, abs=0.0005)
+    write_json(tmp_path / "inventory.json", {"volumes": []})
+    clear = validate(small_dataset, inventory=tmp_path / "inventory.json")
+    assert check(clear, "depth").warnings == []
 
 
 def test_exports_own_what_they_list(small_dataset: Path) -> None:

@@ -38,7 +38,8 @@ class Facts:
 
     ``clamped`` and ``nan`` are the renderer's counts, ``marked`` whether the pixels without a
     source could be compared, ``constant`` whether a reprojected view has one colour (as a piece of
-    sky or a wall may), ``patches`` what geometry needs of a view with depth.
+    sky or a wall may), ``missed`` the part of the lens's pixels that hit nothing and ``patches``
+    what geometry needs, both of a view with depth.
     """
 
     checksum: str
@@ -48,6 +49,7 @@ class Facts:
     nan: int | None = None
     marked: bool = False
     constant: bool = False
+    missed: float = 0.0
     patches: Patches | None = None
 
     def fault(self, check: str, text: str, found: bool | int = True) -> None:
@@ -131,6 +133,7 @@ class Examiner:
                 facts.fault("depth", "has depth where the lens sees nothing", filled)
             wrong = int((depth <= 0).sum())
             facts.fault("depth", f"{wrong} depths are not positive", wrong)
+            facts.missed = float(np.isposinf(depth[seen]).mean())
             facts.patches = consistency.sample(image_set.camera(file.view), depth, RAYS_A_VIEW)
         if not is_rendered:
             self._compare_marks(file, image, facts)
@@ -196,8 +199,13 @@ class Examiner:
         return self.regions[key]
 
 
-def checks(image_set: ImageSet, own: Mapping[File, Facts]) -> list[Check]:
-    """Return the checks that each image of a set passes or fails by itself."""
+def checks(
+    image_set: ImageSet, own: Mapping[File, Facts], volumes: Sequence[str] = ()
+) -> list[Check]:
+    """Return the checks that each image of a set passes or fails by itself.
+
+    ``volumes`` are those of the scene, in which depth sees nothing.
+    """
     readable = {file: fact for file, fact in own.items() if "images" not in fact.faults}
     checks = [
         _outcome(image_set, "images", own, "are whole, of the right size and channels"),
@@ -212,6 +220,12 @@ def checks(image_set: ImageSet, own: Mapping[File, Facts]) -> list[Check]:
         marked = {file: fact for file, fact in readable.items() if fact.marked}
         text = "mark the pixels that their source cannot see"
         return [*checks, _outcome(image_set, "marks", marked, text)]
+    if volumes and deep:
+        missed = sum(fact.missed for fact in deep.values()) / len(deep)
+        checks[2].warnings.append(
+            f"{missed:.1%} of the depths are inf; volumes are no surfaces: {', '.join(volumes[:8])}"
+            + (" …" if len(volumes) > 8 else "")
+        )
     counted = {file: fact for file, fact in readable.items() if fact.nan is not None}
     check = _outcome(image_set, "counts", counted, "have their renderer's counts, without NaN")
     clamped = [fact.clamped for fact in counted.values() if fact.clamped]

@@ -17,7 +17,7 @@ from typing import Any
 
 import OpenImageIO as oiio
 
-from lightfield.core.files import sha256
+from lightfield.core.files import read_json, sha256
 from lightfield.core.progress import Progress
 from lightfield.validation import files, geometry, pixels
 from lightfield.validation.consistency import Answer
@@ -31,6 +31,7 @@ def validate(
     reprojections: Sequence[str] = (),
     records: Sequence[Path] = (),
     clearance: Path | None = None,
+    inventory: Path | None = None,
     processes: int = 1,
     manifests: Sequence[Manifest] = (),
 ) -> Result:
@@ -38,11 +39,12 @@ def validate(
 
     ``reprojections`` are folders in the dataset; ``records`` JSON files of what was rendered
     (``files``: relative path: ``bytes``, ``sha256``); ``clearance`` a JSON file of what surrounds
-    each camera (``views``: name: ``distance`` in metres, ``inside``); ``manifests`` those of the
-    exports that it may hold. Raises `UserError` where one of these cannot be read; whatever is
-    wrong with the dataset is in the result.
+    each camera (``views``: name: ``distance`` in metres, ``inside``); ``inventory`` one of what the
+    scene contains; ``manifests`` those of the exports that it may hold. Raises `UserError` where
+    one of these cannot be read; whatever is wrong with the dataset is in the result.
     """
     dataset = dataset.resolve()
+    volumes = read_json(inventory)["volumes"] if inventory else []
     sets, checks = files.read_sets(dataset, reprojections)
     views, presence = files.of_views(dataset, sets)
     extras, lists, exports = files.of_exports(dataset, sets, views, manifests)
@@ -55,7 +57,7 @@ def validate(
         for number, image_set in enumerate(sets):
             own = {file: facts[file] for file in views if file.set == number}
             seen = {file: fact.patches for file, fact in own.items() if fact.patches is not None}
-            checks += [presence[number], *pixels.checks(image_set, own)]
+            checks += [presence[number], *pixels.checks(image_set, own, volumes)]
             checks.append(geometry.check(image_set, seen, lambda asked: mapped(_answer, asked)))
     checks.append(pixels.with_extras(exports, {file: facts[file] for file in extras}))
     found = {file.path: (fact.bytes, fact.checksum) for file, fact in facts.items()}
