@@ -30,10 +30,10 @@ def material(name, alpha=1.0):
     return made
 
 
-def volume(name, surface=None):
+def volume(name, surface=None, shader="ShaderNodeVolumeScatter"):
     made = bpy.data.materials.new(name)
     made.use_nodes = True
-    add_volume(made.node_tree)
+    add_volume(made.node_tree, shader)
     links, nodes = made.node_tree.links, made.node_tree.nodes
     nodes.remove(nodes["Principled BSDF"])
     if surface:
@@ -41,8 +41,8 @@ def volume(name, surface=None):
     return made
 
 
-def add_volume(tree):
-    scatter = tree.nodes.new("ShaderNodeVolumeScatter")
+def add_volume(tree, shader="ShaderNodeVolumeScatter"):
+    scatter = tree.nodes.new(shader)
     scatter.inputs["Density"].default_value = 0.5
     output = next(node for node in tree.nodes if "Output" in node.bl_idname)
     tree.links.new(scatter.outputs[0], output.inputs["Volume"])
@@ -102,8 +102,12 @@ def volume_object():
     cloud = bpy.data.objects.new("cloud", bpy.data.volumes.new("cloud"))
     bpy.context.scene.collection.objects.link(cloud)
     modifier = cloud.modifiers.new("from mesh", "MESH_TO_VOLUME")
-    modifier.object, modifier.interior_band_width = shape, 10
-    cloud.data.materials.append(volume("cloud"))
+    modifier.object, modifier.interior_band_width, modifier.voxel_amount = shape, 10, 8
+    # A volume object is where a grid is that its material asks for.
+    cloud.data.materials.append(volume("cloud", shader="ShaderNodeVolumePrincipled"))
+    # Its colour need not be right, but be there soon.
+    bpy.context.scene.cycles.volume_biased = True
+    bpy.context.scene.cycles.volume_step_rate = 20
 
 
 def world_fog():
