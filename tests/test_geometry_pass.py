@@ -122,6 +122,8 @@ def test_there_are_misses_where_there_is_nothing_and_nowhere_else(name, views):
     z = views[f"{name}.z"]
     np.testing.assert_array_equal(np.isposinf(z)[around], np.isposinf(distance)[around])
     assert not np.isnan(z).any()
+    for empty in ("normal", "objects", "materials"):
+        assert not views[f"{name}.{empty}"][np.isposinf(z)].any()
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -96,8 +96,8 @@ class Errors:
     than that; relative_mse_whole: the same of all pixels, the worst thousandth too; psnr (decibel;
     inf if equal), ssim and flip (0 is equal) of the tone-mapped image;
     depth: mean of |z/r − 1|, at most 1 a pixel, where a pixel in which only one of the two hit
-    anything counts as 1, or None without depth. Cycles takes depth from one sample, so that more
-    do not improve it.
+    anything counts as 1, or None without depth. That is one sample, so that more do not
+    improve it.
     """
 
     relative_mse: float

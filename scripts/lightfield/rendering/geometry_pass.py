@@ -40,9 +40,9 @@ class Geometry:
 
     ``depth``, (height, width) float32 in metres, is inf where nothing is hit: Z-depth for a
     perspective camera and distance for any other. ``normal``, (height, width, 3) float32, is the
-    shading normal in world space on the camera's side, and 0 where nothing is hit. ``objects`` and
-    ``materials``, (height, width) uint16, are their pass indices. ``render_seconds`` and
-    ``synchronization_seconds`` are Cycles' own.
+    shading normal in world space on the camera's side. ``objects`` and ``materials``,
+    (height, width) uint16, are their pass indices. These are 0 where nothing is hit.
+    ``render_seconds`` and ``synchronization_seconds`` are Cycles' own.
     """
 
     depth: Array
@@ -57,12 +57,18 @@ def render_geometry(world_matrix: Array) -> Geometry:
     """Render the geometry that a camera at ``world_matrix``, (4, 4) camera-to-world, sees."""
     with _geometry_settings():
         found = render_view(world_matrix, 0, _PASSES)
-    depth = found.passes["Depth"][..., 0]
+    depth = found.passes["Depth"]
+    # Cycles leaves values that are not a number where the lens sees nothing.
+    hit = depth < MISS
+    normal, objects, materials = (
+        np.where(hit, found.passes[name], np.float32(0))
+        for name in ("Normal", "Object Index", "Material Index")
+    )
     return Geometry(
-        np.where(depth >= MISS, np.float32(np.inf), depth),
-        found.passes["Normal"],
-        found.passes["Object Index"][..., 0].astype(np.uint16),
-        found.passes["Material Index"][..., 0].astype(np.uint16),
+        np.where(hit, depth, np.float32(np.inf))[..., 0],
+        normal,
+        objects[..., 0].astype(np.uint16),
+        materials[..., 0].astype(np.uint16),
         found.render_seconds,
         found.synchronization_seconds,
     )

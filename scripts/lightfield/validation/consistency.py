@@ -1,7 +1,7 @@
 """Do the views of a light field see the same world? Depth of one view, looked up in another.
 
 A view's depth is lifted into the world as small surface patches: 3 × 3 pixels and the plane that
-fits them best. Cycles samples depth once a pixel, somewhere under the pixel filter, so one depth
+fits them best. Depth may have been sampled somewhere under the pixel filter (SILVR's is), so one
 value is only good to the slope of the surface times that jitter; the plane averages it, and how far
 the nine points lie from it (`Patches.spread`) tells how far one can trust it. Patches that no plane
 fits (edges, thin structures) are not used to ask, and give a range instead of an answer.
