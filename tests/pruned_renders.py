@@ -14,7 +14,6 @@ import numpy as np
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.rendering import blend_file, cycles, inventory, pruning
-from lightfield.rendering import blend_file, cycles, inventory, pruning
 from lightfield.rendering.colour_pass import render_colour
 from lightfield.rendering.geometry_pass import render_geometry
 from scenes import room
