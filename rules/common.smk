@@ -21,11 +21,12 @@ shell.prefix(
 
 from lightfield.core.errors import UserError
 from lightfield.core.failures import failure_report
-from lightfield.core.files import set_aside, write_json
+from lightfield.core.files import read_json, set_aside, write_json
 from lightfield.dataset import ledger
 from lightfield.dataset.config import load_config
 from lightfield.dataset.dataset import STILLS, load_datasets, scene_datasets
 from lightfield.dataset.exports import MANIFEST, VIEWS
+from lightfield.measurement.sampling import calibrated
 
 # The rigs that config.yaml names are those of the scene that it names.
 if "scenes" in GIVEN and "rigs" not in GIVEN:
@@ -165,6 +166,22 @@ def note_sums():
     )
 
 
+def outdated(dataset):
+    """Return the files that say that they were made from other settings than the present ones.
+
+    Snakemake remembers settings, too, but only as long as its own folder is kept.
+    """
+    if dataset.source.blend and not Path(dataset.blend_check).exists():
+        return []
+    render = dataset.render
+    if dataset.calibration:
+        record = Path(dataset.calibration)
+        if not record.exists() or record in map(Path, BROKEN):
+            return []
+        render = calibrated(render, read_json(record))
+    return list(dataset.outdated(render))
+
+
 def whole(datasets):
     """Return the input function of a target: no input, but what is broken is made anew.
 
@@ -177,6 +194,8 @@ def whole(datasets):
                 if path not in BROKEN:
                     print(f"{path}: {problem}; it is made anew", file=sys.stderr)
                     BROKEN[path] = problem
+                made_anew(path)
+            for path in outdated(dataset):
                 made_anew(path)
             # A run without a job would note no checksums.
             if not Path(SUMS).exists():

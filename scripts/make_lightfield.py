@@ -17,9 +17,6 @@ from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import rigs
 from lightfield.measurement.sampling import calibrated
 
-# What of a scene YAML's `scene` block is written down: not where a file came from, nor where it is.
-SOURCE_KEYS = {"builder", "parameters", "frame"}
-
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
@@ -63,14 +60,7 @@ def main() -> None:
     LightField.from_rig(
         dataset.rig,
         dataset.rig.camera.make(),
-        depth=dataset.depth,
-        frame=dataset.source.frame,
-        scene={
-            "name": dataset.scene_name,
-            **dataset.source.model_dump(include=SOURCE_KEYS, exclude_none=True),
-            "fingerprint": dataset.fingerprint,
-        },
-        render=render,
+        **dataset.origin(render),
     ).write(arguments.output)
 
 

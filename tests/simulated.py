@@ -56,7 +56,18 @@ def planned(folder: Path, *arguments: str) -> set[str]:
 
 def _views(folder: Path, dataset: Dataset) -> None:
     """Write the views and their records, every pixel of another colour."""
-    lightfield = LightField.from_rig(dataset.rig, dataset.rig.camera.make(), depth=dataset.depth)
+    lightfield = LightField.from_rig(
+        dataset.rig, dataset.rig.camera.make(), **dataset.origin(dataset.render)
+    )
+    lightfield.write(folder / dataset.folder / "lightfield.json")
+    for name, reprojection in dataset.reprojections.items():
+        lens = reprojection.camera.make()
+        lightfield.changed(lens).write(folder / dataset.folder / name / "lightfield.json")
+    for name in dataset.exported:
+        if name.endswith("export.json"):
+            export = dataset.exports.wanted[Path(name).parent.name]
+            options = export.model_dump(mode="json", exclude={"sources"})
+            write_json(folder / name, {"options": options, "files": {}})
     for stage in ("render", *dataset.reprojections):
         reprojection = dataset.reprojections.get(stage)
         suffix = reprojection.suffix if reprojection else ".exr"

@@ -184,3 +184,29 @@ def test_what_is_mended_is_planned_and_nothing_else(copy, run_program):
     assert two.inventory not in planned and two.blend not in planned
     assert f"{two.folder}/lightfield.json" not in planned
     assert Path("work/removed", one.folder, "notes.txt").read_text() == "a stray"
+
+
+def test_what_was_made_from_other_settings_is_planned_without_snakemakes_memory(copy):
+    one, two, three = copy
+    assert not Path(".snakemake", "metadata").exists()
+    scene = Path("configs/scenes/smoke.yaml")
+    text = scene.read_text()
+    # The checkout's files are links to the repository's own.
+    scene.unlink()
+    scene.write_text(
+        text.replace(
+            "colmap: {sources: [perspective_hdr], points: 2000",
+            "colmap: {sources: [perspective_hdr], points: 1000",
+        )
+    )
+    planned = simulated.planned(Path(), "smoke")
+    assert f"{one.folder}/perspective_hdr/exports/colmap/export.json" in planned
+    assert f"{one.folder}/perspective_hdr/exports/nerfstudio/export.json" not in planned
+    assert not any("lightfield.json" in name or name in one.all_records for name in planned)
+    scene.write_text(text.replace("size: 0.5", "size: 0.25", 1))
+    planned = simulated.planned(Path(), "smoke")
+    assert {f"{two.folder}/lightfield.json", *two.all_records} <= planned
+    assert not any(name.startswith((one.folder, three.folder)) for name in planned)
+    scene.write_text(text.replace("samples: 4", "samples: 2"))
+    planned = simulated.planned(Path(), "smoke")
+    assert all({f"{d.folder}/lightfield.json", *d.all_records} <= planned for d in copy)

@@ -18,6 +18,7 @@ from lightfield.dataset import config
 from lightfield.dataset.config import CHOSEN, Configuration, Preset, Render, Source
 from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
 from lightfield.dataset.keys import scene_fingerprint
+from lightfield.dataset.lightfield import NAME
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.rigs import Poses, Rig
 
@@ -31,6 +32,9 @@ GUESSED_SAMPLES = 256
 START_UP_PART = 0.05
 # More shards of one dataset than this only make the plan long: no machine renders them all at once.
 MOST_SHARDS = 64
+
+# What of a scene YAML's `scene` block is written down: not where a file came from, nor where it is.
+SOURCE_KEYS = {"builder", "parameters", "frame"}
 
 # Pictures of a report that are drawn together, each as .svg and .png.
 STILLS = ("rig", "depth_panorama", "noise")
@@ -92,6 +96,41 @@ class Dataset:
     def fingerprint(self) -> str:
         """What the scene is identified by: see `scene_fingerprint`."""
         return scene_fingerprint(self.source)
+
+    def origin(self, render: dict[str, Any]) -> dict[str, Any]:
+        """Return what lightfield.json says of what is rendered, and how: by this ``render``."""
+        return {
+            "depth": self.depth,
+            "frame": self.source.frame,
+            "scene": {
+                "name": self.scene_name,
+                **self.source.model_dump(include=SOURCE_KEYS, exclude_none=True),
+                "fingerprint": self.fingerprint,
+            },
+            "render": render,
+        }
+
+    def outdated(self, render: dict[str, Any]) -> Iterator[str]:
+        """Yield those published files that were made from other settings, as they themselves say.
+
+        A lightfield.json holds scene, ``render``, lens and poses, an export.json its options. A
+        file that is broken or missing is none of them.
+        """
+        own = f"{self.folder}/{NAME}"
+        expected = self.origin(render) | self.rig.camera.make().to_lightfield()
+        poses = [[pose.name, [*pose.position, *pose.rotation]] for pose in self.rig.poses()]
+        if _differs(own, expected, poses):
+            yield own
+        for name, reprojection in self.reprojections.items():
+            path = f"{self.folder}/{name}/{NAME}"
+            if _differs(path, reprojection.camera.make().to_lightfield()):
+                yield path
+        for path in self.exported:
+            if path.endswith(MANIFEST):
+                export = self.exports.wanted[Path(path).parent.name]
+                options = export.model_dump(mode="json", exclude={"sources"})
+                if _differs(path, {"options": options}):
+                    yield path
 
     @property
     def builder_fingerprint(self) -> str | None:
@@ -345,6 +384,22 @@ class Dataset:
         count = math.ceil(self.view_count / length)
         bounds = [self.view_count * number // count for number in range(count + 1)]
         return list(pairwise(bounds))
+
+
+def _differs(path: str, expected: dict[str, Any], poses: list[Any] | None = None) -> bool:
+    """Whether a JSON file is there and says something else than is ``expected`` of its keys."""
+    try:
+        content = json.loads(Path(path).read_bytes())
+        if any(content[key] != value for key, value in json.loads(json.dumps(expected)).items()):
+            return True
+        frames = content["frames"] if poses else []
+        return poses is not None and poses != [
+            [frame["name"], [*frame["position"], *frame["rotation"]]] for frame in frames
+        ]
+    except FileNotFoundError:
+        return False
+    except (OSError, ValueError, LookupError, TypeError):
+        return True
 
 
 def _entries(folder: str, name: str) -> list[os.DirEntry[str]]:
