@@ -86,7 +86,7 @@ rule verify:
     message:
         "Checking every byte of the chosen datasets"
     shell:
-        "python scripts/verify.py {params.folders} --work {params.work} 2>&1 | tee {log}"
+        "python {SCRIPTS}/verify.py {params.folders} --work {params.work} 2>&1 | tee {log}"
 
 
 rule package_all:

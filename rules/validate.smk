@@ -24,12 +24,14 @@ rule validate:
     params:
         dataset=DATASET,
         reprojections=reprojection_words,
+        removed=REMOVED,
     message:
         "Validating {wildcards.scene}/{wildcards.rig}"
     shell:
         "python {SCRIPTS}/validate.py --dataset {params.dataset} {params.reprojections}"
         " --records {input.records} --clearance {input.cameras}"
         " --inventory {input.inventory} --processes {threads}"
+        " --removed {params.removed}"
         " --output {output.validation} --sums {output.sums} 2>&1 | tee {log}"
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from lightfield.core.cli import run
 from lightfield.core.files import write_json
 from lightfield.export import MANIFESTS
-from lightfield.validation.files import remove_leftovers, write_sums
+from lightfield.validation.files import remove_leftovers, remove_strays, write_sums
 from lightfield.validation.validate import validate
 
 
@@ -29,10 +29,20 @@ def main() -> None:
     add("--inventory", type=Path, help="JSON of what the scene contains")
     folders = "folders of the dataset that hold a reprojection"
     add("--reprojection", action="extend", nargs="+", default=[], metavar="NAME", help=folders)
+    add("--removed", type=Path, help="folder to which files go that are not the dataset's")
     add("--processes", type=int, default=1, help="worker processes (default: 1)")
     arguments = parser.parse_args()
 
     remove_leftovers(arguments.dataset)
+    if arguments.removed:
+        count = remove_strays(
+            arguments.dataset, arguments.reprojection, MANIFESTS, arguments.removed
+        )
+        if count:
+            print(
+                f"{arguments.dataset}: {count} files that are no longer the dataset's are now in "
+                f"{arguments.removed / arguments.dataset}"
+            )
     result = validate(
         arguments.dataset,
         arguments.reprojection,

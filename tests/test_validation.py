@@ -828,6 +828,24 @@ def test_program_writes_the_same_bytes_each_time_and_sums_that_hold(
     subprocess.run(["sha256sum", "-c", "--strict", "sha256sums.txt"], cwd=dataset, check=True)
 
 
+def test_strays_are_moved_before_they_make_a_dataset_invalid(
+    dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    folder = Path("room/sphere")
+    shutil.copytree(folder / "exr", folder / "former")
+    shutil.copy(folder / NAME, folder / "former" / NAME)
+    shutil.copy(folder / "exr" / f"{names(dataset)[0]}.exr", folder / "exr" / "view_9999f.exr")
+    before = len(list((folder / "exr").iterdir()))
+    assert not check(validate(folder), "files").passed
+    assert files.remove_strays(folder, [], MANIFESTS, Path("removed")) == before + 1
+    assert check(validate(folder), "files").passed
+    assert not (folder / "former").exists()
+    assert Path("removed/room/sphere/exr/view_9999f.exr").is_file()
+    assert len(list((folder / "exr").iterdir())) == before - 1
+    assert files.remove_strays(folder, [], MANIFESTS, Path("removed")) == 0
+
+
 def test_program_names_what_is_wrong_and_publishes_no_sums(dataset: Path, run_program: Any) -> None:
     (dataset / "sha256sums.txt").write_text("of an earlier validation")
     on_file(truncate)(dataset)

@@ -125,6 +125,12 @@ class Dataset:
             path = f"{self.folder}/{name}/{NAME}"
             if _differs(path, reprojection.camera.make().to_lightfield()):
                 yield path
+        if any(
+            path.parent.name not in self.reprojections
+            for path in Path(self.folder).glob(f"*/{NAME}")
+        ):
+            # A reprojection that there was makes the dataset invalid until validation removes it.
+            yield f"{self.folder}/validation.json"
         for path in self.exported:
             if path.endswith(MANIFEST):
                 export = self.exports.wanted[Path(path).parent.name]

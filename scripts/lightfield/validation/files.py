@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, read_json, sha256
+from lightfield.core.files import atomic_path, read_json, set_aside, sha256
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.geometry import rotations
 from lightfield.geometry.lenses import Lens
@@ -239,13 +239,46 @@ def listing(
     dataset: Path, sets: Sequence[ImageSet], known: Iterable[str]
 ) -> tuple[list[str], Check]:
     """Return every file that the dataset publishes, and fail on those that are not its own."""
+    published, strays = _sorted_out(dataset, sets, known)
+    problems = [f"{path}: is no file of this dataset" for path in strays]
+    return published, Check("files", not strays, f"{len(published)} files", problems=problems)
+
+
+def _sorted_out(
+    dataset: Path, sets: Sequence[ImageSet], known: Iterable[str]
+) -> tuple[list[str], list[str]]:
+    """Return the files that the dataset publishes, and those that are not its own."""
     own = {*known, *(f"{image_set.prefix}{NAME}" for image_set in sets)}
     paths = [path.relative_to(dataset) for path in dataset.rglob("*") if path.is_file()]
     present = sorted(path.as_posix() for path in paths if path.parts[0] != REPORT)
     strays = [path for path in present if path not in own and path not in OUTPUTS]
-    published = [path for path in present if path in own]
-    problems = [f"{path}: is no file of this dataset" for path in strays]
-    return published, Check("files", not strays, f"{len(published)} files", problems=problems)
+    return [path for path in present if path in own], strays
+
+
+def remove_strays(
+    dataset: Path, reprojections: Sequence[str], manifests: Sequence[Manifest], folder: Path
+) -> int:
+    """Move the files that are not the dataset's own into ``folder``; return how many they were.
+
+    Such are the views of a rig that had more cameras, and reprojections that there were. Nothing
+    is moved of a dataset with a lightfield.json or an export that cannot be understood.
+    """
+    sets, _ = read_sets(dataset, reprojections)
+    if len(sets) <= len(reprojections):
+        return 0
+    views, _ = of_views(dataset, sets)
+    extras, lists, exports = of_exports(dataset.resolve(), sets, views, manifests)
+    if exports.passed is False:
+        return 0
+    known = {*lists, *(file.path for file in [*views, *extras])}
+    _, strays = _sorted_out(dataset, sets, known)
+    for name in strays:
+        set_aside(dataset / name, folder)
+        for parent in (dataset / name).parents:
+            if parent == dataset or any(parent.iterdir()):
+                break
+            parent.rmdir()
+    return len(strays)
 
 
 def checksums(
