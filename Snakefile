@@ -86,7 +86,8 @@ rule verify:
     message:
         "Checking every byte of the chosen datasets"
     shell:
-        "python {SCRIPTS}/verify.py {params.folders} --work {params.work} 2>&1 | tee {log}"
+        f"python {SCRIPTS}/verify.py"
+        " {params.folders} --work {params.work} 2>&1 | tee {log}"
 
 
 rule package_all:

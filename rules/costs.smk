@@ -33,7 +33,8 @@ rule costs:
     message:
         "Adding up what {wildcards.scene}/{wildcards.rig} has cost"
     shell:
-        "python {SCRIPTS}/costs.py --dataset {params.dataset} --journals {params.journals}"
+        f"python {SCRIPTS}/costs.py"
+        " --dataset {params.dataset} --journals {params.journals}"
         " --benchmarks {params.benchmarks} --scene-benchmarks {params.scene_benchmarks}"
         " --blend {input.blend:q} --energy {params.energy:q} --full {params.full:q}"
         " {params.reprojections} --output {output} 2>&1 | tee {log}"
@@ -52,5 +53,6 @@ rule status:
     message:
         "Looking how far the chosen datasets are"
     shell:
-        "python {SCRIPTS}/status.py --results {params.results} --work {params.work}"
+        f"python {SCRIPTS}/status.py"
+        " --results {params.results} --work {params.work}"
         " {params.datasets} 2>&1 | tee {log}"

@@ -21,7 +21,8 @@ rule probe_cameras:
     message:
         "Placing the probe cameras of {wildcards.scene}"
     shell:
-        "python {SCRIPTS}/make_lightfield.py --scene {params.name} --limits {params.limits:q}"
+        f"python {SCRIPTS}/make_lightfield.py"
+        " --scene {params.name} --limits {params.limits:q}"
         " --output {output} 2>&1 | tee {log}"
 
 
@@ -52,7 +53,8 @@ rule calibrate:
     message:
         "Choosing the settings that reach the target error of {wildcards.scene}"
     shell:
-        "python {SCRIPTS}/calibrate.py --blend {input.blend:q} --inventory {input.inventory}"
+        f"python {SCRIPTS}/calibrate.py"
+        " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} --device {params.device} --threads {threads}"
         " --cache {params.cache} --output {output} --seconds {params.seconds} 2>&1 | tee {log}"
 
@@ -90,7 +92,8 @@ rule measure_error:
     message:
         "Measuring error against render time in {wildcards.scene}"
     shell:
-        "python {SCRIPTS}/error_vs_time.py --blend {input.blend:q} --inventory {input.inventory}"
+        f"python {SCRIPTS}/error_vs_time.py"
+        " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} {params.calibration} --device {params.device} --threads 1"
         " --cache {params.cache} --output {params.stem} 2>&1 | tee {log}"
 

@@ -19,7 +19,8 @@ rule export_views_to_instant_ngp:
     message:
         "Exporting {wildcards.scene}/{wildcards.rig} for instant-ngp"
     shell:
-        "python {SCRIPTS}/export_instant_ngp.py --input-cfg {input.lightfield}"
+        f"python {SCRIPTS}/export_instant_ngp.py"
+        " --input-cfg {input.lightfield}"
         " --image-dir {params.views} --image-suffix .exr {params.placement} --output {output}"
         " 2>&1 | tee {log}"
 
@@ -42,7 +43,8 @@ rule export_reprojection_to_instant_ngp:
     message:
         "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection} for instant-ngp"
     shell:
-        "python {SCRIPTS}/export_instant_ngp.py --input-cfg {input.lightfield}"
+        f"python {SCRIPTS}/export_instant_ngp.py"
+        " --input-cfg {input.lightfield}"
         " --image-suffix {params.suffix} {params.placement} --output {output} 2>&1 | tee {log}"
 
 
@@ -65,11 +67,12 @@ rule export:
         mem_mb=4000,
         runtime=120,
     params:
-        dataset=DATASET,
+        dataset=subpath(input.dataset, parent=True),
         words=export_words,
         folder=subpath(output[0], parent=True),
     message:
         "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for {wildcards.format}"
     shell:
-        "python {SCRIPTS}/export.py {wildcards.format} --dataset {params.dataset} {params.words}"
+        f"python {SCRIPTS}/export.py"
+        " {wildcards.format} --dataset {params.dataset} {params.words}"
         " --output {params.folder} 2>&1 | tee {log}"

@@ -18,7 +18,8 @@ rule rig_tables:
     message:
         "Tabulating the camera setups"
     shell:
-        "python {SCRIPTS}/rig_table.py {input} --markdown {params.table} --csv {params.figures}"
+        f"python {SCRIPTS}/rig_table.py"
+        " {input} --markdown {params.table} --csv {params.figures}"
         " 2>&1 | tee {log}"
 
 
@@ -43,7 +44,8 @@ rule probe:
     message:
         "Measuring what the views of {wildcards.scene}/{wildcards.rig} cost"
     shell:
-        "python {SCRIPTS}/probe.py --blend {input.blend:q} --inventory {input.inventory}"
+        f"python {SCRIPTS}/probe.py"
+        " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} --device {params.device} --output {output}"
         " 2>&1 | tee {log}"
 
@@ -64,4 +66,5 @@ rule plan:
     message:
         "Adding up what the chosen datasets will take"
     shell:
-        "python {SCRIPTS}/plan.py {params.datasets} --output {params.table} 2>&1 | tee {log}"
+        f"python {SCRIPTS}/plan.py"
+        " {params.datasets} --output {params.table} 2>&1 | tee {log}"

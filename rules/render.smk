@@ -30,7 +30,8 @@ rule render:
     message:
         "Rendering views {wildcards.first} to {wildcards.end} of {wildcards.scene}/{wildcards.rig}"
     shell:
-        "python {SCRIPTS}/render_shard.py --blend {input.blend:q} --lightfield {input.lightfield}"
+        f"python {SCRIPTS}/render_shard.py"
+        " --blend {input.blend:q} --lightfield {input.lightfield}"
         " --inventory {input.inventory}"
         " --views {wildcards.first}:{wildcards.end} --device {params.device} --threads {threads}"
         " --output {params.folder} --journal {params.journal} --record {output}"

@@ -24,7 +24,8 @@ rule panorama_lightfield:
     message:
         "Placing the panorama of {wildcards.scene}/{wildcards.rig}"
     shell:
-        "python {SCRIPTS}/make_lightfield.py --scene {params.name} --rig {wildcards.rig}"
+        f"python {SCRIPTS}/make_lightfield.py"
+        " --scene {params.name} --rig {wildcards.rig}"
         " --limits {params.limits:q} --panorama {params.width} {params.calibration}"
         " --output {output} 2>&1 | tee {log}"
 
@@ -53,7 +54,8 @@ rule render_panorama:
     message:
         "Rendering the panorama of {wildcards.scene}/{wildcards.rig}"
     shell:
-        "python {SCRIPTS}/render_shard.py --blend {input.blend:q} --lightfield {input.lightfield}"
+        f"python {SCRIPTS}/render_shard.py"
+        " --blend {input.blend:q} --lightfield {input.lightfield}"
         " --inventory {input.inventory}"
         " --device {params.device} --threads {threads} --output {params.folder} 2>&1 | tee {log}"
 
@@ -77,7 +79,8 @@ rule panorama:
     message:
         "Developing the panorama of {wildcards.scene}/{wildcards.rig}"
     shell:
-        "python {SCRIPTS}/develop.py --input {input} --output {output} 2>&1 | tee {log}"
+        f"python {SCRIPTS}/develop.py"
+        " --input {input} --output {output} 2>&1 | tee {log}"
 
 
 rule contact_sheet:
@@ -102,7 +105,8 @@ rule contact_sheet:
     message:
         "Making the contact sheet of {wildcards.scene}/{wildcards.rig}"
     shell:
-        "python {SCRIPTS}/contact_sheet.py --lightfield {input.lightfield} --views {params.views}"
+        f"python {SCRIPTS}/contact_sheet.py"
+        " --lightfield {input.lightfield} --views {params.views}"
         " --output {output} 2>&1 | tee {log}"
 
 
@@ -133,7 +137,8 @@ rule figures:
     message:
         "Drawing the rig, depth and noise of {wildcards.scene}/{wildcards.rig}"
     shell:
-        "python {SCRIPTS}/report_figures.py --lightfield {input.lightfield} --rig {params.rig:q}"
+        f"python {SCRIPTS}/report_figures.py"
+        " --lightfield {input.lightfield} --rig {params.rig:q}"
         " --panorama {input.panorama} --output {params.folder} 2>&1 | tee {log}"
 
 
@@ -161,7 +166,8 @@ rule page:
     message:
         "Making the page of {wildcards.scene}/{wildcards.rig}"
     shell:
-        "python {SCRIPTS}/report_html.py --dataset {params.dataset}"
+        f"python {SCRIPTS}/report_html.py"
+        " --dataset {params.dataset}"
         " --name {wildcards.scene}/{wildcards.rig} --rig {params.rig:q}"
         " --measurements {params.measurements} --output {output} 2>&1 | tee {log}"
 
@@ -180,5 +186,6 @@ rule index:
     message:
         "Making the page of all datasets"
     shell:
-        "python {SCRIPTS}/report_index.py --results {params.results} --output {output} 2>&1"
+        f"python {SCRIPTS}/report_index.py"
+        " --results {params.results} --output {output} 2>&1"
         " | tee {log}"

@@ -20,7 +20,8 @@ rule reprojected_lightfield:
     message:
         "Writing the lens of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
-        "python {SCRIPTS}/reproject.py --dry-run {params.optics} {params.development}"
+        f"python {SCRIPTS}/reproject.py"
+        " --dry-run {params.optics} {params.development}"
         " --input-cfg {input} --output-cfg {output} --input-dir {params.views}"
         " --output-dir {params.folder} 2>&1 | tee {log}"
 
@@ -41,7 +42,8 @@ rule lens_map:
     message:
         "Computing the lens map of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
-        "python {SCRIPTS}/lens_map.py {output} {params.optics} --input-cfg {input} 2>&1 | tee {log}"
+        f"python {SCRIPTS}/lens_map.py"
+        " {output} {params.optics} --input-cfg {input} 2>&1 | tee {log}"
 
 
 rule reproject:
@@ -69,7 +71,8 @@ rule reproject:
         "Reprojecting views {wildcards.first} to {wildcards.end} of"
         " {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
-        "python {SCRIPTS}/reproject.py {params.optics} {params.development}"
+        f"python {SCRIPTS}/reproject.py"
+        " {params.optics} {params.development}"
         " --lens-map {input.lens_map} --input-cfg {input.lightfield} --input-dir {params.views}"
         " --views {wildcards.first}:{wildcards.end} --output-dir {params.folder}"
         " --source-record {input.record} --record {output} 2>&1 | tee {log}"

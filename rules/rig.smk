@@ -24,7 +24,8 @@ rule lightfield:
     message:
         "Placing the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
-        "python {SCRIPTS}/make_lightfield.py --scene {params.name} --rig {wildcards.rig}"
+        f"python {SCRIPTS}/make_lightfield.py"
+        " --scene {params.name} --rig {wildcards.rig}"
         " --limits {params.limits:q} {params.calibration} --output {output} 2>&1 | tee {log}"
 
 
@@ -47,5 +48,6 @@ rule check_cameras:
     message:
         "Looking for cameras of {wildcards.scene}/{wildcards.rig} inside geometry"
     shell:
-        "python {SCRIPTS}/check_cameras.py --blend {input.blend:q} --lightfield {input.lightfield}"
+        f"python {SCRIPTS}/check_cameras.py"
+        " --blend {input.blend:q} --lightfield {input.lightfield}"
         " --output {output} 2>&1 | tee {log}"

@@ -23,7 +23,8 @@ rule build_scene:
     message:
         "Building the scene {wildcards.name}"
     shell:
-        "python {SCRIPTS}/build_scene.py --builder {params.builder}"
+        f"python {SCRIPTS}/build_scene.py"
+        " --builder {params.builder}"
         " --parameters {params.parameters:q} --output {output} 2>&1 | tee {log}"
 
 
@@ -44,7 +45,8 @@ rule check_blend:
     message:
         "Checking {input}"
     shell:
-        "python {SCRIPTS}/check_blend.py --scene {wildcards.name} --blend {input:q}"
+        f"python {SCRIPTS}/check_blend.py"
+        " --scene {wildcards.name} --blend {input:q}"
         " --output {output} 2>&1 | tee {log}"
 
 
@@ -66,7 +68,8 @@ rule inventory:
     message:
         "Listing what the scene {wildcards.name} contains"
     shell:
-        "python {SCRIPTS}/inventory.py --blend {input.blend:q} --output {output} 2>&1 | tee {log}"
+        f"python {SCRIPTS}/inventory.py"
+        " --blend {input.blend:q} --output {output} 2>&1 | tee {log}"
 
 
 # Only where a scene YAML says from where, and the user has not brought the file.
@@ -90,5 +93,6 @@ for name, dataset in SCENES.items():
         message:
             "Downloading {output}"
         shell:
-            "python {SCRIPTS}/fetch_blend.py --scene {params.name} --output {output:q}"
+            f"python {SCRIPTS}/fetch_blend.py"
+            " --scene {params.name} --output {output:q}"
             " 2>&1 | tee {log}"

@@ -28,7 +28,8 @@ rule validate:
     message:
         "Validating {wildcards.scene}/{wildcards.rig}"
     shell:
-        "python {SCRIPTS}/validate.py --dataset {params.dataset} {params.reprojections}"
+        f"python {SCRIPTS}/validate.py"
+        " --dataset {params.dataset} {params.reprojections}"
         " --records {input.records} --clearance {input.cameras}"
         " --inventory {input.inventory} --processes {threads}"
         " --removed {params.removed}"
@@ -50,5 +51,6 @@ rule checksums:
     message:
         "Publishing the checksums of {wildcards.scene}/{wildcards.rig}"
     shell:
-        "python {SCRIPTS}/publish_checksums.py --validation {input.validation} --page {input.page}"
+        f"python {SCRIPTS}/publish_checksums.py"
+        " --validation {input.validation} --page {input.page}"
         " --sums {input.sums} --output {output} 2>&1 | tee {log}"
