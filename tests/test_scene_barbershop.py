@@ -12,7 +12,7 @@ import yaml
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-from lightfield.geometry.rigs import poses
+from lightfield.geometry.rigs import from_settings
 from scenes import barbershop
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -91,7 +91,9 @@ def test_objects_triangles_and_instancing(scene):
 
 def test_cameras_keep_clear(scene):
     """No camera of any rig has geometry within 5 cm, by BVHs of the evaluated meshes."""
-    cameras = np.concatenate([[pose.position for pose in poses(rig)] for rig in RIGS.values()])
+    cameras = np.concatenate(
+        [[pose.position for pose in from_settings(rig).poses()] for rig in RIGS.values()]
+    )
     nearest = np.inf
     for instance in scene.object_instances:
         thing, matrix = instance.object, instance.matrix_world

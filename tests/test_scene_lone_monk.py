@@ -11,7 +11,7 @@ import pytest
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-from lightfield.geometry.rigs import poses
+from lightfield.geometry.rigs import from_settings
 from scenes import lone_monk
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
@@ -106,7 +106,9 @@ def test_triangles_and_instancing(scene):
 
 def test_cameras_keep_clear(scene):
     """No camera of any rig has geometry within 5 cm, by BVHs of the evaluated meshes."""
-    cameras = np.concatenate([[p.position for p in poses(rig)] for rig in RIGS.values()])
+    cameras = np.concatenate(
+        [[p.position for p in from_settings(rig).poses()] for rig in RIGS.values()]
+    )
     nearest = REACH
     for instance in scene.object_instances:
         thing = instance.object
