@@ -119,7 +119,7 @@ def show(browser):
 @pytest.fixture(scope="module")
 def sphere(tmp_path_factory, run_program):
     """The page of a sphere of cameras with all that a page can have; and its lightfield.json."""
-    folder = tmp_path_factory.mktemp("ball") / "LFSphere"
+    folder = tmp_path_factory.mktemp("results") / "ball" / "LFSphere"
     lightfield = write_dataset(folder, SPHERE)
     panorama = lenses.from_camera({"lens": "equirectangular", "resolution": [128, 64]})
     colour, _ = view(
