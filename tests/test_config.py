@@ -203,9 +203,9 @@ def test_defaults_and_limits_are_applied(tmp_path, monkeypatch):
         ("right_small", 42),
         ("right_small", 48),
     ]
-    assert small[0].rig.camera.resolution == [100, 100]
-    assert small[1].rig.camera.resolution == [100, 50]
-    assert small[0].reprojections["perspective"].camera.resolution == [100, 100]
+    assert small[0].rig.camera.resolution == (100, 100)
+    assert small[1].rig.camera.resolution == (100, 50)
+    assert small[0].reprojections["perspective"].camera.resolution == (100, 100)
     assert small[0].render["samples"] == 8
     assert small[0].render["denoise"] is True
 

@@ -554,8 +554,9 @@ def _limited(camera: CameraSettings, limits: Preset) -> CameraSettings:
     width, height = camera.resolution
     scale = min(1.0, (limits.resolution or max(width, height)) / max(width, height))
     update: dict[str, Any] = {
-        "resolution": [max(1, round(width * scale)), max(1, round(height * scale))]
+        "resolution": (max(1, round(width * scale)), max(1, round(height * scale)))
     }
     if camera.principal_point:
-        update["principal_point"] = [value * scale for value in camera.principal_point]
+        x, y = camera.principal_point
+        update["principal_point"] = (x * scale, y * scale)
     return camera.model_copy(update=update)
