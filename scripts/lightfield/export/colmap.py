@@ -65,7 +65,7 @@ def camera(lens: Lens) -> tuple[tuple[int, str], list[float]]:
 def pose(view: View) -> tuple[list[float], list[float]]:
     """Return a view's world-to-camera rotation as a quaternion (w, x, y, z), and translation."""
     turn = FLIP @ view.matrix[:3, :3].T
-    x, y, z, w = Rotation.from_matrix(turn).as_quat()
+    x, y, z, w = Rotation.from_matrix(turn).as_quat().tolist()
     return [w, x, y, z], (-turn @ view.matrix[:3, 3]).tolist()
 
 
