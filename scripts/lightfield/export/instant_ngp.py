@@ -424,7 +424,7 @@ def _ftheta(lens: Lens) -> list[float]:
     known = np.isfinite(across)
     nodes, across, down = nodes[known], across[known], down[known]
     for degree in (1, 4):
-        fit = Polynomial.fit(  # type: ignore[no-untyped-call]
+        fit = Polynomial.fit(  # type: ignore[no-untyped-call, unused-ignore]
             nodes, across, degree, domain=[0, seen[-1]], window=[0, 1]
         )
         if np.abs(fit(nodes) - across).max() < 1e-9:

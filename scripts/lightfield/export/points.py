@@ -111,7 +111,7 @@ def _one_a_voxel(positions: Floats, voxel: float) -> NDArray[np.intp]:
 
 def _voxel_for(positions: Floats, count: int) -> float:
     """Return the side of voxels of which at most ``count`` hold points, to a percent."""
-    low, high = 0.0, float(np.ptp(positions, axis=0).max())
+    low, high = 0.0, float(np.max(positions.max(axis=0) - positions.min(axis=0)))
     while high - low > 0.01 * high:
         middle = (low + high) / 2
         if len(_one_a_voxel(positions, middle)) > count:

@@ -76,7 +76,8 @@ def _depth(depth: Array) -> Array:
 
 
 def _step(pixels: Array) -> int:
-    return math.ceil(max(pixels.shape) / SIDE)
+    step: int = math.ceil(max(pixels.shape) / SIDE)
+    return step
 
 
 def _marked(shown: Array, wrong: Array) -> Array:

@@ -90,7 +90,8 @@ def source_index(
 def _sample(source: Array, row: int, column: int, wy: Any, wx: Any) -> tuple[Any, Any, Any, Any]:
     """The weighted sum of the pixels from (row, column) on, all of which exist."""
     # Unsigned, so that no index is checked for counting from the end.
-    i, j = np.uint64(row), np.uint64(column)
+    i: Any = np.uint64(row)
+    j: Any = np.uint64(column)
     s0 = s1 = s2 = s3 = np.float32(0)
     for a in range(np.uint64(len(wy))):
         r0 = r1 = r2 = r3 = np.float32(0)

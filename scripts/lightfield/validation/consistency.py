@@ -167,8 +167,8 @@ def sample(camera: Camera, depth: NDArray[Any], rays: int) -> Patches:
     patches, smooth = _patches(camera, depth, columns.ravel(), rows.ravel())
     roughness = np.full(len(smooth), np.inf)
     roughness[smooth] = patches.spread[smooth] / patches.footprint[smooth]
-    roughness = roughness.reshape(-1, 4)
-    best = roughness.argmin(axis=1) + 4 * np.arange(len(roughness))
+    cells = roughness.reshape(-1, 4)
+    best = cells.argmin(axis=1) + 4 * np.arange(len(cells))
     return patches[best[smooth[best]]]
 
 

@@ -26,7 +26,7 @@ class Hemisphere(Orbit):
         if self.pattern == "fibonacci":
             # Equal steps of height are equal areas. Source: Gonzalez 2010, "Measurement of areas on
             # a sphere using Fibonacci and latitude-longitude lattices".
-            number = np.arange(self.count)
+            number = np.arange(self.count, dtype=np.float64)
             height = low + (high - low) * (number + 0.5) / self.count
             return on_sphere(GOLDEN_ANGLE * number, height)
         lowest, highest = np.radians(self.elevation)
