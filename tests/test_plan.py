@@ -23,9 +23,9 @@ def test_the_rigs_are_those_that_silvr_published():
         for scene in SILVR
         for dataset in scene_datasets(scene)
     }
-    fisheye = ("equidistant", [2048, 2048])
-    evaluation = (42, "rectilinear", [2048, 2048])
-    panoramas = (8, "equirectangular", [4096, 2048])
+    fisheye = ("equidistant", (2048, 2048))
+    evaluation = (42, "rectilinear", (2048, 2048))
+    panoramas = (8, "equirectangular", (4096, 2048))
     assert counts == {
         ("garden", "LFCuboid_2x2x1"): (1806, *fisheye),
         ("garden", "LFSphere_e100cm_d170cm"): (642, *fisheye),
