@@ -33,6 +33,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.export.source import DEPTH_UNIT, millimetres
 from lightfield.geometry.depth import distance_from_z, z_from_distance
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -45,9 +46,6 @@ Floats = NDArray[np.float64]
 
 TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """World to NeRF coordinates, as SILVR's generate_NERF_transforms.py turns its scenes."""
-
-DEPTH_UNIT = 0.001
-"""Metres of one step of a 16-bit depth map; what lies beyond 65.535 m has no depth there."""
 
 RIG_PART = 0.2
 """Part of the unit cube's side that the rig takes where nothing else is known of the scene."""
@@ -352,9 +350,7 @@ def depth_map(
         values = z_from_distance(values, rays)
     elif not reads_z and meaning == "z":
         values = distance_from_z(values, rays)
-    steps = np.round(values / DEPTH_UNIT)
-    valid = np.isfinite(steps) & (steps >= 1) & (steps <= np.iinfo(np.uint16).max)
-    return np.where(valid, steps, 0).astype(np.uint16)
+    return millimetres(values)
 
 
 def world_points(depth: NDArray[Any], meaning: str, rays: NDArray[Any], view: View) -> Floats:

@@ -17,7 +17,7 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.exports import Nerfstudio
 from lightfield.export import cameras
 from lightfield.export.points import lift, write_ply
-from lightfield.export.source import Floats, Source
+from lightfield.export.source import Source, millimetres
 from lightfield.export.splits import splits
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -25,8 +25,6 @@ from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
 
 POINT_CLOUD = "points.ply"
-# The parser's own unit: metres of one step of a depth map. 0 is unknown there.
-DEPTH_UNIT = 0.001
 
 
 def export(source: Source, settings: Nerfstudio, folder: Path) -> None:
@@ -83,10 +81,3 @@ def camera(lens: Lens) -> dict[str, Any]:
 
 def _center(lens: Lens) -> dict[str, float]:
     return {"cx": lens.center[0], "cy": lens.center[1]}
-
-
-def millimetres(depth: Floats) -> np.ndarray[Any, np.dtype[np.uint16]]:
-    """Return depth (h, w) in metres as 16-bit steps of `DEPTH_UNIT`; 0 is none, or beyond 65 m."""
-    steps = np.round(depth / DEPTH_UNIT)
-    valid = np.isfinite(steps) & (steps >= 1) & (steps <= np.iinfo(np.uint16).max)
-    return np.where(valid, steps, 0).astype(np.uint16)

@@ -25,6 +25,9 @@ Bools = NDArray[np.bool_]
 # other of a point somewhere in the pixel.
 SAME_SURFACE = 0.01
 
+DEPTH_UNIT = 0.001
+"""Metres of one step of a 16-bit depth map; what lies beyond 65.535 m has no depth there."""
+
 
 @dataclass(frozen=True)
 class Source:
@@ -161,6 +164,13 @@ def pixel_indices(lens: Lens, rays: Floats) -> tuple[NDArray[np.intp], NDArray[n
         inside = (x >= 0) & (x < lens.width) & (y >= 0) & (y < lens.height)
     column, row = (np.where(inside, value, 0).astype(np.intp) for value in (x, y))
     return column, row, inside
+
+
+def millimetres(depth: Floats) -> NDArray[np.uint16]:
+    """Return depth (h, w) in metres as 16-bit steps of `DEPTH_UNIT`; 0 is none, or too far."""
+    steps = np.round(depth / DEPTH_UNIT)
+    valid = np.isfinite(steps) & (steps >= 1) & (steps <= np.iinfo(np.uint16).max)
+    return np.where(valid, steps, 0).astype(np.uint16)
 
 
 def _depth_of(path: Path, lightfield: LightField, rays: Floats, meaning: str) -> Floats:
