@@ -22,7 +22,8 @@ rule reprojection_benchmark:
     message:
         "Measuring the error of reprojection against its run time"
     shell:
-        "python benchmarks/reprojection.py {params.folder} --batch 8 2>&1 | tee {log}"
+        f"python {BENCHMARKS}/reprojection.py"
+        " {params.folder} --batch 8 2>&1 | tee {log}"
 
 
 rule stability:
@@ -42,7 +43,7 @@ rule stability:
     message:
         "Taking every pair of lenses to its extremes"
     shell:
-        "python benchmarks/stability.py --output {params.folder} 2>&1 | tee {log}"
+        f"python {BENCHMARKS}/stability.py" " --output {params.folder} 2>&1 | tee {log}"
 
 
 rule render_overhead:
@@ -56,4 +57,4 @@ rule render_overhead:
     message:
         "Measuring what the workflow adds to Cycles' own render time"
     shell:
-        "python benchmarks/render_overhead.py 2> {log} | tee {output}"
+        f"python {BENCHMARKS}/render_overhead.py" " 2> {log} | tee {output}"
