@@ -343,6 +343,13 @@ def reprojection_words(wildcards):
     return " ".join(words)
 
 
+def instant_ngp_words(wildcards):
+    """Return the words that say to scripts/export_instant_ngp.py what to write."""
+    dataset = dataset_of(wildcards)
+    folder = Path(dataset.folder, wildcards.get("reprojection", ""))
+    return dataset.instant_ngp_words(str(folder))
+
+
 def export_words(wildcards):
     """Return the words that say to scripts/export.py from what it exports, and how."""
     dataset = dataset_of(wildcards)

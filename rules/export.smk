@@ -15,13 +15,13 @@ rule export_views_to_instant_ngp:
         ENVIRONMENT
     params:
         views=f"{DATASET}/exr",
-        placement=of_dataset("placement"),
+        options=instant_ngp_words,
     message:
         "Exporting {wildcards.scene}/{wildcards.rig} for instant-ngp"
     shell:
         f"python {SCRIPTS}/export_instant_ngp.py"
         " --input-cfg {input.lightfield}"
-        " --image-dir {params.views} --image-suffix .exr {params.placement} --output {output}"
+        " --image-dir {params.views} --image-suffix .exr {params.options} --output {output}"
         " 2>&1 | tee {log}"
 
 
@@ -39,13 +39,13 @@ rule export_reprojection_to_instant_ngp:
         ENVIRONMENT
     params:
         suffix=of_reprojection("suffix"),
-        placement=of_dataset("placement"),
+        options=instant_ngp_words,
     message:
         "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection} for instant-ngp"
     shell:
         f"python {SCRIPTS}/export_instant_ngp.py"
         " --input-cfg {input.lightfield}"
-        " --image-suffix {params.suffix} {params.placement} --output {output} 2>&1 | tee {log}"
+        " --image-suffix {params.suffix} {params.options} --output {output} 2>&1 | tee {log}"
 
 
 rule export:

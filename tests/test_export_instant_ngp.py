@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter, ValidationError
 
 from lightfield.core.errors import UserError
+from lightfield.dataset.exports import InstantNgp
 from lightfield.dataset.lightfield import LightField
 from lightfield.export import instant_ngp
 from lightfield.geometry import lenses
@@ -340,6 +342,26 @@ def test_fitted_to_the_rig_its_box_is_a_fifth_of_the_cube_and_centred(dataset: D
     assert np.ptp(positions, axis=0).max() == pytest.approx(0.2, abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    "rig",
+    [
+        {"type": "sphere", "subdivisions": 1, "size": 3, "face_inside": True},
+        {"type": "hemisphere", "count": 9, "elevation": [10, 60], "size": 3},
+        {"type": "ring", "count": 5, "size": 3},
+    ],
+)
+def test_a_rig_that_looks_inward_fills_the_cube_around_what_it_looks_at(
+    rig: Any, dataset: Dataset
+) -> None:
+    content = dataset.write(PERSPECTIVE, rig | {"center": [5, 6, 7]})
+    loader = Loader(dataset.export())
+    np.testing.assert_allclose(loader.position(silvr_orientation([5, 6, 7])), 0.5, atol=1e-6)
+    places = [frame["position"] for frame in content["frames"]]
+    assert in_unit_cube(loader, places)
+    apart = [loader.position(silvr_orientation(place)) - 0.5 for place in places]
+    assert np.abs(apart).max() == pytest.approx(0.5, abs=1e-6)
+
+
 def test_fitted_to_depth_the_scene_is_within_the_cube(dataset: Dataset) -> None:
     rig = {"type": "sphere", "subdivisions": 1, "size": 0.02, "center": [1, -2, 3]}
     content = dataset.write(FISHEYE, rig, depth="distance")
@@ -373,6 +395,23 @@ def test_boxes_and_scales_are_passed_on(dataset: Dataset) -> None:
     )
     assert transforms["aabb_scale"] == 16
     assert transforms["render_aabb"] == [[0.1, 0.2, 0.3], [0.7, 0.8, 0.9]]
+
+
+def test_the_yaml_asks_for_all_that_the_program_can_do(dataset: Dataset) -> None:
+    content = dataset.write(FISHEYE, depth="distance")
+    dataset.render(content, FISHEYE, "distance", 4.0)
+    settings = {"sources": ["views"], "bounds": "depth", "aabb_scale": 2, "depth": True}
+    box = [[0.1, 0.2, 0.3], [0.7, 0.8, 0.9]]
+    model = TypeAdapter(InstantNgp).validate_python(settings | {"render_aabb": box})
+    transforms = dataset.export("--image-suffix", ".exr", *model.words(str(dataset.folder)))
+    assert transforms["scale"] == dataset.export("--depth-bounds")["scale"]
+    assert transforms["render_aabb"] == box
+    assert transforms["aabb_scale"] == 2
+    depth = dataset.folder / transforms["frames"][0]["depth_path"]
+    assert depth.parent == dataset.folder / "instant_ngp" / "depth"
+    assert images.read_image(depth).channels["Y"].max() == 4000
+    with pytest.raises(ValidationError, match="bounds: goes without scale"):
+        TypeAdapter(InstantNgp).validate_python(settings | {"scale": 0.1})
 
 
 @pytest.mark.parametrize("lens", ["equisolid", "stereographic"])

@@ -158,10 +158,12 @@ class Dataset:
         """Twice a 180 degree fisheye view's angular resolution, within 4096 pixels."""
         return min(4 * self.rig.camera.resolution[0], 4096)
 
-    @property
-    def placement(self) -> str:
-        """The words that say to scripts/export_instant_ngp.py what the scene YAML asks for."""
-        words = self.exports.instant_ngp.words() if self.exports.instant_ngp else []
+    def instant_ngp_words(self, folder: str) -> str:
+        """Return the words that say to scripts/export_instant_ngp.py what the scene YAML asks for.
+
+        ``folder`` is that of the transforms.json.
+        """
+        words = self.exports.instant_ngp.words(folder) if self.exports.instant_ngp else []
         return shlex.join([*words, *(["--split"] if self.rig.evaluation_split else [])])
 
     # The scene's files, which all rigs and presets have in common.

@@ -5,11 +5,11 @@ cannot open and how it can be had. What the options do is written in `lightfield
 """
 
 import math
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal, Self, get_args
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from lightfield.core.settings import Settings, Vector
+from lightfield.core.settings import Settings, Vector, as_list
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -62,17 +62,43 @@ class InstantNgp(Export):
     offset: Vector = Field(
         (0.5, 0.5, 0.5), description="Where the mean camera lies in the unit cube."
     )
+    bounds: Literal["rig", "depth"] = Field(
+        "rig",
+        description="What is fitted without a scale: the rig, or what the views' depth shows.",
+    )
     aabb_scale: Literal[1, 2, 4, 8, 16, 32, 64, 128] | None = Field(
         None, description="Side of the training volume, in unit cubes."
     )
+    render_aabb: Annotated[tuple[Vector, Vector], as_list(2)] | None = Field(
+        None, description="Two corners of the part of the unit cube that is shown."
+    )
+    depth: bool = Field(False, description="Depth maps too, 16 bit, from sources with depth.")
 
-    def words(self) -> list[str]:
-        """Return the words that place the scene in instant-ngp's unit cube."""
+    @model_validator(mode="after")
+    def _one_placement(self) -> Self:
+        if self.scale is not None and self.bounds == "depth":
+            raise ValueError("bounds: goes without scale, which it would find")
+        return self
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        return NO_DEPTH if (self.depth or self.bounds == "depth") and not has_depth else None
+
+    def words(self, folder: str) -> list[str]:
+        """Return the words of scripts/export_instant_ngp.py; depth maps go below ``folder``."""
         words = []
         if self.scale is not None:
             words += ["--scale", str(self.scale), "--offset", *map(str, self.offset)]
+        if self.bounds == "depth":
+            words += ["--depth-bounds"]
         if self.aabb_scale is not None:
             words += ["--aabb-scale", str(self.aabb_scale)]
+        if self.render_aabb is not None:
+            words += [
+                "--render-aabb",
+                *(str(value) for corner in self.render_aabb for value in corner),
+            ]
+        if self.depth:
+            words += ["--depth-dir", f"{folder}/instant_ngp/depth"]
         return words
 
 

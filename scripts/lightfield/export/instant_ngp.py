@@ -102,7 +102,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--depth-bounds",
         action="store_true",
         help="fit to what channel Z of the .exr views sees: cameras and nine tenths of the points "
-        "fill the unit cube (default: the rig fills a fifth of it)",
+        "fill the unit cube (default: the rig fills a fifth of it, or all if it looks inward)",
     )
     add(
         "--aabb-scale",
@@ -175,7 +175,7 @@ class _Writer:
             offset = self.arguments.offset or (0.5, 0.5, 0.5)
             return self.arguments.scale, placed(cameras, self.arguments.scale, offset)
         if not self.arguments.depth_bounds:
-            return fitted_to_rig(cameras)
+            return fitted_to_rig(cameras, -self.lightfield.matrices[:, :3, 2])
         points = np.concatenate(list(self.seen_points()))
         if not len(points):
             raise UserError(f"{self.image_dir}: no view sees anything at a finite depth")
@@ -381,11 +381,35 @@ def fitted(low: Floats, high: Floats) -> tuple[float, list[float]]:
     return scale, (0.5 - scale * TURN @ ((low + high) / 2)).tolist()
 
 
-def fitted_to_rig(cameras: Floats) -> tuple[float, list[float]]:
-    """Return the scale and offset that put the rig in the cube's middle, `RIG_PART` wide."""
+def fitted_to_rig(cameras: Floats, axes: Floats) -> tuple[float, list[float]]:
+    """Return the scale and offset that put the rig in the cube's middle, `RIG_PART` wide.
+
+    ``axes`` (n, 3) are the directions in which the ``cameras`` (n, 3) look. A rig that looks
+    inward, as at an object, fills the whole cube around the point that it looks at.
+    """
     center = (cameras.min(axis=0) + cameras.max(axis=0)) / 2
     half = (cameras.max(axis=0) - cameras.min(axis=0)) / 2 / RIG_PART
+    point = looked_at(cameras, axes)
+    if point is not None:
+        center, half = point, np.abs(cameras - point).max(axis=0)
     return fitted(center - half, center + half)
+
+
+def looked_at(cameras: Floats, axes: Floats) -> Floats | None:
+    """Return the point (3,) within a rig that all its cameras look at; None if there is none.
+
+    It is the point nearest to all optical axes by least squares; it lies before every camera, and
+    no farther from the rig's middle than the rig reaches.
+    """
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    normal = across.sum(axis=0)
+    if np.linalg.matrix_rank(normal, tol=1e-6 * len(cameras)) < 3:
+        return None  # parallel
+    point: Floats = np.linalg.solve(normal, (across @ cameras[:, :, None]).sum(axis=0))[:, 0]
+    before = ((point - cameras) * axes).sum(axis=1) > 0
+    middle = (cameras.min(axis=0) + cameras.max(axis=0)) / 2
+    reach = np.max(np.linalg.norm(cameras - middle, axis=1))
+    return point if before.all() and np.linalg.norm(point - middle) <= reach else None
 
 
 def placed(cameras: Floats, scale: float, offset: Sequence[float]) -> list[float]:
