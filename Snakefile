@@ -14,7 +14,7 @@ if Path("config.yaml").exists():
     configfile: "config.yaml"
 
 
-report: "report/workflow.rst"
+report: "captions/workflow.rst"
 
 
 include: "rules/common.smk"

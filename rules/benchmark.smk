@@ -9,7 +9,7 @@ rule reprojection_benchmark:
         report(
             f"{MEASURED}/reprojection.png",
             category="Measurements",
-            caption="../report/reprojection_benchmark.rst",
+            caption="../captions/reprojection_benchmark.rst",
         ),
     log:
         log_of("reprojection_benchmark"),
@@ -32,7 +32,7 @@ rule stability:
         report(
             f"{MEASURED}/stability.png",
             category="Measurements",
-            caption="../report/stability.rst",
+            caption="../captions/stability.rst",
         ),
     log:
         log_of("stability"),

@@ -68,7 +68,7 @@ rule panorama:
             f"{DATASET}/report/panorama.png",
             category="{scene}",
             subcategory="{rig}",
-            caption="../report/panorama.rst",
+            caption="../captions/panorama.rst",
         ),
     log:
         log_of("{scene}/{rig}/panorama/develop"),
@@ -92,7 +92,7 @@ rule contact_sheet:
             f"{DATASET}/report/contact_sheet.png",
             category="{scene}",
             subcategory="{rig}",
-            caption="../report/contact_sheet.rst",
+            caption="../captions/contact_sheet.rst",
         ),
     log:
         log_of("{scene}/{rig}/contact_sheet"),
@@ -121,7 +121,7 @@ rule figures:
                 f"{DATASET}/report/{still}.png",
                 category="{scene}",
                 subcategory="{rig}",
-                caption=f"../report/{still}.rst",
+                caption=f"../captions/{still}.rst",
             )
             for still in STILLS
         ],

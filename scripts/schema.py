@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema
 
 from lightfield.core.cli import run
-from lightfield.core.files import atomic_path
+from lightfield.core.files import write_text
 from lightfield.dataset.config import ROOT, Configuration, Scene
 
 FOLDER = ROOT / "configs" / "schema"
@@ -46,8 +46,7 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=FOLDER, help="default: %(default)s")
     folder: Path = parser.parse_args().folder
     for name in MODELS:
-        with atomic_path(folder / f"{name}.schema.json") as temporary:
-            temporary.write_text(schema(name), encoding="utf-8")
+        write_text(folder / f"{name}.schema.json", schema(name))
 
 
 if __name__ == "__main__":

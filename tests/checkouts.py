@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PARTS = ("Snakefile", "config.yaml", "configs", "envs", "profiles", "report", "rules", "scripts")
+PARTS = ("Snakefile", "config.yaml", "configs", "envs", "profiles", "captions", "rules", "scripts")
 
 
 def checkout(folder, **scenes):

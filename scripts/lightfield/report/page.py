@@ -11,7 +11,7 @@ from markupsafe import Markup
 from PIL import Image
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path
+from lightfield.core.files import write_text
 from lightfield.report.packing import data_uri
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
@@ -33,9 +33,7 @@ def write(output: Path, template: str, **content: Any) -> None:
     environment.filters |= {"number": number, "cell": cell, "measure": measure, "named": title}
     # These are the project's own files, not somebody's text.
     css, js = (Markup((TEMPLATES / name).read_text("utf-8")) for name in ("page.css", "page.js"))
-    text = environment.get_template(template).render(css=css, js=js, **content)
-    with atomic_path(output) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(output, environment.get_template(template).render(css=css, js=js, **content))
 
 
 def photo(path: Path, widest: int) -> str | None:

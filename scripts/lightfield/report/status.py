@@ -1,0 +1,147 @@
+"""How far a dataset is, also while it is being built: from its files alone.
+
+A rendered view counts if its file carries the key of the settings that lightfield.json gives; a
+reprojected one if it is no older than the view that it was made from.
+"""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import broken, read_json
+from lightfield.core.progress import duration
+from lightfield.dataset import journal, keys
+from lightfield.dataset.lightfield import NAME, LightField, View
+from lightfield.imaging import images
+
+# The rate is that of so many seconds.
+WINDOW = 600.0
+# A process on another machine that has been silent for so long is taken for dead.
+SILENCE = 3600.0
+
+
+@dataclass
+class Rendering:
+    """Of one dataset: the views that are rendered, and what its shards' processes are doing."""
+
+    finished: set[str] = field(default_factory=set)
+    # When views were finished, and the span over which that was looked at, both within `WINDOW`.
+    recent: int = 0
+    seconds: float = 0.0
+    running: list[str] = field(default_factory=list)
+    silent: list[str] = field(default_factory=list)
+    killed: list[str] = field(default_factory=list)
+
+
+def look(folder: Path, work: Path, now: float) -> Rendering:
+    """Find out how far the rendering of a dataset is at ``now``, in seconds since 1970."""
+    views: Sequence[View] = ()
+    found = Rendering()
+    try:
+        if (folder / NAME).exists():
+            lightfield = LightField.read(folder / NAME)
+            views = lightfield.views
+            found.finished = {
+                view.name
+                for view in views
+                if images.has_key(_file(folder, view.name), keys.render_key(lightfield, view))
+            }
+    except UserError as error:
+        print(f"{error}; it is made anew", file=sys.stderr)
+    journals = filter(Path.is_file, (work / "render").glob("*.journal.jsonl"))
+    for bounds, path in sorted((_bounds(path), path) for path in journals):
+        if runs := journal.read(path):
+            first, end = bounds
+            missing = any(view.name not in found.finished for view in views[first:end])
+            _add_shard(found, f"{first}:{end}", runs, missing, now)
+    if not found.running:
+        found.recent = 0
+    return found
+
+
+def _add_shard(
+    found: Rendering, name: str, runs: Sequence[journal.Run], missing: bool, now: float
+) -> None:
+    """Note what the processes of a shard, of which views are ``missing``, are doing."""
+    last = runs[-1]
+    at_work = last.is_running()
+    silence = now - last.last_heard
+    if at_work:
+        found.running.append(name)
+    elif at_work is None and silence < SILENCE:
+        host = last.start["host"]
+        found.running.append(f"{name} on {host} (heard of {duration(silence)} ago)")
+    elif missing and last.end is None:
+        (found.silent if at_work is None else found.killed).append(name)
+    for run in runs:
+        found.recent += sum(view["finished"] > now - WINDOW for view in run.views)
+        # What works now counts until now, although its next view is not yet finished.
+        until = now if run is last and at_work is not False else run.last_heard
+        if until > now - WINDOW:
+            span = min(WINDOW, now - float(run.start["started"]))
+            found.seconds = max(found.seconds, span)
+
+
+def lines(
+    name: str, folder: Path, count: int, reprojections: Sequence[str], rendering: Rendering
+) -> list[str]:
+    """Say in lines how far a dataset of ``count`` views is."""
+    done = len(rendering.finished)
+    left = outlook(count - done, rendering.recent, rendering.seconds)
+    parts = [name, f"  rendered: {done} of {count}{left}"]
+    for reprojection in reprojections:
+        reprojected = _reprojected(folder, reprojection, rendering.finished)
+        parts.append(f"  {reprojection}: {reprojected} of {count}")
+    parts.append(f"  validated: {_validated(folder, count, rendering.finished)}")
+    for title, shards in (
+        ("shards at work", rendering.running),
+        ("shards killed, the next run goes on with them", rendering.killed),
+        ("shards not heard of for an hour", rendering.silent),
+    ):
+        if shards:
+            parts.append(f"  {title}: {', '.join(shards)}")
+    return parts
+
+
+def outlook(left: int, recent: int, seconds: float) -> str:
+    """Say the rate of ``recent`` views in so many ``seconds``, and how long the others take."""
+    if not left:
+        return ""
+    if not recent:
+        return ", no rate yet"
+    return (
+        f", {recent / seconds * 60:.3g} a minute, {duration(left / recent * seconds)} left"
+        f" at the rate of the last {duration(seconds)}"
+    )
+
+
+def _reprojected(folder: Path, reprojection: str, finished: set[str]) -> int:
+    """Count the finished views that are reprojected too."""
+    made = (p for p in (folder / reprojection).glob("*") if p.suffix in (".png", ".exr"))
+    times = {path.stem: path.stat().st_mtime for path in made}
+    return sum(times.get(name, -1) >= _file(folder, name).stat().st_mtime for name in finished)
+
+
+def _validated(folder: Path, count: int, finished: set[str]) -> str:
+    """Say whether a dataset's validation has been made of its views, and what came out."""
+    path = folder / "validation.json"
+    if len(finished) < count or not path.exists():
+        return "no"
+    newest = max((_file(folder, name).stat().st_mtime for name in finished), default=0)
+    if path.stat().st_mtime < newest:
+        return "not since its views were made"
+    if problem := broken(path):
+        return f"no: {path} {problem}, and is made anew"
+    return "yes" if read_json(path).get("valid") else f"yes, and it is not valid: see {path}"
+
+
+def _bounds(path: Path) -> tuple[int, int]:
+    """Return the first view and the end of the shard that a journal is of."""
+    first, end = path.name.partition(".")[0].split("-")
+    return int(first), int(end)
+
+
+def _file(folder: Path, name: str) -> Path:
+    return folder / "exr" / f"{name}.exr"
