@@ -1,5 +1,11 @@
 # Plenoforge: scene YAMLs in configs/scenes/ become light-field datasets in results/.
+import sys
 from pathlib import Path
+
+sys.path.insert(0, f"{workflow.basedir}/scripts")
+
+from lightfield.core.errors import UserError
+from lightfield.dataset.config import read_config
 
 # What the command line says; config.yaml fills in the rest.
 GIVEN = set(config)
@@ -10,6 +16,12 @@ configfile: f"{workflow.basedir}/config.yaml"
 
 
 if Path("config.yaml").exists():
+
+    # Snakemake loads it without a limit.
+    try:
+        read_config(Path("config.yaml"))
+    except UserError as error:
+        sys.exit(f"error: {error}")
 
     configfile: "config.yaml"
 

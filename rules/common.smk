@@ -12,7 +12,6 @@ from pathlib import Path
 # From the folder that Snakemake works in, which may be a user's own.
 SCRIPTS = os.path.relpath(Path(workflow.current_basedir).parent / "scripts")
 BENCHMARKS = os.path.relpath(Path(workflow.current_basedir).parent / "benchmarks")
-sys.path.insert(0, os.path.abspath(SCRIPTS))
 # A prefix takes the place of Snakemake's own, whose strict mode keeps the exit status of a program
 # before `| tee`. The rules call `python`: let that be the one that runs Snakemake.
 shell.prefix(
@@ -20,7 +19,6 @@ shell.prefix(
     f" export PATH={shlex.quote(str(Path(sys.executable).parent))}:$PATH; "
 )
 
-from lightfield.core.errors import UserError
 from lightfield.core.failures import failure_report
 from lightfield.core.files import read_json, set_aside, write_json
 from lightfield.dataset import ledger

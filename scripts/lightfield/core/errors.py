@@ -1,5 +1,18 @@
 """The one exception that the programs show to the user without a traceback."""
 
+# Longer messages are cut: what they quote comes from a file.
+LONGEST = 2000
+
 
 class UserError(Exception):
-    """Something the user can mend; the message says what is wrong, where, and what is right."""
+    """Something the user can mend; the message says what is wrong, where, and what is right.
+
+    It is one line whatever it quotes: line breaks and a terminal's codes are written as escapes.
+    """
+
+    def __init__(self, message: str) -> None:
+        line = "".join(
+            letter if letter.isprintable() else letter.encode("unicode_escape").decode()
+            for letter in message[:LONGEST]
+        )
+        super().__init__(line + ("…" if len(message) > LONGEST else ""))

@@ -65,10 +65,13 @@ def _unchanged(value: Any, check: Callable[[Any], Any]) -> Any:
 # Beside a number that a dataset's identity follows from: 10 stays 10, and does not become 10.0.
 AS_WRITTEN = WrapValidator(_unchanged)
 
+# Metres, or degrees. Blender computes in 32 bits, which beyond that are coarser than a metre.
+FARTHEST = 1e7
+Coordinate = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
 # Named, so that the JSON schema has it once.
-Vector = TypeAliasType("Vector", Annotated[tuple[float, float, float], as_list(3)])
+Vector = TypeAliasType("Vector", Annotated[tuple[Coordinate, Coordinate, Coordinate], as_list(3)])
 # Of a folder that a key names.
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=100)]
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

@@ -4,8 +4,11 @@ From these models scripts/schema.py makes the JSON schemas in configs/schema/, b
 complete and check the files. Nothing else in the project reads a scene YAML.
 """
 
+import json
+import math
 import re
 import shlex
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -33,10 +36,18 @@ SCENES = ROOT / "configs" / "scenes"
 OWN_SCENES = Path("configs", "scenes")
 BUILDERS = ROOT / "scripts" / "scenes"
 
-# Folders of a dataset that a reprojection may not take.
-RESERVED_NAMES = ("exr", "exports", "report")
-# Folders of a sequence's frames.
-FRAME_FOLDER = re.compile(r"f\d{5,7}")
+# What already has these names beside a scene's folder, a rig's, and a reprojection's.
+SCENE_NEIGHBOURS = {"benchmarks", "logs", "removed", "tables"}
+RIG_NEIGHBOURS = {"trials"}
+REPROJECTION_NEIGHBOURS = {"exr", "exports", "panorama", "render", "report"}
+# Files lie there, too, and folders of a sequence's frames.
+OTHER_NEIGHBOURS = re.compile(r"f\d{5,7}|.*\.(blend|html|json|txt)")
+# More of them have no use, and planning them would take hours.
+MOST_FRAMES = 10_000
+MOST_VIEWS = 1_000_000
+# A scene YAML has some thousand bytes; its aliases may repeat what it says, within these nodes.
+LARGEST_YAML = 2**16
+MOST_NODES = 20_000
 
 
 def _listed(value: Any) -> Any:
@@ -51,13 +62,17 @@ def _unique(names: list[str]) -> list[str]:
 
 # A bare word on the command line is a list of one.
 Names = Annotated[
-    list[Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]],
+    list[Name],
     BeforeValidator(_listed),
     AfterValidator(_unique),
 ]
 Auto = Literal["auto"]
 Address = Annotated[str, Field(pattern=r"^https?://")]
-AtLeastOne = Annotated[int, Field(ge=1)]
+# A path that the rules write into commands, with {wildcards} beside it.
+Folder = Annotated[str, Field(pattern=r"^[\w./][\w./+=@-]*$", max_length=1000)]
+# Of a path that is quoted there.
+QUOTED = r"[^{}*?\[\]\x00-\x1f\x7f]{1,1000}"
+AtLeastOne = Annotated[int, Field(ge=1, le=2**31 - 1)]
 
 
 class Preset(Settings):
@@ -72,13 +87,13 @@ class Preset(Settings):
 class Energy(Settings):
     """From which report/costs.json has energy and price."""
 
-    watts: float = Field(65, ge=0, description="Of a machine, while all its cores work.")
+    watts: float = Field(65, ge=0, le=1e6, description="Of a machine, while all its cores work.")
     cores: Auto | AtLeastOne = Field(
         "auto",
         description="How many that machine has; auto is those of the machine that adds up.",
     )
-    price_per_kwh: float = Field(0.32, ge=0)
-    currency: str = "EUR"
+    price_per_kwh: float = Field(0.32, ge=0, le=1e6)
+    currency: str = Field("EUR", max_length=20)
 
 
 class Configuration(Settings):
@@ -89,9 +104,9 @@ class Configuration(Settings):
         "all", description="all, or the names of the rigs to build."
     )
     preset: str = Field(description="One of the presets below.")
-    presets: dict[Annotated[str, Field(pattern="^[a-z][a-z0-9]*$")], Preset]
-    results: str = Field("results", description="Folder of the datasets.")
-    work: str = Field(
+    presets: dict[Annotated[str, Field(pattern="^[a-z][a-z0-9]*$", max_length=30)], Preset]
+    results: Folder = Field("results", description="Folder of the datasets.")
+    work: Folder = Field(
         "work",
         description="Folder of what is made on the way: scenes, lens maps, records, timings.",
     )
@@ -108,6 +123,10 @@ class Configuration(Settings):
         if self.preset not in self.presets:
             known = ", ".join(self.presets)
             raise ValueError(f"preset: is {self.preset!r}; must be one of {known}")
+        for name in self.scenes:
+            if "." in name or name in SCENE_NEIGHBOURS:
+                taken = ", ".join(sorted(SCENE_NEIGHBOURS))
+                raise ValueError(f"scenes: {name} is no name for a scene; no dots, and not {taken}")
         for key in ("results", "work"):
             folder = getattr(self, key)
             if Path(folder).resolve() in (Path.cwd(), ROOT, *ROOT.parents):
@@ -120,8 +139,20 @@ class Parameters(Settings):
 
     model_config = ConfigDict(extra="allow")
 
-    seed: int = Field(0, ge=0)
+    seed: int = Field(0, ge=0, le=2**63 - 1)
     detail: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] = Field(1.0, description="1 is full.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_json(cls, content: Any) -> Any:
+        for key, value in content.items() if isinstance(content, dict) else ():
+            try:
+                json.dumps(value, allow_nan=False)
+            except (TypeError, ValueError):
+                raise ValueError(
+                    f"{key}: must be finite numbers, text, lists or mappings"
+                ) from None
+        return content
 
 
 class Source(Settings):
@@ -135,7 +166,7 @@ class Source(Settings):
     parameters: Parameters = Parameters()
     blend: str | None = Field(
         None,
-        pattern=r"\.blend$",
+        pattern=rf"^{QUOTED}\.blend$",
         description="The user's own .blend file, relative to the scene YAML's repository.",
     )
     frame: Frame = Field(1, description="Of the animation, the frame that is rendered.")
@@ -183,7 +214,7 @@ class Render(Settings):
     max_bounces: int | None = Field(
         None, ge=0, le=1024, description="Bounces of a path, of any kind."
     )
-    clamp_indirect: Annotated[float, Field(ge=0), AS_WRITTEN] | None = Field(
+    clamp_indirect: Annotated[float, Field(ge=0, le=1e9), AS_WRITTEN] | None = Field(
         None, description="Largest value of one indirect sample; 0 does not clamp."
     )
     filter_width: Annotated[float, Field(ge=0.01, le=10), AS_WRITTEN] | None = Field(
@@ -193,7 +224,9 @@ class Render(Settings):
         0, description="Noise at which adaptive sampling stops early; 0 takes every sample."
     )
     denoise: bool = Field(False, description="Denoise each view with OpenImageDenoise.")
-    seed: int = Field(0, ge=0, description="From this and its name each view has its own seed.")
+    seed: int = Field(
+        0, ge=0, le=2**63 - 1, description="From this and its name each view has its own seed."
+    )
     depth: Literal["auto", "z", "distance", "none"] = Field(
         "auto",
         description="Meaning of channel Z: auto is z up to 180 degrees and distance beyond.",
@@ -225,8 +258,8 @@ class Reprojection(Settings):
         "adaptive", description="How colour is resampled."
     )
     samples: int = Field(1, ge=1, le=64, description="n x n samples a pixel.")
-    exposure: float = Field(0, description="In stops.")
-    reinhard: Annotated[float, Field(gt=0)] | None = Field(
+    exposure: float = Field(0, ge=-100, le=100, description="In stops.")
+    reinhard: Annotated[float, Field(gt=0, le=1e9)] | None = Field(
         None, description="Reinhard tone mapping with this maximum."
     )
 
@@ -272,11 +305,11 @@ class Scene(Settings):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         for name, rig in self.rigs.items():
+            _check_name(f"rigs.{name}", name, RIG_NEIGHBOURS)
             self._check_rig(f"rigs.{name}", rig)
         for name, reprojection in self.reprojections.items():
             key = f"reprojections.{name}"
-            if name in RESERVED_NAMES or FRAME_FOLDER.fullmatch(name):
-                raise ValueError(f"{key}: the name {name} is taken; choose another")
+            _check_name(key, name, REPROJECTION_NEIGHBOURS)
             for rig_name in reprojection.rigs or ():
                 if rig_name not in self.rigs:
                     hint = suggestion(rig_name, self.rigs)
@@ -309,6 +342,12 @@ class Scene(Settings):
             raise ValueError(f"{key}: is missing the key camera")
         if isinstance(rig, Poses) and not Path(rig.file).is_file():
             raise ValueError(f"{key}.file: is {rig.file!r}; there is no such file")
+        frames = len(rig.frames.numbers) if rig.frames else 1
+        if frames > MOST_FRAMES or frames * rig.view_count > MOST_VIEWS:
+            raise ValueError(
+                f"{key}: has {frames} frames of {rig.view_count} views; must be at most "
+                f"{MOST_FRAMES} frames and {MOST_VIEWS} views in all"
+            )
         if not LENSES[camera.lens].in_cycles:
             known = ", ".join(name for name, lens in LENSES.items() if lens.in_cycles)
             raise ValueError(
@@ -332,6 +371,11 @@ class Scene(Settings):
             )
 
 
+def _check_name(key: str, name: str, neighbours: set[str]) -> None:
+    if name in neighbours or OTHER_NEIGHBOURS.fullmatch(name):
+        raise ValueError(f"{key}: the name {name} is taken; choose another")
+
+
 _CONFIGURATION = TypeAdapter(Configuration)
 _SCENE = TypeAdapter(Scene)
 
@@ -339,6 +383,14 @@ _SCENE = TypeAdapter(Scene)
 def load_config(content: Any, file: str = "config.yaml") -> Configuration:
     """Return the top-level configuration; raises `UserError`."""
     return checked(_CONFIGURATION, content, file)
+
+
+def read_config(path: Path) -> dict[str, Any]:
+    """Read a config.yaml, unchecked but for being a mapping; raises `UserError`."""
+    content = read_yaml(path, path.name)
+    if not isinstance(content, dict):
+        raise UserError(f"{path}: must be a mapping of keys to values")
+    return content
 
 
 def load_scene(scene: str) -> Scene:
@@ -399,11 +451,38 @@ class _UniqueKeyLoader(yaml.SafeLoader):
 
 
 def read_yaml(path: Path, file: str) -> Any:
+    """Read a YAML file, which errors name ``file``; raises `UserError` for what is none.
+
+    Refused, too, is one so large, or of aliases to so much, that it is no settings.
+    """
     try:
-        return yaml.load(path.read_text(encoding="utf-8"), Loader=_UniqueKeyLoader)
+        with path.open("rb") as stream:
+            content = stream.read(LARGEST_YAML + 1)
+        if len(content) > LARGEST_YAML:
+            raise UserError(f"{file}: is larger than {LARGEST_YAML} bytes, so it is no settings")
+        loader = _UniqueKeyLoader(content.decode())
+        node = loader.get_single_node()
+        if _size(node, {}) > MOST_NODES:
+            raise UserError(f"{file}: its aliases (*name) repeat too much, so it is no settings")
+        return loader.construct_document(node) if node else None
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
         raise UserError(f"{file}: {where}{error.problem}") from None
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         raise UserError(f"{file}: cannot be read as YAML: {error}") from None
+
+
+def _size(node: yaml.Node | None, sizes: dict[int, float]) -> float:
+    """Return how many nodes there are below one, each alias counted as what it stands for.
+
+    A node that holds itself is infinite.
+    """
+    if node is None or isinstance(node.value, str):
+        return 1
+    if id(node) not in sizes:
+        sizes[id(node)] = math.inf
+        pairs = isinstance(node, yaml.MappingNode)
+        below = chain.from_iterable(node.value) if pairs else node.value
+        sizes[id(node)] = 1 + sum(_size(part, sizes) for part in below)
+    return sizes[id(node)]

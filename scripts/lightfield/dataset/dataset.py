@@ -522,7 +522,7 @@ def _frames(name: str, rig: Rig, frame: int) -> Iterator[tuple[str, int]]:
     if rig.frames is None:
         yield name, frame
         return
-    for number in range(rig.frames.first, rig.frames.last + 1, rig.frames.step):
+    for number in rig.frames.numbers:
         yield f"{name}/f{number:05d}", number
 
 

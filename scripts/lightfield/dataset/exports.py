@@ -43,9 +43,9 @@ class Export(Settings):
 class Developed(Export):
     """An export of 8-bit pictures."""
 
-    exposure: float = Field(0.0, description="Of EXR sources, in stops.")
+    exposure: float = Field(0.0, ge=-100, le=100, description="Of EXR sources, in stops.")
     reinhard: float = Field(
-        1.0, gt=0, description="Of EXR sources: the value that becomes white; 1 is none."
+        1.0, gt=0, le=1e9, description="Of EXR sources: the value that becomes white; 1 is none."
     )
 
 
@@ -56,7 +56,7 @@ NO_DEPTH = "holds no depth; give it format: exr"
 class InstantNgp(Export):
     """The transforms.json of instant-ngp."""
 
-    scale: Annotated[float, Field(gt=0)] | None = Field(
+    scale: Annotated[float, Field(gt=0, le=1e6)] | None = Field(
         None, description="World to unit cube; without it, fitted to the scene."
     )
     offset: Vector = Field(

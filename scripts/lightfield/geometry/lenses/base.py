@@ -44,7 +44,8 @@ LENSES: dict[str, "type[Lens]"] = {}
 """Every lens, by its name."""
 
 Pixels = Annotated[int, Field(ge=1, le=65536)]
-Millimetres = Annotated[float, Field(gt=0)]
+Place = Annotated[float, Field(ge=-1e6, le=1e6)]
+Millimetres = Annotated[float, Field(gt=0, le=1e6)]
 FocalLength = Annotated[Millimetres, Field(description="Millimetres.")]
 
 
@@ -62,7 +63,7 @@ class LensSettings(Settings):
     sensor_size: Millimetres | Annotated[tuple[Millimetres, Millimetres], as_list(2)] | None = (
         Field(None, description="Millimetres: the width, or width and height.")
     )
-    principal_point: Annotated[Pair, as_list(2)] | None = Field(
+    principal_point: Annotated[tuple[Place, Place], as_list(2)] | None = Field(
         None, description="In pixels; without it, the centre."
     )
 

@@ -2,9 +2,10 @@
 
 import csv
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +14,25 @@ from pydantic.json_schema import SkipJsonSchema
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
+from lightfield.core.settings import FARTHEST
 from lightfield.geometry.rigs.rig import Rig, UnitPoses
-from lightfield.geometry.rotations import Floats
+from lightfield.geometry.rotations import Floats, euler_to_matrix, matrix_to_euler
 
 CSV_HEADER = ["name", "x", "y", "z", "rx", "ry", "rz"]
 LF_TYPES = ("PLANE", "CUBOID", "CYLINDER", "SPHERE")
+# How far a matrix may be from a rotation, and one form of a pose from the other: files round.
+TOLERANCE = 1e-4
+# Bytes: some hundred thousand poses of the longest form.
+LARGEST_FILE = 2**28
+
+
+class PosesFile(NamedTuple):
+    """What a file of poses says: names (n), positions and XYZ Euler angles (n, 3) in radians."""
+
+    lf_type: str
+    names: list[str]
+    positions: Floats
+    rotations: Floats
 
 
 class Poses(Rig):
@@ -30,21 +45,22 @@ class Poses(Rig):
         pattern=r"\.(json|csv)$",
         description="A lightfield.json, or a CSV of name,x,y,z,rx,ry,rz.",
     )
-    max_views: SkipJsonSchema[int | None] = None
+    max_views: SkipJsonSchema[int | None] = Field(None, ge=1)
 
     @property
     def positions(self) -> int:
-        return len(self._rows(len(_read_poses(Path(self.file))[1])))
+        return len(self._rows(len(_read_poses(Path(self.file)).names)))
 
     @property
     def lf_type(self) -> str:
         """That of its file."""
-        return _read_poses(Path(self.file))[0]
+        return _read_poses(Path(self.file)).lf_type
 
     def unit_poses(self) -> UnitPoses:
-        _, names, positions, rotations = _read_poses(Path(self.file))
-        rows = self._rows(len(names))
-        return UnitPoses([names[row] for row in rows], rows, positions[rows], rotations[rows])
+        poses = _read_poses(Path(self.file))
+        rows = self._rows(len(poses.names))
+        names = [poses.names[row] for row in rows]
+        return UnitPoses(names, rows, poses.positions[rows], poses.rotations[rows])
 
     def _thinned_to(self, positions: int) -> Self | None:
         return self.model_copy(update={"max_views": positions}) if positions else None
@@ -56,31 +72,89 @@ class Poses(Rig):
         return rows
 
 
-def _read_poses(path: Path) -> tuple[str, list[str], Floats, Floats]:
-    """Return lf_type, names, positions and Euler angles from a lightfield.json or a CSV."""
+def _read_poses(path: Path) -> PosesFile:
+    """Read a lightfield.json or a CSV, checked whole; the same file only once."""
+    try:
+        status = path.stat()
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+    if status.st_size > LARGEST_FILE:
+        raise UserError(f"{path}: is {status.st_size} bytes; must be at most {LARGEST_FILE}")
+    return _read_whole(path, status.st_mtime_ns)
+
+
+@lru_cache(maxsize=8)
+def _read_whole(path: Path, _changed: int) -> PosesFile:
     rows = _csv_rows(path) if path.suffix.lower() == ".csv" else _json_rows(path)
     lf_type = next(rows)
-    names: list[str] = []
-    numbers = []
-    seen = set()
-    for where, name, values in rows:
-        if not isinstance(name, str) or not name or "/" in name or "\\" in name:
-            raise UserError(f"{path}: {where}: name: must be a file name, not {name!r}")
-        if name in seen:
+    names: dict[str, str] = {}
+    vectors, matrices = [], []
+    for where, name, vector, matrix in rows:
+        check_name(f"{path}: {where}: name", name)
+        if name in names:
             raise UserError(f"{path}: {where}: name: {name!r} is there twice")
-        seen.add(name)
-        names.append(name)
-        numbers.append([_number(path, f"{where}: {key}", value) for key, value in values])
+        names[name] = where
+        vectors.append([_number(path, f"{where}: {key}", value) for key, value in vector])
+        matrices.append([_number(path, f"{where}: {key}", value) for key, value in matrix])
     if not names:
         raise UserError(f"{path}: holds no pose")
-    table = np.array(numbers)
-    return lf_type, names, table[:, :3], table[:, 3:]
+    nothing = [math.nan]
+    table = np.array([vector or nothing * 6 for vector in vectors])
+    given = np.array([matrix or nothing * 16 for matrix in matrices]).reshape(-1, 4, 4)
+    check_poses(path, list(names.values()), given, table)
+    alone = np.isnan(table[:, 0])
+    table[alone] = np.hstack([given[alone, :3, 3], matrix_to_euler(given[alone, :3, :3])])
+    return PosesFile(lf_type, list(names), table[:, :3], table[:, 3:])
+
+
+def check_name(where: str, name: Any) -> None:
+    """Check that a view's name can be that of its files; raises `UserError`."""
+    if (
+        not isinstance(name, str)
+        or not name.isprintable()
+        or not 0 < len(name.encode()) <= 200
+        or name != name.strip(" .")
+        or set(name) & set("/\\")
+    ):
+        raise UserError(f"{where}: must be a file name, not {name!r}")
+
+
+def check_poses(path: Path, where: Sequence[str], matrices: Floats, vectors: Floats) -> None:
+    """Check the poses of a file, of which each has one of two forms or both; raises `UserError`.
+
+    ``where`` names each pose. ``matrices`` (n, 4, 4) are camera-to-world, ``vectors`` (n, 6) are
+    positions in metres and XYZ Euler angles in radians; the form that a pose lacks is NaN.
+    """
+
+    def refuse(wrong: NDArray[np.bool_], why: str) -> None:
+        if wrong.any():
+            raise UserError(f"{path}: {where[int(np.argmax(wrong))]}: {why}")
+
+    positions = np.concatenate([matrices[:, :3, 3], vectors[:, :3]], axis=1)
+    far = (np.abs(positions) > FARTHEST).any(-1)
+    refuse(far, f"position: must be within {FARTHEST:g} metres of the origin")
+    turns = matrices[:, :3, :3]
+    with np.errstate(over="ignore", invalid="ignore"):
+        skew = np.abs(turns @ turns.swapaxes(-1, -2) - np.eye(3)).max((-1, -2))
+        mirrored = np.linalg.det(turns) < 0
+        last = np.abs(matrices[:, 3] - [0, 0, 0, 1]).max(-1)
+        apart = np.abs(turns - euler_to_matrix(vectors[:, 3:])).max((-1, -2))
+        away = np.abs(matrices[:, :3, 3] - vectors[:, :3]).max(-1)
+    # Of a form that is not given all these are NaN, which is never more.
+    refuse(skew > TOLERANCE, "world_matrix: its first 3 × 3 must be a rotation, without scale")
+    refuse(mirrored, "world_matrix: its first 3 × 3 must be a rotation, and mirrors")
+    refuse(last > TOLERANCE, "world_matrix: its last row must be 0, 0, 0, 1")
+    refuse(apart > TOLERANCE, "world_matrix and rotation: must be the same rotation")
+    refuse(
+        away > TOLERANCE * np.maximum(1, np.abs(vectors[:, :3]).max(-1)),
+        "world_matrix and position: must be the same place",
+    )
 
 
 def _number(path: Path, where: str, value: Any) -> float:
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number) or isinstance(value, bool):
         raise UserError(f"{path}: {where}: must be a finite number, not {value!r}")
@@ -88,7 +162,7 @@ def _number(path: Path, where: str, value: Any) -> float:
 
 
 def _csv_rows(path: Path) -> Iterator[Any]:
-    """Yield lf_type, then (where, name, [(key, value)]) of each row; angles in radians."""
+    """Yield lf_type, then of each row what `_json_rows` yields of a frame, without a matrix."""
     keys = CSV_HEADER
     yield Poses.shape
     try:
@@ -106,7 +180,7 @@ def _csv_rows(path: Path) -> Iterator[Any]:
                 where = f"row {reader.line_num}"
                 if len(row) != len(keys):
                     raise UserError(f"{path}: {where}: has {len(row)} values, not {len(keys)}")
-                yield where, row[0], list(zip(keys[1:], row[1:], strict=True))
+                yield where, row[0], list(zip(keys[1:], row[1:], strict=True)), []
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error) as error:
@@ -114,7 +188,10 @@ def _csv_rows(path: Path) -> Iterator[Any]:
 
 
 def _json_rows(path: Path) -> Iterator[Any]:
-    """Yield lf_type, then (where, name, [(key, value)]) of each frame of a lightfield.json."""
+    """Yield lf_type, then where, name, position and angles, and matrix of each frame.
+
+    Position and angles are one list of (key, value), and so is the matrix; one may be empty.
+    """
     content = read_json(path)
     frames = content.get("frames") if isinstance(content, dict) else None
     if not isinstance(frames, list):
@@ -128,10 +205,20 @@ def _json_rows(path: Path) -> Iterator[Any]:
         where = f"frames[{index}]"
         if not isinstance(frame, dict):
             raise UserError(f"{path}: {where}: must be a mapping, not {frame!r}")
-        values = []
-        for key in ("position", "rotation"):
-            vector = frame.get(key)
-            if not isinstance(vector, list) or len(vector) != 3:
-                raise UserError(f"{path}: {where}: {key}: must be three numbers, not {vector!r}")
-            values += [(f"{key}[{axis}]", value) for axis, value in enumerate(vector)]
-        yield where, frame.get("name"), values
+        vector, matrix = [], []
+        if "world_matrix" not in frame or "position" in frame or "rotation" in frame:
+            for key in ("position", "rotation"):
+                vector += _numbered(path, f"{where}: {key}", key, frame.get(key), 3)
+        if "world_matrix" in frame:
+            rows = _numbered(path, f"{where}: world_matrix", "row", frame["world_matrix"], 4)
+            for index, (_, row) in enumerate(rows):
+                key = f"world_matrix[{index}]"
+                matrix += _numbered(path, f"{where}: {key}", key, row, 4)
+        yield where, frame.get("name"), vector, matrix
+
+
+def _numbered(path: Path, where: str, key: str, values: Any, count: int) -> list[tuple[str, Any]]:
+    """Return (key, value) of each of a list's values."""
+    if not isinstance(values, list) or len(values) != count:
+        raise UserError(f"{path}: {where}: must be a list of {count}, not {values!r}")
+    return [(f"{key}[{index}]", value) for index, value in enumerate(values)]

@@ -14,7 +14,7 @@ from pydantic import ConfigDict, Field, model_validator
 from typing_extensions import TypeAliasType
 
 from lightfield.core.errors import UserError
-from lightfield.core.settings import Settings, Vector, as_list
+from lightfield.core.settings import FARTHEST, Settings, Vector, as_list
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.cube_map import CUBE_FACE_ANGLES
 from lightfield.geometry.rotations import (
@@ -24,7 +24,7 @@ from lightfield.geometry.rotations import (
     matrix_to_euler,
 )
 
-Side = Annotated[float, Field(ge=0)]
+Side = Annotated[float, Field(ge=0, le=FARTHEST)]
 Size = TypeAliasType("Size", Side | Annotated[tuple[Side, Side, Side], as_list(3)])
 Frame = Annotated[int, Field(ge=0, le=1048574)]
 
@@ -83,6 +83,11 @@ class Frames(Settings):
         if self.first > self.last:
             raise ValueError(f"first is {self.first}; must be at most last")
         return self
+
+    @property
+    def numbers(self) -> range:
+        """Of the animation's frames, those that are rendered."""
+        return range(self.first, self.last + 1, self.step)
 
 
 def _require_camera(schema: dict[str, Any]) -> None:
