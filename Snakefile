@@ -48,6 +48,9 @@ onstart:
     try:
         for path in BROKEN:
             set_aside(Path(path), Path(REMOVED))
+        if SETTINGS.accept_blend:
+            for name in SCENES:
+                accept_blend(name)
         write_json(RUN, {dataset.folder: dataset.view_count for dataset in CHOSEN})
     except UserError as error:
         sys.exit(f"error: {error}")

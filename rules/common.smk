@@ -22,7 +22,7 @@ shell.prefix(
 from lightfield.core.failures import failure_report
 from lightfield.core.files import read_json, set_aside, write_json
 from lightfield.dataset import ledger
-from lightfield.dataset.config import load_config
+from lightfield.dataset.config import accept_blend, load_config
 from lightfield.dataset.dataset import STILLS, load_datasets, scene_datasets
 from lightfield.dataset.exports import MANIFEST, VIEWS
 from lightfield.measurement.sampling import calibrated

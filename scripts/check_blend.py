@@ -28,10 +28,17 @@ def main() -> None:
         arguments.scene, config.load_scene(arguments.scene).scene
     )
     if expected is None:
-        write_json(origin, {"blend": arguments.blend.name, "sha256": found})
-        print(f"{arguments.blend}: its sha256 {found} is now recorded in {origin}")
+        config.accept_blend(arguments.scene)
     elif found != expected:
-        raise UserError(f"{arguments.blend}: its sha256 is {found}, but {origin} says {expected}")
+        remedy = (
+            "write the new one there"
+            if origin.suffix == ".yaml"
+            else "snakemake with --config accept_blend=true takes it as it is now"
+        )
+        raise UserError(
+            f"{arguments.blend}: its sha256 is {found}, but {origin} says {expected}; if it was "
+            f"edited on purpose, {remedy}"
+        )
     write_json(
         arguments.output,
         {

@@ -184,9 +184,11 @@ def test_the_first_file_used_is_recorded_and_every_later_one_checked(scene, monk
     blend.write_bytes(CONTENT[1:])
     with pytest.raises(UserError) as caught:
         check(monkeypatch, blend)
-    for part in (str(blend), sha256(blend), SUM, str(lock)):
+    for part in (str(blend), sha256(blend), SUM, str(lock), "--config accept_blend=true"):
         assert part in str(caught.value)
     assert json.loads(lock.read_text())["sha256"] == SUM
+    config.accept_blend("own")
+    assert check(monkeypatch, blend)["sha256"] == sha256(blend)
 
 
 def test_the_sum_of_the_yaml_is_checked_and_needs_no_lock(scene, monkeypatch):
@@ -197,6 +199,8 @@ def test_the_sum_of_the_yaml_is_checked_and_needs_no_lock(scene, monkeypatch):
     blend.write_bytes(b"another")
     with pytest.raises(UserError, match=rf"{sha256(blend)}, but .*own\.yaml says {SUM}"):
         check(monkeypatch, blend)
+    with pytest.raises(UserError, match=rf"own\.yaml: scene\.sha256: is {SUM}, but .* there"):
+        config.accept_blend("own")
 
 
 def test_a_missing_file_gives_the_page_and_the_place(scene):

@@ -23,7 +23,7 @@ from pydantic import (
 )
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json
+from lightfield.core.files import read_json, sha256, write_json
 from lightfield.core.settings import AS_WRITTEN, Name, Settings, Vector, checked, suggestion
 from lightfield.dataset.exports import VIEWS, Export, Exports
 from lightfield.geometry.lenses import LENSES, CameraSettings
@@ -52,6 +52,11 @@ MOST_NODES = 20_000
 
 def _listed(value: Any) -> Any:
     return [value] if isinstance(value, str) else value
+
+
+def _switch(value: Any) -> Any:
+    """Read what Snakemake leaves a text of `--config key=true`."""
+    return {"true": True, "false": False}.get(value, value) if isinstance(value, str) else value
 
 
 def _unique(names: list[str]) -> list[str]:
@@ -115,6 +120,11 @@ class Configuration(Settings):
     )
     views_per_shard: Auto | AtLeastOne = Field(
         "auto", description="auto, or how many views one render job makes."
+    )
+    accept_blend: Annotated[bool, BeforeValidator(_switch)] = Field(
+        False,
+        description="Take each .blend as it is now: its lock file beside the scene YAML is written "
+        "anew.",
     )
     energy: Energy = Energy()
 
@@ -431,6 +441,26 @@ def blend_sha256(scene: str, source: Source) -> tuple[str | None, Path]:
         return source.sha256, scene_path(scene)
     lock = scene_path(scene).with_suffix(".lock.json")
     return (str(read_json(lock)["sha256"]) if lock.exists() else None), lock
+
+
+def accept_blend(scene: str) -> None:
+    """Record a scene's .blend as it is now as the one that is meant.
+
+    Raises `UserError` where the scene YAML itself says which one that is.
+    """
+    source = load_scene(scene).scene
+    if source.blend is None or not Path(source.blend).is_file():
+        return
+    found = sha256(Path(source.blend))
+    expected, origin = blend_sha256(scene, source)
+    if source.sha256 and found != expected:
+        raise UserError(
+            f"{origin}: scene.sha256: is {expected}, but {source.blend} has {found}; accept_blend "
+            "writes no scene YAML: write it there"
+        )
+    if found != expected:
+        write_json(origin, {"blend": Path(source.blend).name, "sha256": found})
+        print(f"{source.blend}: its sha256 {found} is now recorded in {origin}")
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):
