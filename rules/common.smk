@@ -23,7 +23,7 @@ from lightfield.core.failures import failure_report
 from lightfield.core.files import read_json, set_aside, write_json
 from lightfield.dataset import ledger
 from lightfield.dataset.config import accept_blend, load_config
-from lightfield.dataset.dataset import STILLS, load_datasets, scene_datasets
+from lightfield.dataset.dataset import PICTURES, PLOTS, load_datasets, scene_datasets
 from lightfield.dataset.exports import MANIFEST, VIEWS
 from lightfield.measurement.sampling import calibrated
 
@@ -81,7 +81,6 @@ wildcard_constraints:
 localrules:
     check_blend,
     checksums,
-    contact_sheet,
     costs,
     export_reprojection_to_instant_ngp,
     export_views_to_instant_ngp,
@@ -90,7 +89,6 @@ localrules:
     lens_map,
     lightfield,
     page,
-    panorama,
     panorama_lightfield,
     plan,
     probe_cameras,

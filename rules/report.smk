@@ -60,71 +60,22 @@ rule render_panorama:
         " --device {params.device} --threads {threads} --output {params.folder} 2>&1 | tee {log}"
 
 
-rule panorama:
-    input:
-        f"{PANORAMA}/exr/view_0000f.exr",
-    output:
-        report(
-            f"{DATASET}/report/panorama.png",
-            category="{scene}",
-            subcategory="{rig}",
-            caption="../captions/panorama.rst",
-        ),
-    log:
-        log_of("{scene}/{rig}/panorama/develop"),
-    benchmark:
-        times_of("{scene}/{rig}/panorama/develop")
-    conda:
-        ENVIRONMENT
-    message:
-        "Developing the panorama of {wildcards.scene}/{wildcards.rig}"
-    shell:
-        f"python {SCRIPTS}/develop.py"
-        " --input {input} --output {output} 2>&1 | tee {log}"
-
-
-rule contact_sheet:
+rule figures:
     input:
         records=records,
         lightfield=f"{DATASET}/lightfield.json",
+        panorama=of_dataset("panorama"),
     output:
-        report(
-            f"{DATASET}/report/contact_sheet.png",
-            category="{scene}",
-            subcategory="{rig}",
-            caption="../captions/contact_sheet.rst",
-        ),
-    log:
-        log_of("{scene}/{rig}/contact_sheet"),
-    benchmark:
-        times_of("{scene}/{rig}/report/contact_sheet")
-    conda:
-        ENVIRONMENT
-    params:
-        views=f"{DATASET}/exr",
-    message:
-        "Making the contact sheet of {wildcards.scene}/{wildcards.rig}"
-    shell:
-        f"python {SCRIPTS}/contact_sheet.py"
-        " --lightfield {input.lightfield} --views {params.views}"
-        " --output {output} 2>&1 | tee {log}"
-
-
-rule figures:
-    input:
-        lightfield=f"{DATASET}/lightfield.json",
-        panorama=f"{PANORAMA}/exr/view_0000f.exr",
-    output:
-        [f"{DATASET}/report/{still}.svg" for still in STILLS],
         [
             report(
-                f"{DATASET}/report/{still}.png",
+                f"{DATASET}/report/{picture}.png",
                 category="{scene}",
                 subcategory="{rig}",
-                caption=f"../captions/{still}.rst",
+                caption=f"../captions/{picture}.rst",
             )
-            for still in STILLS
+            for picture in PICTURES
         ],
+        [f"{DATASET}/report/{plot}.svg" for plot in PLOTS],
     log:
         log_of("{scene}/{rig}/figures"),
     benchmark:
@@ -132,13 +83,14 @@ rule figures:
     conda:
         ENVIRONMENT
     params:
+        dataset=DATASET,
         rig=of_dataset("rig_json"),
         folder=lambda wildcards, output: str(Path(output[0]).parent),
     message:
-        "Drawing the rig, depth and noise of {wildcards.scene}/{wildcards.rig}"
+        "Drawing the pictures of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/report_figures.py"
-        " --lightfield {input.lightfield} --rig {params.rig:q}"
+        " --dataset {params.dataset} --rig {params.rig:q}"
         " --panorama {input.panorama} --output {params.folder} 2>&1 | tee {log}"
 
 
@@ -160,6 +112,7 @@ rule page:
     params:
         dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
         rig=of_dataset("rig_json"),
+        panorama=of_dataset("panorama"),
         measurements=measurements,
         # Not in the command: when a measurement was made anew, so is the page.
         measured=measurement_times,
@@ -169,7 +122,8 @@ rule page:
         f"python {SCRIPTS}/report_html.py"
         " --dataset {params.dataset}"
         " --name {wildcards.scene}/{wildcards.rig} --rig {params.rig:q}"
-        " --measurements {params.measurements} --output {output} 2>&1 | tee {log}"
+        " --panorama {params.panorama} --measurements {params.measurements}"
+        " --output {output} 2>&1 | tee {log}"
 
 
 rule index:

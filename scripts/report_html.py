@@ -14,13 +14,14 @@ from typing import Any
 from lightfield.core.cli import run
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.geometry import rigs
+from lightfield.geometry.overview import middle_view
 from lightfield.report import faults, page
 from lightfield.report import tables as report_tables
 from lightfield.report import views as report_views
 from lightfield.validation.files import IMAGES, REPORT, SUMS
 
-PICTURES = ("panorama", "contact_sheet")
-PLOTS = ("rig", "depth_panorama", "noise")
+PICTURES = ("overview", "contact_sheet")
+PLOTS = ("depth", "noise")
 WIDEST = 1600
 
 
@@ -29,6 +30,11 @@ def main() -> None:
     parser.add_argument("--dataset", required=True, type=Path, help="folder of the dataset")
     parser.add_argument("--name", required=True, help="how it is called: scene/rig")
     parser.add_argument("--rig", required=True, type=json.loads, help="the scene YAML's rig, JSON")
+    parser.add_argument(
+        "--panorama",
+        nargs="?",
+        help="what the overview was made of, where it is not the view in the rig's middle",
+    )
     parser.add_argument(
         "--measurements",
         type=Path,
@@ -63,6 +69,7 @@ def main() -> None:
         pictures={stem: page.photo(report / f"{stem}.png", WIDEST) for stem in PICTURES},
         plots={stem: page.plot(report / stem) for stem in PLOTS},
         looks=looks,
+        middle=None if arguments.panorama else lightfield.views[middle_view(rig)].name,
         render=lightfield.render,
         validation=validation,
         faults=fault_pictures(folder, validation),

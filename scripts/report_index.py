@@ -41,7 +41,7 @@ def entry(results: Path, path: Path) -> dict[str, Any]:
         "resolution": f"{lightfield.lens.width} × {lightfield.lens.height}",
         "lens": lightfield.lens.description,
         "valid": validation["valid"] if validation else None,
-        "picture": page.photo(path.parent / "panorama.png", THUMBNAIL),
+        "picture": page.photo(path.parent / "overview.png", THUMBNAIL),
     }
 
 

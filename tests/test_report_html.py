@@ -13,8 +13,8 @@ from playwright.sync_api import sync_playwright
 
 from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField
-from lightfield.geometry import lenses, rigs
-from lightfield.imaging import images
+from lightfield.geometry import lenses, overview, rigs
+from lightfield.imaging import images, pictures
 from lightfield.report import epipolar, faults, packing
 
 RADIUS = 5.0
@@ -80,6 +80,11 @@ def make_page(run_program, folder, rig, *arguments, name="ball/LFSphere"):
     return output
 
 
+def draw(run_program, folder, rig, output, *arguments):
+    words = ("--dataset", folder, "--rig", json.dumps(rig), "--output", output)
+    run_program("report_figures.py", *words, *arguments)
+
+
 @pytest.fixture(scope="module")
 def browser():
     path = shutil.which("chromium")
@@ -128,14 +133,7 @@ def sphere(tmp_path_factory, run_program):
     channels = dict(zip("RGB", np.moveaxis(colour.astype(np.float32), -1, 0), strict=True))
     channels["Z"] = np.full((64, 128), RADIUS, np.float32)
     images.write_exr(folder / "panorama.exr", channels)
-    run_program(
-        *("report_figures.py", "--lightfield", folder / "lightfield.json"),
-        *("--rig", json.dumps(SPHERE), "--panorama", folder / "panorama.exr"),
-        *("--output", folder / "report"),
-    )
-    picture = np.full((32, 64, 3), 90, np.uint8)
-    for name in ("panorama", "contact_sheet"):
-        images.write_png(folder / "report" / f"{name}.png", picture)
+    draw(run_program, folder, SPHERE, folder / "report", "--panorama", folder / "panorama.exr")
     check = {"views": [], "problems": [], "warnings": [], "figures": {"nearest_metres": 0.25}}
     checks = [
         {"name": "views", "passed": True, "detail": "12 of 12 images are there", **check},
@@ -199,7 +197,7 @@ def test_the_page_loads_whole_from_one_file(sphere, show):
     tab = show(sphere.page)
     pixels(tab, "viewer")
     widths = tab.eval_on_selector_all("img", "all => all.map((image) => image.naturalWidth)")
-    assert len(widths) == 5
+    assert len(widths) == 4
     assert min(widths) > 0
     text = tab.inner_text("main")
     for part in ("not valid", "equidistant fisheye, 180°", "12 of 12 images", "snakemake"):
@@ -338,7 +336,7 @@ def test_an_index_leads_to_every_page(sphere, run_program, show):
         ("lightfield.json", '{"frames": []}', "lightfield.json: camera: is missing"),
         ("validation.json", "{}", "validation.json: is not what"),
         ("report/costs.json", "[]", "costs.json: must be a mapping"),
-        ("report/panorama.png", "no", "panorama.png: is no picture"),
+        ("report/overview.png", "no", "overview.png: is no picture"),
         ("exr/view_0001f.exr", "no", "view_0001f.exr: is no image"),
     ],
 )
@@ -391,15 +389,67 @@ def test_a_view_that_validation_could_not_read_is_no_error_of_the_page(run_progr
 
 
 def test_stills_are_the_same_each_time(sphere, run_program, tmp_path):
-    run_program(
-        *("report_figures.py", "--lightfield", sphere.folder / "lightfield.json"),
-        *("--rig", json.dumps(SPHERE), "--panorama", sphere.folder / "panorama.exr"),
-        *("--output", tmp_path),
-    )
+    draw(run_program, sphere.folder, SPHERE, tmp_path, "--panorama", sphere.folder / "panorama.exr")
     made = sorted(tmp_path.iterdir())
-    assert len(made) == 6
+    assert len(made) == 8
     for path in made:
         assert path.read_bytes() == (sphere.folder / "report" / path.name).read_bytes()
+
+
+FISHEYE, NARROW, PANORAMA = (
+    {"lens": "equidistant", "fov": 180, "resolution": [8, 8]},
+    {"lens": "rectilinear", "fov": 90, "resolution": [8, 8]},
+    {"lens": "equirectangular", "resolution": [8, 4]},
+)
+LATTICE = {"type": "lattice", "cameras": [2, 2, 2]}
+
+
+@pytest.mark.parametrize(
+    ("rig", "camera", "expected"),
+    [
+        (SPHERE, FISHEYE, True),
+        ({**SPHERE, "subdivisions": 3}, NARROW, True),
+        ({"type": "cuboid", "cameras": [20, 20, 20]}, FISHEYE, True),
+        ({**SPHERE, "face_inside": True}, FISHEYE, False),
+        ({**SPHERE, "look_at": [0, 0, 0]}, NARROW, False),
+        ({"type": "hemisphere", "count": 20}, FISHEYE, False),
+        ({"type": "ring", "count": 20}, NARROW, False),
+        (LINE, FISHEYE, False),
+        (LATTICE, FISHEYE, False),
+        (LATTICE, PANORAMA, True),
+        ({**LATTICE, "cube_map": True}, NARROW, True),
+        ({"type": "poses", "file": "unused.csv"}, PANORAMA, False),
+    ],
+)
+def test_a_panorama_is_made_where_the_views_show_what_it_would(rig, camera, expected):
+    rig = {**rig, "camera": camera, "center": [1, 2, 3]}
+    assert overview.sees_all_round(rigs.from_settings(rig)) is expected
+
+
+@pytest.mark.parametrize(
+    ("rig", "expected"),
+    [
+        ({"type": "plane", "cameras": [5, 3]}, 7),
+        ({"type": "hemisphere", "count": 9}, 4),
+        ({**LATTICE, "cameras": [3, 1, 1], "cube_map": True}, 6),
+    ],
+)
+def test_the_middle_view_is_that_of_the_middle_row_or_of_the_order(rig, expected):
+    assert overview.middle_view(rigs.from_settings(rig)) == expected
+
+
+def test_without_a_panorama_the_overview_is_the_view_in_the_middle(run_program, tmp_path):
+    write_dataset(tmp_path, LINE)
+    draw(run_program, tmp_path, LINE, tmp_path / "report")
+    page = make_page(run_program, tmp_path, LINE).read_text()
+    assert "view_0007f, the view in the middle of the rig" in page
+    middle = images.read_image(tmp_path / "exr/view_0007f.exr").colour
+    shown = images.read_image(tmp_path / "report/overview.png").colour
+    np.testing.assert_array_equal(shown, pictures.develop(middle, pictures.exposure_for(middle)))
+    # One that cannot be read is black, as validation will say.
+    (tmp_path / "exr/view_0007f.exr").write_text("no image")
+    draw(run_program, tmp_path, LINE, tmp_path / "report")
+    assert not images.read_image(tmp_path / "report/overview.png").colour.any()
 
 
 @pytest.mark.parametrize("rig", [SPHERE, LINE])

@@ -298,6 +298,16 @@ class Reprojection(Settings):
         return shlex.join(words)
 
 
+class Report(Settings):
+    """What a dataset's page shows."""
+
+    panorama: Auto | bool = Field(
+        "auto",
+        description="A panorama from the rig's centre; auto makes one where the cameras look "
+        "outward, all round. Without it the view in the rig's middle is in its place.",
+    )
+
+
 class Scene(Settings):
     """One scene: where it is from, how it is rendered, by which rigs, and what the views become."""
 
@@ -311,6 +321,7 @@ class Scene(Settings):
         {}, description="The same views through other lenses, by the names of their folders."
     )
     exports: Exports = Field(Exports(), description="Files for trainers.")
+    report: Report = Field(Report(), description="What a dataset's page shows.")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -20,6 +20,7 @@ from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
 from lightfield.dataset.keys import scene_fingerprint
 from lightfield.dataset.lightfield import NAME
 from lightfield.geometry.lenses import CameraSettings
+from lightfield.geometry.overview import sees_all_round
 from lightfield.geometry.rigs import Poses, Rig
 
 # For planning only, measured on one core of a 2-core x86-64 machine: path tracing of one sample of
@@ -36,8 +37,9 @@ MOST_SHARDS = 64
 # What of a scene YAML's `scene` block is written down: not where a file came from, nor where it is.
 SOURCE_KEYS = {"builder", "parameters", "frame"}
 
-# Pictures of a report that are drawn together, each as .svg and .png.
-STILLS = ("rig", "depth_panorama", "noise")
+# Pictures of a report, and those of them that are plots, which are .svg too.
+PICTURES = ("overview", "contact_sheet", "rig", "depth", "noise")
+PLOTS = ("rig", "depth", "noise")
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,7 @@ class Dataset:
     rig: Rig
     reprojections: dict[str, config.Reprojection]
     exports: Exports
+    report: config.Report
     limits: Preset
     results_root: str = "results"
     work_root: str = "work"
@@ -232,11 +235,15 @@ class Dataset:
 
     @property
     def pictures(self) -> list[str]:
-        stills = [f"{name}{suffix}" for name in STILLS for suffix in (".svg", ".png")]
-        return [
-            f"{self.folder}/report/{name}"
-            for name in ("contact_sheet.png", "panorama.png", *stills)
-        ]
+        names = [*(f"{name}.png" for name in PICTURES), *(f"{name}.svg" for name in PLOTS)]
+        return [f"{self.folder}/report/{name}" for name in names]
+
+    @cached_property
+    def panorama(self) -> str | list[str]:
+        """The panorama from the rig's centre for the report; none where it says nothing."""
+        wanted = self.report.panorama
+        made = sees_all_round(self.rig) if wanted == "auto" else wanted
+        return f"{self.work}/panorama/exr/view_0000f.exr" if made else []
 
     @property
     def costs(self) -> str:
@@ -286,8 +293,11 @@ class Dataset:
             *([self.calibration] if isinstance(self.calibration, str) else []),
             f"{self.work}/cameras.json",
             f"{self.work}/checksums.txt",
-            f"{self.work}/panorama/lightfield.json",
-            f"{self.work}/panorama/exr/view_0000f.exr",
+            *(
+                [f"{self.work}/panorama/lightfield.json", self.panorama]
+                if isinstance(self.panorama, str)
+                else []
+            ),
             *(f"{self.work}/{name}/lens_map.npy" for name in self.reprojections),
         ]
 
@@ -490,6 +500,7 @@ def scene_datasets(
                     rig=_limited_rig(rig, limits),
                     reprojections=reprojections,
                     exports=written.exports.model_copy(update=exports),
+                    report=written.report,
                     limits=limits,
                 )
             )

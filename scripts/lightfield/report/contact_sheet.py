@@ -1,0 +1,72 @@
+"""Many views on one sheet, small, in their order and at one exposure."""
+
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import OpenImageIO as oiio
+
+from lightfield.core.errors import UserError
+from lightfield.imaging import images, pictures
+from lightfield.imaging.pictures import Array
+
+SHEET_WIDTH = 1600
+# Narrower cells have no room for a view's name.
+LEAST_CELL = 96
+GAP = 4
+CAPTION = 14
+BACKGROUND = 24
+INK = (0.8, 0.8, 0.8)
+# Matplotlib brings its font along, so that captions look alike on every machine.
+FONT = Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf")
+
+
+def sheet(views: Sequence[Path], width: int, height: int) -> Array:
+    """Return the sheet's 8-bit pixels; each view has its name beneath.
+
+    The views are EXRs, which are developed, or PNGs, which are. Their size is ``width`` ×
+    ``height``.
+    """
+    columns = max(1, round(math.sqrt(len(views) * 1.6 * height / width)))
+    rows = math.ceil(len(views) / columns)
+    cell_width = min(max(width, LEAST_CELL), (SHEET_WIDTH - GAP) // columns - GAP)
+    cell_height = max(1, round(cell_width * height / width))
+    cells = [small_view(path, cell_width, cell_height) for path in views]
+    exposure = pictures.exposure_for(np.stack(cells))
+
+    step_x, step_y = cell_width + GAP, cell_height + GAP + CAPTION
+    page = np.full((GAP + rows * step_y, GAP + columns * step_x, 3), BACKGROUND, dtype=np.uint8)
+    corners = [(GAP + n % columns * step_x, GAP + n // columns * step_y) for n in range(len(views))]
+    for path, cell, (left, top) in zip(views, cells, corners, strict=True):
+        developed = cell if path.suffix == ".png" else pictures.develop(cell, exposure)
+        page[top : top + cell_height, left : left + cell_width] = developed
+    buffer = oiio.ImageBuf(page)
+    for path, (left, top) in zip(views, corners, strict=True):
+        oiio.ImageBufAlgo.render_text(
+            buffer,
+            left + cell_width // 2,
+            top + cell_height + CAPTION // 2 + 1,
+            path.stem,
+            fontsize=10,
+            fontname=str(FONT),
+            textcolor=INK,
+            alignx="center",
+            aligny="center",
+        )
+    return np.asarray(buffer.get_pixels(oiio.UINT8))
+
+
+def small_view(path: Path, width: int, height: int) -> Array:
+    """Return a view's colour at a cell's size; black where there is none, as validation will say.
+
+    Pixels that hold no number are black too.
+    """
+    try:
+        colour = images.read_image(path, "RGB").colour
+    except UserError as error:
+        print(f"warning: {error}", file=sys.stderr)
+        return np.zeros((height, width, 3), dtype=np.float32)
+    return pictures.shrunk(np.where(np.isfinite(colour), colour, 0), width, height)

@@ -1,0 +1,209 @@
+"""A dataset's stills: overview, contact sheet, the rig, and what the overview says in numbers.
+
+The overview is a panorama from the rig's centre or, without one, the view in the rig's middle.
+"""
+
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LogNorm, to_rgb
+from matplotlib.ticker import FuncFormatter
+
+from lightfield.core.errors import UserError
+from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.geometry.overview import middle_view
+from lightfield.geometry.rigs import Rig
+from lightfield.imaging import images, pictures
+from lightfield.imaging.pictures import Array
+from lightfield.imaging.plots import BLUE, GREY, PURPLE, VERMILION, plot
+from lightfield.measurement import noise
+from lightfield.report import contact_sheet
+from lightfield.validation.files import IMAGES
+
+# From where the rig is looked at: degrees round it from −Y, and above the ground.
+AZIMUTH, ELEVATION = 30.0, 24.0
+MISS = "#b0b0b0"
+# The noise map has about this many blocks across.
+NOISE_BLOCKS = 128
+PART_COLOURS = {None: BLUE, "train": BLUE, "validation": PURPLE, "test": VERMILION}
+DEPTHS = {"z": "Z-depth", "distance": "distance from the camera", None: "no depth"}
+
+
+@dataclass(frozen=True)
+class Overview:
+    """Linear ``colour`` (height, width, 3); ``depth`` (height, width) in metres, NaN for none."""
+
+    colour: Array
+    depth: Array
+    is_panorama: bool
+    depth_label: str
+
+
+def draw(dataset: Path, rig: Rig, panorama: Path | None, output: Path) -> None:
+    """Write all pictures of the dataset in the folder ``dataset`` to ``output``."""
+    lightfield = LightField.read(dataset / NAME)
+    views = [dataset / IMAGES / f"{view.name}.exr" for view in lightfield.views]
+    lens = lightfield.lens
+    thinned = views[:: math.ceil(len(views) / pictures.MOST_VIEWS)]
+    sheet = contact_sheet.sheet(thinned, lens.width, lens.height)
+    images.write_png(output / "contact_sheet.png", sheet)
+    parts = [view.split for view in lightfield.views]
+    draw_rig(output / "rig", rig, lightfield.matrices, parts)
+    if panorama:
+        overview = read_panorama(panorama)
+    else:
+        overview = read_view(views[middle_view(rig)], lightfield)
+    exposure = pictures.exposure_for(overview.colour)
+    images.write_png(output / "overview.png", pictures.develop(overview.colour, exposure))
+    draw_depth(output / "depth", overview)
+    draw_noise(output / "noise", overview)
+
+
+def read_panorama(path: Path) -> Overview:
+    image = images.read_image(path)
+    unknown = np.full(image.colour.shape[:2], np.nan, np.float32)
+    depth = image.channels.get("Z", unknown).astype(np.float32)
+    return Overview(image.colour, depth, True, "distance from the rig's centre")
+
+
+def read_view(path: Path, lightfield: LightField) -> Overview:
+    """Read a view; where it is no image, as validation will say, its overview is black."""
+    lens, label = lightfield.lens, DEPTHS[lightfield.depth]
+    unknown = np.full((lens.height, lens.width), np.nan, np.float32)
+    try:
+        image = images.read_image(path)
+        colour = np.nan_to_num(image.colour, posinf=0, neginf=0)
+        depth = image.channels.get("Z", unknown)
+    except UserError as error:
+        print(f"warning: {error}", file=sys.stderr)
+        return Overview(np.stack([np.zeros_like(unknown)] * 3, axis=-1), unknown, False, label)
+    outside = np.isnan(lens.pixel_rays()[..., 0])
+    return Overview(colour, np.where(outside, np.nan, depth).astype(np.float32), False, label)
+
+
+def draw_rig(stem: Path, rig: Rig, poses: Array, parts: Sequence[str | None]) -> None:
+    """Draw each camera as a dot and an arrow along its view, as Figure 2 of the SILVR paper.
+
+    ``poses`` are (n, 4, 4); ``parts`` (n) of the dataset, as train and test, have their colours.
+    """
+    turn, rise = np.radians(AZIMUTH), np.radians(ELEVATION)
+    right = np.array([np.cos(turn), np.sin(turn), 0.0])
+    ahead = np.array([-np.sin(turn) * np.cos(rise), np.cos(turn) * np.cos(rise), -np.sin(rise)])
+    screen = np.stack([right, np.cross(right, ahead)], axis=-1)
+    places, forwards = poses[:, :3, 3], -poses[:, :3, 2]
+    drawn = np.concatenate([places, *rig.outline()])
+    extent = float(np.linalg.norm(np.ptp(drawn, axis=0))) or 1.0
+    arrow = min(0.09, 0.5 / np.sqrt(len(poses))) * extent
+    order = np.argsort(-(places @ ahead), kind="stable")
+    # What is nearer is drawn later and darker.
+    near = np.linspace(0.35, 1.0, len(poses))
+    ends = places[order] + arrow * forwards[order]
+    lines = [line @ screen for line in rig.outline()]
+    with plot(stem, size=(7, 6)) as axes:
+        axes.add_collection(LineCollection(lines, colors=GREY, linewidths=0.8))
+        start, end = places[order] @ screen, ends @ screen
+        axes.quiver(
+            *start.T,
+            *(end - start).T,
+            color=[(0.0, 0.0, 0.0, alpha) for alpha in near],
+            angles="xy",
+            scale_units="xy",
+            scale=1,
+            width=0.0022,
+            headwidth=4,
+            headlength=5,
+        )
+        colours = [PART_COLOURS[parts[view]] for view in order]
+        dots = [(*to_rgb(colour), alpha) for colour, alpha in zip(colours, near, strict=True)]
+        axes.scatter(*start.T, s=min(20.0, 350 / np.sqrt(len(poses))), c=dots, linewidths=0)
+        for part in sorted({part for part in parts if part}, reverse=True):
+            axes.scatter(
+                [], [], s=20, color=PART_COLOURS[part], label=f"{part} {parts.count(part)}"
+            )
+        if any(parts):
+            axes.legend(loc="upper right")
+        draw_axes(axes, screen, np.concatenate([start, end, *lines]), extent)
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+
+
+def draw_axes(axes: Any, screen: Array, drawn: Array, extent: float) -> None:
+    """Draw X, Y and Z below left of what is ``drawn``, each of a round length, and say which."""
+    length = 10.0 ** np.floor(np.log10(0.3 * extent))
+    length *= max(step for step in (1, 2, 5) if step * length <= 0.3 * extent)
+    corner = drawn.min(axis=0) - 0.12 * extent
+    for name, axis in zip("XYZ", screen, strict=True):
+        tip = corner + length * axis
+        axes.annotate("", tip, corner, arrowprops={"arrowstyle": "->", "color": GREY, "shrinkA": 0})
+        axes.annotate(
+            name, corner + 1.22 * (tip - corner), ha="center", va="center", color="#333333"
+        )
+    axes.annotate(
+        f"axes: {length:g} m", corner, (0, -30), textcoords="offset points", color="#333333"
+    )
+    axes.update_datalim([corner - 0.1 * extent, drawn.max(axis=0) + 0.03 * extent])
+    axes.autoscale_view()
+
+
+def draw_depth(stem: Path, overview: Overview) -> None:
+    """Draw depth in metres; what no ray hit is grey."""
+    depth = overview.depth
+    hit = np.where(np.isfinite(depth) & (depth > 0), depth, np.nan)
+    known = hit[np.isfinite(hit)]
+    low, high = np.percentile(known, [0.1, 99.9]) if known.size else (1.0, 2.0)
+    label = f"{overview.depth_label} (m)"
+    draw_map(stem, hit, (low, max(high, 1.01 * low)), "viridis_r", label, overview.is_panorama)
+
+
+def draw_noise(stem: Path, overview: Overview) -> None:
+    """Draw the relative noise in percent."""
+    block = max(noise.SMALLEST_BLOCK, overview.colour.shape[1] // NOISE_BLOCKS)
+    percent = 100 * noise.relative_noise(pictures.luminance(overview.colour), block)
+    known = percent[np.isfinite(percent) & (percent > 0)]
+    low, high = np.percentile(known, [2, 99]) if known.size else (1.0, 2.0)
+    limits = (max(low, high / 1e3), max(high, 1.01 * low))
+    draw_map(stem, percent, limits, "magma", "noise of luminance (%)", overview.is_panorama)
+
+
+def draw_map(
+    stem: Path,
+    values: Array,
+    limits: tuple[float, float],
+    colours: str,
+    label: str,
+    is_panorama: bool,
+) -> None:
+    """Draw an image's values with a logarithmic scale bar; NaN is grey."""
+    height, width = values.shape
+    size = (10, 5) if is_panorama else (6, 1 + min(6, 6 * height / width))
+    with plot(stem, size=size) as axes:
+        palette = matplotlib.colormaps[colours].with_extremes(bad=MISS)
+        picture = axes.imshow(
+            values,
+            norm=LogNorm(*limits, clip=True),
+            cmap=palette,
+            extent=(-180, 180, -90, 90) if is_panorama else None,
+            interpolation="nearest",
+        )
+        axes.grid(False)
+        if is_panorama:
+            axes.set(xlabel="azimuth (°)", ylabel="elevation (°)")
+            axes.set_xticks(range(-180, 181, 60))
+            axes.set_yticks(range(-90, 91, 30))
+        else:
+            axes.set_axis_off()
+        bar = axes.figure.colorbar(
+            picture, ax=axes, orientation="horizontal", shrink=0.73, aspect=40
+        )
+        bar.set_label(f"{label}; grey: nothing there")
+        shown = FuncFormatter(lambda value, _: f"{value:g}")
+        bar.ax.xaxis.set_major_formatter(shown)
+        few = limits[1] / limits[0] < 30
+        bar.ax.xaxis.set_minor_formatter(shown if few else FuncFormatter(lambda *_: ""))
