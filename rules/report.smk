@@ -83,15 +83,14 @@ rule figures:
     conda:
         ENVIRONMENT
     params:
-        dataset=DATASET,
+        dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
         rig=of_dataset("rig_json"),
-        folder=lambda wildcards, output: str(Path(output[0]).parent),
     message:
         "Drawing the pictures of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/report_figures.py"
         " --dataset {params.dataset} --rig {params.rig:q}"
-        " --panorama {input.panorama} --output {params.folder} 2>&1 | tee {log}"
+        " --panorama {input.panorama} --output {params.dataset}/report 2>&1 | tee {log}"
 
 
 rule page:

@@ -22,7 +22,7 @@ def sees_all_round(rig: Rig) -> bool:
     if isinstance(rig, Poses):
         return False
     lens = rig.camera.make()
-    number = np.arange(DIRECTIONS)
+    number = np.arange(DIRECTIONS, dtype=np.float64)
     directions = on_sphere(GOLDEN_ANGLE * number, 1 - (2 * number + 1) / DIRECTIONS)
     cameras = np.array([pose.matrix() for pose in rig.thinned(MOST_CAMERAS).poses()])
     x, y = np.moveaxis(lens.pixels(directions @ cameras[:, :3, :3]), -1, 0)
