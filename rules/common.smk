@@ -25,6 +25,7 @@ from lightfield.dataset import ledger
 from lightfield.dataset.config import accept_blend, load_config
 from lightfield.dataset.dataset import PICTURES, PLOTS, load_datasets, scene_datasets
 from lightfield.dataset.exports import MANIFEST, VIEWS
+from lightfield.dataset.splits import SPLITS
 from lightfield.measurement.sampling import calibrated
 
 # The rigs that config.yaml names are those of the scene that it names.
@@ -34,14 +35,16 @@ if "scenes" in GIVEN and "rigs" not in GIVEN:
 try:
     SETTINGS = load_config(config)
     CHOSEN = load_datasets(SETTINGS)
+    WHOLE = load_datasets(SETTINGS.model_copy(update={"rigs": "all"}))
     SMOKE = scene_datasets("smoke", settings=SETTINGS)
 except UserError as error:
     sys.exit(f"error: {error}")
 
 RESULTS = SETTINGS.results
 WORK = SETTINGS.work
+# Those that are not chosen may test what is trained on the chosen ones.
 DATASETS = {
-    (dataset.scene_folder, dataset.rig_folder): dataset for dataset in [*SMOKE, *CHOSEN]
+    (dataset.scene_folder, dataset.rig_folder): dataset for dataset in [*SMOKE, *WHOLE]
 }
 # Any dataset of each scene YAML: all of them have the same .blend.
 SCENES = {dataset.scene_name: dataset for dataset in DATASETS.values()}
@@ -93,6 +96,7 @@ localrules:
     plan,
     probe_cameras,
     reprojected_lightfield,
+    splits,
     rig_tables,
     status,
 
@@ -339,11 +343,12 @@ def reprojection_words(wildcards):
     return " ".join(words)
 
 
-def instant_ngp_words(wildcards):
+def instant_ngp_words(wildcards, input):
     """Return the words that say to scripts/export_instant_ngp.py what to write."""
     dataset = dataset_of(wildcards)
     folder = Path(dataset.folder, wildcards.get("reprojection", ""))
-    return dataset.instant_ngp_words(str(folder))
+    words = dataset.instant_ngp_words(str(folder))
+    return f"{words} --placed-as {input.trained}" if input.trained else words
 
 
 def export_words(wildcards):
@@ -355,7 +360,48 @@ def export_words(wildcards):
         exclude_unset=True, exclude={"sources"}
     )
     words = ["--source", name or VIEWS, "--suffix", suffix, "--options", options]
+    for other in tested_by(dataset):
+        words += ["--tested-by", other.rig_name, other.folder]
     return shlex.join(words)
+
+
+def tested_by(dataset):
+    """Return the datasets whose views test what is trained on this one."""
+    return [DATASETS[dataset.scene_folder, rig] for rig in dataset.tested_by]
+
+
+def exported_views(wildcards):
+    """Return what an export reads: the views of its dataset and of those that test it.
+
+    Points are lifted from the depth of the rendered views, whatever the source.
+    """
+    dataset = dataset_of(wildcards)
+    files = [*dataset.records("render"), *records(wildcards)]
+    for other in tested_by(dataset):
+        files += [*other.records("render"), *other.records(stage_of(wildcards))]
+        files += [
+            f"{other.folder}/{name}lightfield.json" for name in ("", wildcards.source)
+        ]
+    return list(dict.fromkeys(files))
+
+
+def split_rigs(wildcards):
+    """Return the light fields of a scene whose rigs say what their views are for."""
+    return [
+        f"{dataset.folder}/lightfield.json"
+        for (scene, _), dataset in DATASETS.items()
+        if scene == wildcards.scene and dataset.splits
+    ]
+
+
+def trained_by(wildcards):
+    """Return the transforms.json, if any, of what is trained on and tested by this dataset."""
+    dataset = dataset_of(wildcards)
+    if dataset.trained_by is None:
+        return []
+    name = wildcards.get("reprojection")
+    folder = f"{RESULTS}/{dataset.scene_folder}/{dataset.trained_by}"
+    return f"{folder}/{f'{name}/' if name else ''}transforms.json"
 
 
 def failed_jobs():

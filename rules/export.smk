@@ -5,6 +5,7 @@ rule export_views_to_instant_ngp:
     input:
         records=records,
         lightfield=f"{DATASET}/lightfield.json",
+        trained=trained_by,
     output:
         f"{DATASET}/transforms.json",
     log:
@@ -29,6 +30,7 @@ rule export_reprojection_to_instant_ngp:
     input:
         records=records,
         lightfield=f"{REPROJECTED}/lightfield.json",
+        trained=trained_by,
     output:
         f"{REPROJECTED}/transforms.json",
     log:
@@ -50,9 +52,7 @@ rule export_reprojection_to_instant_ngp:
 
 rule export:
     input:
-        # Points are lifted from the depth of the rendered views, whatever the source.
-        rendered=lambda wildcards: dataset_of(wildcards).records("render"),
-        records=records,
+        views=exported_views,
         lightfield=f"{DATASET}/{{source}}lightfield.json",
         dataset=f"{DATASET}/lightfield.json",
     output:

@@ -51,3 +51,18 @@ rule check_cameras:
         f"python {SCRIPTS}/check_cameras.py"
         " --blend {input.blend:q} --lightfield {input.lightfield}"
         " --output {output} 2>&1 | tee {log}"
+
+
+rule splits:
+    input:
+        split_rigs,
+    output:
+        f"{RESULTS}/{{scene}}/{SPLITS}",
+    log:
+        log_of("{scene}/splits"),
+    conda:
+        ENVIRONMENT
+    message:
+        "Listing what the views of {wildcards.scene} are for"
+    shell:
+        f"python {SCRIPTS}/splits.py" " --output {output} {input} 2>&1 | tee {log}"

@@ -8,6 +8,7 @@ rule validate:
         published=of_dataset("published"),
         cameras=f"{MADE}/cameras.json",
         inventory=of_dataset("inventory"),
+        splits=of_dataset("splits"),
     output:
         validation=f"{DATASET}/validation.json",
         sums=f"{MADE}/checksums.txt",
@@ -24,6 +25,9 @@ rule validate:
     params:
         dataset=DATASET,
         reprojections=reprojection_words,
+        splits=lambda wildcards, input: (
+            f"--splits {input.splits}" if input.splits else ""
+        ),
         removed=REMOVED,
     message:
         "Validating {wildcards.scene}/{wildcards.rig}"
@@ -31,7 +35,7 @@ rule validate:
         f"python {SCRIPTS}/validate.py"
         " --dataset {params.dataset} {params.reprojections}"
         " --records {input.records} --clearance {input.cameras}"
-        " --inventory {input.inventory} --processes {threads}"
+        " --inventory {input.inventory} {params.splits} --processes {threads}"
         " --removed {params.removed}"
         " --output {output.validation} --sums {output.sums} 2>&1 | tee {log}"
 

@@ -23,6 +23,14 @@ def main() -> None:
     parser.add_argument("format", choices=formats)
     parser.add_argument("--dataset", type=Path, required=True, help="the dataset's folder")
     parser.add_argument("--source", default=VIEWS, help=f"a reprojection's name (default: {VIEWS})")
+    parser.add_argument(
+        "--tested-by",
+        nargs=2,
+        action="append",
+        default=[],
+        metavar=("RIG", "FOLDER"),
+        help="a rig whose views test what is trained on these, and its dataset's folder",
+    )
     parser.add_argument("--suffix", choices=[".png", ".exr"], default=".exr", help="of the views")
     parser.add_argument("--options", default="{}", help="JSON of the export's options")
     parser.add_argument("--output", type=Path, required=True, help="folder to write")
@@ -34,7 +42,8 @@ def main() -> None:
     development = {
         key: getattr(settings, key) for key in ("exposure", "reinhard") if hasattr(settings, key)
     }
-    source = Source(arguments.dataset, name, arguments.suffix, **development)
+    beside = {rig: Path(folder) for rig, folder in arguments.tested_by}
+    source = Source(arguments.dataset, name, arguments.suffix, beside, **development)
     files = export.run(arguments.format, source, settings, arguments.output)
     print(f"{arguments.output}: {len(source.lightfield.views)} views in {len(files)} files")
 

@@ -27,6 +27,7 @@ def main() -> None:
     add("--records", type=Path, nargs="*", default=[], help=records)
     add("--clearance", type=Path, help="JSON of what surrounds each camera")
     add("--inventory", type=Path, help="JSON of what the scene contains")
+    add("--splits", type=Path, help="splits.json of the scene")
     folders = "folders of the dataset that hold a reprojection"
     add("--reprojection", action="extend", nargs="+", default=[], metavar="NAME", help=folders)
     add("--removed", type=Path, help="folder to which files go that are not the dataset's")
@@ -51,6 +52,7 @@ def main() -> None:
         arguments.inventory,
         arguments.processes,
         MANIFESTS,
+        arguments.splits,
     )
     write_json(arguments.output, result.to_json())
     print(result.summary())

@@ -25,7 +25,7 @@ RIG: dict[str, Any] = {
     "size": [1.5, 1.5, 1],
     "center": [0.4, -0.7, 1.2],
     "rotation": [15, -25, 40],
-    "evaluation_split": "odd",
+    "split": "odd",
 }
 PERSPECTIVE = {
     "lens": "rectilinear",
@@ -377,7 +377,7 @@ def test_fitted_to_depth_the_scene_is_within_the_cube(dataset: Dataset) -> None:
 
 def test_split_gives_odd_sequence_numbers_to_the_test_file(dataset: Dataset) -> None:
     dataset.write(FISHEYE)
-    everything = dataset.export("--split")
+    everything = dataset.export()
     parts = {}
     for part in ("train", "test"):
         parts[part] = dataset.read(f"transforms_{part}.json")
@@ -386,6 +386,17 @@ def test_split_gives_odd_sequence_numbers_to_the_test_file(dataset: Dataset) -> 
     assert names == ["view_0001f", "view_0003f", "view_0005f"]
     assert len(parts["train"]["frames"]) == 3
     assert len(everything["frames"]) == 6
+
+
+def test_what_tests_another_dataset_is_placed_as_that_one(dataset: Dataset) -> None:
+    dataset.write(FISHEYE)
+    trained = dataset.export()
+    (dataset.folder / "transforms.json").rename(dataset.folder / "trained.json")
+    dataset.write(FISHEYE, RIG | {"size": 5.0, "split": "test"})
+    tested = dataset.export("--placed-as", dataset.folder / "trained.json")
+    assert (tested["scale"], tested["offset"]) == (trained["scale"], trained["offset"])
+    assert dataset.read("transforms_test.json") == tested
+    assert not (dataset.folder / "transforms_validation.json").exists()
 
 
 def test_boxes_and_scales_are_passed_on(dataset: Dataset) -> None:
@@ -440,7 +451,6 @@ def test_other_fisheyes_are_followed_to_a_quarter_of_a_pixel(lens: str, dataset:
         (ORTHOGRAPHIC | {"resolution": [64, 64]}, [], "misses it by 0.41 pixels"),
         (PANORAMA | {"latitude": [-45, 45]}, [], "instant-ngp cannot follow"),
         (PANORAMA | {"longitude": [-180, 170]}, [], "instant-ngp cannot follow"),
-        (FISHEYE, ["--split"], "none has the split 'train'"),
         (FISHEYE, ["--offset", 0, 0, 0], "--offset: goes with --scale"),
         (FISHEYE, ["--scale", 0], "--scale: is 0"),
         (FISHEYE, ["--image-suffix", ".exr"], "view_0000f.exr: no such file"),

@@ -95,7 +95,7 @@ def dataset(tmp_path_factory):
     for name, camera in LENSES.items():
         write_views(folder / name, camera, RIG)
     write_views(folder / "png", LENSES["perspective"], RIG, ".png")
-    write_views(folder / "split", LENSES["perspective"], RIG | {"evaluation_split": "odd"})
+    write_views(folder / "split", LENSES["perspective"], RIG | {"split": "odd"})
     return folder
 
 

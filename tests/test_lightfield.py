@@ -20,7 +20,7 @@ FISHEYE = lenses.from_camera({"lens": "equidistant", "resolution": [64, 64], "fo
 WIDE = lenses.from_camera({"lens": "equidistant", "resolution": [64, 64], "fov": 181})
 PERSPECTIVE = lenses.from_camera({"lens": "rectilinear", "resolution": [64, 48], "fov": 60})
 PANORAMA = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
-CUBOID = {"type": "cuboid", "cameras": [3, 2, 2], "evaluation_split": "odd"}
+CUBOID = {"type": "cuboid", "cameras": [3, 2, 2], "split": "odd"}
 GONE = object()
 PLANE = {"type": "plane", "cameras": [2, 1], "center": [1, 2, 3], "rotation": [10, 20, 30]}
 

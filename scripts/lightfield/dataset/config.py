@@ -29,6 +29,7 @@ from lightfield.dataset.exports import VIEWS, Export, Exports
 from lightfield.geometry.lenses import LENSES, CameraSettings
 from lightfield.geometry.rigs import AnyRig, Poses, Rig
 from lightfield.geometry.rigs.rig import Frame
+from lightfield.geometry.rigs.split import PARTS, Chosen
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENES = ROOT / "configs" / "scenes"
@@ -337,7 +338,28 @@ class Scene(Settings):
                     raise ValueError(f"{key}.rigs: there is no rig {rig_name!r}{hint}")
         for name, export in self.exports.wanted.items():
             self._check_export(f"exports.{name}.sources", export)
+        self._check_whole_rigs()
         return self
+
+    def _check_whole_rigs(self) -> None:
+        """Check that rigs of which one trains and others test can be one dataset to a trainer."""
+        whole = {name: rig for name, rig in self.rigs.items() if rig.split in PARTS}
+        first = next((name for name, rig in whole.items() if rig.split == "train"), None)
+        if whole and (first is None or not any(rig.split == "test" for rig in whole.values())):
+            name, missing = (first, "tests") if first else (next(iter(whole)), "trains")
+            raise ValueError(f"rigs.{name}.split: is {whole[name].split}, but no rig {missing}")
+        for name, rig in whole.items():
+            for key in ("camera", "frames"):
+                if getattr(rig, key) != getattr(whole[str(first)], key):
+                    raise ValueError(f"rigs.{name}.{key}: must be that of {first}, which trains")
+        for name, reprojection in self.reprojections.items():
+            missing_rigs = whole.keys() - set(reprojection.rigs or self.rigs)
+            if missing_rigs and missing_rigs != whole.keys():
+                rigs = ", ".join(sorted(missing_rigs))
+                raise ValueError(
+                    f"reprojections.{name}.rigs: lacks {rigs}; must have all rigs "
+                    "of which one trains and others test, or none"
+                )
 
     def _check_export(self, key: str, export: Export) -> None:
         """Check that the sources are there, and that the consumer can take them."""
@@ -369,6 +391,8 @@ class Scene(Settings):
                 f"{key}: has {frames} frames of {rig.view_count} views; must be at most "
                 f"{MOST_FRAMES} frames and {MOST_VIEWS} views in all"
             )
+        for name in _unknown_names(rig):
+            raise ValueError(f"{key}.split: there is no view {name!r}")
         if not LENSES[camera.lens].in_cycles:
             known = ", ".join(name for name, lens in LENSES.items() if lens.in_cycles)
             raise ValueError(
@@ -395,6 +419,13 @@ class Scene(Settings):
 def _check_name(key: str, name: str, neighbours: set[str]) -> None:
     if name in neighbours or OTHER_NEIGHBOURS.fullmatch(name):
         raise ValueError(f"{key}: the name {name} is taken; choose another")
+
+
+def _unknown_names(rig: Rig) -> list[str]:
+    """Return the names in a rig's split that no view has."""
+    if not isinstance(rig.split, Chosen) or not rig.split.names:
+        return []
+    return sorted({*rig.split.names} - {pose.name for pose in rig.poses()})
 
 
 _CONFIGURATION = TypeAdapter(Configuration)

@@ -19,6 +19,7 @@ from lightfield.dataset.config import CHOSEN, Configuration, Preset, Render, Sou
 from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
 from lightfield.dataset.keys import scene_fingerprint
 from lightfield.dataset.lightfield import NAME
+from lightfield.dataset.splits import SPLITS
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.overview import sees_all_round
 from lightfield.geometry.rigs import Poses, Rig
@@ -36,6 +37,9 @@ MOST_SHARDS = 64
 
 # What of a scene YAML's `scene` block is written down: not where a file came from, nor where it is.
 SOURCE_KEYS = {"builder", "parameters", "frame"}
+
+# Parts of a split that a rig may be as a whole beside one that trains.
+TESTED_WITH = ("validation", "test")
 
 # Pictures of a report, and those of them that are plots, which are .svg too.
 PICTURES = ("overview", "contact_sheet", "rig", "depth", "noise")
@@ -61,6 +65,10 @@ class Dataset:
     exports: Exports
     report: config.Report
     limits: Preset
+    # Folders of the rigs in which others test what is trained on this one, and that of the rig on
+    # which is trained what this one tests.
+    tested_by: tuple[str, ...] = ()
+    trained_by: str | None = None
     results_root: str = "results"
     work_root: str = "work"
     views_per_shard: int | Literal["auto"] = "auto"
@@ -121,7 +129,9 @@ class Dataset:
         """
         own = f"{self.folder}/{NAME}"
         expected = self.origin(render) | self.rig.camera.make().to_lightfield()
-        poses = [[pose.name, [*pose.position, *pose.rotation]] for pose in self.rig.poses()]
+        poses = [
+            [pose.name, [*pose.position, *pose.rotation], pose.split] for pose in self.rig.poses()
+        ]
         if _differs(own, expected, poses):
             yield own
         for name, reprojection in self.reprojections.items():
@@ -166,8 +176,9 @@ class Dataset:
 
         ``folder`` is that of the transforms.json.
         """
-        words = self.exports.instant_ngp.words(folder) if self.exports.instant_ngp else []
-        return shlex.join([*words, *(["--split"] if self.rig.evaluation_split else [])])
+        return shlex.join(
+            self.exports.instant_ngp.words(folder) if self.exports.instant_ngp else []
+        )
 
     # The scene's files, which all rigs and presets have in common.
 
@@ -229,6 +240,11 @@ class Dataset:
         ]
 
     @property
+    def splits(self) -> str | list[str]:
+        """The list of what the views of all rigs are for, where this rig says it of its own."""
+        return f"{self.results_root}/{self.scene_folder}/{SPLITS}" if self.rig.split else []
+
+    @property
     def published(self) -> list[str]:
         """The files that a job makes one by one, the views aside."""
         return [*self.lightfields, *self.exported]
@@ -276,6 +292,7 @@ class Dataset:
         return [
             f"{self.folder}/validation.json",
             f"{self.folder}/sha256sums.txt",
+            *([self.splits] if isinstance(self.splits, str) else []),
             *self.published,
             *self.pictures,
             self.costs,
@@ -412,7 +429,8 @@ def _differs(path: str, expected: dict[str, Any], poses: list[Any] | None = None
             return True
         frames = content["frames"] if poses else []
         return poses is not None and poses != [
-            [frame["name"], [*frame["position"], *frame["rotation"]]] for frame in frames
+            [frame["name"], [*frame["position"], *frame["rotation"]], frame.get("split")]
+            for frame in frames
         ]
     except FileNotFoundError:
         return False
@@ -475,6 +493,8 @@ def scene_datasets(
     if source.blend:
         checksum = config.blend_sha256(scene, source)[0]
         source = source.model_copy(update={"sha256": checksum})
+    testing = [name for name, rig in written.rigs.items() if rig.split in TESTED_WITH]
+    training = next((name for name, rig in written.rigs.items() if rig.split == "train"), None)
     found = []
     for name, rig in written.rigs.items():
         reprojections = {
@@ -486,9 +506,13 @@ def scene_datasets(
             key: export.model_copy(
                 update={"sources": [s for s in export.sources if s in (VIEWS, *reprojections)]}
             )
+            # What a rig tests is exported with what is trained on.
+            if rig.split not in TESTED_WITH or key == "instant_ngp"
+            else None
             for key, export in written.exports.wanted.items()
         }
         for folder, frame in _frames(name, rig, source.frame):
+            below = folder.removeprefix(name)
             found.append(
                 Dataset(
                     scene_name=scene,
@@ -502,6 +526,10 @@ def scene_datasets(
                     exports=written.exports.model_copy(update=exports),
                     report=written.report,
                     limits=limits,
+                    tested_by=tuple(f"{other}{below}" for other in testing)
+                    if rig.split == "train"
+                    else (),
+                    trained_by=f"{training}{below}" if rig.split in TESTED_WITH else None,
                 )
             )
     if settings is None:

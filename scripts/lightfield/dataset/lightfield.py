@@ -48,7 +48,7 @@ class View:
 
     @property
     def split(self) -> str | None:
-        """Whether the view is meant to ``train`` on or to ``test`` with; None where all are."""
+        """What the view is for: ``train``, ``validate`` or ``test``; None where none is said."""
         return self.others.get("split")
 
     def to_json(self) -> dict[str, Any]:
@@ -94,9 +94,7 @@ class LightField:
     def from_rig(cls, rig: rigs.Rig | Mapping[str, Any], lens: Lens, **keys: Any) -> "LightField":
         """Return what a rig sees through a lens; ``keys`` are further ones of the file.
 
-        Where the rig asks for an evaluation split, it is "test" for odd sequence numbers, as
-        SILVR's paper suggests, and "train" for the others. Raises `UserError` where a cube map's
-        lens is not a 90° rectilinear.
+        Raises `UserError` where a cube map's lens is not a 90° rectilinear.
         """
         rig = rigs.from_settings(rig)
         intrinsics = lens.to_lightfield()
@@ -111,14 +109,13 @@ class LightField:
             "sensor_size": intrinsics["sensor_size"],
             **keys,
         }
-        split = ("train", "test") if rig.evaluation_split else None
         views = [
             View(
                 pose.name,
                 np.round(pose.matrix(), 12) + 0.0,  # without noise such as 6e-17 or −0
                 np.array(pose.position),
                 np.array(pose.rotation),
-                {"split": split[pose.number % 2]} if split else {},
+                {"split": pose.split} if pose.split else {},
             )
             for pose in rig.poses()
         ]

@@ -23,11 +23,16 @@ from lightfield.dataset.lightfield import View
 from lightfield.export import cameras
 from lightfield.export.points import Observations, Points, lift, observations
 from lightfield.export.source import Source
+from lightfield.export.splits import splits
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
 
 PINHOLE, OPENCV_FISHEYE = (1, "PINHOLE"), (5, "OPENCV_FISHEYE")
+
+# Beside the model, where the scene has a split: names of the images to test with, one a line, as
+# the original 3D Gaussian splatting reads them.
+TESTS = "test.txt"
 
 # From Blender's camera (y up, looks along −z) to COLMAP's (y down, looks along z).
 FLIP = np.diag([1.0, -1.0, -1.0])
@@ -36,14 +41,18 @@ FLIP = np.diag([1.0, -1.0, -1.0])
 def export(source: Source, settings: Colmap, folder: Path) -> None:
     """Write the model of a source's views into ``folder``."""
     points = lift(source, count=settings.points)
+    views = source.lightfield.views
+    if any(view.split for view in views):
+        tests = [f"{view.name}.png\n".encode() for view in splits(source.lightfield).test]
+        _write(folder / "sparse" / "0" / TESTS, tests)
     seen = observations(source, points)
     # A track has two views at least.
     counts = np.bincount(np.concatenate([o.indices for o in seen]), minlength=len(points.positions))
     model = _Model(source, points, seen, np.flatnonzero(counts >= 2))
     write = model.write_binary if settings.format == "binary" else model.write_text
     write(folder / "sparse" / "0")
-    progress = Progress(len(source.lightfield.views), "colmap", "views")
-    for view in source.lightfield.views:
+    progress = Progress(len(views), "colmap", "views")
+    for view in views:
         name = f"{view.name}.png"
         source.write_image(view, folder / "images" / name)
         valid = source.valid(view)

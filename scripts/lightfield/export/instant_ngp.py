@@ -38,6 +38,7 @@ from lightfield.geometry.depth import distance_from_z, z_from_distance
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.rigs.split import PARTS
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.imaging import images
 from lightfield.validation.files import Manifest
@@ -118,9 +119,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the part of the unit cube that instant-ngp shows",
     )
     add(
-        "--split",
-        action="store_true",
-        help="also write <output>_train.json and <output>_test.json by the frames' split",
+        "--placed-as",
+        type=Path,
+        metavar="TRANSFORMS",
+        help="take scale and offset from there: the transforms.json that these views test",
     )
 
 
@@ -132,11 +134,9 @@ def export(arguments: argparse.Namespace) -> None:
         raise UserError(f"--scale: is {arguments.scale}; must be above 0")
     lightfield = LightField.read(arguments.input_cfg)
     parts = {arguments.output: [view.name for view in lightfield.views]}
-    for part in ("train", "test") if arguments.split else ():
-        path = arguments.output.with_stem(f"{arguments.output.stem}_{part}")
-        parts[path] = [view.name for view in lightfield.views if view.split == part]
-        if not parts[path]:
-            raise UserError(f"{lightfield.path}: frames: none has the split {part!r}")
+    for part in PARTS:
+        if own := [view.name for view in lightfield.views if view.split == part]:
+            parts[arguments.output.with_stem(f"{arguments.output.stem}_{part}")] = own
     writer = _Writer(arguments, lightfield)
     scale, offset = writer.placement()
     common = writer.lens_keys | {"scale": scale, "offset": offset}
@@ -170,6 +170,9 @@ class _Writer:
 
     def placement(self) -> tuple[float, list[float]]:
         """Return scale and offset: as given, or fitted to what the views see, or to the rig."""
+        if self.arguments.placed_as:
+            trained = read_json(self.arguments.placed_as)
+            return trained["scale"], trained["offset"]
         cameras = np.array([view.position for view in self.lightfield.views])
         if self.arguments.scale is not None:
             offset = self.arguments.offset or (0.5, 0.5, 0.5)

@@ -7,6 +7,7 @@ validate, too. Source: load_blender.py of the original NeRF.
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,19 +26,22 @@ def export(source: Source, settings: NerfSynthetic, folder: Path) -> None:
     lens = source.lens
     assert isinstance(lens, Rectilinear)
     angle = 2 * math.atan(lens.width / 2 / cameras.focal_pixels(lens)[0])
-    train, test = splits(source.lightfield)
+    parts = splits(source.lightfield)
     progress = Progress(len(source.lightfield.views), "nerf_synthetic", "views")
-    for part, own in (("train", train), ("test", test)):
-        frames = []
+    # Without views of its own, val has those of test.
+    lists = {"train": parts.train, "test": parts.test, "val": parts.validation}
+    frames: dict[str, Any] = {}
+    for part, own in lists.items():
         for view in own:
+            if view.name in frames:
+                continue
+            path = f"{part}/{view.name}"
             alpha = source.valid(view).astype(np.uint8) * 255
-            images.write_png(
-                folder / part / f"{view.name}.png", np.dstack([source.colour(view), alpha])
-            )
-            frames.append(
-                {"file_path": f"./{part}/{view.name}", "transform_matrix": view.matrix.tolist()}
-            )
+            images.write_png(folder / f"{path}.png", np.dstack([source.colour(view), alpha]))
+            frames[view.name] = {
+                "file_path": f"./{path}",
+                "transform_matrix": view.matrix.tolist(),
+            }
             progress.done()
-        for name in ("train",) if part == "train" else ("val", "test"):
-            content = {"camera_angle_x": angle, "frames": frames}
-            write_json(folder / f"transforms_{name}.json", content)
+        content = {"camera_angle_x": angle, "frames": [frames[view.name] for view in own]}
+        write_json(folder / f"transforms_{part}.json", content)

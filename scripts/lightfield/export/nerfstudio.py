@@ -50,10 +50,10 @@ def export(source: Source, settings: Nerfstudio, folder: Path) -> None:
             images.write_png(folder / "depths" / name, millimetres(source.depth(view, meaning)))
         frames.append(frame)
         progress.done()
+    parts = splits(source.lightfield)
     write_ply(folder / POINT_CLOUD, lift(source, count=settings.points))
-    train, test = splits(source.lightfield)
     paths = {view.name: frame["file_path"] for view, frame in zip(views, frames, strict=True)}
-    lists = {"train": train, "val": test, "test": test}
+    lists = {"train": parts.train, "val": parts.validation, "test": parts.test}
     content = {
         **camera(source.lens),
         "applied_transform": np.eye(4)[:3].tolist(),

@@ -36,17 +36,18 @@ class Observations:
 
 
 def lift(source: Source, count: int | None = None, voxel: float | None = None) -> Points:
-    """Lift points from the depth of all views: about ``count``, or one in each ``voxel`` metres.
+    """Lift points from depth: about ``count``, or one in each ``voxel`` metres.
 
-    Each has the colour that the view it was lifted from shows there.
+    They come from all views, but with a split from those to train on alone. Each has the colour
+    that the view it was lifted from shows there.
     """
-    views = source.lightfield.views
+    views = [view for view in source.lightfield.views if view.split in (None, "train")]
     size = source.rendered.lens.width * source.rendered.lens.height
     wanted = _CANDIDATES * count / len(views) if count else size
     step = max(1, int((size / wanted) ** 0.5))
     progress = Progress(len(views), "points", "views")
     kept: Points | None = None
-    for view, surface in source.surfaces():
+    for view, surface in source.surfaces(views):
         positions, normals = surface.points(step)
         local = (positions - view.matrix[:3, 3]) @ view.matrix[:3, :3]
         column, row, inside = pixel_indices(source.lens, local)
@@ -67,7 +68,7 @@ def observations(source: Source, points: Points) -> list[Observations]:
     """Return what each view sees of the points: those in its frame that no surface hides."""
     found = []
     progress = Progress(len(source.lightfield.views), "tracks", "views")
-    for view, surface in source.surfaces():
+    for view, surface in source.surfaces(source.lightfield.views):
         local = (points.positions - view.matrix[:3, 3]) @ view.matrix[:3, :3]
         column, row, inside = pixel_indices(source.lens, local)
         inside &= source.valid(view)[row, column] & surface.sees(points.positions)

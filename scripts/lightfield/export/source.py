@@ -2,8 +2,8 @@
 
 import os
 import shutil
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -33,6 +33,8 @@ DEPTH_UNIT = 0.001
 class Source:
     """The views of a dataset folder: the rendered ones (``name`` "") or those of a reprojection.
 
+    ``beside`` are the folders of the rigs whose views test what is trained on these, by the rigs'
+    names, which precede the names of their views: spiral_view_0000f.
     EXR views are developed with ``exposure`` (stops) and ``reinhard`` (the value that becomes
     white; 1 leaves light as it is); PNG views are taken as they are.
     """
@@ -40,24 +42,47 @@ class Source:
     dataset: Path
     name: str
     suffix: str
+    beside: Mapping[str, Path] = field(default_factory=dict)
     exposure: float = 0.0
     reinhard: float = 1.0
 
     @cached_property
     def lightfield(self) -> LightField:
-        return LightField.read(self.dataset / self.name / NAME)
+        return self._read(self.name)
 
     @cached_property
     def rendered(self) -> LightField:
         """The rendered views, which hold the depth of every surface."""
-        return LightField.read(self.dataset / NAME)
+        return self._read("")
+
+    def _read(self, name: str) -> LightField:
+        own = LightField.read(self.dataset / name / NAME)
+        views = list(own.views)
+        for rig, folder in self.beside.items():
+            for view in LightField.read(folder / name / NAME).views:
+                views.append(replace(view, name=f"{rig}_{view.name}"))
+        return own.changed(views=views)
 
     @property
     def lens(self) -> Lens:
         return self.lightfield.lens
 
     def path(self, view: View) -> Path:
-        return self.dataset / (self.name or "exr") / f"{view.name}{self.suffix}"
+        return self._path(view, self.name or "exr", self.suffix)
+
+    def _path(self, view: View, folder: str, suffix: str) -> Path:
+        dataset, name = self._homes.get(view.name, (self.dataset, view.name))
+        return dataset / folder / f"{name}{suffix}"
+
+    @cached_property
+    def _homes(self) -> dict[str, tuple[Path, str]]:
+        """The folder, and the name there, of each view of another rig."""
+        return {
+            f"{rig}_{view.name}": (folder, view.name)
+            for rig, folder in self.beside.items()
+            for name in {"", self.name}
+            for view in LightField.read(folder / name / NAME).views
+        }
 
     def colour(self, view: View) -> NDArray[np.uint8]:
         """Return a view's sRGB pixels, (height, width, 3)."""
@@ -97,18 +122,18 @@ class Source:
     def _rays(self) -> Floats:
         return self.lens.pixel_rays()
 
-    def surfaces(self) -> Iterator[tuple[View, "Surface"]]:
-        """Yield each view with the surface that it sees, as the rendered view beneath it has it."""
+    def surfaces(self, views: Iterable[View]) -> Iterator[tuple[View, "Surface"]]:
+        """Yield views with the surface that each sees, as the rendered view beneath it has it."""
         if self.rendered.depth is None:
             raise UserError(
                 f"{self.rendered.path}: depth: is null; points need it (render.depth in the YAML)"
             )
         by_name = {view.name: view for view in self.rendered.views}
         rays = self.rendered.lens.pixel_rays()
-        for view in self.lightfield.views:
+        for view in views:
             # A face of a cube map is named after its view: view_0000f_l.
             below = by_name.get(view.name) or by_name[view.name.rpartition("_")[0]]
-            path = self.dataset / "exr" / f"{below.name}.exr"
+            path = self._path(below, "exr", ".exr")
             distance = _depth_of(path, self.rendered, rays, "distance")
             yield view, Surface(self.rendered.lens, below, rays, distance)
 

@@ -1,27 +1,39 @@
-"""Which views are to train on, and which to test with."""
+"""Which views are to train on, for validation, and to test with."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.geometry.rigs.split import PARTS
 
 # Where the rig has no split of its own: the test views of most trainers' own examples.
 EVERY = 8
 
 
-def splits(lightfield: LightField) -> tuple[Sequence[View], Sequence[View]]:
-    """Return the views to train on and those to test with: the rig's split, or every eighth.
+class Splits(NamedTuple):
+    """Without views for ``validation``, those to ``test`` with are for it too."""
 
-    Raises `UserError` if one of the two has no view.
+    train: Sequence[View]
+    validation: Sequence[View]
+    test: Sequence[View]
+
+
+def splits(lightfield: LightField) -> Splits:
+    """Return the views of each part: by the scene's split, or else every eighth to test with.
+
+    Raises `UserError` if there is none to train on, or none to test with.
     """
     views = lightfield.views
     if any(view.split for view in views):
-        test = [view for view in views if view.split == "test"]
+        part = {view.name: view.split for view in views}
     else:
-        test = sorted(views, key=lambda view: view.name)[::EVERY]
-    kept = {view.name for view in test}
-    train = [view for view in views if view.name not in kept]
+        tests = {*sorted(view.name for view in views)[::EVERY]}
+        part = {view.name: "test" if view.name in tests else "train" for view in views}
+    train, validation, test = (
+        [view for view in views if part[view.name] == name] for name in PARTS
+    )
     if not (train and test):
-        part = "test" if train else "train"
-        raise UserError(f"{lightfield.path}: frames: none is there to {part}")
-    return train, test
+        missing = "test" if train else "train"
+        raise UserError(f"{lightfield.path}: frames: none is there to {missing}")
+    return Splits(train, validation or test, test)

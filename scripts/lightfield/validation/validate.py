@@ -20,6 +20,7 @@ import OpenImageIO as oiio
 from lightfield.core.files import read_json, sha256
 from lightfield.core.progress import Progress
 from lightfield.validation import files, geometry, pixels
+from lightfield.validation import splits as validation_splits
 from lightfield.validation.consistency import Answer
 from lightfield.validation.files import File, Manifest
 from lightfield.validation.pixels import Examiner, Facts
@@ -34,14 +35,16 @@ def validate(
     inventory: Path | None = None,
     processes: int = 1,
     manifests: Sequence[Manifest] = (),
+    splits: Path | None = None,
 ) -> Result:
     """Check a dataset's files, and what its pixels must satisfy.
 
     ``reprojections`` are folders in the dataset; ``records`` JSON files of what was rendered
     (``files``: relative path: ``bytes``, ``sha256``); ``clearance`` a JSON file of what surrounds
     each camera (``views``: name: ``distance`` in metres, ``inside``); ``inventory`` one of what the
-    scene contains; ``manifests`` those of the exports that it may hold. Raises `UserError` where
-    one of these cannot be read; whatever is wrong with the dataset is in the result.
+    scene contains; ``manifests`` those of the exports that it may hold; ``splits`` the scene's
+    splits.json, if it has one. Raises `UserError` where one of these cannot be read; whatever is
+    wrong with the dataset is in the result.
     """
     dataset = dataset.resolve()
     volumes = read_json(inventory)["volumes"] if inventory else []
@@ -65,6 +68,8 @@ def validate(
     if len(sets) <= len(reprojections):
         listing = Check("files", None, "a lightfield.json that cannot be understood lists no files")
     checks += [listing, files.checksums(records, found, sets), files.clearance(clearance, sets)]
+    if splits:
+        checks.append(validation_splits.check(splits, dataset, sets))
     rendered = files.rendered(sets)
     return Result(
         f"{dataset.parent.name}/{dataset.name}",

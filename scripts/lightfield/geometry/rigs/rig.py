@@ -17,6 +17,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.settings import FARTHEST, Settings, Vector, as_list
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.cube_map import CUBE_FACE_ANGLES
+from lightfield.geometry.rigs.split import Chosen, Part, Split, part_of
 from lightfield.geometry.rotations import (
     Floats,
     euler_to_matrix,
@@ -33,14 +34,15 @@ Frame = Annotated[int, Field(ge=0, le=1048574)]
 class Pose:
     """One camera of a rig.
 
-    ``number`` is the sequence number within the view's name, ``position`` is in metres and
-    ``rotation`` holds Blender's XYZ Euler angles in radians.
+    ``number`` is the sequence number within the view's name, ``position`` is in metres,
+    ``rotation`` holds Blender's XYZ Euler angles in radians, and ``split`` is what the view is for.
     """
 
     name: str
     number: int
     position: tuple[float, float, float]
     rotation: tuple[float, float, float]
+    split: Part | None
 
     def matrix(self) -> Floats:
         """Return the (4, 4) camera-to-world matrix; the camera looks along −Z, +Y is up."""
@@ -123,8 +125,10 @@ class Rig(Settings):
         None,
         description="A sequence: each of these frames of the animation is a dataset of its own.",
     )
-    evaluation_split: Literal["odd"] | None = Field(
-        None, description="odd: the views with odd sequence numbers are for evaluation."
+    split: Split | None = Field(
+        None,
+        description="What the views are for: odd tests with odd sequence numbers, every with each "
+        "n-th position, lists name views; train, validation and test say it of the whole rig.",
     )
     # A scene YAML's rigs all have one; where the places alone matter there may be none.
     camera: CameraSettings = None  # type: ignore[assignment]
@@ -172,7 +176,9 @@ class Rig(Settings):
         thinner = self._thinned_to(max_views // self.views_a_position)
         if thinner is None:
             raise UserError(f"a rig of type {self.type} cannot have as few as {max_views} views")
-        return thinner
+        # A list is of the views of the full rig.
+        listed = isinstance(self.split, Chosen) and self.split.names
+        return thinner.model_copy(update={"split": None}) if listed else thinner
 
     def to_world(self, points: Floats) -> Floats:
         """Return points (…, 3) of the unit box where the rig has them, in metres."""
@@ -212,9 +218,15 @@ class Rig(Settings):
                 positions = np.repeat(positions, len(CUBE_FACE_ANGLES), axis=0)
             rotations = matrix_to_euler(matrices)
         return [
-            Pose(name, number, tuple(position), tuple(rotation))
-            for name, number, position, rotation in zip(
-                names, numbers.tolist(), plain(positions), plain(rotations), strict=True
+            Pose(
+                name,
+                number,
+                tuple(position),
+                tuple(rotation),
+                part_of(self.split, name, number, index // self.views_a_position),
+            )
+            for index, (name, number, position, rotation) in enumerate(
+                zip(names, numbers.tolist(), plain(positions), plain(rotations), strict=True)
             )
         ]
 

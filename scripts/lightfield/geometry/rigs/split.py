@@ -1,0 +1,48 @@
+"""Which views of a rig are to train on, for validation, and to test with."""
+
+from typing import Literal, Self, get_args
+
+from pydantic import Field, model_validator
+
+from lightfield.core.settings import Settings
+
+Part = Literal["train", "validation", "test"]
+PARTS: tuple[Part, ...] = get_args(Part)
+
+
+class Chosen(Settings):
+    """Views at each n-th position, or by name; all others train."""
+
+    every: int | None = Field(None, ge=2, description="Of so many positions the first tests.")
+    validation: list[str] = Field([], description="Names of views.")
+    test: list[str] = Field([], description="Names of views.")
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        if (self.every is None) == (not self.names):
+            raise ValueError("must have every, or test and validation with names of views")
+        for name in self.names:
+            if self.names.count(name) > 1:
+                raise ValueError(f"must have each view once, but {name!r} is there twice")
+        return self
+
+    @property
+    def names(self) -> list[str]:
+        return [*self.validation, *self.test]
+
+
+Split = Literal["odd"] | Part | Chosen
+
+
+def part_of(split: Split | None, name: str, number: int, place: int) -> Part | None:
+    """Return what a view is for: of a name, a sequence number, and the ``place``-th position."""
+    if split is None:
+        return None
+    if split == "odd":
+        return "test" if number % 2 else "train"
+    if not isinstance(split, Chosen):
+        return split
+    if name in split.validation:
+        return "validation"
+    tests = name in split.test if split.every is None else place % split.every == 0
+    return "test" if tests else "train"

@@ -1,0 +1,65 @@
+"""What the views are for: as splits.json says it, and none to train on is seen in a test."""
+
+from collections.abc import Sequence
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json
+from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.dataset.splits import listed
+from lightfield.geometry.rigs.split import PARTS
+from lightfield.validation.files import ImageSet
+from lightfield.validation.result import Check
+
+# Decimals of metres and of a rotation's matrix to which two poses are the same.
+_SAME_POSE = 6
+
+
+def check(path: Path, dataset: Path, sets: Sequence[ImageSet]) -> Check:
+    """Check a scene's splits.json, beside the folders of its rigs, and the sets of one of these.
+
+    No view may be in two lists, nor have the pose of one that is in another: it would be the same
+    picture. Raises `UserError` where splits.json cannot be read.
+    """
+    content = read_json(path)
+    try:
+        parts = {part: [str(name) for name in content[part]] for part in PARTS}
+    except (LookupError, TypeError):
+        raise UserError(f"{path}: must map {', '.join(PARTS)} to names of views") from None
+    # In the order of their names, for a rig may be in several lists.
+    folders = sorted({name.rpartition("/")[0] for name in chain(*parts.values())})
+    try:
+        lightfields = {folder: LightField.read(path.parent / folder / NAME) for folder in folders}
+    except UserError as error:
+        return Check("splits", False, "cannot be checked", problems=[str(error)])
+    expected = listed(lightfields)
+    problems = [
+        f"{path.name}: {part}: is not what the rigs' {NAME} say"
+        for part in PARTS
+        if sorted(parts[part]) != sorted(expected[part])
+    ]
+    own = lightfields.get(dataset.relative_to(path.resolve().parent).as_posix())
+    split = {view.name: view.split for view in own.views} if own else {}
+    for image_set in sets:
+        for view in image_set.lightfield.views:
+            # A face of a cube map is named after its view.
+            names = {view.name, view.name.rpartition("_")[0]}
+            if view.split not in [split[name] for name in names & split.keys()]:
+                problems.append(f"{image_set.prefix}{NAME}: frames: {view.name}: split is another")
+    trained: dict[bytes, str] = {}
+    for part in PARTS:
+        for folder, lightfield in lightfields.items():
+            for view in lightfield.views:
+                if view.split != part:
+                    continue
+                name = f"{folder}/{view.name}"
+                place = (np.round(view.matrix, _SAME_POSE) + 0.0).tobytes()
+                if part == "train":
+                    trained[place] = name
+                elif place in trained:
+                    problems.append(f"{name}: is for {part}, but is {trained[place]} of train")
+    detail = ", ".join(f"{len(parts[part])} {part}" for part in PARTS)
+    return Check("splits", not problems, detail, problems=problems)

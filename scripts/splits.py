@@ -1,0 +1,26 @@
+"""List what the views of a scene's rigs are for: to train on, for validation, or to test with."""
+
+import argparse
+from pathlib import Path
+
+from lightfield.core.cli import run
+from lightfield.core.files import write_json
+from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.splits import listed
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("lightfields", type=Path, nargs="+", help="the rigs' lightfield.json files")
+    parser.add_argument("--output", type=Path, required=True, help="splits.json to write")
+    arguments = parser.parse_args()
+
+    scene = arguments.output.parent
+    found = [LightField.read(path) for path in arguments.lightfields]
+    content = listed({lf.folder.relative_to(scene).as_posix(): lf for lf in found})
+    write_json(arguments.output, content)
+    print(", ".join(f"{len(views)} views for {part}" for part, views in content.items()))
+
+
+if __name__ == "__main__":
+    run(main)

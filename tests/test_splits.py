@@ -1,0 +1,219 @@
+"""Splits: what each view is for, from the scene YAML to every export and to validation."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from checkouts import checkout, planned
+from pydantic import TypeAdapter
+from test_exports import RADIUS, VIEWS, Colmap, ply, write_views
+
+from lightfield import export
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_json
+from lightfield.core.settings import checked
+from lightfield.dataset import config
+from lightfield.dataset.dataset import scene_datasets
+from lightfield.dataset.exports import settings_of
+from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.splits import listed
+from lightfield.export.source import Source
+from lightfield.export.splits import splits
+from lightfield.geometry import rigs
+from lightfield.validation import splits as validation
+from lightfield.validation.files import read_sets
+
+PERSPECTIVE = {"lens": "rectilinear", "fov": 70, "resolution": [32, 24]}
+PLANE = {"type": "plane", "cameras": [4, 3], "size": 1.2}
+LISTS = {"validation": ["view_0003f"], "test": ["view_0001f", "view_0007f"]}
+
+
+@pytest.mark.parametrize(
+    ("split", "validation", "test"),
+    [
+        ("odd", [], range(1, 12, 2)),
+        ({"every": 5}, [], (0, 5, 10)),
+        (LISTS, [3], (1, 7)),
+        ("train", [], ()),
+        ("validation", range(12), ()),
+        ("test", [], range(12)),
+    ],
+)
+def test_a_rig_says_what_its_views_are_for(split, validation, test):
+    found = [pose.split for pose in rigs.from_settings(PLANE | {"split": split}).poses()]
+    parts = dict.fromkeys(test, "test") | dict.fromkeys(validation, "validation")
+    assert found == [parts.get(number, "train") for number in range(12)]
+
+
+def test_the_faces_of_a_cube_map_stay_together():
+    rig = rigs.from_settings(PLANE | {"cube_map": True, "split": {"every": 4}})
+    assert [pose.split for pose in rig.poses()] == 3 * (6 * ["test"] + 18 * ["train"])
+
+
+def test_a_thinned_rig_has_no_list_of_views_that_it_lacks():
+    assert rigs.from_settings(PLANE | {"split": LISTS}).thinned(4).split is None
+    assert rigs.from_settings(PLANE | {"split": "odd"}).thinned(4).split == "odd"
+
+
+SCENE = {
+    "scene": {"builder": "room"},
+    "render": {"samples": 1},
+    "rigs": {
+        "around": {**PLANE, "split": "train", "camera": PERSPECTIVE},
+        "along": {"type": "spiral", "count": 5, "split": "test", "camera": PERSPECTIVE},
+    },
+    "reprojections": {"small": {"camera": PERSPECTIVE, "format": "exr"}},
+    "exports": {
+        "nerf_synthetic": {"sources": ["views", "small"]},
+        "instant_ngp": {"sources": ["small"]},
+    },
+}
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "expected"),
+    [
+        ("rigs.around.split", "even", 'split: is "even"; must be odd or train, validation or test'),
+        ("rigs.around.split", {"every": 1}, "split.every: is 1; must be a whole number at least 2"),
+        ("rigs.around.split", {"test": ["a", "a"]}, "'a' is there twice"),
+        ("rigs.around.split", {"every": 2, "test": ["a"]}, "must be odd or .* have every, or test"),
+        ("rigs.around.split", {"test": ["view_0012f"]}, "there is no view 'view_0012f'"),
+        ("rigs.around.split", "test", "rigs.around.split: is test, but no rig trains"),
+        ("rigs.along.split", "odd", "rigs.around.split: is train, but no rig tests"),
+        ("rigs.along.camera.fov", 60, "rigs.along.camera: must be that of around, which trains"),
+        ("rigs.along.frames", {"first": 1, "last": 2}, "rigs.along.frames: must be that of around"),
+        ("reprojections.small.rigs", ["around"], "reprojections.small.rigs: lacks along; must"),
+    ],
+)
+def test_what_is_no_split_is_refused(path, value, expected):
+    content = json.loads(json.dumps(SCENE))
+    *parents, last = path.split(".")
+    part = content
+    for key in parents:
+        part = part[key]
+    part[last] = value
+    with pytest.raises(UserError, match=expected):
+        checked(TypeAdapter(config.Scene), content, "scene.yaml")
+
+
+def test_what_one_rig_tests_is_exported_with_what_another_trains(tmp_path, monkeypatch):
+    (tmp_path / "two.yaml").write_text(json.dumps(SCENE))
+    monkeypatch.setattr(config, "SCENES", tmp_path)
+    around, along = scene_datasets("two")
+    assert (around.tested_by, along.trained_by) == (("along",), "around")
+    assert [name for name, _ in around.exports] == [name for name, _ in along.exports]
+    assert list(around.exports.wanted) == ["instant_ngp", "nerf_synthetic"]
+    assert list(along.exports.wanted) == ["instant_ngp"]
+    assert around.splits == along.splits == "results/two/splits.json"
+    assert around.splits in around.files
+    (tmp_path / "checkout").mkdir()
+    folder = checkout(tmp_path / "checkout", two=json.dumps(SCENE))
+    jobs = planned(folder, "--config", "scenes=two", "rigs=around", "preset=full")
+    assert (jobs["lightfield"], jobs["splits"], jobs["export"]) == (2, 1, 2)
+    assert jobs["validate"] == 1
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """A scene's folder with a rig to train on and one each for validation and to test with."""
+    folder = tmp_path_factory.mktemp("splits") / "scene"
+    for name, split in (("around", "train"), ("near", "validation"), ("along", "test")):
+        rig = {"type": "plane", "cameras": [2, 2], "size": 0.5, "split": split}
+        rig["center"] = [0.1 * len(name), 0, 0]
+        camera = VIEWS | {"resolution": [32, 32]}
+        write_views(folder / name / "dataset", camera, rig)
+        write_views(folder / name / "dataset" / "small", PERSPECTIVE, rig)
+        (folder / name / "dataset").rename(folder / f"{name}_")
+        (folder / name).rmdir()
+        (folder / f"{name}_").rename(folder / name)
+    return folder
+
+
+def exported(scene, name, folder, **options):
+    settings = TypeAdapter(settings_of(name)).validate_python({"sources": ["small"], **options})
+    beside = {rig: scene / rig for rig in ("near", "along")}
+    export.run(name, Source(scene / "around", "small", ".exr", beside), settings, folder)
+    return folder
+
+
+NAMES = {
+    "train": {f"view_000{i}f" for i in range(4)},
+    "val": {f"near_view_000{i}f" for i in range(4)},
+    "test": {f"along_view_000{i}f" for i in range(4)},
+}
+
+
+def test_nerf_synthetic_has_a_folder_and_a_list_a_part(scene, tmp_path):
+    folder = exported(scene, "nerf_synthetic", tmp_path / "export")
+    for part, names in NAMES.items():
+        frames = json.loads((folder / f"transforms_{part}.json").read_text())["frames"]
+        assert {frame["file_path"] for frame in frames} == {f"./{part}/{name}" for name in names}
+        assert {path.stem for path in (folder / part).iterdir()} == names
+
+
+def test_the_lists_of_nerfstudio_and_colmap_follow_the_split(scene, tmp_path):
+    folder = exported(scene, "nerfstudio", tmp_path / "nerfstudio", points=200)
+    content = json.loads((folder / "transforms.json").read_text())
+    for part, names in NAMES.items():
+        found = content[f"{part}_filenames"]
+        assert sorted(found) == sorted(f"images/{name}.png" for name in names)
+    folder = exported(scene, "colmap", tmp_path / "colmap", format="text", points=200)
+    assert (folder / "sparse/0/test.txt").read_text().split() == [
+        f"along_view_000{i}f.png" for i in range(4)
+    ]
+    assert len(Colmap(folder / "sparse/0").images) == 12
+
+
+def test_points_come_from_the_views_to_train_on_alone(scene, tmp_path):
+    shutil.copytree(scene, tmp_path / "scene")
+    for rig in ("near", "along"):
+        shutil.rmtree(tmp_path / "scene" / rig / "exr")
+    folder = exported(tmp_path / "scene", "point_cloud", tmp_path / "export", voxel=0.1)
+    vertices, _ = ply(folder / "points.ply")
+    distance = np.linalg.norm(np.stack([vertices[axis] for axis in "xyz"], axis=-1), axis=-1)
+    np.testing.assert_allclose(distance, RADIUS, atol=1e-5)
+
+
+def test_a_split_without_a_part_is_an_error():
+    lens = rigs.from_settings(PLANE | {"camera": PERSPECTIVE}).camera.make()
+    for split, missing in (("train", "test"), ("test", "train")):
+        lightfield = LightField.from_rig(PLANE | {"split": split}, lens)
+        with pytest.raises(UserError, match=f"frames: none is there to {missing}"):
+            splits(lightfield)
+
+
+def test_validation_finds_what_is_not_as_the_split_says(scene, tmp_path):
+    folder = tmp_path / "scene"
+    shutil.copytree(scene, folder)
+    path = folder / "splits.json"
+    rig_names = ("around", "near", "along")
+
+    def problems():
+        dataset = folder / "around"
+        return validation.check(path, dataset, read_sets(dataset, ["small"])[0]).problems
+
+    def write():
+        found = {name: LightField.read(folder / name / "lightfield.json") for name in rig_names}
+        write_json(path, listed(found))
+        return json.loads(path.read_text())
+
+    content = write()
+    assert content["train"] == [f"around/view_000{i}f" for i in range(4)]
+    assert problems() == []
+    write_json(path, content | {"test": [*content["test"], "around/view_0001f"]})
+    assert problems() == ["splits.json: test: is not what the rigs' lightfield.json say"]
+    # A test view from where one trains.
+    trained = json.loads((folder / "around" / "lightfield.json").read_text())
+    tested = json.loads((folder / "along" / "lightfield.json").read_text())
+    tested["frames"][2] = trained["frames"][1] | {"name": "view_0002f", "split": "test"}
+    write_json(folder / "along" / "lightfield.json", tested)
+    write()
+    assert problems() == ["along/view_0002f: is for test, but is around/view_0001f of train"]
+    trained["frames"][0]["split"] = "validation"
+    write_json(folder / "around" / "lightfield.json", trained)
+    write()
+    assert problems()[0] == "small/lightfield.json: frames: view_0000f: split is another"
+    write_json(path, {"train": []})
+    with pytest.raises(UserError, match="must map train, validation, test to names of views"):
+        problems()
