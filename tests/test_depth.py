@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from lightfield.geometry.depth import distance_from_z, z_from_distance
+from lightfield.geometry.depth import distance_from_z, with_precision, z_from_distance
 from lightfield.geometry.lenses.equidistant import Equidistant
 
 
@@ -68,3 +68,15 @@ def test_half_depths_widen_to_the_rays() -> None:
     z = z_from_distance(np.array([65504], np.float16), rays)
     assert z.dtype == np.float32
     np.testing.assert_allclose(z, 65504 * 0.8, rtol=1e-6)
+
+
+def test_rounded_depth_is_the_nearest_float_of_17_digits() -> None:
+    depth = (10 ** np.random.default_rng(2).uniform(-6, 9, 1000)).astype(np.float32)
+    found = with_precision(depth, "rounded")
+    mantissa, exponent = np.frexp(depth.astype(np.float64))
+    np.testing.assert_array_equal(found, np.ldexp(np.rint(mantissa * 2**17), exponent - 17))
+    assert found.dtype == np.float32 and with_precision(depth.astype("f8"), "float").dtype == "f4"
+    tie = np.float32(1 + 2.0**-17)  # midway between two floats of 17 digits, one of them even
+    odd = np.array([tie, np.inf, -np.inf, 0, -2.5], np.float32)
+    np.testing.assert_array_equal(with_precision(odd, "rounded"), [1, np.inf, -np.inf, 0, -2.5])
+    assert np.isnan(with_precision(np.array([0xFFFFFFFF], "u4").view("f4"), "rounded")).all()

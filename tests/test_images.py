@@ -7,7 +7,14 @@ import OpenImageIO as oiio
 import pytest
 
 from lightfield.core.errors import UserError
-from lightfield.imaging.images import read_header, read_image, write_exr, write_png
+from lightfield.imaging.images import (
+    CODECS,
+    check_codec,
+    read_header,
+    read_image,
+    write_exr,
+    write_png,
+)
 
 ATTRIBUTES = {"plenoforge:depth": "z", "plenoforge:nan": 3, "plenoforge:scale": 0.5}
 
@@ -68,6 +75,24 @@ def test_other_libraries_read_what_is_written(tmp_path, channels):
     assert tuple(image.size) == (53, 37)
     rows = np.array(image.pixels, np.float32).reshape(37, 53, -1)[::-1]
     assert np.array_equal(rows[2:, :, 1], channels["G"][2:].astype("f4"))
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_every_codec_keeps_every_bit(tmp_path, channels, codec):
+    write_exr(tmp_path / "a.exr", channels, ATTRIBUTES, codec)
+    image = read_image(tmp_path / "a.exr")
+    assert list(image.channels) == list("RGBZ")
+    assert all(same(image.channels[name], channels[name]) for name in channels)
+    assert image.attributes.items() >= ATTRIBUTES.items()
+    header = OpenEXR.File(str(tmp_path / "a.exr"), header_only=True).header()
+    assert header["compression"] == getattr(OpenEXR, CODECS[codec])
+
+
+def test_a_codec_that_openexr_lacks_is_refused(monkeypatch):
+    monkeypatch.delattr(OpenEXR, CODECS["zstd"])
+    check_codec("zip")
+    with pytest.raises(UserError, match=r"compression: is 'zstd', which OpenEXR .* zip, .*htj2k$"):
+        check_codec("zstd")
 
 
 def test_some_rows_of_some_channels(tmp_path, channels):

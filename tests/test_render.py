@@ -5,6 +5,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 
 from lightfield.core.files import sha256
@@ -233,8 +234,14 @@ def test_views_that_another_bpy_rendered_are_rendered_again_and_reported(shard):
 
 
 def test_views_hold_what_design_asks_for(shard):
+    render = shard.content["render"] | {"compression": "htj2k", "depth_precision": "rounded"}
+    shard.file.write_text(json.dumps(shard.content | {"render": render}))
     shard("--views", "0:1")
-    image = images.read_image(next(shard.views.iterdir()))
+    (path,) = shard.views.iterdir()
+    image = images.read_image(path)
+    header = OpenEXR.File(str(path), header_only=True).header()
+    assert header["compression"] == OpenEXR.HTJ2K256_COMPRESSION
+    assert not (np.ascontiguousarray(image.channels["Z"]).view("u4") & 0x7F).any()
     kinds = {name: str(channel.dtype) for name, channel in image.channels.items()}
     assert kinds == {"R": "float16", "G": "float16", "B": "float16", "Z": "float32"}
     assert image.attributes[images.DEPTH_ATTRIBUTE] == "z"

@@ -113,7 +113,11 @@ def test_the_papers_command(dataset, run):
     assert config["depth"] is None and config["note"] == "kept" and len(config["frames"]) == 3
 
 
-def test_exr_has_depth_along_its_own_axis(dataset, run):
+@pytest.mark.parametrize("precision", ["float", "rounded"])
+def test_exr_has_depth_along_its_own_axis(dataset, run, precision):
+    config = json.loads((dataset / "lightfield.json").read_text())
+    config["render"] = {"depth_precision": precision}
+    (dataset / "lightfield.json").write_text(json.dumps(config))
     run(*PERSPECTIVE, "--exr", "--rotation", "20,-10,30")
     image = read_image(dataset / "out" / "view_0001f.exr")
     assert image.attributes["plenoforge:depth"] == "z"
@@ -121,6 +125,8 @@ def test_exr_has_depth_along_its_own_axis(dataset, run):
     x, y = np.meshgrid(np.arange(24) + 0.5, np.arange(24) + 0.5)
     z = 2 / np.sqrt(1 + ((x - 12) ** 2 + (y - 12) ** 2) / 144)
     assert np.abs(image.channels["Z"] / z - 1).max() < 1e-4
+    digits = np.ascontiguousarray(image.channels["Z"]).view("u4") & 0x7F
+    assert digits.any() == (precision == "float")
     config = json.loads((dataset / "out" / "lightfield.json").read_text())
     assert config["depth"] == "z"
     matrix = np.array(config["frames"][1]["world_matrix"])

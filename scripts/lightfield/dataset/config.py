@@ -242,8 +242,15 @@ class Render(Settings):
         "auto",
         description="Meaning of channel Z: auto is z up to 180 degrees and distance beyond.",
     )
-    depth_precision: Literal["float", "half"] = Field(
-        "float", description="float has 32 bits, half has 16."
+    depth_precision: Literal["float", "rounded", "half"] = Field(
+        "float",
+        description="Binary digits that are kept: float has 24, half 11; rounded is a float of "
+        "which 17 are kept, within 1e-5, in smaller files.",
+    )
+    compression: Literal["zip", "zips", "piz", "htj2k", "zstd"] | None = Field(
+        None,
+        description="Of the views' EXR files, lossless: zip, which every program reads, unless "
+        "given. htj2k and zstd are smaller, for archives and scratch.",
     )
 
     @model_validator(mode="after")

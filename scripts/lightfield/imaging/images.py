@@ -1,12 +1,12 @@
 """Images in and out: always whole, and equal pixels give equal bytes.
 
-OpenImageIO reads and writes, but for the pixels of EXR files in scan lines, which the OpenEXR
-package reads twice as fast and writes in two thirds of the time.
+OpenImageIO reads and writes, but for EXR files of one part in scan lines, which the OpenEXR
+package reads twice as fast and writes in two thirds of the time, and with codecs that are newer.
 """
 
 import struct
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,19 @@ NAN_ATTRIBUTE = "plenoforge:nan"
 
 HALF_MAX = 65504.0
 
-_EXR_TYPES = {"half": np.float16, "float": np.float32, "uint": np.uint32}
+# Those of OpenEXR's codecs that keep every bit of halves and floats.
+CODECS = {
+    "zip": "ZIP_COMPRESSION",
+    "zips": "ZIPS_COMPRESSION",
+    "piz": "PIZ_COMPRESSION",
+    "htj2k": "HTJ2K256_COMPRESSION",
+    "zstd": "ZSTD_COMPRESSION",
+}
+
+# How an EXR begins, and the bits of its version that mark tiles, deep pixels and several parts.
+_EXR_MAGIC = 20000630
+_EXR_OTHER_KINDS = 0x1A00
+_EXR_TYPES = {"HALF": np.float16, "FLOAT": np.float32, "UINT": np.uint32}
 
 
 @dataclass(frozen=True)
@@ -59,6 +71,8 @@ class Header:
 
 def read_header(path: Path | str) -> Header:
     """Read the header alone; raises `UserError` for a file that is no image."""
+    if _is_plain_exr(path):
+        return _exr_header(_open_exr(path).header())
     file = _open(path)
     spec = file.spec()
     file.close()
@@ -77,32 +91,12 @@ def read_image(
     arrays may be read-only. Raises `UserError` for a file that is missing, no image, cut short,
     or without one of the ``channels``.
     """
-    file = _open(path)
-    found: dict[str, np.ndarray[Any, Any]] = {}
-    attributes: dict[str, Attribute] = {}
-    names: list[str] = []
-    subimage = 0
-    while file.seek_subimage(subimage, 0):
-        spec = file.spec()
-        attributes = _attributes(spec) | attributes
-        names += spec.channelnames
-        wanted = [
-            index
-            for index, name in enumerate(spec.channelnames)
-            if channels is None or name in channels
-        ]
-        first, end = rows or (0, spec.height)
-        if _has_plain_scan_lines(file, spec):
-            found |= _scan_lines(path, spec, wanted, first, end)
-        else:
-            pixels = _pixels(path, file, subimage, wanted)
-            found |= {name: array[first:end] for name, array in pixels.items()}
-        subimage += 1
-    file.close()
-    missing = [name for name in channels or () if name not in found]
+    read = _read_plain_exr if _is_plain_exr(path) else _read_other
+    image, names = read(path, channels, rows)
+    missing = [name for name in channels or () if name not in image.channels]
     if missing:
         raise UserError(f"{path}: has no channel {missing[0]}; it has {', '.join(names)}")
-    return Image(found, attributes)
+    return image
 
 
 def attribute(path: Path, name: str) -> Attribute | None:
@@ -126,17 +120,28 @@ def is_finished(path: Path, key: str) -> bool:
         return False
 
 
+def check_codec(compression: str) -> None:
+    """Raise `UserError` for one of `CODECS` that the OpenEXR at hand cannot write."""
+    if not hasattr(OpenEXR, CODECS[compression]):
+        able = ", ".join(name for name, codec in CODECS.items() if hasattr(OpenEXR, codec))
+        raise UserError(
+            f"render.compression: is {compression!r}, which OpenEXR {OpenEXR.__version__} cannot "
+            f"write; must be one of {able}"
+        )
+
+
 def write_exr(
     path: Path | str,
     channels: Mapping[str, np.ndarray[Any, Any]],
     attributes: Mapping[str, Attribute] | None = None,
+    compression: str = "zip",
 ) -> None:
     """Write (height, width) arrays as one EXR part: float16 as half, float32 as float.
 
-    Lossless (ZIP), atomic, and without time stamp or host name, so that equal input gives equal
-    bytes. Raises `UserError` if the file cannot be written.
+    Lossless (one of `CODECS`), atomic, and without time stamp or host name, so that equal input
+    gives equal bytes. Raises `UserError` if the file cannot be written.
     """
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    header = {"compression": getattr(OpenEXR, CODECS[compression]), "type": OpenEXR.scanlineimage}
     # OpenEXR writes strided arrays as if they were contiguous.
     planes = {name: np.ascontiguousarray(array) for name, array in channels.items()}
     with atomic_path(path) as temporary:
@@ -218,31 +223,86 @@ def _open(path: Path | str) -> Any:
     return file
 
 
-def _has_plain_scan_lines(file: Any, spec: Any) -> bool:
+def _is_plain_exr(path: Path | str) -> bool:
     """Whether a file is an EXR of one part, without tiles or deep pixels."""
-    parts = spec.get_int_attribute("oiio:subimages", 1)
-    return bool(
-        file.format_name() == "openexr" and parts == 1 and not spec.tile_width and not spec.deep
-    )
+    try:
+        with Path(path).open("rb") as file:
+            magic, version = struct.unpack("<II", file.read(8))
+    except (OSError, struct.error):
+        return False
+    return magic == _EXR_MAGIC and not version & _EXR_OTHER_KINDS
 
 
-def _scan_lines(
-    path: Path | str, spec: Any, wanted: Sequence[int], first: int, end: int
-) -> dict[str, np.ndarray[Any, Any]]:
-    """Return channels of an EXR file, the rows from ``first`` to ``end``."""
-    names = [spec.channelnames[index] for index in wanted]
-    kinds = [np.dtype(_EXR_TYPES[str(spec.channelformat(index))]) for index in wanted]
+def _open_exr(path: Path | str) -> Any:
     try:
         # OpenEXR.File, which is to replace InputFile, reads whole files only.
-        read = OpenEXR.InputFile(str(path)).channels(
-            names, scanLine1=spec.y + first, scanLine2=spec.y + end - 1
-        )
+        return OpenEXR.InputFile(str(path))
+    except OSError as error:
+        raise UserError(f"{path}: is no image that can be read: {error}") from None
+
+
+def _exr_header(header: dict[str, Any]) -> Header:
+    window = header["dataWindow"]
+    width, height = window.max.x - window.min.x + 1, window.max.y - window.min.y + 1
+    # Text that is not UTF-8 is damaged: none of ours, which is ASCII.
+    values = {
+        name: value.decode(errors="replace") if isinstance(value, bytes) else value
+        for name, value in header.items()
+    }
+    attributes = {k: v for k, v in values.items() if isinstance(v, str | int | float)}
+    return Header(width, height, _colour_first(header["channels"]), attributes)
+
+
+def _colour_first(names: Iterable[str]) -> list[str]:
+    """Return an EXR's channels, which it holds by the alphabet, as R, G, B, A and the others."""
+    return sorted(names, key=lambda name: ("RGBA".find(name) % 5, name))
+
+
+def _read_plain_exr(
+    path: Path | str, channels: Sequence[str] | None, rows: tuple[int, int] | None
+) -> tuple[Image, list[str]]:
+    """Return an EXR's channels, those asked for, and the names of all."""
+    file = _open_exr(path)
+    raw = file.header()
+    header = _exr_header(raw)
+    names = [name for name in header.channels if channels is None or name in channels]
+    kinds = [np.dtype(_EXR_TYPES[str(raw["channels"][name].type)]) for name in names]
+    top = raw["dataWindow"].min.y
+    first, end = rows or (0, header.height)
+    try:
+        read = file.channels(names, scanLine1=top + first, scanLine2=top + end - 1)
     except OSError as error:
         raise UserError(f"{path}: cannot be read whole: {error}") from None
-    return {
-        name: np.frombuffer(values, kind).reshape(end - first, spec.width)
+    found = {
+        name: np.frombuffer(values, kind).reshape(end - first, header.width)
         for name, kind, values in zip(names, kinds, read, strict=True)
     }
+    return Image(found, header.attributes), header.channels
+
+
+def _read_other(
+    path: Path | str, channels: Sequence[str] | None, rows: tuple[int, int] | None
+) -> tuple[Image, list[str]]:
+    """Return any image's channels, those asked for, and the names of all."""
+    file = _open(path)
+    found: dict[str, np.ndarray[Any, Any]] = {}
+    attributes: dict[str, Attribute] = {}
+    names: list[str] = []
+    subimage = 0
+    while file.seek_subimage(subimage, 0):
+        spec = file.spec()
+        attributes = _attributes(spec) | attributes
+        names += spec.channelnames
+        wanted = [
+            index
+            for index, name in enumerate(spec.channelnames)
+            if channels is None or name in channels
+        ]
+        pixels = _pixels(path, file, subimage, wanted)
+        found |= {name: array[slice(*(rows or (None,)))] for name, array in pixels.items()}
+        subimage += 1
+    file.close()
+    return Image(found, attributes), names
 
 
 def _pixels(

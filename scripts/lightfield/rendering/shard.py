@@ -51,6 +51,7 @@ def render(
     Raises `UserError` where the scene cannot be opened, the ``device`` is not there, or a file
     cannot be written.
     """
+    images.check_codec(lightfield.render.get("compression", "zip"))
     log, sums = Journal(journal), ShardRecord(record, folder)
     chosen = lightfield.views[view_slice(views, len(lightfield.views))]
     paths = [folder / f"{view.name}.exr" for view in chosen]
@@ -124,7 +125,8 @@ def _render_views(
             attributes[images.DEPTH_ATTRIBUTE] = str(lightfield.depth)
         path, key = folder / f"{view.name}.exr", keys.render_key(lightfield, view)
         attributes |= {images.KEY_ATTRIBUTE: key, images.BPY_ATTRIBUTE: version("bpy")}
-        images.write_exr(path, channels, attributes)
+        compression = lightfield.render.get("compression", "zip")
+        images.write_exr(path, channels, attributes, compression)
         record.add(path, key)
         journal.append(
             {
@@ -175,6 +177,4 @@ def depth_channel(cycles_depth: Array, lightfield: LightField, rays: Array | Non
         z = depth.distance_from_z(z, rays)
     # Outside the image circle there is no ray; nothing was hit there.
     z = np.where(np.isnan(z), np.inf, z)
-    half = lightfield.render["depth_precision"] == "half"
-    with np.errstate(over="ignore"):
-        return z.astype(np.float16 if half else np.float32)
+    return depth.with_precision(z, lightfield.render["depth_precision"])

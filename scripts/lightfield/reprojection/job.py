@@ -137,6 +137,12 @@ class Job:
     def depth_wanted(self) -> bool:
         return bool(self.arguments.exr or self.arguments.depth_png)
 
+    @property
+    def depth_precision(self) -> str:
+        """That of the source's floats, by its lightfield.json; others' may not say it."""
+        render = self.lightfield.content.get("render", {})
+        return str(render.get("depth_precision", "float"))
+
     def key(self, target: Target, identity: str) -> str:
         """Return the SHA-256 of all that an output's pixels depend on.
 

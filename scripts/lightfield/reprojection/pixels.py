@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from lightfield.core.errors import UserError
+from lightfield.geometry.depth import with_precision
 from lightfield.geometry.lenses import Array
 from lightfield.geometry.lenses.cube_map import CubeMap
 from lightfield.imaging.halves import narrow, widen
@@ -161,7 +162,7 @@ def write(
 def _resampled(
     job: Job, made: LensMap, source: Source, as_z: bool
 ) -> tuple[Iterable[tuple[slice, Array]], Array | None]:
-    """Return the target's colour, in strips, and its depth in the source's dtype."""
+    """Return the target's colour, in strips, and its depth in the source's precision."""
     colour, depth = source.window(made)
     if job.copies and source.is_z == as_z:
         row, end_row, column, end_column = made.window
@@ -171,8 +172,8 @@ def _resampled(
         return [(np.s_[:], _in_frame(colour, made))], copy
     if depth is not None:
         found = resample_depth(depth, source.is_z, as_z, made)
-        with np.errstate(over="ignore"):
-            depth = found.astype(depth.dtype, copy=False)
+        precision = "half" if depth.dtype == np.float16 else job.depth_precision
+        depth = with_precision(found, precision)
     return colour_strips(colour, made), depth
 
 
