@@ -49,6 +49,11 @@ DATASETS = {
 # Any dataset of each scene YAML: all of them have the same .blend.
 SCENES = {dataset.scene_name: dataset for dataset in DATASETS.values()}
 
+# The scenes that are somebody else's views, as a wildcard's constraint; "(?!)" matches nothing.
+IMPORTED = (
+    "|".join({folder for (folder, _), d in DATASETS.items() if d.imported}) or "(?!)"
+)
+
 # Snakemake sets this up by itself if it is run with --software-deployment-method conda.
 ENVIRONMENT = "../envs/environment.yaml"
 
@@ -280,7 +285,10 @@ def probes():
     """Return name, number of frames, and probe of each chosen rig: a sequence's first frame's."""
     frames = {}
     for dataset in CHOSEN:
-        frames.setdefault((dataset.scene_folder, dataset.rig_name), []).append(dataset)
+        if not dataset.imported:
+            frames.setdefault((dataset.scene_folder, dataset.rig_name), []).append(
+                dataset
+            )
     return [
         (f"{scene}/{rig}", len(datasets), f"{datasets[0].work}/probe.json")
         for (scene, rig), datasets in frames.items()
@@ -323,6 +331,26 @@ def first_dataset(folder):
 def of_first(attribute):
     """Return the function by which a rule asks for an attribute of that dataset."""
     return lambda wildcards: getattr(first_dataset(wildcards.scene), attribute)
+
+
+def optional_words(wildcards, input):
+    """Return the words that name to scripts/validate.py what not every dataset has."""
+    given = {
+        "clearance": input.cameras,
+        "inventory": input.inventory,
+        "splits": input.splits,
+    }
+    return shlex.join(
+        word
+        for name, path in given.items()
+        if path
+        for word in (f"--{name}", str(path))
+    )
+
+
+def blend_words(wildcards, input):
+    """Return the words that name a dataset's scene to a program, if there is one."""
+    return shlex.join(["--blend", str(input.blend)]) if input.blend else ""
 
 
 def calibration_words(wildcards, input):

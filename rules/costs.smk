@@ -27,6 +27,7 @@ rule costs:
                 wildcards.scene: None,
             }
         ],
+        blend=blend_words,
         energy=SETTINGS.energy.model_dump_json(),
         full=full_size,
         reprojections=reprojection_words,
@@ -36,7 +37,7 @@ rule costs:
         f"python {SCRIPTS}/costs.py"
         " --dataset {params.dataset} --journals {params.journals}"
         " --benchmarks {params.benchmarks} --scene-benchmarks {params.scene_benchmarks}"
-        " --blend {input.blend:q} --energy {params.energy:q} --full {params.full:q}"
+        " {params.blend} --energy {params.energy:q} --full {params.full:q}"
         " {params.reprojections} --output {output} 2>&1 | tee {log}"
 
 

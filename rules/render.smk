@@ -1,6 +1,34 @@
 # The views: one job renders one shard, and keeps every view that is already there and right.
 
 
+# A light field that somebody else has rendered is taken over as it is.
+ruleorder: import_views > render
+
+
+rule import_views:
+    input:
+        lightfield=f"{DATASET}/lightfield.json",
+        renewal=renewal,
+    output:
+        f"{MADE}/render/{{first}}-{{end}}.json",
+    log:
+        log_of("{scene}/{rig}/render/{first}-{end}"),
+    wildcard_constraints:
+        scene=IMPORTED,
+    conda:
+        ENVIRONMENT
+    params:
+        dataset=of_dataset("imported"),
+        folder=f"{DATASET}/exr",
+    message:
+        "Importing views {wildcards.first} to {wildcards.end} of {wildcards.scene}/{wildcards.rig}"
+    shell:
+        f"python {SCRIPTS}/import_views.py"
+        " --dataset {params.dataset:q} --lightfield {input.lightfield}"
+        " --views {wildcards.first}:{wildcards.end} --output {params.folder} --record {output}"
+        " 2>&1 | tee {log}"
+
+
 rule render:
     input:
         check=of_dataset("blend_check"),

@@ -6,7 +6,7 @@ rule validate:
     input:
         records=of_dataset("all_records"),
         published=of_dataset("published"),
-        cameras=f"{MADE}/cameras.json",
+        cameras=of_dataset("cameras"),
         inventory=of_dataset("inventory"),
         splits=of_dataset("splits"),
     output:
@@ -25,17 +25,14 @@ rule validate:
     params:
         dataset=DATASET,
         reprojections=reprojection_words,
-        splits=lambda wildcards, input: (
-            f"--splits {input.splits}" if input.splits else ""
-        ),
+        optional=optional_words,
         removed=REMOVED,
     message:
         "Validating {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/validate.py"
         " --dataset {params.dataset} {params.reprojections}"
-        " --records {input.records} --clearance {input.cameras}"
-        " --inventory {input.inventory} {params.splits} --processes {threads}"
+        " --records {input.records} {params.optional} --processes {threads}"
         " --removed {params.removed}"
         " --output {output.validation} --sums {output.sums} 2>&1 | tee {log}"
 

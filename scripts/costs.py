@@ -23,7 +23,7 @@ def main() -> None:
         type=Path,
         help="folders of the scene's jobs' TSVs",
     )
-    parser.add_argument("--blend", required=True, type=Path, help="the scene")
+    parser.add_argument("--blend", type=Path, help="the scene, if there is one")
     parser.add_argument(
         "--energy",
         required=True,

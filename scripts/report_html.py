@@ -127,7 +127,7 @@ def facts(folder: Path, lightfield: LightField, rig: rigs.Rig) -> list[tuple[str
         ("Samples", samples),
         ("Depth", depth.get(lightfield.depth or "", "none")),
         ("Size of the views", page.bytes_(size)),
-        ("Rendered by", f"Cycles in bpy {version('bpy')}"),
+        ("Rendered by", f"Cycles in bpy {version('bpy')}" if "samples" in render else "others"),
     ]
 
 

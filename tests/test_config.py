@@ -75,7 +75,7 @@ BROKEN = {
     "misspelt key": ("render.sample", 4, "render.sample: unknown key; did you mean samples?"),
     "unknown key": ("render.xyzzy", 4, "render.xyzzy: unknown key; allowed here: samples, "),
     "unknown builder": ("scene.builder", "nowhere", "'nowhere'; must be one of"),
-    "two sources": ("scene.blend", "a.blend", "scene: must have one of builder and blend"),
+    "two sources": ("scene.blend", "a.blend", "scene: must have one of builder, blend and dataset"),
     "address of a builder": (
         "scene.url",
         "https://example.org/a.blend",

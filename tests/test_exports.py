@@ -1,7 +1,4 @@
-"""Exports, read back as their consumers read them, of a scene whose every point is known.
-
-The scene is the inside of a sphere around the origin; its colour follows from the place.
-"""
+"""Exports, read back as their consumers read them, of a scene whose every point is known."""
 
 import csv
 import json
@@ -14,6 +11,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 from scipy.spatial.transform import Rotation
+from sphere import RADIUS, colour_of, write_views
 
 from lightfield import export
 from lightfield.core.errors import UserError
@@ -23,12 +21,9 @@ from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField
 from lightfield.export.source import Source
 from lightfield.geometry import lenses, rigs
-from lightfield.geometry.depth import z_from_distance
 from lightfield.imaging import images
-from lightfield.imaging.tonemap import decode_srgb, to_8_bit
 from lightfield.validation import files as validation_files
 
-RADIUS = 3.0
 RIG = {"type": "plane", "cameras": [4, 3], "size": 1.2, "center": [0.3, -0.2, 0.1]}
 VIEWS = {"lens": "equidistant", "fov": 180, "resolution": [96, 96]}
 LENSES = {
@@ -51,41 +46,6 @@ LENSES = {
     "wide": {"lens": "equidistant", "fov": 220, "resolution": [64, 64]},
     "panorama": {"lens": "equirectangular", "resolution": [64, 32]},
 }
-
-
-def colour_of(points):
-    """The sRGB colour, 0 to 255, of places on the sphere."""
-    return 40 + 175 * (points / RADIUS / 2 + 0.5)
-
-
-def look(lens, matrix):
-    """Return linear colour, and distance, of what a camera inside the sphere sees."""
-    rays = lens.pixel_rays() @ matrix[:3, :3].T
-    along = (rays * matrix[:3, 3]).sum(axis=-1)
-    distance = -along + np.sqrt(along**2 + RADIUS**2 - matrix[:3, 3] @ matrix[:3, 3])
-    colour = decode_srgb(colour_of(matrix[:3, 3] + rays * distance[..., None]) / 255)
-    return np.nan_to_num(colour), distance
-
-
-def write_views(folder, camera, rig, suffix=".exr"):
-    lens = lenses.from_camera(camera)
-    depth = "z" if lens.has_z_depth else "distance"
-    lightfield = LightField.from_rig(rig, lens, depth=depth)
-    images_folder = folder / "exr" if folder.name == "dataset" else folder
-    images_folder.mkdir(parents=True)
-    lightfield.write(folder / "lightfield.json")
-    for view in lightfield.views:
-        colour, distance = look(lens, view.matrix)
-        z = z_from_distance(distance, lens.pixel_rays()) if depth == "z" else distance
-        channels = {name: colour[..., i].astype(np.float16) for i, name in enumerate("RGB")}
-        if suffix == ".png":
-            alpha = np.isfinite(distance).astype(np.uint8)[..., None] * 255
-            pixels = np.concatenate([to_8_bit(colour.astype(np.float32)), alpha], axis=-1)
-            images.write_png(images_folder / f"{view.name}.png", pixels)
-        else:
-            attributes = {images.DEPTH_ATTRIBUTE: depth}
-            channels["Z"] = z.astype(np.float32)
-            images.write_exr(images_folder / f"{view.name}.exr", channels, attributes)
 
 
 @pytest.fixture(scope="module")

@@ -25,6 +25,7 @@ from pydantic import (
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.core.settings import AS_WRITTEN, Name, Settings, Vector, checked, suggestion
+from lightfield.dataset import published
 from lightfield.dataset.exports import VIEWS, Export, Exports
 from lightfield.geometry.lenses import LENSES, CameraSettings
 from lightfield.geometry.rigs import AnyRig, Poses, Rig
@@ -167,7 +168,7 @@ class Parameters(Settings):
 
 
 class Source(Settings):
-    """Where the scene comes from: a builder, or a .blend file."""
+    """Where the scene comes from: a builder, a .blend file, or views that are there already."""
 
     builder: str | None = Field(
         None,
@@ -179,6 +180,11 @@ class Source(Settings):
         None,
         pattern=rf"^{QUOTED}\.blend$",
         description="The user's own .blend file, relative to the scene YAML's repository.",
+    )
+    dataset: str | None = Field(
+        None,
+        description="Instead of a scene to render: the folder of a light field in SILVR's layout "
+        "(lightfield.json and exr/), or one with several such folders.",
     )
     frame: Frame = Field(1, description="Of the animation, the frame that is rendered.")
     sha256: str | None = Field(
@@ -195,9 +201,9 @@ class Source(Settings):
     )
 
     @model_validator(mode="after")
-    def _one_of_two(self) -> Self:
-        if (self.builder is None) == (self.blend is None):
-            raise ValueError("must have one of builder and blend")
+    def _one_of_three(self) -> Self:
+        if [self.builder, self.blend, self.dataset].count(None) != 2:
+            raise ValueError("must have one of builder, blend and dataset")
         if self.builder is not None:
             known = builders()
             if self.builder not in known:
@@ -205,6 +211,9 @@ class Source(Settings):
             for name in ("sha256", "url", "page"):
                 if getattr(self, name) is not None:
                     raise ValueError(f"{name}: goes with blend, not with builder")
+        elif self.dataset is not None and len(self.model_fields_set) > 1:
+            (name, *_) = self.model_fields_set - {"dataset"}
+            raise ValueError(f"{name}: goes without dataset")
         return self
 
 
@@ -321,9 +330,11 @@ class Scene(Settings):
 
     description: str | None = Field(None, description="One line about the scene.")
     scene: Source
-    render: Render
+    render: Render | None = Field(None, description="How; scene.dataset alone has none.")
     rigs: dict[Name, AnyRig] = Field(
-        min_length=1, description="The camera setups, by the names of their folders."
+        {},
+        min_length=1,
+        description="The camera setups, by the names of their folders; scene.dataset has its own.",
     )
     reprojections: dict[Name, Reprojection] = Field(
         {}, description="The same views through other lenses, by the names of their folders."
@@ -331,8 +342,25 @@ class Scene(Settings):
     exports: Exports = Field(Exports(), description="Files for trainers.")
     report: Report = Field(Report(), description="What a dataset's page shows.")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _rigs_of_dataset(cls, content: Any) -> Any:
+        match content:
+            case {"scene": {"dataset": str(dataset)}}:
+                for key in ("render", "rigs"):
+                    if key in content:
+                        raise ValueError(f"{key}: goes without scene.dataset, which has its own")
+                try:
+                    return {**content, "rigs": published.rigs(dataset)}
+                except UserError as error:
+                    raise ValueError(f"scene.dataset: {error}") from None
+        return content
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        for key in ("render", "rigs"):
+            if not self.scene.dataset and not getattr(self, key):
+                raise ValueError(f"is missing the key {key}")
         for name, rig in self.rigs.items():
             _check_name(f"rigs.{name}", name, RIG_NEIGHBOURS)
             self._check_rig(f"rigs.{name}", rig)
@@ -374,7 +402,7 @@ class Scene(Settings):
         for source in export.sources:
             if source not in known:
                 raise ValueError(f"{key}: is {source!r}; must be of {', '.join(known)}")
-            has_depth = self.render.depth != "none"
+            has_depth = self.render is None or self.render.depth != "none"
             if source == VIEWS:
                 cameras = {rig.camera for rig in self.rigs.values()}
             else:
@@ -400,14 +428,14 @@ class Scene(Settings):
             )
         for name in _unknown_names(rig):
             raise ValueError(f"{key}.split: there is no view {name!r}")
-        if not LENSES[camera.lens].in_cycles:
+        if self.render and not LENSES[camera.lens].in_cycles:
             known = ", ".join(name for name, lens in LENSES.items() if lens.in_cycles)
             raise ValueError(
                 f"{key}.camera.lens: is {camera.lens!r}, which Cycles does not have; "
                 f"must be one of {known} (reproject for the others)"
             )
         lens = camera.make()
-        if self.render.depth == "z" and not lens.has_z_depth:
+        if self.render and self.render.depth == "z" and not lens.has_z_depth:
             raise ValueError(
                 f"render.depth: is 'z', but {key}.camera sees beyond 180 degrees; "
                 "must be auto, distance or none"

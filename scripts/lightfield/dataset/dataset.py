@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken
-from lightfield.dataset import config
+from lightfield.dataset import config, published
 from lightfield.dataset.config import CHOSEN, Configuration, Preset, Render, Source
 from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
 from lightfield.dataset.keys import scene_fingerprint
@@ -154,7 +154,14 @@ class Dataset:
     @property
     def builder_fingerprint(self) -> str | None:
         """What changes when a builder does; a user's .blend is a file, which is checked."""
-        return self.fingerprint if self.source.builder else None
+        return None if self.source.blend else self.fingerprint
+
+    @property
+    def imported(self) -> str | None:
+        """The folder of a light field that somebody else has rendered."""
+        if isinstance(self.rig, Poses) and self.source.dataset:
+            return str(Path(self.rig.file).parent)
+        return None
 
     @property
     def limits_json(self) -> str:
@@ -187,8 +194,10 @@ class Dataset:
         return f"{self.work_root}/{self.scene_name}"
 
     @property
-    def blend(self) -> str:
-        """The .blend: what a builder makes, or what the user brought."""
+    def blend(self) -> str | list[str]:
+        """The .blend: what a builder makes, or what the user brought; none of an import."""
+        if self.imported:
+            return []
         return self.source.blend or f"{self.scene_work}/scene.blend"
 
     @property
@@ -197,9 +206,14 @@ class Dataset:
         return f"{self.scene_work}/blend.json" if self.source.blend else []
 
     @property
-    def inventory(self) -> str:
-        """The list of what the scene contains."""
-        return f"{self.scene_work}/inventory.json"
+    def inventory(self) -> str | list[str]:
+        """The list of what the scene contains; none of an import."""
+        return [] if self.imported else f"{self.scene_work}/inventory.json"
+
+    @property
+    def cameras(self) -> str | list[str]:
+        """What surrounds each camera; not known of an import."""
+        return [] if self.imported else f"{self.work}/cameras.json"
 
     @property
     def trials(self) -> str:
@@ -256,10 +270,14 @@ class Dataset:
 
     @cached_property
     def panorama(self) -> str | list[str]:
-        """The panorama from the rig's centre for the report; none where it says nothing."""
+        """The panorama from the rig's centre for the report; none where it says nothing.
+
+        Nor is there one of an import, of which no scene is there to render it from.
+        """
         wanted = self.report.panorama
         made = sees_all_round(self.rig) if wanted == "auto" else wanted
-        return f"{self.work}/panorama/exr/view_0000f.exr" if made else []
+        here = made and not self.imported
+        return f"{self.work}/panorama/exr/view_0000f.exr" if here else []
 
     @property
     def costs(self) -> str:
@@ -303,12 +321,10 @@ class Dataset:
     @property
     def intermediates(self) -> list[str]:
         """What is made on the way to the dataset, named so that a missing one is made anew, too."""
-        blend = self.blend if self.source.builder else str(self.blend_check)
+        scene = self.blend if self.source.builder else self.blend_check
+        perhaps = (scene, self.inventory, self.calibration, self.cameras)
         return [
-            blend,
-            self.inventory,
-            *([self.calibration] if isinstance(self.calibration, str) else []),
-            f"{self.work}/cameras.json",
+            *(path for path in perhaps if isinstance(path, str)),
             f"{self.work}/checksums.txt",
             *(
                 [f"{self.work}/panorama/lightfield.json", self.panorama]
@@ -520,8 +536,8 @@ def scene_datasets(
                     rig_name=name,
                     rig_folder=folder,
                     source=source.model_copy(update={"frame": frame}),
-                    render=_limited_render(written.render, limits),
-                    rig=_limited_rig(rig, limits),
+                    render=_limited_render(written.render, rig, limits),
+                    rig=_limited_rig(rig, limits, written.render is not None),
                     reprojections=reprojections,
                     exports=written.exports.model_copy(update=exports),
                     report=written.report,
@@ -565,21 +581,31 @@ def _frames(name: str, rig: Rig, frame: int) -> Iterator[tuple[str, int]]:
         yield f"{name}/f{number:05d}", number
 
 
-def _limited_rig(rig: Rig, limits: Preset) -> Rig:
-    """Return a rig of as many views at most, with a file of poses found from any folder."""
+def _limited_rig(rig: Rig, limits: Preset, is_rendered: bool) -> Rig:
+    """Return a rig of as many views at most, with a file of poses found from any folder.
+
+    Views that are there already keep their resolution.
+    """
     if isinstance(rig, Poses):
         rig = rig.model_copy(update={"file": str(Path(rig.file).resolve())})
     if limits.views:
         rig = rig.thinned(limits.views)
-    return rig.model_copy(update={"camera": _limited(rig.camera, limits)})
+    if is_rendered:
+        rig = rig.model_copy(update={"camera": _limited(rig.camera, limits)})
+    return rig
 
 
-def _limited_render(render: Render, limits: Preset) -> dict[str, Any]:
+def _limited_render(render: Render | None, rig: Rig, limits: Preset) -> dict[str, Any]:
     """Return the ``render`` block under a preset's ``limits``.
+
+    Of views that are there already no more is known than what their depth means.
 
     With a ``target_error``, samples, threshold and denoising are not known before the calibration;
     what the preset says of them limits its choice: at most ``most_samples``, and ``denoise``.
     """
+    if render is None:
+        assert isinstance(rig, Poses)
+        return {"depth": published.depth(rig)}
     content = render.model_dump(exclude_none=True)
     denoise = {} if limits.denoise is None else {"denoise": limits.denoise}
     if render.samples is not None:

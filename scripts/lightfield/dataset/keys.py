@@ -11,6 +11,7 @@ from importlib.metadata import version
 from typing import Any
 
 from lightfield.core.errors import UserError
+from lightfield.dataset import published
 from lightfield.dataset.config import BUILDERS, Source
 from lightfield.dataset.lightfield import LightField, View
 
@@ -21,7 +22,8 @@ RENDER_VERSION = 3
 def scene_fingerprint(source: Source) -> str:
     """Return what identifies a scene YAML's ``scene`` block: 64 hexadecimal digits.
 
-    A .blend is identified by its bytes; raises `UserError` while their SHA-256 is not known. A
+    A .blend is identified by its bytes; raises `UserError` while their SHA-256 is not known.
+    Somebody else's views are by their lightfield.json. A
     built one differs from build to build (it holds memory addresses), so it is identified by the
     text of the builder and of the library that all builders have in common, its parameters, and
     bpy's version.
@@ -30,6 +32,8 @@ def scene_fingerprint(source: Source) -> str:
         if source.sha256 is None:
             raise UserError(f"{source.blend}: its sha256 is not known; check_blend.py records it")
         return source.sha256
+    if source.dataset:
+        return _digest(published.fingerprint(source.dataset))
     assert source.builder
     files = [
         [file.relative_to(BUILDERS).as_posix(), _hash(file.read_bytes())]

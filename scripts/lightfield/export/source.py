@@ -1,7 +1,5 @@
 """What an exporter writes from: the views of a lightfield.json, and the surfaces they see."""
 
-import os
-import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -11,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path
+from lightfield.core.files import second_name
 from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.geometry.depth import distance_from_z, z_from_distance
 from lightfield.geometry.lenses import Lens
@@ -114,7 +112,7 @@ class Source:
     def write_image(self, view: View, target: Path) -> None:
         """Write a view as an 8-bit PNG; one that is a PNG becomes a second name of that file."""
         if self.suffix == ".png":
-            _second_name(self.path(view), target)
+            second_name(self.path(view), target)
         else:
             images.write_png(target, self.colour(view))
 
@@ -207,12 +205,3 @@ def _depth_of(path: Path, lightfield: LightField, rays: Floats, meaning: str) ->
         return np.where(np.isnan(rays[..., 2]), np.nan, depth)
     convert = z_from_distance if meaning == "z" else distance_from_z
     return convert(depth, rays)
-
-
-def _second_name(file: Path, target: Path) -> None:
-    """Make ``target`` a hard link to a file, or a copy where the file system has no links."""
-    with atomic_path(target) as temporary:
-        try:
-            os.link(file, temporary)
-        except OSError:
-            shutil.copyfile(file, temporary)

@@ -167,10 +167,10 @@ def job_times(path: Path) -> tuple[float, float, int]:
     return wall, cpu, memory
 
 
-def stage_bytes(stage: str, dataset: Path, blend: Path) -> int:
+def stage_bytes(stage: str, dataset: Path, blend: Path | None) -> int:
     """Return the size of what a stage left behind, 0 if that is no part of the dataset."""
     if stage == "scene":
-        return blend.stat().st_size
+        return blend.stat().st_size if blend else 0
     paths = [dataset / name for name in MADE.get(stage, (stage,))]
     files = [file for path in paths for file in ([path] if path.is_file() else path.rglob("*"))]
     return sum(
@@ -216,7 +216,7 @@ def on_processor(run: journal.Run) -> bool:
 
 def costs(
     dataset: Path,
-    blend: Path,
+    blend: Path | None,
     journals: Path,
     benchmarks: Path,
     scene_benchmarks: Iterable[Path],

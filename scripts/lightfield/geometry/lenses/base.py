@@ -23,7 +23,7 @@ import math
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -221,6 +221,19 @@ class Lens(ABC):
         """Return the lens's own keys in the ``camera`` mapping of lightfield.json."""
         return {}
 
+    def settings(self) -> dict[str, Any]:
+        """Return the ``camera`` with which a scene YAML has this lens."""
+        camera: dict[str, Any] = {"lens": self.name, "resolution": [self.width, self.height]}
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value is None or field.name in ("width", "height"):
+                continue
+            angles = field.name in ("fov", "longitude", "latitude")
+            values = value if isinstance(value, tuple) else (value,)
+            numbers = [_degrees(number) if angles else number for number in values]
+            camera[field.name] = numbers if isinstance(value, tuple) else numbers[0]
+        return camera
+
     @classmethod
     def read(cls, camera: Mapping[str, Any], image: Mapping[str, Any]) -> Self:
         """Return the lens of a ``camera`` mapping of lightfield.json.
@@ -409,6 +422,13 @@ def named_numbers(text: str, form: str) -> dict[str, float]:
     if not least <= len(values) <= len(names) or not all(map(math.isfinite, values)):
         raise UserError(f"must have the form {form}")
     return dict(zip(names, values, strict=False))
+
+
+def _degrees(radians: float) -> float:
+    """Return an angle in degrees, without what Blender's float32 adds to a round one."""
+    degrees = math.degrees(radians)
+    rounded = round(degrees, 3)
+    return rounded if abs(math.radians(rounded) - radians) < ANGLE_SLACK else degrees
 
 
 def _as_float(*arrays: npt.ArrayLike) -> list[Array]:

@@ -1,0 +1,37 @@
+"""Take over views that somebody else has rendered: link or copy them, and record them."""
+
+import argparse
+from pathlib import Path
+
+from lightfield.core.cli import run, view_slice
+from lightfield.core.errors import UserError
+from lightfield.core.files import second_name
+from lightfield.core.progress import Progress
+from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.records import ShardRecord
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--dataset", required=True, type=Path, help="folder with views in exr/")
+    parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
+    parser.add_argument("--views", default=":", metavar="FIRST:END", help="a slice of its frames")
+    parser.add_argument("--output", required=True, type=Path, help="folder of the views")
+    parser.add_argument("--record", type=Path, help="JSON of the views' sizes and checksums")
+    arguments = parser.parse_args()
+
+    views = LightField.read(arguments.lightfield).views
+    names = [f"{view.name}.exr" for view in views[view_slice(arguments.views, len(views))]]
+    progress = Progress(len(names), "import", "views")
+    for name in names:
+        path = arguments.dataset / "exr" / name
+        if not path.is_file():
+            raise UserError(f"{path}: no such file, but its lightfield.json has the view")
+        second_name(path, arguments.output / name)
+        progress.done()
+    files = [arguments.output / name for name in names]
+    ShardRecord(arguments.record, arguments.output).write(files)
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,136 @@
+"""Views that somebody else has rendered, in SILVR's published layout, become a dataset of ours."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from checkouts import ROOT, planned
+from pydantic import TypeAdapter
+from sphere import write_views
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import sha256
+from lightfield.core.settings import checked
+from lightfield.dataset.config import Scene
+from lightfield.geometry import lenses
+from lightfield.imaging import images
+
+RIG = {"type": "plane", "cameras": [2, 2], "size": 0.4, "center": [0.3, -0.2, 0.1]}
+VIEWS = {"lens": "equidistant", "fov": 180, "resolution": [48, 48]}
+YAML = """
+scene: {dataset: published}
+reprojections:
+  perspective:
+    camera: {lens: rectilinear, fov: 90, resolution: [24, 24]}
+    format: exr
+exports:
+  instant_ngp: {sources: [perspective], depth: true}
+"""
+
+
+@pytest.fixture
+def published(tmp_path):
+    """A folder with one rig's views as SILVR publishes its own: half depth, and nothing of ours."""
+    folder = tmp_path / "published" / "LFPlane"
+    write_views(folder, VIEWS, RIG)
+    content = json.loads((folder / "lightfield.json").read_text())
+    del content["depth"]
+    (folder / "lightfield.json").write_text(json.dumps(content))
+    for path in folder.glob("*.exr"):
+        channels = images.read_image(path).channels
+        nothing = np.isnan(channels["Z"])
+        half = {name: pixels.astype(np.float16) for name, pixels in channels.items()}
+        half["Z"][nothing] = np.inf
+        images.write_exr(folder / "exr" / path.name, half)
+        path.unlink()
+    (tmp_path / "configs" / "scenes").mkdir(parents=True)
+    (tmp_path / "configs" / "scenes" / "theirs.yaml").write_text(YAML)
+    return folder
+
+
+def test_published_views_are_reprojected_exported_and_validated(published, tmp_path, run_program):
+    def run(name, *words):
+        return run_program(name, *words, cwd=tmp_path)
+
+    dataset = tmp_path / "results" / "theirs" / "LFPlane"
+    own = dataset / "lightfield.json"
+    run("make_lightfield.py", "--scene", "theirs", "--rig", "LFPlane", "--output", own)
+    content, theirs = (json.loads(p.read_text()) for p in (own, published / "lightfield.json"))
+    assert content["frames"] == theirs["frames"]
+    assert content["camera"] == theirs["camera"]
+    assert content["depth"] == "z"
+    record, views = tmp_path / "0-4.json", dataset / "exr"
+    words = ["--dataset", published, "--lightfield", own, "--output", views, "--record", record]
+    run("import_views.py", *words)
+    files = json.loads(record.read_text())["files"]
+    assert files.keys() == {f"exr/{path.name}" for path in (published / "exr").iterdir()}
+    for name, entry in files.items():
+        assert sha256(published / name) == sha256(dataset / name) == entry["sha256"]
+    again = dataset / "perspective"
+    camera = '{"lens": "rectilinear", "fov": 90, "resolution": [24, 24]}'
+    words = ["--exr", "--camera", camera, "--input-cfg", own, "--input-dir", views]
+    run("reproject.py", *words, "--output-dir", again, "--output-cfg", again / "lightfield.json")
+    words = ["--input-cfg", again / "lightfield.json", "--image-suffix", ".exr"]
+    run("export_instant_ngp.py", *words, "--output", again / "transforms.json")
+    words = ["--dataset", dataset, "--reprojection", "perspective", "--records", record]
+    words += ["--output", dataset / "validation.json", "--sums", tmp_path / "sums.txt"]
+    run("validate.py", *words)
+    validation = json.loads((dataset / "validation.json").read_text())
+    assert validation["valid"], validation["summary"]
+
+
+def test_nothing_is_rendered_of_it(published, tmp_path):
+    jobs = planned(
+        tmp_path, "--snakefile", ROOT / "Snakefile", "--config", "scenes=theirs", "preset=full"
+    )
+    assert jobs.keys() >= {"import_views", "reproject", "validate", "page"}
+    rendering = {"render", "render_panorama", "build_scene", "inventory", "check_cameras"}
+    assert not rendering & jobs.keys()
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        ({"scene": {"dataset": "elsewhere"}}, "there is no lightfield.json in elsewhere"),
+        ({"scene": {"dataset": "published"}, "rigs": {}}, "rigs: goes without scene.dataset"),
+        ({"scene": {"dataset": "published", "blend": "a.blend"}}, "must have one of builder,"),
+        ({"scene": {"dataset": "published", "frame": 3}}, "frame: goes without dataset"),
+        (
+            {"scene": {"dataset": "published"}, "exports": {"colmap": {"sources": ["views"]}}},
+            "exports.colmap.sources: views sees 180 degrees",
+        ),
+    ],
+)
+def test_what_goes_not_with_it_is_refused(published, tmp_path, monkeypatch, content, problem):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match=problem):
+        checked(TypeAdapter(Scene), content, "theirs.yaml")
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [
+        VIEWS,
+        {"lens": "rectilinear", "focal_length": 18, "sensor_size": 36, "resolution": [8, 6]},
+        {"lens": "equirectangular", "latitude": [-90, 45], "resolution": [8, 6]},
+        {"lens": "equisolid", "focal_length": 10.5, "fov": 123.4567, "resolution": [8, 8]},
+        {
+            "lens": "polynomial",
+            "fov": 180,
+            "coefficients": [0, -0.08, 0, 0, 1e-6],
+            "principal_point": [3.5, 4],
+            "resolution": [8, 8],
+        },
+    ],
+)
+def test_a_lens_is_a_camera_of_a_yaml_again(camera):
+    lens = lenses.from_camera(camera)
+    assert lenses.from_camera(lens.settings()) == lens
+
+
+def test_an_angle_that_blender_rounded_is_whole_again():
+    camera = {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT"}
+    camera["fisheye_fov"] = float(np.float32(2 * math.pi))
+    lens = lenses.from_lightfield({"camera": camera, "resolution": [8, 8]})
+    assert lens.settings()["fov"] == 360
