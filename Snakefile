@@ -15,7 +15,7 @@ GIVEN = set(config)
 configfile: f"{workflow.basedir}/config.yaml"
 
 
-if Path("config.yaml").exists():
+if Path("config.yaml").exists() and Path.cwd() != Path(workflow.basedir):
 
     # Snakemake loads it without a limit.
     try:
@@ -30,6 +30,7 @@ report: "captions/workflow.rst"
 
 
 include: "rules/common.smk"
+include: "rules/display.smk"
 include: "rules/scene.smk"
 include: "rules/rig.smk"
 include: "rules/render.smk"
@@ -51,16 +52,19 @@ onstart:
         if SETTINGS.accept_blend:
             for name in SCENES:
                 accept_blend(name)
-        write_json(RUN, {dataset.folder: dataset.view_count for dataset in CHOSEN})
     except UserError as error:
         sys.exit(f"error: {error}")
+    begin_display()
 
 
 onsuccess:
+    end_display()
     note_sums()
+    print_pages()
 
 
 onerror:
+    end_display()
     note_sums()
     # Snakemake has something to say after this, too: what failed is repeated when it has.
     atexit.register(
@@ -102,7 +106,7 @@ rule verify:
         "Checking every byte of the chosen datasets"
     shell:
         f"python {SCRIPTS}/verify.py"
-        " {params.folders} --work {params.work} 2>&1 | tee {log}"
+        " {params.folders} --work {params.work} > {log} 2>&1"
 
 
 rule package_all:

@@ -22,8 +22,7 @@ rule reprojection_benchmark:
     message:
         "Measuring the error of reprojection against its run time"
     shell:
-        f"python {BENCHMARKS}/reprojection.py"
-        " {params.folder} --batch 8 2>&1 | tee {log}"
+        f"python {BENCHMARKS}/reprojection.py" " {params.folder} --batch 8 > {log} 2>&1"
 
 
 rule stability:
@@ -43,7 +42,7 @@ rule stability:
     message:
         "Taking every pair of lenses to its extremes"
     shell:
-        f"python {BENCHMARKS}/stability.py" " --output {params.folder} 2>&1 | tee {log}"
+        f"python {BENCHMARKS}/stability.py" " --output {params.folder} > {log} 2>&1"
 
 
 rule render_overhead:
@@ -57,4 +56,4 @@ rule render_overhead:
     message:
         "Measuring what the workflow adds to Cycles' own render time"
     shell:
-        f"python {BENCHMARKS}/render_overhead.py" " 2> {log} | tee {output}"
+        f"python {BENCHMARKS}/render_overhead.py" " > {output} 2> {log}"

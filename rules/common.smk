@@ -12,15 +12,17 @@ from pathlib import Path
 # From the folder that Snakemake works in, which may be a user's own.
 SCRIPTS = os.path.relpath(Path(workflow.current_basedir).parent / "scripts")
 BENCHMARKS = os.path.relpath(Path(workflow.current_basedir).parent / "benchmarks")
-# A prefix takes the place of Snakemake's own, whose strict mode keeps the exit status of a program
-# before `| tee`. The rules call `python`: let that be the one that runs Snakemake.
+# A prefix takes the place of Snakemake's own, strict mode and all. The rules call `python`: let
+# that be the one that runs Snakemake, and a signal that ends it be named in the job's log.
 shell.prefix(
     "set -euo pipefail;"
-    f" export PATH={shlex.quote(str(Path(sys.executable).parent))}:$PATH; "
+    f" export PATH={shlex.quote(str(Path(sys.executable).parent))}:$PATH;"
+    ' python() {{ command python "$@" || {{ local status=$?; if ((status > 128)); then'
+    ' echo "error: killed by SIG$(kill -l $status)" >&2; fi; return $status; }}; }}; '
 )
 
 from lightfield.core.failures import failure_report
-from lightfield.core.files import read_json, set_aside, write_json
+from lightfield.core.files import read_json, set_aside
 from lightfield.dataset import ledger
 from lightfield.dataset.config import accept_blend, load_config
 from lightfield.dataset.dataset import PICTURES, PLOTS, load_datasets, scene_datasets
@@ -62,8 +64,6 @@ DATASET = f"{RESULTS}/{{scene}}/{{rig}}"
 MADE = f"{WORK}/{{scene}}/{{rig}}"
 PANORAMA = f"{MADE}/panorama"
 REPROJECTED = f"{DATASET}/{{reprojection}}"
-# Which datasets are being built, for the progress lines of each shard.
-RUN = f"{WORK}/run.json"
 # What is not what a program wrote there, and what is wrong with it.
 BROKEN = {}
 # Where that is moved to, for nobody to lose anything.
@@ -237,7 +237,7 @@ def shard_threads(wildcards):
 def shard_minutes(wildcards):
     """Allow a shard several times its estimated time, and never less than half an hour."""
     views = int(wildcards.end) - int(wildcards.first)
-    seconds = views * dataset_of(wildcards).expected_view_seconds
+    seconds = views * dataset_of(wildcards).expected_view[0]
     return 30 + math.ceil(5 * seconds / 60)
 
 

@@ -38,7 +38,7 @@ rule costs:
         " --dataset {params.dataset} --journals {params.journals}"
         " --benchmarks {params.benchmarks} --scene-benchmarks {params.scene_benchmarks}"
         " {params.blend} --energy {params.energy:q} --full {params.full:q}"
-        " {params.reprojections} --output {output} 2>&1 | tee {log}"
+        " {params.reprojections} --output {output} > {log} 2>&1"
 
 
 # Without input and output, so that it can be asked at any time; with --nolock while a build runs.
@@ -56,4 +56,4 @@ rule status:
     shell:
         f"python {SCRIPTS}/status.py"
         " --results {params.results} --work {params.work}"
-        " {params.datasets} 2>&1 | tee {log}"
+        " {params.datasets} > {log} 2>&1"

@@ -23,7 +23,7 @@ rule probe_cameras:
     shell:
         f"python {SCRIPTS}/make_lightfield.py"
         " --scene {params.name} --limits {params.limits:q}"
-        " --output {output} 2>&1 | tee {log}"
+        " --output {output} > {log} 2>&1"
 
 
 # Only scenes with a target error ask for it. Its output is the same each time but for --seconds.
@@ -56,7 +56,7 @@ rule calibrate:
         f"python {SCRIPTS}/calibrate.py"
         " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} --device {params.device} --threads {threads}"
-        " --cache {params.cache} --output {output} --seconds {params.seconds} 2>&1 | tee {log}"
+        " --cache {params.cache} --output {output} --seconds {params.seconds} > {log} 2>&1"
 
 
 rule measure_error:
@@ -95,7 +95,7 @@ rule measure_error:
         f"python {SCRIPTS}/error_vs_time.py"
         " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} {params.calibration} --device {params.device} --threads 1"
-        " --cache {params.cache} --output {params.stem} 2>&1 | tee {log}"
+        " --cache {params.cache} --output {params.stem} > {log} 2>&1"
 
 
 rule error_vs_time:

@@ -23,7 +23,7 @@ rule export_views_to_instant_ngp:
         f"python {SCRIPTS}/export_instant_ngp.py"
         " --input-cfg {input.lightfield}"
         " --image-dir {params.views} --image-suffix .exr {params.options} --output {output}"
-        " 2>&1 | tee {log}"
+        " > {log} 2>&1"
 
 
 rule export_reprojection_to_instant_ngp:
@@ -47,7 +47,7 @@ rule export_reprojection_to_instant_ngp:
     shell:
         f"python {SCRIPTS}/export_instant_ngp.py"
         " --input-cfg {input.lightfield}"
-        " --image-suffix {params.suffix} {params.options} --output {output} 2>&1 | tee {log}"
+        " --image-suffix {params.suffix} {params.options} --output {output} > {log} 2>&1"
 
 
 rule export:
@@ -75,4 +75,4 @@ rule export:
     shell:
         f"python {SCRIPTS}/export.py"
         " {wildcards.format} --dataset {params.dataset} {params.words}"
-        " --output {params.folder} 2>&1 | tee {log}"
+        " --output {params.folder} > {log} 2>&1"

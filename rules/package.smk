@@ -21,4 +21,4 @@ rule package:
         " --owner=0 --group=0 --numeric-owner --mode=u=rwX,go=rX"
         " --exclude='{wildcards.rig}/report' --exclude='{wildcards.rig}/f*/report'"
         " --transform='s,^,{wildcards.scene}_,'"
-        " {wildcards.rig} 2>&1 | tee {log}"
+        " {wildcards.rig} > {log} 2>&1"

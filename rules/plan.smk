@@ -20,7 +20,7 @@ rule rig_tables:
     shell:
         f"python {SCRIPTS}/rig_table.py"
         " {input} --markdown {params.table} --csv {params.figures}"
-        " 2>&1 | tee {log}"
+        " > {log} 2>&1"
 
 
 rule probe:
@@ -47,7 +47,7 @@ rule probe:
         f"python {SCRIPTS}/probe.py"
         " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} --device {params.device} --output {output}"
-        " 2>&1 | tee {log}"
+        " > {log} 2>&1"
 
 
 # Without output: it is asked for to be read.
@@ -67,4 +67,4 @@ rule plan:
         "Adding up what the chosen datasets will take"
     shell:
         f"python {SCRIPTS}/plan.py"
-        " {params.datasets} --output {params.table} 2>&1 | tee {log}"
+        " {params.datasets} --output {params.table} > {log} 2>&1"

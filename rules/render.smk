@@ -26,7 +26,7 @@ rule import_views:
         f"python {SCRIPTS}/import_views.py"
         " --dataset {params.dataset:q} --lightfield {input.lightfield}"
         " --views {wildcards.first}:{wildcards.end} --output {params.folder} --record {output}"
-        " 2>&1 | tee {log}"
+        " > {log} 2>&1"
 
 
 rule render:
@@ -54,7 +54,6 @@ rule render:
         folder=f"{DATASET}/exr",
         journal=f"{MADE}/render/{{first}}-{{end}}.journal.jsonl",
         device=SETTINGS.device,
-        run=RUN,
     message:
         "Rendering views {wildcards.first} to {wildcards.end} of {wildcards.scene}/{wildcards.rig}"
     shell:
@@ -63,5 +62,4 @@ rule render:
         " --inventory {input.inventory}"
         " --views {wildcards.first}:{wildcards.end} --device {params.device} --threads {threads}"
         " --output {params.folder} --journal {params.journal} --record {output}"
-        " --run {params.run}"
-        " 2>&1 | tee {log}"
+        " > {log} 2>&1"

@@ -27,7 +27,7 @@ rule panorama_lightfield:
         f"python {SCRIPTS}/make_lightfield.py"
         " --scene {params.name} --rig {wildcards.rig}"
         " --limits {params.limits:q} --panorama {params.width} {params.calibration}"
-        " --output {output} 2>&1 | tee {log}"
+        " --output {output} > {log} 2>&1"
 
 
 rule render_panorama:
@@ -57,7 +57,7 @@ rule render_panorama:
         f"python {SCRIPTS}/render_shard.py"
         " --blend {input.blend:q} --lightfield {input.lightfield}"
         " --inventory {input.inventory}"
-        " --device {params.device} --threads {threads} --output {params.folder} 2>&1 | tee {log}"
+        " --device {params.device} --threads {threads} --output {params.folder} > {log} 2>&1"
 
 
 rule figures:
@@ -90,7 +90,7 @@ rule figures:
     shell:
         f"python {SCRIPTS}/report_figures.py"
         " --dataset {params.dataset} --rig {params.rig:q}"
-        " --panorama {input.panorama} --output {params.dataset}/report 2>&1 | tee {log}"
+        " --panorama {input.panorama} --output {params.dataset}/report > {log} 2>&1"
 
 
 rule page:
@@ -122,7 +122,7 @@ rule page:
         " --dataset {params.dataset}"
         " --name {wildcards.scene}/{wildcards.rig} --rig {params.rig:q}"
         " --panorama {params.panorama} --measurements {params.measurements}"
-        " --output {output} 2>&1 | tee {log}"
+        " --output {output} > {log} 2>&1"
 
 
 rule index:
@@ -140,5 +140,4 @@ rule index:
         "Making the page of all datasets"
     shell:
         f"python {SCRIPTS}/report_index.py"
-        " --results {params.results} --output {output} 2>&1"
-        " | tee {log}"
+        " --results {params.results} --output {output} > {log} 2>&1"

@@ -23,7 +23,7 @@ rule reprojected_lightfield:
         f"python {SCRIPTS}/reproject.py"
         " --dry-run {params.optics} {params.development}"
         " --input-cfg {input} --output-cfg {output} --input-dir {params.views}"
-        " --output-dir {params.folder} 2>&1 | tee {log}"
+        " --output-dir {params.folder} > {log} 2>&1"
 
 
 rule lens_map:
@@ -43,7 +43,7 @@ rule lens_map:
         "Computing the lens map of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
         f"python {SCRIPTS}/lens_map.py"
-        " {output} {params.optics} --input-cfg {input} 2>&1 | tee {log}"
+        " {output} {params.optics} --input-cfg {input} > {log} 2>&1"
 
 
 rule reproject:
@@ -75,4 +75,4 @@ rule reproject:
         " {params.optics} {params.development}"
         " --lens-map {input.lens_map} --input-cfg {input.lightfield} --input-dir {params.views}"
         " --views {wildcards.first}:{wildcards.end} --output-dir {params.folder}"
-        " --source-record {input.record} --record {output} 2>&1 | tee {log}"
+        " --source-record {input.record} --record {output} > {log} 2>&1"

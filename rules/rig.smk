@@ -26,7 +26,7 @@ rule lightfield:
     shell:
         f"python {SCRIPTS}/make_lightfield.py"
         " --scene {params.name} --rig {wildcards.rig}"
-        " --limits {params.limits:q} {params.calibration} --output {output} 2>&1 | tee {log}"
+        " --limits {params.limits:q} {params.calibration} --output {output} > {log} 2>&1"
 
 
 rule check_cameras:
@@ -50,7 +50,7 @@ rule check_cameras:
     shell:
         f"python {SCRIPTS}/check_cameras.py"
         " --blend {input.blend:q} --lightfield {input.lightfield}"
-        " --output {output} 2>&1 | tee {log}"
+        " --output {output} > {log} 2>&1"
 
 
 rule splits:
@@ -65,4 +65,4 @@ rule splits:
     message:
         "Listing what the views of {wildcards.scene} are for"
     shell:
-        f"python {SCRIPTS}/splits.py" " --output {output} {input} 2>&1 | tee {log}"
+        f"python {SCRIPTS}/splits.py" " --output {output} {input} > {log} 2>&1"

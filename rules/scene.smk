@@ -25,7 +25,7 @@ rule build_scene:
     shell:
         f"python {SCRIPTS}/build_scene.py"
         " --builder {params.builder}"
-        " --parameters {params.parameters:q} --output {output} 2>&1 | tee {log}"
+        " --parameters {params.parameters:q} --output {output} > {log} 2>&1"
 
 
 rule check_blend:
@@ -47,7 +47,7 @@ rule check_blend:
     shell:
         f"python {SCRIPTS}/check_blend.py"
         " --scene {wildcards.name} --blend {input:q}"
-        " --output {output} 2>&1 | tee {log}"
+        " --output {output} > {log} 2>&1"
 
 
 rule inventory:
@@ -69,7 +69,7 @@ rule inventory:
         "Listing what the scene {wildcards.name} contains"
     shell:
         f"python {SCRIPTS}/inventory.py"
-        " --blend {input.blend:q} --output {output} 2>&1 | tee {log}"
+        " --blend {input.blend:q} --output {output} > {log} 2>&1"
 
 
 # Only where a scene YAML says from where, and the user has not brought the file.
@@ -95,4 +95,4 @@ for name, dataset in SCENES.items():
         shell:
             f"python {SCRIPTS}/fetch_blend.py"
             " --scene {params.name} --output {output:q}"
-            " 2>&1 | tee {log}"
+            " > {log} 2>&1"

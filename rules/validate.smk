@@ -34,7 +34,7 @@ rule validate:
         " --dataset {params.dataset} {params.reprojections}"
         " --records {input.records} {params.optional} --processes {threads}"
         " --removed {params.removed}"
-        " --output {output.validation} --sums {output.sums} 2>&1 | tee {log}"
+        " --output {output.validation} --sums {output.sums} > {log} 2>&1"
 
 
 rule checksums:
@@ -54,4 +54,4 @@ rule checksums:
     shell:
         f"python {SCRIPTS}/publish_checksums.py"
         " --validation {input.validation} --page {input.page}"
-        " --sums {input.sums} --output {output} 2>&1 | tee {log}"
+        " --sums {input.sums} --output {output} > {log} 2>&1"

@@ -12,14 +12,17 @@ from pathlib import Path
 from lightfield.core.cli import run
 from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField
-from lightfield.measurement import calibration, trials
+from lightfield.measurement import calibration, sampling, trials
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
     trials.add_arguments(parser, "lightfield.json with render.target_error")
     parser.add_argument(
-        "--probes", type=int, default=16, help="windows of views, as many held out (default: 16)"
+        "--probes",
+        type=int,
+        default=sampling.PROBES,
+        help="windows of views, as many held out (default: %(default)s)",
     )
     parser.add_argument("--output", required=True, type=Path, help="JSON of choice and evidence")
     parser.add_argument("--seconds", type=Path, help="JSON of the seconds that each way took")

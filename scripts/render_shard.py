@@ -26,7 +26,6 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="folder of the views")
     parser.add_argument("--record", type=Path, help="JSON of the views' sizes and checksums")
     parser.add_argument("--journal", type=Path, help="JSON lines of what was rendered and how fast")
-    parser.add_argument("--run", type=Path, help="JSON of a run: each dataset's views, by folder")
     parser.add_argument(
         "--device",
         default="auto",
@@ -45,7 +44,6 @@ def main() -> None:
         threads=arguments.threads,
         record=arguments.record,
         journal=arguments.journal,
-        run=arguments.run,
     )
 
 

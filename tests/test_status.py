@@ -16,7 +16,6 @@ import status
 from lightfield.core import progress
 from lightfield.dataset import keys
 from lightfield.dataset.lightfield import LightField, View
-from lightfield.dataset.run_progress import RunProgress
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 
@@ -179,32 +178,3 @@ def test_progress_begins_at_once_and_reads_in_a_log(capsys, monkeypatch):
     assert capsys.readouterr().err == ""
     told.done(6)
     assert capsys.readouterr().err.endswith("done in 2 min 41 s\n")
-
-
-def test_a_shard_tells_of_the_views_that_others_finished(dataset):
-    dataset.render("a")
-    others = RunProgress(2, dataset.content, dataset.folder / "exr", None)
-    assert others() == "; of the whole dataset 1 of 4"
-    dataset.render("c", "d")
-    assert others() == "; of the whole dataset 3 of 4"
-    # Alone it would only say the same again.
-    assert RunProgress(4, dataset.content, dataset.folder / "exr", None)() == ""
-
-
-def test_a_shard_tells_how_far_the_run_is(dataset, tmp_path, monkeypatch):
-    now = [100.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    later = tmp_path / "later"
-    run = tmp_path / "run.json"
-    run.write_text(json.dumps({str(dataset.folder): 4, str(later): 6}))
-    dataset.render("a")
-    others = RunProgress(4, dataset.content, dataset.folder / "exr", run)
-    assert others() == "; of the run 1 of 10"
-    dataset.render("b", "c")
-    now[0] += 30
-    # 15 s a view.
-    assert others() == "; of the run 3 of 10, 1 min 45 s left"
-    # The other dataset's cameras are placed, and nothing is rendered there.
-    later.mkdir()
-    dataset.content.write(later / "lightfield.json")
-    assert others().startswith("; of the run 3 of 10")

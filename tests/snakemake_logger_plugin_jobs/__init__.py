@@ -13,7 +13,8 @@ FILES = ("input", "output", "log")
 class LogHandler(LogHandlerBase):
     writes_to_stream = True
     writes_to_file = False
-    has_filter = False
+    # The profile's --quiet does not apply.
+    has_filter = True
     has_formatter = False
     needs_rulegraph = False
 

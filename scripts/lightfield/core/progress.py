@@ -1,8 +1,12 @@
 """Progress of long work: views done, rate, and time left, readable on a terminal and in a log."""
 
+import re
 import sys
 import time
-from collections.abc import Callable
+from dataclasses import dataclass
+
+_BEGIN = re.compile(r".*: (\d+) \w+ to do(?:, (\d+) already done)?")
+_NOW = re.compile(r".*: (\d+) of (\d+) \w+, ")
 
 
 def duration(seconds: float) -> str:
@@ -15,13 +19,33 @@ def duration(seconds: float) -> str:
     return f"{minutes // 60} h {minutes % 60:02d} min"
 
 
+@dataclass(frozen=True)
+class Said:
+    """What a line of `Progress` says: pieces ``done`` of ``total``, and ``already`` done before.
+
+    That is None but for the first line.
+    """
+
+    done: int
+    total: int
+    already: int | None = None
+
+
+def read(line: str) -> Said | None:
+    """Return what a line of `Progress` says, or None if it is none."""
+    if found := _BEGIN.fullmatch(line):
+        return Said(0, int(found[1]), int(found[2] or 0))
+    if found := _NOW.match(line):
+        return Said(int(found[1]), int(found[2]))
+    return None
+
+
 class Progress:
     """Counts finished pieces of work and prints a line from time to time, the first at once.
 
     Whole lines, never carriage returns, so that several shards can share one log. The lines come
     every ``interval`` seconds, and more rarely, down to one a minute, the longer the work takes.
-    ``already`` pieces were finished before; ``total`` are to do. ``note`` ends each line but the
-    first.
+    ``already`` pieces were finished before; ``total`` are to do.
     """
 
     def __init__(
@@ -31,13 +55,11 @@ class Progress:
         unit: str = "views",
         interval: float = 5.0,
         already: int = 0,
-        note: Callable[[], str] = str,
     ) -> None:
         self.total = total
         self.label = label
         self.unit = unit
         self.interval = interval
-        self.note = note
         self.count = 0
         self._print(f"{total} {unit} to do" + (f", {already} already done" if already else ""))
         self.begin()
@@ -65,7 +87,6 @@ class Progress:
         self._print(
             f"{self.count} of {self.total} {self.unit}, {each:.3g} s each, "
             + (f"{duration(left)} left" if left else f"done in {duration(elapsed)}")
-            + self.note()
         )
 
     def _print(self, text: str) -> None:

@@ -10,6 +10,7 @@ from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from stat import S_ISREG
+from statistics import fmean
 from typing import Any, Literal
 
 from lightfield.core.errors import UserError
@@ -32,6 +33,10 @@ START_UP_SECONDS = 3.0
 GUESSED_SAMPLES = 256
 # Start-up is kept under this part of a shard's time.
 START_UP_PART = 0.05
+# Of the bytes of half-float colour and of depth, what an EXR takes: measured in the three scenes.
+COMPRESSED = 0.75
+# A pixel of an 8-bit PNG.
+PNG_BYTES = 2
 # More shards of one dataset than this only make the plan long: no machine renders them all at once.
 MOST_SHARDS = 64
 
@@ -405,20 +410,53 @@ class Dataset:
     @property
     def planned_view_seconds(self) -> float:
         """Estimate of how long one core path-traces one view."""
-        width, height = self.rig.camera.resolution
-        return width * height * self.planned_samples * SECONDS_PER_SAMPLE
+        return self._pixels * self.planned_samples * SECONDS_PER_SAMPLE
 
     @property
-    def expected_view_seconds(self) -> float:
-        """The same with the samples that the calibration has found, if it has."""
+    def expected_samples(self) -> float:
+        """The same samples, or those that the calibration has found, if it has."""
         if not isinstance(self.calibration, str):
-            return self.planned_view_seconds
+            return self.planned_samples
         try:
-            samples = json.loads(Path(self.calibration).read_bytes())["cost_samples"]
-            return float(self.planned_view_seconds * samples / self.planned_samples)
+            return float(json.loads(Path(self.calibration).read_bytes())["cost_samples"])
         except (OSError, ValueError, LookupError, TypeError):
             # Not there yet, or broken, and then it is made anew.
-            return self.planned_view_seconds
+            return self.planned_samples
+
+    @cached_property
+    def expected_view(self) -> tuple[float, float]:
+        """Seconds of one core that a view takes, and its bytes: as a probe measured, or guessed."""
+        try:
+            # A sequence's first frame is probed for all.
+            rig = Path(self.work_root, self.scene_folder, self.rig_name)
+            probe = json.loads(next(rig.glob("**/probe.json")).read_bytes())
+            now = [list(self.rig.camera.resolution), self.render.get("samples", probe["samples"])]
+            if probe["device"] == "CPU" and now == [probe["resolution"], probe["samples"]]:
+                return fmean(probe["view_seconds"]), fmean(probe["view_bytes"])
+        except (OSError, ValueError, LookupError, TypeError, StopIteration):
+            pass
+        width = {"float": 4, "rounded": 3, "half": 2}[self.render["depth_precision"]]
+        size = self._pixels * (6 + width * bool(self.depth)) * COMPRESSED
+        return self._pixels * self.expected_samples * SECONDS_PER_SAMPLE, size
+
+    @property
+    def expected_view_bytes(self) -> float:
+        """Bytes of a view and of what it is reprojected to."""
+        sizes = {"exr": 10 * COMPRESSED, "png": PNG_BYTES}
+        return self.expected_view[1] + sum(
+            math.prod(reprojection.camera.resolution) * sizes[reprojection.format]
+            for reprojection in self.reprojections.values()
+        )
+
+    @property
+    def panorama_seconds(self) -> float:
+        """Estimate of how long one core renders the panorama, which is twice as wide as high."""
+        pixels = self.panorama_width**2 / 2
+        return START_UP_SECONDS + self.expected_view[0] * pixels / self._pixels
+
+    @property
+    def _pixels(self) -> int:
+        return math.prod(self.rig.camera.resolution)
 
     @cached_property
     def shards(self) -> list[tuple[int, int]]:

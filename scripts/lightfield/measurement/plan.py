@@ -1,11 +1,14 @@
 """What the chosen datasets will take on this machine: views, hours and gigabytes."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from statistics import fmean
 from typing import Any
 
 from lightfield.core import processors
-from lightfield.measurement.sampling import standard_error
+from lightfield.dataset.dataset import SECONDS_PER_SAMPLE, START_UP_SECONDS
+from lightfield.measurement.sampling import PROBES, WINDOW_SIZE, standard_error
 
 HEAD = "| dataset | views | resolution | samples | s a view | hours | GB |"
 
@@ -44,3 +47,44 @@ def table(datasets: list[tuple[str, int, dict[str, Any]]]) -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class Work:
+    """What a run will do of one rig, or to calibrate: views, seconds of one core, and bytes."""
+
+    name: str
+    views: int
+    seconds: float
+    size: float = 0.0
+
+
+def forecast(works: Sequence[Work]) -> str:
+    """Return the table that a dry run ends with, sums below."""
+    total = Work(
+        "all",
+        sum(work.views for work in works),
+        sum(work.seconds for work in works),
+        sum(work.size for work in works),
+    )
+    rows = [
+        f"{work.name:<40} {work.views or '':>8} {_figure(work.seconds / 3600):>10} "
+        f"{_figure(work.size / 1e9) if work.size else '':>8}"
+        for work in [*works, *([total] if len(works) > 1 else [])]
+    ]
+    head = f"{'to render':<40} {'views':>8} {'CPU hours':>10} {'GB':>8}"
+    return "\n".join([head, *rows, "Expected from pixels and samples, or from probes: see `plan`."])
+
+
+def calibration_seconds(samples: int) -> float:
+    """Estimate how long one core calibrates where ``samples`` a pixel would reach the target.
+
+    A reference takes five times as many, and the search about twice as many; then both again, for
+    the views that are held out.
+    """
+    pixels = PROBES * WINDOW_SIZE**2
+    return START_UP_SECONDS + pixels * 2 * (5 + 2) * samples * SECONDS_PER_SAMPLE
+
+
+def _figure(value: float) -> str:
+    return f"{value:.2g}" if value < 10 else f"{value:,.0f}"

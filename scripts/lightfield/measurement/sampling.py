@@ -9,6 +9,11 @@ from typing import Any
 # target, and a preset's limits.
 UNCALIBRATED = ("target_error", "most_samples", "denoise")
 
+# A calibration renders so many windows of views, of so many pixels along a side, and again as many
+# that are held out.
+PROBES = 16
+WINDOW_SIZE = 64
+
 PLAIN = {"adaptive_threshold": 0, "denoise": False}
 
 # What denoising a pixel costs in samples of it: 18 µs against 6, measured on one core of an EPYC in

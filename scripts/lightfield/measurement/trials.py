@@ -23,7 +23,7 @@ from lightfield.dataset import keys
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.imaging import images
 from lightfield.measurement.metrics import Mask, Reference, make_reference
-from lightfield.measurement.sampling import PLAIN, without_target
+from lightfield.measurement.sampling import PLAIN, WINDOW_SIZE, without_target
 from lightfield.validation.consistency import Camera
 
 # Seeds of references begin here, and those of trials at 1: no trial is part of its reference.
@@ -216,7 +216,9 @@ def add_arguments(parser: argparse.ArgumentParser, lightfield: str) -> None:
     parser.add_argument("--blend", required=True, type=Path, help="the scene")
     parser.add_argument("--inventory", required=True, type=Path, help="what the scene contains")
     parser.add_argument("--lightfield", required=True, type=Path, help=lightfield)
-    parser.add_argument("--size", type=int, default=64, help="of a window's sides (default: 64)")
+    parser.add_argument(
+        "--size", type=int, default=WINDOW_SIZE, help="of a window's sides (default: %(default)s)"
+    )
     parser.add_argument("--device", default="auto", help="what Cycles renders on (default: auto)")
     parser.add_argument("--threads", type=int, default=1, help="CPU threads (default: 1)")
     parser.add_argument("--cache", required=True, type=Path, help="folder of what was rendered")

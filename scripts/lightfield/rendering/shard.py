@@ -24,7 +24,6 @@ from lightfield.dataset import keys
 from lightfield.dataset.journal import Journal
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.records import ShardRecord
-from lightfield.dataset.run_progress import RunProgress
 from lightfield.geometry import depth
 from lightfield.imaging import images
 
@@ -42,12 +41,11 @@ def render(
     threads: int | None,
     record: Path | None = None,
     journal: Path | None = None,
-    run: Path | None = None,
 ) -> None:
     """Render into ``folder`` those of the ``views``, FIRST:END, that are missing there.
 
     ``blend`` is the scene and ``inventory`` a JSON of what it contains; ``threads`` None are all.
-    ``record``, ``journal`` and ``run``, a JSON of each dataset's views by its folder, may be None.
+    ``record`` and ``journal`` may be None.
     Raises `UserError` where the scene cannot be opened, the ``device`` is not there, or a file
     cannot be written.
     """
@@ -63,9 +61,7 @@ def render(
     _warn_of_other_versions(folder / f"{view.name}.exr" for view in missing)
     # The dataset's folder says which scene and rig it is, and in a sequence which frame.
     label = f"render {folder.parent}" + (f" {views}" if views != ":" else "")
-    # A shard that is finished has no line to end, and need not look at any other's files.
-    note = RunProgress(len(chosen), lightfield, folder, run) if missing else str
-    progress = Progress(len(missing), label, already=len(chosen) - len(missing), note=note)
+    progress = Progress(len(missing), label, already=len(chosen) - len(missing))
     if missing:
         threads = threads or processors.available()
         # Only now, because it takes a second and a shard that is finished does not need it.

@@ -1,0 +1,139 @@
+# What the terminal shows: how far a run is, and what a dry run would do.
+import logging
+
+from lightfield.core.run_display import RunDisplay, Task
+from lightfield.dataset.dataset import START_UP_SECONDS
+from lightfield.measurement.plan import Work, calibration_seconds, forecast
+
+# Of more datasets than this the page of all is named instead of each one's own.
+MOST_PAGES = 12
+# What the rules of a file are called, where that is not the file's name.
+PHASES = {
+    "rig": "cameras",
+    "render": "views",
+    "error": "calibration",
+    "reproject": "reprojections",
+    "export": "exports",
+    "validate": "validation",
+    "costs": "report",
+}
+
+
+def rendering(job):
+    """Return how many views of a dataset a job renders, and for how long, in seconds of a core."""
+    match job.rule.name:
+        case "render":
+            views = int(job.wildcards.end) - int(job.wildcards.first)
+            seconds = dataset_of(job.wildcards).expected_view[0]
+            return views, START_UP_SECONDS + views * seconds
+        case "render_panorama":
+            return 0, dataset_of(job.wildcards).panorama_seconds
+        case "calibrate":
+            samples = first_dataset(job.wildcards.scene).planned_samples
+            return 0, calibration_seconds(samples)
+    return 0, 0.0
+
+
+def task_of(job):
+    """Return what the display has to know of a job."""
+    stem = Path(job.rule.snakefile).stem
+    views, seconds = rendering(job)
+    return Task(
+        job.rule.name,
+        str(Path(job.log[0]).relative_to(f"{WORK}/logs").with_suffix("")),
+        PHASES.get(stem, stem),
+        Path(job.log[0]),
+        views=views,
+        seconds=seconds,
+        shown=job.rule.name in ("check_blend", "inventory"),
+    )
+
+
+def jobs_of(found):
+    """Return the jobs of what Snakemake's scheduler lists: jobs, and groups of them."""
+    return {one for job in found for one in (job.jobs if job.is_group() else [job])}
+
+
+TASKS = {}
+
+
+def look():
+    """Return the jobs that are running, finished and failed."""
+    running, failed = list(workflow.scheduler.running), list(workflow.scheduler.failed)
+    return jobs_of(running), filter(workflow.dag.finished, TASKS), jobs_of(failed)
+
+
+DISPLAY = RunDisplay(look)
+
+
+def is_quiet_about(kind):
+    """Whether --quiet names a kind of output: ALL, PROGRESS, …"""
+    return kind in {choice.name for choice in workflow.output_settings.quiet or ()}
+
+
+def passes(record):
+    """Let Snakemake's warnings be logged under a display, and more only where it is not quiet."""
+    if record.levelno < logging.WARNING and is_quiet_about("PROGRESS"):
+        return False
+    DISPLAY.clear()
+    return True
+
+
+def begin_display():
+    """Show how far the run is, from now on."""
+    for handler in logging.getLogger("snakemake.logging").handlers:
+        # Snakemake's own log file is for itself.
+        if not isinstance(handler, logging.FileHandler):
+            handler.addFilter(passes)
+    # What has no output is asked for to be read, and takes seconds.
+    jobs = [job for job in workflow.dag.needrun_jobs() if job.log and job.output]
+    if jobs and not is_quiet_about("ALL"):
+        TASKS.update({job: task_of(job) for job in jobs})
+        DISPLAY.begin(TASKS, workflow.cores or 1)
+        DISPLAY.start()
+        # However the run ends.
+        atexit.register(DISPLAY.stop)
+
+
+def end_display():
+    """Show no more how far the run is, but what jobs without output say: they are asked to."""
+    DISPLAY.stop()
+    for job in workflow.dag.needrun_jobs(exclude_finished=False):
+        if job.log and not job.output and Path(job.log[0]).exists():
+            print(Path(job.log[0]).read_text(), end="", flush=True)
+
+
+def print_pages():
+    """Print where the pages are of the datasets that are valid: all that this run was for."""
+    made = {str(file) for job in workflow.dag.jobs for file in job.output}
+    pages = [d.page for d in DATASETS.values() if f"{d.folder}/sha256sums.txt" in made]
+    if len(pages) > MOST_PAGES:
+        pages = [f"{len(pages)} datasets: {RESULTS}/index.html"]
+    for page in pages:
+        print(f"valid: {page}", file=sys.stderr)
+
+
+def print_forecast():
+    """Print at the end of a dry run how many jobs there are, and what rendering will take."""
+    if not (workflow.dryrun and workflow.scheduler and len(workflow.dag)):
+        return
+    works = {}
+    for job in workflow.dag.needrun_jobs(exclude_finished=False):
+        views, seconds = rendering(job)
+        if seconds:
+            name, size = f"calibration of {job.wildcards.scene}", 0.0
+            if job.rule.name != "calibrate":
+                dataset = dataset_of(job.wildcards)
+                name = f"{dataset.scene_folder}/{dataset.rig_name}"
+                size = views * dataset.expected_view_bytes
+            work = works.get(name, Work(name, 0, 0.0))
+            works[name] = Work(
+                name, work.views + views, work.seconds + seconds, work.size + size
+            )
+    if is_quiet_about("PROGRESS"):
+        print(workflow.dag.stats()[0])
+    if works:
+        print(forecast(list(works.values())))
+
+
+atexit.register(print_forecast)

@@ -1,0 +1,126 @@
+"""What a run shows while it works: a line that stays in view, warnings, failures, phases."""
+
+import io
+import time
+
+import pytest
+
+from lightfield.core import progress, run_display
+from lightfield.core.run_display import RunDisplay, Task
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+class Run:
+    """Jobs whose states and logs a test writes, and what is shown of them."""
+
+    def __init__(self, folder, stream):
+        self.folder, self.stream, self.now = folder, stream, time.time()
+        self.states = {"running": set(), "finished": set(), "failed": set()}
+        self.display = RunDisplay(lambda: tuple(self.states.values()), stream)
+        self.tasks = {
+            "place": self.task("place", "cameras"),
+            "a": self.task("a", "views", views=10, seconds=100.0),
+            "b": self.task("b", "views", views=10, seconds=100.0),
+            "panorama": self.task("panorama", "report", seconds=50.0),
+        }
+        self.display.begin(self.tasks, cores=2)
+
+    def task(self, name, phase, **more):
+        return Task(name, f"scene/{name}", phase, self.folder / name, **more)
+
+    def log(self, name, *lines):
+        with (self.folder / name).open("a") as file:
+            file.writelines(f"{line}\n" for line in lines)
+
+    def shown(self, seconds=0, **states):
+        """Return the lines that are shown when jobs have come to other states."""
+        self.now += seconds
+        for state, names in states.items():
+            for others in self.states.values():
+                others -= set(names)
+            self.states[state] |= set(names)
+        before = len(self.stream.getvalue())
+        self.display.update()
+        text = self.stream.getvalue()[before:].replace(run_display.CLEAR_LINE, "\n")
+        return [line for line in text.splitlines() if line]
+
+
+@pytest.fixture(params=[Terminal, io.StringIO])
+def run(request, tmp_path, monkeypatch):
+    run = Run(tmp_path, request.param())
+    run.began = run.now
+    monkeypatch.setattr(run_display.time, "time", lambda: run.now)
+    return run
+
+
+@pytest.mark.parametrize("run", [Terminal], indirect=True)
+def test_one_line_says_how_far_the_whole_run_is(run):
+    # 250 s of renders and four times 1.5 s, on two cores.
+    assert run.shown() == ["0 of 4 jobs · 0 of 20 views · 2 min 08 s left"]
+    run.shown(running=["place"])
+    assert run.shown(2, finished=["place"], running=["a", "b"])[0] == "cameras: 1 job in 2 s"
+    run.log("a", "render scene a: 8 views to do, 2 already done")
+    run.log("b", "render scene b: 10 views to do", "render scene b: 2 of 10 views, 20 s each, …")
+    (line,) = run.shown(40)
+    assert line.startswith("1 of 4 jobs · 4 of 20 views, 3 a minute · ")
+    assert line.endswith(" left · views")
+    run.shown(160, finished=["a", "b"], running=["panorama"])
+    # 18 views took 400 s instead of 180 s, two at a time: 50 s become 111 s, and these 56 s.
+    assert run.display.line(run.now) == "3 of 4 jobs · 20 of 20 views · 56 s left · report"
+    assert run.shown(50, finished=["panorama"]) == ["report: 1 job in 50 s"]
+
+
+def test_warnings_are_shown_once_and_other_lines_not(run):
+    run.log("a", "warning: coarse", "a detail", "note: so and so")
+    run.log("b", "warning: coarse")
+    shown = run.shown(running=["a", "b"])
+    assert [line for line in shown if " left" not in line] == [
+        "warning: scene/a: coarse",
+        "note: scene/a: so and so",
+    ]
+    assert not any("coarse" in line for line in run.shown())
+
+
+def test_the_whole_log_of_a_job_is_shown_where_it_is_for_the_user(run):
+    run.tasks["a"].shown = True
+    run.log("a", "what the scene has")
+    run.log("a", "render scene a: 8 views to do")
+    shown = run.shown(running=["a"])
+    assert [line for line in shown if " left" not in line] == ["what the scene has"]
+
+
+def test_a_failure_is_shown_at_once_where_others_go_on(run):
+    run.shown(running=["a", "b"])
+    run.log("a", "error: no room")
+    shown = run.shown(failed=["a"])
+    assert shown[:2] == ["a failed: error: no room", f"  log: {run.folder / 'a'}"]
+
+
+@pytest.mark.parametrize("run", [io.StringIO], indirect=True)
+def test_a_log_gets_a_line_now_and_then(run):
+    lines = []
+    for _ in range(3600):
+        lines += run.shown(1, running=["a"])
+    assert 30 < len(lines) < 60
+    assert run.shown(10 * 24 * 3600)[0].startswith("0 of 4 jobs · 0 of 20 views · ")
+
+
+def test_a_log_of_another_run_is_not_read(run):
+    run.log("a", "warning: of old")
+    run.now += 60
+    run.display.begin(run.tasks, cores=2)
+    assert not any("of old" in line for line in run.shown(running=["a"]))
+
+
+def test_what_progress_says_can_be_read(capsys):
+    shard = progress.Progress(2, "render results/a: b 0:2", already=3)
+    shard.done()
+    shard.done()
+    first, last = map(progress.read, capsys.readouterr().err.splitlines())
+    assert (first.done, first.total, first.already) == (0, 2, 3)
+    assert (last.done, last.total, last.already) == (2, 2, None)
+    assert progress.read("3 of 4 views") is None
