@@ -24,7 +24,7 @@ shell.prefix(
 from lightfield.core.failures import failure_report
 from lightfield.core.files import read_json, set_aside
 from lightfield.dataset import ledger
-from lightfield.dataset.config import accept_blend, load_config
+from lightfield.dataset.config import accept_blend, load_config, scene_path
 from lightfield.dataset.dataset import PICTURES, PLOTS, load_datasets, scene_datasets
 from lightfield.dataset.exports import MANIFEST, VIEWS
 from lightfield.dataset.splits import SPLITS
@@ -308,6 +308,16 @@ def measurements(wildcards):
         for suffix in (".csv", ".json", ".svg", ".png")
     ]
     return [file for file in files if file.exists()]
+
+
+def rebuilding(wildcards):
+    """Return the command that makes a dataset, to be shown on its page."""
+    dataset = dataset_of(wildcards)
+    snakefile = os.path.relpath(Path(workflow.basedir, "Snakefile"))
+    words = [] if snakefile == "Snakefile" else ["-s", snakefile]
+    choice = [f"scenes={dataset.scene_name}", f"rigs={dataset.rig_name}"]
+    words += ["--cores", "all", "--config", *choice, f"preset={dataset.preset}"]
+    return shlex.join(["snakemake", *words])
 
 
 def measurement_times(wildcards):

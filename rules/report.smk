@@ -112,7 +112,11 @@ rule page:
         dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
         rig=of_dataset("rig_json"),
         panorama=of_dataset("panorama"),
+        yaml=lambda wildcards: str(scene_path(dataset_of(wildcards).scene_name)),
+        command=rebuilding,
         measurements=measurements,
+        # Not in the command: when the YAML is another, so is the page.
+        text=lambda wildcards: scene_path(dataset_of(wildcards).scene_name).read_text(),
         # Not in the command: when a measurement was made anew, so is the page.
         measured=measurement_times,
     message:
@@ -121,6 +125,7 @@ rule page:
         f"python {SCRIPTS}/report_html.py"
         " --dataset {params.dataset}"
         " --name {wildcards.scene}/{wildcards.rig} --rig {params.rig:q}"
+        " --yaml {params.yaml:q} --command {params.command:q}"
         " --panorama {params.panorama} --measurements {params.measurements}"
         " --output {output} > {log} 2>&1"
 

@@ -11,11 +11,12 @@ import pytest
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
+from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses, overview, rigs
 from lightfield.imaging import images, pictures
-from lightfield.report import epipolar, faults, packing
+from lightfield.report import dataset_page, epipolar, faults, figures, packing
 
 RADIUS = 5.0
 SPHERE = {
@@ -31,6 +32,7 @@ LINE = {
     "size": [2, 1, 1],
     "camera": {"lens": "rectilinear", "fov": 90, "resolution": [64, 48]},
 }
+YAML = "render: {samples: 4}  # <b>\n"
 HOSTILE = "<img src=x onerror=\"document.title='broken'\"></script><script>document.title='broken'"
 
 
@@ -59,6 +61,7 @@ def write_dataset(folder, rig, depth="z", names=None):
         rig,
         lens,
         depth=depth,
+        frame=7,
         scene={"name": "ball"},
         render={"samples": 4, "adaptive_threshold": 0, "denoise": False},
     ).to_json()
@@ -73,16 +76,16 @@ def write_dataset(folder, rig, depth="z", names=None):
     return lightfield
 
 
-def make_page(run_program, folder, rig, *arguments, name="ball/LFSphere"):
+def make_page(folder, rig, *measurements, name="ball/LFSphere", panorama=False):
     output = folder / "report" / "index.html"
-    words = ("--dataset", folder, "--name", name, "--rig", json.dumps(rig), "--output", output)
-    run_program("report_html.py", *words, *arguments)
+    rig = rigs.from_settings(rig)
+    origin = dataset_page.Origin(rig, YAML, "snakemake --cores all", panorama, measurements)
+    dataset_page.write(output, folder, name, origin)
     return output
 
 
-def draw(run_program, folder, rig, output, *arguments):
-    words = ("--dataset", folder, "--rig", json.dumps(rig), "--output", output)
-    run_program("report_figures.py", *words, *arguments)
+def draw(folder, rig, output, panorama=None):
+    figures.draw(folder, rigs.from_settings(rig), panorama, output)
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +125,7 @@ def show(browser):
 
 
 @pytest.fixture(scope="module")
-def sphere(tmp_path_factory, run_program):
+def sphere(tmp_path_factory):
     """The page of a sphere of cameras with all that a page can have; and its lightfield.json."""
     folder = tmp_path_factory.mktemp("results") / "ball" / "LFSphere"
     lightfield = write_dataset(folder, SPHERE)
@@ -133,7 +136,7 @@ def sphere(tmp_path_factory, run_program):
     channels = dict(zip("RGB", np.moveaxis(colour.astype(np.float32), -1, 0), strict=True))
     channels["Z"] = np.full((64, 128), RADIUS, np.float32)
     images.write_exr(folder / "panorama.exr", channels)
-    draw(run_program, folder, SPHERE, folder / "report", "--panorama", folder / "panorama.exr")
+    draw(folder, SPHERE, folder / "report", folder / "panorama.exr")
     check = {"views": [], "problems": [], "warnings": [], "figures": {"nearest_metres": 0.25}}
     checks = [
         {"name": "views", "passed": True, "detail": "12 of 12 images are there", **check},
@@ -148,7 +151,7 @@ def sphere(tmp_path_factory, run_program):
             "energy_kwh": 0.25,
             "price": 0.08,
             "currency": "EUR",
-            "extrapolation": {"core_hours": 12.0, "core_hours_uncertainty": 1.5},
+            "extrapolation": {"core_hours": 12.03, "core_hours_uncertainty": 1.5},
         },
     )
     measured = folder.parent / "benchmarks"
@@ -158,7 +161,7 @@ def sphere(tmp_path_factory, run_program):
         "lens pair,a to b,float32,5.0,1e-6,2e-6,ok\n"
         "lens pair,b to a,float32,5.0,4e-6,2e-6,FAIL\n"
     )
-    page = make_page(run_program, folder, SPHERE, "--measurements", *sorted(measured.glob("*.csv")))
+    page = make_page(folder, SPHERE, *measured.glob("*.csv"), panorama=True)
     return SimpleNamespace(page=page, lightfield=lightfield, folder=folder)
 
 
@@ -202,19 +205,22 @@ def test_the_page_loads_whole_from_one_file(sphere, show):
     text = tab.inner_text("main")
     for part in ("not valid", "equidistant fisheye, 180°", "12 of 12 images", "snakemake"):
         assert part in text
-    # What things cost, in words, and what it would at full size.
-    for part in ("3 min 20 s", "2.5 MB", "0.08 EUR", "12 h ± 1.5 h"):
+    # What things cost, in words, and what it would at full size, in no more digits than are known.
+    for part in ("3 min 20 s", "2.5 MB", "0.08 EUR", "12 h"):
         assert part in text
+    assert "±" not in text
+    for part in ("180° × 180°", "Frame\n7", "Depth that is inf\n0 %", "snakemake --cores all"):
+        assert part in text
+    assert YAML.strip() in tab.text_content("#rebuild pre >> nth=1")
     # The case that is worst, as part of its bound, comes first.
     assert text.index("200%") < text.index("50%")
 
 
-def test_the_page_is_the_same_each_time(sphere, run_program, tmp_path):
+def test_the_page_is_the_same_each_time(sphere):
     before = sphere.page.read_bytes()
-    assert make_page(run_program, sphere.folder, SPHERE).read_bytes() != before
-    measured = sorted((sphere.folder.parent / "benchmarks").glob("*.csv"))
-    again = make_page(run_program, sphere.folder, SPHERE, "--measurements", *measured)
-    assert again.read_bytes() == before
+    assert make_page(sphere.folder, SPHERE).read_bytes() != before
+    measured = (sphere.folder.parent / "benchmarks").glob("*.csv")
+    assert make_page(sphere.folder, SPHERE, *measured, panorama=True).read_bytes() == before
 
 
 def test_the_viewer_steps_exposes_and_shows_depth(sphere, show):
@@ -301,20 +307,60 @@ def test_a_phone_does_not_scroll_sideways(sphere, show, width):
     assert tab.evaluate("() => document.documentElement.scrollWidth") <= width
 
 
-def test_names_are_text_whatever_they_hold(run_program, show, tmp_path):
+def test_names_are_text_whatever_they_hold(show, tmp_path):
     rig = {**LINE, "cameras": [2, 1]}
     names = ["a\"<b>&'", "<i>"]
     write_dataset(tmp_path, rig, depth=None, names=names)
-    page = make_page(run_program, tmp_path, rig, name=f"{HOSTILE}/{HOSTILE}")
-    tab = show(page)
+    tab = show(make_page(tmp_path, rig, name=f"{HOSTILE}/{HOSTILE}"))
     pixels(tab, "viewer")
     assert tab.title() != "broken"
     assert tab.inner_text("#view-name") in names
-    # Without depth, validation, costs or measurements the page says so, and how to get them.
-    text = tab.inner_text("main")
-    for part in ("Not validated yet", "error_vs_time", "stability", "No costs", "no three cameras"):
-        assert part in text
+    # Without depth, validation, costs, measurements or a row of cameras there is nothing of them.
+    titles = tab.locator("h2, h3").all_inner_texts()
+    expected = ["Explore", "Views", "Quality", "Samples and noise", "Rebuild", "Files", "In Python"]
+    assert titles == expected
+    links = tab.locator("nav a").all_inner_texts()
+    assert links == ["All datasets", "Explore", "Views", "Quality", "Rebuild", "Files"]
+    assert tab.locator("#show-points").count() == 0
     assert tab.is_disabled("#show-depth")
+
+
+def test_the_scenes_points_are_drawn_where_the_views_see_them(sphere, show):
+    tab = show(sphere.page)
+    shown = pixels(tab, "rig")
+    places = tab.evaluate("() => rig.points.map((point) => point.at)")
+    assert len(places) > 4000
+    np.testing.assert_allclose(np.linalg.norm(places, axis=1), RADIUS, rtol=0.02)
+    tab.click("#show-points")
+    assert (pixels(tab, "rig") != shown).any(axis=-1).sum() > 1000
+
+
+def test_cameras_have_the_colour_of_their_part_of_the_dataset(show, tmp_path):
+    rig = {**LINE, "split": "odd"}
+    write_dataset(tmp_path, rig)
+    draw(tmp_path, rig, tmp_path / "report")
+    tab = show(make_page(tmp_path, rig))
+    pixels(tab, "viewer")
+    assert "15 (8 train, 7 test)" in tab.inner_text("main")
+    colours = tab.evaluate("() => DATA.views.map((_, number) => colourOf(number))")
+    # The middle row is one colour, but for its tests.
+    expected = ["--row" if 5 <= number < 10 else "--shown" for number in range(15)]
+    assert colours == ["--test" if n % 2 else colour for n, colour in enumerate(expected)]
+    assert tab.locator(".keys .dot.test").count() == 1
+
+
+def test_each_reprojection_is_shown(show, tmp_path):
+    rig = {**LINE, "cameras": [2, 1]}
+    content = write_dataset(tmp_path, rig)
+    picture = np.full((4, 4, 3), 200, np.uint8)
+    for frame in content["frames"]:
+        images.write_png(tmp_path / "small" / f"{frame['name']}.png", picture)
+    lens = lenses.from_camera({"lens": "rectilinear", "fov": 90, "resolution": [4, 4]})
+    write_json(tmp_path / "small/lightfield.json", content | lens.to_lightfield())
+    tab = show(make_page(tmp_path, rig))
+    source = tab.get_attribute("img[alt='The views as small']", "src")
+    # Developed already, it is shown as it is.
+    assert abs(decoded(source)[50, 50].astype(int) - 200).max() <= 2
 
 
 def test_an_index_leads_to_every_page(sphere, run_program, show):
@@ -340,16 +386,32 @@ def test_an_index_leads_to_every_page(sphere, run_program, show):
         ("exr/view_0001f.exr", "no", "view_0001f.exr: is no image"),
     ],
 )
-def test_what_cannot_be_read_is_told_in_a_line(run_program, tmp_path, file, text, expected):
+def test_what_cannot_be_read_is_an_error_of_one_line(tmp_path, file, text, expected):
     rig = {**LINE, "cameras": [2, 1]}
     write_dataset(tmp_path, rig)
     (tmp_path / file).parent.mkdir(exist_ok=True)
     (tmp_path / file).write_text(text)
-    words = ("--dataset", tmp_path, "--name", "a/b", "--rig", json.dumps(rig))
-    result = run_program("report_html.py", *words, "--output", tmp_path / "x.html", check=False)
-    assert result.returncode == 1
-    assert expected in result.stderr
-    assert "Traceback" not in result.stderr
+    with pytest.raises(UserError, match=expected) as caught:
+        make_page(tmp_path, rig)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_programs_make_pictures_and_page(run_program, tmp_path):
+    rig = {**LINE, "cameras": [2, 1]}
+    write_dataset(tmp_path, rig)
+    yaml = tmp_path / "ball.yaml"
+    yaml.write_text(YAML)
+    words = ("--dataset", tmp_path, "--rig", json.dumps(rig), "--panorama", "--output")
+    run_program("report_figures.py", *words, tmp_path / "report")
+    page = ("--name", "a/b", "--yaml", yaml, "--command", "make <it>")
+    run_program("report_html.py", *words, tmp_path / "x.html", *page)
+    text = (tmp_path / "x.html").read_text()
+    for part in (
+        "view_0001f, the view in the middle",
+        "make &lt;it&gt;",
+        "samples: 4}  # &lt;b&gt;",
+    ):
+        assert part in text
 
 
 # What the page is made of.
@@ -378,18 +440,18 @@ def decoded(uri):
 
 
 @pytest.mark.parametrize("view", ["view_0001f", "view_0007f"])
-def test_a_view_that_validation_could_not_read_is_no_error_of_the_page(run_program, tmp_path, view):
+def test_a_view_that_validation_could_not_read_is_no_error_of_the_page(tmp_path, view):
     write_dataset(tmp_path, LINE)
     (tmp_path / "exr" / f"{view}.exr").write_text("no image")
     problem = f"exr/{view}.exr: is no image"
     check = {"detail": "", "warnings": [], "figures": {}, "problems": [problem]}
     check |= {"name": "images", "passed": False, "views": [view]}
     write_json(tmp_path / "validation.json", {"valid": False, "checks": [check]})
-    assert problem in make_page(run_program, tmp_path, LINE).read_text()
+    assert problem in make_page(tmp_path, LINE).read_text()
 
 
-def test_stills_are_the_same_each_time(sphere, run_program, tmp_path):
-    draw(run_program, sphere.folder, SPHERE, tmp_path, "--panorama", sphere.folder / "panorama.exr")
+def test_stills_are_the_same_each_time(sphere, tmp_path):
+    draw(sphere.folder, SPHERE, tmp_path, sphere.folder / "panorama.exr")
     made = sorted(tmp_path.iterdir())
     assert len(made) == 8
     for path in made:
@@ -438,17 +500,17 @@ def test_the_middle_view_is_that_of_the_middle_row_or_of_the_order(rig, expected
     assert overview.middle_view(rigs.from_settings(rig)) == expected
 
 
-def test_without_a_panorama_the_overview_is_the_view_in_the_middle(run_program, tmp_path):
+def test_without_a_panorama_the_overview_is_the_view_in_the_middle(tmp_path):
     write_dataset(tmp_path, LINE)
-    draw(run_program, tmp_path, LINE, tmp_path / "report")
-    page = make_page(run_program, tmp_path, LINE).read_text()
+    draw(tmp_path, LINE, tmp_path / "report")
+    page = make_page(tmp_path, LINE).read_text()
     assert "view_0007f, the view in the middle of the rig" in page
     middle = images.read_image(tmp_path / "exr/view_0007f.exr").colour
     shown = images.read_image(tmp_path / "report/overview.png").colour
     np.testing.assert_array_equal(shown, pictures.develop(middle, pictures.exposure_for(middle)))
     # One that cannot be read is black, as validation will say.
     (tmp_path / "exr/view_0007f.exr").write_text("no image")
-    draw(run_program, tmp_path, LINE, tmp_path / "report")
+    draw(tmp_path, LINE, tmp_path / "report")
     assert not images.read_image(tmp_path / "report/overview.png").colour.any()
 
 

@@ -350,7 +350,7 @@ def extrapolation(
             + (f", and denoising, which counts as {DENOISING_SAMPLES}" if denoise else "")
             + "; in proportion to pixels and samples; on "
             + ("the processor" if processor else "a graphics card: hours are the machine's")
-            + "; ± is the standard error over these views; all else as measured, the part that "
-            "every view needs in proportion to views and pixels"
+            + "; all else as measured, the part that every view needs in proportion to views and "
+            "pixels; tried out on renders of 64 and 128 pixels, it was 1.57 and 0.86 of the truth"
         ),
     }

@@ -22,7 +22,7 @@ from lightfield.geometry.overview import middle_view
 from lightfield.geometry.rigs import Rig
 from lightfield.imaging import images, pictures
 from lightfield.imaging.pictures import Array
-from lightfield.imaging.plots import BLUE, GREY, PURPLE, VERMILION, plot
+from lightfield.imaging.plots import BLUE, GREY, ORANGE, PURPLE, plot
 from lightfield.measurement import noise
 from lightfield.report import contact_sheet
 from lightfield.validation.files import IMAGES
@@ -32,7 +32,7 @@ AZIMUTH, ELEVATION = 30.0, 24.0
 MISS = "#b0b0b0"
 # The noise map has about this many blocks across.
 NOISE_BLOCKS = 128
-PART_COLOURS = {None: BLUE, "train": BLUE, "validation": PURPLE, "test": VERMILION}
+PART_COLOURS = {None: BLUE, "train": BLUE, "validation": ORANGE, "test": PURPLE}
 DEPTHS = {"z": "Z-depth", "distance": "distance from the camera", None: "no depth"}
 
 

@@ -87,4 +87,9 @@ def webp(pixels: NDArray[np.uint8], quality: int | None = None) -> str:
 
 def data_uri(content: bytes, kind: str) -> str:
     """Return bytes as a data URI of the MIME type ``kind``."""
-    return f"data:{kind};base64,{base64.b64encode(content).decode('ascii')}"
+    return f"data:{kind};base64,{packed_bytes(content)}"
+
+
+def packed_bytes(content: bytes) -> str:
+    """Return bytes in base 64."""
+    return base64.b64encode(content).decode("ascii")

@@ -191,22 +191,22 @@ def costs(path: Path) -> dict[str, Any] | None:
         "tables": tables,
         "facts": _with_units(facts, currency),
         "notes": _sentences(facts),
-        "full": _with_units(full, currency),
+        # Renders of another size say no more than two digits of it.
+        "full": _with_units(
+            {k: float(f"{v:.2g}") if isinstance(v, float) else v for k, v in full.items()}, currency
+        ),
         "basis": _sentences(full),
     }
 
 
 def _with_units(facts: Mapping[str, Any], currency: str) -> list[tuple[str, str]]:
-    """Return titles and figures in the units that their names end in, each ± its uncertainty."""
+    """Return titles and figures in the units that their names end in."""
     told = []
     for name, value in facts.items():
         if name.endswith("_uncertainty") or name == "currency" or _is_sentence(value):
             continue
         sides = name == "resolution" and isinstance(value, list)
         text = " × ".join(map(str, value)) if sides else page.measure(value, name)
-        uncertain = facts.get(f"{name}_uncertainty")
-        if uncertain is not None:
-            text = f"{text} ± {page.measure(uncertain, name)}"
         if "price" in name:
             text = f"{text} {currency}"
         told.append((page.title(name), text))

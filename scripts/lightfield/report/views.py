@@ -11,18 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.dataset.lightfield import LightField
+from lightfield.geometry.depth import distance_from_z
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.overview import middle_view
 from lightfield.geometry.rigs import Rig
 from lightfield.imaging import images, pictures
 from lightfield.measurement.noise import relative_noise
 from lightfield.report import epipolar
 from lightfield.report.packing import (
     DEPTH_STEPS,
-    data_uri,
     depth_range,
     light_range,
     pack_depth,
     pack_light,
+    packed_bytes,
     webp,
 )
 
@@ -35,6 +37,8 @@ LIGHT_QUALITY = 88
 # Views are sampled for epipolar-plane images at this size, which their columns have too.
 EPIPOLAR_SIDE = 512
 MOST_ROWS = 48
+# Of the scene, as the views' depth shows it.
+POINTS = 5000
 # A view's noise is measured in its middle.
 NOISE_SIDE = 512
 
@@ -50,12 +54,18 @@ class View:
 
 @dataclass(frozen=True)
 class Looks:
-    """What `collect` found: ``data`` for the page's program, and numbers to be told in words."""
+    """What `collect` found: ``data`` for the page's program, and numbers for its text.
+
+    ``noise`` is that of the least, the median and the worst view, ``missed`` the part of depths
+    that are inf, ``parts`` are those of the dataset, as train and test.
+    """
 
     data: dict[str, Any]
     embedded: int
     views: int
+    parts: list[str]
     noise: tuple[float, float, float] | None
+    missed: float | None
     row: epipolar.Row | None
     row_shown: int
 
@@ -83,13 +93,17 @@ def collect(
     light = np.stack([view.colour for view in loaded])
     found = [view.depth for view in loaded if view.depth is not None]
     depths = np.stack(found) if found else None
-    limits = light_range(light)
+    limits, exposure = light_range(light), round(pictures.exposure_for(light), 2)
     packed_views = []
-    outside = _outside(small)
-    reach = None
+    rays = small.pixel_rays()
+    reach = points = missed = None
     if depths is not None:
-        depths = np.where(outside, np.nan, depths)
+        depths = np.where(np.isnan(rays[..., 0]), np.nan, depths)
         reach = depth_range(depths)
+        known = depths[~np.isnan(depths)]
+        missed = float(np.isposinf(known).mean()) if known.size else None
+        distances = distance_from_z(depths, rays) if meaning == "z" else depths
+        points = _points(distances, rays, matrices[shown], pictures.develop(light, exposure))
     for number, view in enumerate(shown):
         entry = {"view": view, "light": webp(pack_light(light[number], limits), LIGHT_QUALITY)}
         if depths is not None and reach is not None:
@@ -101,24 +115,25 @@ def collect(
     data = {
         "views": [
             {
-                "name": name,
+                "name": view.name,
+                "part": view.split,
                 "at": _rounded(matrix[:3, 3]),
                 "right": _rounded(matrix[:3, 0]),
                 "up": _rounded(matrix[:3, 1]),
                 "ahead": _rounded(-matrix[:3, 2]),
             }
-            for name, matrix in zip(names, matrices, strict=True)
+            for view, matrix in zip(lightfield.views, matrices, strict=True)
         ],
         "outline": [[_rounded(point) for point in line] for line in rig.outline()],
         "resolution": [lens.width, lens.height],
         "size": [small.width, small.height],
         "light": limits,
         "white": pictures.WHITE,
-        "exposure": round(pictures.exposure_for(light), 2),
+        "exposure": exposure,
+        "points": points,
         "depth": _depth_scale(depths, reach, meaning),
         "embedded": packed_views,
-        # A view that looks level and ahead shows more of a scene than the first one may.
-        "first": int(np.argmin(np.round(matrices[shown, 1, 2], 6))),
+        "first": int(np.argmin(np.abs(np.array(shown) - middle_view(rig)))),
         "row": None,
     }
     kept: list[int] = []
@@ -129,7 +144,9 @@ def collect(
         data,
         len(shown),
         len(names),
+        sorted({view.split for view in lightfield.views if view.split}),
         (min(noises), float(np.median(noises)), max(noises)) if noises else None,
+        missed,
         row,
         len(kept),
     )
@@ -173,10 +190,33 @@ def _fitted(lens: Lens, side: int) -> Lens:
     return lens.resized(max(1, round(lens.width * part)), max(1, round(lens.height * part)))
 
 
-def _outside(lens: Lens) -> Array:
-    """Return which pixels (height, width) have no ray."""
-    outside: Array = np.isnan(lens.pixel_rays()[..., 0])
-    return outside
+def _points(
+    distances: Array, rays: Array, matrices: Array, colours: Array
+) -> dict[str, Any] | None:
+    """Return some of the points that views see: places and sRGB colours, packed.
+
+    ``distances`` (views, height, width) are along ``rays`` (height, width, 3), ``colours`` (views,
+    height, width, 3). Places are 16 bits between the corners of the box around all of them.
+    """
+    view, row, column = np.nonzero(np.isfinite(distances) & (distances > 0))
+    if not len(view):
+        return None
+    picked = np.linspace(0, len(view) - 1, min(len(view), POINTS)).astype(int)
+    at = view[picked], row[picked], column[picked]
+    turned = np.einsum("nij,nj->ni", matrices[at[0], :3, :3], rays[at[1:]])
+    places = matrices[at[0], :3, 3] + distances[at][:, None] * turned
+    # The few that are farthest would cost the others their precision.
+    away = np.linalg.norm(places - matrices[:, :3, 3].mean(axis=0), axis=1)
+    near = away <= np.percentile(away, 99)
+    low = places[near].min(axis=0)
+    side = max(float((places[near] - low).max()), 1e-6)
+    steps = np.round((places[near] - low) / side * 65535).astype("<u2")
+    return {
+        "low": _rounded(low),
+        "side": side,
+        "places": packed_bytes(steps.tobytes()),
+        "colours": packed_bytes(colours[at][near].tobytes()),
+    }
 
 
 def _rounded(values: Array) -> list[float]:
@@ -197,7 +237,7 @@ def _depth_scale(
         "steps": DEPTH_STEPS,
         "shown": [near, max(far, near + 0.1)],
         "meaning": meaning,
-        "colours": data_uri(palette.tobytes(), "").rpartition(",")[2],
+        "colours": packed_bytes(palette.tobytes()),
     }
 
 

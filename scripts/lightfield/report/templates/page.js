@@ -1,6 +1,6 @@
 "use strict";
 // What can be turned, stepped through and pointed at on a dataset's page. How the pictures are
-// packed is said in scripts/lightfield/packing.py, what `DATA` holds in report_views.py.
+// packed is said in scripts/lightfield/report/packing.py, what `DATA` holds in views.py beside it.
 
 const DATA = JSON.parse(document.getElementById("data").textContent);
 const MISS = DATA.depth ? DATA.depth.steps - 1 : 0;
@@ -41,9 +41,11 @@ function depthOf(code, [low, high]) {
   return code === MISS ? Infinity : 2 ** (low + ((code - 1) / (MISS - 2)) * (high - low));
 }
 
+const bytesOf = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+
 // One colour (r, g, b) for each depth code, for codes that span `range`.
 function depthColours(range) {
-  const bytes = Uint8Array.from(atob(DATA.depth.colours), (letter) => letter.charCodeAt(0));
+  const bytes = bytesOf(DATA.depth.colours);
   const [near, far] = DATA.depth.shown;
   const table = new Uint8ClampedArray(3 * DATA.depth.steps);
   for (let code = 1; code < MISS; code++) {
@@ -299,10 +301,10 @@ function startDepthScale() {
   const [near, far] = DATA.depth.shown;
   const context = element("depth-bar").getContext("2d");
   const image = context.createImageData(256, 1);
-  const bytes = atob(DATA.depth.colours);
+  const bytes = bytesOf(DATA.depth.colours);
   for (let place = 0; place < 256; place++) {
     for (let channel = 0; channel < 3; channel++) {
-      image.data[4 * place + channel] = bytes.charCodeAt(3 * place + channel);
+      image.data[4 * place + channel] = bytes[3 * place + channel];
     }
     image.data[4 * place + 3] = 255;
   }
@@ -320,7 +322,7 @@ const HOME = { turn: 0.55, rise: 0.4, zoom: 1 };
 // Beyond this many cameras, lines instead of frusta keep it fluid.
 const MOST_FRUSTA = 700;
 
-const rig = { canvas: element("rig"), ...HOME, hover: null, screen: [], pointers: new Map(), moved: 0 };
+const rig = { canvas: element("rig"), ...HOME, hover: null, screen: [], pointers: new Map(), moved: 0, points: scenePoints(), showsPoints: true };
 
 function measureRig() {
   const points = [...DATA.views.map((view) => view.at), ...DATA.outline.flat()];
@@ -345,6 +347,28 @@ function projection(width, height) {
     const size = scale / Math.max(depth, 1e-3 * distance);
     return [width / 2 + dot(way, right) * size, height / 2 - dot(way, up) * size, depth];
   };
+}
+
+// The scene as its views' depth has it: a list of places and colours.
+function scenePoints() {
+  if (!DATA.points) return [];
+  const { low, side } = DATA.points;
+  const steps = new Uint16Array(bytesOf(DATA.points.places).buffer);
+  const colours = bytesOf(DATA.points.colours);
+  return Array.from({ length: steps.length / 3 }, (_, number) => ({
+    at: low.map((value, axis) => value + (steps[3 * number + axis] / 65535) * side),
+    colour: `rgb(${colours.subarray(3 * number, 3 * number + 3).join(" ")})`,
+  }));
+}
+
+function drawPoints(context, project) {
+  const nearest = (0.4 * 4 * rig.extent) / rig.zoom;
+  for (const { at, colour } of rig.points) {
+    const [x, y, depth] = project(at);
+    if (depth < nearest) continue;
+    context.fillStyle = colour;
+    context.fillRect(x - 1, y - 1, 2, 2);
+  }
 }
 
 function polyline(context, points) {
@@ -384,6 +408,14 @@ function drawAxes(context, project, height) {
   });
 }
 
+// What a camera's view is for says more than whether it is in the page or in the row.
+function colourOf(number) {
+  const { part } = DATA.views[number];
+  if (part === "test" || part === "validation") return `--${part}`;
+  if (row.has(number)) return "--row";
+  return shown.has(number) ? "--shown" : "--faint";
+}
+
 function addCamera(context, view, project, simple) {
   const apex = project(view.at);
   if (simple) {
@@ -402,6 +434,7 @@ const drawRig = onceAFrame(() => {
   const [width, height] = [rig.canvas.clientWidth, rig.canvas.clientHeight];
   const project = projection(width, height);
   drawGround(context, project);
+  if (rig.showsPoints) drawPoints(context, project);
   rig.screen = DATA.views.map((view) => project(view.at));
   context.strokeStyle = themed("--faint");
   context.beginPath();
@@ -415,11 +448,8 @@ const drawRig = onceAFrame(() => {
   // What is behind is drawn first and paler; one path for all of a colour, for speed.
   for (const behind of [true, false]) {
     context.globalAlpha = behind ? 0.4 : 1;
-    for (const [colour, among] of [
-      ["--faint", (number) => !shown.has(number) && !row.has(number)],
-      ["--shown", (number) => shown.has(number) && !row.has(number)],
-      ["--row", (number) => row.has(number)],
-    ]) {
+    for (const colour of ["--faint", "--shown", "--row", "--validation", "--test"]) {
+      const among = (number) => colourOf(number) === colour;
       context.strokeStyle = context.fillStyle = themed(colour);
       context.lineWidth = 1;
       context.beginPath();
@@ -457,7 +487,8 @@ function showTip() {
   tip.hidden = rig.hover === null;
   if (tip.hidden) return;
   const [x, y] = rig.screen[rig.hover];
-  tip.textContent = DATA.views[rig.hover].name;
+  const { name, part } = DATA.views[rig.hover];
+  tip.textContent = part ? `${name} (${part})` : name;
   const half = tip.offsetWidth / 2;
   tip.style.left = `${clamp(x, half, rig.canvas.clientWidth - half)}px`;
   tip.style.top = `${Math.max(y, 40)}px`;
@@ -499,7 +530,7 @@ function startRig() {
       pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
       rig.moved += Math.abs(x) + Math.abs(y);
       if (before) {
-        rig.zoom = clamp((rig.zoom * spread(pointers)) / before, 0.3, 20);
+        rig.zoom = clamp((rig.zoom * spread(pointers)) / before, 0.05, 20);
       } else {
         rig.turn -= 0.008 * x;
         rig.rise = clamp(rig.rise + 0.008 * y, -Math.PI / 2, Math.PI / 2);
@@ -523,9 +554,17 @@ function startRig() {
   });
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
-    rig.zoom = clamp(rig.zoom * Math.exp(-0.0015 * event.deltaY), 0.3, 20);
+    rig.zoom = clamp(rig.zoom * Math.exp(-0.0015 * event.deltaY), 0.05, 20);
     drawRig();
   }, { passive: false });
+  const toggle = element("show-points");
+  if (toggle) {
+    toggle.addEventListener("click", () => {
+      rig.showsPoints = !rig.showsPoints;
+      toggle.setAttribute("aria-pressed", rig.showsPoints);
+      drawRig();
+    });
+  }
   element("rig-reset").addEventListener("click", () => {
     Object.assign(rig, HOME);
     drawRig();
