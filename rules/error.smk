@@ -5,6 +5,7 @@
 rule probe_cameras:
     input:
         check=of_first("blend_check"),
+        places=of_first("places"),
     output:
         f"{WORK}/{{scene}}/probes.json",
     log:
@@ -14,6 +15,7 @@ rule probe_cameras:
     params:
         name=of_first("scene_name"),
         limits=of_first("limits_json"),
+        places=place_words,
         # Not in the command: when what the YAML says changes, so does the file.
         rig=of_first("rig_json"),
         render=of_first("render"),
@@ -22,7 +24,7 @@ rule probe_cameras:
         "Placing the probe cameras of {wildcards.scene}"
     shell:
         f"python {SCRIPTS}/make_lightfield.py"
-        " --scene {params.name} --limits {params.limits:q}"
+        " --scene {params.name} --limits {params.limits:q} {params.places}"
         " --output {output} > {log} 2>&1"
 
 

@@ -1,10 +1,40 @@
 # Where the cameras are and through which lens they look.
 
 
+# Only a random rig's cameras have to know the scene.
+rule free_places:
+    input:
+        check=of_dataset("blend_check"),
+        blend=of_dataset("blend"),
+    output:
+        f"{MADE}/places.json",
+    log:
+        log_of("{scene}/{rig}/free_places"),
+    benchmark:
+        times_of("{scene}/{rig}/cameras/free_places")
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=8000,
+        runtime=60,
+    params:
+        rig=lambda wildcards: dataset_of(wildcards).rig.model_dump_json(
+            exclude_unset=True, exclude={"camera", "split"}
+        ),
+        frame=lambda wildcards: dataset_of(wildcards).source.frame,
+    message:
+        "Looking for free places for the cameras of {wildcards.scene}/{wildcards.rig}"
+    shell:
+        f"python {SCRIPTS}/free_places.py"
+        " --blend {input.blend:q} --rig {params.rig:q} --frame {params.frame}"
+        " --output {output} > {log} 2>&1"
+
+
 rule lightfield:
     input:
         check=of_dataset("blend_check"),
         calibration=of_dataset("calibration"),
+        places=of_dataset("places"),
     output:
         f"{DATASET}/lightfield.json",
     log:
@@ -17,6 +47,7 @@ rule lightfield:
         name=of_dataset("scene_name"),
         limits=of_dataset("limits_json"),
         calibration=calibration_words,
+        places=place_words,
         # Not in the command: when what the YAML says of this dataset changes, so does the file.
         rig=of_dataset("rig_json"),
         render=of_dataset("render"),
@@ -26,7 +57,8 @@ rule lightfield:
     shell:
         f"python {SCRIPTS}/make_lightfield.py"
         " --scene {params.name} --rig {wildcards.rig}"
-        " --limits {params.limits:q} {params.calibration} --output {output} > {log} 2>&1"
+        " --limits {params.limits:q} {params.calibration} {params.places}"
+        " --output {output} > {log} 2>&1"
 
 
 rule check_cameras:

@@ -43,6 +43,9 @@ def main() -> None:
         type=Path,
         help="what scripts/calibrate.py chose for the scene's target_error",
     )
+    parser.add_argument(
+        "--places", type=Path, help="what scripts/free_places.py found for a random rig"
+    )
     parser.add_argument("--output", required=True, type=Path, help="lightfield.json to write")
     arguments = parser.parse_args()
 
@@ -54,6 +57,10 @@ def main() -> None:
         raise UserError(f"--rig: is {arguments.rig!r}; must be one of {known}")
     if arguments.panorama:
         dataset = replace(dataset, rig=panorama_rig(dataset.rig, arguments.panorama))
+    elif isinstance(dataset.rig, rigs.Random):
+        if arguments.places is None:
+            raise UserError("--places: is missing; scripts/free_places.py finds them")
+        dataset = replace(dataset, rig=dataset.rig.placed(arguments.places))
     render = dataset.render
     if arguments.calibration:
         render = calibrated(render, read_json(arguments.calibration))

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from lightfield.core.files import atomic_path
 from lightfield.core.progress import Progress
@@ -24,6 +23,7 @@ from lightfield.export import cameras
 from lightfield.export.points import Observations, Points, lift, observations
 from lightfield.export.source import Source
 from lightfield.export.splits import splits
+from lightfield.geometry.colmap import pose
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
@@ -33,9 +33,6 @@ PINHOLE, OPENCV_FISHEYE = (1, "PINHOLE"), (5, "OPENCV_FISHEYE")
 # Beside the model, where the scene has a split: names of the images to test with, one a line, as
 # the original 3D Gaussian splatting reads them.
 TESTS = "test.txt"
-
-# From Blender's camera (y up, looks along −z) to COLMAP's (y down, looks along z).
-FLIP = np.diag([1.0, -1.0, -1.0])
 
 
 def export(source: Source, settings: Colmap, folder: Path) -> None:
@@ -69,13 +66,6 @@ def camera(lens: Lens) -> tuple[tuple[int, str], list[float]]:
         return PINHOLE, [*cameras.focal_pixels(lens), *lens.center]
     fx, fy, *distortion = cameras.opencv_fisheye(lens)
     return OPENCV_FISHEYE, [fx, fy, *lens.center, *distortion]
-
-
-def pose(view: View) -> tuple[list[float], list[float]]:
-    """Return a view's world-to-camera rotation as a quaternion (w, x, y, z), and translation."""
-    turn = FLIP @ view.matrix[:3, :3].T
-    x, y, z, w = Rotation.from_matrix(turn).as_quat().tolist()
-    return [w, x, y, z], (-turn @ view.matrix[:3, 3]).tolist()
 
 
 class _Model:
@@ -130,7 +120,7 @@ class _Model:
     def _binary_images(self) -> Iterator[bytes]:
         yield struct.pack("<Q", len(self.views))
         for number, (view, seen) in enumerate(zip(self.views, self.seen, strict=True), 1):
-            quaternion, translation = pose(view)
+            quaternion, translation = pose(view.matrix)
             yield struct.pack("<i7di", number, *quaternion, *translation, 1)
             yield f"{view.name}.png".encode() + b"\0" + struct.pack("<Q", len(seen.indices))
             table = np.empty(len(seen.indices), [("pixel", "<f8", 2), ("point", "<i8")])
@@ -159,7 +149,7 @@ class _Model:
 
     def _text_images(self) -> Iterator[bytes]:
         for number, (view, seen) in enumerate(zip(self.views, self.seen, strict=True), 1):
-            quaternion, translation = pose(view)
+            quaternion, translation = pose(view.matrix)
             yield f"{number} {_words(quaternion + translation)} 1 {view.name}.png\n".encode()
             points = zip(seen.pixels.tolist(), seen.indices.tolist(), strict=True)
             yield (" ".join(f"{x!r} {y!r} {index}" for (x, y), index in points) + "\n").encode()

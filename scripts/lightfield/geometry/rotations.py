@@ -51,6 +51,14 @@ def matrix_to_euler(matrix: Floats) -> Floats:
     return np.where((smaller & ~locked)[..., None], second, first)
 
 
+def quaternion_to_matrix(quaternion: Floats) -> Floats:
+    """Return the rotation (3, 3) of a unit quaternion (4,), in the order w, x, y, z."""
+    w, x, y, z = quaternion
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    matrix: Floats = np.eye(3) + 2 * w * cross + 2 * cross @ cross
+    return matrix
+
+
 def looking_at(positions: Floats, target: Floats) -> Floats:
     """Return the rotations (n, 3, 3) of cameras at ``positions`` (n, 3) that look at a point (3,).
 

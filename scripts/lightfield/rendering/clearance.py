@@ -10,6 +10,9 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 from numpy.typing import NDArray
 
+from lightfield.core.errors import UserError
+from lightfield.core.progress import Progress
+from lightfield.geometry.rigs.random import Random
 from lightfield.geometry.rigs.sphere import icosphere
 
 Floats = NDArray[np.float64]
@@ -18,15 +21,18 @@ Floats = NDArray[np.float64]
 REACH = 0.5
 # Nearer than this it counts as touching.
 TOUCHING = 0.001
+# How many places each camera of a random rig tries, and how many say what the box is inside of.
+_TRIES = 100
+_SAMPLES = 64
 
 
-def clearances(positions: Floats) -> Floats:
-    """Return each camera's distance in metres to the nearest surface, inf beyond `REACH`."""
+def clearances(positions: Floats, reach: float = REACH) -> Floats:
+    """Return each camera's distance in metres to the nearest surface, inf beyond ``reach``."""
     nearest = np.full(len(positions), np.inf)
     for mesh, matrix, low, high in instances():
         # Only cameras within reach of the instance's bounding box can be near its surface.
         outside = np.maximum(np.maximum(low - positions, positions - high), 0)
-        near = np.flatnonzero(np.linalg.norm(outside, axis=1) < np.minimum(nearest, REACH))
+        near = np.flatnonzero(np.linalg.norm(outside, axis=1) < np.minimum(nearest, reach))
         if not len(near) or not len(mesh.polygons):
             continue
         tree = BVHTree.FromPolygons(
@@ -34,7 +40,7 @@ def clearances(positions: Floats) -> Floats:
             [tuple(polygon.vertices) for polygon in mesh.polygons],
         )
         for index in near:
-            distance = tree.find_nearest(Vector(positions[index]), REACH)[3]
+            distance = tree.find_nearest(Vector(positions[index]), reach)[3]
             if distance is not None:
                 nearest[index] = min(nearest[index], distance)
     return nearest
@@ -55,8 +61,45 @@ def instances() -> Iterator[tuple[Any, Any, Floats, Floats]]:
 def enclosing_objects(positions: Floats) -> Sequence[str | None]:
     """Return for each camera the name of the object that it is inside of, or None.
 
-    A camera is inside an object if most rays from it first meet that object's back. What has the
-    whole rig inside it is a room, not an obstacle.
+    What has the whole rig inside it is a room, not an obstacle.
+    """
+    found = enclosures(positions)
+    rooms = {name for name in found if name and found.count(name) == len(found)}
+    return [None if name in rooms else name for name in found]
+
+
+def free_places(rig: Random) -> Floats:
+    """Return the first place (n, 3) in the unit box that is free for each camera of a rig.
+
+    What has most of the box inside it is a room, not an obstacle. Raises `UserError` where a camera
+    finds no place.
+    """
+    box = rig.to_world(np.random.default_rng(rig.seed).random((_SAMPLES, 3)) - 0.5)
+    around = Counter(enclosures(box))
+    rooms = {name for name, count in around.items() if count > _SAMPLES / 2}
+    places = np.full((rig.count, 3), np.nan)
+    progress = Progress(rig.count, "places", "cameras")
+    for number in range(_TRIES):
+        left = np.flatnonzero(np.isnan(places[:, 0]))
+        tried = np.array([rig.candidate(int(view), number) for view in left])
+        world = rig.to_world(tried)
+        free = clearances(world, rig.clearance) >= rig.clearance
+        inside = [name not in {None, *rooms} for name in enclosures(world)]
+        free &= ~np.array(inside)
+        places[left[free]] = tried[free]
+        progress.done(int(free.sum()))
+        if free.all():
+            return places
+    raise UserError(
+        f"{(~free).sum()} of {rig.count} cameras find no place with {rig.clearance:g} m around it "
+        f"in {_TRIES} tries; make clearance smaller, or the box larger (size in the scene YAML)"
+    )
+
+
+def enclosures(positions: Floats) -> list[str | None]:
+    """Return for each camera the name of the object, or room, that it is inside of, or None.
+
+    A camera is inside an object if most rays from it first meet that object's back.
     """
     depsgraph = bpy.context.evaluated_depsgraph_get()
     directions = [Vector(vertex).normalized() for vertex in icosphere(1)]
@@ -71,5 +114,4 @@ def enclosing_objects(positions: Floats) -> Sequence[str | None]:
                 backs[thing.name] += 1
         name, count = backs.most_common(1)[0] if backs else ("", 0)
         found.append(name if count > len(directions) / 2 else None)
-    rooms = {name for name in found if name and found.count(name) == len(found)}
-    return [None if name in rooms else name for name in found]
+    return found

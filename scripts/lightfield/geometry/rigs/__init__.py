@@ -16,8 +16,10 @@ from lightfield.geometry.rigs.cylinder import Cylinder
 from lightfield.geometry.rigs.grid import Grid
 from lightfield.geometry.rigs.hemisphere import Hemisphere
 from lightfield.geometry.rigs.lattice import Lattice
+from lightfield.geometry.rigs.path import Path
 from lightfield.geometry.rigs.plane import Plane
 from lightfield.geometry.rigs.poses import Poses
+from lightfield.geometry.rigs.random import Random
 from lightfield.geometry.rigs.rig import Pose, Rig
 from lightfield.geometry.rigs.ring import Ring
 from lightfield.geometry.rigs.sphere import Sphere
@@ -28,13 +30,24 @@ __all__ = [
     "Grid",
     "Pose",
     "Poses",
+    "Random",
     "Rig",
     "Sphere",
     "from_settings",
 ]
 
 AnyRig = Annotated[
-    Plane | Cuboid | Cylinder | Sphere | Lattice | Hemisphere | Ring | Spiral | Poses,
+    Plane
+    | Cuboid
+    | Cylinder
+    | Sphere
+    | Lattice
+    | Hemisphere
+    | Ring
+    | Spiral
+    | Path
+    | Random
+    | Poses,
     Field(discriminator="type"),
 ]
 _SETTINGS: TypeAdapter[Rig] = TypeAdapter(AnyRig, config=ConfigDict(defer_build=True))

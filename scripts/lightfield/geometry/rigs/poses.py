@@ -1,7 +1,13 @@
-"""Loose poses: cameras as a file has them, a lightfield.json or a CSV."""
+"""Loose poses: cameras as a file has them.
+
+A lightfield.json, a CSV with angles or quaternions, a transforms.json, or COLMAP's images.txt or
+images.bin. Poses alone are read: through which lens they look, the scene YAML says.
+"""
 
 import csv
 import math
+import re
+import struct
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -15,10 +21,17 @@ from pydantic.json_schema import SkipJsonSchema
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.core.settings import FARTHEST
+from lightfield.geometry import colmap
 from lightfield.geometry.rigs.rig import Rig, UnitPoses
-from lightfield.geometry.rotations import Floats, euler_to_matrix, matrix_to_euler
+from lightfield.geometry.rotations import (
+    Floats,
+    euler_to_matrix,
+    matrix_to_euler,
+    quaternion_to_matrix,
+)
 
 CSV_HEADER = ["name", "x", "y", "z", "rx", "ry", "rz"]
+QUATERNION_HEADER = ["name", "x", "y", "z", "qw", "qx", "qy", "qz"]
 LF_TYPES = ("PLANE", "CUBOID", "CYLINDER", "SPHERE")
 # How far a matrix may be from a rotation, and one form of a pose from the other: files round.
 TOLERANCE = 1e-4
@@ -42,8 +55,9 @@ class Poses(Rig):
 
     type: Literal["poses"]
     file: str = Field(
-        pattern=r"\.(json|csv)$",
-        description="A lightfield.json, or a CSV of name,x,y,z,rx,ry,rz.",
+        pattern=r"\.(json|csv|txt|bin)$",
+        description="A lightfield.json; a CSV of name,x,y,z,rx,ry,rz in metres and radians, or of "
+        "name,x,y,z,qw,qx,qy,qz; a transforms.json; COLMAP's images.txt or images.bin.",
     )
     max_views: SkipJsonSchema[int | None] = Field(None, ge=1)
 
@@ -73,7 +87,7 @@ class Poses(Rig):
 
 
 def _read_poses(path: Path) -> PosesFile:
-    """Read a lightfield.json or a CSV, checked whole; the same file only once."""
+    """Read a file of poses, checked whole; the same file only once."""
     try:
         status = path.stat()
     except OSError as error:
@@ -85,8 +99,8 @@ def _read_poses(path: Path) -> PosesFile:
 
 @lru_cache(maxsize=8)
 def _read_whole(path: Path, _changed: int) -> PosesFile:
-    rows = _csv_rows(path) if path.suffix.lower() == ".csv" else _json_rows(path)
-    lf_type = next(rows)
+    rows = _ROWS[path.suffix](path)
+    lf_type, form = next(rows)
     names: dict[str, str] = {}
     vectors, matrices = [], []
     for where, name, vector, matrix in rows:
@@ -101,7 +115,7 @@ def _read_whole(path: Path, _changed: int) -> PosesFile:
     nothing = [math.nan]
     table = np.array([vector or nothing * 6 for vector in vectors])
     given = np.array([matrix or nothing * 16 for matrix in matrices]).reshape(-1, 4, 4)
-    check_poses(path, list(names.values()), given, table)
+    check_poses(path, list(names.values()), given, table, form)
     alone = np.isnan(table[:, 0])
     table[alone] = np.hstack([given[alone, :3, 3], matrix_to_euler(given[alone, :3, :3])])
     return PosesFile(lf_type, list(names), table[:, :3], table[:, 3:])
@@ -119,11 +133,14 @@ def check_name(where: str, name: Any) -> None:
         raise UserError(f"{where}: must be a file name, not {name!r}")
 
 
-def check_poses(path: Path, where: Sequence[str], matrices: Floats, vectors: Floats) -> None:
+def check_poses(
+    path: Path, where: Sequence[str], matrices: Floats, vectors: Floats, form: str = "world_matrix"
+) -> None:
     """Check the poses of a file, of which each has one of two forms or both; raises `UserError`.
 
     ``where`` names each pose. ``matrices`` (n, 4, 4) are camera-to-world, ``vectors`` (n, 6) are
-    positions in metres and XYZ Euler angles in radians; the form that a pose lacks is NaN.
+    positions in metres and XYZ Euler angles in radians; the form that a pose lacks is NaN. ``form``
+    is what the file calls the matrices.
     """
 
     def refuse(wrong: NDArray[np.bool_], why: str) -> None:
@@ -141,9 +158,9 @@ def check_poses(path: Path, where: Sequence[str], matrices: Floats, vectors: Flo
         apart = np.abs(turns - euler_to_matrix(vectors[:, 3:])).max((-1, -2))
         away = np.abs(matrices[:, :3, 3] - vectors[:, :3]).max(-1)
     # Of a form that is not given all these are NaN, which is never more.
-    refuse(skew > TOLERANCE, "world_matrix: its first 3 × 3 must be a rotation, without scale")
-    refuse(mirrored, "world_matrix: its first 3 × 3 must be a rotation, and mirrors")
-    refuse(last > TOLERANCE, "world_matrix: its last row must be 0, 0, 0, 1")
+    refuse(skew > TOLERANCE, f"{form}: its first 3 × 3 must be a rotation, without scale")
+    refuse(mirrored, f"{form}: its first 3 × 3 must be a rotation, and mirrors")
+    refuse(last > TOLERANCE, f"{form}: its last row must be 0, 0, 0, 1")
     refuse(apart > TOLERANCE, "world_matrix and rotation: must be the same rotation")
     refuse(
         away > TOLERANCE * np.maximum(1, np.abs(vectors[:, :3]).max(-1)),
@@ -162,17 +179,16 @@ def _number(path: Path, where: str, value: Any) -> float:
 
 
 def _csv_rows(path: Path) -> Iterator[Any]:
-    """Yield lf_type, then of each row what `_json_rows` yields of a frame, without a matrix."""
-    keys = CSV_HEADER
-    yield Poses.shape
+    """Yield what `_json_rows` yields, of rows of angles or quaternions."""
+    yield Poses.shape, "quaternion"
     try:
         with path.open(encoding="utf-8", newline="") as file:
             reader = csv.reader(file)
-            header = next(reader, [])
-            if header != keys:
+            keys = next(reader, [])
+            if keys not in (CSV_HEADER, QUATERNION_HEADER):
                 raise UserError(
-                    f"{path}: row 1: must be {','.join(keys)} (metres, radians), "
-                    f"not {','.join(header)}"
+                    f"{path}: row 1: must be {','.join(CSV_HEADER)} (metres, radians) "
+                    f"or {','.join(QUATERNION_HEADER)}, not {','.join(keys)}"
                 )
             for row in reader:
                 if not row:
@@ -180,7 +196,17 @@ def _csv_rows(path: Path) -> Iterator[Any]:
                 where = f"row {reader.line_num}"
                 if len(row) != len(keys):
                     raise UserError(f"{path}: {where}: has {len(row)} values, not {len(keys)}")
-                yield where, row[0], list(zip(keys[1:], row[1:], strict=True)), []
+                if keys == CSV_HEADER:
+                    yield where, row[0], list(zip(keys[1:], row[1:], strict=True)), []
+                    continue
+                numbers = [
+                    _number(path, f"{where}: {key}", value)
+                    for key, value in zip(keys[1:], row[1:], strict=True)
+                ]
+                matrix = np.eye(4)
+                matrix[:3, :3] = quaternion_to_matrix(_unit(path, where, numbers[3:]))
+                matrix[:3, 3] = numbers[:3]
+                yield where, row[0], [], _keyed(matrix)
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from None
     except (UnicodeDecodeError, csv.Error) as error:
@@ -188,7 +214,7 @@ def _csv_rows(path: Path) -> Iterator[Any]:
 
 
 def _json_rows(path: Path) -> Iterator[Any]:
-    """Yield lf_type, then where, name, position and angles, and matrix of each frame.
+    """Yield lf_type and the matrices' key, then where, name, position and angles, and matrix.
 
     Position and angles are one list of (key, value), and so is the matrix; one may be empty.
     """
@@ -196,11 +222,14 @@ def _json_rows(path: Path) -> Iterator[Any]:
     frames = content.get("frames") if isinstance(content, dict) else None
     if not isinstance(frames, list):
         raise UserError(f"{path}: frames: must be a list of views")
+    if frames and isinstance(frames[0], dict) and "transform_matrix" in frames[0]:
+        yield from _transforms_rows(path, content)
+        return
     lf_type = content.get("lf_type", Poses.shape)
     if lf_type not in LF_TYPES:
         allowed = ", ".join(LF_TYPES)
         raise UserError(f"{path}: lf_type: must be one of {allowed}, not {lf_type!r}")
-    yield lf_type
+    yield lf_type, "world_matrix"
     for index, frame in enumerate(frames):
         where = f"frames[{index}]"
         if not isinstance(frame, dict):
@@ -210,11 +239,114 @@ def _json_rows(path: Path) -> Iterator[Any]:
             for key in ("position", "rotation"):
                 vector += _numbered(path, f"{where}: {key}", key, frame.get(key), 3)
         if "world_matrix" in frame:
-            rows = _numbered(path, f"{where}: world_matrix", "row", frame["world_matrix"], 4)
-            for index, (_, row) in enumerate(rows):
-                key = f"world_matrix[{index}]"
-                matrix += _numbered(path, f"{where}: {key}", key, row, 4)
+            matrix = _matrix(path, where, "world_matrix", frame["world_matrix"], 4)
         yield where, frame.get("name"), vector, matrix
+
+
+def _transforms_rows(path: Path, content: dict[str, Any]) -> Iterator[Any]:
+    """Yield what `_json_rows` yields, of a transforms.json: axes as ours, camera to world.
+
+    What nerfstudio's applied_transform has done to the poses is undone. Source: nerfstudio's data
+    conventions; instant-ngp's nerf_dataset_tips.md.
+    """
+    yield Poses.shape, "transform_matrix"
+    undone = np.eye(4)
+    if "applied_transform" in content:
+        key = "applied_transform"
+        rows = _matrix(path, key, key, content[key], 3)
+        undone[:3] = np.reshape([_number(path, k, value) for k, value in rows], (3, 4))
+        if abs(np.linalg.det(undone)) < 1e-12:
+            raise UserError(f"{path}: {key}: cannot be undone")
+        undone = np.linalg.inv(undone)
+    for index, frame in enumerate(content["frames"]):
+        where = f"frames[{index}]"
+        if not isinstance(frame, dict):
+            raise UserError(f"{path}: {where}: must be a mapping, not {frame!r}")
+        rows = _matrix(path, where, "transform_matrix", frame.get("transform_matrix"), 4)
+        numbers = [_number(path, f"{where}: {key}", value) for key, value in rows]
+        matrix = undone @ np.reshape(numbers, (4, 4))
+        yield where, _view_name(path, where, frame.get("file_path")), [], _keyed(matrix)
+
+
+def _colmap_rows(path: Path) -> Iterator[Any]:
+    """Yield what `_json_rows` yields, of COLMAP's images.txt or images.bin."""
+    yield Poses.shape, "quaternion"
+    read = _colmap_text if path.suffix == ".txt" else _colmap_binary
+    for where, numbers, name in read(path):
+        values = [_number(path, where, value) for value in numbers]
+        quaternion = _unit(path, where, values[:4])
+        matrix = colmap.camera_to_world(quaternion, np.array(values[4:]))
+        yield where, _view_name(path, where, name), [], _keyed(matrix)
+
+
+def _colmap_text(path: Path) -> Iterator[tuple[str, Sequence[Any], str]]:
+    """Yield where, seven numbers and the name of each image: every other line, but comments."""
+    try:
+        lines = iter(path.read_text(encoding="utf-8").splitlines())
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(f"{path}: cannot be read as text: {error}") from None
+    for line in lines:
+        if not line.strip() or line.startswith("#"):
+            continue
+        number, *words = line.split(maxsplit=9)
+        where = f"image {number}"
+        if len(words) != 9:
+            raise UserError(
+                f"{path}: {where}: must be IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME"
+            )
+        yield where, words[:7], words[8]
+        # The image's points, of which there may be none.
+        next(lines, None)
+
+
+def _colmap_binary(path: Path) -> Iterator[tuple[str, Sequence[Any], str]]:
+    """Yield where, seven numbers and the name of each image."""
+    content = path.read_bytes()
+    try:
+        (count,), start = struct.unpack_from("<Q", content), 8
+        for _ in range(count):
+            number, *numbers, _ = struct.unpack_from("<i7di", content, start)
+            start += struct.calcsize("<i7di")
+            end = content.index(b"\0", start)
+            name = content[start:end].decode()
+            (points,) = struct.unpack_from("<Q", content, end + 1)
+            start = end + 9 + points * struct.calcsize("<ddq")
+            if start > len(content):
+                raise ValueError
+            yield f"image {number}", numbers, name
+    except (struct.error, ValueError):
+        raise UserError(f"{path}: is no images.bin of COLMAP's, or is cut short") from None
+
+
+_ROWS = {".csv": _csv_rows, ".json": _json_rows, ".txt": _colmap_rows, ".bin": _colmap_rows}
+
+
+def _view_name(path: Path, where: str, image: Any) -> str:
+    """Return the name of an image's file without folders and suffix."""
+    if not isinstance(image, str):
+        raise UserError(f"{path}: {where}: file_path: must be a text, not {image!r}")
+    return re.sub(r"(?i)\.(png|jpe?g|exr|tiff?|webp)$", "", image.rpartition("/")[2])
+
+
+def _unit(path: Path, where: str, quaternion: Sequence[float]) -> Floats:
+    """Return a quaternion (4,) of length 1; a file rounds it."""
+    length = math.hypot(*quaternion)
+    if not abs(length - 1) <= TOLERANCE:
+        raise UserError(f"{path}: {where}: quaternion: has the length {length:g}; must be 1")
+    return np.array(quaternion) / length
+
+
+def _keyed(matrix: Floats) -> list[tuple[str, float]]:
+    return [("matrix", value) for value in matrix.ravel().tolist()]
+
+
+def _matrix(path: Path, where: str, key: str, value: Any, rows: int) -> list[tuple[str, Any]]:
+    """Return (key, value) of each number of a matrix with four columns."""
+    found = []
+    for index, (_, row) in enumerate(_numbered(path, f"{where}: {key}", "row", value, rows)):
+        row_key = f"{key}[{index}]"
+        found += _numbered(path, f"{where}: {row_key}", row_key, row, 4)
+    return found
 
 
 def _numbered(path: Path, where: str, key: str, values: Any, count: int) -> list[tuple[str, Any]]:

@@ -92,6 +92,16 @@ class Frames(Settings):
         return range(self.first, self.last + 1, self.step)
 
 
+# The eyes of a stereo pair: to which side each is of the position, along the camera's +X.
+EYES = {"left": -1, "right": 1}
+
+
+class Stereo(Settings):
+    distance: float = Field(
+        gt=0, le=1000, description="Metres between the eyes, on both sides of the position."
+    )
+
+
 def _require_camera(schema: dict[str, Any]) -> None:
     schema["required"] = [*schema.get("required", ()), "camera"]
 
@@ -121,6 +131,7 @@ class Rig(Settings):
         None, description="Where every camera looks, in the world, metres; instead of its own view."
     )
     cube_map: bool = Field(False, description="Six 90 degree views at each position.")
+    stereo: Stereo | None = Field(None, description="A pair of views at each position.")
     frames: Frames | None = Field(
         None,
         description="A sequence: each of these frames of the animation is a dataset of its own.",
@@ -137,6 +148,8 @@ class Rig(Settings):
     def _looks_one_way(self) -> Self:
         if self.look_at is not None and (self.face_inside or self.cube_map):
             raise ValueError("look_at: goes without face_inside and cube_map")
+        if self.stereo is not None and self.cube_map:
+            raise ValueError("stereo: goes without cube_map")
         return self
 
     @property
@@ -164,6 +177,8 @@ class Rig(Settings):
 
     @property
     def views_a_position(self) -> int:
+        if self.stereo:
+            return len(EYES)
         return len(CUBE_FACE_ANGLES) if self.cube_map else 1
 
     def thinned(self, max_views: int) -> Self:
@@ -217,6 +232,13 @@ class Rig(Settings):
                 numbers = np.repeat(numbers, len(CUBE_FACE_ANGLES))
                 positions = np.repeat(positions, len(CUBE_FACE_ANGLES), axis=0)
             rotations = matrix_to_euler(matrices)
+        if self.stereo:
+            aside = euler_to_matrix(rotations)[:, None, :, 0] * self.stereo.distance / 2
+            sides = np.array(list(EYES.values()))[:, None]
+            positions = (positions[:, None] + sides * aside).reshape(-1, 3)
+            names = [f"{name}_{eye}" for name in names for eye in EYES]
+            numbers = np.repeat(numbers, len(EYES))
+            rotations = np.repeat(rotations, len(EYES), axis=0)
         return [
             Pose(
                 name,

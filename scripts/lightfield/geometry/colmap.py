@@ -1,0 +1,30 @@
+"""Poses as COLMAP has them: world to camera, with x right, y down and z forward.
+
+Source: COLMAP's format.rst.
+"""
+
+import numpy as np
+
+from lightfield.geometry.rotations import Floats, quaternion_to_matrix
+
+# From Blender's camera (y up, looks along −z) to COLMAP's (y down, looks along z).
+_FLIP = np.diag([1.0, -1.0, -1.0])
+
+
+def pose(matrix: Floats) -> tuple[list[float], list[float]]:
+    """Return the quaternion (w, x, y, z) and the translation of a camera-to-world matrix (4, 4)."""
+    # SciPy takes long to import, and no plan needs it.
+    from scipy.spatial.transform import Rotation
+
+    turn = _FLIP @ matrix[:3, :3].T
+    x, y, z, w = Rotation.from_matrix(turn).as_quat().tolist()
+    return [w, x, y, z], (-turn @ matrix[:3, 3]).tolist()
+
+
+def camera_to_world(quaternion: Floats, translation: Floats) -> Floats:
+    """Return the camera-to-world matrix (4, 4) of a unit quaternion (w, x, y, z) and (3,)."""
+    turn = quaternion_to_matrix(quaternion)
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn.T @ _FLIP
+    matrix[:3, 3] = -turn.T @ translation
+    return matrix

@@ -1,0 +1,118 @@
+"""A path: cameras evenly along a smooth curve through key poses."""
+
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from lightfield.core.settings import Settings, Vector, as_list
+from lightfield.geometry.rigs.rig import Rig, UnitPoses
+from lightfield.geometry.rotations import Floats, looking_at, matrix_to_euler
+
+# Pieces between two keys by which the curve's length is measured: it errs by less than 1e-6 of it.
+_PIECES = 2000
+
+
+class Key(Settings):
+    position: Vector
+    rotation: Vector | None = Field(None, description="XYZ Euler angles in degrees.")
+    quaternion_wxyz: Annotated[tuple[float, float, float, float], as_list(4)] | None = Field(
+        None, description="The rotation as a quaternion, w first; instead of angles."
+    )
+
+    @model_validator(mode="after")
+    def _one_rotation(self) -> Self:
+        if self.rotation is not None and self.quaternion_wxyz is not None:
+            raise ValueError("quaternion_wxyz: goes without rotation")
+        if self.quaternion_wxyz is not None and not any(self.quaternion_wxyz):
+            raise ValueError("quaternion_wxyz: must not be all 0")
+        return self
+
+    @property
+    def is_turned(self) -> bool:
+        return self.rotation is not None or self.quaternion_wxyz is not None
+
+
+class Path(Rig):
+    """Keys without rotations let the cameras look along the path, upright."""
+
+    shape = "PLANE"
+
+    type: Literal["path"]
+    count: int = Field(ge=1, le=100000, description="Cameras, evenly spaced along the path.")
+    keys: list[Key] = Field(
+        min_length=2, max_length=1000, description="Poses that the path goes through, in order."
+    )
+    closed: bool = Field(False, description="Go on from the last key to the first.")
+
+    @model_validator(mode="after")
+    def _is_a_path(self) -> Self:
+        if len({key.is_turned for key in self.keys}) > 1:
+            raise ValueError("keys: must all have a rotation, or none of them")
+        if (np.linalg.norm(np.diff(self._places(), axis=0), axis=-1) < 1e-9).any():
+            raise ValueError("keys: two in a row are at one place")
+        return self
+
+    @property
+    def positions(self) -> int:
+        return self.count
+
+    def _thinned_to(self, positions: int) -> Self | None:
+        return self.model_copy(update={"count": positions}) if positions else None
+
+    def unit_poses(self) -> UnitPoses:
+        # SciPy takes long to import, and no plan needs it.
+        from scipy.interpolate import PchipInterpolator
+        from scipy.spatial.transform import Rotation, Slerp
+
+        spline, fine, length = self._curve()
+        along = np.linspace(0, length[-1], self.count, endpoint=not self.closed)
+        where = PchipInterpolator(length, fine)(along)
+        if self.keys[0].is_turned:
+            turns = Slerp(length[::_PIECES], Rotation.from_quat(self._quaternions()))(along)
+            matrices = turns.as_matrix()
+        else:
+            matrices = looking_at(-spline(where, 1) * self.sides, np.zeros(3))
+        return UnitPoses.of_sides(("", spline(where), matrix_to_euler(matrices)))
+
+    def unit_outline(self) -> list[Floats]:
+        spline, fine, _ = self._curve()
+        return [spline(fine[:: _PIECES // 20])]
+
+    def _places(self) -> Floats:
+        """Return the keys' positions (n, 3), of a closed path the first one again at the end."""
+        keys = [*self.keys, self.keys[0]] if self.closed else self.keys
+        return np.array([key.position for key in keys], float)
+
+    def _quaternions(self) -> Floats:
+        """Return the keys' rotations (n, 4), the scalar last as SciPy has it."""
+        from scipy.spatial.transform import Rotation
+
+        turns = [
+            Rotation.from_euler("xyz", key.rotation or (0, 0, 0), degrees=True)
+            if key.quaternion_wxyz is None
+            else Rotation.from_quat(np.roll(key.quaternion_wxyz, -1))
+            for key in self.keys
+        ]
+        closing = turns[:1] if self.closed else []
+        quaternions: Floats = np.array([turn.as_quat() for turn in [*turns, *closing]])
+        return quaternions
+
+    def _curve(self) -> tuple[Any, Floats, Floats]:
+        """Return the curve, many values (n) of its parameter, and the length in metres up to each.
+
+        It is a cubic spline whose second derivative is continuous; its parameter grows by the root
+        of the distance between keys (centripetal), which avoids loops where these are uneven.
+        Source: Lee 1989, "Choosing nodes in parametric curve interpolation".
+        """
+        from scipy.interpolate import CubicSpline
+
+        keys = self._places()
+        steps = np.sqrt(np.linalg.norm(np.diff(keys, axis=0), axis=-1))
+        knots = np.concatenate([[0], np.cumsum(steps)])
+        spline = CubicSpline(knots, keys, bc_type="periodic" if self.closed else "natural")
+        fine = np.interp(
+            np.arange(_PIECES * (len(knots) - 1) + 1) / _PIECES, np.arange(len(knots)), knots
+        )
+        pieces = np.linalg.norm(np.diff(spline(fine), axis=0) * self.sides, axis=-1)
+        return spline, fine, np.concatenate([[0], np.cumsum(pieces)])

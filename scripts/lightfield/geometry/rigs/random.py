@@ -1,0 +1,78 @@
+"""Random places in a box, each with free space around it, level and in any direction."""
+
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+from pydantic.json_schema import SkipJsonSchema
+
+from lightfield.core.files import read_json
+from lightfield.geometry.rigs.grid import box_outline
+from lightfield.geometry.rigs.rig import Rig, UnitPoses, stack
+from lightfield.geometry.rotations import Floats
+
+# What the places follow from, besides the scene.
+BOX = {"count", "seed", "clearance", "size", "center", "rotation"}
+
+
+class Random(Rig):
+    """Each view has a sequence of places of its own, so a thinned rig is the first of its views.
+
+    ``file`` is for no scene YAML: there scripts/free_places.py writes the places that it found.
+    Before it has, the poses are those that would be taken in an empty scene.
+    """
+
+    shape = "CUBOID"
+    unit_volume = 1.0
+
+    type: Literal["random"]
+    count: int = Field(ge=1, le=100000, description="Cameras.")
+    seed: int = Field(0, ge=0, le=2**31 - 1)
+    clearance: float = Field(
+        0.2, gt=0, le=1000, description="Metres to the nearest surface, at least."
+    )
+    file: SkipJsonSchema[str | None] = None
+
+    @model_validator(mode="after")
+    def _stands_still(self) -> Self:
+        if self.frames is not None:
+            raise ValueError("frames: goes without type random, whose places are of one frame")
+        return self
+
+    @property
+    def positions(self) -> int:
+        return self.count
+
+    def _thinned_to(self, positions: int) -> Self | None:
+        return self.model_copy(update={"count": positions}) if positions else None
+
+    def placed(self, file: Path | str) -> Self:
+        """Return the rig with its cameras at the places that a file has."""
+        return self.model_copy(update={"file": str(file)})
+
+    @property
+    def box(self) -> dict[str, Any]:
+        """The settings that the places follow from, as JSON has them."""
+        return self.model_dump(mode="json", include=BOX)
+
+    def unit_poses(self) -> UnitPoses:
+        if self.file is None:
+            places = np.stack([self.candidate(view, 0) for view in range(self.count)])
+        else:
+            places = np.array(read_json(Path(self.file))["places"], float)
+        directions = [self._numbers(view)[0] for view in range(self.count)]
+        azimuth = 2 * np.pi * np.array(directions)
+        return UnitPoses.of_sides(("", places, stack(np.pi / 2, 0.0, azimuth)))
+
+    def unit_outline(self) -> list[Floats]:
+        return box_outline()
+
+    def candidate(self, view: int, number: int) -> Floats:
+        """Return the ``number``-th place (3,) in the unit box for a view."""
+        return self._numbers(view, number + 1)[-3:] - 0.5
+
+    def _numbers(self, view: int, places: int = 0) -> Floats:
+        """Return a view's numbers from 0 to 1: the first for its direction, three for a place."""
+        numbers: Floats = np.random.default_rng([self.seed, view]).random(1 + 3 * places)
+        return numbers

@@ -1,0 +1,297 @@
+"""Rigs whose poses are given: paths through keys, free places, stereo pairs, and files' formats."""
+
+import json
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from lightfield.core.errors import UserError
+from lightfield.dataset import config
+from lightfield.dataset.dataset import scene_datasets
+from lightfield.geometry import colmap
+from lightfield.geometry.rigs import from_settings
+
+SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
+CORNER = [[0, 0, 0], [1, 0, 0], [1, 2, 0.5], [-3, 2, 0.5]]
+
+
+def places(rig):
+    return np.array([pose.position for pose in rig.poses()])
+
+
+def matrices(rig):
+    return np.stack([pose.matrix() for pose in rig.poses()])
+
+
+def path(keys, count, **more):
+    keys = [key if isinstance(key, dict) else {"position": key} for key in keys]
+    return from_settings({"type": "path", "keys": keys, "count": count, **more})
+
+
+# ---- path -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize("size", [1, [1, 3, 0.5]])
+def test_cameras_are_evenly_along_a_path_through_its_keys(closed, size):
+    many = places(path(CORNER, 20001, closed=closed, size=size))
+    ends = np.vstack([many, many[:1]]) if closed else many
+    steps = np.linalg.norm(np.diff(ends, axis=0), axis=-1)
+    np.testing.assert_allclose(steps, steps.mean(), rtol=1e-4)
+    for key in np.array(CORNER) * size:
+        assert np.linalg.norm(many - key, axis=-1).min() < steps.mean()
+    few = places(path(CORNER, 6, closed=closed, size=size))
+    index = np.arange(6) * (20001 / 6 if closed else 4000)
+    np.testing.assert_allclose(few, many[np.round(index).astype(int)], atol=steps.mean())
+    assert np.allclose(few[0], many[0])
+
+
+def test_without_rotations_cameras_look_along_the_path_upright():
+    turns = matrices(path([[0, 0, 0], [3, 4, 0]], 4))[:, :3, :3]
+    np.testing.assert_allclose(turns[:, :, 2], [[-0.6, -0.8, 0]] * 4, atol=1e-9)
+    np.testing.assert_allclose(turns[:, :, 1], [[0, 0, 1]] * 4, atol=1e-9)
+    curved = path(CORNER, 2001)
+    forward = -matrices(curved)[:, :3, 2]
+    steps = np.gradient(places(curved), axis=0)
+    steps /= np.linalg.norm(steps, axis=-1, keepdims=True)
+    np.testing.assert_allclose(forward[1:-1], steps[1:-1], atol=1e-4)
+    assert np.allclose(-matrices(path(CORNER, 3, look_at=[9, 9, 9]))[0, :3, 2], 3**-0.5)
+
+
+def test_rotations_turn_evenly_from_key_to_key():
+    turned = {"position": [0, 4, 0], "quaternion_wxyz": [0.5**0.5, 0, 0, 0.5**0.5]}
+    rig = path([{"position": [0, 0, 0], "rotation": [0, 0, 0]}, turned], 5)
+    angles = np.degrees([pose.rotation for pose in rig.poses()])
+    np.testing.assert_allclose(angles, [[0, 0, z] for z in (0, 22.5, 45, 67.5, 90)], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ([CORNER[0]], "keys: is .* at least 2"),
+        ([CORNER[0], CORNER[0]], "keys: two in a row are at one place"),
+        ([CORNER[0], {"position": [1, 1, 1], "rotation": [0, 0, 0]}], "keys: must all have a rot"),
+        ([CORNER[0], {"position": [1, 1, 1], "quaternion_wxyz": [0, 0, 0, 0]}], "not be all 0"),
+        (
+            [{"position": [1, 1, 1], "quaternion_wxyz": [1, 0, 0, 0], "rotation": [0, 0, 0]}] * 2,
+            "quaternion_wxyz: goes without rotation",
+        ),
+    ],
+)
+def test_what_is_no_path_is_refused(keys, expected):
+    with pytest.raises(UserError, match=expected):
+        path(keys, 3)
+
+
+# ---- random ---------------------------------------------------------------------------------
+
+RANDOM = {"type": "random", "count": 40, "size": [5.8, 5.8, 2.8], "center": [0, 0, 1.5]}
+
+
+def test_random_places_are_seeded_and_a_thinned_rig_has_the_first_of_them():
+    rig = from_settings(RANDOM)
+    assert rig.poses() == from_settings(RANDOM).poses()
+    assert rig.thinned(7).poses() == rig.poses()[:7]
+    assert not np.allclose(places(rig), places(from_settings(RANDOM | {"seed": 1})))
+    assert (np.abs(places(rig) - [0, 0, 1.5]) <= [2.9, 2.9, 1.4]).all()
+    assert np.ptp(places(rig), axis=0).min() > 2
+    up = matrices(rig)[:, :3, 1]
+    np.testing.assert_allclose(up, [[0, 0, 1]] * 40, atol=1e-9)
+
+
+BUILD = """
+import sys, bpy
+sys.path.insert(0, sys.argv[1])
+from scenes.room import build
+bpy.ops.wm.read_factory_settings(use_empty=True)
+build({})
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2])
+"""
+
+
+def free_places(blend, rig, output):
+    words = ["--blend", blend, "--rig", json.dumps(rig), "--output", output]
+    return subprocess.run(
+        [sys.executable, SCRIPTS / "free_places.py", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_free_places_are_in_the_room_and_clear_of_all_that_stands_in_it(tmp_path):
+    blend = tmp_path / "room.blend"
+    subprocess.run([sys.executable, "-c", BUILD, SCRIPTS, blend], check=True, capture_output=True)
+    output = tmp_path / "places.json"
+    result = free_places(blend, RANDOM | {"clearance": 0.6}, output)
+    assert result.returncode == 0, result.stderr
+    found = places(from_settings(RANDOM).placed(output))
+    assert len(np.unique(found, axis=0)) == 40
+    # Walls, floor and ceiling; the ball, the box within its own ball, and the pillar's axis.
+    assert (np.abs(found - [0, 0, 1.5]) <= np.array([3, 3, 1.5]) - 0.6 + 1e-6).all()
+    assert np.linalg.norm(found - [2, 1, 0.5], axis=-1).min() > 0.5 + 0.6 - 0.01
+    assert np.linalg.norm(found - [2.2, -1.2, 0.35], axis=-1).min() > 0.35 + 0.6
+    assert np.linalg.norm(found[:, :2] + 2, axis=-1).min() > 0.2 + 0.6 - 0.01
+    # Nowhere in the box is the box's own half of a metre free.
+    narrow = {"type": "random", "count": 3, "size": 0.6, "center": [2.2, -1.2, 0.35]}
+    result = free_places(blend, narrow | {"clearance": 0.5}, tmp_path / "none.json")
+    assert result.returncode == 1
+    assert "3 of 3 cameras find no place with 0.5 m around it in 100 tries" in result.stderr
+    assert not (tmp_path / "none.json").exists()
+
+
+def test_a_random_rig_is_outdated_with_its_places(tmp_path, monkeypatch):
+    camera = {"lens": "rectilinear", "fov": 60, "resolution": [8, 8]}
+    rigs = {"somewhere": RANDOM | {"camera": camera}}
+    content = {"scene": {"builder": "room"}, "render": {"samples": 1}, "rigs": rigs}
+    (tmp_path / "somewhere.yaml").write_text(json.dumps(content))
+    monkeypatch.setattr(config, "SCENES", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    (dataset,) = scene_datasets("somewhere")
+    assert dataset.places == "work/somewhere/somewhere/places.json"
+    assert dataset.places in dataset.intermediates
+    assert list(dataset.outdated(dataset.render)) == []
+    Path(dataset.work).mkdir(parents=True)
+    for box, expected in ((dataset.rig.box, []), ({"count": 1}, [dataset.places])):
+        written = {"box": box, "places": [[0, 0, 0]] * 40}
+        Path(dataset.places).write_text(json.dumps(written))
+        assert list(dataset.outdated(dataset.render)) == expected
+    with pytest.raises(UserError, match="frames: goes without type random"):
+        from_settings(RANDOM | {"frames": {"first": 1, "last": 2}})
+
+
+# ---- stereo ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("more", [{}, {"rotation": [10, 20, 30]}, {"look_at": [5, 5, 5]}])
+@pytest.mark.parametrize("kind", ["plane", "cylinder"])
+def test_a_stereo_pair_stands_on_both_sides_of_its_position(kind, more):
+    rig = {"type": kind, "cameras": [3, 2], "size": 2, **more}
+    one = from_settings(rig)
+    pair = from_settings(rig | {"stereo": {"distance": 0.064}})
+    assert pair.view_count == 12
+    names = [pose.name for pose in pair.poses()]
+    assert names == sorted(names)
+    assert names[:2] == ["view_0000f_left", "view_0000f_right"]
+    left, right = matrices(pair)[::2], matrices(pair)[1::2]
+    np.testing.assert_allclose(left[:, :3, :3], matrices(one)[:, :3, :3], atol=1e-9)
+    np.testing.assert_array_equal(left[:, :3, :3], right[:, :3, :3])
+    np.testing.assert_allclose((left + right)[:, :3, 3] / 2, places(one), atol=1e-9)
+    # In the camera's own axes the right eye is to the right.
+    apart = (right - left)[:, None, :3, 3] @ left[:, :3, :3]
+    np.testing.assert_allclose(apart[:, 0], [[0.064, 0, 0]] * 6, atol=1e-9)
+    assert len(pair.thinned(4).poses()) == 4
+
+
+def test_a_stereo_pair_is_no_cube_map():
+    with pytest.raises(UserError, match="stereo: goes without cube_map"):
+        from_settings(
+            {"type": "plane", "cameras": [2, 2], "cube_map": True, "stereo": {"distance": 0.1}}
+        )
+
+
+# ---- files ----------------------------------------------------------------------------------
+
+TURNS = Rotation.from_euler("xyz", [[90, 0, 0], [20, -30, 40], [180, 5, -170]], degrees=True)
+POSES = np.tile(np.eye(4), (3, 1, 1))
+POSES[:, :3, :3] = TURNS.as_matrix()
+POSES[:, :3, 3] = [[0, 0, 1], [1.5, -2, 0.25], [-4, 3, 2]]
+WXYZ = np.roll(TURNS.as_quat(), 1, axis=-1)
+
+
+def _csv(folder):
+    rows = [
+        f"v{i}," + ",".join(map(str, [*POSES[i, :3, 3], *np.round(WXYZ[i], 6)])) for i in range(3)
+    ]
+    (folder / "poses.csv").write_text("\n".join(["name,x,y,z,qw,qx,qy,qz", *rows]))
+    return "poses.csv"
+
+
+def _transforms(folder, applied=None):
+    moved = POSES if applied is None else np.vstack([applied, [0, 0, 0, 1]]) @ POSES
+    frames = [
+        {"file_path": f"./images/v{i}.png", "transform_matrix": moved[i].tolist()} for i in range(3)
+    ]
+    content = {"camera_angle_x": 0.7, "frames": frames}
+    if applied is not None:
+        content["applied_transform"] = applied
+    (folder / "transforms.json").write_text(json.dumps(content))
+    return "transforms.json"
+
+
+def _applied(folder):
+    return _transforms(folder, [[0, 1, 0, 2], [-1, 0, 0, 0], [0, 0, 1, -1]])
+
+
+def _images():
+    for index, matrix in enumerate(POSES):
+        yield index + 1, *colmap.pose(matrix), f"folder/v{index}.jpg"
+
+
+def _colmap_text(folder):
+    lines = ["# Image list", ""]
+    for number, quaternion, translation, name in _images():
+        lines += [" ".join(map(str, [number, *quaternion, *translation, 1, name]))]
+        lines += ["" if number == 2 else "1.5 2.5 -1 3.5 4.5 7"]
+    (folder / "images.txt").write_text("\n".join(lines))
+    return "images.txt"
+
+
+def _colmap_binary(folder):
+    content = struct.pack("<Q", 3)
+    for number, quaternion, translation, name in _images():
+        content += struct.pack("<i7di", number, *quaternion, *translation, 1)
+        content += name.encode() + b"\0" + struct.pack("<Q", number)
+        content += struct.pack("<ddq", 1.5, 2.5, -1) * number
+    (folder / "images.bin").write_bytes(content)
+    return "images.bin"
+
+
+@pytest.mark.parametrize("write", [_csv, _transforms, _applied, _colmap_text, _colmap_binary])
+def test_poses_are_read_as_each_format_has_them(write, tmp_path):
+    rig = from_settings({"type": "poses", "file": str(tmp_path / write(tmp_path))})
+    assert [pose.name for pose in rig.poses()] == ["v0", "v1", "v2"]
+    np.testing.assert_allclose(matrices(rig), POSES, atol=3e-6)
+
+
+def test_colmaps_pose_puts_a_point_before_the_camera_where_it_sees_it():
+    """By its definition: a world point x is at R x + t, with x right, y down and z forward."""
+    for matrix in POSES:
+        (w, *xyz), translation = colmap.pose(matrix)
+        world = (matrix @ [0.3, 0.2, -5, 1])[:3]
+        seen = Rotation.from_quat([*xyz, w]).apply(world) + translation
+        np.testing.assert_allclose(seen, [0.3, -0.2, 5], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"),
+    [
+        ("a.csv", "name,x,y,z,qx,qy,qz,qw\n", "row 1: must be .* or name,x,y,z,qw,qx,qy,qz, not"),
+        ("a.csv", "name,x,y,z,qw,qx,qy,qz\nv,0,0,0,1,1,0,0", "row 2: quaternion: has the length"),
+        ("a.json", '{"frames": [{"transform_matrix": [[1]]}]}', "transform_matrix: must be a list"),
+        (
+            "a.json",
+            '{"frames": [{"file_path": "v", "transform_matrix": '
+            "[[2,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}",
+            r"frames\[0\]: transform_matrix: its first 3 × 3 must be a rotation",
+        ),
+        (
+            "a.json",
+            '{"frames": [{"transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}',
+            r"frames\[0\]: file_path: must be a text",
+        ),
+        ("images.txt", "1 1 0 0 0 0 0\n", "image 1: must be IMAGE_ID, QW"),
+        ("images.txt", "1 1 0 x 0 0 0 0 1 v.png\n", "image 1: must be a finite number"),
+        ("images.bin", "\0" * 7, "is no images.bin of COLMAP's, or is cut short"),
+        ("images.bin", "\x02" + "\0" * 30, "is no images.bin of COLMAP's, or is cut short"),
+    ],
+)
+def test_what_no_format_has_is_refused(name, content, expected, tmp_path):
+    (tmp_path / name).write_text(content)
+    with pytest.raises(UserError, match=expected):
+        from_settings({"type": "poses", "file": str(tmp_path / name)}).poses()
