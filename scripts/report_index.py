@@ -28,7 +28,7 @@ def main() -> None:
 
 
 def entry(results: Path, path: Path) -> dict[str, Any]:
-    """Return what the index tells of the dataset that has its page at ``path``."""
+    """Return what the index says of the dataset that has its page at ``path``."""
     folder = path.parents[1]
     lightfield = LightField.read(folder / NAME)
     scene, *rig = folder.relative_to(results).parts

@@ -10,15 +10,17 @@ import numpy as np
 import pytest
 from PIL import Image
 from playwright.sync_api import sync_playwright
+from sphere import RADIUS, colour_of, look
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.lightfield import LightField, View
 from lightfield.geometry import lenses, overview, rigs
+from lightfield.geometry.depth import z_from_distance
 from lightfield.imaging import images, pictures
+from lightfield.imaging.tonemap import decode_srgb
 from lightfield.report import dataset_page, epipolar, faults, figures, packing
 
-RADIUS = 5.0
 SPHERE = {
     "type": "sphere",
     "subdivisions": 1,
@@ -36,44 +38,26 @@ YAML = "render: {samples: 4}  # <b>\n"
 HOSTILE = "<img src=x onerror=\"document.title='broken'\"></script><script>document.title='broken'"
 
 
-def light_of(points):
-    """Return the colour (..., 3) of points on the inside of a sphere: smooth, over 8 stops."""
-    return 2.0 ** (4 * points / RADIUS)
-
-
-def view(lens, matrix):
-    """Return colour and Z-depth of the inside of a sphere about the origin, solved exactly."""
-    rays = lens.pixel_rays()
-    world = rays @ matrix[:3, :3].T
-    place = matrix[:3, 3]
-    along = world @ place
-    distance = -along + np.sqrt(along**2 - place @ place + RADIUS**2)
-    outside = np.isnan(distance)
-    colour = light_of(place + distance[..., None] * world)
-    colour[outside] = 0
-    return colour, np.where(outside, np.inf, distance * -rays[..., 2])
-
-
-def write_dataset(folder, rig, depth="z", names=None):
+def write_dataset(folder, rig, depth="z", names=()):
     """Write the views of a rig in a sphere, as the renderer writes them."""
     lens = lenses.from_camera(rig["camera"])
-    lightfield = LightField.from_rig(
-        rig,
-        lens,
-        depth=depth,
-        frame=7,
-        scene={"name": "ball"},
-        render={"samples": 4, "adaptive_threshold": 0, "denoise": False},
-    ).to_json()
-    for number, frame in enumerate(lightfield["frames"]):
-        frame["name"] = names[number] if names else frame["name"]
-        colour, z = view(lens, np.array(frame["world_matrix"]))
-        channels = dict(zip("RGB", np.moveaxis(colour.astype(np.float16), -1, 0), strict=True))
-        if depth:
-            channels["Z"] = z.astype(np.float32)
-        images.write_exr(folder / "exr" / f"{frame['name']}.exr", channels)
-    write_json(folder / "lightfield.json", lightfield)
+    keys = {"depth": depth, "frame": 7, "scene": {"name": "ball"}}
+    keys["render"] = {"samples": 4, "adaptive_threshold": 0, "denoise": False}
+    lightfield = LightField.from_rig(rig, lens, **keys)
+    renamed = [View.placed(n, v.matrix) for n, v in zip(names, lightfield.views, strict=False)]
+    lightfield = lightfield.changed(views=renamed or lightfield.views)
+    for view in lightfield.views:
+        colour, distance = look(lens, view.matrix)
+        z = z_from_distance(distance, lens.pixel_rays())
+        channels = channels_of(colour.astype(np.float16), Z=np.nan_to_num(z, nan=np.inf))
+        images.write_exr(folder / "exr" / f"{view.name}.exr", channels)
+    lightfield.write(folder / "lightfield.json")
     return lightfield
+
+
+def channels_of(colour, **others):
+    planes = dict(zip("RGB", np.moveaxis(colour, -1, 0), strict=True))
+    return planes | {name: plane.astype(np.float32) for name, plane in others.items()}
 
 
 def make_page(folder, rig, *measurements, name="ball/LFSphere", panorama=False):
@@ -130,11 +114,8 @@ def sphere(tmp_path_factory):
     folder = tmp_path_factory.mktemp("results") / "ball" / "LFSphere"
     lightfield = write_dataset(folder, SPHERE)
     panorama = lenses.from_camera({"lens": "equirectangular", "resolution": [128, 64]})
-    colour, _ = view(
-        panorama, rigs.from_settings({"type": "lattice", "cameras": [1, 1, 1]}).poses()[0].matrix()
-    )
-    channels = dict(zip("RGB", np.moveaxis(colour.astype(np.float32), -1, 0), strict=True))
-    channels["Z"] = np.full((64, 128), RADIUS, np.float32)
+    colour, distance = look(panorama, np.eye(4))
+    channels = channels_of(colour.astype(np.float32), Z=distance)
     images.write_exr(folder / "panorama.exr", channels)
     draw(folder, SPHERE, folder / "report", folder / "panorama.exr")
     check = {"views": [], "problems": [], "warnings": [], "figures": {"nearest_metres": 0.25}}
@@ -247,7 +228,7 @@ def test_the_viewer_steps_exposes_and_shows_depth(sphere, show):
     assert (pixels(tab, "viewer")[lit] != darker[lit]).any()
 
 
-def test_the_readout_tells_what_the_file_holds(sphere, show):
+def test_the_readout_says_what_the_file_holds(sphere, show):
     tab = show(sphere.page)
     pixels(tab, "viewer")
     frame = frame_of(tab, "viewer")
@@ -285,7 +266,7 @@ def test_the_rig_turns_and_its_cameras_open_their_views(sphere, show):
     )
     tab.mouse.move(frame["x"] + closed["x"], frame["y"] + closed["y"])
     tab.wait_for_selector("#rig-name:visible")
-    name = sphere.lightfield["frames"][closed["number"]]["name"]
+    name = sphere.lightfield.views[closed["number"]].name
     assert tab.inner_text("#rig-name") == name
     tab.mouse.click(frame["x"] + closed["x"], frame["y"] + closed["y"])
     assert tab.inner_text("#view-name") == name
@@ -305,6 +286,8 @@ def test_a_phone_does_not_scroll_sideways(sphere, show, width):
     tab = show(sphere.page, width)
     pixels(tab, "viewer")
     assert tab.evaluate("() => document.documentElement.scrollWidth") <= width
+    cut = "all => all.filter((table) => table.scrollWidth > table.clientWidth).length"
+    assert tab.eval_on_selector_all(".scroll", cut) == 0
 
 
 def test_names_are_text_whatever_they_hold(show, tmp_path):
@@ -351,12 +334,12 @@ def test_cameras_have_the_colour_of_their_part_of_the_dataset(show, tmp_path):
 
 def test_each_reprojection_is_shown(show, tmp_path):
     rig = {**LINE, "cameras": [2, 1]}
-    content = write_dataset(tmp_path, rig)
-    picture = np.full((4, 4, 3), 200, np.uint8)
-    for frame in content["frames"]:
-        images.write_png(tmp_path / "small" / f"{frame['name']}.png", picture)
+    lightfield = write_dataset(tmp_path, rig)
+    for view in lightfield.views:
+        picture = np.full((4, 4, 3), 200, np.uint8)
+        images.write_png(tmp_path / "small" / f"{view.name}.png", picture)
     lens = lenses.from_camera({"lens": "rectilinear", "fov": 90, "resolution": [4, 4]})
-    write_json(tmp_path / "small/lightfield.json", content | lens.to_lightfield())
+    lightfield.changed(lens).write(tmp_path / "small/lightfield.json")
     tab = show(make_page(tmp_path, rig))
     source = tab.get_attribute("img[alt='The views as small']", "src")
     # Developed already, it is shown as it is.
@@ -523,7 +506,8 @@ def test_epipolar_images_hold_the_light_and_depth_of_the_scene(rig, tilt):
     rays = epipolar.directions(row, tilt, 90)
     seen = 0
     for number in row.views:
-        colour, z = view(lens, poses[number])
+        colour, distance = look(lens, poses[number])
+        z = z_from_distance(distance, lens.pixel_rays())
         light, reach = epipolar.sample(lens, poses[number], colour, z, "z", rays)
         points = poses[number, :3, 3] + reach[:, None] * rays
         hit = np.isfinite(reach)
@@ -532,7 +516,8 @@ def test_epipolar_images_hold_the_light_and_depth_of_the_scene(rig, tilt):
         seen += hit.sum()
         np.testing.assert_allclose(np.linalg.norm(points[hit], axis=-1), RADIUS, rtol=0.06)
         on_ball = points[hit] * (RADIUS / np.linalg.norm(points[hit], axis=-1))[:, None]
-        np.testing.assert_allclose(light[hit], light_of(on_ball), rtol=0.12)
+        expected = decode_srgb(colour_of(on_ball) / 255)
+        np.testing.assert_allclose(light[hit], expected, rtol=0.12)
     assert seen > 40
 
 

@@ -33,7 +33,7 @@ def traced_volume(rig: dict[str, Any], sees: Any, count: int) -> tuple[float, fl
     """Estimate the volume by tracing rays from random points, with its standard error.
 
     By the definition: every ray from the point must cross a triangle of three neighbouring
-    cameras that all see the ray's direction. ``sees`` tells it from directions in the camera's
+    cameras that all see the ray's direction. ``sees`` says it of directions in the camera's
     coordinates. The rays go to a fine grid on each triangle of the sphere, its corners included.
     """
     views = rigs.from_settings(rig).poses()

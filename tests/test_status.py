@@ -64,7 +64,7 @@ def finished(name, ago):
     return {"view": name, "finished": time.time() - ago, **seconds}
 
 
-def test_a_build_that_was_never_started_is_told(dataset):
+def test_a_build_that_was_never_started_has_no_views(dataset):
     assert dataset() == [
         "scene/rig",
         "  rendered: 0 of 4, no rate yet",
@@ -81,7 +81,7 @@ def test_views_of_other_settings_are_not_counted(dataset):
     assert dataset()[1] == "  rendered: 2 of 4, no rate yet"
 
 
-def test_the_rate_of_the_shards_at_work_tells_the_time_left(dataset, monkeypatch):
+def test_the_time_left_is_that_at_the_rate_of_the_shards_at_work(dataset, monkeypatch):
     dataset.render("a", "b")
     # This process stands for the renderer's. It began just now, so the clock is put forward.
     now = time.time() + 1000
@@ -97,7 +97,7 @@ def test_the_rate_of_the_shards_at_work_tells_the_time_left(dataset, monkeypatch
     assert lines[-1] == lines[1].replace("  rendered: 2 of 4", "all: 2 of 4 views rendered")
 
 
-def test_a_killed_shard_is_told_until_its_views_are_there(dataset):
+def test_a_killed_shard_is_listed_until_its_views_are_there(dataset):
     dataset.render("a")
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
@@ -149,7 +149,7 @@ def test_all_chosen_datasets_are_added_up(dataset):
     )
 
 
-def test_snakemake_tells_it_without_a_lock(tmp_path):
+def test_snakemake_says_it_without_a_lock(tmp_path):
     folders = (f"results={tmp_path / 'results'}", f"work={tmp_path / 'work'}")
     words = ("--quiet", "all", "--nolock", "status", "--config", *folders, "preset=tiny")
     result = snakemake(ROOT, *words)

@@ -68,7 +68,8 @@ class Dataset:
     rig: Rig
     reprojections: dict[str, config.Reprojection]
     exports: Exports
-    report: config.Report
+    # For the report, from the rig's centre.
+    has_panorama: bool
     limits: Preset
     # Folders of the rigs in which others test what is trained on this one, and that of the rig on
     # which is trained what this one tests.
@@ -292,16 +293,11 @@ class Dataset:
         names = [*(f"{name}.png" for name in PICTURES), *(f"{name}.svg" for name in PLOTS)]
         return [f"{self.folder}/report/{name}" for name in names]
 
-    @cached_property
+    @property
     def panorama(self) -> str | list[str]:
-        """The panorama from the rig's centre for the report; none where it says nothing.
-
-        Nor is there one of an import, of which no scene is there to render it from.
-        """
-        wanted = self.report.panorama
-        made = sees_all_round(self.rig) if wanted == "auto" else wanted
-        here = made and not self.imported
-        return f"{self.work}/panorama/exr/view_0000f.exr" if here else []
+        """The report's panorama; none of an import, of which there is no scene to render it."""
+        made = self.has_panorama and not self.imported
+        return f"{self.work}/panorama/exr/view_0000f.exr" if made else []
 
     @property
     def costs(self) -> str:
@@ -584,6 +580,8 @@ def scene_datasets(
             else None
             for key, export in written.exports.wanted.items()
         }
+        panorama = written.report.panorama
+        has_panorama = sees_all_round(rig) if panorama == "auto" else panorama
         for folder, frame in _frames(name, rig, source.frame):
             below = folder.removeprefix(name)
             found.append(
@@ -597,7 +595,7 @@ def scene_datasets(
                     rig=_limited_rig(rig, limits, written.render is not None),
                     reprojections=reprojections,
                     exports=written.exports.model_copy(update=exports),
-                    report=written.report,
+                    has_panorama=has_panorama,
                     limits=limits,
                     tested_by=tuple(f"{other}{below}" for other in testing)
                     if rig.split == "train"

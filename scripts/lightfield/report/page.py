@@ -12,6 +12,7 @@ from PIL import Image
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_text
+from lightfield.core.progress import duration
 from lightfield.report.packing import data_uri
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
@@ -71,15 +72,8 @@ def bytes_(value: float) -> str:
 
 
 def seconds(value: float) -> str:
-    """Return a duration in words: 4.2 s, 3 min 20 s, 5 h 12 min, 12.1 days."""
-    if value < 99.5:
-        return f"{value:.3g} s"
-    minutes = round(value / 60)
-    if minutes < 60:
-        return f"{int(value // 60)} min {int(value % 60)} s"
-    if minutes < 48 * 60:
-        return f"{minutes // 60} h {minutes % 60} min"
-    return f"{value / 86400:.1f} days"
+    """Return a duration in words, a short one to three digits: 4.22 s, 3 min 20 s, 5 h 12 min."""
+    return f"{value:.3g} s" if value < 99.5 else duration(value)
 
 
 def number(value: float) -> str:

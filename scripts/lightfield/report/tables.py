@@ -1,4 +1,4 @@
-"""What a dataset's page tells in tables: checks, measurements and costs, each from its file."""
+"""What a dataset's page says in tables: checks, measurements and costs, each from its file."""
 
 import csv
 import math
@@ -50,8 +50,8 @@ def validation(path: Path) -> dict[str, Any] | None:
     try:
         for check in content["checks"]:
             group, _, name = check["name"].rpartition("/")
-            told = {key: check[key] for key in CHECK_KEYS}
-            groups.setdefault(group, []).append({**told, "short": name})
+            kept = {key: check[key] for key in CHECK_KEYS}
+            groups.setdefault(group, []).append({**kept, "short": name})
         return {"valid": content["valid"], "groups": groups}
     except (LookupError, TypeError, AttributeError):
         raise UserError(f"{path}: is not what scripts/validate.py writes") from None
@@ -156,7 +156,7 @@ def _slopes(slopes: Mapping[str, Any]) -> Table:
         "of_all_pixels_over_samples",
     )
 
-    def told(fit: Any) -> str | None:
+    def text(fit: Any) -> str | None:
         if not isinstance(fit, Mapping) or "slope" not in fit:
             return None
         return f"{fit['slope']:.2f} ± {fit.get('slope_error', math.nan):.2f}".replace("-", "−")
@@ -164,7 +164,7 @@ def _slopes(slopes: Mapping[str, Any]) -> Table:
     return Table(
         ["method", *(name.replace("_", " ") for name in over)],
         [
-            [method, *(told(fits.get(name)) for name in over)]
+            [method, *(text(fits.get(name)) for name in over)]
             for method, fits in slopes.items()
             if isinstance(fits, Mapping)
         ],
@@ -172,7 +172,7 @@ def _slopes(slopes: Mapping[str, Any]) -> Table:
 
 
 def costs(path: Path) -> dict[str, Any] | None:
-    """Return what costs.json tells, or None where no costs were counted.
+    """Return what costs.json says, or None where no costs were counted.
 
     ``tables`` by title; ``facts`` and ``full`` (of the dataset at full size, extrapolated) as
     pairs of title and text; ``notes`` and ``basis``, how they were counted.
@@ -201,7 +201,7 @@ def costs(path: Path) -> dict[str, Any] | None:
 
 def _with_units(facts: Mapping[str, Any], currency: str) -> list[tuple[str, str]]:
     """Return titles and figures in the units that their names end in."""
-    told = []
+    found = []
     for name, value in facts.items():
         if name.endswith("_uncertainty") or name == "currency" or _is_sentence(value):
             continue
@@ -209,8 +209,8 @@ def _with_units(facts: Mapping[str, Any], currency: str) -> list[tuple[str, str]
         text = " × ".join(map(str, value)) if sides else page.measure(value, name)
         if "price" in name:
             text = f"{text} {currency}"
-        told.append((page.title(name), text))
-    return told
+        found.append((page.title(name), text))
+    return found
 
 
 def _sentences(facts: Mapping[str, Any]) -> list[str]:
