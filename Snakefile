@@ -47,6 +47,7 @@ include: "rules/error.smk"
 
 onstart:
     try:
+        check_device()
         for path in BROKEN:
             set_aside(Path(path), Path(REMOVED))
         if SETTINGS.accept_blend:

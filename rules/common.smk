@@ -4,6 +4,7 @@ import json
 import math
 import os
 import shlex
+import subprocess
 import sys
 from functools import cache
 from importlib.metadata import version
@@ -445,6 +446,20 @@ def trained_by(wildcards):
     name = wildcards.get("reprojection")
     folder = f"{RESULTS}/{dataset.scene_folder}/{dataset.trained_by}"
     return f"{folder}/{f'{name}/' if name else ''}transforms.json"
+
+
+def check_device():
+    """Refuse a device that is not there before the first job, where renders are for this machine.
+
+    Raises `UserError`.
+    """
+    renders = any(job.resources.get("gpu") for job in workflow.dag.needrun_jobs())
+    if renders and workflow.local_exec:
+        words = [sys.executable, f"{SCRIPTS}/check_device.py", SETTINGS.device]
+        checked = subprocess.run(words, capture_output=True, text=True)
+        if checked.returncode:
+            *_, problem = checked.stderr.strip().splitlines() or ["it said nothing"]
+            raise UserError(problem.removeprefix("error: "))
 
 
 def failed_jobs():

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 from checkouts import checkout
 
+from lightfield.core.cli import run
 from lightfield.core.failures import cause, failure_report
 
 ROOT = Path(__file__).parents[1]
@@ -91,7 +93,7 @@ class Failing:
             },
         )
 
-    def fail(self, *rules, options=()):
+    def fail(self, *rules, options=(), config=()):
         """Run the job of each rule alone; return what the terminal says."""
         # One content and one time that pass for a record, a calibration, and a checked .blend.
         content = {"files": {}, "cost_samples": 4, "bytes": 200, "mtime_ns": WHEN * 10**9}
@@ -104,7 +106,8 @@ class Failing:
         targets = [job["output"][0] if job["output"] else job["rule"] for job in jobs]
         work = [file for job in jobs for file in job["output"]]
         run = self.run(
-            *("--rerun-triggers", "mtime", *options, *CHOSEN, "--force", *targets), work=work
+            *("--rerun-triggers", "mtime", *options, *CHOSEN, *config, "--force", *targets),
+            work=work,
         )
         assert run.returncode != 0, run.stdout
         return run.stdout
@@ -162,6 +165,46 @@ def test_the_cause_is_the_last_error_or_else_the_last_line(tmp_path):
     assert cause(log) == "error: no such scene"
     log.write_bytes(b"tar: a: Cannot open: \xff\ntar: Exiting with failure status due to\n")
     assert cause(log) == "tar: a: Cannot open: �"
+
+
+@pytest.mark.parametrize(
+    ("signal", "advice"),
+    [("KILL", "memory ran out: lower --cores"), ("BUS", "make room in /dev/shm and TMPDIR")],
+)
+def test_a_signal_is_named_with_what_to_lower(failing, signal, advice):
+    program = failing.folder / "scripts/render_shard.py"
+    program.write_text(f"import os, signal; os.kill(os.getpid(), signal.SIG{signal})")
+    try:
+        *_, why, log = failing.fail("render").splitlines()
+    finally:
+        program.write_text(FAILING)
+    assert why.startswith(f"render failed: error: killed by SIG{signal}: most likely")
+    assert advice in why
+    assert log.startswith("  log: work/logs/")
+
+
+def test_a_device_that_is_not_there_is_reported_before_the_first_job(failing):
+    shutil.copy(ROOT / "scripts/check_device.py", failing.folder / "scripts")
+    terminal = failing.fail("render", config=["device=metal"])
+    assert terminal.splitlines()[-1].startswith("error: device: this machine has no metal device")
+    assert "views" not in terminal
+
+
+@pytest.mark.parametrize(
+    ("problem", "said"),
+    [
+        (MemoryError(), "error: out of memory: lower --cores"),
+        (OSError(28, "No space left on device", "/tmp/a"), "error: /tmp/a: No space left on"),
+        (FileNotFoundError(2, "No usable temporary directory"), "error: No usable temporary"),
+    ],
+)
+def test_what_the_system_refuses_is_one_line(problem, said):
+    def main():
+        raise problem
+
+    with pytest.raises(SystemExit) as caught:
+        run(main)
+    assert str(caught.value).startswith(said)
 
 
 def test_the_same_cause_of_many_jobs_is_said_once(tmp_path):

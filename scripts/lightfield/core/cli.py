@@ -5,20 +5,29 @@ import sys
 from collections.abc import Callable
 
 from lightfield.core.errors import UserError
+from lightfield.core.failures import LESS_MEMORY
 
 
 def run(main: Callable[[], None]) -> None:
-    """Run ``main``; a `UserError` becomes ``error: …`` on standard error and exit status 1."""
+    """Run ``main``; a `UserError` becomes ``error: …`` on standard error and exit status 1.
+
+    So does what the system refuses: memory, and files and folders that nobody expected it to.
+    """
     try:
         main()
     except UserError as error:
         sys.exit(f"error: {error}")
+    except MemoryError:
+        sys.exit(f"error: out of memory: {LESS_MEMORY}")
     except KeyboardInterrupt:
         sys.exit("error: interrupted")
     except BrokenPipeError:
         # The reader of our output left (as `head` does): say nothing more, not even at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        sys.exit(f"error: {where}{error.strerror or error}")
 
 
 def view_slice(text: str, count: int) -> slice:

@@ -3,6 +3,17 @@
 from collections.abc import Iterable
 from pathlib import Path
 
+# What takes less memory, wherever it ran out.
+LESS_MEMORY = "lower --cores, for fewer shards at once, or resolution"
+# What a signal that ends a program most likely means.
+_SIGNALS = {
+    "SIGKILL": f"most likely memory ran out: {LESS_MEMORY}",
+    "SIGABRT": f"most likely memory ran out: {LESS_MEMORY}",
+    "SIGSEGV": f"Blender crashed, as it does where it gets no memory: {LESS_MEMORY}",
+    "SIGBUS": "most likely a temporary folder is full: make room in /dev/shm and TMPDIR",
+    "SIGTERM": "it was cancelled, or ran longer than it may",
+}
+
 # What tar says after the cause.
 _AFTER_THE_CAUSE = ("tar: Exiting with failure status", "tar: Error is not recoverable")
 
@@ -10,14 +21,18 @@ _AFTER_THE_CAUSE = ("tar: Exiting with failure status", "tar: Error is not recov
 def cause(log: Path) -> str | None:
     """Return the line of a program's log that says why it failed; None if the log has no line.
 
-    That is its last ``error: …``; of a program that did not get so far, its last line.
+    That is its last ``error: …``; of a program that did not get so far, its last line. What a
+    signal means is added.
     """
     text = log.read_text(encoding="utf-8", errors="replace") if log.is_file() else ""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     lines = [line for line in lines if not line.startswith(_AFTER_THE_CAUSE)]
     errors = [line for line in lines if line.startswith("error: ")]
     said = errors or lines
-    return said[-1] if said else None
+    if not said:
+        return None
+    meaning = _SIGNALS.get(said[-1].removeprefix("error: killed by "))
+    return f"{said[-1]}: {meaning}" if meaning else said[-1]
 
 
 def failure_report(jobs: Iterable[tuple[str, Path]]) -> str:

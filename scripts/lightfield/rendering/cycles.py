@@ -123,30 +123,36 @@ def set_window(x: int, y: int, width: int, height: int) -> None:
     render.border_min_y, render.border_max_y = 1 - (y + height) / down, 1 - y / down
 
 
-def _use_device(scene: Any, device: str) -> None:
-    """Choose what Cycles renders on; a device that is asked for by name must be there."""
-    if device == "cpu":
-        scene.cycles.device = "CPU"
-        return
+def gpu(device: str) -> str | None:
+    """Return Cycles' name of the kind of GPU that a ``device`` means, or None for the processor.
+
+    Raises `UserError` where one is asked for by name that is not there.
+    """
     preferences = bpy.context.preferences.addons["cycles"].preferences
-    for name in GPU_DEVICES if device == "auto" else (device,):
+    for name in {"auto": GPU_DEVICES, "cpu": ()}.get(device, (device,)):
         try:
             found = list(preferences.get_devices_for_type(name.upper()) or ())
         except (TypeError, ValueError):
-            found = []
-        gpus = [entry for entry in found if entry.type == name.upper()]
-        if gpus:
-            preferences.compute_device_type = name.upper()
-            for entry in preferences.devices:
-                entry.use = entry.type == name.upper()
-            scene.cycles.device = "GPU"
-            return
-    if device != "auto":
+            continue
+        if any(entry.type == name.upper() for entry in found):
+            return name.upper()
+    if device not in ("auto", "cpu"):
         raise UserError(
             f"device: this machine has no {device} device that Cycles can use; "
             "use device=cpu, or device=auto to take what there is"
         )
-    scene.cycles.device = "CPU"
+    return None
+
+
+def _use_device(scene: Any, device: str) -> None:
+    """Choose what Cycles renders on; a device that is asked for by name must be there."""
+    kind = gpu(device)
+    scene.cycles.device = "GPU" if kind else "CPU"
+    if kind:
+        preferences = bpy.context.preferences.addons["cycles"].preferences
+        preferences.compute_device_type = kind
+        for entry in preferences.devices:
+            entry.use = entry.type == kind
 
 
 def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:

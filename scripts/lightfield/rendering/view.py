@@ -1,6 +1,8 @@
 """One render of one view with Cycles, as `lightfield.rendering.cycles` has set it up."""
 
 import math
+import os
+import shutil
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,11 +13,16 @@ import bpy
 import mathutils
 import numpy as np
 
+from lightfield.core.errors import UserError
+from lightfield.core.failures import LESS_MEMORY
 from lightfield.imaging import images
 from lightfield.rendering.cycles import view_layer
 from lightfield.rendering.quiet import quiet
 
 Array = np.ndarray[Any, Any]
+
+# Of all passes of a view in 32-bit floats, at most, and some room for others.
+PIXEL_BYTES = 200
 
 
 @dataclass(frozen=True)
@@ -44,12 +51,26 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
         name: [f"{layer}.{name}.{channel}" for channel in channels]
         for name, channels in passes.items()
     }
-    with tempfile.TemporaryDirectory(prefix="plenoforge-", dir=_fast_folder()) as folder:
+    pixels = scene.render.resolution_x * scene.render.resolution_y
+    with tempfile.TemporaryDirectory(prefix="plenoforge-", dir=_fast_folder(pixels)) as folder:
         path = Path(folder) / "view.exr"
         scene.render.filepath = str(path)
-        with quiet():
-            bpy.ops.render.render(write_still=True)
-        image = images.read_image(path, [channel for group in names.values() for channel in group])
+        try:
+            with quiet():
+                bpy.ops.render.render(write_still=True)
+        except RuntimeError as error:
+            text = " ".join(str(error).removeprefix("Error:").split())
+            advice = f": {LESS_MEMORY}" if "memory" in text.lower() else ""
+            raise UserError(f"Cycles cannot render the view: {text}{advice}") from None
+        try:
+            channels = [channel for group in names.values() for channel in group]
+            image = images.read_image(path, channels)
+        except UserError as error:
+            free = shutil.disk_usage(folder).free
+            raise UserError(
+                f"{error}; {free} bytes are free there: make room, or set TMPDIR to a folder with "
+                f"{pixels * PIXEL_BYTES} bytes"
+            ) from None
     return Rendered(
         {
             name: np.stack([image.channels[channel] for channel in group], axis=-1)
@@ -60,9 +81,12 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
     )
 
 
-def _fast_folder() -> str | None:
-    """Return a folder in memory for Cycles' own output, where the system has one."""
-    return "/dev/shm" if Path("/dev/shm").is_dir() else None
+def _fast_folder(pixels: int) -> str | None:
+    """Return a folder in memory for Cycles' own output, where there is one with room for it."""
+    folder = "/dev/shm"
+    if not os.access(folder, os.W_OK | os.X_OK):
+        return None
+    return folder if shutil.disk_usage(folder).free > pixels * PIXEL_BYTES else None
 
 
 def _seconds(text: images.Attribute) -> float:

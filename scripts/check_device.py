@@ -1,0 +1,18 @@
+"""Check that Cycles can render on a device here, before anything is rendered."""
+
+import argparse
+
+from lightfield.core.cli import run
+from lightfield.rendering.cycles import gpu
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "device", choices=["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"]
+    )
+    gpu(parser.parse_args().device)
+
+
+if __name__ == "__main__":
+    run(main)
