@@ -11,6 +11,7 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.core.settings import checked
+from lightfield.dataset import passes
 from lightfield.dataset.config import Preset
 from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.lightfield import LightField
@@ -55,13 +56,14 @@ def main() -> None:
     if dataset is None:
         known = ", ".join(d.rig_folder for d in datasets)
         raise UserError(f"--rig: is {arguments.rig!r}; must be one of {known}")
+    render = dataset.render
     if arguments.panorama:
         dataset = replace(dataset, rig=panorama_rig(dataset.rig, arguments.panorama))
+        render = passes.without(render)
     elif isinstance(dataset.rig, rigs.Random):
         if arguments.places is None:
             raise UserError("--places: is missing; scripts/free_places.py finds them")
         dataset = replace(dataset, rig=dataset.rig.placed(arguments.places))
-    render = dataset.render
     if arguments.calibration:
         render = calibrated(render, read_json(arguments.calibration))
     LightField.from_rig(

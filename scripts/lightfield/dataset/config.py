@@ -27,6 +27,7 @@ from lightfield.core.files import read_json, sha256, write_json
 from lightfield.core.settings import AS_WRITTEN, Name, Settings, Vector, checked, suggestion
 from lightfield.dataset import published
 from lightfield.dataset.exports import VIEWS, Export, Exports
+from lightfield.dataset.passes import PASSES, in_order
 from lightfield.geometry.lenses import LENSES, CameraSettings
 from lightfield.geometry.rigs import AnyRig, Poses, Rig
 from lightfield.geometry.rigs.rig import Frame
@@ -41,7 +42,7 @@ BUILDERS = ROOT / "scripts" / "scenes"
 # What already has these names beside a scene's folder, a rig's, and a reprojection's.
 SCENE_NEIGHBOURS = {"benchmarks", "logs", "removed", "tables"}
 RIG_NEIGHBOURS = {"trials"}
-REPROJECTION_NEIGHBOURS = {"exr", "exports", "panorama", "render", "report"}
+REPROJECTION_NEIGHBOURS = {"exr", "exports", "panorama", "render", "report", *PASSES}
 # Files lie there, too, and folders of a sequence's frames.
 OTHER_NEIGHBOURS = re.compile(r"f\d{5,7}|.*\.(blend|html|json|txt)")
 # More of them have no use, and planning them would take hours.
@@ -72,6 +73,9 @@ Names = Annotated[
     list[Name],
     BeforeValidator(_listed),
     AfterValidator(_unique),
+]
+PassNames = Annotated[
+    list[Annotated[str, Field(json_schema_extra={"enum": list(PASSES)})]], AfterValidator(in_order)
 ]
 Auto = Literal["auto"]
 Address = Annotated[str, Field(pattern=r"^https?://")]
@@ -261,6 +265,9 @@ class Render(Settings):
         description="Of the views' EXR files, lossless: zip, which every program reads, unless "
         "given. htj2k and zstd are smaller, for archives and scratch.",
     )
+    passes: PassNames | None = Field(
+        None, description="What else of a view is written, each into a folder of its own."
+    )
 
     @model_validator(mode="after")
     def _samples_or_target(self) -> Self:
@@ -289,6 +296,9 @@ class Reprojection(Settings):
     reinhard: Annotated[float, Field(gt=0, le=1e9)] | None = Field(
         None, description="Reinhard tone mapping with this maximum."
     )
+    passes: PassNames | None = Field(
+        None, description="Those of render.passes that are reprojected, too, as EXR."
+    )
 
     @property
     def suffix(self) -> str:
@@ -312,6 +322,8 @@ class Reprojection(Settings):
         words = [f"--{self.format}", "--exposure", str(self.exposure)]
         if self.reinhard is not None:
             words += ["--reinhard", str(self.reinhard)]
+        if self.passes:
+            words += ["--passes", ",".join(self.passes)]
         return shlex.join(words)
 
 
@@ -371,6 +383,11 @@ class Scene(Settings):
                 if rig_name not in self.rigs:
                     hint = suggestion(rig_name, self.rigs)
                     raise ValueError(f"{key}.rigs: there is no rig {rig_name!r}{hint}")
+            for pass_name in reprojection.passes or ():
+                if self.render is None or pass_name not in (self.render.passes or ()):
+                    raise ValueError(f"{key}.passes: {pass_name} is not in render.passes")
+                if PASSES[pass_name].kind == "motion":
+                    raise ValueError(f"{key}.passes: motion is in pixels of the rendered lens")
         for name, export in self.exports.wanted.items():
             self._check_export(f"exports.{name}.sources", export)
         self._check_whole_rigs()

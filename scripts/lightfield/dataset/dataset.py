@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken
-from lightfield.dataset import config, published
+from lightfield.dataset import config, passes, published
 from lightfield.dataset.config import CHOSEN, Configuration, Preset, Render, Source
 from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
 from lightfield.dataset.keys import scene_fingerprint
@@ -269,6 +269,17 @@ class Dataset:
         return [f"{folder}/lightfield.json" for folder in folders]
 
     @property
+    def image_folders(self) -> list[str]:
+        """The folders in ``folder`` that hold views, their passes and reprojections."""
+        own = passes.wanted(self.render)
+        reprojected = [
+            f"{name}/{pass_name}"
+            for name, reprojection in self.reprojections.items()
+            for pass_name in reprojection.passes or ()
+        ]
+        return ["exr", *(found.name for found in own), *self.reprojections, *reprojected]
+
+    @property
     def exported(self) -> list[str]:
         """The files by which each export for each of its sources is known to be there."""
         return [
@@ -385,9 +396,7 @@ class Dataset:
         for path in [*self.files, *self.intermediates]:
             if problem := broken(Path(path)):
                 yield path, problem
-        views = (
-            view for name in ("exr", *self.reprojections) for view in _entries(self.folder, name)
-        )
+        views = (view for name in self.image_folders for view in _entries(self.folder, name))
         journals = (
             journal
             for stage in ("render", *self.reprojections)

@@ -49,6 +49,11 @@ def render_key(lightfield: LightField, view: View) -> str:
     return _digest([RENDER_VERSION, version("bpy"), lightfield.content, view.name, pose])
 
 
+def names_key(lightfield: LightField) -> str:
+    """Return the key of the numbers that a light field's objects and materials have."""
+    return _digest([RENDER_VERSION, version("bpy"), lightfield.content.get("scene")])
+
+
 def view_seed(seed: int, name: str) -> int:
     """Return the Cycles seed, 0 to 2^31 − 1, of the view ``name`` under the scene's ``seed``."""
     return int(_digest([seed, name])[:8], 16) & 0x7FFFFFFF

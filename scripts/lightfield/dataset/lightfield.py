@@ -2,7 +2,8 @@
 
 The keys are SILVR's (``camera``, ``lf_type``, ``resolution``, ``sensor_size``, ``frames``) and ours
 beside them: ``depth``, what channel Z of the views means, ``frame`` of the scene, ``scene`` and
-``render``, what was rendered and how. Files that SILVR's tools wrote are read too.
+``render``, what was rendered and how. ``passes``, of a
+reprojection, are those of ``render`` that it has. Files that SILVR's tools wrote are read too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,6 +17,8 @@ from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
+from lightfield.dataset import passes
+from lightfield.dataset.passes import Pass
 from lightfield.geometry import lenses, rigs, rotations
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -205,6 +208,12 @@ class LightField:
         """How it was rendered: the scene YAML's ``render`` block."""
         found: Mapping[str, Any] = self._key("render")
         return found
+
+    @property
+    def passes(self) -> list[Pass]:
+        """What the views have beside colour and depth; of a reprojection, what it has itself."""
+        render = self.content.get("render", {})
+        return passes.wanted(self.content if "passes" in self.content else render)
 
     def _key(self, key: str) -> Any:
         if key not in self.content:

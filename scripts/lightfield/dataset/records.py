@@ -7,6 +7,7 @@ added at the moment when the file is finished. It outlives the record, which is 
 files are no longer those on disk: a file is finished if its bytes are those that were logged.
 """
 
+import os
 from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +21,7 @@ _LOG_SUFFIX = ".sums.jsonl"
 
 
 class ShardRecord:
-    """The record at ``path`` of a shard's files, all of them in ``folder`` of a dataset.
+    """The record at ``path`` of a shard's files, in ``folder`` of a dataset or beside it.
 
     With ``path`` None nothing is recorded, and a finished file is one that can be read whole and
     has the key in its header.
@@ -62,7 +63,8 @@ class ShardRecord:
         write_json(self._path, {"files": content, **more})
 
     def _name(self, file: Path) -> str:
-        return f"{self._dataset_folder}/{file.relative_to(self._folder).as_posix()}"
+        # A view's passes lie beside the folder of the views.
+        return os.path.normpath(Path(self._dataset_folder, os.path.relpath(file, self._folder)))
 
     @cached_property
     def _logged_here(self) -> set[tuple[Any, Any, Any]]:

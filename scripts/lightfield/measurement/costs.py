@@ -50,6 +50,7 @@ from typing import Any
 
 from lightfield.dataset import journal
 from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.dataset.passes import PASSES
 from lightfield.measurement.sampling import DENOISING_SAMPLES, cost_in_samples, standard_error
 
 # The stages that every dataset has, in the order of the work; others come between.
@@ -57,7 +58,7 @@ FIRST_STAGES, LAST_STAGES = ("scene", "cameras", "render"), ("export", "validate
 # What a stage made, where that is not the folder of its name.
 MADE = {
     "cameras": ("lightfield.json",),
-    "render": ("exr",),
+    "render": ("exr", *PASSES),
     "export": ("transforms.json",),
     "validate": ("validation.json",),
 }

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from lightfield.core import processors
 from lightfield.core.files import read_json
-from lightfield.dataset import keys
+from lightfield.dataset import keys, passes
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.imaging import images
 from lightfield.measurement.metrics import Mask, Reference, make_reference
@@ -88,7 +88,9 @@ class Trials:
     ) -> None:
         self.lens = lightfield.lens
         # How many samples are taken, and why, is for each trial to say.
-        self.lightfield = lightfield.changed(render=without_target(lightfield.render))
+        self.lightfield = lightfield.changed(
+            render=passes.without(without_target(lightfield.render))
+        )
         self._blend, self._inventory = blend, inventory
         self._device, self._threads, self._cache = device, threads, cache
         self._started = False

@@ -2,12 +2,14 @@
 
 import re
 import time
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import bpy
 import numpy as np
 
+from lightfield.dataset.passes import Pass
 from lightfield.rendering.cycles import view_layer
 from lightfield.rendering.view import Array, render_view
 
@@ -18,24 +20,31 @@ _COUNTS = "Debug Sample Count"
 class Colour:
     """The colour of a view, (height, width, 3) float32, scene-linear.
 
+    ``passes`` are those that were asked for, by name, each as the colour itself.
     ``render_seconds`` and ``synchronization_seconds`` are Cycles' own. ``samples``,
     (height, width), is how many each pixel took, and ``worked_seconds`` the processor time, of all
     threads, of those ``render_seconds``; None unless `watch_samples` asked for them.
     """
 
     pixels: Array
+    passes: dict[str, Array]
     samples: Array | None
     render_seconds: float
     worked_seconds: float | None
     synchronization_seconds: float
 
 
-def render_colour(world_matrix: Array, seed: int) -> Colour:
-    """Render the view of a camera at ``world_matrix``, (4, 4) camera-to-world."""
+def render_colour(world_matrix: Array, seed: int, passes: Iterable[Pass] = ()) -> Colour:
+    """Render the view of a camera at ``world_matrix``, (4, 4) camera-to-world.
+
+    Of the ``passes`` those are made that are of colour, for which Cycles has been set up.
+    """
     watched = view_layer(bpy.context.scene).cycles.pass_debug_sample_count
     _reports.clear()
+    wanted = [found for found in passes if found.of_colour]
+    needed = ("Combined", *(name for found in wanted for name in found.needed))
     found = render_view(
-        world_matrix, seed, {"Combined": "RGB"} | ({_COUNTS: "X"} if watched else {})
+        world_matrix, seed, dict.fromkeys(needed, "RGB") | ({_COUNTS: "X"} if watched else {})
     )
     samples = None
     if watched:
@@ -43,11 +52,18 @@ def render_colour(world_matrix: Array, seed: int) -> Colour:
         samples = np.rint(found.passes[_COUNTS][..., 0] * max(count for _, count in _reports))
     return Colour(
         pixels=found.passes["Combined"],
+        passes={each.name: _composed(each, found.passes) for each in wanted},
         samples=samples,
         worked_seconds=_reports[-1][0] - _reports[0][0] if _reports else None,
         render_seconds=found.render_seconds,
         synchronization_seconds=found.synchronization_seconds,
     )
+
+
+def _composed(wanted: Pass, passes: Mapping[str, Array]) -> Array:
+    """Return a pass of ours from those of Cycles, by name."""
+    total = np.sum([passes[name] for name in wanted.cycles], axis=0)
+    return np.asarray(total * passes[wanted.factor] if wanted.factor else total)
 
 
 def watch_samples() -> None:

@@ -1,6 +1,6 @@
 """Cycles, set up once for all views of a light field: sampling, device, camera, passes."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +8,8 @@ import bpy
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField
-from lightfield.rendering import blend_file, pruning
+from lightfield.dataset.passes import Pass
+from lightfield.rendering import blend_file, ids, pruning
 
 # In the order in which `auto` tries them.
 GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
@@ -30,16 +31,25 @@ def set_up(
     """
     left_out = inventory["left_out"] if inventory else []
     blend_file.open_scene(blend)
+    passes = lightfield.passes
+    numbered = [found.name for found in passes if found.kind == "id"]
     if inventory and "hidden_objects" in left_out:
         pruning.remove_objects(inventory["hidden"])
+    elif numbered and not inventory:
+        # So that their numbers are the same.
+        pruning.remove_objects(pruning.removable_objects())
+    for kind in numbered:
+        ids.assign(kind)
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     _set_quality(lightfield.render)
     _set_output(scene, lightfield, threads)
-    _set_passes(scene)
+    _set_passes(scene, passes)
     _use_device(scene, device)
     _set_camera(scene, lightfield.content)
     scene.frame_set(lightfield.frame)
+    if any(found.kind == "motion" for found in passes):
+        left_out = [name for name in left_out if name != "animation"]
     pruning.leave_out(left_out)
     return str(scene.cycles.device)
 
@@ -80,19 +90,28 @@ def _set_output(scene: Any, lightfield: LightField, threads: int) -> None:
     output.exr_codec = "NONE"
 
 
-def _set_passes(scene: Any) -> None:
-    """Make colour, and nothing else that the artist had on."""
+def _set_passes(scene: Any, passes: Iterable[Pass]) -> None:
+    """Make colour and what ``passes`` need of it, and nothing else that the artist had on."""
     layer = view_layer(scene)
-    for name in dir(layer):
-        if name.startswith("use_pass_"):
-            setattr(layer, name, False)
-    layer.use_pass_combined = True
+    for owner in (layer, layer.cycles):
+        for name in dir(owner):
+            if name.startswith("use_pass_"):
+                setattr(owner, name, False)
+    for name in ("Combined", *(name for p in passes if p.of_colour for name in p.needed)):
+        setattr(*pass_property(layer, name), True)
     layer.cycles.denoising_store_passes = False
     layer.cycles.pass_debug_sample_count = False
     # Passes of the artist's own, and those of light groups.
     for group in (layer.aovs, layer.lightgroups):
         for entry in list(group):
             group.remove(entry)
+
+
+def pass_property(layer: Any, name: str) -> tuple[Any, str]:
+    """Return where a view layer is asked for Cycles' pass of a name: the owner, its attribute."""
+    owner = layer.cycles if name.startswith("Volume ") else layer
+    short = {"Depth": "z", "Emission": "emit"}.get(name, name.lower().replace(" ", "_"))
+    return owner, f"use_pass_{short}"
 
 
 def set_sampling(settings: Mapping[str, Any]) -> None:

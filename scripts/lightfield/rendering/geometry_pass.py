@@ -5,7 +5,7 @@ and with the narrowest filter that is the pixel's centre. What transparency cuts
 as in the colour; glass is one, and fog, smoke and every other volume is none.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +13,8 @@ from typing import Any
 import bpy
 import numpy as np
 
-from lightfield.rendering.cycles import view_layer
+from lightfield.dataset.passes import PASSES
+from lightfield.rendering.cycles import pass_property, view_layer
 from lightfield.rendering.view import Array, render_view
 
 # Cycles gives this depth to a ray that hits nothing.
@@ -32,6 +33,9 @@ _SAMPLING = {
     "max_bounces": 0,
 }
 _PASSES = {"Depth": "Z", "Normal": "XYZ", "Object Index": "X", "Material Index": "X"}
+_MOTION = {"Vector": "XYZW"}
+# Cycles has the next place with the other sign, and y upwards.
+_MOTION_SIGNS = np.array([1, -1, -1, 1], np.float32)
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,9 @@ class Geometry:
     ``depth``, (height, width) float32 in metres, is inf where nothing is hit: Z-depth for a
     perspective camera and distance for any other. ``normal``, (height, width, 3) float32, is the
     shading normal in world space on the camera's side. ``objects`` and ``materials``,
-    (height, width) uint16, are their pass indices. These are 0 where nothing is hit.
+    (height, width) uint16, are their pass indices. ``motion``, (height, width, 4) float32 if it was
+    asked for, is where the surface is in the previous and in the next frame: x and y of both in
+    pixels from here, to the right and down. These are 0 where nothing is hit.
     ``render_seconds`` and ``synchronization_seconds`` are Cycles' own.
     """
 
@@ -49,14 +55,16 @@ class Geometry:
     normal: Array
     objects: Array
     materials: Array
+    motion: Array | None
     render_seconds: float
     synchronization_seconds: float
 
 
-def render_geometry(world_matrix: Array) -> Geometry:
+def render_geometry(world_matrix: Array, motion: bool = False) -> Geometry:
     """Render the geometry that a camera at ``world_matrix``, (4, 4) camera-to-world, sees."""
-    with _geometry_settings():
-        found = render_view(world_matrix, 0, _PASSES)
+    wanted = _PASSES | (_MOTION if motion else {})
+    with _geometry_settings(wanted):
+        found = render_view(world_matrix, 0, wanted)
     depth = found.passes["Depth"]
     # Cycles leaves values that are not a number where the lens sees nothing.
     hit = depth < MISS
@@ -69,22 +77,26 @@ def render_geometry(world_matrix: Array) -> Geometry:
         normal,
         objects[..., 0].astype(np.uint16),
         materials[..., 0].astype(np.uint16),
+        np.where(hit, found.passes["Vector"] * _MOTION_SIGNS, np.float32(0)) if motion else None,
         found.render_seconds,
         found.synchronization_seconds,
     )
 
 
 @contextmanager
-def _geometry_settings() -> Iterator[None]:
-    """Let Cycles render geometry, and then what it was set up for."""
+def _geometry_settings(wanted: Iterable[str]) -> Iterator[None]:
+    """Let Cycles render the passes ``wanted``, and then what it was set up for."""
     scene = bpy.context.scene
     layer = view_layer(scene)
     with ExitStack() as stack:
         for name, value in _SAMPLING.items():
             stack.enter_context(_changed(scene.cycles, name, value))
         stack.enter_context(_changed(scene.render, "use_motion_blur", False))
-        for name in ("z", "normal", "object_index", "material_index"):
-            stack.enter_context(_changed(layer, f"use_pass_{name}", True))
+        for found in PASSES.values():
+            for name in found.needed if found.of_colour else ():
+                stack.enter_context(_changed(*pass_property(layer, name), False))
+        for name in wanted:
+            stack.enter_context(_changed(*pass_property(layer, name), True))
         stack.enter_context(_changed(layer, "pass_alpha_threshold", OPACITY))
         stack.enter_context(_changed(layer.cycles, "pass_debug_sample_count", False))
         for thing in bpy.data.objects:

@@ -43,7 +43,10 @@ def measure(
         )
         (run,) = journal.read(log)
         rendered = run.views[1:]
-        sizes = [(folder / f"{view['view']}.exr").stat().st_size for view in rendered]
+        sizes = [
+            sum(file.stat().st_size for file in Path(name).rglob(f"{view['view']}.exr"))
+            for view in rendered
+        ]
     # On a processor the time that it worked, whatever else it did meanwhile.
     busy = "cpu_seconds" if run.start["device"] == "CPU" else "render_seconds"
     factor = lens.width * lens.height / math.prod(small)

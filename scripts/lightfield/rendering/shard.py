@@ -1,9 +1,9 @@
 """A shard: views of a dataset that one process renders, keeping every one that is already right.
 
 Each view is written, and its checksum logged beside the record, the moment it is done. A view whose
-file has the bytes that were logged for the render key that its settings give is left as it is, so
-that a shard, killed and started again, renders only what is missing. Its journal, one JSON line a
-rendered view, says what was done and how fast.
+files, one and one for each pass, have the bytes that were logged for the render key that its
+settings give is left as it is, so that a shard, killed and started again, renders only what is
+missing. Its journal, one JSON line a rendered view, says what was done and how fast.
 """
 
 import sys
@@ -11,21 +11,28 @@ import time
 from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import psutil
 
 from lightfield.core import processors
 from lightfield.core.cli import view_slice
-from lightfield.core.files import read_json
+from lightfield.core.files import read_json, write_json
 from lightfield.core.progress import Progress
-from lightfield.dataset import keys
+from lightfield.dataset import keys, passes
 from lightfield.dataset.journal import Journal
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.dataset.passes import Pass
 from lightfield.dataset.records import ShardRecord
 from lightfield.geometry import depth
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.imaging import images
+
+if TYPE_CHECKING:
+    from lightfield.rendering.colour_pass import Colour
+    from lightfield.rendering.geometry_pass import Geometry
 
 Array = np.ndarray[Any, Any]
 
@@ -44,6 +51,7 @@ def render(
 ) -> None:
     """Render into ``folder`` those of the ``views``, FIRST:END, that are missing there.
 
+    Their passes go into folders beside it, with the names of what has a number in them.
     ``blend`` is the scene and ``inventory`` a JSON of what it contains; ``threads`` None are all.
     ``record`` and ``journal`` may be None.
     Raises `UserError` where the scene cannot be opened, the ``device`` is not there, or a file
@@ -52,17 +60,23 @@ def render(
     images.check_codec(lightfield.render.get("compression", "zip"))
     log, sums = Journal(journal), ShardRecord(record, folder)
     chosen = lightfield.views[view_slice(views, len(lightfield.views))]
-    paths = [folder / f"{view.name}.exr" for view in chosen]
+    wanted = lightfield.passes
+    paths = {view.name: _files(folder, view, wanted) for view in chosen}
+    names = [folder.parent / found.name / passes.NAMES for found in wanted if found.kind == "id"]
+    names_key = keys.names_key(lightfield)
     missing = [
         view
-        for view, path in zip(chosen, paths, strict=True)
-        if not sums.is_finished(path, keys.render_key(lightfield, view))
+        for view in chosen
+        if not all(
+            sums.is_finished(path, keys.render_key(lightfield, view)) for path in paths[view.name]
+        )
     ]
+    nameless = [path for path in names if not sums.is_finished(path, names_key)]
     _warn_of_other_versions(folder / f"{view.name}.exr" for view in missing)
     # The dataset's folder says which scene and rig it is, and in a sequence which frame.
     label = f"render {folder.parent}" + (f" {views}" if views != ":" else "")
     progress = Progress(len(missing), label, already=len(chosen) - len(missing))
-    if missing:
+    if missing or nameless:
         threads = threads or processors.available()
         # Only now, because it takes a second and a shard that is finished does not need it.
         with processors.only(threads):
@@ -77,9 +91,26 @@ def render(
                 "threads": threads,
             }
         )
+        for path in nameless:
+            write_json(path, _names(path.parent.name))
+            sums.add(path, names_key)
         _render_views(missing, lightfield, folder, sums, log, progress)
-    sums.write(paths)
+    sums.write([*names, *(path for view in chosen for path in paths[view.name])])
     log.end()
+
+
+def _files(folder: Path, view: View, wanted: Iterable[Pass]) -> list[Path]:
+    """Return all files of a view: its own, and one for each pass."""
+    return [
+        folder / f"{view.name}.exr",
+        *(found.path(folder.parent, view.name) for found in wanted),
+    ]
+
+
+def _names(kind: str) -> dict[str, int]:
+    from lightfield.rendering import ids
+
+    return ids.names(kind)
 
 
 def _warn_of_other_versions(paths: Iterable[Path]) -> None:
@@ -106,24 +137,33 @@ def _render_views(
     from lightfield.rendering.geometry_pass import render_geometry
 
     rays = depth_rays(lightfield)
+    wanted = lightfield.passes
+    seed = lightfield.render["seed"]
+    compression = lightfield.render.get("compression", "zip")
+    motion = any(found.kind == "motion" for found in wanted)
+    has_geometry = lightfield.depth or not all(found.of_colour for found in wanted)
     process = psutil.Process()
     progress.begin()
     for view in views:
         began, began_cpu = time.perf_counter(), time.process_time()
         # Of the same pose one after the other: Cycles keeps the scene as it is.
-        geometry = render_geometry(view.matrix) if lightfield.depth else None
+        geometry = render_geometry(view.matrix, motion) if has_geometry else None
         geometry_seconds = time.perf_counter() - began
-        colour = render_colour(view.matrix, keys.view_seed(lightfield.render["seed"], view.name))
+        colour = render_colour(view.matrix, keys.view_seed(seed, view.name), wanted)
         parts = [part for part in (geometry, colour) if part]
         channels, attributes = colour_channels(colour.pixels)
-        if geometry:
+        if geometry and lightfield.depth:
             channels["Z"] = depth_channel(geometry.depth, lightfield, rays)
             attributes[images.DEPTH_ATTRIBUTE] = str(lightfield.depth)
-        path, key = folder / f"{view.name}.exr", keys.render_key(lightfield, view)
-        attributes |= {images.KEY_ATTRIBUTE: key, images.BPY_ATTRIBUTE: version("bpy")}
-        compression = lightfield.render.get("compression", "zip")
-        images.write_exr(path, channels, attributes, compression)
-        record.add(path, key)
+        key = keys.render_key(lightfield, view)
+        made = {images.KEY_ATTRIBUTE: key, images.BPY_ATTRIBUTE: version("bpy")}
+        contents = [(channels, attributes)]
+        contents += [pass_channels(found, geometry, colour, lightfield.lens) for found in wanted]
+        for path, (channels, attributes) in zip(
+            _files(folder, view, wanted), contents, strict=True
+        ):
+            images.write_exr(path, channels, attributes | made, compression)
+            record.add(path, key)
         journal.append(
             {
                 "view": view.name,
@@ -159,6 +199,31 @@ def colour_channels(colour: Array) -> tuple[dict[str, Array], dict[str, images.A
     half = np.clip(colour, -images.HALF_MAX, images.HALF_MAX).astype(np.float16)
     channels = {name: half[:, :, index] for index, name in enumerate("RGB")}
     return channels, {images.CLAMPED_ATTRIBUTE: clamped, images.NAN_ATTRIBUTE: nan}
+
+
+def pass_channels(
+    wanted: Pass, geometry: "Geometry | None", colour: "Colour", lens: Lens
+) -> tuple[dict[str, Array], dict[str, images.Attribute]]:
+    """Return the channels and attributes of the EXR of one of a view's passes."""
+    if wanted.of_colour:
+        return colour_channels(colour.passes[wanted.name])
+    assert geometry
+    match wanted.name:
+        case "normal":
+            pixels = geometry.normal
+        case "object":
+            pixels = geometry.objects[..., None]
+        case "material":
+            pixels = geometry.materials[..., None]
+        case _:
+            assert geometry.motion is not None
+            pixels = geometry.motion.copy()
+            if isinstance(lens, Equirectangular):
+                # The shorter of the two paths around.
+                turn = lens.width * 2 * np.pi / (lens.longitude[1] - lens.longitude[0])
+                pixels[..., ::2] -= turn * np.rint(pixels[..., ::2] / turn)
+    planes = np.moveaxis(pixels.astype(wanted.dtype), -1, 0)
+    return dict(zip(wanted.channels, planes, strict=True)), {}
 
 
 def depth_channel(cycles_depth: Array, lightfield: LightField, rays: Array | None) -> Array:

@@ -15,6 +15,7 @@ from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
 from lightfield.dataset import lightfield, records
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.passes import PASSES, Pass
 from lightfield.dataset.records import ShardRecord
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
@@ -47,6 +48,13 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
         "--mask",
         action="store_true",
         help="write dynamic_mask_<name>.png: 255 where a pixel has no source",
+    )
+    files.add_argument(
+        "--passes",
+        type=lambda text: text.split(","),
+        default=[],
+        metavar="NAME,…",
+        help="reproject these passes, too, which lie beside --input-cfg, into --output-dir/<pass>/",
     )
     files.add_argument(
         "--record", type=Path, metavar="JSON", help="list of the files, written last"
@@ -100,7 +108,16 @@ class Job:
             raise UserError(f"--depth-png {arguments.depth_png:g}: must be positive")
         if arguments.no_configs and arguments.output_cfg:
             raise UserError("--output-cfg: needs --input-cfg, which --no-configs excludes")
+        self.passes = self._passes_wanted(arguments.passes)
         self.record = ShardRecord(arguments.record, arguments.output_dir)
+
+    def _passes_wanted(self, names: list[str]) -> list[Pass]:
+        there = [found.name for found in self.lightfield.passes if found.kind != "motion"]
+        for name in names:
+            if name not in there:
+                known = ", ".join(there) or "no passes to reproject"
+                raise UserError(f"--passes: is {name}; --input-cfg has {known}")
+        return [PASSES[name] for name in names]
 
     @cached_property
     def source_sums(self) -> Mapping[str, str]:
@@ -171,6 +188,16 @@ class Job:
         folder: Path = self.arguments.output_dir
         return {kind: folder / file for kind, (wanted, file) in every.items() if wanted}
 
+    def pass_outputs(self, view: SourceView, target: Target) -> dict[Pass, Path]:
+        """Return the files to make of a view's passes."""
+        folder: Path = self.arguments.output_dir
+        return {found: found.path(folder, view.name + target.suffix) for found in self.passes}
+
+    def sources(self, view: SourceView) -> list[Path]:
+        """Return the files that a view is made of: its own, and those of its passes."""
+        folder = self.lightfield.folder
+        return [*view.paths, *(found.path(folder, view.name) for found in self.passes)]
+
     def output_lightfield(self) -> LightField:
         """Return the input's lightfield.json with lens, depth and poses of what is written."""
         lens = self.targets[0].lens
@@ -181,7 +208,9 @@ class Job:
             if self._passes(view.name, ".exr")
             for target in self.targets
         ]
-        return self.lightfield.changed(lens, views, depth=depth)
+        passes = [found.name for found in self.passes]
+        more = {"passes": passes} if self.lightfield.passes else {}
+        return self.lightfield.changed(lens, views, depth=depth, **more)
 
     def views(self) -> list[SourceView]:
         """Return the views that the command line chooses, in the order of their names or frames."""

@@ -15,6 +15,7 @@ from lightfield.imaging.images import KEY_ATTRIBUTE, read_header
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.job import Job, SourceView
 from lightfield.reprojection.lens_arguments import Target
+from lightfield.reprojection.passes import write_pass
 from lightfield.reprojection.pixels import Source, write
 
 
@@ -61,28 +62,30 @@ def reproject_view(job: Job, view: SourceView) -> list[Path]:
     """Make a view's files, but for those that are there and up to date; return them all."""
     arguments = job.arguments
     made: list[Path] = []
-    todo: list[tuple[int, Target, dict[str, Path], str]] = []
+    todo: list[tuple[int, Target, str]] = []
     identity = ""
     for index, target in enumerate(job.targets):
-        outputs = job.outputs(view, target)
-        made += outputs.values()
-        if arguments.skip_if_exists and all(path.exists() for path in outputs.values()):
+        paths = [*job.outputs(view, target).values(), *job.pass_outputs(view, target).values()]
+        made += paths
+        if arguments.skip_if_exists and all(path.exists() for path in paths):
             continue
         identity = identity or _identity(view)
         key = job.key(target, identity)
-        if not all(job.record.is_finished(path, key) for path in outputs.values()):
-            todo.append((index, target, outputs, key))
+        if not all(job.record.is_finished(path, key) for path in paths):
+            todo.append((index, target, key))
     if todo:
         _check(job, view)
         source = Source(job, view, [job.maps[index].window for index, *_ in todo])
-        for index, target, outputs, key in todo:
-            write(job, target, job.maps[index], source, outputs, key)
+        for index, target, key in todo:
+            write(job, target, job.maps[index], source, job.outputs(view, target), key)
+            for wanted, path in job.pass_outputs(view, target).items():
+                write_pass(job, wanted, view, job.maps[index], path, key)
     return made
 
 
 def _check(job: Job, view: SourceView) -> None:
     """Raise `UserError` for a source that is not as the record of those who made it says."""
-    for path in view.paths:
+    for path in job.sources(view):
         expected = job.source_sums.get(f"{path.parent.name}/{path.name}")
         if expected and sha256(path) != expected:
             raise UserError(

@@ -15,6 +15,7 @@ import numpy as np
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, read_json, set_aside, sha256
 from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.dataset.passes import NAMES
 from lightfield.geometry import rotations
 from lightfield.geometry.lenses import Lens
 from lightfield.validation.consistency import Camera
@@ -90,12 +91,13 @@ class File:
     """An image file: ``path`` relative to the dataset, and the set and view that it is of.
 
     What is no view (a mask, a depth map, a picture for a trainer) has ``view`` −1, and has only to
-    be readable and of its set's size.
+    be readable and of its set's size. ``of_pass`` is the name of the pass that it holds of a view.
     """
 
     path: str
     set: int
     view: int = -1
+    of_pass: str | None = None
 
 
 def read_sets(dataset: Path, reprojections: Iterable[str]) -> tuple[list[ImageSet], list[Check]]:
@@ -185,6 +187,26 @@ def of_views(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[
     return files, checks
 
 
+def of_passes(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], dict[str, str]]:
+    """Return the files of the views' passes, and what is wrong with those that are not there."""
+    files = [
+        File(found.path(Path(image_set.name), view).as_posix(), number, index, found.name)
+        for number, image_set in enumerate(sets)
+        for found in image_set.lightfield.passes
+        for index, view in enumerate(image_set.views)
+    ]
+    present = [file for file in files if (dataset / file.path).is_file()]
+    missing = {file.path for file in files} - {file.path for file in present}
+    return present, dict.fromkeys(sorted(missing), "is missing")
+
+
+def names(sets: Sequence[ImageSet]) -> list[str]:
+    """Return the files in which what is rendered has its numbers."""
+    own = rendered(sets)
+    found = own.lightfield.passes if own else []
+    return [f"{each.name}/{NAMES}" for each in found if each.kind == "id"]
+
+
 def of_exports(
     dataset: Path, sets: Sequence[ImageSet], views: Iterable[File], manifests: Sequence[Manifest]
 ) -> tuple[list[File], list[str], Check]:
@@ -267,10 +289,11 @@ def remove_strays(
     if len(sets) <= len(reprojections):
         return 0
     views, _ = of_views(dataset, sets)
+    views += of_passes(dataset, sets)[0]
     extras, lists, exports = of_exports(dataset.resolve(), sets, views, manifests)
     if exports.passed is False:
         return 0
-    known = {*lists, *(file.path for file in [*views, *extras])}
+    known = {*lists, *names(sets), *(file.path for file in [*views, *extras])}
     _, strays = _sorted_out(dataset, sets, known)
     for name in strays:
         set_aside(dataset / name, folder)
@@ -306,7 +329,9 @@ def checksums(
             faults[path] = f"has the sha256 {found[path][1]}, but its record says {digest}"
     # Masks and pictures for trainers are not the renderer's.
     own = rendered(sets)
-    for path in sorted(f"{IMAGES}/{view}.exr" for view in (own.views if own else [])):
+    views = own.views if own else []
+    folders = [IMAGES, *(found.name for found in (own.lightfield.passes if own else []))]
+    for path in sorted(f"{folder}/{view}.exr" for folder in folders for view in views):
         if path in found and path not in recorded:
             faults[path] = "has no record"
     detail = f"{len(recorded)} of {len(found)} images have a record"

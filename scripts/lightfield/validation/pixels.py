@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import sha256
+from lightfield.core.files import read_json, sha256
+from lightfield.dataset.passes import NAMES, PASSES, Pass
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.validation import consistency
@@ -26,6 +27,8 @@ RAYS_A_VIEW = 400
 RIM_PIXELS = 2
 # An image has one colour if no larger part of it than this has another.
 FEW = 0.002
+# A unit vector's length differs from 1 by less than this.
+NOT_UNIT = 1e-4
 # So much of what lies outside the image circle may be lighter than that.
 MOST_LIT_OUTSIDE, FAINT = 0.05, 0.001
 # Of more differently turned views than this, the regions are computed again.
@@ -65,6 +68,7 @@ class Examiner:
         self.dataset = dataset
         self.sets = sets
         self.regions: dict[Any, tuple[Bools, Bools]] = {}
+        self.numbers: dict[Pass, set[int]] = {}
 
     def examine(self, file: File) -> Facts:
         """Read an image file whole and find out what it shows by itself."""
@@ -72,16 +76,19 @@ class Examiner:
         facts = Facts(sha256(path), path.stat().st_size)
         image_set = self.sets[file.set]
         lens = image_set.lightfield.lens
+        check = "passes" if file.of_pass else "images"
         try:
             image = images.read_image(path)
         except UserError as error:
             text = " ".join(str(error).split()).replace(f"{path}: ", "")
-            facts.fault("images", text.replace(str(path), file.path))
+            facts.fault(check, text.replace(str(path), file.path))
             return facts
         height, width = next(iter(image.channels.values())).shape
         if (width, height) != (lens.width, lens.height):
             text = f"is {width} × {height}; must be {lens.width} × {lens.height}"
-            facts.fault("images", text)
+            facts.fault(check, text)
+        elif file.of_pass:
+            self._examine_pass(PASSES[file.of_pass], image, facts)
         elif file.view >= 0:
             problem = _format_problem(file, image_set, image)
             if problem:
@@ -141,6 +148,33 @@ class Examiner:
             facts.nan = int(image.attributes[images.NAN_ATTRIBUTE])
             facts.clamped = int(image.attributes.get(images.CLAMPED_ATTRIBUTE, 0))
             facts.fault("counts", f"{facts.nan} rendered values were not a number", facts.nan)
+
+    def _examine_pass(self, wanted: Pass, image: images.Image, facts: Facts) -> None:
+        problem = _channels_problem(image, dict.fromkeys(wanted.channels, wanted.dtype))
+        if problem:
+            facts.fault("passes", problem)
+            return
+        pixels = np.stack([image.channels[name] for name in wanted.channels])
+        wrong = int((~np.isfinite(pixels)).sum())
+        facts.fault("passes", f"{wrong} values are not finite", wrong)
+        if wanted.kind == "normal":
+            lengths = np.linalg.norm(pixels, axis=0)
+            wrong = int(((np.abs(lengths - 1) > NOT_UNIT) & (lengths != 0)).sum())
+            facts.fault("passes", f"{wrong} normals are no unit vectors", wrong)
+        if wanted.kind == "id":
+            unknown = sorted(set(np.unique(pixels).tolist()) - self._numbers(wanted))
+            path = f"{wanted.name}/{NAMES}"
+            facts.fault("passes", f"has {unknown[:4]}, which {path} does not have", bool(unknown))
+
+    def _numbers(self, wanted: Pass) -> set[int]:
+        """Return the numbers that the names file of a pass has; none if it cannot be read."""
+        if wanted not in self.numbers:
+            try:
+                named = read_json(self.dataset / wanted.name / NAMES)
+                self.numbers[wanted] = {0, *named.values()}
+            except (UserError, AttributeError, TypeError):
+                self.numbers[wanted] = set()
+        return self.numbers[wanted]
 
     def _compare_marks(self, file: File, image: images.Image, facts: Facts) -> None:
         """Compare the pixels that are marked as without source with what the two lenses say."""
@@ -247,6 +281,17 @@ def _outcome(image_set: ImageSet, name: str, own: Mapping[File, Facts], claim: s
     return Check.of_files(f"{image_set.prefix}{name}", faults, detail)
 
 
+def of_passes(own: Mapping[File, Facts], missing: Mapping[str, str]) -> Check:
+    """Return the check of the views' passes, some of which may be ``missing``."""
+    faults = {**missing}
+    faults |= {
+        file.path: ", ".join(fact.faults["passes"]) for file, fact in own.items() if fact.faults
+    }
+    count = len(own) + len(missing)
+    detail = f"{count - len(faults)} of {count} are there and hold what they must"
+    return Check.of_files("passes", faults, detail)
+
+
 def with_extras(exports: Check, extras: Mapping[File, Facts]) -> Check:
     """Return the check of what was made for trainers, with the pictures that cannot be read."""
     problems = [
@@ -267,7 +312,7 @@ def _inner(region: Bools) -> Bools:
 
 def _format_problem(file: File, image_set: ImageSet, image: images.Image) -> str | None:
     """Say which channels a view has and should have, if they differ in name or type."""
-    found = {name: str(pixels.dtype) for name, pixels in image.channels.items()}
+    found = {name: pixels.dtype for name, pixels in image.channels.items()}
     colour = [*"RGB", *(["A"] if "A" in found and image_set.name else [])]
     if file.path.endswith(".png"):
         wanted = dict.fromkeys(colour, "uint16" if found.get("R") == "uint16" else "uint8")
@@ -275,6 +320,12 @@ def _format_problem(file: File, image_set: ImageSet, image: images.Image) -> str
         wanted = dict.fromkeys(colour, "float16")
         if image_set.lightfield.depth:
             wanted["Z"] = "float16" if found.get("Z") == "float16" else "float32"
+    return _channels_problem(image, wanted)
+
+
+def _channels_problem(image: images.Image, wanted: Mapping[str, str]) -> str | None:
+    """Say which channels an image has and should have, if they differ in name or type."""
+    found = {name: str(pixels.dtype) for name, pixels in image.channels.items()}
     if found == wanted:
         return None
     texts = [

@@ -50,11 +50,13 @@ def validate(
     volumes = read_json(inventory)["volumes"] if inventory else []
     sets, checks = files.read_sets(dataset, reprojections)
     views, presence = files.of_views(dataset, sets)
+    passes, missing = files.of_passes(dataset, sets)
     extras, lists, exports = files.of_exports(dataset, sets, views, manifests)
     facts: dict[File, Facts] = {}
     with _workers(Examiner(dataset, sets), processes) as mapped:
-        progress = Progress(len(views + extras), f"validate {dataset.name}", "files")
-        for file, fact in mapped(_examine, views + extras):
+        images = views + passes + extras
+        progress = Progress(len(images), f"validate {dataset.name}", "files")
+        for file, fact in mapped(_examine, images):
             facts[file] = fact
             progress.done()
         for number, image_set in enumerate(sets):
@@ -62,8 +64,13 @@ def validate(
             seen = {file: fact.patches for file, fact in own.items() if fact.patches is not None}
             checks += [presence[number], *pixels.checks(image_set, own, volumes)]
             checks.append(geometry.check(image_set, seen, lambda asked: mapped(_answer, asked)))
+    if passes or missing:
+        checks.append(pixels.of_passes({file: facts[file] for file in passes}, missing))
     checks.append(pixels.with_extras(exports, {file: facts[file] for file in extras}))
     found = {file.path: (fact.bytes, fact.checksum) for file, fact in facts.items()}
+    for name in files.names(sets):
+        if (dataset / name).is_file():
+            found[name] = (dataset / name).stat().st_size, sha256(dataset / name)
     published, listing = files.listing(dataset, sets, {*lists, *found})
     if len(sets) <= len(reprojections):
         listing = Check("files", None, "a lightfield.json that cannot be understood lists no files")

@@ -1,0 +1,40 @@
+"""The numbers by which the passes of objects and materials name them: the same in every view.
+
+They are places in the sorted list of full names, from 1, and so follow from the .blend alone.
+Cycles gives all instances of one object the number of that object.
+"""
+
+from typing import Any
+
+import bpy
+
+from lightfield.core.errors import UserError
+
+# Blender's greatest index.
+MOST = 32767
+# What these are has no surface.
+_WITHOUT_SURFACE = ("ARMATURE", "CAMERA", "EMPTY", "LATTICE", "LIGHT", "LIGHT_PROBE", "SPEAKER")
+
+
+def assign(kind: str) -> None:
+    """Number the blocks of a ``kind``, "object" or "material"; `UserError` for too many."""
+    blocks = sorted(_blocks(kind), key=lambda block: str(block.name_full))
+    if len(blocks) > MOST:
+        raise UserError(
+            f"render.passes: {kind}: the scene has {len(blocks)} {kind}s, and Blender numbers "
+            f"{MOST} at most; leave this pass out"
+        )
+    for number, block in enumerate(blocks, 1):
+        block.pass_index = number
+
+
+def names(kind: str) -> dict[str, int]:
+    """Return the numbers that `assign` has given, by full name."""
+    found = {str(block.name_full): int(block.pass_index) for block in _blocks(kind)}
+    return dict(sorted(found.items(), key=lambda item: item[1]))
+
+
+def _blocks(kind: str) -> list[Any]:
+    if kind == "material":
+        return list(bpy.data.materials)
+    return [thing for thing in bpy.data.objects if thing.type not in _WITHOUT_SURFACE]

@@ -1,0 +1,50 @@
+"""Passes through a lens map: light as colour, normals made unit vectors again, ids as they are."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from lightfield.dataset.passes import Pass
+from lightfield.geometry.lenses import Array
+from lightfield.imaging.halves import widen
+from lightfield.imaging.images import HALF_MAX, KEY_ATTRIBUTE, read_image, write_exr
+from lightfield.reprojection import kernels
+from lightfield.reprojection.colour import resample_colour
+from lightfield.reprojection.job import Job, SourceView
+from lightfield.reprojection.lens_map import LensMap
+
+
+def write_pass(
+    job: Job, wanted: Pass, view: SourceView, made: LensMap, path: Path, key: str
+) -> None:
+    """Resample one pass of a view through one lens map and write its file; 0 has no source."""
+    channels = read_image(wanted.path(job.lightfield.folder, view.name), wanted.channels).channels
+    if not job.copies:
+        planes = [channels[name] for name in wanted.channels]
+        pixels = _resampled(planes, wanted, made)[..., : len(planes)]
+        if wanted.kind == "normal":
+            length = np.linalg.norm(pixels, axis=-1, keepdims=True)
+            pixels = np.divide(pixels, length, out=np.zeros_like(pixels), where=length > 1e-6)
+        elif wanted.kind == "light":
+            pixels = pixels.clip(-HALF_MAX, HALF_MAX)
+        planes = list(np.moveaxis(pixels.astype(wanted.dtype), -1, 0))
+        channels = dict(zip(wanted.channels, planes, strict=True))
+    write_exr(path, channels, {KEY_ATTRIBUTE: key})
+    job.record.add(path, key)
+
+
+def _resampled(planes: list[Array], wanted: Pass, made: LensMap) -> Array:
+    row, end_row, column, end_column = made.window
+    # A float has all numbers that an id can be.
+    source = widen(*(plane[row:end_row, column:end_column] for plane in (planes * 3)[:3]))
+    if wanted.kind == "id":
+        # Of each target pixel the one ray through its centre.
+        seen = ~np.isnan(made.centers[..., 0])
+        made = replace(
+            made,
+            settings={**made.settings, "filter": "nearest", "samples": 1},
+            coordinates=made.centers,
+            flags=np.where(seen, kernels.INSIDE, kernels.NOTHING).astype(np.uint8),
+        )
+    return np.nan_to_num(resample_colour(source, made), nan=0)

@@ -1,0 +1,149 @@
+"""Program that renders a scene with a bit of everything, through several lenses, with all passes.
+
+Runs in a process of its own, because bpy keeps one global state. Argument: a folder. Output in it,
+for each lens: a dataset <lens>/, its record <lens>.json and journal <lens>.jsonl, and in
+objects.npz as <lens> the name of the object that Blender's own ray casts find behind each pixel of
+its first view. "plain" is the first of the lenses without passes.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.passes import PASSES
+from lightfield.geometry import lenses
+from lightfield.rendering import blend_file, shard
+
+# Where the wall is at the frames 1, 2 and 3, of which 2 is rendered.
+WALL = [(-0.1, 2.8, 0), (0, 3, 0), (0.25, 3.1, 0.05)]
+SIZE = 32
+LENSES = {
+    "perspective": {"lens": "rectilinear", "fov": 80, "resolution": [SIZE, SIZE]},
+    "fisheye": {"lens": "equidistant", "fov": 180, "resolution": [SIZE, SIZE]},
+    "panorama": {"lens": "equirectangular", "resolution": [2 * SIZE, SIZE]},
+}
+RENDER = {
+    **{"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0, "max_bounces": 4},
+    **{"depth_precision": "float", "passes": list(PASSES)},
+}
+
+
+def lightfield(camera, **render):
+    lens = lenses.from_camera(LENSES[camera])
+    rig = {"type": "lattice", "cameras": [2, 1, 1], "size": 0.3, "center": [0.2, -0.4, 1.1]}
+    rig["rotation"] = [8, -5, 12]
+    depth = "z" if lens.has_z_depth else "distance"
+    scene = {"fingerprint": "0"}
+    content = {**RENDER, **render}
+    return LightField.from_rig(rig, lens, depth=depth, frame=2, scene=scene, render=content)
+
+
+def material(name, **inputs):
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    for key, value in inputs.items():
+        made.node_tree.nodes["Principled BSDF"].inputs[key.replace("_", " ")].default_value = value
+    return made
+
+
+def add(name, kind, surface, **settings):
+    getattr(bpy.ops.mesh, f"primitive_{kind}_add")(**settings)
+    thing = bpy.context.object
+    thing.name = name
+    thing.data.materials.append(surface)
+    return thing
+
+
+def build():
+    upright = (np.pi / 2, 0, 0)
+    add("floor", "plane", material("grey"), size=40)
+    wall = add("wall", "plane", material("red", Base_Color=(0.8, 0.1, 0.1, 1)), size=40)
+    wall.rotation_euler = upright
+    for frame, place in enumerate(WALL, 1):
+        wall.location = place
+        wall.keyframe_insert("location", frame=frame)
+    glass = material("glass", Transmission_Weight=1.0, Roughness=0.0)
+    add("ball", "uv_sphere", glass, radius=0.5, location=(-0.8, 1.5, 0.8))
+    add("metal", "cube", material("metal", Metallic=1.0), size=0.8, location=(1, 1.6, 0.4))
+    glowing = material("glow", Emission_Strength=2.0, Emission_Color=(1, 0.5, 0.2, 1))
+    glow = add("glow", "cube", glowing, size=0.3, location=(0.2, 1.4, 1.6))
+    twin = bpy.data.objects.new("twin", glow.data)
+    twin.location = (1.2, 1.4, 1.9)
+    bpy.context.collection.objects.link(twin)
+    hidden = add("a hidden one", "cube", material("b"), size=1)
+    hidden.hide_render = hidden.hide_viewport = True
+    fog = material("fog")
+    nodes, links = fog.node_tree.nodes, fog.node_tree.links
+    scatter = nodes.new("ShaderNodeVolumeScatter")
+    links.new(scatter.outputs[0], nodes["Material Output"].inputs["Volume"])
+    nodes.remove(nodes["Principled BSDF"])
+    add("fog", "cube", fog, size=0.6, location=(-0.1, 1, 0.7))
+    world = bpy.data.worlds.new("world")
+    world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.3, 0.5, 0.9, 1)
+    bpy.context.scene.world = world
+    bpy.ops.object.light_add(type="POINT", location=(0, 0, 3))
+    bpy.context.object.data.energy = 200
+
+
+def cast(content):
+    """Return the name of the object behind each pixel (h, w) of the first view."""
+    view, scene = content.views[0], bpy.context.scene
+    rays = content.lens.pixel_rays() @ view.matrix[:3, :3].T
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    names = np.full(rays.shape[:2], "", dtype="U8")
+    for pixel in zip(*np.nonzero(np.isfinite(rays[..., 0])), strict=True):
+        origin, direction, name = Vector(view.position), Vector(rays[pixel]), "fog"
+        while name == "fog":
+            hit, origin, _, _, thing, _ = scene.ray_cast(depsgraph, origin, direction)
+            origin = origin + 1e-4 * direction
+            name = thing.name if hit else ""
+        names[pixel] = name
+    return names
+
+
+def main(folder: Path) -> None:
+    blend = folder / "scene.blend"
+    blend_file.new_scene()
+    build()
+    blend_file.save_scene(blend)
+
+    def render(name, content, views=":"):
+        content.write(folder / name / "lightfield.json")
+        shard.render(
+            content,
+            views,
+            folder / name / "exr",
+            blend=blend,
+            inventory=None,
+            device="cpu",
+            threads=1,
+            record=folder / f"{name}.json",
+            journal=folder / f"{name}.jsonl",
+        )
+
+    objects = {}
+    for name in LENSES:
+        render(name, lightfield(name))
+        objects[name] = cast(lightfield(name))
+    np.savez(folder / "objects.npz", **objects)
+    bare = lightfield("perspective")
+    settings = {key: value for key, value in RENDER.items() if key != "passes"}
+    render("plain", bare.changed(render=settings), "0:1")
+    # A view without one of its files, and the names, are made once more.
+    files = ["normal/view_0001f.exr", "object/names.json"]
+    made = {file: (folder / "perspective" / file).read_bytes() for file in files}
+    for file in files:
+        (folder / "perspective" / file).unlink()
+    render("perspective", lightfield("perspective"))
+    same = {file: (folder / "perspective" / file).read_bytes() == made[file] for file in files}
+    (folder / "again.json").write_text(json.dumps(same))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

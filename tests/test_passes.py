@@ -1,0 +1,244 @@
+"""The passes: against surfaces that are known, ray casts, and the colour that they add up to."""
+
+import json
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from pass_views import LENSES, RENDER, SIZE, WALL
+
+from lightfield.core.files import read_json, sha256
+from lightfield.dataset import passes
+from lightfield.dataset.config import Scene
+from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
+from lightfield.geometry import lenses
+from lightfield.imaging import images
+from lightfield.rendering import shard
+from lightfield.validation.validate import validate
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory, run_program):
+    folder = tmp_path_factory.mktemp("passes")
+    run_program(Path(__file__).with_name("pass_views.py"), folder)
+    return folder
+
+
+def read(folder, name, view="view_0000f"):
+    """Return a pass's pixels (h, w, channels), or the colour's."""
+    if name == "exr":
+        return images.read_image(folder / "exr" / f"{view}.exr").colour
+    channels = images.read_image(PASSES[name].path(folder, view)).channels
+    assert {key: str(plane.dtype) for key, plane in channels.items()} == dict.fromkeys(
+        PASSES[name].channels, PASSES[name].dtype
+    )
+    return np.stack([channels[key] for key in PASSES[name].channels], axis=-1)
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_objects_are_those_of_ray_casts_under_the_same_numbers_everywhere(lens, made):
+    numbers = read_json(made / lens / "object" / "names.json")
+    assert list(numbers.values()) == list(range(1, len(numbers) + 1))
+    assert list(numbers) == sorted(numbers) and "a hidden one" not in numbers
+    assert numbers == read_json(made / "perspective" / "object" / "names.json")
+    cast = np.load(made / "objects.npz")[lens]
+    assert {"floor", "wall", "ball", "metal", "glow", "twin"} <= set(cast.ravel())
+    expected = np.vectorize(lambda name: numbers.get(name, 0))(cast)
+    np.testing.assert_array_equal(read(made / lens, "object")[..., 0], expected)
+    materials = read_json(made / lens / "material" / "names.json")
+    found = read(made / lens, "material")[..., 0]
+    painted = {"floor": "grey", "wall": "red", "ball": "glass", "twin": "glow"}
+    for thing, surface in painted.items():
+        assert set(found[cast == thing]) == {materials[surface]}
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_normals_are_those_of_the_planes_in_world_space(lens, made):
+    cast, normal = np.load(made / "objects.npz")[lens], read(made / lens, "normal")
+    for thing, known in {"floor": (0, 0, 1), "wall": (0, -1, 0)}.items():
+        angle = np.linalg.norm(normal[cast == thing] - known, axis=-1)
+        assert angle.max() < 1e-5
+    lengths = np.linalg.norm(normal, axis=-1)
+    np.testing.assert_allclose(lengths[cast != ""], 1, atol=1e-5)
+    assert not lengths[read(made / lens, "object")[..., 0] == 0].any()
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_motion_is_where_the_lens_sees_the_wall_before_and_after(lens, made):
+    content = LightField.read(made / lens / "lightfield.json")
+    cast, motion = np.load(made / "objects.npz")[lens], read(made / lens, "motion")
+    view, on_wall = content.views[0], cast == "wall"
+    rays = content.lens.pixel_rays()[on_wall] @ view.matrix[:3, :3].T
+    points = rays * ((WALL[1][1] - view.position[1]) / rays[:, 1:2])
+    for frame, found in ((0, motion[on_wall][:, :2]), (2, motion[on_wall][:, 2:])):
+        moved = points + np.subtract(WALL[frame], WALL[1])
+        truth = content.lens.pixels(moved @ view.matrix[:3, :3])
+        truth -= content.lens.pixels(points @ view.matrix[:3, :3])
+        if lens == "panorama":
+            truth[:, 0] -= 2 * SIZE * np.rint(truth[:, 0] / (2 * SIZE))
+        assert np.abs(truth).max() > 0.3
+        np.testing.assert_allclose(found, truth, atol=1e-3)
+    assert not motion[~on_wall].any()
+
+
+def test_motion_across_the_seam_of_a_panorama_is_the_short_one():
+    lens = lenses.from_camera(LENSES["panorama"])
+    motion = np.array([[[60, 1, -61.5, 2]]], np.float32)
+    channels, _ = shard.pass_channels(PASSES["motion"], SimpleNamespace(motion=motion), None, lens)
+    assert [plane.item() for plane in channels.values()] == [-4, 1, 2.5, 2]
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_the_parts_of_light_add_up_to_the_colour(lens, made):
+    parts = {name: read(made / lens, name).astype(np.float64) for name in PARTS_OF_LIGHT}
+    cast = np.load(made / "objects.npz")[lens]
+    assert parts["diffuse_light"][cast == "floor"].mean() > 0.1
+    assert parts["transmission_light"][cast == "ball"].mean() > 0.1
+    assert parts["volume_light"].max() > 0.01
+    assert parts["emission"][cast == "twin"].mean() > 0.3
+    assert np.median(parts["environment"][cast == "wall"]) == 0
+    # Seven values are rounded to a half's 11 bits, none of the parts greater than the colour.
+    colour = read(made / lens, "exr")
+    np.testing.assert_allclose(sum(parts.values()), colour, rtol=2**-10, atol=1e-6)
+    red = read(made / lens, "albedo")[cast == "wall"]
+    assert np.median(red[:, 0]) > 3 * np.median(red[:, 1])
+
+
+def test_colour_and_depth_are_the_same_without_passes(made):
+    one, other = (
+        images.read_image(made / name / "exr" / "view_0000f.exr").channels
+        for name in ("perspective", "plain")
+    )
+    for channel in "RGBZ":
+        np.testing.assert_array_equal(one[channel], other[channel])
+    assert {path.name for path in (made / "plain").iterdir()} == {"exr", "lightfield.json"}
+
+
+def test_a_view_is_finished_when_all_of_its_files_are(made):
+    lines = map(json.loads, (made / "perspective.jsonl").read_text().splitlines())
+    rendered = [line["view"] for line in lines if "view" in line]
+    assert rendered == ["view_0000f", "view_0001f", "view_0001f"]
+    assert set(read_json(made / "again.json").values()) == {True}
+    files = read_json(made / "perspective.json")["files"]
+    assert len(files) == 2 * (1 + len(PASSES)) + 2
+    for name, entry in files.items():
+        assert entry["sha256"] == sha256(made / "perspective" / name)
+
+
+def spoil_ids(folder):
+    path = folder / "object" / "view_0000f.exr"
+    images.write_exr(path, {"Y": np.full((SIZE, SIZE), 99, np.uint32)})
+
+
+def spoil_normals(folder):
+    planes = dict.fromkeys("RGB", np.full((SIZE, SIZE), 0.7, np.float32))
+    images.write_exr(folder / "normal" / "view_0001f.exr", planes)
+
+
+def spoil_light(folder):
+    planes = dict.fromkeys("RGB", np.full((SIZE, SIZE), np.nan, np.float16))
+    images.write_exr(folder / "emission" / "view_0001f.exr", planes)
+
+
+SPOILED = {
+    "nothing": (lambda folder: None, None),
+    "missing": (
+        lambda folder: (folder / "albedo" / "view_0001f.exr").unlink(),
+        "albedo/view_0001f.exr: is missing",
+    ),
+    "ids": (spoil_ids, "object/view_0000f.exr: has [99], which object/names.json does not have"),
+    "normals": (spoil_normals, "normal/view_0001f.exr: 1024 normals are no unit vectors"),
+    "light": (spoil_light, "emission/view_0001f.exr: 3072 values are not finite"),
+    "kind": (
+        lambda folder: shutil.copy(folder / "normal/view_0000f.exr", folder / "object"),
+        "object/view_0000f.exr: has the channels B:float32 G:float32 R:float32; must have Y:uint32",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", SPOILED)
+def test_validation_knows_what_a_pass_must_hold(what, made, tmp_path):
+    folder = tmp_path / "perspective"
+    shutil.copytree(made / "perspective", folder)
+    spoil, problem = SPOILED[what]
+    spoil(folder)
+    result = validate(folder, records=[made / "perspective.json"])
+    checks = {check.name: check for check in result.checks}
+    assert checks["passes"].problems == ([problem] if problem else [])
+    assert checks["checksums"].passed is (problem is None)
+    assert checks["files"].passed
+    if not problem:
+        assert result.valid and set(result.checksums) == {
+            *read_json(made / "perspective.json")["files"],
+            "lightfield.json",
+        }
+
+
+def test_reprojected_ids_are_kept_normals_unit_and_light_still_adds_up(made, tmp_path, run_program):
+    """A perspective view made of the fisheye's, against the one that was rendered."""
+    names = [name for name in PASSES if name != "motion"]
+    source, target = made / "fisheye", tmp_path / "perspective"
+    camera = json.dumps(LENSES["perspective"])
+    run_program(
+        *("reproject.py", "--camera", camera, "--exr", "--bl", "--passes", ",".join(names)),
+        *("--input-cfg", source / "lightfield.json", "--input-dir", source / "exr"),
+        *("--output-dir", target, "--output-cfg", target / "lightfield.json"),
+        *("--source-record", made / "fisheye.json", "--record", tmp_path / "record.json"),
+    )
+    content = LightField.read(target / "lightfield.json")
+    assert [found.name for found in content.passes] == names
+    files = read_json(tmp_path / "record.json")["files"]
+    assert len(files) == 2 * (1 + len(names))
+    assert "perspective/normal/view_0000f.exr" in files
+    ids, truth = (read(folder, "object")[..., 0] for folder in (target, made / "perspective"))
+    assert set(np.unique(ids)) <= set(np.unique(read(source, "object")))
+    # A source pixel is three of these wide, and where it has an edge they differ.
+    assert (ids == truth).mean() > 0.85
+    normal, known = read(target, "normal"), read(made / "perspective", "normal")
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=-1)[truth > 0], 1, atol=1e-5)
+    cosine = np.sum(normal * known, axis=-1)
+    assert np.median(cosine[truth > 0]) > 1 - 1e-6
+    total = sum(read(target, name).astype(np.float64) for name in PARTS_OF_LIGHT)
+    # Filters with negative lobes keep each part from becoming negative, and so the sum is another.
+    # All values are rounded before and after.
+    colour = images.read_image(target / "view_0000f.exr").colour
+    np.testing.assert_allclose(total, colour, rtol=2**-9, atol=1e-6)
+
+
+def scene(**render):
+    rig = {"type": "lattice", "cameras": [1, 1, 1], "camera": LENSES["fisheye"]}
+    reprojection = {"camera": LENSES["perspective"], "passes": render.pop("again", None)}
+    return {
+        "scene": {"builder": "room"},
+        "render": {"samples": 1, **render},
+        "rigs": {"one": rig},
+        "reprojections": {render.pop("folder", "other"): reprojection},
+    }
+
+
+@pytest.mark.parametrize(
+    ("wrong", "problem"),
+    [
+        ({"passes": ["normals"]}, "each once, of normal, object"),
+        ({"passes": []}, "each once, of normal, object"),
+        ({"passes": ["normal", "normal"]}, "each once, of normal, object"),
+        ({"passes": ["normal"], "again": ["object"]}, "other.passes: object is not in render."),
+        ({"passes": ["motion"], "again": ["motion"]}, "other.passes: motion is in pixels of"),
+    ],
+)
+def test_passes_that_cannot_be_are_refused(wrong, problem):
+    with pytest.raises(ValueError, match=problem):
+        Scene.model_validate(scene(**wrong))
+
+
+def test_passes_keep_the_tables_order_and_what_asks_for_none_is_as_before():
+    content = Scene.model_validate(scene(passes=["emission", "normal"], again=["normal"]))
+    assert content.render.passes == ["normal", "emission"]
+    assert "--passes normal" in content.reprojections["other"].development
+    bare = Scene.model_validate(scene())
+    assert "passes" not in bare.render.model_dump(exclude_none=True)
+    assert "passes" not in bare.reprojections["other"].development
+    assert passes.without(RENDER).keys() == RENDER.keys() - {"passes"}
