@@ -1,5 +1,6 @@
 """Exports, read back as their consumers read them, of a scene whose every point is known."""
 
+import configparser
 import csv
 import json
 import math
@@ -289,6 +290,77 @@ def test_nerf_synthetic_is_read_by_its_own_recipe(dataset, tmp_path):
     assert len(names) == 12
 
 
+def pfm(path):
+    kind, size, scale, body = path.read_bytes().split(b"\n", 3)
+    assert (kind, scale) == (b"Pf", b"-1.0")
+    width, height = map(int, size.split())
+    return np.flipud(np.frombuffer(body, "<f4").reshape(height, width))
+
+
+def test_hci_disparity_leads_from_view_to_view(tmp_path):
+    rig = {"type": "plane", "cameras": [3, 4], "size": [0.4, 1, 0.6], "rotation": [10, 20, 30]}
+    folder = tmp_path / "dataset"
+    write_views(folder, LENSES["perspective"], rig)
+    found = exported(folder, "hci", "views", tmp_path)
+    config = configparser.ConfigParser()
+    config.read(found / "parameters.cfg")
+    extrinsics, intrinsics = config["extrinsics"], config["intrinsics"]
+    columns, rows = (extrinsics.getint(f"num_cams_{axis}") for axis in "xy")
+    assert (columns, rows) == (3, 4)
+    assert extrinsics.getfloat("baseline_mm") == pytest.approx(200)
+    focal = intrinsics.getfloat("focal_length_mm") / intrinsics.getfloat("sensor_size_mm") * 64
+    disparities = []
+    for number in range(12):
+        name = f"Cam{number:03}.pfm"
+        z = pfm(found / f"gt_depth_lowres_{name}")
+        disparity = pfm(found / f"gt_disp_lowres_{name}")
+        np.testing.assert_allclose(disparity, 0.2 * focal / z, rtol=1e-6)
+        disparities.append(disparity)
+    low, high = (config["meta"].getfloat(f"disp_{end}") for end in ("min", "max"))
+    assert low == pytest.approx(np.min(disparities))
+    assert high == pytest.approx(np.max(disparities))
+    pictures = [
+        np.stack([images.read_image(found / f"input_Cam{n:03}.png").channels[c] for c in "RGB"], -1)
+        for n in range(12)
+    ]
+    # What one camera sees is by its disparity farther left in the next, and higher in the lower.
+    y, x = np.mgrid[10:38, 20:44]
+    for number, step, shift in ((4, 1, (1, 0)), (4, 3, (0, 1)), (7, -3, (0, -1))):
+        apart = disparities[number][y, x]
+        at = [np.float32(x - shift[0] * apart), np.float32(y - shift[1] * apart)]
+        moved = cv2.remap(pictures[number + step], *at, cv2.INTER_LINEAR)
+        assert np.abs(moved.astype(float) - pictures[number][y, x]).max() <= 1.5
+    middle = found / "gt_disp_lowres.pfm"
+    assert middle.read_bytes() == (found / "gt_disp_lowres_Cam007.pfm").read_bytes()
+    center = [extrinsics.getfloat(f"center_cam_{axis}_m") for axis in "xyz"]
+    names = {tuple(np.round(m[:3, 3], 9)): name for name, m in matrices(folder, ".").items()}
+    assert names[tuple(np.round(center, 9))] == "view_0007f"
+
+
+def test_hci_is_for_regular_grids(dataset, tmp_path):
+    with pytest.raises(UserError, match="frames: are no grid of cameras that look in parallel"):
+        exported(dataset, "hci", "perspective", tmp_path)  # farther apart down than across
+
+
+def test_scannetpp_is_a_text_model_beside_fisheyes_with_masks(dataset, tmp_path):
+    folder = exported(dataset, "scannetpp", "fisheye", tmp_path, points=200)
+    model = Colmap(folder / "colmap")
+    assert model.model == "OPENCV_FISHEYE"
+    assert model.parameters[4:] == [0, 0, 0, 0]
+    for image, rows in model.seen.items():
+        places = np.array([model.positions[int(number)] for number in rows[:, 2]])
+        expected = model.project(places, *model.images[image][1:])
+        np.testing.assert_allclose(rows[:, :2], expected, atol=1e-6)
+    lists = json.loads((folder / "train_test_lists.json").read_text())
+    assert lists.pop("has_masks") is True
+    assert {part: len(names) for part, names in lists.items()} == {"train": 10, "test": 2}
+    for name in lists["train"] + lists["test"]:
+        path = folder / "image_undistorted_fisheye" / name
+        mask = images.read_image(path.with_name(f"{path.stem}_mask.png")).channels["Y"]
+        assert set(np.unique(mask)) == {0, 255}
+        assert not images.read_image(path).channels["R"][mask == 0].any()
+
+
 def ply(path):
     head, _, body = path.read_bytes().partition(b"end_header\n")
     kinds = {"float": "<f4", "uchar": "u1"}
@@ -393,6 +465,9 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
         ),
         ("nerf_synthetic", "views", VIEWS, {}, "is no pinhole camera"),
         ("nerf_synthetic", "views", LENSES["shifted"], {}, "off centre"),
+        ("hci", "views", VIEWS, {}, "is no pinhole camera"),
+        ("hci", "again", VIEWS, {}, "holds no depth; give it format: exr"),
+        ("scannetpp", "views", VIEWS, {}, "no equidistant fisheye below 180 degrees"),
         ("poses_csv", "elsewhere", VIEWS, {}, "is 'elsewhere'; must be of views, again"),
     ],
 )
@@ -409,3 +484,23 @@ def test_what_a_consumer_cannot_take_is_refused_when_the_yaml_is_read(
     with pytest.raises(ValidationError, match=problem) as caught:
         TypeAdapter(Scene).validate_python(content)
     assert f"exports.{name}.sources: " in str(caught.value)
+
+
+def test_a_rig_that_a_consumer_cannot_take_is_refused_when_the_yaml_is_read():
+    camera = LENSES["perspective"]
+    rigs = {
+        "Plane": RIG | {"camera": camera},
+        "Ball": {"type": "sphere", "subdivisions": 1, "camera": camera},
+    }
+    again = {"rigs": ["Plane"], "camera": camera, "format": "exr"}
+    content = {
+        "scene": {"blend": "a.blend"},
+        "render": {"samples": 1},
+        "rigs": rigs,
+        "reprojections": {"again": again},
+        "exports": {"hci": {"sources": ["again"]}},
+    }
+    assert TypeAdapter(Scene).validate_python(content).exports.hci
+    content["exports"] = {"hci": {"sources": ["views"]}}
+    with pytest.raises(ValidationError, match="views is of the rig Ball, which is no plane"):
+        TypeAdapter(Scene).validate_python(content)

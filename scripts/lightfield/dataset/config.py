@@ -420,15 +420,21 @@ class Scene(Settings):
             if source not in known:
                 raise ValueError(f"{key}: is {source!r}; must be of {', '.join(known)}")
             has_depth = self.render is None or self.render.depth != "none"
+            rigs = [*self.rigs]
             if source == VIEWS:
                 cameras = {rig.camera for rig in self.rigs.values()}
             else:
                 cameras = {self.reprojections[source].camera}
                 has_depth &= self.reprojections[source].format == "exr"
+                rigs = self.reprojections[source].rigs or rigs
             for camera in cameras:
                 refusal = export.refusal(camera.make(), has_depth)
                 if refusal:
                     raise ValueError(f"{key}: {source} {refusal}")
+            for rig in rigs:
+                refusal = export.rig_refusal(self.rigs[rig])
+                if refusal:
+                    raise ValueError(f"{key}: {source} is of the rig {rig}, which {refusal}")
 
     def _check_rig(self, key: str, rig: Rig) -> None:
         """Check what of a rig depends on its camera, its file and the depth."""

@@ -15,6 +15,8 @@ from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.rigs import Rig
+from lightfield.geometry.rigs.plane import Plane
 
 # In `sources`, the rendered views themselves.
 VIEWS = "views"
@@ -37,6 +39,10 @@ class Export(Settings):
 
         ``has_depth`` is whether the source itself holds depth: EXR does and PNG does not.
         """
+        return None
+
+    def rig_refusal(self, rig: Rig) -> str | None:
+        """Say why the consumer cannot take the views of a rig; None if it can."""
         return None
 
 
@@ -142,14 +148,30 @@ class NerfSynthetic(Developed):
     """The layout of NeRF's synthetic scenes: RGBA, three lists."""
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
-        if not isinstance(lens, Rectilinear):
-            return f"is no pinhole camera, which this layout knows alone; {TO_RECTILINEAR}"
-        square = math.isclose(
-            lens.sensor[0] / lens.width, lens.sensor[1] / lens.height, rel_tol=1e-6
-        )
-        if lens.center != (lens.width / 2, lens.height / 2) or not square:
-            return "has its axis off centre or oblong pixels, which this layout cannot say"
-        return None
+        return _centred_pinhole(lens)
+
+
+class Hci(Developed):
+    """The layout of the HCI 4D light field benchmark, with disparities."""
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        return _centred_pinhole(lens) or (None if has_depth else NO_DEPTH)
+
+    def rig_refusal(self, rig: Rig) -> str | None:
+        if isinstance(rig, Plane) and not rig.cube_map and rig.look_at is None:
+            return None
+        return "is no plane of parallel cameras, which HCI's light fields are; export planes alone"
+
+
+class ScanNetPP(Developed):
+    """ScanNet++'s layout of a fisheye camera, for 3DGRUT and Fisheye-GS."""
+
+    points: PointCount = Field(50000, description="Points lifted from depth, at most.")
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if isinstance(lens, Equidistant) and lens.fov < math.pi:
+            return None
+        return "is no equidistant fisheye below 180 degrees; reproject to one"
 
 
 class PosesCsv(Export):
@@ -167,6 +189,8 @@ class Exports(Settings):
     colmap: Colmap | None = None
     nerfstudio: Nerfstudio | None = None
     nerf_synthetic: NerfSynthetic | None = None
+    hci: Hci | None = None
+    scannetpp: ScanNetPP | None = None
     poses_csv: PosesCsv | None = None
     point_cloud: PointCloud | None = None
 
@@ -174,6 +198,16 @@ class Exports(Settings):
     def wanted(self) -> dict[str, Export]:
         """The exports that are asked for, by name."""
         return {name: export for name, export in self if export}
+
+
+def _centred_pinhole(lens: Lens) -> str | None:
+    """Say why a lens is no pinhole with a centred axis and square pixels; None if it is."""
+    if not isinstance(lens, Rectilinear):
+        return f"is no pinhole camera, which this layout knows alone; {TO_RECTILINEAR}"
+    square = math.isclose(lens.sensor[0] / lens.width, lens.sensor[1] / lens.height, rel_tol=1e-6)
+    if lens.center != (lens.width / 2, lens.height / 2) or not square:
+        return "has its axis off centre or oblong pixels, which this layout cannot say"
+    return None
 
 
 def settings_of(name: str) -> type[Export]:

@@ -37,16 +37,12 @@ TESTS = "test.txt"
 
 def export(source: Source, settings: Colmap, folder: Path) -> None:
     """Write the model of a source's views into ``folder``."""
-    points = lift(source, count=settings.points)
     views = source.lightfield.views
     if any(view.split for view in views):
         tests = [f"{view.name}.png\n".encode() for view in splits(source.lightfield).test]
         _write(folder / "sparse" / "0" / TESTS, tests)
-    seen = observations(source, points)
-    # A track has two views at least.
-    counts = np.bincount(np.concatenate([o.indices for o in seen]), minlength=len(points.positions))
-    model = _Model(source, points, seen, np.flatnonzero(counts >= 2))
-    write = model.write_binary if settings.format == "binary" else model.write_text
+    found = model(source, settings.points)
+    write = found.write_binary if settings.format == "binary" else found.write_text
     write(folder / "sparse" / "0")
     progress = Progress(len(views), "colmap", "views")
     for view in views:
@@ -60,6 +56,15 @@ def export(source: Source, settings: Colmap, folder: Path) -> None:
         progress.done()
 
 
+def model(source: Source, count: int) -> "Model":
+    """Lift ``count`` points at most, and return them with the views that see each."""
+    points = lift(source, count=count)
+    seen = observations(source, points)
+    # A track has two views at least.
+    counts = np.bincount(np.concatenate([o.indices for o in seen]), minlength=len(points.positions))
+    return Model(source, points, seen, np.flatnonzero(counts >= 2))
+
+
 def camera(lens: Lens) -> tuple[tuple[int, str], list[float]]:
     """Return COLMAP's model (id, name) of a lens, and its parameters in pixels."""
     if isinstance(lens, Rectilinear):
@@ -68,7 +73,7 @@ def camera(lens: Lens) -> tuple[tuple[int, str], list[float]]:
     return OPENCV_FISHEYE, [fx, fy, *lens.center, *distortion]
 
 
-class _Model:
+class Model:
     """The points that are kept, numbered from 1, and who sees them: images from 1, in order."""
 
     def __init__(

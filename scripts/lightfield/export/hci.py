@@ -1,0 +1,124 @@
+"""The layout of the HCI 4D light field benchmark, for a plane of parallel pinhole cameras.
+
+``input_Cam000.png`` and so on, row by row from the top left as the cameras see it,
+``parameters.cfg``, and for each view ``gt_depth_lowres_Cam….pfm`` (Z in metres) and
+``gt_disp_lowres_Cam….pfm``; the middle view's are there without a number, too. A disparity is how
+many pixels a point moves between neighbours, d = b f (1 / Z − 1 / F). Cameras that look in parallel
+have F = ∞, for which `FOCUS` stands. Source: Honauer et al. 2016, and the benchmark's parameters.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import atomic_path, write_text
+from lightfield.core.progress import Progress
+from lightfield.dataset.exports import Hci
+from lightfield.dataset.lightfield import LightField, View
+from lightfield.export import cameras
+from lightfield.export.source import Floats, Source
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+
+FOCUS = 1e9  # metres
+
+
+def export(source: Source, settings: Hci, folder: Path) -> None:
+    """Write a source's views into ``folder``."""
+    views, columns, baseline = grid(source.lightfield)
+    lens = source.lens
+    assert isinstance(lens, Rectilinear)
+    middle = len(views) // columns // 2 * columns + columns // 2
+    known: list[float] = []
+    progress = Progress(len(views), "hci", "views")
+    for number, view in enumerate(views):
+        source.write_image(view, folder / f"input_Cam{number:03}.png")
+        depth = source.depth(view, "z")
+        with np.errstate(divide="ignore"):
+            disparity = np.nan_to_num(baseline * cameras.focal_pixels(lens)[0] / depth)
+        maps = {"depth": np.where(np.isfinite(depth), depth, 0), "disp": disparity}
+        for name, values in maps.items():
+            for end in (f"_Cam{number:03}", *([""] if number == middle else [])):
+                write_pfm(folder / f"gt_{name}_lowres{end}.pfm", values)
+        known += [float(np.min(disparity)), float(np.max(disparity))]
+        progress.done()
+    write_text(
+        folder / "parameters.cfg",
+        parameters(source, views[middle], (columns, len(views) // columns), baseline, known),
+    )
+
+
+def grid(lightfield: LightField) -> tuple[list[View], int, float]:
+    """Return the views row by row, how many a row has, and their distance in metres.
+
+    Raises `UserError` for views that are no regular grid in the plane of their images.
+    """
+    views = list(lightfield.views)
+    turn = lightfield.matrices[:, :3, :3]
+    places = lightfield.matrices[:, :3, 3] @ turn[0]
+    x, y, z = (np.unique(np.round(places[:, axis], 9)) for axis in range(3))
+    steps = np.concatenate([np.diff(x), np.diff(y)])
+    regular = (
+        np.allclose(turn, turn[0], atol=1e-6)
+        and np.ptp(z) < 1e-6
+        and len(x) * len(y) == len(views) > 1
+        and np.ptp(steps) < 1e-6 * steps.max()
+    )
+    if not regular:
+        raise UserError(
+            f"{lightfield.path}: frames: are no grid of cameras that look in parallel, "
+            "as far apart across as down, which this layout is for"
+        )
+    order = np.lexsort((places[:, 0].round(9), -places[:, 1].round(9)))
+    return [views[index] for index in order], len(x), float(steps.mean())
+
+
+def parameters(
+    source: Source, middle: View, size: tuple[int, int], baseline: float, disparities: list[float]
+) -> str:
+    """Return the text of parameters.cfg; ``baseline`` is in metres."""
+    lens = source.lens
+    assert isinstance(lens, Rectilinear)
+    scene = source.lightfield.content.get("scene", {}).get("name", source.dataset.parent.name)
+    center = zip(
+        ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"),
+        [*middle.position.tolist(), *middle.rotation.tolist()],
+        strict=True,
+    )
+    sections = {
+        "intrinsics": {
+            "focal_length_mm": lens.focal_length,
+            "image_resolution_x_px": lens.width,
+            "image_resolution_y_px": lens.height,
+            "sensor_size_mm": max(lens.sensor),
+            "fstop": 100.0,  # no depth of field
+        },
+        "extrinsics": {
+            "num_cams_x": size[0],
+            "num_cams_y": size[1],
+            "baseline_mm": 1000 * baseline,
+            "focus_distance_m": FOCUS,
+            **{f"center_cam_{key}": value for key, value in center},
+            "offset": 0.0,
+        },
+        "meta": {
+            "scene": scene,
+            "category": "additional",
+            "disp_min": min(disparities),
+            "disp_max": max(disparities),
+            "depth_map_scale": 1.0,
+        },
+    }
+    return "\n".join(
+        "".join([f"[{name}]\n", *(f"{key} = {value}\n" for key, value in section.items())])
+        for name, section in sections.items()
+    )
+
+
+def write_pfm(path: Path, values: Floats | NDArray[np.float32]) -> None:
+    """Write a (height, width) map as a portable float map: float32, the lowest row first."""
+    height, width = values.shape
+    with atomic_path(path) as temporary:
+        head = f"Pf\n{width} {height}\n-1.0\n".encode()
+        temporary.write_bytes(head + np.flipud(values).astype("<f4").tobytes())

@@ -1,0 +1,41 @@
+"""ScanNet++'s layout of a fisheye camera, from which 3DGRUT and Fisheye-GS start.
+
+``colmap/`` is a COLMAP model as text, ``image_undistorted_fisheye/`` the views, each an ideal
+equidistant fisheye, beside them ``<view>_mask.png`` (0 is ignored) of views with pixels that show
+nothing, and ``train_test_lists.json`` says what the views are for. Source: ScanNet++'s
+documentation, and 3DGRUT's reader of it.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from lightfield.core.files import write_json
+from lightfield.core.progress import Progress
+from lightfield.dataset.exports import ScanNetPP
+from lightfield.export.colmap import model
+from lightfield.export.source import Source
+from lightfield.export.splits import splits
+from lightfield.imaging import images
+
+IMAGES = "image_undistorted_fisheye"
+
+
+def export(source: Source, settings: ScanNetPP, folder: Path) -> None:
+    """Write a source's views into ``folder``."""
+    model(source, settings.points).write_text(folder / "colmap")
+    views = source.lightfield.views
+    masked = False
+    progress = Progress(len(views), "scannetpp", "views")
+    for view in views:
+        source.write_image(view, folder / IMAGES / f"{view.name}.png")
+        valid = source.valid(view)
+        if not valid.all():
+            mask = valid.astype(np.uint8) * 255
+            images.write_png(folder / IMAGES / f"{view.name}_mask.png", mask)
+            masked = True
+        progress.done()
+    parts = splits(source.lightfield)
+    lists = {"train": parts.train, "test": parts.test}
+    content = {part: [f"{view.name}.png" for view in own] for part, own in lists.items()}
+    write_json(folder / "train_test_lists.json", {**content, "has_masks": masked})
