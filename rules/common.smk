@@ -35,6 +35,11 @@ from lightfield.measurement.sampling import calibrated
 if "scenes" in GIVEN and "rigs" not in GIVEN:
     config["rigs"] = "all"
 
+# Several for each job that runs at once, so that none waits long for the last.
+config.setdefault(
+    "most_shards", min(max(64, 4 * (workflow.resource_settings.nodes or 0)), 10_000)
+)
+
 try:
     SETTINGS = load_config(config)
     CHOSEN = load_datasets(SETTINGS)
@@ -212,11 +217,17 @@ def whole(datasets):
     return input_function
 
 
+@cache
+def is_false(dataset, record):
+    """Return whether a record's files are not on disk; each plan asks twice."""
+    return DATASETS[dataset].is_false(record)
+
+
 def renewal(wildcards):
     """Return no input, but let a shard's record be made anew if its files are not on disk."""
     dataset = dataset_of(wildcards)
     record = dataset.record(stage_of(wildcards), wildcards.first, wildcards.end)
-    if dataset.is_false(record):
+    if is_false((wildcards.scene, wildcards.rig), record):
         made_anew(record)
     return []
 

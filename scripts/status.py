@@ -29,7 +29,7 @@ def main() -> None:
     renderings = []
     for name, views, reprojections in arguments.dataset:
         folder = arguments.results / name
-        renderings.append(status.look(folder, arguments.work / name, now))
+        renderings.append(status.look(folder, arguments.work / name, int(views), now))
         others = list(filter(None, reprojections.split(",")))
         print("\n".join(status.lines(name, folder, int(views), others, renderings[-1])))
     total = sum(int(views) for _, views, _ in arguments.dataset)

@@ -13,7 +13,7 @@ import pytest
 from checkouts import ROOT, snakemake
 
 import status
-from lightfield.core import progress
+from lightfield.core import files, progress
 from lightfield.dataset import keys
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.geometry import lenses
@@ -50,7 +50,7 @@ def dataset(tmp_path, monkeypatch, capsys):
         text = "".join(json.dumps(line) + "\n" for line in lines)
         (made / f"render/{name}.journal.jsonl").write_text(text)
 
-    lines.folder, lines.content = folder, content
+    lines.folder, lines.made, lines.content = folder, made, content
     lines.render, lines.journal = render, journal
     return lines
 
@@ -178,3 +178,20 @@ def test_progress_begins_at_once_and_reads_in_a_log(capsys, monkeypatch):
     assert capsys.readouterr().err == ""
     told.done(6)
     assert capsys.readouterr().err.endswith("done in 2 min 41 s\n")
+
+
+def test_a_record_says_which_views_are_finished_until_a_file_is_lost(dataset):
+    dataset.render("a", settings=dataset.content)
+    dataset.render("b", "c", settings=dataset.content.changed(resolution=[4, 1]))
+    record = dataset.made / "render/1-3.json"
+    sizes = {
+        f"exr/{name}.exr": (dataset.folder / f"exr/{name}.exr").stat().st_size for name in "bc"
+    }
+    files.write_json(record, {"files": {name: {"bytes": size} for name, size in sizes.items()}})
+    assert dataset()[1].startswith("  rendered: 3 of 4")
+    (dataset.folder / "exr/c.exr").write_bytes(b"cut short")
+    assert dataset()[1].startswith("  rendered: 1 of 4")
+    # Of a lightfield.json that is newer than the record only what has its key counts.
+    dataset.render("c", settings=dataset.content.changed(resolution=[4, 1]))
+    os.utime(record, (1, 1))
+    assert dataset()[1].startswith("  rendered: 1 of 4")

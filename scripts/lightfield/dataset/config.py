@@ -127,6 +127,11 @@ class Configuration(Settings):
     views_per_shard: Auto | AtLeastOne = Field(
         "auto", description="auto, or how many views one render job makes."
     )
+    most_shards: AtLeastOne = Field(
+        64,
+        description="With views_per_shard: auto, the most render jobs of one dataset; without it "
+        "64, or four times the jobs that Snakemake runs at once (--jobs) where that is more.",
+    )
     accept_blend: Annotated[bool, BeforeValidator(_switch)] = Field(
         False,
         description="Take each .blend as it is now: its lock file beside the scene YAML is written "

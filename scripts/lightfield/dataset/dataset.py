@@ -4,18 +4,17 @@ import json
 import math
 import os
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from stat import S_ISREG
 from statistics import fmean
 from typing import Any, Literal
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken
-from lightfield.dataset import config, passes, published
+from lightfield.dataset import config, passes, published, shard_files
 from lightfield.dataset.config import CHOSEN, Configuration, Preset, Render, Source
 from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
 from lightfield.dataset.keys import scene_fingerprint
@@ -23,7 +22,7 @@ from lightfield.dataset.lightfield import NAME
 from lightfield.dataset.splits import SPLITS
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.overview import sees_all_round
-from lightfield.geometry.rigs import Poses, Random, Rig
+from lightfield.geometry.rigs import Pose, Poses, Random, Rig
 
 # For planning only, measured on one core of a 2-core x86-64 machine: path tracing of one sample of
 # one pixel, and start-up (bpy, the scene, and Cycles' acceleration structures).
@@ -37,8 +36,6 @@ START_UP_PART = 0.05
 COMPRESSED = 0.75
 # A pixel of an 8-bit PNG.
 PNG_BYTES = 2
-# More shards of one dataset than this only make the plan long: no machine renders them all at once.
-MOST_SHARDS = 64
 
 # What of a scene YAML's `scene` block is written down: not where a file came from, nor where it is.
 SOURCE_KEYS = {"builder", "parameters", "frame"}
@@ -78,6 +75,7 @@ class Dataset:
     results_root: str = "results"
     work_root: str = "work"
     views_per_shard: int | Literal["auto"] = "auto"
+    most_shards: int = 64
 
     @property
     def scene_folder(self) -> str:
@@ -141,11 +139,7 @@ class Dataset:
                 return
         own = f"{self.folder}/{NAME}"
         expected = self.origin(render) | self.rig.camera.make().to_lightfield()
-        poses = [
-            [pose.name, [*pose.position, *pose.rotation], pose.split]
-            for pose in self.placed_rig.poses()
-        ]
-        if _differs(own, expected, poses):
+        if Path(own).exists() and _differs(own, expected, self.placed_rig.poses()):
             yield own
         for name, reprojection in self.reprojections.items():
             path = f"{self.folder}/{name}/{NAME}"
@@ -377,16 +371,9 @@ class Dataset:
         what is missing, and by the log of checksums finds every other file that is not as it was.
         """
         try:
-            files = json.loads(Path(record).read_bytes())["files"]
-            found = [(Path(self.folder, name).stat(), file) for name, file in files.items()]
-            return any(
-                not S_ISREG(status.st_mode) or status.st_size != file["bytes"]
-                for status, file in found
-            )
+            return shard_files.recorded(Path(record), self.folder) is None
         except FileNotFoundError:
-            return Path(record).exists()
-        except (OSError, ValueError, LookupError, TypeError, AttributeError):
-            return True
+            return False
 
     def broken(self) -> Iterator[tuple[str, str]]:
         """Yield each file that cannot be what a program wrote there, and what is wrong with it.
@@ -487,11 +474,12 @@ class Dataset:
         """The views in runs (first, end) of nearly equal length.
 
         Automatically, a run is as short as it can be without start-up taking more than its part:
-        the shorter, the more processes can work at once.
+        the shorter, the more processes can work at once. More than ``most_shards`` would only make
+        the plan long, because no more are rendered at once.
         """
         if self.views_per_shard == "auto":
             length = math.ceil(START_UP_SECONDS / START_UP_PART / self.planned_view_seconds)
-            length = max(length, math.ceil(self.view_count / MOST_SHARDS))
+            length = max(length, math.ceil(self.view_count / self.most_shards))
         else:
             length = self.views_per_shard
         count = math.ceil(self.view_count / length)
@@ -499,20 +487,29 @@ class Dataset:
         return list(pairwise(bounds))
 
 
-def _differs(path: str, expected: dict[str, Any], poses: list[Any] | None = None) -> bool:
-    """Whether a JSON file is there and says something else than is ``expected`` of its keys."""
+def _differs(path: str, expected: dict[str, Any], poses: Sequence[Pose] = ()) -> bool:
+    """Whether a JSON file is there and says something else than is ``expected`` of its keys.
+
+    Its frames must be the ``poses``, if there are any.
+    """
+    others = iter(poses)
+
+    def is_pose(mapping: dict[str, Any]) -> Any:
+        # Of a hundred thousand views nothing else is kept in memory.
+        if not (poses and "world_matrix" in mapping):
+            return mapping
+        pose = next(others)
+        found = (mapping["name"], *mapping["position"], *mapping["rotation"], mapping.get("split"))
+        return found == (pose.name, *pose.position, *pose.rotation, pose.split)
+
     try:
-        content = json.loads(Path(path).read_bytes())
+        content = json.loads(Path(path).read_bytes(), object_hook=is_pose)
         if any(content[key] != value for key, value in json.loads(json.dumps(expected)).items()):
             return True
-        frames = content["frames"] if poses else []
-        return poses is not None and poses != [
-            [frame["name"], [*frame["position"], *frame["rotation"]], frame.get("split")]
-            for frame in frames
-        ]
+        return bool(poses) and content["frames"] != [True] * len(poses)
     except FileNotFoundError:
         return False
-    except (OSError, ValueError, LookupError, TypeError):
+    except (OSError, ValueError, LookupError, TypeError, StopIteration, RecursionError):
         return True
 
 
@@ -620,6 +617,7 @@ def scene_datasets(
             results_root=settings.results,
             work_root=settings.work,
             views_per_shard=settings.views_per_shard,
+            most_shards=settings.most_shards,
         )
         for dataset in found
     ]

@@ -7,7 +7,8 @@ leaves out changes no byte (see `lightfield.rendering.pruning`) and is therefore
 
 import hashlib
 import json
-from importlib.metadata import version
+from functools import cache
+from importlib import metadata
 from typing import Any
 
 from lightfield.core.errors import UserError
@@ -17,6 +18,10 @@ from lightfield.dataset.lightfield import LightField, View
 
 # Raised when the program that renders changes what it writes for the same settings.
 RENDER_VERSION = 3
+
+
+# Looked up in the package's files, which takes a millisecond.
+version = cache(metadata.version)
 
 
 def scene_fingerprint(source: Source) -> str:

@@ -1,7 +1,7 @@
 """How far a dataset is, also while it is being built: from its files alone.
 
-A rendered view counts if its file carries the key of the settings that lightfield.json gives; a
-reprojected one if it is no older than the view that it was made from.
+A rendered view counts if its shard's record has it, or if its file carries the key of the settings
+that lightfield.json gives; a reprojected one if it is no older than the view it was made from.
 """
 
 import sys
@@ -12,7 +12,7 @@ from pathlib import Path
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken, read_json
 from lightfield.core.progress import duration
-from lightfield.dataset import journal, keys
+from lightfield.dataset import journal, keys, shard_files
 from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.imaging import images
 
@@ -35,19 +35,18 @@ class Rendering:
     killed: list[str] = field(default_factory=list)
 
 
-def look(folder: Path, work: Path, now: float) -> Rendering:
-    """Find out how far the rendering of a dataset is at ``now``, in seconds since 1970."""
-    views: Sequence[View] = ()
+def look(folder: Path, work: Path, count: int, now: float) -> Rendering:
+    """Find out how far the rendering of ``count`` views is at ``now``, in seconds since 1970."""
     found = Rendering()
+    views: Sequence[View] = ()
     try:
         if (folder / NAME).exists():
-            lightfield = LightField.read(folder / NAME)
-            views = lightfield.views
-            found.finished = {
-                view.name
-                for view in views
-                if images.has_key(_file(folder, view.name), keys.render_key(lightfield, view))
-            }
+            found.finished = _recorded(folder, work)
+            # A finished dataset's poses need not be read.
+            if len(found.finished) < count:
+                lightfield = LightField.read(folder / NAME)
+                views = lightfield.views
+                found.finished |= _keyed(folder, lightfield, found.finished)
     except UserError as error:
         print(f"{error}; it is made anew", file=sys.stderr)
     journals = filter(Path.is_file, (work / "render").glob("*.journal.jsonl"))
@@ -59,6 +58,26 @@ def look(folder: Path, work: Path, now: float) -> Rendering:
     if not found.running:
         found.recent = 0
     return found
+
+
+def _recorded(folder: Path, work: Path) -> set[str]:
+    """Return the views that records have which are no older than lightfield.json."""
+    written = (folder / NAME).stat().st_mtime_ns
+    records = (work / "render").glob("*-*.json")
+    current = (path for path in records if path.stat().st_mtime_ns >= written)
+    files = (shard_files.recorded(path, str(folder)) for path in current)
+    return {Path(name).stem for sizes in files for name in sizes or ()}
+
+
+def _keyed(folder: Path, lightfield: LightField, recorded: set[str]) -> set[str]:
+    """Return those of the other views whose files carry the key of their settings."""
+    present = {path.stem for path in _file(folder, "").parent.glob("*.exr")} - recorded
+    return {
+        view.name
+        for view in lightfield.views
+        if view.name in present
+        and images.has_key(_file(folder, view.name), keys.render_key(lightfield, view))
+    }
 
 
 def _add_shard(

@@ -1,0 +1,28 @@
+"""Whether a shard's files are on disk as its record has them, by their sizes alone."""
+
+import json
+from pathlib import Path
+from stat import S_ISREG
+
+
+def recorded(record: Path, folder: str) -> dict[str, int] | None:
+    """Return the size of each of a record's files by its path in the dataset's ``folder``.
+
+    None where a file is not there, or of another size: deleted, or cut short. None, too, for a
+    record that is broken; raises FileNotFoundError where there is none.
+    """
+    try:
+        files = json.loads(record.read_bytes())["files"]
+        sizes: dict[str, int] = {name: entry["bytes"] for name, entry in files.items()}
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+    try:
+        for name, size in sizes.items():
+            status = Path(folder, name).stat()
+            if status.st_size != size or not S_ISREG(status.st_mode):
+                return None
+    except OSError:
+        return None
+    return sizes
