@@ -1,6 +1,7 @@
 # What the terminal shows: how far a run is, and what a dry run would do.
 import logging
 
+from lightfield.core.progress import duration
 from lightfield.core.run_display import RunDisplay, Task
 from lightfield.dataset.dataset import START_UP_SECONDS
 from lightfield.measurement.plan import Work, calibration_seconds, forecast
@@ -88,11 +89,30 @@ def begin_display():
     # What has no output is asked for to be read, and takes seconds.
     jobs = [job for job in workflow.dag.needrun_jobs() if job.log and job.output]
     if jobs and not is_quiet_about("ALL"):
+        announce_calibrations(jobs)
         TASKS.update({job: task_of(job) for job in jobs})
         DISPLAY.begin(TASKS, workflow.cores or 1)
         DISPLAY.start()
         # However the run ends.
         atexit.register(DISPLAY.stop)
+
+
+def announce_calibrations(jobs):
+    """Print what each calibration is expected to cost, and what the datasets that it is for."""
+    for job in jobs:
+        if job.rule.name == "calibrate":
+            datasets = [
+                rendering(other)[1]
+                for other in jobs
+                if other.rule.name == "render"
+                and other.wildcards.scene == job.wildcards.scene
+            ]
+            print(
+                f"calibrating {job.wildcards.scene} takes some"
+                f" {duration(rendering(job)[1])} of a core, and rendering it then some"
+                f" {duration(sum(datasets))}",
+                file=sys.stderr,
+            )
 
 
 def end_display():

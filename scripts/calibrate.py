@@ -36,10 +36,10 @@ def main() -> None:
     write_json(arguments.output, record)
     if arguments.seconds:
         write_json(arguments.seconds, seconds)
-    target, error = record["target_error"], record["probe_error"]
+    target, error, found = (record[k] for k in ("target_error", "probe_error", "held_out_error"))
     print(
-        f"{record['way']}, {record['choice']}: error {error:.3g} on the probe views and "
-        f"{record['held_out_error']:.3g} ± {record['held_out_standard_error']:.1g} on others, "
+        f"note: {record['way']}, {record['choice']}: error {error:.3g} on the probe views and "
+        f"{found:.3g} ± {record['held_out_standard_error']:.1g} on others, "
         f"wanted {target:g}; {record['times_fewer_samples']:.1f} times cheaper than plain path "
         "tracing at equal error"
     )
@@ -50,8 +50,7 @@ def main() -> None:
             f"{target:g} is not reached within the preset's {most} samples; "
             f"the best there is has {error:.3g}"
         )
-    elif not record["confirmed"]:
-        found = record["held_out_error"]
+    elif not record["confirmed"] and found > target:
         wrong = f"is {target:g}, and views that the choice does not know have {found:.3g}"
     if wrong:
         print(f"warning: render.target_error: {wrong}", file=sys.stderr)

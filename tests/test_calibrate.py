@@ -1,6 +1,7 @@
 """A target error instead of a sample count: what is chosen, whether it holds, and for good."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ from checkouts import checkout, planned, snakemake
 
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
+from lightfield.dataset.config import Preset
 from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
@@ -97,6 +99,25 @@ def test_a_preset_limits_the_choice(calibrated):
     assert record["choice"]["denoise"] is False
     assert not record["reached"]
     assert "warning: render.target_error: 0.01 is not reached within the preset's" in told.stderr
+
+
+def test_a_scene_may_be_calibrated_without_a_denoiser(tmp_path, monkeypatch):
+    path = tmp_path / "aimed.yaml"
+    path.write_text(SCENE.format(render="target_error: {value: 0.02, denoise: never}"))
+    monkeypatch.setattr("lightfield.dataset.config.SCENES", tmp_path)
+    for preset in (None, Preset(denoise=True, samples=8)):
+        (dataset,) = scene_datasets("aimed", limits=preset)
+        assert dataset.render["target_error"] == 0.02
+        assert dataset.render["denoise"] is False
+
+
+def test_what_calibration_will_cost_is_said_beforehand(tmp_path):
+    told = snakemake(
+        checkout(tmp_path, aimed=SCENE.format(render="target_error: 0.02")), "-n", *ASKED
+    )
+    table = told.stdout.split("to render")[1]
+    # 16 windows of 64², 14 times 256 samples of 6 µs, and a start.
+    assert re.search(r"^calibration of aimed +0\.39 +$", table, re.M), table
 
 
 def test_effort_follows_from_what_lies_on_both_sides_of_the_target():

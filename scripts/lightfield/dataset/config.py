@@ -230,11 +230,20 @@ class Source(Settings):
 CHOSEN = ("samples", "adaptive_threshold", "denoise")
 
 
+class TargetError(Settings):
+    """A target error, and what may be chosen to reach it."""
+
+    value: Annotated[float, Field(gt=0, le=1), AS_WRITTEN]
+    denoise: Literal["auto", "never"] = Field(
+        "auto", description="never chooses among plain and adaptive sampling alone."
+    )
+
+
 class Render(Settings):
     """What Cycles is asked for; what is not given here stays as the .blend has it."""
 
     samples: AtLeastOne | None = Field(None, description="Paths a pixel.")
-    target_error: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] | None = Field(
+    target_error: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] | TargetError | None = Field(
         None,
         description="Instead of samples: relative mean squared error, (x - r)^2 / (r^2 + 0.01) "
         "with middle grey at 0.18, for which samples, adaptive_threshold and denoise are chosen "

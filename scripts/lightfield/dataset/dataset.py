@@ -15,7 +15,14 @@ from typing import Any, Literal
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken
 from lightfield.dataset import config, passes, published, shard_files
-from lightfield.dataset.config import CHOSEN, Configuration, Preset, Render, Source
+from lightfield.dataset.config import (
+    CHOSEN,
+    Configuration,
+    Preset,
+    Render,
+    Source,
+    TargetError,
+)
 from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
 from lightfield.dataset.keys import scene_fingerprint
 from lightfield.dataset.lightfield import NAME
@@ -674,6 +681,10 @@ def _limited_render(render: Render | None, rig: Rig, limits: Preset) -> dict[str
         samples = min(render.samples, limits.samples or render.samples)
         return {**content, "samples": samples, **denoise}
     most = {"most_samples": limits.samples} if limits.samples else {}
+    if isinstance(render.target_error, TargetError):
+        content["target_error"] = render.target_error.value
+        if render.target_error.denoise == "never":
+            denoise = {"denoise": False}
     kept = {key: value for key, value in content.items() if key not in CHOSEN}
     return {**kept, **most, **denoise}
 
