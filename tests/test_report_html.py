@@ -476,10 +476,12 @@ def test_a_panorama_is_made_where_the_views_show_what_it_would(rig, camera, expe
     [
         ({"type": "plane", "cameras": [5, 3]}, 7),
         ({"type": "hemisphere", "count": 9}, 4),
+        # Of the middle ring, the one that looks ahead.
+        ({"type": "cylinder", "cameras": [8, 3]}, 8),
         ({**LATTICE, "cameras": [3, 1, 1], "cube_map": True}, 6),
     ],
 )
-def test_the_middle_view_is_that_of_the_middle_row_or_of_the_order(rig, expected):
+def test_the_middle_view_is_of_the_middle_row_or_of_the_order(rig, expected):
     assert overview.middle_view(rigs.from_settings(rig)) == expected
 
 

@@ -32,8 +32,15 @@ def sees_all_round(rig: Rig) -> bool:
 
 
 def middle_view(rig: Rig) -> int:
-    """Return the number of the view in the middle of the rig's middle row, or of its order."""
+    """Return the number of a view in the middle of the rig.
+
+    It is that in the middle of the rig's middle row or, where this goes round, the one that looks
+    ahead, along +Y. Of a rig without rows it is that in the middle of the order.
+    """
     poses = rig.poses()[:: rig.views_a_position]
     places = (np.array([pose.position for pose in poses]) - np.array(rig.center)) @ rig.turn
     row = rig.middle_row(places) or range(len(poses))
-    return row[len(row) // 2] * rig.views_a_position
+    middle = row[len(row) // 2]
+    if rig.is_round and len(row) < len(poses):
+        middle = max(row, key=lambda number: -poses[number].matrix()[1, 2])
+    return middle * rig.views_a_position

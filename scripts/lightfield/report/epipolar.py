@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 
 from lightfield.geometry.depth import distance_from_z
 from lightfield.geometry.lenses import Lens
@@ -114,7 +115,9 @@ def sample(
     with np.errstate(invalid="ignore"):
         seen = (x >= 0) & (x <= width) & (y >= 0) & (y <= height)
     light = np.zeros((len(rays), 3), np.float32)
-    light[seen] = _bilinear(colour, x[seen] - 0.5, y[seen] - 0.5)
+    at = (y[seen] - 0.5, x[seen] - 0.5)
+    for channel in range(3):
+        light[seen, channel] = map_coordinates(colour[..., channel], at, order=1, mode="nearest")
     reach = np.full(len(rays), np.nan)
     reach[seen] = np.inf
     if depth is not None:
@@ -125,19 +128,6 @@ def sample(
             found = distance_from_z(found, lens.rays(column + 0.5, line + 0.5))
         reach[seen] = found / np.linalg.norm(own[seen], axis=-1)
     return light, reach
-
-
-def _bilinear(values: Array, x: Array, y: Array) -> Array:
-    height, width = values.shape[:2]
-    left = np.clip(np.floor(x).astype(int), 0, max(width - 2, 0))
-    top = np.clip(np.floor(y).astype(int), 0, max(height - 2, 0))
-    right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
-    across = np.clip(x - left, 0, 1)[:, np.newaxis]
-    down = np.clip(y - top, 0, 1)[:, np.newaxis]
-    upper = values[top, left] * (1 - across) + values[top, right] * across
-    lower = values[bottom, left] * (1 - across) + values[bottom, right] * across
-    mixed: Array = upper * (1 - down) + lower * down
-    return mixed
 
 
 def thinned(views: Sequence[int], most: int) -> list[int]:

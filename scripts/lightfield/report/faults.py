@@ -42,12 +42,13 @@ def _fault(folder: Path, view: str) -> Fault | None:
     exr, png = folder / f"{view}.exr", folder / f"{view}.png"
     path = exr if exr.is_file() or not png.is_file() else png
     try:
-        channels = images.read_image(path).channels
-        colour = np.stack([channels[name] for name in "RGB"], axis=-1)
+        image = images.read_image(path)
+        colour = image.colour
     except (UserError, LookupError):
         return None
-    depth = webp(_depth(channels["Z"])) if "Z" in channels else None
-    return Fault(path.name, webp(colour if path == png else _colour(colour)), depth)
+    depth = webp(_depth(image.channels["Z"])) if "Z" in image.channels else None
+    shown = colour.astype(np.uint8) if path == png else _colour(colour)
+    return Fault(path.name, webp(shown), depth)
 
 
 def _colour(colour: Array) -> Array:

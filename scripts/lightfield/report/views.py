@@ -112,6 +112,7 @@ def collect(
 
     noises = [view.noise for view in loaded if math.isfinite(view.noise)]
     row = epipolar.find_row(rig, matrices)
+    middle = matrices[middle_view(rig)]
     data = {
         "views": [
             {
@@ -133,7 +134,8 @@ def collect(
         "points": points,
         "depth": _depth_scale(depths, reach, meaning),
         "embedded": packed_views,
-        "first": int(np.argmin(np.abs(np.array(shown) - middle_view(rig)))),
+        # The one most like that in the middle.
+        "first": int(np.argmin(np.abs(matrices[shown] - middle).sum(axis=(1, 2)))),
         "row": None,
     }
     kept: list[int] = []

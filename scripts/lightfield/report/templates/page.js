@@ -340,7 +340,7 @@ function projection(width, height) {
   const ahead = [-sine * level, cosine * level, -rise];
   const up = [-sine * rise, cosine * rise, level];
   const distance = (4 * rig.extent) / rig.zoom;
-  const scale = 1.95 * Math.min(width, height);
+  const scale = 1.75 * Math.min(width, height);
   return (point) => {
     const way = minus(point, rig.center);
     const depth = dot(way, ahead) + distance;
@@ -398,7 +398,7 @@ function drawAxes(context, project, height) {
     const unit = [0, 0, 0];
     unit[axis] = 0.01 * rig.extent;
     const tip = project(along(rig.center, unit, 1));
-    const length = 28 / ((0.01 * 1.95 * Math.min(rig.canvas.clientWidth, height)) / (4 / rig.zoom));
+    const length = 28 / ((0.01 * 1.75 * Math.min(rig.canvas.clientWidth, height)) / (4 / rig.zoom));
     const [x, y] = [(tip[0] - origin[0]) * length, (tip[1] - origin[1]) * length];
     context.strokeStyle = context.fillStyle = themed("--soft");
     context.beginPath();
