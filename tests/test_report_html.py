@@ -447,6 +447,7 @@ FISHEYE, NARROW, PANORAMA = (
     {"lens": "equirectangular", "resolution": [8, 4]},
 )
 LATTICE = {"type": "lattice", "cameras": [2, 2, 2]}
+KEYS = [{"position": [0, 0, 0]}, {"position": [0, 3, 0.5]}]
 
 
 @pytest.mark.parametrize(
@@ -464,6 +465,8 @@ LATTICE = {"type": "lattice", "cameras": [2, 2, 2]}
         (LATTICE, PANORAMA, True),
         ({**LATTICE, "cube_map": True}, NARROW, True),
         ({"type": "poses", "file": "unused.csv"}, PANORAMA, False),
+        ({"type": "random", "count": 9}, PANORAMA, False),
+        ({"type": "path", "count": 9, "keys": KEYS}, PANORAMA, False),
     ],
 )
 def test_a_panorama_is_made_where_the_views_show_what_it_would(rig, camera, expected):
@@ -483,6 +486,14 @@ def test_a_panorama_is_made_where_the_views_show_what_it_would(rig, camera, expe
 )
 def test_the_middle_view_is_of_the_middle_row_or_of_the_order(rig, expected):
     assert overview.middle_view(rigs.from_settings(rig)) == expected
+
+
+def test_a_rig_in_words_has_no_size_that_nobody_gave():
+    places = np.array([[0, 0, 0], [0, 3, 0.5]])
+    path = rigs.from_settings({"type": "path", "count": 2, "keys": KEYS})
+    assert dataset_page.rig_text(path, places) == "path, 0 × 3 × 0.5 m"
+    assert dataset_page.rig_text(rigs.from_settings(SPHERE), places) == "sphere, ⌀ 2 m"
+    assert dataset_page.rig_text(rigs.from_settings(LINE), places) == "plane 5 × 3, 2 × 1 × 1 m"
 
 
 def test_without_a_panorama_the_overview_is_the_view_in_the_middle(tmp_path):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lightfield.geometry.rigs import Poses, Rig
+from lightfield.geometry.rigs import Path, Poses, Random, Rig
 from lightfield.geometry.rigs.hemisphere import GOLDEN_ANGLE
 from lightfield.geometry.rigs.orbit import on_sphere
 
@@ -17,9 +17,9 @@ def sees_all_round(rig: Rig) -> bool:
 
     They do if most directions are seen by a camera on that side of the centre. The cameras of a
     plane see half of them at most, those that look at an object none: its inside would be the
-    panorama's place. Of loose poses nobody knows what is in the middle.
+    panorama's place. Of loose poses, paths and random places nobody knows what is in the middle.
     """
-    if isinstance(rig, Poses):
+    if isinstance(rig, Poses | Path | Random):
         return False
     lens = rig.camera.make()
     number = np.arange(DIRECTIONS, dtype=np.float64)

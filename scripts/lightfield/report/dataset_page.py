@@ -136,12 +136,13 @@ def facts(
 def rig_text(rig: rigs.Rig, places: views.Array) -> str:
     """Return a rig in words: its type, its cameras along each axis, and its size.
 
-    Loose poses are as large as the box around their ``places`` (n, 3).
+    Loose poses and paths are as large as the box around their ``places`` (n, 3).
     """
     kind = rig.type
     if isinstance(rig, rigs.Grid):
         kind += " " + " × ".join(map(str, rig.cameras))
-    size = tuple(np.ptp(places, axis=0).tolist()) if isinstance(rig, rigs.Poses) else rig.size
+    is_loose = isinstance(rig, rigs.Poses | rigs.Path)
+    size = tuple(np.ptp(places, axis=0).tolist()) if is_loose else rig.size
     if isinstance(size, tuple):
         return f"{kind}, {' × '.join(f'{side:.4g}' for side in size)} m"
     return f"{kind}, {'⌀ ' if rig.is_round else ''}{size:g} m"

@@ -28,6 +28,7 @@ from lightfield.geometry.rigs.spiral import Spiral
 __all__ = [
     "AnyRig",
     "Grid",
+    "Path",
     "Pose",
     "Poses",
     "Random",
