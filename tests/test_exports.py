@@ -5,6 +5,7 @@ import csv
 import json
 import math
 import shutil
+import subprocess
 from pathlib import Path
 
 import cv2
@@ -20,6 +21,7 @@ from lightfield.core.files import sha256
 from lightfield.dataset.config import Scene
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField
+from lightfield.export import disparity
 from lightfield.export.source import Source
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
@@ -46,6 +48,7 @@ LENSES = {
     },
     "wide": {"lens": "equidistant", "fov": 220, "resolution": [64, 64]},
     "panorama": {"lens": "equirectangular", "resolution": [64, 32]},
+    "half": {"lens": "equirectangular", "longitude": [-90, 90], "resolution": [32, 32]},
 }
 
 
@@ -290,6 +293,114 @@ def test_nerf_synthetic_is_read_by_its_own_recipe(dataset, tmp_path):
     assert len(names) == 12
 
 
+def of_disparity(levels, camera, bits):
+    near, far = camera["Depth_range"]
+    return 1 / (1 / far + levels / (2**bits - 1) * (1 / near - 1 / far))
+
+
+def opengl_points(camera, depth):
+    """Points of every pixel as OpenDIBR's vertex shader finds them, in OpenGL's world."""
+    width, height = camera["Resolution"]
+    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    if camera["Projection"] == "Perspective":
+        (fx, fy), (cx, cy) = camera["Focal"], camera["Principle_point"]
+        x, y, z = (u * width - cx) / fx, (cy - v * height) / fy, -np.ones_like(u)
+    elif camera["Projection"] == "Equirectangular":
+        across, down = np.radians(camera["Hor_range"]), np.radians(camera["Ver_range"])
+        phi, theta = across[1] - np.ptp(across) * u, down[1] - np.ptp(down) * v
+        x, y, z = -np.cos(theta) * np.sin(phi), np.sin(theta), -np.cos(theta) * np.cos(phi)
+    else:
+        assert camera["Projection"] == "Fisheye_Equidistant"
+        x, y = 2 * u - 1, 2 * v - 1
+        r = np.hypot(x, y)
+        theta = r * math.radians(camera["Fov"]) / 2
+        x, y, z = np.sin(theta) * x / r, -np.sin(theta) * y / r, -np.cos(theta)
+        depth = np.where(r < 1, depth, np.nan)
+    turn = Rotation.from_euler("xyz", camera["Rotation"], degrees=True).as_matrix()
+    return np.stack([x, y, z], axis=-1) * depth[..., None] @ turn.T + camera["Position"]
+
+
+@pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "wide", "panorama"])
+def test_opendibr_lifts_its_disparity_to_the_scene(dataset, tmp_path, source):
+    folder = exported(dataset, "opendibr", source, tmp_path)
+    content = json.loads((folder / "cameras.json").read_text())
+    viewport, *views = content["cameras"]
+    assert content["Axial_system"] == "OPENGL"
+    assert viewport["NameColor"] == "viewport"
+    np.testing.assert_allclose(viewport["Position"], [0.3, 0.1, 0.2], atol=1e-9)
+    assert len(views) == 12
+    for camera in views:
+        levels = images.read_image(folder / camera["NameDepth"]).channels["Y"]
+        assert (levels.dtype, camera["BitDepthDepth"], camera["BitDepthColor"]) == ("u2", 16, 8)
+        points = opengl_points(camera, of_disparity(levels, camera, 16))
+        seen = np.isfinite(points[..., 0])
+        assert seen.mean() > 0.7
+        on_sphere(points[seen], 1e-3)
+        ours = points[..., 0], -points[..., 2], points[..., 1]
+        picture = images.read_image(folder / camera["NameColor"]).channels
+        rgb = np.stack([picture[name] for name in "RGB"], axis=-1)
+        expected = colour_of(np.stack(ours, axis=-1))
+        np.testing.assert_allclose(rgb[seen], expected[seen], atol=1)
+
+
+@pytest.mark.parametrize("source", ["perspective", "shifted", "panorama", "half"])
+def test_miv_lifts_its_disparity_to_the_scene(dataset, tmp_path, source):
+    folder = exported(dataset, "miv", source, tmp_path)
+    content = json.loads((folder / "sequence.json").read_text())
+    assert content["sourceCameraNames"] == [camera["Name"] for camera in content["cameras"]]
+    for camera in content["cameras"]:
+        width, height = camera["Resolution"]
+        u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+        if camera["Projection"] == "Perspective":
+            (fx, fy), (cx, cy) = camera["Focal"], camera["Principle_point"]
+            x, y, z = np.ones_like(u), (cx - u * width) / fx, (cy - v * height) / fy
+        else:
+            across, down = np.radians(camera["Hor_range"]), np.radians(camera["Ver_range"])
+            phi, theta = across[1] - np.ptp(across) * u, down[1] - np.ptp(down) * v
+            x, y, z = np.cos(theta) * np.cos(phi), np.cos(theta) * np.sin(phi), np.sin(theta)
+        turn = Rotation.from_euler("ZYX", camera["Rotation"], degrees=True).as_matrix()
+        size = f"{width}x{height}"
+        frame = np.fromfile(folder / f"{camera['Name']}_depth_{size}_yuv420p16le.yuv", "<u2")
+        assert frame.size == width * height * 3 // 2
+        levels = frame[: width * height].reshape(height, width)
+        assert (levels > 0).all()
+        rays = np.stack([x, y, z], axis=-1) @ turn.T
+        points = rays * of_disparity(levels, camera, 16)[..., None] + camera["Position"]
+        on_sphere(points, 1e-3)
+        frame = np.fromfile(folder / f"{camera['Name']}_texture_{size}_yuv420p10le.yuv", "<u2")
+        luma = frame[: width * height].reshape(height, width)
+        expected = colour_of(points) / 255 @ [0.2126, 0.7152, 0.0722]
+        np.testing.assert_allclose((luma / 4 - 16) / 219, expected, atol=2e-3)
+        red = frame[width * height * 5 // 4 :].reshape(height // 2, width // 2) / 4 - 128
+        apart = colour_of(points)[..., 0] / 255 - expected
+        apart = apart.reshape(height // 2, 2, width // 2, 2).mean(axis=(1, 3))
+        np.testing.assert_allclose(red / 224 * 1.5748, apart, atol=3e-3)
+
+
+def test_pixels_without_a_source_and_misses_are_none_and_far_to_miv():
+    depth = np.array([[1.0, 2.0], [np.inf, np.nan]])
+    assert disparity.depth_range(depth) == (1, disparity.FARTHEST)
+    assert disparity.levels(depth, (1, 1000), 16, 1).tolist() == [[65535, 32735], [1, 0]]
+
+
+def test_opendibr_takes_lossless_h265_where_there_is_ffmpeg(dataset, tmp_path, monkeypatch):
+    lens = LightField.read(dataset / "perspective" / "lightfield.json").lens
+    settings = settings_of("opendibr").model_validate({"sources": ["views"], "format": "h265"})
+    if shutil.which("ffmpeg"):
+        assert settings.refusal(lens, True) is None
+        folder = exported(dataset, "opendibr", "perspective", tmp_path, format="h265")
+        camera = json.loads((folder / "cameras.json").read_text())["cameras"][1]
+        command = ["ffmpeg", "-v", "error", "-i", folder / camera["NameDepth"], "-f", "rawvideo"]
+        raw = subprocess.run([*command, "-"], capture_output=True, check=True).stdout
+        levels = np.frombuffer(raw, "<u2")[: 64 * 48].reshape(48, 64)
+        assert camera["BitDepthDepth"] == 12
+        on_sphere(opengl_points(camera, of_disparity(levels, camera, 12)), 0.01)
+    monkeypatch.setenv("PATH", "")
+    assert "ffmpeg must be installed" in settings.refusal(lens, True)
+    with pytest.raises(UserError, match="needs ffmpeg, which is not installed"):
+        exported(dataset, "opendibr", "perspective", tmp_path, format="h265")
+
+
 def pfm(path):
     kind, size, scale, body = path.read_bytes().split(b"\n", 3)
     assert (kind, scale) == (b"Pf", b"-1.0")
@@ -465,6 +576,10 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
         ),
         ("nerf_synthetic", "views", VIEWS, {}, "is no pinhole camera"),
         ("nerf_synthetic", "views", LENSES["shifted"], {}, "off centre"),
+        ("opendibr", "views", VIEWS | {"principal_point": [40, 48]}, {}, "axis off centre"),
+        ("opendibr", "again", VIEWS, {}, "holds no depth; give it format: exr"),
+        ("miv", "views", VIEWS, {}, "a fisheye of 180 degrees with longitude: .-90, 90."),
+        ("miv", "views", LENSES["perspective"] | {"resolution": [64, 47]}, {}, "use even sizes"),
         ("hci", "views", VIEWS, {}, "is no pinhole camera"),
         ("hci", "again", VIEWS, {}, "holds no depth; give it format: exr"),
         ("scannetpp", "views", VIEWS, {}, "no equidistant fisheye below 180 degrees"),

@@ -5,6 +5,7 @@ cannot open and how it can be had. What the options do is written in `lightfield
 """
 
 import math
+import shutil
 from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, model_validator
@@ -151,6 +152,35 @@ class NerfSynthetic(Developed):
         return _centred_pinhole(lens)
 
 
+class OpenDibr(Developed):
+    """What OpenDIBR plays."""
+
+    format: Literal["png", "h265"] = Field("png", description="h265 needs ffmpeg.")
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if isinstance(lens, Equidistant):
+            if lens.center != (lens.width / 2, lens.height / 2):
+                return "has its axis off centre, which OpenDIBR's fisheye cannot have"
+        elif not isinstance(lens, Rectilinear | Equirectangular):
+            return f"has a lens that OpenDIBR lacks; {TO_RECTILINEAR}, equidistant or a panorama"
+        if self.format == "h265" and shutil.which("ffmpeg") is None:
+            return "is to be H.265, for which ffmpeg must be installed; or give format: png"
+        odd = _odd(lens) if self.format == "h265" else None
+        return odd or (None if has_depth else NO_DEPTH)
+
+
+class Miv(Developed):
+    """A sequence of MPEG immersive video's test model."""
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if not isinstance(lens, Rectilinear | Equirectangular):
+            return (
+                "has a lens that MIV lacks; reproject to rectilinear, or to equirectangular, "
+                "a fisheye of 180 degrees with longitude: [-90, 90], and format: exr"
+            )
+        return _odd(lens) or (None if has_depth else NO_DEPTH)
+
+
 class Hci(Developed):
     """The layout of the HCI 4D light field benchmark, with disparities."""
 
@@ -189,6 +219,8 @@ class Exports(Settings):
     colmap: Colmap | None = None
     nerfstudio: Nerfstudio | None = None
     nerf_synthetic: NerfSynthetic | None = None
+    opendibr: OpenDibr | None = None
+    miv: Miv | None = None
     hci: Hci | None = None
     scannetpp: ScanNetPP | None = None
     poses_csv: PosesCsv | None = None
@@ -198,6 +230,13 @@ class Exports(Settings):
     def wanted(self) -> dict[str, Export]:
         """The exports that are asked for, by name."""
         return {name: export for name, export in self if export}
+
+
+def _odd(lens: Lens) -> str | None:
+    """Say that a lens's image has an odd side, where four pixels share a colour; None if not."""
+    if lens.width % 2 or lens.height % 2:
+        return "has an odd width or height, which YUV 4:2:0 cannot have; use even sizes"
+    return None
 
 
 def _centred_pinhole(lens: Lens) -> str | None:

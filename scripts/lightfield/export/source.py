@@ -14,7 +14,7 @@ from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.geometry.depth import distance_from_z, z_from_distance
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
-from lightfield.imaging.tonemap import to_8_bit, tone_map
+from lightfield.imaging.tonemap import encode_srgb, to_8_bit, tone_map
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -88,6 +88,14 @@ class Source:
         if self.suffix == ".png":
             return np.stack([image.channels[name] for name in "RGB"], axis=-1)
         return to_8_bit(tone_map(image.colour, self.exposure, self.reinhard))
+
+    def encoded(self, view: View) -> Floats:
+        """Return a view's sRGB-encoded colour, (height, width, 3), 0 to 1, not rounded."""
+        if self.suffix == ".png":
+            return self.colour(view) / 255
+        image = images.read_image(self.path(view))
+        developed = tone_map(image.colour, self.exposure, self.reinhard)
+        return np.asarray(encode_srgb(developed), np.float64)
 
     def valid(self, view: View) -> Bools:
         """Return which pixels (height, width) hold light: the lens has a ray there and a source."""

@@ -1,0 +1,33 @@
+"""Depth as normalised disparity, as players and coders of immersive video keep it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lightfield.export.source import Floats
+
+FARTHEST = 1000.0
+"""Metres: where nothing is hit, and what is farther, is taken to be here."""
+
+
+def depth_range(depth: Floats) -> tuple[float, float]:
+    """Return the nearest and the farthest depth in metres of a view, NaN being unknown."""
+    known = np.minimum(depth[depth > 0], FARTHEST)
+    near = float(known.min(initial=FARTHEST))
+    # A plane seen head on has one depth, and a range needs two.
+    return near, max(float(known.max(initial=near)), 1.001 * near)
+
+
+def levels(
+    depth: Floats, limits: tuple[float, float], bits: int, lowest: int
+) -> NDArray[np.uint16]:
+    """Return normalised disparity in integers of so many ``bits``; 0 where depth is unknown.
+
+    It is (1 / depth − 1 / far) / (1 / near − 1 / far), 0 to 1, of the ``limits`` near and far. What
+    is known has the level ``lowest`` at least.
+    """
+    near, far = limits
+    with np.errstate(invalid="ignore", divide="ignore"):
+        disparity = (1 / depth - 1 / far) / (1 / near - 1 / far)
+    highest = 2**bits - 1
+    found = np.clip(np.round(disparity * highest), lowest, highest)
+    return np.where(depth > 0, found, 0).astype(np.uint16)

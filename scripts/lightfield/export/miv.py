@@ -1,0 +1,77 @@
+"""A sequence of MPEG immersive video's test model, of one frame, to be coded by TMIV.
+
+A JSON of cameras, and for each ``<name>_texture_<W>x<H>_yuv420p10le.yuv`` and
+``<name>_depth_<W>x<H>_yuv420p16le.yuv``: normalised disparity, of Z for perspective views and of
+distance for panoramas; level 0 is none. Axes are OMAF's: x forward, y left, z up, and a rotation is
+yaw, pitch and roll in degrees. Source: TMIV's sequence configurations.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightfield.core.files import write_json
+from lightfield.core.progress import Progress
+from lightfield.dataset.exports import Miv
+from lightfield.export import yuv
+from lightfield.export.disparity import depth_range, levels
+from lightfield.export.opendibr import projection
+from lightfield.export.source import Floats, Source
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.rotations import matrix_to_euler
+
+COLOUR_BITS, DEPTH_BITS = 10, 16
+
+# Columns: what a camera of OMAF's has as forward, left and up, in ours (looks along −z, y up).
+FROM_OMAF = np.array([[0.0, -1, 0], [0, 0, 1], [-1, 0, 0]])
+
+
+def export(source: Source, settings: Miv, folder: Path) -> None:
+    """Write a source's views into ``folder``."""
+    lens = source.lens
+    meaning = "z" if isinstance(lens, Rectilinear) else "distance"
+    size = f"{lens.width}x{lens.height}"
+    views = source.lightfield.views
+    found = []
+    progress = Progress(len(views), "miv", "views")
+    for view in views:
+        depth = source.depth(view, meaning)
+        limits = depth_range(depth)
+        texture = yuv.of_colour(source.encoded(view), COLOUR_BITS)
+        yuv.write(folder / f"{view.name}_texture_{size}_yuv420p{COLOUR_BITS}le.yuv", texture)
+        geometry = yuv.of_levels(levels(depth, limits, DEPTH_BITS, 1), DEPTH_BITS)
+        yuv.write(folder / f"{view.name}_depth_{size}_yuv420p{DEPTH_BITS}le.yuv", geometry)
+        found.append(
+            {
+                "Name": view.name,
+                "Position": view.matrix[:3, 3].tolist(),
+                "Rotation": rotation(view.matrix),
+                "Depth_range": list(limits),
+                "Resolution": [lens.width, lens.height],
+                **projection(lens),
+                "BitDepthColor": COLOUR_BITS,
+                "BitDepthDepth": DEPTH_BITS,
+                "ColorSpace": "YUV420",
+                "DepthColorSpace": "YUV420",
+                "HasInvalidDepth": True,
+            }
+        )
+        progress.done()
+    content: dict[str, Any] = {
+        "Version": "3.0",
+        "Content_name": source.dataset.name,
+        "BoundingBox_center": source.lightfield.matrices[:, :3, 3].mean(axis=0).tolist(),
+        "Fps": 30,
+        "Frames_number": 1,
+        "lengthsInMeters": True,
+        "sourceCameraNames": [view.name for view in views],
+        "cameras": found,
+    }
+    write_json(folder / "sequence.json", content)
+
+
+def rotation(matrix: Floats) -> list[float]:
+    """Return yaw, pitch and roll in degrees of a camera-to-world matrix (4, 4)."""
+    roll, pitch, yaw = np.degrees(matrix_to_euler(matrix[:3, :3] @ FROM_OMAF)).tolist()
+    return [yaw, pitch, roll]

@@ -1,0 +1,107 @@
+"""What OpenDIBR plays: a JSON of cameras, and for each its colour and its normalised disparity.
+
+Both are PNG (8 and 16 bit) or H.265 (10 and 12 bit, lossless). Depth is Z for perspective views and
+distance for fisheyes and panoramas. Poses are in OpenGL's axes, y up: world coordinates (x, y, z)
+are (x, z, −y) there. Source: OpenDIBR's ioHelper.h and vertex.fs.
+"""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightfield.core.files import write_json
+from lightfield.core.progress import Progress
+from lightfield.dataset.exports import OpenDibr
+from lightfield.export import cameras, yuv
+from lightfield.export.disparity import FARTHEST, depth_range, levels
+from lightfield.export.source import Floats, Source
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.rotations import matrix_to_euler
+from lightfield.imaging import images
+
+TO_OPENGL = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+BITS = {"png": (8, 16), "h265": (10, 12)}
+
+
+def export(source: Source, settings: OpenDibr, folder: Path) -> None:
+    """Write a source's views into ``folder``."""
+    lens = source.lens
+    meaning = "z" if isinstance(lens, Rectilinear) else "distance"
+    colour_bits, depth_bits = BITS[settings.format]
+    suffix = ".png" if settings.format == "png" else ".mp4"
+    views = source.lightfield.views
+    found: list[dict[str, Any]] = [viewport(source.lightfield.matrices)]
+    progress = Progress(len(views), "opendibr", "views")
+    for view in views:
+        depth = source.depth(view, meaning)
+        limits = depth_range(depth)
+        disparity = levels(depth, limits, depth_bits, 0)
+        names = [f"{view.name}_{kind}{suffix}" for kind in ("texture", "depth")]
+        texture, map_of_depth = (folder / name for name in names)
+        if settings.format == "png":
+            source.write_image(view, texture)
+            images.write_png(map_of_depth, disparity)
+        else:
+            size = (lens.width, lens.height)
+            frame = yuv.of_colour(source.encoded(view), colour_bits)
+            yuv.write_hevc(texture, frame, size, colour_bits)
+            yuv.write_hevc(map_of_depth, yuv.of_levels(disparity, depth_bits), size, depth_bits)
+        found.append(
+            {
+                "NameColor": names[0],
+                "NameDepth": names[1],
+                **pose(view.matrix),
+                "Depth_range": list(limits),
+                "Resolution": [lens.width, lens.height],
+                **projection(lens),
+                "BitDepthColor": colour_bits,
+                "BitDepthDepth": depth_bits,
+            }
+        )
+        progress.done()
+    write_json(folder / "cameras.json", {"Axial_system": "OPENGL", "cameras": found})
+
+
+def pose(matrix: Floats) -> dict[str, list[float]]:
+    """Return the keys of a camera-to-world matrix (4, 4): metres, and XYZ Euler degrees."""
+    angles = matrix_to_euler(TO_OPENGL @ matrix[:3, :3])
+    return {
+        "Position": (TO_OPENGL @ matrix[:3, 3]).tolist(),
+        "Rotation": np.degrees(angles).tolist(),
+    }
+
+
+def projection(lens: Lens) -> dict[str, Any]:
+    """Return the keys of a lens; of a panorama's longitudes those to the left are positive."""
+    if isinstance(lens, Rectilinear):
+        focal = list(cameras.focal_pixels(lens))
+        return {"Projection": "Perspective", "Focal": focal, "Principle_point": list(lens.center)}
+    if isinstance(lens, Equirectangular):
+        (west, east), latitude = np.degrees(lens.longitude), np.degrees(lens.latitude)
+        return {
+            "Projection": "Equirectangular",
+            "Hor_range": [float(-east), float(-west)],
+            "Ver_range": latitude.tolist(),
+        }
+    assert isinstance(lens, Equidistant)
+    return {"Projection": "Fisheye_Equidistant", "Fov": math.degrees(lens.fov)}
+
+
+def viewport(matrices: Floats) -> dict[str, Any]:
+    """Return the camera that is shown at first: in the rig's middle, turned as the first view."""
+    middle = matrices[0].copy()
+    middle[:3, 3] = matrices[:, :3, 3].mean(axis=0)
+    return {
+        "NameColor": "viewport",
+        **pose(middle),
+        "Depth_range": [0.1, FARTHEST],
+        "Resolution": [1920, 1080],
+        "Projection": "Perspective",
+        "Focal": [960.0, 960.0],
+        "Principle_point": [960.0, 540.0],
+    }

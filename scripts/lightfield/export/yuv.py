@@ -1,0 +1,56 @@
+"""Raw planar video frames, 4:2:0, little-endian 16-bit samples: what ffmpeg calls yuv420p10le."""
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import atomic_path
+from lightfield.export.source import Floats
+
+
+def of_colour(encoded: Floats, bits: int) -> bytes:
+    """Return a frame of sRGB-encoded colour (h, w, 3), 0 to 1, with even sides.
+
+    Y'CbCr in the narrow range; a chroma sample is the mean of four. Source: ITU-R BT.709, 3 and 4.
+    """
+    red, green, blue = np.moveaxis(encoded, -1, 0)
+    luma = 0.2126 * red + 0.7152 * green + 0.0722 * blue
+    unit = 2 ** (bits - 8)
+    height, width = luma.shape
+    planes = [(16 + 219 * luma) * unit]
+    for value, scale in ((blue, 1.8556), (red, 1.5748)):
+        chroma = (128 + 224 * (value - luma) / scale) * unit
+        planes.append(chroma.reshape(height // 2, 2, width // 2, 2).mean(axis=(1, 3)))
+    return b"".join(np.round(plane).astype("<u2").tobytes() for plane in planes)
+
+
+def of_levels(levels: NDArray[np.uint16], bits: int) -> bytes:
+    """Return a frame whose luma is ``levels`` (h, w), with even sides, and which has no colour."""
+    grey = np.full(levels.size // 2, 2 ** (bits - 1), "<u2")
+    return levels.astype("<u2").tobytes() + grey.tobytes()
+
+
+def write(path: Path, frame: bytes) -> None:
+    """Write a file of one frame."""
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(frame)
+
+
+def write_hevc(path: Path, frame: bytes, size: tuple[int, int], bits: int) -> None:
+    """Write one frame as lossless H.265 with ffmpeg; raises `UserError` where it cannot."""
+    pixels = ["-pix_fmt", f"yuv420p{bits}le"]
+    given = ["-f", "rawvideo", *pixels, "-s", f"{size[0]}x{size[1]}", "-i", "-"]
+    coded = ["-c:v", "libx265", "-x265-params", "lossless=1:log-level=none:pools=1:info=0"]
+    exact = ["-fflags", "+bitexact", "-flags:v", "+bitexact", *pixels]
+    with atomic_path(path) as temporary:
+        command = ["ffmpeg", "-v", "error", "-y", *given, *coded, *exact, str(temporary)]
+        try:
+            result = subprocess.run(command, input=frame, capture_output=True, check=False)
+        except FileNotFoundError:
+            raise UserError(f"{path}: H.265 needs ffmpeg, which is not installed") from None
+        if result.returncode:
+            problem = " ".join(result.stderr.decode(errors="replace").split())
+            raise UserError(f"{path}: ffmpeg cannot write H.265 of {bits} bits: {problem}")
