@@ -7,8 +7,9 @@ magnified by 3. CPU time a view is reading, resampling and writing, EXR to EXR.
 
 Batches (--batch N): N views of 2048 x 2048 pixels, half R G B and Z, to EXR with depth at the same
 size and to PNG at an eighth, by scripts/reproject.py with its default filter and with st_warp, by a
-bare read and write of the same files, and by --peer. All of a process's CPU time counts, divided
-by its views.
+bare read and write of the same files, and by --peer. All CPU time counts, of the start and of the
+lens map too, divided by the views. Ours is compressed at zlib's level 4; SILVR's tool has 9 in its
+source, with which most of its time goes into a hundredth of the bytes.
 
 --peer PATH adds a program that takes the flags of SILVR's reprojection tool. Writes
 reprojection.csv, reprojection_batches.csv and reprojection.svg and .png into the output folder.
@@ -388,9 +389,9 @@ def measure_batches(arguments: argparse.Namespace, folder: Path) -> list[dict[st
         ) -> float:
             made = folder / f"{filter_name}.npy"
             start = [sys.executable, str(SCRIPTS / "lens_map.py"), str(made), *CAMERA, *size]
-            cpu_of([*start, "--input-cfg", str(config), "--filter", filter_name])
+            cpu = cpu_of([*start, "--input-cfg", str(config), "--filter", filter_name])
             program = [sys.executable, str(SCRIPTS / "reproject.py"), "--lens-map", str(made)]
-            return run_batch([*program, "--filter", filter_name], folder, flags)
+            return cpu + run_batch([*program, "--filter", filter_name], folder, flags)
 
         programs = {
             f"ours, {DEFAULT_FILTER}": lambda ours=ours: ours(DEFAULT_FILTER),

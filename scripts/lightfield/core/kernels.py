@@ -1,10 +1,20 @@
 """Loops over pixels, compiled by numba."""
 
+import sys
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numba
 from numba.extending import register_jitable
+
+# When this module of numba's is imported, by the first kernel that runs, it looks for scipy's BLAS,
+# which no kernel calls and which takes longer to import than numba. So it does not find it.
+_BLAS = "scipy.linalg.cython_blas"
+if _BLAS not in sys.modules:
+    sys.modules[_BLAS] = None  # type: ignore[assignment]
+    import numba.np.arraymath
+
+    del sys.modules[_BLAS]
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 

@@ -62,6 +62,7 @@ class CubeMap(Lens):
 
     def _rays(self, x: Array, y: Array) -> Array:
         size = self.height
+        x, y = np.broadcast_arrays(x, y)
         with np.errstate(invalid="ignore"):
             inside = (x >= 0) & (x <= self.width) & (y >= 0) & (y <= size)
         index = np.minimum(np.where(inside, x, 0) // size, 5).astype(np.intp)

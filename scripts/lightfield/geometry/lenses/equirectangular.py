@@ -84,12 +84,11 @@ class Equirectangular(Lens):
         latitude = north - (north - south) * (y / self.height)
         with np.errstate(invalid="ignore"):
             radius = np.maximum(np.cos(latitude), 0)
-            ray = np.stack(
-                [radius * np.sin(longitude), np.sin(latitude), -radius * np.cos(longitude)],
-                axis=-1,
-            )
-            ray[~((np.abs(latitude) <= math.pi / 2 + ANGLE_SLACK) & np.isfinite(x))] = np.nan
-        return np.asarray(ray)
+            right, ahead = radius * np.sin(longitude), -radius * np.cos(longitude)
+            ray = np.stack([right, np.broadcast_to(np.sin(latitude), right.shape), ahead])
+            outside = ~((np.abs(latitude) <= math.pi / 2 + ANGLE_SLACK) & np.isfinite(x))
+        np.copyto(ray, np.nan, where=outside)
+        return np.moveaxis(ray, 0, -1)
 
     def _pixels(self, rays: Array) -> Array:
         (west, east), (south, north) = self.longitude, self.latitude
