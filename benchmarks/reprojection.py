@@ -9,7 +9,7 @@ Batches (--batch N): N views of 2048 x 2048 pixels, half R G B and Z, to EXR wit
 size and to PNG at an eighth, by scripts/reproject.py with its default filter and with st_warp, by a
 bare read and write of the same files, and by --peer. All CPU time counts, of the start and of the
 lens map too, divided by the views. Ours is compressed at zlib's level 4; SILVR's tool has 9 in its
-source, with which most of its time goes into a hundredth of the bytes.
+source, with which most of its time goes into 3 % fewer bytes.
 
 --peer PATH adds a program that takes the flags of SILVR's reprojection tool. Writes
 reprojection.csv, reprojection_batches.csv and reprojection.svg and .png into the output folder.
