@@ -59,9 +59,7 @@ def lift(source: Source, count: int | None = None, voxel: float | None = None) -
             kept = kept.chosen(_one_a_voxel(kept.positions, voxel))
         progress.done()
     assert kept
-    if count and len(kept.positions) > count:
-        kept = kept.chosen(_one_a_voxel(kept.positions, _voxel_for(kept.positions, count)))
-    return kept
+    return kept.chosen(evenly(kept.positions, count)) if count else kept
 
 
 def observations(source: Source, points: Points) -> list[Observations]:
@@ -102,6 +100,13 @@ def _joined(parts: Sequence[Points]) -> Points:
         np.concatenate([part.colours for part in parts]),
         np.concatenate([part.normals for part in parts]),
     )
+
+
+def evenly(positions: Floats, count: int) -> NDArray[np.intp]:
+    """Return the indices of at most ``count`` of the ``positions`` (n, 3), evenly spread."""
+    if len(positions) <= count:
+        return np.arange(len(positions))
+    return _one_a_voxel(positions, _voxel_for(positions, count))
 
 
 def _one_a_voxel(positions: Floats, voxel: float) -> NDArray[np.intp]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.dataset.lightfield import LightField
+from lightfield.export.points import evenly
 from lightfield.geometry.depth import distance_from_z
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
@@ -37,8 +38,8 @@ LIGHT_QUALITY = 88
 # Views are sampled for epipolar-plane images at this size, which their columns have too.
 EPIPOLAR_SIDE = 512
 MOST_ROWS = 48
-# Of the scene, as the views' depth shows it.
-POINTS = 5000
+# Points of the scene, as the views' depth has them, and of how many they are chosen.
+POINTS, CANDIDATES = 8_000, 30_000
 # A view's noise is measured in its middle.
 NOISE_SIDE = 512
 
@@ -198,26 +199,30 @@ def _points(
     """Return some of the points that views see: places and sRGB colours, packed.
 
     ``distances`` (views, height, width) are along ``rays`` (height, width, 3), ``colours`` (views,
-    height, width, 3). Places are 16 bits between the corners of the box around all of them.
+    height, width, 3). The farther from the cameras, the farther apart the points are. Places are
+    16 bits between the corners of the box around all of them.
     """
     view, row, column = np.nonzero(np.isfinite(distances) & (distances > 0))
     if not len(view):
         return None
-    picked = np.linspace(0, len(view) - 1, min(len(view), POINTS)).astype(int)
+    picked = np.linspace(0, len(view) - 1, min(len(view), CANDIDATES)).astype(int)
     at = view[picked], row[picked], column[picked]
     turned = np.einsum("nij,nj->ni", matrices[at[0], :3, :3], rays[at[1:]])
     places = matrices[at[0], :3, 3] + distances[at][:, None] * turned
     # The few that are farthest would cost the others their precision.
-    away = np.linalg.norm(places - matrices[:, :3, 3].mean(axis=0), axis=1)
-    near = away <= np.percentile(away, 99)
-    low = places[near].min(axis=0)
-    side = max(float((places[near] - low).max()), 1e-6)
-    steps = np.round((places[near] - low) / side * 65535).astype("<u2")
+    way = places - matrices[:, :3, 3].mean(axis=0)
+    away = np.linalg.norm(way, axis=1)
+    near = np.flatnonzero(away <= np.percentile(away, 98))
+    scale = np.log1p(away[near] / (0.2 * np.median(away))) / np.maximum(away[near], 1e-9)
+    kept = near[evenly(way[near] * scale[:, None], POINTS)]
+    low = places[kept].min(axis=0)
+    side = max(float((places[kept] - low).max()), 1e-6)
+    steps = np.round((places[kept] - low) / side * 65535).astype("<u2")
     return {
         "low": _rounded(low),
         "side": side,
         "places": packed_bytes(steps.tobytes()),
-        "colours": packed_bytes(colours[at][near].tobytes()),
+        "colours": packed_bytes(colours[at][kept].tobytes()),
     }
 
 

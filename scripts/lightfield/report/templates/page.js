@@ -318,11 +318,13 @@ function startDepthScale() {
 
 // The rig in 3D.
 
+// Focal length of the picture of the rig, in lengths of its shorter side.
+const SPREAD = 1.75;
 const HOME = { turn: 0.55, rise: 0.4, zoom: 1 };
 // Beyond this many cameras, lines instead of frusta keep it fluid.
 const MOST_FRUSTA = 700;
 
-const rig = { canvas: element("rig"), ...HOME, hover: null, screen: [], pointers: new Map(), moved: 0, points: scenePoints(), showsPoints: true };
+const rig = { canvas: element("rig"), ...HOME, hover: null, screen: [], pointers: new Map(), moved: 0, points: [], showsPoints: true };
 
 function measureRig() {
   const points = [...DATA.views.map((view) => view.at), ...DATA.outline.flat()];
@@ -340,7 +342,7 @@ function projection(width, height) {
   const ahead = [-sine * level, cosine * level, -rise];
   const up = [-sine * rise, cosine * rise, level];
   const distance = (4 * rig.extent) / rig.zoom;
-  const scale = 1.75 * Math.min(width, height);
+  const scale = SPREAD * Math.min(width, height);
   return (point) => {
     const way = minus(point, rig.center);
     const depth = dot(way, ahead) + distance;
@@ -355,19 +357,23 @@ function scenePoints() {
   const { low, side } = DATA.points;
   const steps = new Uint16Array(bytesOf(DATA.points.places).buffer);
   const colours = bytesOf(DATA.points.colours);
-  return Array.from({ length: steps.length / 3 }, (_, number) => ({
-    at: low.map((value, axis) => value + (steps[3 * number + axis] / 65535) * side),
-    colour: `rgb(${colours.subarray(3 * number, 3 * number + 3).join(" ")})`,
-  }));
+  return Array.from({ length: steps.length / 3 }, (_, number) => {
+    const at = low.map((value, axis) => value + (steps[3 * number + axis] / 65535) * side);
+    const colour = `rgb(${colours.subarray(3 * number, 3 * number + 3).join(" ")})`;
+    return { at, colour, size: 0.012 * (rig.extent + Math.hypot(...minus(at, rig.center))) };
+  });
 }
 
-function drawPoints(context, project) {
-  const nearest = (0.4 * 4 * rig.extent) / rig.zoom;
-  for (const { at, colour } of rig.points) {
-    const [x, y, depth] = project(at);
+// From far to near, each a square that grows with its distance from the rig, as their spacing does.
+function drawPoints(context, project, scale) {
+  const nearest = (0.5 * 4 * rig.extent) / rig.zoom;
+  const drawn = rig.points.map((point) => [...project(point.at), point]);
+  drawn.sort((a, b) => b[2] - a[2]);
+  for (const [x, y, depth, { colour, size }] of drawn) {
     if (depth < nearest) continue;
+    const side = clamp((size * scale) / depth, 1, 3.5);
     context.fillStyle = colour;
-    context.fillRect(x - 1, y - 1, 2, 2);
+    context.fillRect(x - side / 2, y - side / 2, side, side);
   }
 }
 
@@ -398,7 +404,7 @@ function drawAxes(context, project, height) {
     const unit = [0, 0, 0];
     unit[axis] = 0.01 * rig.extent;
     const tip = project(along(rig.center, unit, 1));
-    const length = 28 / ((0.01 * 1.75 * Math.min(rig.canvas.clientWidth, height)) / (4 / rig.zoom));
+    const length = 28 / ((0.01 * SPREAD * Math.min(rig.canvas.clientWidth, height)) / (4 / rig.zoom));
     const [x, y] = [(tip[0] - origin[0]) * length, (tip[1] - origin[1]) * length];
     context.strokeStyle = context.fillStyle = themed("--soft");
     context.beginPath();
@@ -434,7 +440,7 @@ const drawRig = onceAFrame(() => {
   const [width, height] = [rig.canvas.clientWidth, rig.canvas.clientHeight];
   const project = projection(width, height);
   drawGround(context, project);
-  if (rig.showsPoints) drawPoints(context, project);
+  if (rig.showsPoints) drawPoints(context, project, SPREAD * Math.min(width, height));
   rig.screen = DATA.views.map((view) => project(view.at));
   context.strokeStyle = themed("--faint");
   context.beginPath();
@@ -514,6 +520,7 @@ const spread = (pointers) => {
 
 function startRig() {
   measureRig();
+  rig.points = scenePoints();
   const { canvas, pointers } = rig;
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
