@@ -114,7 +114,26 @@ def compare(
     """Compare an image, (h, w, 3) scene-linear with depth (h, w), with its reference."""
     mask = reference.mask
     shown, truth = (developed(x, reference) for x in (colour, reference.colour))
-    similarity = structural_similarity(
+    with np.errstate(divide="ignore"):
+        psnr = peak_signal_noise_ratio(truth[mask], shown[mask], data_range=1.0)
+    return Errors(
+        relative_mse=relative_mse(colour, reference),
+        relative_mse_whole=relative_mse(colour, reference, left_out=0),
+        psnr=float(psnr),
+        ssim=float(ssim_map(truth, shown)[mask].mean()),
+        flip=float(flip_map(truth, shown)[mask].mean()),
+        depth=None
+        if depth is None or reference.depth is None
+        else depth_error(depth[mask], reference.depth[mask]),
+    )
+
+
+def ssim_map(truth: Array, shown: Array) -> Array:
+    """Return the structural similarity (h, w, 3) of sRGB pictures in [0, 1]; 1 is equal.
+
+    Source: Wang et al. 2004, with its Gaussian window of 1.5 pixels.
+    """
+    similarity: Array = structural_similarity(
         truth,
         shown,
         data_range=1.0,
@@ -124,21 +143,15 @@ def compare(
         use_sample_covariance=False,
         full=True,
     )[1]
-    flip = flip_evaluator.evaluate(
+    return similarity
+
+
+def flip_map(truth: Array, shown: Array) -> Array:
+    """Return the FLIP (h, w) of sRGB pictures in [0, 1]; 0 is equal. Source: Andersson 2020."""
+    flip: Array = flip_evaluator.evaluate(
         truth.astype(np.float32), shown.astype(np.float32), "LDR", applyMagma=False
     )[0]
-    with np.errstate(divide="ignore"):
-        psnr = peak_signal_noise_ratio(truth[mask], shown[mask], data_range=1.0)
-    return Errors(
-        relative_mse=relative_mse(colour, reference),
-        relative_mse_whole=relative_mse(colour, reference, left_out=0),
-        psnr=float(psnr),
-        ssim=float(similarity[mask].mean()),
-        flip=float(flip.reshape(mask.shape)[mask].mean()),
-        depth=None
-        if depth is None or reference.depth is None
-        else depth_error(depth[mask], reference.depth[mask]),
-    )
+    return flip.reshape(truth.shape[:2])
 
 
 def relative_mse(

@@ -1,0 +1,127 @@
+"""Renders beside the truth: errors that are known beforehand, and none of the truth itself."""
+
+import csv
+import math
+import shutil
+
+import numpy as np
+import pytest
+from sphere import write_views
+
+from lightfield.core.errors import UserError
+from lightfield.dataset.lightfield import LightField
+from lightfield.export.source import Source
+from lightfield.imaging import images
+from lightfield.measurement import evaluation
+
+RIG = {"type": "plane", "cameras": [2, 2], "size": 0.4, "split": "odd"}
+LENSES = {
+    "perspective": {"lens": "rectilinear", "fov": 70, "resolution": [64, 48]},
+    "fisheye": {"lens": "equidistant", "fov": 180, "resolution": [48, 48]},
+}
+TESTS = ("view_0001f", "view_0003f")
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("evaluate") / "dataset"
+    for name, camera in LENSES.items():
+        write_views(folder / name, camera, RIG)
+        for view in LightField.read(folder / name / "lightfield.json").views:
+            size = camera["resolution"][::-1]
+            up = {channel: np.full(size, channel == "B", np.float32) for channel in "RGB"}
+            images.write_exr(folder / name / "normal" / f"{view.name}.exr", up)
+    return folder
+
+
+def rows_of(dataset, name, shown, mask=True, view="view_0001f"):
+    """Return the errors of a render by region."""
+    source = Source(dataset, name, ".exr")
+    found = next(each for each in source.lightfield.views if each.name == view)
+    rendered = evaluation.rendered(shown, source)
+    true = evaluation.truth(source, found, shown)
+    counted = np.broadcast_to(mask, rendered.colour.shape[:2])
+    parts = evaluation.regions(source, found, counted, true.depth)
+    return dict(evaluation.errors(rendered, true, parts))
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_the_truth_scores_perfectly(dataset, tmp_path, name, run_program):
+    renders = tmp_path / "renders"
+    shutil.copytree(dataset / name, renders)
+    source = Source(dataset, name, ".exr")
+    second = next(view for view in source.lightfield.views if view.name == TESTS[1])
+    (renders / f"{second.name}.exr").unlink()
+    images.write_png(renders / f"{second.name}.png", source.colour(second))
+    words = [renders, "--dataset", dataset, "--source", name, "--output", tmp_path / "page"]
+    result = run_program("evaluate.py", *words)
+    assert "LPIPS is left out" in result.stdout
+    with (tmp_path / "page" / "evaluation.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert {row["view"] for row in rows} == {*TESTS, "mean"}
+    assert {"all", "centre", "rim"} <= {row["region"] for row in rows}
+    for row in rows:
+        assert (row["psnr"], row["ssim"], row["flip"], row["normal"]) == (
+            "inf",
+            "1.0",
+            "0.0",
+            "0.0",
+        )
+        assert row["depth"] == ("" if row["view"] == second.name else "0.0")
+    html = (tmp_path / "page" / "index.html").read_text()
+    assert all(name in html for name in TESTS)
+    assert html.count("data:image/webp") == 2
+    assert "train" not in html
+
+
+def test_errors_are_those_that_were_made(dataset, tmp_path):
+    path = dataset / "perspective" / "view_0001f.exr"
+    image = images.read_image(path)
+    source = Source(dataset, "perspective", ".exr")
+    view = source.lightfield.views[1]
+    pixels = source.colour(view)
+    pixels[:, :32] += 10
+    shown = tmp_path / "view_0001f.png"
+    images.write_png(shown, pixels)
+    left = np.zeros((48, 64), bool)
+    left[:, :32] = True
+    expected = -20 * math.log10(10 / 255)
+    assert rows_of(dataset, "perspective", shown, left)["all"]["psnr"] == pytest.approx(expected)
+    assert rows_of(dataset, "perspective", shown, ~left)["all"]["psnr"] == math.inf
+    both = rows_of(dataset, "perspective", shown)["all"]
+    assert both["psnr"] == pytest.approx(expected + 10 * math.log10(2))
+    assert both["ssim"] < 1
+    assert both["flip"] > 0
+    assert both["pixels"] == 48 * 64
+    deeper = image.channels | {"Z": image.channels["Z"] * np.float32(1.25)}
+    images.write_exr(tmp_path / "view_0001f.exr", deeper)
+    turned = {"R": np.full((48, 64), 1, np.float32), "B": np.full((48, 64), 1, np.float32)}
+    turned["G"] = np.zeros((48, 64), np.float32)
+    images.write_exr(tmp_path / "normal" / "view_0001f.exr", turned)
+    found = rows_of(dataset, "perspective", tmp_path / "view_0001f.exr")["all"]
+    assert found["psnr"] == math.inf
+    assert found["depth"] == pytest.approx(0.25, abs=1e-6)
+    assert found["normal"] == pytest.approx(45)
+
+
+def test_regions_are_where_the_lens_sees_and_where_depth_jumps(dataset):
+    source = Source(dataset, "fisheye", ".exr")
+    depth = np.ones((48, 48))
+    depth[:, 24:], depth[:10] = 2, np.inf
+    whole = np.ones((48, 48), bool)
+    parts = evaluation.regions(source, source.lightfield.views[1], whole, depth)
+    assert parts["all"].sum() == pytest.approx(math.pi * 24**2, rel=0.02)
+    assert parts["centre"].sum() == pytest.approx(math.pi * 12**2, rel=0.02)
+    assert (parts["centre"] ^ parts["rim"] == parts["all"]).all()
+    assert np.flatnonzero(parts["edges"][30]).tolist() == [22, 23, 24, 25]
+    assert np.flatnonzero(parts["background"][:, 24]).tolist() == list(range(10))
+
+
+def test_what_is_missing_or_of_another_size_is_named(dataset, tmp_path, run_program):
+    words = ["--dataset", dataset, "--source", "perspective", "--output", tmp_path / "page"]
+    result = run_program("evaluate.py", tmp_path, *words, check=False)
+    assert result.returncode == 1
+    assert "has no view_0001f.png or .exr, which is a view to test with" in result.stderr
+    images.write_png(tmp_path / "small.png", np.zeros((4, 6, 3), np.uint8))
+    with pytest.raises(UserError, match="is 6 × 4, but the dataset's views are 64 × 48"):
+        evaluation.rendered(tmp_path / "small.png", Source(dataset, "perspective", ".exr"))
