@@ -24,7 +24,8 @@ shell.prefix(
 
 from lightfield.core.failures import failure_report
 from lightfield.core.files import read_json, set_aside
-from lightfield.dataset import ledger
+from lightfield.core.memory import available
+from lightfield.dataset import ledger, memory
 from lightfield.dataset.config import accept_blend, load_config, scene_path
 from lightfield.dataset.dataset import PICTURES, PLOTS, load_datasets, scene_datasets
 from lightfield.dataset.exports import MANIFEST, VIEWS
@@ -75,6 +76,7 @@ BROKEN = {}
 # Where that is moved to, for nobody to lose anything.
 REMOVED = f"{WORK}/removed"
 SUMS = f"{WORK}/{ledger.NAME}"
+MEMORY = available()
 GPUS = 0 if SETTINGS.device in ("auto", "cpu") else 1
 
 
@@ -241,9 +243,22 @@ def checked_blend(wildcards):
 
 
 def shard_threads(wildcards):
-    """Give each shard one core, or more where there are fewer shards than cores."""
-    total = sum(len(dataset.shards) for dataset in CHOSEN)
-    return max(1, workflow.cores // total) if workflow.cores else 1
+    """Give each shard so many cores that what runs at once fits this machine's memory."""
+    shards = sum(len(dataset.shards) for dataset in CHOSEN)
+    need = dataset_of(wildcards).view_memory_bytes
+    return memory.threads(workflow.cores or 1, shards, need, MEMORY)
+
+
+def shard_memory(wildcards, attempt):
+    """Ask for the memory in MB that a shard takes, and for more where that was too little."""
+    return math.ceil(dataset_of(wildcards).view_memory_bytes / 1e6) * attempt
+
+
+def panorama_memory(wildcards, attempt):
+    """Ask for the same for the panorama."""
+    dataset = dataset_of(wildcards)
+    need = dataset.memory_bytes(dataset.panorama_width**2 // 2)
+    return math.ceil(need / 1e6) * attempt
 
 
 def shard_minutes(wildcards):

@@ -47,7 +47,7 @@ rule render:
         ENVIRONMENT
     threads: shard_threads
     resources:
-        mem_mb=6000,
+        mem_mb=shard_memory,
         runtime=shard_minutes,
         gpu=GPUS,
     params:

@@ -45,7 +45,7 @@ rule render_panorama:
     conda:
         ENVIRONMENT
     resources:
-        mem_mb=6000,
+        mem_mb=panorama_memory,
         runtime=120,
         gpu=GPUS,
     params:

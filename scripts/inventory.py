@@ -12,7 +12,7 @@ import bpy
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.rendering import blend_file, pruning
+from lightfield.rendering import blend_file, pruning, scene_memory
 from lightfield.rendering.inventory import FEATURES, inventory
 
 
@@ -44,7 +44,11 @@ def main() -> None:
             file=sys.stderr,
         )
     leave_out = pruning.left_out(found)
-    write_json(arguments.output, {**found, "left_out": leave_out})
+    found["left_out"] = leave_out
+    # Of what is open here nothing is left, for it to be rendered in the same memory.
+    blend_file.new_scene()
+    found["memory_bytes"] = scene_memory.measure(arguments.blend, found)
+    write_json(arguments.output, found)
     print(
         f"{found['objects']} objects, {found['triangles']} triangles, with instances "
         f"{found['triangles_with_instances']}; {', '.join(n for n in FEATURES if found[n])}"

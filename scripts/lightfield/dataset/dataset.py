@@ -6,7 +6,7 @@ import os
 import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
 from statistics import fmean
@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken
-from lightfield.dataset import config, passes, published, shard_files
+from lightfield.dataset import config, memory, passes, published, shard_files
 from lightfield.dataset.config import (
     CHOSEN,
     Configuration,
@@ -466,6 +466,23 @@ class Dataset:
             for reprojection in self.reprojections.values()
         )
 
+    def memory_bytes(self, pixels: int) -> int:
+        """Estimate of what a process takes that renders views of so many pixels.
+
+        For the scene that is what the inventory has measured, as soon as it has, and a fifth more.
+        """
+        scene = memory.UNKNOWN_SCENE
+        inventory = Path(str(self.inventory))
+        if inventory.is_file():
+            scene = _scene_memory(inventory, inventory.stat().st_mtime_ns)
+        # Until the calibration has chosen, it may choose to denoise.
+        return memory.needed(scene, pixels, self.render.get("denoise", True))
+
+    @property
+    def view_memory_bytes(self) -> int:
+        """The same of the dataset's own views."""
+        return self.memory_bytes(self._pixels)
+
     @property
     def panorama_seconds(self) -> float:
         """Estimate of how long one core renders the panorama, which is twice as wide as high."""
@@ -492,6 +509,15 @@ class Dataset:
         count = math.ceil(self.view_count / length)
         bounds = [self.view_count * number // count for number in range(count + 1)]
         return list(pairwise(bounds))
+
+
+@lru_cache
+def _scene_memory(inventory: Path, _changed: int) -> int:
+    """Return what a scene's inventory says that it takes, and a fifth more."""
+    try:
+        return int(1.2 * json.loads(inventory.read_bytes())["memory_bytes"])
+    except (OSError, ValueError, LookupError, TypeError):
+        return memory.UNKNOWN_SCENE
 
 
 def _differs(path: str, expected: dict[str, Any], poses: Sequence[Pose] = ()) -> bool:

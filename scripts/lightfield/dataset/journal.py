@@ -13,9 +13,7 @@ that was really spent. Times of day are seconds since 1970. A process's lines ar
 """
 
 import os
-import resource
 import socket
-import sys
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -24,6 +22,7 @@ from typing import Any
 
 import psutil
 
+from lightfield.core import memory
 from lightfield.core.files import append_json_line, read_json_lines
 
 # What every line of a kind has, after the key that says which kind it is.
@@ -58,14 +57,12 @@ class Journal:
     def end(self) -> None:
         """Add the line of a process that has done all its work."""
         now = time.time()
-        # In KiB, but for macOS.
-        unit = 1 if sys.platform == "darwin" else 1024
         self.append(
             {
                 "ended": round(now, 3),
                 "wall_seconds": round(now - self.started, 4),
                 "cpu_seconds": round(time.process_time(), 4),
-                "peak_memory_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit,
+                "peak_memory_bytes": memory.peak(),
             }
         )
 

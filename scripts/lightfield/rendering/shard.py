@@ -8,7 +8,7 @@ missing. Its journal, one JSON line a rendered view, says what was done and how 
 
 import sys
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,9 +18,11 @@ import psutil
 
 from lightfield.core import processors
 from lightfield.core.cli import view_slice
+from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
+from lightfield.core.memory import available
 from lightfield.core.progress import Progress
-from lightfield.dataset import keys, passes
+from lightfield.dataset import keys, memory, passes
 from lightfield.dataset.journal import Journal
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.passes import Pass
@@ -77,11 +79,12 @@ def render(
     label = f"render {folder.parent}" + (f" {views}" if views != ":" else "")
     progress = Progress(len(missing), label, already=len(chosen) - len(missing))
     if missing or nameless:
+        found = read_json(inventory) if inventory else None
+        _refuse_what_does_not_fit(blend, found or {}, lightfield)
         threads = threads or processors.available()
         # Only now, because it takes a second and a shard that is finished does not need it.
         with processors.only(threads):
             from lightfield.rendering import cycles
-        found = read_json(inventory) if inventory else None
         used = cycles.set_up(blend, found, lightfield, device, threads)
         log.append(
             {
@@ -111,6 +114,21 @@ def _names(kind: str) -> dict[str, int]:
     from lightfield.rendering import ids
 
     return ids.names(kind)
+
+
+def _refuse_what_does_not_fit(
+    blend: Path, inventory: Mapping[str, Any], lightfield: LightField
+) -> None:
+    """Raise `UserError` where a scene, as it was measured, and a view exceed this memory."""
+    lens = lightfield.lens
+    denoise = lightfield.render["denoise"]
+    needed = memory.needed(inventory.get("memory_bytes", 0), lens.width * lens.height, denoise)
+    if needed > available():
+        raise UserError(
+            f"{blend}: a view of {lens.width} × {lens.height} pixels takes {needed / 1e9:.1f} GB "
+            f"of memory, and this machine has {available() / 1e9:.1f} GB; render it on one that "
+            "has more, or smaller, or make the scene lighter"
+        )
 
 
 def _warn_of_other_versions(paths: Iterable[Path]) -> None:

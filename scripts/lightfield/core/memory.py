@@ -1,0 +1,52 @@
+"""How much memory this machine lets a process have, and how much it has had."""
+
+import resource
+import sys
+from pathlib import Path
+
+import psutil
+
+_CGROUPS = Path("/sys/fs/cgroup")
+
+
+def available() -> int:
+    """Return how many bytes all processes here may have: the machine's, or what a limit leaves.
+
+    A batch system and a container limit by control groups, each of which limits those in it.
+    """
+    limits: list[int] = [psutil.virtual_memory().total]
+    for file in _limit_files():
+        text = file.read_text().strip()
+        if text.isdecimal():
+            limits.append(int(text))
+    return min(limits)
+
+
+def _limit_files() -> list[Path]:
+    """Return the files of version 1 and 2 of control groups that may hold a limit."""
+    found = []
+    own = Path("/proc/self/cgroup")
+    for line in own.read_text().splitlines() if own.exists() else ():
+        _, controllers, path = line.split(":", 2)
+        if controllers in ("", "memory"):
+            name = "memory.limit_in_bytes" if controllers else "memory.max"
+            root = _CGROUPS / controllers
+            group = root / path.lstrip("/")
+            found += [folder / name for folder in (group, *group.parents)]
+    return [file for file in found if file.is_file()]
+
+
+def peak() -> int:
+    """Return the most bytes of memory that this process has had.
+
+    Of a process's own account, not of getrusage's, which counts what started it, too.
+    """
+    try:
+        for line in Path("/proc/self/status").read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1]) * 1024
+    except OSError:
+        pass
+    # In KiB, but for macOS.
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit

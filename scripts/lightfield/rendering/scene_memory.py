@@ -1,0 +1,61 @@
+"""How much memory a scene takes: measured on one view of hardly any pixels."""
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_json
+from lightfield.core.memory import available
+from lightfield.dataset import journal
+from lightfield.dataset.lightfield import LightField, View
+from lightfield.geometry.lenses.equirectangular import Equirectangular
+
+PROGRAM = Path(__file__).resolve().parents[2] / "render_shard.py"
+RENDER = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0}
+
+
+def measure(blend: Path, inventory: Mapping[str, Any]) -> int:
+    """Return the most bytes that a process has which renders one small panorama of a scene.
+
+    It has nothing else in its memory, so it is a process of its own. Raises `UserError` where the
+    scene does not fit into the machine's memory, or cannot be rendered.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        content = {
+            **Equirectangular(width=32, height=16).to_lightfield(),
+            **{"depth": "distance", "frame": 1, "scene": {}},
+            "render": {**RENDER, "depth_precision": "float"},
+        }
+        LightField(content, [View.placed("view", np.eye(4))]).write(folder / "lightfield.json")
+        write_json(folder / "inventory.json", inventory)
+        words: list[Any] = [
+            "--blend",
+            blend,
+            "--lightfield",
+            folder / "lightfield.json",
+            "--threads",
+            "1",
+        ]
+        words += ["--inventory", folder / "inventory.json", "--journal", folder / "journal.jsonl"]
+        result = subprocess.run(
+            [sys.executable, PROGRAM, *words, "--output", folder / "exr", "--device", "cpu"],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if result.returncode < 0:
+            raise UserError(
+                f"{blend}: its render ends by signal {-result.returncode}: does the scene fit into "
+                f"this machine's {available() / 1e9:.1f} GB of memory?"
+            )
+        if result.returncode:
+            raise UserError(f"{blend}: {result.stderr.splitlines()[-1].removeprefix('error: ')}")
+        (run,) = journal.read(folder / "journal.jsonl")
+    return run.peak_memory_bytes

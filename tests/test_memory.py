@@ -1,0 +1,80 @@
+"""What rendering takes of memory: measured, asked for, shared between jobs, and refused in time."""
+
+import json
+
+import pytest
+from checkouts import ROOT
+
+from lightfield.core import memory as machine
+from lightfield.core.errors import UserError
+from lightfield.dataset import memory
+from lightfield.dataset.config import load_config, read_config
+from lightfield.dataset.dataset import scene_datasets
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
+from lightfield.rendering import scene_memory, shard
+
+GB = 10**9
+
+
+@pytest.mark.parametrize(
+    ("cores", "shards", "need", "available", "expected"),
+    [
+        (64, 1000, GB, 256 * GB, 1),
+        (64, 1000, 4 * GB, 64 * GB, 5),
+        (7, 1000, 4 * GB, 18 * GB, 2),
+        (64, 2, GB, 256 * GB, 32),
+        (64, 2, 20 * GB, 25 * GB, 64),
+        (2, 1000, 100 * GB, 25 * GB, 2),
+        (1, 0, GB, 25 * GB, 1),
+    ],
+)
+def test_what_runs_at_once_fits_into_memory(cores, shards, need, available, expected):
+    threads = memory.threads(cores, shards, need, available)
+    assert threads == expected
+    assert cores // threads * need <= available or threads == cores
+
+
+def test_this_machines_memory_is_within_every_limit(tmp_path, monkeypatch):
+    found = machine.available()
+    assert 0 < machine.peak() < found
+    (tmp_path / "memory").mkdir()
+    (tmp_path / "memory/memory.limit_in_bytes").write_text("1000000\n")
+    monkeypatch.setattr(machine, "_limit_files", lambda: list(tmp_path.glob("*/*")))
+    assert machine.available() == 1_000_000
+
+
+def test_a_job_asks_for_what_the_scene_was_measured_to_take(tmp_path):
+    content = read_config(ROOT / "config.yaml") | {"work": str(tmp_path), "results": str(tmp_path)}
+    dataset = scene_datasets("garden", settings=load_config(content))[0]
+    pixels = 2048 * 2048 * memory.PIXEL_BYTES
+    assert dataset.view_memory_bytes == memory.UNKNOWN_SCENE + pixels
+    (tmp_path / "garden").mkdir()
+    (tmp_path / "garden/inventory.json").write_text(json.dumps({"memory_bytes": 2 * GB}))
+    assert dataset.view_memory_bytes == 2.4 * GB + pixels
+    # Four pixels for each of a view's, up to 4096 by 2048.
+    assert dataset.memory_bytes(dataset.panorama_width**2 // 2) == 2.4 * GB + 2 * pixels
+
+
+def test_a_scene_is_measured_in_a_process_of_its_own(room):
+    found = scene_memory.measure(room, {"left_out": []})
+    assert 100e6 < found < 1e9
+
+
+def test_a_scene_that_does_not_fit_is_refused_before_it_starts(tmp_path):
+    lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [1000, 1000]})
+    rig = {"type": "plane", "cameras": [1, 1]}
+    lightfield = LightField.from_rig(rig, lens, depth="z", frame=1, render={"denoise": True})
+    inventory = tmp_path / "inventory.json"
+    inventory.write_text(json.dumps({"memory_bytes": machine.available()}))
+    needed = machine.available() + 1000 * 1000 * memory.DENOISED_PIXEL_BYTES
+    message = rf"a\.blend: a view of 1000 × 1000 pixels takes {needed / 1e9:.1f} GB of memory"
+    with pytest.raises(UserError, match=message):
+        shard.render(
+            *(lightfield.changed(render={"denoise": True, "seed": 0}), ":", tmp_path / "exr"),
+            blend=tmp_path / "a.blend",
+            inventory=inventory,
+            device="cpu",
+            threads=1,
+        )
+    assert not (tmp_path / "exr").exists()
