@@ -24,6 +24,7 @@ shell.prefix(
 
 from lightfield.core.failures import failure_report
 from lightfield.core.files import read_json, set_aside
+from lightfield.core.gpus import visible
 from lightfield.core.memory import available
 from lightfield.dataset import ledger, memory
 from lightfield.dataset.config import accept_blend, load_config, scene_path
@@ -77,7 +78,15 @@ BROKEN = {}
 REMOVED = f"{WORK}/removed"
 SUMS = f"{WORK}/{ledger.NAME}"
 MEMORY = available()
-GPUS = 0 if SETTINGS.device in ("auto", "cpu") else 1
+# One for each render, and as many renders at once as this machine has GPUs; nodes count their own.
+LOCAL_GPUS = visible() if workflow.local_exec and SETTINGS.device != "cpu" else []
+if workflow.local_exec and "gpu" not in workflow.global_resources:
+    workflow.register_resource("gpu", max(1, len(LOCAL_GPUS)))
+# Left out where it is none, unless a submit command needs the number.
+DEFAULT_GPUS = (
+    0 if "gpu" in (workflow.resource_settings.default_resources or ()) else None
+)
+GPUS = 1 if LOCAL_GPUS or SETTINGS.device not in ("auto", "cpu") else DEFAULT_GPUS
 
 
 wildcard_constraints:

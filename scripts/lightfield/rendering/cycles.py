@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 
+from lightfield.core import gpus
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.passes import Pass
@@ -164,7 +165,13 @@ def gpu(device: str) -> str | None:
 
 
 def _use_device(scene: Any, device: str) -> None:
-    """Choose what Cycles renders on; a device that is asked for by name must be there."""
+    """Choose what Cycles renders on; a device that is asked for by name must be there.
+
+    Of several GPUs of a machine it is one that no other process renders on.
+    """
+    if device != "cpu":
+        # Before Cycles looks for them for the first time.
+        gpus.use_one()
     kind = gpu(device)
     scene.cycles.device = "GPU" if kind else "CPU"
     if kind:

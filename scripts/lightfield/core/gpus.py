@@ -1,0 +1,92 @@
+"""Which GPU a process renders on: each one is taken by one process at a time."""
+
+import fcntl
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+# From these, CUDA (and OptiX) and HIP read which GPUs a process sees.
+CUDA, HIP = "CUDA_VISIBLE_DEVICES", "HIP_VISIBLE_DEVICES"
+_KFD = Path("/sys/class/kfd/kfd/topology/nodes")
+
+
+@dataclass(frozen=True)
+class Gpu:
+    """A GPU: its id, in the words of the ``variable`` by which a process sees it alone."""
+
+    variable: str
+    id: str
+
+
+def visible(environment: Mapping[str, str] = os.environ) -> list[Gpu]:
+    """Return the GPUs that this process sees: those that a batch system or user left it, or all."""
+    found = []
+    for variable, every in ((CUDA, _nvidia), (HIP, _amd)):
+        given = environment.get(variable)
+        ids = every() if given is None else [name.strip() for name in given.split(",")]
+        found += [Gpu(variable, name) for name in ids if name and name != "-1"]
+    return found
+
+
+def _nvidia() -> list[str]:
+    """Return the UUIDs of NVIDIA's GPUs, as their driver lists them."""
+    try:
+        words = ["nvidia-smi", "--query-gpu=uuid", "--format=csv,noheader"]
+        output = subprocess.run(words, capture_output=True, text=True, check=True, timeout=30)
+    except (OSError, subprocess.SubprocessError):
+        return []
+    return [line for line in output.stdout.split() if line.startswith("GPU-")]
+
+
+def _amd() -> list[str]:
+    """Return the numbers of AMD's GPUs; the driver lists processors, too, whose id is 0."""
+    ids = (path.read_text().strip() for path in sorted(_KFD.glob("*/gpu_id")))
+    return [str(number) for number, _ in enumerate(name for name in ids if name != "0")]
+
+
+def take(gpus: Sequence[Gpu], folder: Path | None = None) -> tuple[Gpu, BinaryIO]:
+    """Wait until one of several GPUs is free, and return it with its lock.
+
+    It is taken until the lock is closed, or this process ends, however it does. The lock files lie
+    in ``folder``, by default where the machine has its temporary files, and hold nothing.
+    """
+    folder = folder or Path(tempfile.gettempdir())
+    waited = False
+    while True:
+        for gpu in gpus:
+            name = re.sub(r"\W", "_", f"{gpu.variable}-{gpu.id}")
+            path = folder / f"plenoforge-{name}.lock"
+            lock = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b")
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                return gpu, lock
+            except BlockingIOError:
+                lock.close()
+        if not waited:
+            print(f"waiting for one of {len(gpus)} GPUs to be free", file=sys.stderr, flush=True)
+        waited = True
+        time.sleep(0.5)
+
+
+_taken: list[BinaryIO] = []
+
+
+def use_one() -> None:
+    """Let this process see one GPU only, which no other process takes before this one ends.
+
+    A single one that is left to it, as by a batch system, is its own already.
+    """
+    gpus = visible()
+    if len(gpus) < 2 or _taken:
+        return
+    gpu, lock = take(gpus)
+    _taken.append(lock)
+    for variable in {other.variable for other in gpus}:
+        os.environ[variable] = gpu.id if variable == gpu.variable else "-1"

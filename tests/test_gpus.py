@@ -1,0 +1,88 @@
+"""One GPU a process: no two processes render on the same one, and none waits for one that is free.
+
+No GPU is needed: what is taken is its name.
+"""
+
+import subprocess
+import sys
+
+import pytest
+from conftest import SCRIPTS
+
+from lightfield.core import gpus
+from lightfield.core.gpus import CUDA, HIP, Gpu
+
+FAKE = [Gpu(CUDA, "GPU-a"), Gpu(CUDA, "GPU-b")]
+
+WAITER = """
+import sys
+from pathlib import Path
+from lightfield.core.gpus import CUDA, Gpu, take
+gpu, _ = take([Gpu(CUDA, name) for name in sys.argv[2:]], Path(sys.argv[1]))
+print(gpu.id, flush=True)
+input()
+"""
+
+
+def waiter(folder, *names):
+    return subprocess.Popen(
+        [sys.executable, "-c", WAITER, folder, *names],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={"PYTHONPATH": str(SCRIPTS)},
+    )
+
+
+def test_no_two_processes_take_the_same_gpu(tmp_path):
+    first, lock = gpus.take(FAKE, tmp_path)
+    second, other = gpus.take(FAKE, tmp_path)
+    assert [first, second] == FAKE
+    with waiter(tmp_path, "GPU-a", "GPU-b") as third, waiter(tmp_path, "GPU-a", "GPU-b") as fourth:
+        for process in (third, fourth):
+            assert process.stderr.readline() == "waiting for one of 2 GPUs to be free\n"
+        other.close()
+        lock.close()
+        assert {third.stdout.readline(), fourth.stdout.readline()} == {"GPU-a\n", "GPU-b\n"}
+        # A killed process keeps none.
+        third.kill()
+        third.wait()
+        fifth, lock = gpus.take(FAKE, tmp_path)
+        assert fifth in FAKE
+        fourth.kill()
+        lock.close()
+
+
+@pytest.mark.parametrize(
+    ("environment", "expected"),
+    [
+        ({CUDA: "0,1", HIP: ""}, [Gpu(CUDA, "0"), Gpu(CUDA, "1")]),
+        ({CUDA: "-1", HIP: "3"}, [Gpu(HIP, "3")]),
+        ({CUDA: "", HIP: ""}, []),
+        ({}, [Gpu(CUDA, "GPU-1"), Gpu(CUDA, "GPU-2"), Gpu(HIP, "0"), Gpu(HIP, "1")]),
+    ],
+)
+def test_the_gpus_are_those_that_are_left_to_the_process(
+    environment, expected, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+    (tmp_path / "nvidia-smi").write_text("#!/bin/sh\necho GPU-1\necho GPU-2\n")
+    (tmp_path / "nvidia-smi").chmod(0o755)
+    monkeypatch.setattr(gpus, "_KFD", tmp_path)
+    for number, name in enumerate(("0", "4711", "4712")):
+        (tmp_path / str(number)).mkdir()
+        (tmp_path / str(number) / "gpu_id").write_text(f"{name}\n")
+    assert gpus.visible(environment) == expected
+
+
+def test_a_process_sees_the_gpu_alone_that_it_took(tmp_path, monkeypatch):
+    monkeypatch.setattr(gpus, "_taken", [])
+    monkeypatch.setattr(gpus.tempfile, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setenv(CUDA, "GPU-a,GPU-b")
+    monkeypatch.setenv(HIP, "0")
+    _, lock = gpus.take(FAKE[:1], tmp_path)
+    gpus.use_one()
+    assert (gpus.os.environ[CUDA], gpus.os.environ[HIP]) == ("GPU-b", "-1")
+    for taken in (lock, *gpus._taken):
+        taken.close()
