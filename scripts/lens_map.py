@@ -23,9 +23,9 @@ def main() -> None:
     arguments = parser.parse_args(joined(sys.argv[1:]))
     work = geometry(arguments)
     path: Path = arguments.file
-    for target in work.targets:
-        made = work.compute(target)
-        lens_map.report(made)
+    maps = [work.compute(target) for target in work.targets]
+    lens_map.report(maps)
+    for target, made in zip(work.targets, maps, strict=True):
         lens_map.save(path.with_name(path.stem + target.suffix + path.suffix), made)
 
 

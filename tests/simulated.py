@@ -62,12 +62,12 @@ def _views(folder: Path, dataset: Dataset) -> None:
     lightfield.write(folder / dataset.folder / "lightfield.json")
     for name, reprojection in dataset.reprojections.items():
         lens = reprojection.camera.make()
-        lightfield.changed(lens).write(folder / dataset.folder / name / "lightfield.json")
+        made = lightfield.changed(lens, reprojection=reprojection.recorded)
+        made.write(folder / dataset.folder / name / "lightfield.json")
     for name in dataset.exported:
-        if name.endswith("export.json"):
-            export = dataset.exports.wanted[Path(name).parent.name]
-            options = export.model_dump(mode="json", exclude={"sources"})
-            write_json(folder / name, {"options": options, "files": {}})
+        kind = Path(name).parent.name if name.endswith("export.json") else "instant_ngp"
+        options = dataset.exports.wanted[kind].recorded
+        write_json(folder / name, {"options": options, "files": {}})
     for stage in ("render", *dataset.reprojections):
         reprojection = dataset.reprojections.get(stage)
         suffix = reprojection.suffix if reprojection else ".exr"

@@ -1,5 +1,6 @@
 """A broken small file is named in one line, set aside, and made again."""
 
+import json
 import os
 import re
 from pathlib import Path
@@ -99,3 +100,20 @@ def test_what_is_broken_is_planned_again_and_set_aside(tmp_path):
         folder / two.folder / "lightfield.json"
     )
     assert noted[f"{one.work}/cameras.json"] == before[f"{one.work}/cameras.json"]
+
+
+def test_a_reprojection_that_does_not_say_how_it_was_made_is_made_anew_alone(tmp_path):
+    folder = checkout(tmp_path)
+    one, *_ = simulated.build(folder)
+    path = folder / one.folder / "perspective/lightfield.json"
+    content = json.loads(path.read_text())
+    del content["reprojection"]
+    path.write_text(json.dumps(content))
+    ngp = folder / one.folder / "perspective_hdr/transforms.json"
+    ngp.write_text(json.dumps({"frames": []}))
+    for changed in (path, ngp):
+        os.utime(changed, (simulated.WHEN, simulated.WHEN))
+    files = simulated.planned(folder, "smoke")
+    assert {str(p.relative_to(folder)) for p in (path, ngp)} <= files
+    assert set(one.records("perspective")) <= files
+    assert not files & {*one.records("render"), *one.records("perspective_hdr")}

@@ -331,6 +331,17 @@ class Reprojection(Settings):
         return shlex.join(words)
 
     @property
+    def recorded(self) -> dict[str, Any]:
+        """What its lightfield.json says beside the lens: see `lightfield.reprojection.job`."""
+        return {
+            "rotation": list(self.rotation),
+            "filter": self.filter,
+            "samples": self.samples,
+            "exposure": self.exposure,
+            "reinhard": 1 if self.reinhard is None else self.reinhard,
+        }
+
+    @property
     def development(self) -> str:
         """The words that say to scripts/reproject.py what to write."""
         words = [f"--{self.format}", "--exposure", str(self.exposure)]

@@ -135,8 +135,8 @@ class Dataset:
     def outdated(self, render: dict[str, Any]) -> Iterator[str]:
         """Yield those published files that were made from other settings, as they themselves say.
 
-        A lightfield.json holds scene, ``render``, lens and poses, an export.json its options. A
-        file that is broken or missing is none of them.
+        A lightfield.json holds scene, ``render``, lens and poses, or how views were reprojected, an
+        export its options. A file that is broken or missing is none of them.
         """
         if isinstance(self.rig, Random):
             places = str(self.places)
@@ -150,8 +150,9 @@ class Dataset:
             yield own
         for name, reprojection in self.reprojections.items():
             path = f"{self.folder}/{name}/{NAME}"
-            if _differs(path, reprojection.camera.make().to_lightfield()):
-                yield path
+            expected = reprojection.camera.make().to_lightfield()
+            if _differs(path, expected | {"reprojection": reprojection.recorded}):
+                yield from (path, f"{self.work}/{name}/lens_map.npy", *self.records(name))
         if any(
             path.parent.name not in self.reprojections
             for path in Path(self.folder).glob(f"*/{NAME}")
@@ -159,11 +160,9 @@ class Dataset:
             # A reprojection that there was makes the dataset invalid until validation removes it.
             yield f"{self.folder}/validation.json"
         for path in self.exported:
-            if path.endswith(MANIFEST):
-                export = self.exports.wanted[Path(path).parent.name]
-                options = export.model_dump(mode="json", exclude={"sources"})
-                if _differs(path, {"options": options}):
-                    yield path
+            name = Path(path).parent.name if path.endswith(MANIFEST) else "instant_ngp"
+            if _differs(path, {"options": self.exports.wanted[name].recorded}):
+                yield path
 
     @property
     def builder_fingerprint(self) -> str | None:

@@ -6,7 +6,7 @@ cannot open and how it can be had. What the options do is written in `lightfield
 
 import math
 import shutil
-from typing import Annotated, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -34,6 +34,11 @@ class Export(Settings):
         min_length=1,
         description=f"Names of reprojections; `{VIEWS}` stands for the rendered views.",
     )
+
+    @property
+    def recorded(self) -> dict[str, Any]:
+        """What the export itself says of its options."""
+        return self.model_dump(mode="json", exclude={"sources"})
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         """Say why the consumer cannot take views of a lens, and what to do; None if it can.
@@ -89,6 +94,12 @@ class InstantNgp(Export):
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         return NO_DEPTH if (self.depth or self.bounds == "depth") and not has_depth else None
+
+    @property
+    def recorded(self) -> dict[str, Any]:
+        # Without a scale the offset is found, too.
+        found = {"offset"} if self.scale is None else set()
+        return self.model_dump(mode="json", exclude={"sources", *found})
 
     def words(self, folder: str) -> list[str]:
         """Return the words of scripts/export_instant_ngp.py; depth maps go below ``folder``."""

@@ -140,6 +140,7 @@ def export(arguments: argparse.Namespace) -> None:
     writer = _Writer(arguments, lightfield)
     scale, offset = writer.placement()
     common = writer.lens_keys | {"scale": scale, "offset": offset}
+    common["options"] = _asked(arguments)
     if arguments.aabb_scale:
         common["aabb_scale"] = arguments.aabb_scale
     if arguments.render_aabb:
@@ -150,6 +151,21 @@ def export(arguments: argparse.Namespace) -> None:
     for path, names in parts.items():
         write_json(path, common | {"frames": [frames[name] for name in names]})
         print(f"{path}: {len(names)} frames, scale {scale:.6g}, offset {offset}")
+
+
+def _asked(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return what the command line asks for, as a scene YAML names it."""
+    corners = arguments.render_aabb
+    asked = {
+        "scale": arguments.scale,
+        "bounds": "depth" if arguments.depth_bounds else "rig",
+        "aabb_scale": arguments.aabb_scale,
+        "render_aabb": [corners[:3], corners[3:]] if corners else None,
+        "depth": arguments.depth_dir is not None,
+    }
+    if arguments.scale is not None:
+        asked["offset"] = arguments.offset or [0.5, 0.5, 0.5]
+    return asked
 
 
 class _Writer:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from lightfield.reprojection import lens_map
 from lightfield.reprojection.lens_arguments import Target, add_geometry_flags, geometry
 from lightfield.reprojection.lens_map import LensMap
 
-VERSION = 2  # of the pixels: part of every key, raised when the same settings give other pixels
+VERSION = 3  # of the files: part of every key, raised when the same settings give others
 SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
 
 
@@ -151,6 +152,21 @@ class Job:
         return made
 
     @property
+    def settings(self) -> dict[str, Any]:
+        """What, beside the lens, was done to the pixels: with it, a PNG's can be undone.
+
+        ``rotation`` is pan, pitch and roll in degrees; `lightfield.imaging.tonemap` defines
+        ``exposure`` and ``reinhard``.
+        """
+        return {
+            "rotation": self.geometry.rotation,
+            "filter": self.geometry.filter,
+            "samples": self.geometry.samples,
+            "exposure": self.arguments.exposure,
+            "reinhard": self.arguments.reinhard,
+        }
+
+    @property
     def depth_wanted(self) -> bool:
         return bool(self.arguments.exr or self.arguments.depth_png)
 
@@ -209,7 +225,8 @@ class Job:
             for target in self.targets
         ]
         passes = [found.name for found in self.passes]
-        more = {"passes": passes} if self.lightfield.passes else {}
+        more: dict[str, Any] = {"passes": passes} if self.lightfield.passes else {}
+        more["reprojection"] = self.settings
         return self.lightfield.changed(lens, views, depth=depth, **more)
 
     def views(self) -> list[SourceView]:

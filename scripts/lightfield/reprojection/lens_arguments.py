@@ -1,6 +1,7 @@
 """Command-line flags for a reprojection's geometry, in the words of SILVR's reprojection tool.
 
-Lengths are in mm, the angles of lenses in radians; only a rotation is in degrees.
+Lengths are in mm, the angles of lenses in radians or, as in 120deg, in degrees; a rotation is in
+degrees.
 """
 
 import argparse
@@ -68,7 +69,9 @@ def add_geometry_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_lens_flags(parser: argparse.ArgumentParser, prefix: str, title: str) -> None:
-    group = parser.add_argument_group(title, "Lengths in mm, angles in radians.")
+    group = parser.add_argument_group(
+        title, "Lengths in mm, angles in radians, or in degrees as in 120deg."
+    )
     choice = group.add_mutually_exclusive_group()
     for lens in LENSES.values():
         if lens.form:
@@ -111,6 +114,8 @@ class Geometry:
     targets: list[Target]
     filter: str
     samples: int
+    # Pan, pitch and roll in degrees.
+    rotation: list[float]
 
     def compute(self, target: Target) -> lens_map.LensMap:
         """Compute the lens map of one of the targets."""
@@ -137,6 +142,7 @@ def geometry(arguments: argparse.Namespace) -> Geometry:
         # The adaptive filter covers the pixel by itself; samples are those of SILVR's default.
         filter=arguments.filter or (DEFAULT_FILTER if arguments.samples == 1 else "bicubic"),
         samples=arguments.samples,
+        rotation=_numbers(arguments.rotation, "--rotation", "PAN,PITCH,ROLL"),
     )
 
 
@@ -180,7 +186,8 @@ def _targets(arguments: argparse.Namespace, source: Lens) -> list[Target]:
         if arguments.cubemap < 1:
             raise UserError(f"--cubemap {arguments.cubemap}: must be at least 1 pixel")
         face = CubeMap(width=6 * arguments.cubemap, height=arguments.cubemap).face
-        return [Target(f"_{name}", face, rotation @ turn) for name, turn in CUBE_FACES.items()]
+        faces = [Target(f"_{name}", face, rotation @ turn) for name, turn in CUBE_FACES.items()]
+        return [target for target in faces if _is_seen(target, source)]
     lens = _lens(arguments, "", width, height)
     if arguments.camera:
         try:
@@ -194,6 +201,12 @@ def _targets(arguments: argparse.Namespace, source: Lens) -> list[Target]:
     if lens is None:
         raise UserError("--rectilinear, …: give the output lens, or --no-reproject")
     return [Target("", lens, np.asarray(rotation))]
+
+
+def _is_seen(target: Target, source: Lens) -> bool:
+    """Whether the source sees anything of a target; a fisheye of 180° sees nothing behind it."""
+    rays = target.lens.resized(64, 64).pixel_rays() @ target.rotation.T
+    return bool(np.isfinite(source.pixels(rays)).any())
 
 
 def _lens(arguments: argparse.Namespace, prefix: str, width: int, height: int) -> Lens | None:

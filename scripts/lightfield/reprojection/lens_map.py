@@ -8,9 +8,10 @@ import json
 import math
 import sys
 import zlib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 import numpy as np
@@ -280,15 +281,22 @@ def warnings(lens_map: LensMap) -> list[str]:
     return found
 
 
-def report(lens_map: LensMap) -> None:
-    """Print the magnification and the warnings to standard error."""
-    found = lens_map.summary
+def report(lens_maps: Sequence[LensMap]) -> None:
+    """Print the magnification and the warnings to standard error, once for all targets."""
+    summaries = [lens_map.summary for lens_map in lens_maps]
+    seen = [summary for summary in summaries if summary["covered"]] or summaries
+    found = {
+        "min": min(summary["min"] for summary in seen),
+        "max": max(summary["max"] for summary in seen),
+        "median": float(np.median([summary["median"] for summary in seen])),
+        "covered": fmean(summary["covered"] for summary in summaries),
+    }
     print(
         f"magnification: {found['min']:.3g} to {found['max']:.3g}, median {found['median']:.3g} "
         f"target pixels to one of the source; {found['covered']:.1%} of the image has a source",
         file=sys.stderr,
     )
-    for warning in warnings(lens_map):
+    for warning in warnings(replace(lens_maps[0], summary=found)):
         print(f"warning: {warning}", file=sys.stderr)
 
 

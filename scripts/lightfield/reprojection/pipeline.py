@@ -29,8 +29,10 @@ def run(job: Job) -> None:
         return
     # One view is one thread's work: the libraries shall not add theirs.
     oiio.attribute("threads", 1)
-    for made in job.maps:
-        lens_map.report(made)
+    maps = job.maps
+    # What lens_map.py computed, it has reported.
+    if arguments.lens_map is None:
+        lens_map.report(maps)
     label = f"reproject to {arguments.output_dir} {arguments.views or ''}".rstrip()
     progress = Progress(len(views), label)
     paths: list[Path] = []

@@ -132,7 +132,9 @@ def write(
         half[:, empty] = 0
         if depth is not None:
             depth[empty] = np.nan
-    attributes = {KEY_ATTRIBUTE: key}
+    attributes = {KEY_ATTRIBUTE: key} | {
+        f"plenoforge:{name}": str(value) for name, value in job.settings.items()
+    }
     for kind, path in outputs.items():
         match kind:
             case "exr":
@@ -146,7 +148,7 @@ def write(
             case "png":
                 if marked:
                     pixels = np.dstack([pixels, np.where(empty, 0, 255).astype(np.uint8)])
-                write_png(path, pixels, {KEY_ATTRIBUTE: key, **PNG_OPTIONS})
+                write_png(path, pixels, {**attributes, **PNG_OPTIONS})
             case "depth":
                 if depth is None:
                     raise UserError("--depth-png: the image has no channel Z")

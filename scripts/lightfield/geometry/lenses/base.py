@@ -417,18 +417,31 @@ def pair(values: Sequence[float]) -> Pair:
 def named_numbers(text: str, form: str) -> dict[str, float]:
     """Return the comma-separated numbers of ``text`` by their names in ``form``.
 
-    Names in brackets, as B in ``A[,B]``, may be missing; what follows a bar is another form.
-    Raises `UserError` unless ``text`` is of the form.
+    Names in brackets, as B in ``A[,B]``, may be missing; what follows a bar is another form. Angles
+    may end in ``deg``; those of lenses are in radians without it. Raises `UserError` unless
+    ``text`` is of the form.
     """
     names = re.findall(r"\w+", form.partition("|")[0])
     least = len(re.findall(r"\w+", form.partition("[")[0].partition("|")[0]))
+    parts = text.split(",")
     try:
-        values = [float(part) for part in text.split(",")]
+        values = [_number(part, name) for part, name in zip(parts, names, strict=False)]
     except ValueError:
-        values = []
-    if not least <= len(values) <= len(names) or not all(map(math.isfinite, values)):
+        values = [math.nan]
+    if not least <= len(parts) <= len(names) or not all(map(math.isfinite, values)):
         raise UserError(f"must have the form {form}")
     return dict(zip(names, values, strict=False))
+
+
+def _number(text: str, name: str) -> float:
+    """Return a number that a user wrote for ``name``; raises ValueError."""
+    if not text.endswith("deg"):
+        return float(text)
+    if name in ("FOV", "LONG_MIN", "LONG_MAX", "LAT_MIN", "LAT_MAX"):
+        return math.radians(float(text.removesuffix("deg")))
+    if name in ("PAN", "PITCH", "ROLL"):
+        return float(text.removesuffix("deg"))
+    raise ValueError(f"{name} is no angle")
 
 
 def _degrees(radians: float) -> float:
