@@ -273,7 +273,7 @@ def costs(
         "energy_kwh": kwh,
         "price": tariff.price(kwh),
         "attribution": (
-            f"{tariff.watts:g} W, the whole machine's, times wall time, times the share of its "
+            f"{tariff.watts:g} W, the whole machine's, times wall time, times the part of its "
             f"{tariff.cores} cores that was busy"
             + ("; all of it while a graphics card renders" if device not in (None, "CPU") else "")
         ),
