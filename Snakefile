@@ -110,7 +110,7 @@ rule verify:
         " {params.folders} --work {params.work} > {log} 2>&1"
 
 
-rule package_all:
+rule package:
     input:
         [dataset.package for dataset in CHOSEN],
         whole(CHOSEN),

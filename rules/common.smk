@@ -308,13 +308,23 @@ def status_words():
     return shlex.join(words)
 
 
-def packed_sums(wildcards):
-    """Return the checksums that say that everything in an archive is finished."""
+def packed(wildcards):
+    """Return the datasets in an archive: a rig's, or one of each frame."""
     return [
-        f"{dataset.folder}/sha256sums.txt"
+        dataset
         for dataset in DATASETS.values()
         if (dataset.scene_folder, dataset.rig_name) == (wildcards.scene, wildcards.rig)
     ]
+
+
+def packed_sums(wildcards):
+    """Return the checksums that say that everything in an archive is finished."""
+    return [f"{dataset.folder}/sha256sums.txt" for dataset in packed(wildcards)]
+
+
+def packed_scene(wildcards):
+    """Return the name of an archive's scene YAML."""
+    return packed(wildcards)[0].scene_name
 
 
 def probes():

@@ -1,24 +1,27 @@
-# A dataset as one archive, as SILVR publishes its own.
+# A dataset as archives with a card, as SILVR publishes its own.
 
 
-rule package:
+rule pack:
     input:
         packed_sums,
     output:
-        f"{RESULTS}/{{scene}}/{{scene}}_{{rig}}.tar",
+        archive=f"{RESULTS}/{{scene}}/{{scene}}_{{rig}}.tar",
+        card=f"{RESULTS}/{{scene}}/{{scene}}_{{rig}}.json",
     log:
         log_of("{scene}/{rig}/package"),
     conda:
         ENVIRONMENT
     params:
-        folder=f"{RESULTS}/{{scene}}",
+        name=packed_scene,
+        folder=f"{RESULTS}/{{scene}}/{{rig}}",
+        size=(
+            f"--gigabytes {SETTINGS.package_gigabytes}"
+            if SETTINGS.package_gigabytes
+            else ""
+        ),
     message:
-        "Packing {output}"
+        "Packing {output.archive}"
     shell:
-        # The same files give the same archive, whoever packs them and when.
-        # A report tells of one build, and is no part of the dataset.
-        "tar --create --file {output} --directory {params.folder} --sort=name --mtime=@0"
-        " --owner=0 --group=0 --numeric-owner --mode=u=rwX,go=rX"
-        " --exclude='{wildcards.rig}/report' --exclude='{wildcards.rig}/f*/report'"
-        " --transform='s,^,{wildcards.scene}_,'"
-        " {wildcards.rig} > {log} 2>&1"
+        f"python {SCRIPTS}/package.py"
+        " --scene {params.name} --folder {params.folder} {params.size} --output {output.archive}"
+        " > {log} 2>&1"

@@ -31,7 +31,7 @@ exports:
   instant_ngp: {sources: [views]}
 """
 TARGETS = [
-    *("all", "smoke", "package_all", "rig_tables", "plan", "status"),
+    *("all", "smoke", "package", "rig_tables", "plan", "status"),
     *("error_vs_time", "reprojection_benchmark", "stability", "render_overhead"),
 ]
 CHOSEN = ["--config", "scenes=[brought]", "rigs=all", "preset=full"]

@@ -21,7 +21,7 @@ SUBMITTED = {
     "render_panorama",
     "reproject",
     "validate",
-    "package",
+    "pack",
 }
 
 

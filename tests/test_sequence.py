@@ -81,12 +81,12 @@ def test_a_reprojection_cannot_take_a_frames_folder(moving):
 
 def test_every_stage_is_planned_for_every_frame(tmp_path):
     folder = checkout(tmp_path, moving=SCENE)
-    jobs = planned(folder, "package_all", "--config", "scenes=[moving]", "rigs=all", "preset=full")
+    jobs = planned(folder, "package", "--config", "scenes=[moving]", "rigs=all", "preset=full")
     assert jobs["build_scene"] == jobs["inventory"] == 1
     for name in ("lightfield", "check_cameras", "render", "reproject", "validate"):
         assert jobs[name] == 4
     # All frames of a sequence in one archive.
-    assert jobs["package"] == 2
+    assert jobs["pack"] == 2
 
 
 def test_fire_and_water_move_and_the_rest_stands_still(run_program, tmp_path):

@@ -137,6 +137,9 @@ class Configuration(Settings):
         description="Take each .blend as it is now: its lock file beside the scene YAML is written "
         "anew.",
     )
+    package_gigabytes: Annotated[float, Field(gt=0)] | None = Field(
+        None, description="Size of a package's parts, at most; without it, a package is one file."
+    )
     energy: Energy = Energy()
 
     @model_validator(mode="after")
@@ -366,6 +369,8 @@ class Scene(Settings):
     """One scene: where it is from, how it is rendered, by which rigs, and what the views become."""
 
     description: str | None = Field(None, description="One line about the scene.")
+    licence: str | None = Field(None, description="Of the scene, for a package's card.")
+    credit: str | None = Field(None, description="How the scene's artist is to be cited.")
     scene: Source
     render: Render | None = Field(None, description="How; scene.dataset alone has none.")
     rigs: dict[Name, AnyRig] = Field(

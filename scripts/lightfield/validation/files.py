@@ -33,6 +33,9 @@ OUTPUTS = ("validation.json", SUMS)
 REPORT = "report"
 """The folder in a dataset that is not published with it."""
 
+README, CARD = "README.md", "card.json"
+"""What a package adds to a dataset."""
+
 BESIDE = "{view}_depth.png"
 """The picture beside a view that scripts/reproject.py makes with --depth-png."""
 

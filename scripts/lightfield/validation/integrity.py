@@ -17,7 +17,7 @@ from lightfield.core.files import broken, read_json, set_aside, sha256
 from lightfield.dataset import ledger
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.validation.files import IMAGES, REPORT, SUMS
+from lightfield.validation.files import CARD, IMAGES, README, REPORT, SUMS
 
 # Made as the work went on, and of it alone: nothing can make them again, and no dataset needs them.
 _HISTORY = (".journal.jsonl", ".tsv")
@@ -177,7 +177,8 @@ class Integrity:
         """Yield the dataset's files, those of its report only with the ledger, which has them."""
         for path in sorted(self.dataset.rglob("*")):
             parts = path.relative_to(self.dataset).parts
-            if not path.is_dir() and parts != (SUMS,) and (self._ledger or parts[0] != REPORT):
+            added = parts in ((SUMS,), (CARD,), (README,))
+            if not path.is_dir() and not added and (self._ledger or parts[0] != REPORT):
                 yield path
 
     def _contents(self, expected: Mapping[Path, tuple[str, str]]) -> Iterator[Fault]:

@@ -1,0 +1,147 @@
+"""A dataset as archives that anybody can make again byte by byte, with a card that explains it.
+
+Each part is a tar by itself; all unfold into one folder, which is named <scene>_<rig> as SILVR's
+are. Names, order, times, owners and modes follow from the files alone.
+"""
+
+import json
+import tarfile
+from collections.abc import Iterator, Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from lightfield.core.files import atomic_path, sha256
+from lightfield.core.progress import Progress
+from lightfield.dataset.config import Scene
+from lightfield.dataset.exports import MANIFEST
+from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.dataset.passes import PASSES
+from lightfield.imaging import images
+from lightfield.report.page import TEMPLATES
+from lightfield.validation.files import CARD, IMAGES, README, REPORT
+
+SILVR = (
+    "Courteaux, Artois, De Pauw, Lambert and Van Wallendael, SILVR: A Synthetic Immersive "
+    "Large-Volume Plenoptic Dataset, MMSys 2022, doi:10.1145/3524273.3532890"
+)
+
+# How each format is loaded, {} being the folder that holds it.
+LOADERS = {
+    "exr": "import OpenEXR\npixels = OpenEXR.File('{}/exr/{view}.exr').channels()",
+    "colmap": "import pycolmap\nmodel = pycolmap.Reconstruction('{}/sparse/0')",
+    "nerfstudio": "ns-train nerfacto --data {}",
+    "nerf_synthetic": "ns-train nerfacto --data {} blender-data",
+    "instant_ngp": "./instant-ngp {}/transforms.json",
+    "opendibr": "./RealtimeDIBR -i {} -j {}/cameras.json",
+    "miv": "Encoder -c {}/sequence.json  # TMIV, with a configuration of its own",
+    "hci": "import configparser\nparameters = configparser.ConfigParser()\n"
+    "parameters.read('{}/parameters.cfg')",
+    "scannetpp": "python train.py --config-name apps/scannetpp_3dgut path={}  # 3DGRUT",
+    "poses_csv": "import csv\nposes = list(csv.DictReader(open('{}/poses.csv')))",
+    "point_cloud": "import open3d\ncloud = open3d.io.read_point_cloud('{}/points.ply')",
+}
+
+
+def card(folder: Path, name: str, scene: Scene) -> dict[str, Any]:
+    """Return what there is to say of a rig's folder, in which a sequence has one of each frame."""
+    first = min(folder.glob(f"**/{NAME}"), key=lambda path: (len(path.parts), path)).parent
+    lightfield = LightField.read(first / NAME)
+    view = lightfield.views[0].name
+    bpy = images.attribute(first / IMAGES / f"{view}.exr", images.BPY_ATTRIBUTE)
+    return {
+        "name": name,
+        "scene": {
+            "name": lightfield.scene["name"],
+            "description": scene.description,
+            "licence": scene.licence,
+            "credit": scene.credit,
+        },
+        "rig": lightfield.content["lf_type"],
+        "views": len(lightfield.views),
+        "lens": lightfield.lens.description,
+        "resolution": [lightfield.lens.width, lightfield.lens.height],
+        "depth": lightfield.depth,
+        "passes": [name for name in PASSES if (first / name).is_dir()],
+        "reprojections": sorted(path.parent.name for path in first.glob(f"*/{NAME}")),
+        "software": f"Cycles in bpy {bpy}" if bpy else None,
+        "cite": [SILVR, *([scene.credit] if scene.credit else [])],
+        "loaders": dict(_loaders(first, view)),
+    }
+
+
+def _loaders(folder: Path, view: str) -> Iterator[tuple[str, str]]:
+    """Yield how the views and each export are loaded, by their folders."""
+    yield ".", LOADERS["exr"].replace("{view}", view).replace("{}", ".")
+    for path in sorted(folder.rglob("transforms.json")):
+        if "exports" not in path.parts:
+            place = path.parent.relative_to(folder).as_posix()
+            yield f"{place}/transforms.json", LOADERS["instant_ngp"].replace("{}", place)
+    for path in sorted(folder.rglob(MANIFEST)):
+        place = path.parent.relative_to(folder).as_posix()
+        yield place, LOADERS[path.parent.name].replace("{}", place)
+
+
+def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None) -> list[Path]:
+    """Write a folder as ``target`` and, if it has more than ``most`` bytes, further parts.
+
+    These are named <target's stem>.2.tar and so on; those of an earlier package are removed.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES), trim_blocks=True, lstrip_blocks=True
+    )
+    readme = environment.get_template("card.md.j2").render(**content)
+    texts = {CARD: json.dumps(content, indent=1) + "\n", README: readme}
+    paths = sorted(
+        path
+        for path in folder.rglob("*")
+        if path.is_file() and REPORT not in path.relative_to(folder).parts[:2]
+    )
+    for old in target.parent.glob(f"{target.stem}.*.tar"):
+        old.unlink()
+    written = []
+    for number, part in enumerate(_parts(paths, most), 1):
+        name = target if number == 1 else target.with_name(f"{target.stem}.{number}.tar")
+        progress = Progress(len(part), name.name, "files")
+        with atomic_path(name) as temporary, tarfile.open(temporary, "w") as archive:
+            for file, text in texts.items() if number == 1 else ():
+                _add(archive, f"{content['name']}/{file}", text.encode())
+            for path in part:
+                inside = f"{content['name']}/{path.relative_to(folder).as_posix()}"
+                _add(archive, inside, path)
+                progress.done()
+        written.append(name)
+    return written
+
+
+def listed(paths: Sequence[Path]) -> list[dict[str, Any]]:
+    """Return name, size and SHA-256 of each part."""
+    return [{"file": p.name, "bytes": p.stat().st_size, "sha256": sha256(p)} for p in paths]
+
+
+def _parts(paths: Sequence[Path], most: float | None) -> Iterator[list[Path]]:
+    """Yield runs of files of at most so many bytes together, or of one file that has more."""
+    part: list[Path] = []
+    size = 0
+    for path in paths:
+        needed = path.stat().st_size + 2 * tarfile.BLOCKSIZE
+        if part and most is not None and size + needed > most:
+            yield part
+            part, size = [], 0
+        part.append(path)
+        size += needed
+    yield part
+
+
+def _add(archive: tarfile.TarFile, name: str, content: Path | bytes) -> None:
+    """Add a file with nothing of this machine, user or time."""
+    entry = tarfile.TarInfo(name)
+    if isinstance(content, bytes):
+        entry.size = len(content)
+        archive.addfile(entry, BytesIO(content))
+        return
+    entry.size = content.stat().st_size
+    with content.open("rb") as file:
+        archive.addfile(entry, file)

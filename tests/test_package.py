@@ -1,0 +1,112 @@
+"""Packages: the same bytes again, in parts, with a card, and whole when they are unfolded."""
+
+import json
+import os
+import subprocess
+import tarfile
+from pathlib import Path
+
+import pytest
+from sphere import write_views
+
+from lightfield.core.files import sha256, write_json
+from lightfield.dataset.config import load_scene
+from lightfield.dataset.exports import Exports
+from lightfield.dataset.lightfield import LightField
+from lightfield.report import package
+from lightfield.validation.integrity import Integrity
+
+NAME = "smoke_LFPlane"
+RIG = {"type": "plane", "cameras": [2, 2], "size": 0.4}
+CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [32, 32]}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A finished dataset with a reprojection, an export, a pass and a report."""
+    dataset = tmp_path_factory.mktemp("package") / "smoke" / "dataset"
+    write_views(dataset, CAMERA, RIG)
+    path = dataset / "lightfield.json"
+    LightField.read(path).changed(scene={"name": "smoke"}).write(path)
+    for name in ("perspective/lightfield.json", "perspective/transforms.json"):
+        write_json(dataset / name, {"frames": []})
+    write_json(dataset / "perspective/exports/colmap/export.json", {"format": "colmap"})
+    write_json(dataset / "normal/names.json", {})
+    write_json(dataset / "report/costs.json", {"not": "packed"})
+    write_json(dataset / "validation.json", {"valid": True})
+    sums = {
+        file.relative_to(dataset).as_posix(): sha256(file)
+        for file in dataset.rglob("*")
+        if file.is_file() and "report" not in file.parts
+    }
+    lines = [f"{digest}  {name}\n" for name, digest in sorted(sums.items())]
+    (dataset / "sha256sums.txt").write_text("".join(lines))
+    return dataset
+
+
+def packed(folder, target, most=None):
+    target.parent.mkdir(parents=True, exist_ok=True)
+    card = package.card(folder, NAME, load_scene("smoke"))
+    return package.pack(folder, card, target, most)
+
+
+def test_the_same_files_give_the_same_bytes_whoever_packs_them_and_when(folder, tmp_path):
+    (one,) = packed(folder, tmp_path / "one" / f"{NAME}.tar")
+    for path in folder.rglob("*"):
+        path.chmod(0o777)
+        os.utime(path, (1, 1))
+    (two,) = packed(folder, tmp_path / "two" / f"{NAME}.tar")
+    assert one.read_bytes() == two.read_bytes()
+    with tarfile.open(one) as archive:
+        for entry in archive:
+            assert (entry.mtime, entry.uid, entry.gid, entry.uname) == (0, 0, 0, "")
+            assert entry.name.startswith(f"{NAME}/")
+            assert "report" not in entry.name
+
+
+def test_parts_of_a_size_unfold_to_a_whole_dataset(folder, tmp_path):
+    target = tmp_path / f"{NAME}.tar"
+    (target.with_name(f"{NAME}.9.tar")).write_text("of an earlier package")
+    parts = packed(folder, target, 12_000)
+    assert [path.name for path in parts[:2]] == [f"{NAME}.tar", f"{NAME}.2.tar"]
+    assert sorted(tmp_path.glob("*.tar")) == sorted(parts)
+    assert len(parts) > 2
+    for path in parts:
+        with tarfile.open(path) as archive:
+            own = [e.size for e in archive if not e.name.endswith(("README.md", "card.json"))]
+            assert sum(own) <= 12_000 or len(own) == 1
+        subprocess.run(["tar", "-xf", path, "-C", tmp_path], check=True)
+    unfolded = tmp_path / NAME
+    assert list(Integrity(unfolded).faults()) == []
+    view = unfolded / "exr" / "view_0001f.exr"
+    view.write_bytes(view.read_bytes()[:-1])
+    assert [fault.path for fault in Integrity(unfolded).faults()] == [Path(os.path.relpath(view))]
+    listed = package.listed(parts)
+    assert [part["sha256"] for part in listed] == [sha256(path) for path in parts]
+
+
+def test_the_card_says_what_it_is_and_how_it_is_loaded_and_cited(folder, tmp_path):
+    (path,) = packed(folder, tmp_path / f"{NAME}.tar")
+    with tarfile.open(path) as archive:
+        card = json.load(archive.extractfile(f"{NAME}/card.json"))
+        readme = archive.extractfile(f"{NAME}/README.md").read().decode()
+    assert card["views"] == 4
+    assert card["lens"] == "equidistant fisheye, 180°"
+    assert card["depth"] == "z"
+    assert card["passes"] == ["normal"]
+    assert card["reprojections"] == ["perspective"]
+    assert card["scene"]["description"].startswith("A tiny rig in a small room")
+    assert any("SILVR" in text for text in card["cite"])
+    assert card["loaders"]["perspective/exports/colmap"].endswith(
+        "Reconstruction('perspective/exports/colmap/sparse/0')"
+    )
+    assert card["loaders"]["."].endswith("'./exr/view_0000f.exr').channels()")
+    assert all(text in readme for text in (*card["cite"], *card["loaders"].values()))
+    assert "licence of the scene | not stated" in readme
+    credited = load_scene("lone_monk_original")
+    again = package.card(folder, NAME, credited)
+    assert again["cite"][1] == credited.credit == "Lone Monk, by Carlo Bergonzini (Monorender)"
+
+
+def test_every_export_has_a_loader():
+    assert package.LOADERS.keys() == {"exr", *Exports.model_fields}
