@@ -31,7 +31,7 @@ rule validate:
         "Validating {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/validate.py"
-        " --dataset {params.dataset} {params.reprojections}"
+        " {params.dataset} {params.reprojections}"
         " --records {input.records} {params.optional} --processes {threads}"
         " --removed {params.removed}"
         " --output {output.validation} --sums {output.sums} > {log} 2>&1"

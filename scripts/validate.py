@@ -1,9 +1,12 @@
 """Check a dataset whole: its files, its pixels, and that its views see the same world.
 
-Writes validation.json, whatever comes out, and the checksums of all that the dataset publishes;
-scripts/publish_checksums.py makes them its sha256sums.txt if it is valid. What an invalid dataset
-fails in is printed, a line a failure. What a killed run left half-written in the dataset (hidden
-*.tmp files), and the sha256sums.txt of an earlier validation, are removed first.
+What an invalid dataset fails in is printed, a line a failure; then the exit status is 1.
+
+With --output and --sums, as the workflow has it, the exit status is 0 whatever comes out, and
+validation.json is written, and the checksums of all that the dataset publishes;
+scripts/publish_checksums.py makes them its sha256sums.txt if it is valid. What a killed run left
+half-written in the dataset (hidden *.tmp files), and the sha256sums.txt of an earlier validation,
+are removed first.
 """
 
 import argparse
@@ -11,7 +14,9 @@ import sys
 from pathlib import Path
 
 from lightfield.core.cli import run
+from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
+from lightfield.dataset.lightfield import NAME
 from lightfield.export import MANIFESTS
 from lightfield.validation.files import remove_leftovers, remove_strays, write_sums
 from lightfield.validation.validate import validate
@@ -20,21 +25,29 @@ from lightfield.validation.validate import validate
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     add = parser.add_argument
-    add("--dataset", required=True, type=Path, help="folder of the dataset")
-    add("--output", required=True, type=Path, help="validation.json to write")
-    add("--sums", required=True, type=Path, help="checksums to write")
+    add("dataset", type=Path, help="folder of the dataset")
+    add("--output", type=Path, help="validation.json to write, with --sums")
+    add("--sums", type=Path, help="checksums to write, with --output")
     records = "JSON of the sizes and checksums with which images were written"
     add("--records", type=Path, nargs="*", default=[], help=records)
     add("--clearance", type=Path, help="JSON of what surrounds each camera")
     add("--inventory", type=Path, help="JSON of what the scene contains")
     add("--splits", type=Path, help="splits.json of the scene")
-    folders = "folders of the dataset that hold a reprojection"
+    folders = "folders of the dataset that hold a reprojection (default without --output: all)"
     add("--reprojection", action="extend", nargs="+", default=[], metavar="NAME", help=folders)
     add("--removed", type=Path, help="folder to which files go that are not the dataset's")
     add("--processes", type=int, default=1, help="worker processes (default: 1)")
     arguments = parser.parse_args()
+    if (arguments.output is None) != (arguments.sums is None):
+        raise UserError("--output, --sums: go together")
+    if not arguments.dataset.is_dir():
+        raise UserError(f"{arguments.dataset}: no such folder")
 
-    remove_leftovers(arguments.dataset)
+    if arguments.output:
+        remove_leftovers(arguments.dataset)
+    elif not arguments.reprojection:
+        found = sorted(arguments.dataset.glob(f"*/{NAME}"))
+        arguments.reprojection = [path.parent.name for path in found]
     if arguments.removed:
         count = remove_strays(
             arguments.dataset, arguments.reprojection, MANIFESTS, arguments.removed
@@ -54,11 +67,14 @@ def main() -> None:
         MANIFESTS,
         arguments.splits,
     )
-    write_json(arguments.output, result.to_json())
     print(result.summary())
     for line in result.failures():
         print(line, file=sys.stderr)
-    write_sums(arguments.sums, result.checksums, arguments.dataset, arguments.output)
+    if arguments.output:
+        write_json(arguments.output, result.to_json())
+        write_sums(arguments.sums, result.checksums, arguments.dataset, arguments.output)
+    elif not result.valid:
+        raise UserError(f"{arguments.dataset}: is not valid")
 
 
 if __name__ == "__main__":

@@ -73,7 +73,7 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
     run("reproject.py", *words, "--output-dir", again, "--output-cfg", again / "lightfield.json")
     words = ["--input-cfg", again / "lightfield.json", "--image-suffix", ".exr"]
     run("export_instant_ngp.py", *words, "--output", again / "transforms.json")
-    words = ["--dataset", dataset, "--reprojection", "perspective", "--records", record]
+    words = [dataset, "--reprojection", "perspective", "--records", record]
     words += ["--output", dataset / "validation.json", "--sums", tmp_path / "sums.txt"]
     run("validate.py", *words)
     validation = json.loads((dataset / "validation.json").read_text())

@@ -787,7 +787,7 @@ def test_missing_picture_of_a_reprojection_is_named(small_dataset: Path) -> None
 
 
 def run(run_program: Any, dataset: Path, *more: Any) -> Any:
-    words = ("--dataset", dataset, "--output", dataset / "validation.json")
+    words = (dataset, "--output", dataset / "validation.json")
     return run_program("validate.py", *words, "--sums", dataset.with_suffix(".sums"), *more)
 
 
@@ -795,6 +795,20 @@ def publish(run_program: Any, dataset: Path) -> Any:
     words = ("--validation", dataset / "validation.json", "--page", "the page")
     words += ("--sums", dataset.with_suffix(".sums"), "--output", dataset / "sha256sums.txt")
     return run_program("publish_checksums.py", *words, check=False)
+
+
+def test_program_needs_no_other_word_than_the_dataset(
+    small_dataset: Path, run_program: Any
+) -> None:
+    add_panoramas(small_dataset)
+    before = {path: path.stat().st_mtime_ns for path in small_dataset.rglob("*")}
+    assert ": valid: " in run_program("validate.py", small_dataset).stdout
+    assert before == {path: path.stat().st_mtime_ns for path in small_dataset.rglob("*")}
+    (small_dataset / "panorama" / "view_0004f.png").unlink()
+    result = run_program("validate.py", small_dataset, check=False)
+    assert result.returncode == 1
+    assert result.stderr.endswith(f"error: {small_dataset}: is not valid\n")
+    assert "panorama/view_0004f.png: is missing" in result.stderr
 
 
 def test_program_writes_the_same_bytes_each_time_and_sums_that_hold(
