@@ -31,6 +31,7 @@ from lightfield.dataset.config import accept_blend, load_config, scene_path
 from lightfield.dataset.dataset import PICTURES, PLOTS, load_datasets, scene_datasets
 from lightfield.dataset.exports import MANIFEST, VIEWS
 from lightfield.dataset.splits import SPLITS
+from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.measurement.sampling import calibrated
 
 # The rigs that config.yaml names are those of the scene that it names.
@@ -72,6 +73,8 @@ DATASET = f"{RESULTS}/{{scene}}/{{rig}}"
 MADE = f"{WORK}/{{scene}}/{{rig}}"
 PANORAMA = f"{MADE}/panorama"
 REPROJECTED = f"{DATASET}/{{reprojection}}"
+# Of a cube map each face has one, with _f, _b, … before the suffix.
+LENS_MAP = f"{MADE}/{{reprojection}}/lens_map.npy"
 # What is not what a program wrote there, and what is wrong with it.
 BROKEN = {}
 # Where that is moved to, for nobody to lose anything.
@@ -112,6 +115,7 @@ localrules:
     figures,
     index,
     lens_map,
+    lens_maps,
     lightfield,
     page,
     panorama_lightfield,
@@ -412,6 +416,12 @@ def blend_words(wildcards, input):
 def calibration_words(wildcards, input):
     """Return the words that name a calibration to a program, if there is one."""
     return f"--calibration {input.calibration}" if input.calibration else ""
+
+
+def lens_maps_of(wildcards):
+    """Return the lens maps of a reprojection; none of what is not one."""
+    dataset, name = dataset_of(wildcards), wildcards.reprojection
+    return dataset.lens_maps(name) if name in dataset.reprojections else []
 
 
 def place_words(wildcards, input):

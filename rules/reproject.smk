@@ -30,7 +30,7 @@ rule lens_map:
     input:
         f"{DATASET}/lightfield.json",
     output:
-        f"{MADE}/{{reprojection}}/lens_map.npy",
+        LENS_MAP,
     log:
         log_of("{scene}/{rig}/{reprojection}/lens_map"),
     benchmark:
@@ -39,18 +39,28 @@ rule lens_map:
         ENVIRONMENT
     params:
         optics=of_reprojection("optics"),
+        file=LENS_MAP,
     message:
         "Computing the lens map of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
         f"python {SCRIPTS}/lens_map.py"
-        " {output} {params.optics} --input-cfg {input} > {log} 2>&1"
+        " {params.file} {params.optics} --input-cfg {input} > {log} 2>&1"
+
+
+use rule lens_map as lens_maps with:
+    output:
+        expand(
+            f"{MADE}/{{reprojection}}/lens_map_{{face}}.npy",
+            face=CUBE_FACES,
+            allow_missing=True,
+        ),
 
 
 rule reproject:
     input:
         record=f"{MADE}/render/{{first}}-{{end}}.json",
         lightfield=f"{DATASET}/lightfield.json",
-        lens_map=f"{MADE}/{{reprojection}}/lens_map.npy",
+        lens_maps=lens_maps_of,
         renewal=renewal,
     output:
         f"{MADE}/{{reprojection}}/{{first}}-{{end}}.json",
@@ -64,6 +74,7 @@ rule reproject:
         mem_mb=2000,
     params:
         views=f"{DATASET}/exr",
+        lens_map=LENS_MAP,
         folder=REPROJECTED,
         optics=of_reprojection("optics"),
         development=of_reprojection("development"),
@@ -73,6 +84,6 @@ rule reproject:
     shell:
         f"python {SCRIPTS}/reproject.py"
         " {params.optics} {params.development}"
-        " --lens-map {input.lens_map} --input-cfg {input.lightfield} --input-dir {params.views}"
+        " --lens-map {params.lens_map} --input-cfg {input.lightfield} --input-dir {params.views}"
         " --views {wildcards.first}:{wildcards.end} --output-dir {params.folder}"
         " --source-record {input.record} --record {output} > {log} 2>&1"

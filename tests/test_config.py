@@ -210,6 +210,26 @@ def test_defaults_and_limits_are_applied(tmp_path, monkeypatch):
     assert small[0].render["denoise"] is True
 
 
+def test_a_cube_map_has_a_lens_map_and_a_view_a_face(tmp_path, monkeypatch):
+    faces = {"camera": {"lens": "rectilinear", "fov": 90, "resolution": [64, 64]}}
+    content = changed("reprojections.faces", faces | {"cube_map": True})
+    (tmp_path / "right.yaml").write_text(yaml.safe_dump(content))
+    monkeypatch.setattr(config, "SCENES", tmp_path)
+    dataset = scene_datasets("right", limits=config.Preset(resolution=32, views=20))[0]
+    assert dataset.reprojections["faces"].optics == "--cubemap 32 --filter adaptive"
+    names = [Path(path).name for path in dataset.lens_maps("faces")]
+    assert names == [f"lens_map_{face}.npy" for face in "fblrud"]
+    assert set(dataset.lens_maps("faces")) <= set(dataset.intermediates)
+    for key, value in (("fov", 80), ("resolution", [64, 32])):
+        faces["camera"][key] = value
+        content["reprojections"]["faces"] |= faces
+        expected = "camera: must be rectilinear with fov 90|square with cube_map"
+        (tmp_path / "wrong.yaml").write_text(yaml.safe_dump(content))
+        with pytest.raises(UserError, match=expected):
+            config.load_scene("wrong")
+        faces["camera"]["fov"] = 90
+
+
 def test_every_scene_of_the_repository_is_right():
     for path in config.SCENES.glob("*.yaml"):
         config.read_scene(path)

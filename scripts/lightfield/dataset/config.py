@@ -28,7 +28,8 @@ from lightfield.core.settings import AS_WRITTEN, Name, Settings, Vector, checked
 from lightfield.dataset import published
 from lightfield.dataset.exports import VIEWS, Export, Exports
 from lightfield.dataset.passes import PASSES, in_order
-from lightfield.geometry.lenses import LENSES, CameraSettings
+from lightfield.geometry.lenses import LENSES, CameraSettings, Lens
+from lightfield.geometry.lenses.cube_map import CubeMap
 from lightfield.geometry.rigs import AnyRig, Poses, Rig
 from lightfield.geometry.rigs.rig import Frame
 from lightfield.geometry.rigs.split import PARTS, Chosen
@@ -303,6 +304,7 @@ class Reprojection(Settings):
         None, min_length=1, description="The rigs it is made for; without it, every one of them."
     )
     camera: CameraSettings
+    cube_map: bool = Field(False, description="Six faces of each view, each a 90 degree view.")
     rotation: Vector = Field((0, 0, 0), description="Pan, pitch and roll in degrees.")
     format: Literal["png", "exr"] = Field("png", description="EXR has depth.")
     filter: Literal["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp"] = Field(
@@ -323,10 +325,19 @@ class Reprojection(Settings):
         return f".{self.format}"
 
     @property
+    def lens(self) -> Lens:
+        """The lens of the images."""
+        size = self.camera.resolution[0]
+        return CubeMap(width=6 * size, height=size).face if self.cube_map else self.camera.make()
+
+    @property
     def optics(self) -> str:
         """The words that say to scripts/reproject.py where each pixel comes from."""
-        camera = self.camera.model_dump_json(exclude_unset=True)
-        words = ["--camera", camera, "--filter", self.filter]
+        if self.cube_map:
+            words = ["--cubemap", str(self.camera.resolution[0])]
+        else:
+            words = ["--camera", self.camera.model_dump_json(exclude_unset=True)]
+        words += ["--filter", self.filter]
         if self.samples > 1:
             words += ["--samples", str(self.samples)]
         if any(self.rotation):
@@ -413,6 +424,7 @@ class Scene(Settings):
                 if rig_name not in self.rigs:
                     hint = suggestion(rig_name, self.rigs)
                     raise ValueError(f"{key}.rigs: there is no rig {rig_name!r}{hint}")
+            _check_cube_map(key, reprojection)
             for pass_name in reprojection.passes or ():
                 if self.render is None or pass_name not in (self.render.passes or ()):
                     raise ValueError(f"{key}.passes: {pass_name} is not in render.passes")
@@ -493,15 +505,19 @@ class Scene(Settings):
                 f"render.depth: is 'z', but {key}.camera sees beyond 180 degrees; "
                 "must be auto, distance or none"
             )
-        if rig.cube_map and (camera.lens, getattr(camera, "fov", None)) != ("rectilinear", 90):
-            raise ValueError(
-                f"{key}.camera: must be rectilinear with fov 90 for a rig with cube_map"
-            )
-        if rig.cube_map and lens.width != lens.height:
-            raise ValueError(
-                f"{key}.camera.resolution: is {camera.resolution}; "
-                "must be square for a rig with cube_map"
-            )
+        _check_cube_map(key, rig)
+
+
+def _check_cube_map(key: str, settings: Rig | Reprojection) -> None:
+    """Check that a camera can be that of a cube map's face, where it has to."""
+    camera = settings.camera
+    if not settings.cube_map:
+        return
+    if (camera.lens, getattr(camera, "fov", None)) != ("rectilinear", 90):
+        raise ValueError(f"{key}.camera: must be rectilinear with fov 90 with cube_map")
+    if camera.resolution[0] != camera.resolution[1]:
+        size = list(camera.resolution)
+        raise ValueError(f"{key}.camera.resolution: is {size}; must be square with cube_map")
 
 
 def _check_name(key: str, name: str, neighbours: set[str]) -> None:

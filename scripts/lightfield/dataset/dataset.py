@@ -28,6 +28,7 @@ from lightfield.dataset.keys import scene_fingerprint
 from lightfield.dataset.lightfield import NAME
 from lightfield.dataset.splits import SPLITS
 from lightfield.geometry.lenses import CameraSettings
+from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.overview import sees_all_round
 from lightfield.geometry.rigs import Pose, Poses, Random, Rig
 
@@ -150,9 +151,9 @@ class Dataset:
             yield own
         for name, reprojection in self.reprojections.items():
             path = f"{self.folder}/{name}/{NAME}"
-            expected = reprojection.camera.make().to_lightfield()
+            expected = reprojection.lens.to_lightfield()
             if _differs(path, expected | {"reprojection": reprojection.recorded}):
-                yield from (path, f"{self.work}/{name}/lens_map.npy", *self.records(name))
+                yield from (path, *self.lens_maps(name), *self.records(name))
         if any(
             path.parent.name not in self.reprojections
             for path in Path(self.folder).glob(f"*/{NAME}")
@@ -256,6 +257,11 @@ class Dataset:
     @property
     def work(self) -> str:
         return f"{self.work_root}/{self.name}"
+
+    def lens_maps(self, name: str) -> list[str]:
+        """Return the lens maps of a reprojection: one, or of a cube map one a face."""
+        faces = CUBE_FACES if self.reprojections[name].cube_map else ("",)
+        return [f"{self.work}/{name}/lens_map{face and f'_{face}'}.npy" for face in faces]
 
     @property
     def places(self) -> str | list[str]:
@@ -362,7 +368,7 @@ class Dataset:
                 if isinstance(self.panorama, str)
                 else []
             ),
-            *(f"{self.work}/{name}/lens_map.npy" for name in self.reprojections),
+            *(path for name in self.reprojections for path in self.lens_maps(name)),
         ]
 
     @property
@@ -461,8 +467,10 @@ class Dataset:
         """Bytes of a view and of what it is reprojected to."""
         sizes = {"exr": 10 * COMPRESSED, "png": PNG_BYTES}
         return self.expected_view[1] + sum(
-            math.prod(reprojection.camera.resolution) * sizes[reprojection.format]
-            for reprojection in self.reprojections.values()
+            math.prod(reprojection.camera.resolution)
+            * sizes[reprojection.format]
+            * len(self.lens_maps(name))
+            for name, reprojection in self.reprojections.items()
         )
 
     def memory_bytes(self, pixels: int) -> int:

@@ -140,6 +140,9 @@ def _reprojected(folder: Path, reprojection: str, finished: set[str]) -> int:
     """Count the finished views that are reprojected too."""
     made = (p for p in (folder / reprojection).glob("*") if p.suffix in (".png", ".exr"))
     times = {path.stem: path.stat().st_mtime for path in made}
+    # Of a cube map the last face counts.
+    last = times.keys() & {f"{name}_d" for name in finished}
+    times |= {name.removesuffix("_d"): times[name] for name in last}
     return sum(times.get(name, -1) >= _file(folder, name).stat().st_mtime for name in finished)
 
 
