@@ -48,6 +48,8 @@ include: "rules/error.smk"
 onstart:
     try:
         check_device()
+        check_room()
+        remove_leftovers()
         for path in BROKEN:
             set_aside(Path(path), Path(REMOVED))
         if SETTINGS.accept_blend:

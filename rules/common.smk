@@ -4,8 +4,10 @@ import json
 import math
 import os
 import shlex
+import shutil
 import subprocess
 import sys
+import tempfile
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -22,6 +24,7 @@ shell.prefix(
     ' echo "error: killed by SIG$(kill -l $status)" >&2; fi; return $status; }}; }}; '
 )
 
+from lightfield.core import leftovers, room
 from lightfield.core.failures import failure_report
 from lightfield.core.files import read_json, set_aside
 from lightfield.core.gpus import visible
@@ -515,6 +518,35 @@ def check_device():
         if checked.returncode:
             *_, problem = checked.stderr.strip().splitlines() or ["it said nothing"]
             raise UserError(problem.removeprefix("error: "))
+
+
+def check_room():
+    """Compare the room on the disks with what this run writes, and warn; raises `UserError`."""
+    jobs = [job for job in workflow.dag.needrun_jobs() if job.rule.name == "render"]
+    datasets = {d.folder: d for d in (dataset_of(job.wildcards) for job in jobs)}
+    needs = [(Path(RESULTS), d.missing_bytes) for d in datasets.values()]
+    # A built scene, at most.
+    needs += [(Path(WORK), 1e8) for _ in {d.scene_name for d in datasets.values()}]
+    if jobs and workflow.local_exec:
+        # What renders at once writes each its view as Cycles has it: in memory if there is room.
+        pixels = max(math.prod(d.rig.camera.resolution) for d in datasets.values())
+        at_once = min(len(jobs), max(1, workflow.cores // jobs[0].threads))
+        size = at_once * pixels * memory.PASSES_PIXEL_BYTES
+        shared = Path("/dev/shm")
+        if not shared.is_dir() or shutil.disk_usage(shared).free < size:
+            needs.append((Path(tempfile.gettempdir()), size))
+    for warning in room.check(needs):
+        print(f"warning: {warning}", file=sys.stderr)
+
+
+def remove_leftovers():
+    """Remove what killed runs have left, and say so."""
+    removed = leftovers.remove(map(Path, (RESULTS, WORK)))
+    if removed:
+        print(
+            f"removed {len(removed)} files and folders that killed runs have left",
+            file=sys.stderr,
+        )
 
 
 def failed_jobs():

@@ -473,6 +473,12 @@ class Dataset:
             for name, reprojection in self.reprojections.items()
         )
 
+    @property
+    def missing_bytes(self) -> float:
+        """Estimate of what the views take that are not there yet, and what is made of them."""
+        there = sum(entry.name.endswith(".exr") for entry in _entries(self.folder, "exr"))
+        return max(0, self.view_count - there) * self.expected_view_bytes
+
     def memory_bytes(self, pixels: int) -> int:
         """Estimate of what a process takes that renders views of so many pixels.
 

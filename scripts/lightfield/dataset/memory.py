@@ -6,6 +6,8 @@ import math
 # bpy 5.0 between 64² and 1024², 255 and 910, and rounded up.
 PIXEL_BYTES = 300
 DENOISED_PIXEL_BYTES = 1000
+# Of all passes of a view in 32-bit floats in a temporary file, at most, and some room for others.
+PASSES_PIXEL_BYTES = 200
 # Of a scene that nobody has measured yet.
 UNKNOWN_SCENE = 6_000_000_000
 

@@ -6,10 +6,10 @@ detail a pixel, and compress worse.
 """
 
 import math
-import tempfile
 from pathlib import Path
 from typing import Any
 
+from lightfield.core.leftovers import temporary_folder
 from lightfield.dataset import journal
 from lightfield.dataset.lightfield import LightField
 from lightfield.rendering import shard
@@ -29,8 +29,8 @@ def measure(
     # The first view's time holds some of the start-up, so it is rendered and not counted.
     step = max(1, len(views) // (count + 1))
     probes = lightfield.changed(lens=lens.resized(*small), views=views[::step][: count + 1])
-    with tempfile.TemporaryDirectory() as name:
-        folder, log = Path(name, "exr"), Path(name, "journal.jsonl")
+    with temporary_folder() as temporary:
+        folder, log = temporary / "exr", temporary / "journal.jsonl"
         shard.render(
             probes,
             ":",
@@ -44,7 +44,7 @@ def measure(
         (run,) = journal.read(log)
         rendered = run.views[1:]
         sizes = [
-            sum(file.stat().st_size for file in Path(name).rglob(f"{view['view']}.exr"))
+            sum(file.stat().st_size for file in temporary.rglob(f"{view['view']}.exr"))
             for view in rendered
         ]
     # On a processor the time that it worked, whatever else it did meanwhile.

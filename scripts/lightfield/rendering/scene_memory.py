@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
+from lightfield.core.leftovers import temporary_folder
 from lightfield.core.memory import available
 from lightfield.dataset import journal
 from lightfield.dataset.lightfield import LightField, View
@@ -26,8 +26,7 @@ def measure(blend: Path, inventory: Mapping[str, Any]) -> int:
     It has nothing else in its memory, so it is a process of its own. Raises `UserError` where the
     scene does not fit into the machine's memory, or cannot be rendered.
     """
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         content = {
             **Equirectangular(width=32, height=16).to_lightfield(),
             **{"depth": "distance", "frame": 1, "scene": {}},

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import psutil
 
-from lightfield.core import processors
+from lightfield.core import leftovers, processors
 from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
@@ -61,6 +61,8 @@ def render(
     """
     images.check_codec(lightfield.render.get("compression", "zip"))
     log, sums = Journal(journal), ShardRecord(record, folder)
+    # On the machine that renders: what was killed there may fill its memory.
+    leftovers.remove()
     chosen = lightfield.views[view_slice(views, len(lightfield.views))]
     wanted = lightfield.passes
     paths = {view.name: _files(folder, view, wanted) for view in chosen}

@@ -3,10 +3,8 @@
 import math
 import os
 import shutil
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -15,14 +13,13 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_MEMORY
+from lightfield.core.leftovers import temporary_folder
+from lightfield.dataset.memory import PASSES_PIXEL_BYTES
 from lightfield.imaging import images
 from lightfield.rendering.cycles import view_layer
 from lightfield.rendering.quiet import quiet
 
 Array = np.ndarray[Any, Any]
-
-# Of all passes of a view in 32-bit floats, at most, and some room for others.
-PIXEL_BYTES = 200
 
 
 @dataclass(frozen=True)
@@ -52,8 +49,8 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
         for name, channels in passes.items()
     }
     pixels = scene.render.resolution_x * scene.render.resolution_y
-    with tempfile.TemporaryDirectory(prefix="plenoforge-", dir=_fast_folder(pixels)) as folder:
-        path = Path(folder) / "view.exr"
+    with temporary_folder(_fast_folder(pixels)) as folder:
+        path = folder / "view.exr"
         scene.render.filepath = str(path)
         try:
             with quiet():
@@ -69,7 +66,7 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
             free = shutil.disk_usage(folder).free
             raise UserError(
                 f"{error}; {free} bytes are free there: make room, or set TMPDIR to a folder with "
-                f"{pixels * PIXEL_BYTES} bytes"
+                f"{pixels * PASSES_PIXEL_BYTES} bytes"
             ) from None
     return Rendered(
         {
@@ -86,7 +83,7 @@ def _fast_folder(pixels: int) -> str | None:
     folder = "/dev/shm"
     if not os.access(folder, os.W_OK | os.X_OK):
         return None
-    return folder if shutil.disk_usage(folder).free > pixels * PIXEL_BYTES else None
+    return folder if shutil.disk_usage(folder).free > pixels * PASSES_PIXEL_BYTES else None
 
 
 def _seconds(text: images.Attribute) -> float:

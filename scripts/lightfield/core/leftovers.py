@@ -1,0 +1,91 @@
+"""What killed processes leave behind: temporary folders, and files that were on their way."""
+
+import fcntl
+import os
+import re
+import shutil
+import tempfile
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+PREFIX = "plenoforge-"
+# Blender makes itself such a folder as long as it runs, an artist's Blender, too.
+BLENDERS = "blender_*"
+# The names of `atomic_path`.
+_ON_THE_WAY = re.compile(r"\..+\.\d+\.tmp(\.\w+)?")
+# Seconds: nobody writes one file for so long, or has a Blender with an empty folder.
+FILE_AGE, BLENDER_AGE = 3600.0, 24 * 3600.0
+# Between making a folder and taking it.
+FOLDER_AGE = 60.0
+
+
+@contextmanager
+def temporary_folder(parent: Path | str | None = None) -> Iterator[Path]:
+    """Yield a temporary folder in ``parent``, or where the machine has its own.
+
+    It is removed at the end, and where this process is killed by `remove`: a lock shows whether the
+    process lives, which a number would not from within a container.
+    """
+    with tempfile.TemporaryDirectory(prefix=PREFIX, dir=parent) as name:
+        lock = os.open(name, os.O_RDONLY)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield Path(name)
+        finally:
+            os.close(lock)
+
+
+def remove(folders: Iterable[Path] = ()) -> list[Path]:
+    """Remove what killed processes of this user have left; return what that was.
+
+    That is files on their way in ``folders`` and below, and temporary folders of this machine.
+    """
+    found = [path for folder in folders for path in _files(folder)]
+    for path in found:
+        path.unlink(missing_ok=True)
+    for parent in {Path(tempfile.gettempdir()), Path("/dev/shm")}:
+        for path in parent.glob(f"{PREFIX}*"):
+            if path.is_dir() and _is_old(path, FOLDER_AGE) and not _is_in_use(path):
+                shutil.rmtree(path, ignore_errors=True)
+                found.append(path)
+        for path in parent.glob(BLENDERS):
+            if path.is_dir() and _is_old(path, BLENDER_AGE):
+                # One that is not empty stays.
+                with suppress(OSError):
+                    path.rmdir()
+                    found.append(path)
+    return found
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    for parent, _, names in os.walk(folder):
+        for name in names:
+            path = Path(parent, name)
+            if _ON_THE_WAY.fullmatch(name) and _is_old(path, FILE_AGE):
+                yield path
+
+
+def _is_old(path: Path, age: float) -> bool:
+    """Whether a file or folder is this user's and has not been changed for so many seconds."""
+    try:
+        status = path.lstat()
+    except OSError:
+        return False
+    return status.st_uid == os.getuid() and status.st_mtime < time.time() - age
+
+
+def _is_in_use(folder: Path) -> bool:
+    """Whether the process lives that has made a temporary folder."""
+    try:
+        lock = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return True
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return False
+    except OSError:
+        return True
+    finally:
+        os.close(lock)

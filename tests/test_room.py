@@ -1,0 +1,93 @@
+"""Room before a run, and what killed runs left: refused and removed before anything is made."""
+
+import os
+import subprocess
+import sys
+import time
+from collections import namedtuple
+from pathlib import Path
+
+import pytest
+from checkouts import checkout, snakemake
+from conftest import SCRIPTS
+
+from lightfield.core import leftovers, room
+from lightfield.core.errors import UserError
+
+Usage = namedtuple("Usage", "free")
+
+HUGE = """
+scene: {builder: room}
+render: {samples: 1}
+rigs:
+  LFHuge:
+    type: plane
+    cameras: [1000, 1000]
+    camera: {lens: rectilinear, fov: 60, resolution: [16384, 16384]}
+"""
+
+KEEPER = """
+import sys, time
+from lightfield.core.leftovers import temporary_folder
+with temporary_folder(sys.argv[1]) as folder:
+    (folder / "view.exr").write_bytes(bytes(1000))
+    print(folder, flush=True)
+    time.sleep(60)
+"""
+
+
+@pytest.mark.parametrize(
+    ("sizes", "expected"),
+    [([40, 40], None), ([50, 45], "warning"), ([150, 45], "warning"), ([150, 55], "error")],
+)
+def test_what_is_written_to_one_disk_is_added_up(sizes, expected, tmp_path, monkeypatch):
+    monkeypatch.setattr(room.shutil, "disk_usage", lambda _: Usage(100))
+    needs = [(tmp_path / f"not/there/{number}", size) for number, size in enumerate(sizes)]
+    text = f"{needs[0][0]}: 100 bytes are free on its disk, and this run writes some {sum(sizes)}"
+    if expected == "error":
+        with pytest.raises(UserError, match=text):
+            list(room.check(needs))
+        return
+    warnings = list(room.check(needs))
+    assert [warning.startswith(text) for warning in warnings] == [True] * (expected == "warning")
+
+
+def test_a_run_that_cannot_fit_ends_before_its_first_job(tmp_path):
+    folder = checkout(tmp_path, huge=HUGE)
+    result = snakemake(folder, "--config", "scenes=huge", "preset=full")
+    assert result.returncode != 0
+    (said,) = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
+    assert said.startswith("error: results: ") and "bytes are free on its disk" in said
+    assert "Traceback" not in result.stderr
+    assert not (folder / "results").exists() and not (folder / "work").exists()
+
+
+def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path, monkeypatch):
+    monkeypatch.setattr(leftovers.tempfile, "gettempdir", lambda: str(tmp_path))
+    words = [sys.executable, "-c", KEEPER, tmp_path]
+    keepers = [
+        subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env={"PYTHONPATH": str(SCRIPTS)})
+        for _ in range(2)
+    ]
+    live, dead = (Path(keeper.stdout.readline().strip()) for keeper in keepers)
+    keepers[1].kill()
+    keepers[1].wait()
+    (tmp_path / "results").mkdir()
+    files = [".view.77.tmp.exr", ".view.78.tmp", ".view.79.tmp.exr", "view.exr", ".tmp.exr"]
+    paths = [tmp_path / "results" / name for name in files]
+    for path in paths:
+        path.write_bytes(b"half")
+    empty, full, young = (tmp_path / f"blender_{name}" for name in ("empty", "full", "young"))
+    for path in (empty, full, young):
+        path.mkdir()
+    (full / "picture.png").write_bytes(b"an artist's")
+    old = time.time() - 2 * leftovers.BLENDER_AGE
+    for path in (live, dead, *paths, full / "picture.png", empty, full):
+        os.utime(path, (old, old))
+    os.utime(paths[2])
+    found = leftovers.remove([tmp_path / "results"])
+    assert {path for path in found if path.is_relative_to(tmp_path)} == {dead, *paths[:2], empty}
+    assert not any(path.exists() for path in found)
+    assert all(path.exists() for path in (live / "view.exr", *paths[2:], full, young))
+    keepers[0].kill()
+    keepers[0].wait()
