@@ -374,7 +374,6 @@ def measure_batches(arguments: argparse.Namespace, folder: Path) -> list[dict[st
     """Return rows of job, program, views, and CPU seconds a view."""
     size, count = arguments.batch_size, arguments.batch
     write_batch(folder, size, count)
-    config = folder / "lightfield.json"
     jobs = {
         "EXR with depth, same size": [*CAMERA, "--exr"],
         "PNG, an eighth": [*CAMERA, "--scale", "0.125", "--png", "--exposure", "-1",
@@ -382,16 +381,10 @@ def measure_batches(arguments: argparse.Namespace, folder: Path) -> list[dict[st
     }  # fmt: skip
     rows: list[dict[str, Any]] = []
     for job, flags in jobs.items():
-        size_flags = [flag for flag in flags if flag in ("--scale", "0.125")]
 
-        def ours(
-            filter_name: str, flags: list[str] = flags, size: Any = tuple(size_flags)
-        ) -> float:
-            made = folder / f"{filter_name}.npy"
-            start = [sys.executable, str(SCRIPTS / "lens_map.py"), str(made), *CAMERA, *size]
-            cpu = cpu_of([*start, "--input-cfg", str(config), "--filter", filter_name])
-            program = [sys.executable, str(SCRIPTS / "reproject.py"), "--lens-map", str(made)]
-            return cpu + run_batch([*program, "--filter", filter_name], folder, flags)
+        def ours(filter_name: str, flags: list[str] = flags) -> float:
+            program = [sys.executable, str(SCRIPTS / "reproject.py"), "--filter", filter_name]
+            return run_batch(program, folder, flags)
 
         programs = {
             f"ours, {DEFAULT_FILTER}": lambda ours=ours: ours(DEFAULT_FILTER),

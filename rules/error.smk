@@ -73,6 +73,7 @@ rule measure_error:
             f"{RESULTS}/benchmarks/error_vs_time/{{scene}}",
             ".json",
             ".csv",
+            ".md",
             ".svg",
             ".png",
         ),

@@ -29,11 +29,18 @@ def main() -> None:
     parser.add_argument(
         "--reference", type=int, default=2048, help="samples of a reference (default: 2048)"
     )
-    parser.add_argument("--seeds", type=int, default=2, help="renders of each way (default: 2)")
+    parser.add_argument(
+        "--seeds",
+        type=int,
+        default=2,
+        help="renders of each way, 2 or more; more tell bias from variance better (default: 2)",
+    )
     parser.add_argument(
         "--output", required=True, type=Path, help="stem of the .csv, .json, .svg and .png to write"
     )
     arguments = parser.parse_args()
+    if arguments.seeds < 2:
+        raise UserError(f"--seeds {arguments.seeds}: must be at least 2")
 
     lightfield = LightField.read(arguments.lightfield)
     if arguments.calibration:

@@ -13,7 +13,8 @@ from lightfield.dataset.config import Preset
 from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.measurement.calibration import effort_for
+from lightfield.measurement.calibration import Candidate, Search, effort_for
+from lightfield.measurement.sampling import PLAIN
 
 TARGET = 0.02
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [24, 24]}
@@ -118,6 +119,31 @@ def test_what_calibration_will_cost_is_said_beforehand(tmp_path):
     table = told.stdout.split("to render")[1]
     # 16 windows of 64², 14 times 256 samples of 6 µs, and a start.
     assert re.search(r"^calibration of aimed +0\.39 +$", table, re.M), table
+
+
+class SimulatedBench:
+    """Plain path tracing of error 1/N, 8/N of all pixels, and others of half that error.
+
+    They leave ``whole_error`` in all pixels, however much effort they take.
+    """
+
+    def __init__(self, whole_error):
+        self.whole_error = whole_error
+
+    def measure(self, way, settings):
+        samples = min(settings["samples"], 1 / (settings.get("adaptive_threshold") or 1e-4))
+        error = 1 / samples if way == "plain" else 0.5 / samples
+        whole = 8 / samples if way == "plain" else self.whole_error
+        return Candidate(way, {**PLAIN, **settings}, samples, samples, error, whole, 1.0), [error]
+
+
+@pytest.mark.parametrize(("whole_error", "way"), [(0.1, "denoised"), (1.0, "plain")])
+def test_what_hides_fireflies_is_not_chosen(whole_error, way):
+    search = Search(SimulatedBench(whole_error), TARGET)
+    # That of plain path tracing at the target, of 50 samples, is 8 / 50.
+    assert search.most_whole_error == pytest.approx(2 * 8 / 50)
+    choice = search.choose()
+    assert choice.way == way and search.reaches(choice)
 
 
 def test_effort_follows_from_what_lies_on_both_sides_of_the_target():

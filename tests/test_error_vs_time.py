@@ -101,6 +101,25 @@ def test_noise_of_neighbouring_views_is_independent(content):
     assert plain["total"] > plain["floor"] > 0
 
 
+def test_methods_are_compared_at_equal_time_and_at_equal_error(measured, content):
+    methods = {entry["method"]: entry for entry in content["methods"]}
+    assert methods["plain"]["times_faster"] == pytest.approx(1)
+    assert methods["plain"]["error"] == pytest.approx(methods["plain"]["equal_error"])
+    for point in content["points"]:
+        parts = point["bias"] + point["variance"]
+        assert parts == pytest.approx(point["relative_mse_whole"], rel=1e-6, abs=1e-9)
+        assert point["mse_seconds"] == point["relative_mse_whole"] * point["seconds"]
+    # A part of what denoised renders are wrong by is common to all of them.
+    plain, denoised = (
+        [p for p in content["points"] if p["method"] == method][-1]
+        for method in ("plain", "denoised")
+    )
+    assert denoised["bias"] > 0.1 * denoised["relative_mse_whole"]
+    assert abs(plain["bias"]) < 0.1 * plain["relative_mse_whole"]
+    table = (measured.folder / "room.md").read_text()
+    assert all(table.count(f"| {method} |") == 2 for method in methods)
+
+
 def test_files_can_be_read_by_others(measured, content):
     rows = list(csv.DictReader((measured.folder / "room.csv").open()))
     assert len(rows) == len(content["points"])

@@ -127,6 +127,48 @@ def test_pictures_are_compared_as_opencv_and_scikit_image_do():
     assert (same.psnr, same.ssim, same.flip) == (np.inf, pytest.approx(1), 0)
 
 
+def test_others_metrics_are_of_light_as_it_is():
+    truth, whole = np.full((16, 16, 3), 0.5, np.float32), np.ones((16, 16), bool)
+    found = metrics.make_reference([truth] * 2, None, whole)
+    errors = metrics.compare(truth + np.float32(0.1), None, found)
+    assert errors.relative_mse_unexposed == pytest.approx(0.01 / 0.26, rel=1e-5)
+    assert errors.mrse == pytest.approx(0.01 / 0.51**2, rel=1e-5)
+
+
+def test_bias_and_variance_are_told_apart_and_add_up():
+    truth = scene()
+    found = reference(truth, 0.01, 8)
+    renders = [noisy(truth + 0.05, 0.03, seed) for seed in range(12)]
+    bias, variance = metrics.bias_and_variance(renders, found)
+    assert bias == pytest.approx(expected(truth, 0.05, found.exposure), rel=0.05)
+    assert variance == pytest.approx(expected(truth, 0.03, found.exposure), rel=0.05)
+    whole = np.mean([metrics.relative_mse(render, found, left_out=0) for render in renders])
+    assert bias + variance == pytest.approx(whole, rel=1e-9)
+    none, _ = metrics.bias_and_variance([noisy(truth, 0.03, seed) for seed in range(12)], found)
+    assert abs(none) < variance / 12
+
+
+@pytest.mark.parametrize(("sign", "correlation"), [(1, 1), (-1, -1), (0, None)])
+def test_biases_of_neighbouring_views_agree_as_far_as_they_do(sign, correlation):
+    truth = scene()
+    pair = reference(truth, 1e-3, 8), reference(truth, 1e-3, 8)
+    everywhere = np.flatnonzero(MASK)
+    renders = [
+        [noisy(truth + bias, 0.02, seed) for seed in range(first, first + 8)]
+        for first, bias in ((0, 0.05 * abs(sign)), (50, 0.05 * sign))
+    ]
+    agreed = metrics.bias_correlation(tuple(renders), pair, (everywhere, everywhere))
+    # Without a bias it is noise over noise, or none is found.
+    assert agreed is None or agreed == pytest.approx(correlation or agreed, abs=0.05)
+
+
+def test_between_points_there_is_a_power_law_and_beyond_them_nothing():
+    points = [(4, 1 / 4), (1, 1), (16, 1 / 16)]
+    assert metrics.interpolated(2, points) == pytest.approx(1 / 2)
+    assert metrics.interpolated(16, points) == pytest.approx(1 / 16)
+    assert metrics.interpolated(0.5, points) is metrics.interpolated(17, points) is None
+
+
 def test_depth_counts_misses():
     truth = np.array([1.0, 2.0, np.inf, np.inf, 4.0, 1.0])
     depth = np.array([1.1, 2.0, np.inf, 7.0, np.inf, 9.0])

@@ -250,8 +250,8 @@ class Render(Settings):
     target_error: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] | TargetError | None = Field(
         None,
         description="Instead of samples: relative mean squared error, (x - r)^2 / (r^2 + 0.01) "
-        "with middle grey at 0.18, for which samples, adaptive_threshold and denoise are chosen "
-        "on probe views.",
+        "with middle grey at 0.18, of all but the worst thousandth of pixels, for which samples, "
+        "adaptive_threshold and denoise are chosen on probe views.",
     )
     max_bounces: int | None = Field(
         None, ge=0, le=1024, description="Bounces of a path, of any kind."

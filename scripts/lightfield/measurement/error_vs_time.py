@@ -13,13 +13,14 @@ them at few samples than at many. So the slope of all pixels is told too, which 
 larger errors. Adaptive sampling and denoising are biased, so theirs are flatter.
 """
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from statistics import fmean, median
 from typing import Any
 
-from lightfield.core.files import write_csv, write_json
+from lightfield.core.files import write_csv, write_json, write_text
 from lightfield.core.progress import Progress
 from lightfield.imaging import plots
 from lightfield.measurement import metrics
@@ -36,6 +37,23 @@ THRESHOLDS = (0.2, 0.1, 0.05, 0.02, 0.01)
 # A reference's samples are split among so many seeds, whose differences tell its own error.
 REFERENCE_SEEDS = 8
 
+# Of a point's figures, those that are means over its renders' errors.
+COMPARED = (
+    "relative_mse",
+    "relative_mse_whole",
+    "relative_mse_unexposed",
+    "mrse",
+    "psnr",
+    "ssim",
+    "flip",
+)
+
+# Of a point's figures, the columns of its table.
+FIGURES = (
+    *("samples", "seconds", "relative_mse", "relative_mse_whole", "bias", "variance"),
+    *("mse_seconds", "relative_mse_unexposed", "mrse", "psnr", "ssim", "flip"),
+)
+
 # What says which way a point is of.
 WAY = ("method", "settings")
 
@@ -50,6 +68,8 @@ class Point:
     ``samples`` is the mean number that a pixel took; ``seconds`` are of one core, or of the GPU, a
     megapixel; ``standard_error`` is that of ``relative_mse``, over seeds. ``resolved``
     says whether the error is above the references' own, below which nothing is drawn or fitted.
+    ``bias`` (squared) and ``variance`` add up to ``relative_mse_whole``; ``mse_seconds`` is that
+    times ``seconds``, which is the same for any number of samples as long as nothing is biased.
     """
 
     method: str
@@ -58,6 +78,11 @@ class Point:
     seconds: float
     relative_mse: float
     relative_mse_whole: float
+    relative_mse_unexposed: float
+    mrse: float
+    bias: float
+    variance: float
+    mse_seconds: float
     standard_error: float
     resolved: bool
     psnr: float
@@ -152,20 +177,24 @@ def compared(
         for seeds, reference in zip(renders, references, strict=True)
     ]
     flat = [error for seeds in errors for error in seeds]
-    mean = {
-        name: fmean(getattr(error, name) for error in flat)
-        for name in ("relative_mse", "relative_mse_whole", "psnr", "ssim", "flip")
-    }
+    mean = {name: fmean(getattr(error, name) for error in flat) for name in COMPARED}
+    parts = [
+        metrics.bias_and_variance([render.colour for render in seeds], reference)
+        for seeds, reference in zip(renders, references, strict=True)
+    ]
     height, width = references[0].mask.shape
+    seconds = fmean(median(render.seconds for render in seeds) for seeds in renders)
+    seconds *= 1e6 / (width * height)
     depths = [error.depth for error in flat if error.depth is not None]
     return Point(
         method=method,
         settings=settings,
         samples=fmean(render.samples for seeds in renders for render in seeds),
-        seconds=fmean(median(render.seconds for render in seeds) for seeds in renders)
-        * 1e6
-        / (width * height),
+        seconds=seconds,
         **mean,
+        bias=fmean(bias for bias, _ in parts),
+        variance=fmean(variance for _, variance in parts),
+        mse_seconds=mean["relative_mse_whole"] * seconds,
         standard_error=standard_error(
             [fmean(error.relative_mse for error in seed) for seed in zip(*errors, strict=True)]
         ),
@@ -207,11 +236,47 @@ def evaluated(points: Sequence[Point], references: Sequence[metrics.Reference]) 
             for method, found in lines.items()
             if found
         },
+        "methods": by_method(seen),
         "pareto_front": [asdict(seen[index]) for index in front],
         "against_plain_at_equal_error": saved,
         "settings": [asdict(point) for point in points if point.method == OWN],
         "points": [asdict(point) for point in points],
     }
+
+
+def by_method(points: Sequence[Point]) -> list[dict[str, Any]]:
+    """Return each method's error at equal time, and its time at equal error.
+
+    Equal to those of plain path tracing in the middle of its points. Interpolated between a
+    method's own points, and None where these do not reach so far; where its cheapest point has less
+    error already, it is that one's time.
+    """
+    plain = sorted((p for p in points if p.method == PLAIN), key=lambda p: p.seconds)
+    if not plain:
+        return []
+    middle = plain[len(plain) // 2]
+    found = []
+    for method in dict.fromkeys(p.method for p in points if p.method != OWN):
+        own = sorted((p for p in points if p.method == method), key=lambda p: p.seconds)
+        seconds = metrics.interpolated(
+            middle.relative_mse, [(p.relative_mse, p.seconds) for p in own]
+        )
+        if seconds is None and own[0].relative_mse <= middle.relative_mse:
+            seconds = own[0].seconds
+        found.append(
+            {
+                "method": method,
+                "seconds": middle.seconds,
+                "error": metrics.interpolated(
+                    middle.seconds, [(p.seconds, p.relative_mse) for p in own]
+                ),
+                "equal_error": middle.relative_mse,
+                "seconds_at_equal_error": seconds,
+                "times_faster": seconds and middle.seconds / seconds,
+                "nearest": asdict(min(own, key=lambda p: abs(p.seconds - middle.seconds))),
+            }
+        )
+    return found
 
 
 def fitted(points: Sequence[Point]) -> dict[str, metrics.Line]:
@@ -235,8 +300,11 @@ def disagreement(
     windows: Sequence[Window],
     references: Sequence[metrics.Reference],
     renders: Renders,
-) -> dict[str, float]:
-    """Return how the first two views disagree, as `metrics.Disagreement`, the mean over seeds."""
+) -> dict[str, float | None]:
+    """Return how the first two views disagree, as `metrics.Disagreement`, the mean over seeds.
+
+    And how far their biases agree, of the renders of all seeds.
+    """
     pair, places = (references[0], references[1]), (windows[0], windows[1])
     seen = both_see((maker.camera(places[0].view), maker.camera(places[1].view)), places, pair)
     if not len(seen[0]):
@@ -245,11 +313,15 @@ def disagreement(
         asdict(metrics.disagreement((first.colour, second.colour), pair, seen))
         for first, second in zip(renders[0], renders[1], strict=True)
     ]
-    return {name: fmean(entry[name] for entry in found) for name in found[0]}
+    colours = [render.colour for render in renders[0]], [render.colour for render in renders[1]]
+    means: dict[str, float | None] = {
+        name: fmean(entry[name] for entry in found) for name in found[0]
+    }
+    return means | {"bias_correlation": metrics.bias_correlation(colours, pair, seen)}
 
 
 def write(stem: Path, content: Mapping[str, Any]) -> None:
-    """Write the points as ``stem``.csv, one row each, a plot as .svg and .png, and all as .json."""
+    """Write the points as ``stem``.csv, a plot as .svg and .png, tables as .md, all as .json."""
     rows = []
     for point in content["points"]:
         settings = {**PLAIN_SAMPLING, **point["settings"]}
@@ -260,7 +332,53 @@ def write(stem: Path, content: Mapping[str, Any]) -> None:
         rows.append({"method": point["method"], **limits, **figures, "pareto": on_front})
     write_csv(stem.with_name(stem.name + ".csv"), rows)
     _draw(stem, content)
+    write_text(stem.with_name(stem.name + ".md"), tables(stem.name, content))
     write_json(stem.with_name(stem.name + ".json"), content)
+
+
+def tables(name: str, content: Mapping[str, Any]) -> str:
+    """Return the methods at equal time and at equal error, and all figures, in Markdown."""
+    methods = content["methods"]
+    if not methods:
+        return f"# {name}\n\nNo point of plain path tracing is above the references' own error.\n"
+    seconds, error = methods[0]["seconds"], methods[0]["equal_error"]
+    common = {
+        (pair["method"], json.dumps(pair["settings"])): pair.get("bias_correlation")
+        for pair in content["neighbouring_views"]
+    }
+    lines = [
+        f"# {name}: methods at equal time and at equal error",
+        "",
+        "The error is the relative mean squared error of all but the worst thousandth of pixels;",
+        "seconds are those of a megapixel; — is outside what was measured.",
+        "",
+        f"| method | error at {seconds:.3g} s | seconds at error {error:.2g} | times faster |",
+        "| --- | ---: | ---: | ---: |",
+        *(
+            _row(m["method"], m["error"], m["seconds_at_equal_error"], m["times_faster"])
+            for m in methods
+        ),
+        "",
+        f"Of each method what was measured nearest to {seconds:.3g} s. Bias (squared) and variance",
+        "add up to the error of all pixels, and × s is that times the seconds; a bias below 0 is",
+        "within the noise of 0. In common is the correlation of the bias with the neighbouring",
+        "view's; texture has 1.",
+        "",
+        "| method | samples | s | error | of all pixels | bias | variance | × s | unexposed "
+        "| MRSE | PSNR | SSIM | FLIP | in common |",
+        "| --- " + "| ---: " * 13 + "|",
+    ]
+    for method in methods:
+        point = method["nearest"]
+        figures = [point[figure] for figure in FIGURES]
+        key = (point["method"], json.dumps(point["settings"]))
+        lines.append(_row(point["method"], *figures, common.get(key)))
+    return "\n".join([*lines, ""])
+
+
+def _row(method: str, *figures: float | None) -> str:
+    cells = ["—" if figure is None else f"{figure:.3g}" for figure in figures]
+    return f"| {method} | {' | '.join(cells)} |"
 
 
 def _draw(stem: Path, content: Mapping[str, Any]) -> None:
@@ -312,7 +430,7 @@ def _draw(stem: Path, content: Mapping[str, Any]) -> None:
             yscale="log",
             title=f"{stem.name}: error against render time",
             xlabel=f"render time, {unit} seconds per megapixel",
-            ylabel="relative mean squared error",
+            ylabel="relative mean squared error of all but the worst thousandth of pixels",
         )
         axes.legend(fontsize=8)
 

@@ -11,6 +11,15 @@ take thousands of views to tell two ways to render apart. Of N independent sampl
 error of all pixels is proportional to 1/N exactly. Without the worst it falls slower: where light
 comes in rare bright paths, few samples make few bright pixels, and the thousandth is most of them.
 
+Beside it stand the same of all pixels, and two that others publish, also of all pixels and of light
+as it is, not exposed: (x − r)² / (r² + ε), and pbrt's MRSE, (x − r)² / (r + ε)². Of a linear image
+whose middle grey is far from 0.18 these say little: ε is then no small part of it, or none at all.
+
+Error is bias and variance: what the mean of many renders would still differ by, and how single ones
+differ from that mean (Celarek, Jakob, Wimmer and Lehtinen 2019 measure them so, by many short
+renders). Plain path tracing has variance alone, which more samples take away; a denoiser's error
+ends at its bias, which they take away more slowly or not at all.
+
 An independent reference adds its own variance to every expected square and nothing else, so
 subtracting an estimate of it, from how its n renders differ, leaves the image's own error.
 """
@@ -18,6 +27,7 @@ subtracting an estimate of it, from how its n renders differ, leaves the image's
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import flip_evaluator
@@ -60,6 +70,12 @@ class Reference:
         return weights
 
     @property
+    def unexposed_weights(self) -> tuple[Array, Array]:
+        """The same of the unexposed relative mean squared error, and of pbrt's MRSE."""
+        truth = self.colour[self.mask]
+        return 1 / (truth**2 + EPSILON), 1 / (truth + EPSILON) ** 2
+
+    @property
     def own_error(self) -> float:
         """Expected relative mean squared error of the reference itself."""
         own = (self.variance[self.mask] * self.weights).mean(axis=-1)
@@ -93,8 +109,9 @@ class Errors:
     """What one image differs by from its reference.
 
     relative_mse: without the reference's own error, and below 0 by chance where it is far smaller
-    than that; relative_mse_whole: the same of all pixels, the worst thousandth too; psnr (decibel;
-    inf if equal), ssim and flip (0 is equal) of the tone-mapped image;
+    than that; relative_mse_whole: the same of all pixels, the worst thousandth too;
+    relative_mse_unexposed and mrse, pbrt's: of all pixels, as light is; psnr (decibel; inf if
+    equal), ssim and flip (0 is equal) of the tone-mapped image;
     depth: mean of |z/r − 1|, at most 1 a pixel, where a pixel in which only one of the two hit
     anything counts as 1, or None without depth. That is one sample, so that more do not
     improve it.
@@ -102,6 +119,8 @@ class Errors:
 
     relative_mse: float
     relative_mse_whole: float
+    relative_mse_unexposed: float
+    mrse: float
     psnr: float
     ssim: float
     flip: float
@@ -116,9 +135,13 @@ def compare(
     shown, truth = (developed(x, reference) for x in (colour, reference.colour))
     with np.errstate(divide="ignore"):
         psnr = peak_signal_noise_ratio(truth[mask], shown[mask], data_range=1.0)
+    excess = _squares(colour, reference) - reference.variance[mask]
+    unexposed, mrse = (float((excess * weights).mean()) for weights in reference.unexposed_weights)
     return Errors(
         relative_mse=relative_mse(colour, reference),
         relative_mse_whole=relative_mse(colour, reference, left_out=0),
+        relative_mse_unexposed=unexposed,
+        mrse=mrse,
         psnr=float(psnr),
         ssim=float(ssim_map(truth, shown)[mask].mean()),
         flip=float(flip_map(truth, shown)[mask].mean()),
@@ -161,11 +184,57 @@ def relative_mse(
 
     ``left_out`` is the part of the pixels that does not count, those with the largest errors.
     """
-    squares = (colour.astype(np.float64) - reference.colour)[reference.mask] ** 2
-    found = (squares * reference.weights).mean(axis=-1)
+    found = (_squares(colour, reference) * reference.weights).mean(axis=-1)
     own = (reference.variance[reference.mask] * reference.weights).mean(axis=-1)
     kept = _inliers(found, left_out)
     return float((found - own)[kept].mean())
+
+
+def bias_and_variance(
+    colours: Sequence[NDArray[np.float32]], reference: Reference
+) -> tuple[float, float]:
+    """Return the squared bias and the variance of renders that differ in their seeds alone.
+
+    Both are relative, as `relative_mse` of all pixels, which is their sum. Of n ≥ 2 renders, the
+    mean's square holds the bias's, an n-th of the variance, and the reference's own; so the bias is
+    known to about an n-th of the variance, and below 0 by chance where it is smaller.
+    """
+    stack = np.stack([colour[reference.mask] for colour in colours]).astype(np.float64)
+    variance = stack.var(axis=0, ddof=1)
+    apart = (stack.mean(axis=0) - reference.colour[reference.mask]) ** 2
+    bias = apart - variance / len(stack) - reference.variance[reference.mask]
+    weights = reference.weights
+    return float((bias * weights).mean()), float((variance * weights).mean())
+
+
+def bias_correlation(
+    renders: tuple[Sequence[NDArray[np.float32]], Sequence[NDArray[np.float32]]],
+    references: tuple[Reference, Reference],
+    seen: tuple[NDArray[np.int64], NDArray[np.int64]],
+) -> float | None:
+    """Return how far two views' biases agree at pixels ``seen``, as `disagreement` has them.
+
+    1 where both are wrong alike, as texture is, and 0 where they have nothing in common; None where
+    no bias is known.
+    """
+    means, squares = [], []
+    for colours, reference, where in zip(renders, references, seen, strict=True):
+        stack = np.stack([c.reshape(-1, 3)[where] for c in colours]).astype(np.float64)
+        means.append(stack.mean(axis=0) - reference.colour.reshape(-1, 3)[where])
+        noise = stack.var(axis=0, ddof=1) / len(stack)
+        squares.append(means[-1] ** 2 - noise - reference.variance.reshape(-1, 3)[where])
+    gain = 4.0 ** references[0].exposure
+    weights = gain / (gain * references[0].colour.reshape(-1, 3)[seen[0]] ** 2 + EPSILON)
+    first, second = (float((square * weights).mean()) for square in squares)
+    if min(first, second) <= 0:
+        return None
+    return float((means[0] * means[1] * weights).mean()) / math.sqrt(first * second)
+
+
+def _squares(colour: NDArray[np.float32], reference: Reference) -> Array:
+    """Return the squared differences of the pixels that count, (n, 3)."""
+    found: Array = (colour.astype(np.float64) - reference.colour)[reference.mask] ** 2
+    return found
 
 
 def _inliers(errors: Array, left_out: float = OUTLIERS) -> NDArray[np.int64]:
@@ -210,6 +279,15 @@ def fit(x: Sequence[float], y: Sequence[float]) -> Line | None:
         return None
     found = linregress(np.log(x), np.log(y))
     return Line(float(found.slope), float(found.stderr), float(np.exp(found.intercept)))
+
+
+def interpolated(x: float, points: Sequence[tuple[float, float]]) -> float | None:
+    """Return y at x of points (x, y) in any order, by power laws between them; None outside."""
+    points = sorted(points)
+    for (x0, y0), (x1, y1) in pairwise(points):
+        if x0 <= x <= x1 and x1 > x0 and min(y0, y1) > 0:
+            return float(y0 * (y1 / y0) ** (math.log(x / x0) / math.log(x1 / x0)))
+    return None
 
 
 def pareto(cost: Sequence[float], error: Sequence[float], same_cost: float = 0.0) -> list[int]:
