@@ -212,15 +212,27 @@ def outdated(dataset):
     return list(dataset.outdated(render))
 
 
+@cache
+def noted_sums():
+    """Return the ledger's checksums; none where it is damaged, which `snakemake verify` says."""
+    try:
+        return ledger.read(Path(SUMS))
+    except UserError:
+        return {}
+
+
 def whole(datasets):
     """Return the input function of a target: no input, but what is broken is made anew.
+
+    So is what views are made from where it has other bytes than those that a job wrote.
 
     That it is broken is said here; it is set aside when the run starts.
     """
 
     def input_function(wildcards):
         for dataset in datasets:
-            for path, problem in dataset.broken():
+            damaged = ledger.damaged(noted_sums(), dataset.view_sources)
+            for path, problem in (*dataset.broken(), *damaged):
                 if path not in BROKEN:
                     print(f"{path}: {problem}; it is made anew", file=sys.stderr)
                     BROKEN[path] = problem

@@ -117,3 +117,17 @@ def test_a_reprojection_that_does_not_say_how_it_was_made_is_made_anew_alone(tmp
     assert {str(p.relative_to(folder)) for p in (path, ngp)} <= files
     assert set(one.records("perspective")) <= files
     assert not files & {*one.records("render"), *one.records("perspective_hdr")}
+
+
+def test_what_views_are_made_from_is_verified_before_it_is_used(tmp_path):
+    simulated.build(checkout(tmp_path))
+    paths = ["work/smoke/inventory.json", "work/smoke/scene.blend"]
+    for path in paths:
+        content = (tmp_path / path).read_bytes()
+        (tmp_path / path).write_bytes(content.replace(b"s", b"t", 1))
+        os.utime(tmp_path / path, (simulated.WHEN, simulated.WHEN))
+    result = snakemake(tmp_path, "smoke", "--dry-run", "--quiet", "all")
+    assert result.returncode == 0, result.stderr
+    said = [line for line in result.stderr.splitlines() if "made anew" in line]
+    problem = "its sha256 is not the one in sums.json; it is made anew"
+    assert sorted(said) == [f"{path}: {problem}" for path in paths]

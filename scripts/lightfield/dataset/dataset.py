@@ -372,6 +372,15 @@ class Dataset:
         ]
 
     @property
+    def view_sources(self) -> list[str]:
+        """What jobs make and views are made from: verified before it is used.
+
+        A user's own .blend is checked by its proof, lens maps carry a checksum.
+        """
+        wanted = [self.blend if self.source.builder else [], self.inventory, self.calibration]
+        return [path for path in wanted if isinstance(path, str)]
+
+    @property
     def package(self) -> str:
         """A rig's dataset as one archive, all frames of a sequence in it, named as SILVR's are."""
         return f"{self.results_root}/{self.scene_folder}/{self.scene_folder}_{self.rig_name}.tar"
