@@ -1,4 +1,5 @@
 # `make` sets up the environment and builds the default dataset; `make test` sets up and runs the tests.
+# `make consumers` reads exports with the consumers' own code, in an environment of theirs.
 
 CORES ?= $(shell getconf _NPROCESSORS_ONLN)
 
@@ -9,7 +10,7 @@ PIP = .venv/bin/pip -qq --disable-pip-version-check
 VERSION = $$(.venv/bin/python -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 LOCK = uv pip compile --generate-hashes --no-emit-index-url --no-header --quiet
 
-.PHONY: all test check locks
+.PHONY: all test check consumers locks
 
 all: .venv/complete
 	snakemake --cores $(CORES)
@@ -25,6 +26,16 @@ check: .venv/complete-for-tests
 	mypy scripts/lightfield
 	snakefmt --check Snakefile rules
 	snakemake --lint
+
+consumers: .venv/complete .venv-consumers/complete
+	python tests/consumers/export.py work/consumers
+	.venv-consumers/bin/python -W ignore tests/consumers/check.py work/consumers
+
+.venv-consumers/complete: .venv/complete envs/requirements-consumers.txt
+	.venv/bin/python -m venv --clear .venv-consumers
+	.venv-consumers/bin/pip -q install -r envs/requirements-consumers.txt
+	.venv-consumers/bin/pip -q install --no-deps nerfstudio==1.1.5
+	@touch $@
 
 # PYTHON names an interpreter; without it the best that is there is taken.
 .venv/complete: envs/requirements-3.13.txt envs/requirements-3.11.txt

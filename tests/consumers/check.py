@@ -1,0 +1,144 @@
+"""Read the exports with the consumers' own code: pycolmap, nerfstudio and OpenCV.
+
+Run by `make consumers` in an environment of theirs, on what export.py wrote. A line for each with
+the largest error found; anything beyond its limit ends in an AssertionError.
+"""
+
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+RADIUS = 3.0  # of the scene, a sphere around the origin
+
+
+def angle(one, other):
+    """Return the angle in radians between directions (..., 3)."""
+    across = np.linalg.norm(np.cross(one, other), axis=-1)
+    return np.arctan2(across, (one * other).sum(axis=-1))
+
+
+def ours(folder, name):
+    """Return names, camera-to-world matrices, and the rays of the pixels of a camera."""
+    saved = np.load(folder / f"{name}.npz")
+    return saved["names"].tolist(), saved["matrices"], saved["rays"]
+
+
+def colmap(folder, name):
+    import pycolmap
+
+    model = pycolmap.Reconstruction(folder / "colmap" / name / "sparse" / "0")
+    names, matrices, _ = ours(folder, name)
+    fewest, pixels, metres = 10**9, 0.0, 0.0
+    for image in model.images.values():
+        seen = [point for point in image.points2D if point.has_point3D()]
+        fewest = min(fewest, len(seen))
+        for point in seen:
+            found = image.project_point(model.points3D[point.point3D_id].xyz)
+            pixels = max(pixels, np.abs(found - point.xy).max())
+        stem = image.name.removesuffix(".png")
+        np.testing.assert_allclose(
+            image.projection_center(), matrices[names.index(stem)][:3, 3], atol=1e-9
+        )
+        path = folder / "colmap" / name / "stereo/depth_maps" / f"{image.name}.geometric.bin"
+        width, height, _, body = path.read_bytes().split(b"&", 3)
+        depth = np.frombuffer(body, "<f4").reshape(int(height), int(width))
+        row, column = np.nonzero(depth)
+        centres = np.column_stack([column, row]) + 0.5
+        local = model.cameras[image.camera_id].cam_from_img(centres)
+        points = np.column_stack([local, np.ones(len(local))]) * depth[row, column, None]
+        world = image.cam_from_world().inverse() * points
+        metres = max(metres, np.abs(np.linalg.norm(world, axis=1) - RADIUS).max())
+    print(
+        f"pycolmap {pycolmap.__version__}, {name}: {len(model.images)} views, at least {fewest} "
+        f"points in each within {pixels:.2g} pixels; depth within {1000 * metres:.2g} mm"
+    )
+    assert fewest >= 1000
+    assert pixels < 0.5
+    assert metres < 1e-3
+
+
+def nerfstudio(folder, name):
+    from nerfstudio.data.dataparsers.nerfstudio_dataparser import NerfstudioDataParserConfig
+
+    parser = NerfstudioDataParserConfig(
+        data=folder / "nerfstudio" / name,
+        orientation_method="none",
+        center_method="none",
+        auto_scale_poses=False,
+        downscale_factor=1,
+        load_3D_points=False,  # would need open3d
+    ).setup()
+    names, matrices, rays = ours(folder, name)
+    seen = np.isfinite(rays[..., 0])
+    radians = metres = 0.0
+    parts = [parser.get_dataparser_outputs(part) for part in ("train", "val", "test")]
+    for outputs in parts[::2]:
+        for index, path in enumerate(outputs.image_filenames):
+            matrix = matrices[names.index(path.stem)]
+            bundle = outputs.cameras.generate_rays(camera_indices=index)
+            directions = bundle.directions.numpy().astype(np.float64)
+            expected = rays @ matrix[:3, :3].T
+            radians = max(radians, angle(directions, expected)[seen].max())
+            np.testing.assert_allclose(
+                bundle.origins.numpy(), np.broadcast_to(matrix[:3, 3], rays.shape), atol=1e-6
+            )
+            depth = cv2.imread(str(outputs.metadata["depth_filenames"][index]), cv2.IMREAD_ANYDEPTH)
+            reach = depth * outputs.metadata["depth_unit_scale_factor"]
+            # As nerfstudio's datasets do: along the axis where rays have another length than 1.
+            reach = reach * bundle.metadata["directions_norm"].numpy()[..., 0]
+            world = matrix[:3, 3] + directions * reach[..., None]
+            known = depth > 0
+            metres = max(metres, np.abs(np.linalg.norm(world, axis=-1) - RADIUS)[known].max())
+            if outputs.mask_filenames:
+                mask = cv2.imread(str(outputs.mask_filenames[index]), cv2.IMREAD_GRAYSCALE)
+                assert ((mask > 0) == known).all()
+    counts = [len(outputs.image_filenames) for outputs in parts]
+    print(
+        f"nerfstudio, {name}: {counts} views; rays within {radians:.2g} rad, "
+        f"depth within {1000 * metres:.2g} mm"
+    )
+    assert radians < 1e-5
+    assert metres < 2e-3
+
+
+def opencv(folder, name):
+    import json
+
+    transforms = folder / "nerfstudio" / name / "transforms.json"
+    if transforms.exists():
+        lens = json.loads(transforms.read_text())
+        values = [lens["fl_x"], lens["fl_y"], lens["cx"], lens["cy"]]
+        distortion = [lens[f"k{number}"] for number in range(1, 5)]
+    else:
+        import pycolmap
+
+        model = pycolmap.Reconstruction(folder / "colmap" / name / "sparse" / "0")
+        (camera,) = model.cameras.values()
+        values, distortion = camera.params[:4], camera.params[4:]
+    fx, fy, cx, cy = values
+    rays = ours(folder, name)[2]
+    # Its undistortion gives no rays beyond 90 degrees, its projection none behind the camera.
+    local = rays[rays[..., 2] < -0.05] * [1, -1, -1]
+    matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+    found = cv2.fisheye.projectPoints(
+        local[:, None], np.zeros(3), np.zeros(3), matrix, np.array(distortion)
+    )[0][:, 0]
+    row, column = np.nonzero(rays[..., 2] < -0.05)
+    pixels = np.abs(found - np.column_stack([column, row]) - 0.5).max()
+    print(f"OpenCV {cv2.__version__}, {name}: {len(local)} rays within {pixels:.2g} pixels")
+    assert pixels < 1e-3
+
+
+def main():
+    folder = Path(sys.argv[1])
+    for check, kind in ((colmap, "colmap"), (nerfstudio, "nerfstudio")):
+        for path in sorted((folder / kind).iterdir()):
+            check(folder, path.name)
+    for name in ("fisheye", "opencv"):
+        opencv(folder, name)
+
+
+if __name__ == "__main__":
+    main()
