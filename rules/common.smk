@@ -30,7 +30,7 @@ from lightfield.core.files import read_json, set_aside
 from lightfield.core.gpus import visible
 from lightfield.core.memory import available
 from lightfield.dataset import ledger, memory
-from lightfield.dataset.config import accept_blend, load_config, scene_path
+from lightfield.dataset.config import accept_blend, load_config, load_scene, scene_path
 from lightfield.dataset.dataset import PICTURES, PLOTS, load_datasets, scene_datasets
 from lightfield.dataset.exports import MANIFEST, VIEWS
 from lightfield.dataset.splits import SPLITS
@@ -201,8 +201,14 @@ def outdated(dataset):
 
     Snakemake remembers settings, too, but only as long as its own folder is kept.
     """
-    if dataset.source.blend and not Path(dataset.blend_check).exists():
-        return []
+    if dataset.source.blend:
+        inventory = Path(dataset.inventory)
+        if not inventory.exists() or inventory in map(Path, BROKEN):
+            return []
+        # What an older program wrote is made anew.
+        if "blend" not in read_json(inventory):
+            return []
+        dataset = dataset.resolved(inventory)
     render = dataset.render
     if dataset.calibration:
         record = Path(dataset.calibration)
@@ -268,6 +274,30 @@ def checked_blend(wildcards):
     if dataset.blend_changed:
         made_anew(dataset.blend_check)
     return dataset.blend
+
+
+def listed_blend(wildcards):
+    """Return a scene's .blend, which is listed again if a file that it reads is another one."""
+    dataset = SCENES[wildcards.name]
+    if dataset.external_changed:
+        made_anew(dataset.inventory)
+    return dataset.blend
+
+
+def inventory_settings(wildcards):
+    """Return what a scene's inventory depends on of its scene YAML."""
+    written = load_scene(wildcards.name)
+    source = written.scene
+    return [
+        *(source.scene_name, source.view_layers, source.allow_missing),
+        [dataset.camera_frames for dataset in scene_datasets(wildcards.name)],
+        written.render.motion_blur,
+    ]
+
+
+def inventory_words(wildcards, input):
+    """Return the words that name a .blend's inventory to a program, if there is one."""
+    return f"--inventory {input.inventory}" if input.inventory else ""
 
 
 def shard_threads(wildcards):

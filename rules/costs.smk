@@ -8,6 +8,7 @@ rule costs:
         published=of_dataset("published"),
         pictures=of_dataset("pictures"),
         blend=of_dataset("blend"),
+        inventory=of_dataset("blend_inventory"),
     output:
         f"{DATASET}/report/costs.json",
     log:
@@ -30,6 +31,7 @@ rule costs:
         blend=blend_words,
         energy=SETTINGS.energy.model_dump_json(),
         full=full_size,
+        inventory=inventory_words,
         reprojections=reprojection_words,
     message:
         "Adding up what {wildcards.scene}/{wildcards.rig} has cost"
@@ -38,7 +40,7 @@ rule costs:
         " --dataset {params.dataset} --journals {params.journals}"
         " --benchmarks {params.benchmarks} --scene-benchmarks {params.scene_benchmarks}"
         " {params.blend} --energy {params.energy:q} --full {params.full:q}"
-        " {params.reprojections} --output {output} > {log} 2>&1"
+        " {params.reprojections} {params.inventory} --output {output} > {log} 2>&1"
 
 
 # Without input and output, so that it can be asked at any time; with --nolock while a build runs.

@@ -4,7 +4,7 @@
 
 rule probe_cameras:
     input:
-        check=of_first("blend_check"),
+        inventory=of_first("blend_inventory"),
         places=of_first("places"),
     output:
         f"{WORK}/{{scene}}/probes.json",
@@ -16,6 +16,7 @@ rule probe_cameras:
         name=of_first("scene_name"),
         limits=of_first("limits_json"),
         places=place_words,
+        inventory=inventory_words,
         # Not in the command: when what the YAML says changes, so does the file.
         rig=of_first("rig_json"),
         render=of_first("render"),
@@ -25,7 +26,7 @@ rule probe_cameras:
     shell:
         f"python {SCRIPTS}/make_lightfield.py"
         " --scene {params.name} --limits {params.limits:q} {params.places}"
-        " --output {output} > {log} 2>&1"
+        " {params.inventory} --output {output} > {log} 2>&1"
 
 
 # Only scenes with a target error ask for it. Its output is the same each time but for --seconds.

@@ -3,7 +3,7 @@
 
 rule panorama_lightfield:
     input:
-        check=of_dataset("blend_check"),
+        inventory=of_dataset("blend_inventory"),
         calibration=of_dataset("calibration"),
     output:
         f"{PANORAMA}/lightfield.json",
@@ -18,6 +18,7 @@ rule panorama_lightfield:
         limits=of_dataset("limits_json"),
         width=of_dataset("panorama_width"),
         calibration=calibration_words,
+        inventory=inventory_words,
         render=of_dataset("render"),
         center=lambda wildcards: dataset_of(wildcards).rig.center,
         fingerprint=of_dataset("builder_fingerprint"),
@@ -27,7 +28,7 @@ rule panorama_lightfield:
         f"python {SCRIPTS}/make_lightfield.py"
         " --scene {params.name} --rig {wildcards.rig}"
         " --limits {params.limits:q} --panorama {params.width} {params.calibration}"
-        " --output {output} > {log} 2>&1"
+        " {params.inventory} --output {output} > {log} 2>&1"
 
 
 rule render_panorama:
@@ -100,6 +101,7 @@ rule page:
         pictures=of_dataset("pictures"),
         validation=f"{DATASET}/validation.json",
         costs=f"{DATASET}/report/costs.json",
+        inventory=of_dataset("blend_inventory"),
     output:
         f"{DATASET}/report/index.html",
     log:
@@ -115,6 +117,7 @@ rule page:
         yaml=lambda wildcards: str(scene_path(dataset_of(wildcards).scene_name)),
         command=rebuilding,
         measurements=measurements,
+        inventory=inventory_words,
         # Not in the command: when the YAML is another, so is the page.
         text=lambda wildcards: scene_path(dataset_of(wildcards).scene_name).read_text(),
         # Not in the command: when a measurement was made anew, so is the page.
@@ -127,7 +130,7 @@ rule page:
         " --name {wildcards.scene}/{wildcards.rig} --rig {params.rig:q}"
         " --yaml {params.yaml:q} --command {params.command:q}"
         " --panorama {params.panorama} --measurements {params.measurements}"
-        " --output {output} > {log} 2>&1"
+        " {params.inventory} --output {output} > {log} 2>&1"
 
 
 rule index:

@@ -21,18 +21,20 @@ rule free_places:
         rig=lambda wildcards: dataset_of(wildcards).rig.model_dump_json(
             exclude_unset=True, exclude={"camera", "split"}
         ),
+        name=of_dataset("scene_name"),
         frame=lambda wildcards: dataset_of(wildcards).source.frame,
     message:
         "Looking for free places for the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/free_places.py"
-        " --blend {input.blend:q} --rig {params.rig:q} --frame {params.frame}"
+        " --blend {input.blend:q} --scene {params.name}"
+        " --rig {params.rig:q} --frame {params.frame}"
         " --output {output} > {log} 2>&1"
 
 
 rule lightfield:
     input:
-        check=of_dataset("blend_check"),
+        inventory=of_dataset("blend_inventory"),
         calibration=of_dataset("calibration"),
         places=of_dataset("places"),
     output:
@@ -48,6 +50,7 @@ rule lightfield:
         limits=of_dataset("limits_json"),
         calibration=calibration_words,
         places=place_words,
+        inventory=inventory_words,
         # Not in the command: when what the YAML says of this dataset changes, so does the file.
         rig=of_dataset("rig_json"),
         render=of_dataset("render"),
@@ -58,7 +61,7 @@ rule lightfield:
         f"python {SCRIPTS}/make_lightfield.py"
         " --scene {params.name} --rig {wildcards.rig}"
         " --limits {params.limits:q} {params.calibration} {params.places}"
-        " --output {output} > {log} 2>&1"
+        " {params.inventory} --output {output} > {log} 2>&1"
 
 
 rule check_cameras:

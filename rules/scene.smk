@@ -53,7 +53,7 @@ rule check_blend:
 rule inventory:
     input:
         check=lambda wildcards: SCENES[wildcards.name].blend_check,
-        blend=lambda wildcards: SCENES[wildcards.name].blend,
+        blend=listed_blend,
     output:
         f"{WORK}/{{name}}/inventory.json",
     log:
@@ -65,11 +65,14 @@ rule inventory:
     resources:
         mem_mb=8000,
         runtime=30,
+    params:
+        # Not in the command: the program reads the scene YAML.
+        settings=inventory_settings,
     message:
         "Listing what the scene {wildcards.name} contains"
     shell:
         f"python {SCRIPTS}/inventory.py"
-        " --blend {input.blend:q} --output {output} > {log} 2>&1"
+        " --scene {wildcards.name} --blend {input.blend:q} --output {output} > {log} 2>&1"
 
 
 # Only where a scene YAML says from where, and the user has not brought the file.

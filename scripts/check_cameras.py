@@ -24,7 +24,7 @@ def main() -> None:
     lightfield = LightField.read(arguments.lightfield)
     names = [view.name for view in lightfield.views]
     positions = np.array([view.position for view in lightfield.views])
-    blend_file.open_scene(arguments.blend)
+    blend_file.open_scene(arguments.blend, lightfield.content.get("scene", {}))
     bpy.context.scene.frame_set(lightfield.frame)
     distances = clearances(positions)
     inside = enclosing_objects(positions)

@@ -5,7 +5,8 @@ import json
 from pathlib import Path
 
 from lightfield.core.cli import run
-from lightfield.core.files import write_json
+from lightfield.core.files import read_json, write_json
+from lightfield.dataset.config import FILE
 from lightfield.measurement import costs
 
 
@@ -39,8 +40,11 @@ def main() -> None:
     parser.add_argument(
         "--reprojection", action="append", default=[], help="name of one; given for each"
     )
+    parser.add_argument("--inventory", type=Path, help="JSON of what the scene's .blend says")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
+    if arguments.full["samples"] == FILE:
+        arguments.full["samples"] = read_json(arguments.inventory)["blend"]["samples"]
     found = costs.costs(
         arguments.dataset,
         arguments.blend,

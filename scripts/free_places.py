@@ -9,6 +9,7 @@ import bpy
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
+from lightfield.dataset import config
 from lightfield.geometry import rigs
 from lightfield.rendering import blend_file
 from lightfield.rendering.clearance import free_places
@@ -18,15 +19,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--blend", required=True, type=Path, help="the scene")
     parser.add_argument("--rig", required=True, type=json.loads, help="the rig's settings, as JSON")
-    parser.add_argument("--frame", type=int, default=1, help="of the animation (default: 1)")
+    parser.add_argument("--scene", help="name of a file in configs/scenes/, for what it chooses")
+    parser.add_argument("--frame", default="1", help="a number, or file: the .blend's own")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 
     rig = rigs.from_settings(arguments.rig)
     if not isinstance(rig, rigs.Random):
         raise UserError(f"--rig: type: is {rig.type}; must be random")
-    blend_file.open_scene(arguments.blend)
-    bpy.context.scene.frame_set(arguments.frame)
+    chosen = config.load_scene(arguments.scene).scene.model_dump() if arguments.scene else {}
+    blend_file.open_scene(arguments.blend, chosen)
+    if arguments.frame != config.FILE:
+        bpy.context.scene.frame_set(int(arguments.frame))
     places = free_places(rig)
     write_json(arguments.output, {"box": rig.box, "places": places.tolist()})
     print(f"{len(places)} cameras, each with {rig.clearance:g} m around it")

@@ -1,60 +1,79 @@
 """List what a scene contains, and from that what its rendering can leave out.
 
-Missing textures and linked libraries are errors here, before anything is rendered pink.
+What is missing or cannot be read is an error here, before anything is rendered pink. Of a user's
+.blend it says in one block what is taken and what is not.
 """
 
 import argparse
-import sys
+import os.path
 from pathlib import Path
+from typing import Any
 
 import bpy
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
-from lightfield.rendering import blend_file, pruning, scene_memory
+from lightfield.dataset import blend, config
+from lightfield.dataset.dataset import scene_datasets
+from lightfield.geometry.rigs import BlendCamera
+from lightfield.rendering import blend_facts, blend_file, pruning, scene_memory
 from lightfield.rendering.inventory import FEATURES, inventory
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scene", help="name of a file in configs/scenes/, for what it chooses")
     parser.add_argument("--blend", required=True, type=Path, help="the scene")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 
-    blend_file.open_scene(arguments.blend)
-    if bpy.app.autoexec_fail:
-        print(
-            f"warning: {arguments.blend}: holds scripts or scripted drivers, which are not run: "
-            f"{bpy.app.autoexec_fail_message}",
-            file=sys.stderr,
-        )
-    found = inventory()
-    missing = found.pop("missing")
-    if missing:
-        raise UserError(
-            f"{arguments.blend}: {len(missing)} files that it shows are not there: "
-            f"{'; '.join(missing[:8])}{' …' if len(missing) > 8 else ''}; put them there, or pack "
-            "them into the .blend (in Blender: File, External Data)"
-        )
-    if found["external_files"]:
-        print(
-            f"warning: {arguments.blend}: reads {len(found['external_files'])} other files, which "
-            "no checksum covers; pack them into the .blend",
-            file=sys.stderr,
-        )
+    written = config.load_scene(arguments.scene) if arguments.scene else None
+    chosen = written.scene.model_dump() if written else {}
+    layers = blend_file.open_scene(arguments.blend, chosen)
+    datasets = scene_datasets(arguments.scene) if chosen.get("blend") else []
+    found: dict[str, Any] = {}
+    if datasets:
+        frames = [frame for dataset in datasets for frame in dataset.camera_frames]
+        found = {"blend": blend_facts.facts(frames) | {"layers": layers}}
+    if written and written.render and written.render.motion_blur is not None:
+        bpy.context.scene.render.use_motion_blur = written.render.motion_blur
+    found |= inventory()
+    if found["missing"] and not chosen.get("allow_missing"):
+        raise UserError(refusal(arguments.blend, found["missing"]))
     leave_out = pruning.left_out(found)
     found["left_out"] = leave_out
     # Of what is open here nothing is left, for it to be rendered in the same memory.
     blend_file.new_scene()
-    found["memory_bytes"] = scene_memory.measure(arguments.blend, found)
+    found["memory_bytes"] = scene_memory.measure(arguments.blend, found, chosen)
     write_json(arguments.output, found)
+    if datasets:
+        resolved = [dataset.resolved(arguments.output) for dataset in datasets]
+        shown = sorted({dataset.source.frame for dataset in resolved})
+        own_camera = any(isinstance(dataset.rig, BlendCamera) for dataset in datasets)
+        words = blend.taken(found, shown, datasets[0].render, own_camera)
+        print(f"note: {arguments.blend}: {' · '.join(words)}")
     print(
         f"{found['objects']} objects, {found['triangles']} triangles, with instances "
         f"{found['triangles_with_instances']}; {', '.join(n for n in FEATURES if found[n])}"
     )
     for name in leave_out:
         print(f"left out: {name}: {pruning.REASONS[name]}")
+
+
+def refusal(path: Path, problems: list[dict[str, str]]) -> str:
+    """Return which files of a .blend are missing or cannot be read, and what to do about them."""
+    named = [
+        f"the {entry['kind']} {entry['name']} at "
+        f"{os.path.normpath(path.parent / entry['path'])} ({entry['problem']})"
+        for entry in problems[:8]
+    ]
+    return (
+        f"{path}: {len(problems)} of the files that it shows are missing or cannot be read: "
+        f"{'; '.join(named)}{' …' if len(problems) > 8 else ''}; mend them, pack them into the "
+        ".blend (in Blender: File, External Data), or render without them: scene: "
+        "{allow_missing: true}"
+    )
 
 
 if __name__ == "__main__":

@@ -45,6 +45,9 @@ def main() -> None:
         help="what scripts/calibrate.py chose for the scene's target_error",
     )
     parser.add_argument(
+        "--inventory", type=Path, help="JSON of what the scene contains: for a .blend"
+    )
+    parser.add_argument(
         "--places", type=Path, help="what scripts/free_places.py found for a random rig"
     )
     parser.add_argument("--output", required=True, type=Path, help="lightfield.json to write")
@@ -56,6 +59,8 @@ def main() -> None:
     if dataset is None:
         known = ", ".join(d.rig_folder for d in datasets)
         raise UserError(f"--rig: is {arguments.rig!r}; must be one of {known}")
+    if arguments.inventory:
+        dataset = dataset.resolved(arguments.inventory)
     render = dataset.render
     if arguments.panorama:
         dataset = replace(dataset, rig=panorama_rig(dataset.rig, arguments.panorama))

@@ -9,6 +9,7 @@ import json
 from pathlib import Path
 
 from lightfield.core.cli import run
+from lightfield.core.files import read_json
 from lightfield.geometry import rigs
 from lightfield.report import dataset_page
 
@@ -32,6 +33,7 @@ def main() -> None:
         default=[],
         help="files that the measurements wrote: .csv, .json, and plots .svg or .png",
     )
+    parser.add_argument("--inventory", type=Path, help="JSON of what the scene's .blend says")
     parser.add_argument("--output", required=True, type=Path, help="HTML file to write")
     arguments = parser.parse_args()
     origin = dataset_page.Origin(
@@ -40,6 +42,7 @@ def main() -> None:
         command=arguments.command,
         has_panorama=bool(arguments.panorama),
         measurements=arguments.measurements,
+        inventory=read_json(arguments.inventory) if arguments.inventory else None,
     )
     dataset_page.write(arguments.output, arguments.dataset, arguments.name, origin)
 

@@ -279,9 +279,9 @@ def test_scripts_and_drivers_in_a_blend_do_not_run(run_program, tmp_path):
     assert "ours: trap.blend" in told
 
 
-def test_another_bpy_makes_everything_of_a_brought_blend_anew(tmp_path, monkeypatch):
+def test_another_bpy_makes_everything_of_a_brought_blend_anew(tmp_path, room, monkeypatch):
     folder = checkout(tmp_path, brought=BLEND_SCENE.format(blend="mine.blend", more=""))
-    (folder / "mine.blend").write_bytes(CONTENT)
+    (folder / "mine.blend").write_bytes(room.read_bytes())
     chosen = ("results/brought/LFPlane/lightfield.json", "--config", "scenes=[brought]")
     chosen += ("rigs=all", "preset=full")
     assert snakemake(folder, *chosen).returncode == 0
@@ -292,7 +292,7 @@ def test_another_bpy_makes_everything_of_a_brought_blend_anew(tmp_path, monkeypa
     other.mkdir(parents=True)
     (other / "METADATA").write_text("Metadata-Version: 2.1\nName: bpy\nVersion: 9.9.9\n")
     monkeypatch.setenv("PYTHONPATH", str(other.parent))
-    assert planned(folder, *chosen) == {"check_blend": 1, "lightfield": 1}
+    assert planned(folder, *chosen) == {"check_blend": 1, "inventory": 1, "lightfield": 1}
 
 
 LINKED = """

@@ -81,6 +81,26 @@ BROKEN = {
         "https://example.org/a.blend",
         "scene.url: goes with blend, not with builder",
     ),
+    "frame of a builder": (
+        "scene.frame",
+        "file",
+        "scene.frame: file goes with blend, not with builder",
+    ),
+    "samples of a builder": (
+        "render.samples",
+        "file",
+        "render.samples: file goes with scene.blend",
+    ),
+    "camera of a builder": (
+        "rigs.LFSphere",
+        {"type": "blend_camera", "camera": {"lens": "file", "resolution": [8, 8]}},
+        "rigs.LFSphere.type: blend_camera goes with scene.blend",
+    ),
+    "lens of a file": (
+        "rigs.LFSphere.camera",
+        {"lens": "file", "resolution": [8, 8]},
+        "rigs.LFSphere.camera.lens: file goes with a rig of type blend_camera",
+    ),
     "bad sum": (
         "scene",
         {"blend": "a.blend", "sha256": "123"},

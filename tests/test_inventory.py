@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from checkouts import checkout, planned
 
+from lightfield.core.files import sha256
 from lightfield.rendering import pruning
 
 NOTHING = {"hidden": [], "animated": [], "moving": [], "motion_blur": False}
@@ -99,6 +100,12 @@ tree = bpy.data.materials["cone"].node_tree
 texture = tree.nodes.new("ShaderNodeTexImage")
 texture.image = image
 tree.links.new(texture.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
+from pathlib import Path
+font = next(Path(bpy.utils.system_resource("DATAFILES"), "fonts").glob("DejaVuSansMono*"))
+Path(folder, "font.woff2").write_bytes(font.read_bytes())
+text = bpy.data.curves.new("sign", "FONT")
+text.font = bpy.data.fonts.load(folder + "/font.woff2")
+bpy.context.scene.collection.objects.link(bpy.data.objects.new("sign", text))
 unused = image.copy()
 unused.name, unused.filepath_raw, unused.use_fake_user = "unused", folder + "/never.png", True
 bpy.ops.wm.save_as_mainfile(filepath=folder + "/textured.blend", relative_remap=False)
@@ -114,25 +121,48 @@ bpy.ops.wm.save_as_mainfile(filepath=folder + "/linked.blend", relative_remap=Fa
 """
 
 
-def test_missing_textures_and_libraries_are_errors(run_program, tmp_path):
+def test_what_is_missing_or_cannot_be_read_is_an_error(run_program, tmp_path):
     (tmp_path / "make.py").write_text(MISSING)
     scripts = Path(pruning.__file__).parents[2]
     run_program(tmp_path / "make.py", tmp_path, scripts)
     output = tmp_path / "inventory.json"
-    for name, file, told in (
-        ("textured", "bark.png", "the texture bark"),
-        ("linked", "library.blend", "the library library.blend"),
-    ):
-        arguments = ("--blend", tmp_path / f"{name}.blend", "--output", output)
-        result = run_program("inventory.py", *arguments)
-        assert "reads 1 other files" in result.stderr if name == "linked" else True
-        output.unlink()
-        (tmp_path / file).unlink()
-        result = run_program("inventory.py", *arguments, check=False)
-        assert result.returncode == 1
-        assert result.stderr.splitlines()[-1].startswith(f"error: {tmp_path / name}.blend: 1 files")
-        assert f"{told} at {tmp_path / file}" in result.stderr
-        assert not output.exists()
+
+    def listed(name):
+        words = ("--blend", tmp_path / f"{name}.blend", "--output", output)
+        result = run_program("inventory.py", *words, check=False)
+        return result.returncode, (result.stderr.splitlines() or [""])[-1]
+
+    assert listed("textured")[0] == 0
+    found = json.loads(output.read_text())["external_files"]
+    assert [Path(file["path"]).name for file in found] == ["bark.png", "font.woff2", "never.png"]
+    assert found[0]["sha256"] == sha256(tmp_path / "bark.png")
+    assert found[2]["sha256"] is None
+    output.unlink()
+
+    bark, font = tmp_path / "bark.png", tmp_path / "font.woff2"
+    texture = f"the texture bark at {bark}"
+    letters = f"the font DejaVu Sans Mono Book at {font}"
+    bark.write_text("no picture")
+    font.write_text("no letters")
+    start = (
+        f"error: {tmp_path}/{{}}.blend: {{}} of the files that it shows are missing or cannot be"
+    )
+    for problem in ("cannot be read", "missing"):
+        code, told = listed("textured")
+        assert code == 1
+        assert told.startswith(
+            f"{start.format('textured', 2)} read: {letters} ({problem}); {texture} ({problem}); "
+        )
+        assert "scene: {allow_missing: true}" in told
+        bark.unlink(missing_ok=True)
+        font.unlink(missing_ok=True)
+    (tmp_path / "library.blend").unlink()
+    code, told = listed("linked")
+    assert code == 1
+    assert told.startswith(
+        f"{start.format('linked', 1)} read: the library library.blend at {tmp_path}/library.blend "
+    )
+    assert not output.exists()
 
 
 MINIMAL = """

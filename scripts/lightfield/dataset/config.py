@@ -30,7 +30,7 @@ from lightfield.dataset.exports import VIEWS, Export, Exports
 from lightfield.dataset.passes import PASSES, in_order
 from lightfield.geometry.lenses import LENSES, CameraSettings, Lens
 from lightfield.geometry.lenses.cube_map import CubeMap
-from lightfield.geometry.rigs import AnyRig, Poses, Rig
+from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
 from lightfield.geometry.rigs.rig import Frame
 from lightfield.geometry.rigs.split import PARTS, Chosen
 
@@ -180,6 +180,12 @@ class Parameters(Settings):
         return content
 
 
+# What a value of the .blend's own is called, wherever the scene YAML may ask for it.
+FILE = "file"
+# Keys of `Source` that a builder does not take.
+OF_A_BLEND = ("scene_name", "view_layers", "allow_missing", "sha256", "url", "page")
+
+
 class Source(Settings):
     """Where the scene comes from: a builder, a .blend file, or views that are there already."""
 
@@ -199,7 +205,25 @@ class Source(Settings):
         description="Instead of a scene to render: the folder of a light field in SILVR's layout "
         "(lightfield.json and exr/), or one with several such folders.",
     )
-    frame: Frame = Field(1, description="Of the animation, the frame that is rendered.")
+    scene_name: str | None = Field(
+        None, description="Of the .blend's scenes; without it, the one that was open when saved."
+    )
+    view_layers: Literal["all"] | list[str] | None = Field(
+        None,
+        min_length=1,
+        description="Of that scene's view layers, shown together in one picture; all are those in "
+        "use; without it, the first of them.",
+    )
+    frame: Frame | Literal["file"] = Field(
+        1,
+        description="Of the animation, the frame that is rendered; file is the one at which the "
+        ".blend was saved.",
+    )
+    allow_missing: bool | None = Field(
+        None,
+        description="Render although textures, fonts, libraries, volumes or caches are missing or "
+        "cannot be read; such a texture is magenta.",
+    )
     sha256: str | None = Field(
         None,
         pattern="^[0-9a-f]{64}$",
@@ -221,9 +245,11 @@ class Source(Settings):
             known = builders()
             if self.builder not in known:
                 raise ValueError(f"builder: is {self.builder!r}; must be one of {', '.join(known)}")
-            for name in ("sha256", "url", "page"):
+            for name in OF_A_BLEND:
                 if getattr(self, name) is not None:
                     raise ValueError(f"{name}: goes with blend, not with builder")
+            if self.frame == FILE:
+                raise ValueError("frame: file goes with blend, not with builder")
         elif self.dataset is not None and len(self.model_fields_set) > 1:
             (name, *_) = self.model_fields_set - {"dataset"}
             raise ValueError(f"{name}: goes without dataset")
@@ -244,9 +270,15 @@ class TargetError(Settings):
 
 
 class Render(Settings):
-    """What Cycles is asked for; what is not given here stays as the .blend has it."""
+    """What Cycles is asked for.
 
-    samples: AtLeastOne | None = Field(None, description="Paths a pixel.")
+    Of what is not given here, max_bounces, clamp_indirect, filter_width and motion_blur stay as the
+    .blend has them; everything else has the default that stands here.
+    """
+
+    samples: AtLeastOne | Literal["file"] | None = Field(
+        None, description="Paths a pixel; file is as many as the .blend has."
+    )
     target_error: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] | TargetError | None = Field(
         None,
         description="Instead of samples: relative mean squared error, (x - r)^2 / (r^2 + 0.01) "
@@ -266,6 +298,14 @@ class Render(Settings):
         0, description="Noise at which adaptive sampling stops early; 0 takes every sample."
     )
     denoise: bool = Field(False, description="Denoise each view with OpenImageDenoise.")
+    motion_blur: bool | None = Field(
+        None, description="Blur what moves; without it, as the .blend has it."
+    )
+    depth_of_field: bool | None = Field(
+        None,
+        description="Blur what is out of the focus of the .blend's own camera, with its aperture; "
+        "without it, everything is sharp.",
+    )
     seed: int = Field(
         0, ge=0, le=2**63 - 1, description="From this and its name each view has its own seed."
     )
@@ -417,8 +457,15 @@ class Scene(Settings):
         for name, rig in self.rigs.items():
             _check_name(f"rigs.{name}", name, RIG_NEIGHBOURS)
             self._check_rig(f"rigs.{name}", rig)
+        if self.render and self.scene.blend is None:
+            if self.render.samples == FILE:
+                raise ValueError("render.samples: file goes with scene.blend")
+            if self.render.depth_of_field:
+                raise ValueError("render.depth_of_field: goes with scene.blend, for its camera")
         for name, reprojection in self.reprojections.items():
             key = f"reprojections.{name}"
+            if reprojection.camera.lens == FILE:
+                raise ValueError(f"{key}.camera.lens: file goes with a rig of type blend_camera")
             _check_name(key, name, REPROJECTION_NEIGHBOURS)
             for rig_name in reprojection.rigs or ():
                 if rig_name not in self.rigs:
@@ -485,7 +532,11 @@ class Scene(Settings):
             raise ValueError(f"{key}: is missing the key camera")
         if isinstance(rig, Poses) and not Path(rig.file).is_file():
             raise ValueError(f"{key}.file: is {rig.file!r}; there is no such file")
-        frames = len(rig.frames.numbers) if rig.frames else 1
+        if self.scene.blend is None and isinstance(rig, BlendCamera):
+            raise ValueError(f"{key}.type: blend_camera goes with scene.blend")
+        if camera.lens == FILE and not isinstance(rig, BlendCamera):
+            raise ValueError(f"{key}.camera.lens: file goes with a rig of type blend_camera")
+        frames = len(rig.sequence.numbers) if rig.sequence else 1
         if frames > MOST_FRAMES or frames * rig.view_count > MOST_VIEWS:
             raise ValueError(
                 f"{key}: has {frames} frames of {rig.view_count} views; must be at most "
@@ -493,13 +544,13 @@ class Scene(Settings):
             )
         for name in _unknown_names(rig):
             raise ValueError(f"{key}.split: there is no view {name!r}")
-        if self.render and not LENSES[camera.lens].in_cycles:
+        lens = camera.make()
+        if self.render and not lens.in_cycles:
             known = ", ".join(name for name, lens in LENSES.items() if lens.in_cycles)
             raise ValueError(
                 f"{key}.camera.lens: is {camera.lens!r}, which Cycles does not have; "
                 f"must be one of {known} (reproject for the others)"
             )
-        lens = camera.make()
         if self.render and self.render.depth == "z" and not lens.has_z_depth:
             raise ValueError(
                 f"render.depth: is 'z', but {key}.camera sees beyond 180 degrees; "
@@ -527,7 +578,8 @@ def _check_name(key: str, name: str, neighbours: set[str]) -> None:
 
 def _unknown_names(rig: Rig) -> list[str]:
     """Return the names in a rig's split that no view has."""
-    if not isinstance(rig.split, Chosen) or not rig.split.names:
+    known_later = isinstance(rig, BlendCamera)
+    if known_later or not isinstance(rig.split, Chosen) or not rig.split.names:
         return []
     return sorted({*rig.split.names} - {pose.name for pose in rig.poses()})
 
@@ -606,7 +658,7 @@ def accept_blend(scene: str) -> None:
         )
     if found != expected:
         write_json(origin, {"blend": Path(source.blend).name, "sha256": found})
-        print(f"{source.blend}: its sha256 {found} is now recorded in {origin}")
+        print(f"note: {source.blend}: its sha256 {found} is now recorded in {origin}")
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):

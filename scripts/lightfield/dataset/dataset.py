@@ -10,13 +10,14 @@ from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
 from statistics import fmean
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import broken
-from lightfield.dataset import config, memory, passes, published, shard_files
+from lightfield.core.files import broken, read_json
+from lightfield.dataset import blend, config, memory, passes, published, shard_files
 from lightfield.dataset.config import (
     CHOSEN,
+    FILE,
     Configuration,
     Preset,
     Render,
@@ -30,7 +31,7 @@ from lightfield.dataset.splits import SPLITS
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.overview import sees_all_round
-from lightfield.geometry.rigs import Pose, Poses, Random, Rig
+from lightfield.geometry.rigs import BlendCamera, Pose, Poses, Random, Rig
 
 # For planning only, measured on one core of a 2-core x86-64 machine: path tracing of one sample of
 # one pixel, and start-up (bpy, the scene, and Cycles' acceleration structures).
@@ -46,7 +47,7 @@ COMPRESSED = 0.75
 PNG_BYTES = 2
 
 # What of a scene YAML's `scene` block is written down: not where a file came from, nor where it is.
-SOURCE_KEYS = {"builder", "parameters", "frame"}
+SOURCE_KEYS = {"builder", "parameters", "scene_name", "view_layers", "frame"}
 
 # Parts of a split that a rig may be as a whole beside one that trains.
 TESTED_WITH = ("validation", "test")
@@ -84,6 +85,36 @@ class Dataset:
     work_root: str = "work"
     views_per_shard: int | Literal["auto"] = "auto"
     most_shards: int = 64
+    # Path and SHA-256 of each file that a .blend reads, once its inventory is known.
+    external_files: Sequence[tuple[str, str | None]] = ()
+
+    def resolved(self, inventory: Path) -> Self:
+        """Return the dataset with what its .blend says, by its ``inventory``, filled in.
+
+        Raises `UserError` where the .blend has not what the scene YAML asks of it.
+        """
+        found = read_json(inventory)
+        said = found["blend"]
+        frame = int(said["frame"] if self.source.frame == FILE else self.source.frame)
+        render, rig = dict(self.render), self.rig
+        if render.get("samples") == FILE:
+            most = render.pop("most_samples", said["samples"])
+            render["samples"] = min(said["samples"], most)
+        if render.get("depth_of_field"):
+            blend.camera_of(said)
+        if isinstance(rig, BlendCamera):
+            blend.camera_of(said)
+            rig = rig.placed(inventory, frame)
+        if rig.camera.lens == FILE:
+            camera = blend.lens_of(said, rig.camera.resolution)
+            rig = rig.model_copy(update={"camera": camera})
+        return replace(
+            self,
+            source=self.source.model_copy(update={"frame": frame}),
+            render=render,
+            rig=rig,
+            external_files=[(file["path"], file["sha256"]) for file in found["external_files"]],
+        )
 
     @property
     def scene_folder(self) -> str:
@@ -95,6 +126,12 @@ class Dataset:
     def view_count(self) -> int:
         """Number of views of the rig."""
         return self.rig.view_count
+
+    @property
+    def camera_frames(self) -> list[int | None]:
+        """The frames at which a rig of the .blend's camera needs it; None is the file's own."""
+        rig = self.placed_rig
+        return rig.path if isinstance(rig, BlendCamera) else []
 
     @property
     def depth(self) -> str | None:
@@ -118,7 +155,7 @@ class Dataset:
     @property
     def fingerprint(self) -> str:
         """What the scene is identified by: see `scene_fingerprint`."""
-        return scene_fingerprint(self.source)
+        return scene_fingerprint(self.source, self.external_files)
 
     def origin(self, render: dict[str, Any]) -> dict[str, Any]:
         """Return what lightfield.json says of what is rendered, and how: by this ``render``."""
@@ -184,10 +221,13 @@ class Dataset:
 
     @property
     def placed_rig(self) -> Rig:
-        """The rig; a random one knows where its places are found."""
-        if not isinstance(self.rig, Random):
-            return self.rig
-        return self.rig.placed(str(self.places))
+        """The rig; a random one and a .blend's camera know where their places are found."""
+        if isinstance(self.rig, BlendCamera):
+            frame = self.source.frame
+            return self.rig.placed(str(self.inventory), None if frame == FILE else int(frame))
+        if isinstance(self.rig, Random):
+            return self.rig.placed(str(self.places))
+        return self.rig
 
     @property
     def rig_json(self) -> str:
@@ -235,6 +275,11 @@ class Dataset:
     def cameras(self) -> str | list[str]:
         """What surrounds each camera; not known of an import."""
         return [] if self.imported else f"{self.work}/cameras.json"
+
+    @property
+    def blend_inventory(self) -> str | list[str]:
+        """The list of what the user's own .blend says, from which its datasets follow, too."""
+        return self.inventory if self.source.blend else []
 
     @property
     def trials(self) -> str:
@@ -428,16 +473,33 @@ class Dataset:
         except (OSError, ValueError, LookupError, TypeError):
             return True
 
+    @property
+    def external_changed(self) -> bool:
+        """Whether a file that the user's .blend reads is no longer the one in its inventory."""
+        if not self.source.blend:
+            return False
+        home = Path(self.source.blend).parent
+        try:
+            return any(
+                _size_and_time(home / file["path"]) != (file["bytes"], file["mtime_ns"])
+                for file in json.loads(Path(str(self.inventory)).read_bytes())["external_files"]
+            )
+        except FileNotFoundError:
+            return False
+        except (OSError, ValueError, LookupError, TypeError):
+            return True
+
     # What it will take.
 
     @property
     def planned_samples(self) -> int:
-        """A pixel's samples; with a target error a guess, the same before and after calibration.
+        """A pixel's samples; with a target error, or the .blend's own, a guess that stays the same.
 
         Shards follow from it, whose bounds must follow from the configuration alone.
         """
+        samples = self.render.get("samples", FILE)
         limit = self.render.get("most_samples", GUESSED_SAMPLES)
-        return int(self.render.get("samples", min(limit, GUESSED_SAMPLES)))
+        return min(limit, GUESSED_SAMPLES) if samples == FILE else int(samples)
 
     @property
     def planned_view_seconds(self) -> float:
@@ -568,6 +630,14 @@ def _differs(path: str, expected: dict[str, Any], poses: Sequence[Pose] = ()) ->
         return True
 
 
+def _size_and_time(path: Path) -> tuple[int, int] | tuple[None, None]:
+    """Return a file's bytes and when it was changed, in nanoseconds; None where there is none."""
+    if not path.is_file():
+        return None, None
+    status = path.stat()
+    return status.st_size, status.st_mtime_ns
+
+
 def _entries(folder: str, name: str) -> list[os.DirEntry[str]]:
     """Return what lies in a folder in ``folder``; nothing where there is none."""
     try:
@@ -689,12 +759,12 @@ def _check_presence(dataset: Dataset) -> None:
         )
 
 
-def _frames(name: str, rig: Rig, frame: int) -> Iterator[tuple[str, int]]:
+def _frames(name: str, rig: Rig, frame: int | str) -> Iterator[tuple[str, int | str]]:
     """Yield the folder and the frame number of each dataset of a rig."""
-    if rig.frames is None:
+    if rig.sequence is None:
         yield name, frame
         return
-    for number in rig.frames.numbers:
+    for number in rig.sequence.numbers:
         yield f"{name}/f{number:05d}", number
 
 
@@ -725,10 +795,12 @@ def _limited_render(render: Render | None, rig: Rig, limits: Preset) -> dict[str
         return {"depth": published.depth(rig)}
     content = render.model_dump(exclude_none=True)
     denoise = {} if limits.denoise is None else {"denoise": limits.denoise}
-    if render.samples is not None:
+    if isinstance(render.samples, int):
         samples = min(render.samples, limits.samples or render.samples)
         return {**content, "samples": samples, **denoise}
     most = {"most_samples": limits.samples} if limits.samples else {}
+    if render.samples == FILE:
+        return {**content, **most, **denoise}
     if isinstance(render.target_error, TargetError):
         content["target_error"] = render.target_error.value
         if render.target_error.denoise == "never":

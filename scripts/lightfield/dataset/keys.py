@@ -7,6 +7,7 @@ leaves out changes no byte (see `lightfield.rendering.pruning`) and is therefore
 
 import hashlib
 import json
+from collections.abc import Sequence
 from functools import cache
 from importlib import metadata
 from typing import Any
@@ -24,19 +25,19 @@ RENDER_VERSION = 3
 version = cache(metadata.version)
 
 
-def scene_fingerprint(source: Source) -> str:
+def scene_fingerprint(source: Source, external: Sequence[tuple[str, str | None]] = ()) -> str:
     """Return what identifies a scene YAML's ``scene`` block: 64 hexadecimal digits.
 
-    A .blend is identified by its bytes; raises `UserError` while their SHA-256 is not known.
-    Somebody else's views are by their lightfield.json. A
-    built one differs from build to build (it holds memory addresses), so it is identified by the
-    text of the builder and of the library that all builders have in common, its parameters, and
-    bpy's version.
+    A .blend is identified by its bytes and those of the ``external`` files that it reads, each
+    given by its path and SHA-256, None where it is missing; raises `UserError` while its own
+    SHA-256 is not known. Somebody else's views are by their lightfield.json. A built scene differs
+    from build to build (it holds memory addresses), so it is identified by the text of the builder
+    and of the library that all builders have in common, its parameters, and bpy's version.
     """
     if source.blend:
         if source.sha256 is None:
             raise UserError(f"{source.blend}: its sha256 is not known; check_blend.py records it")
-        return source.sha256
+        return _digest([source.sha256, external]) if external else source.sha256
     if source.dataset:
         return _digest(published.fingerprint(source.dataset))
     assert source.builder

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lightfield.geometry.rigs import Path, Poses, Random, Rig
+from lightfield.geometry.rigs import BlendCamera, Path, Poses, Random, Rig
 from lightfield.geometry.rigs.hemisphere import GOLDEN_ANGLE
 from lightfield.geometry.rigs.orbit import on_sphere
 
@@ -19,7 +19,7 @@ def sees_all_round(rig: Rig) -> bool:
     plane see half of them at most, those that look at an object none: its inside would be the
     panorama's place. Of loose poses, paths and random places nobody knows what is in the middle.
     """
-    if isinstance(rig, Poses | Path | Random):
+    if isinstance(rig, Poses | Path | Random | BlendCamera):
         return False
     lens = rig.camera.make()
     number = np.arange(DIRECTIONS, dtype=np.float64)

@@ -1,7 +1,9 @@
 """Scenes from and to .blend files: opened with their scripts disabled, saved whole."""
 
 import struct
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import bpy
@@ -43,11 +45,13 @@ def _check_blend(path: Path) -> None:
         raise OSError("the file is cut short")
 
 
-def open_scene(path: Path) -> None:
-    """Open a .blend with its scripts disabled.
+def open_scene(path: Path, chosen: Mapping[str, Any] = MappingProxyType({})) -> list[str]:
+    """Open a .blend with its scripts disabled, and return the names of the view layers rendered.
 
-    Raises `UserError` if Blender cannot read it, or would lose what it does not know: where a newer
-    version saved it, or a library that it links.
+    These and the scene are those of ``scene_name`` and ``view_layers`` in ``chosen``, a scene
+    YAML's ``scene`` block. Raises `UserError` if Blender cannot read the file, or would lose what
+    it does not know: where a newer version saved it, or a library that it links; and where what is
+    chosen is not there.
     """
     here = bpy.app.version_string
     try:
@@ -64,6 +68,68 @@ def open_scene(path: Path) -> None:
                 f"new in it; build with bpy {newer}, or save it with Blender "
                 f"{bpy.app.version[0]}.{bpy.app.version[1]}"
             )
+    try:
+        return _choose(chosen.get("scene_name"), chosen.get("view_layers"))
+    except UserError as error:
+        raise UserError(f"{path}: {error}") from None
+
+
+def _choose(scene_name: str | None, view_layers: str | Sequence[str] | None) -> list[str]:
+    """Make a scene the current one, and some of its view layers the only one that is in use."""
+    window = bpy.context.window
+    if scene_name is not None:
+        if scene_name not in bpy.data.scenes:
+            known = ", ".join(scene.name for scene in bpy.data.scenes)
+            raise UserError(f"scene_name: is {scene_name!r}; must be one of {known}")
+        window.scene = bpy.data.scenes[scene_name]
+    found = window.scene.view_layers
+    layers = [layer for layer in found if layer.use] or [found[0]]
+    if view_layers is None:
+        layers = layers[:1]
+    elif view_layers != "all":
+        for name in view_layers:
+            if name not in found:
+                known = ", ".join(layer.name for layer in found)
+                raise UserError(f"view_layers: {name!r} is none of {known}")
+        layers = [found[name] for name in view_layers]
+    _join(layers)
+    for layer in found:
+        layer.use = layer == layers[0]
+    window.view_layer = layers[0]
+    return [layer.name for layer in layers]
+
+
+def _join(layers: Sequence[Any]) -> None:
+    """Let the first of some view layers show each collection that any of them shows.
+
+    One is a holdout, or there for indirect light alone, where it is so in all that show it.
+    """
+    overrides = {(layer.material_override, layer.world_override) for layer in layers}
+    if len(overrides) > 1:
+        names = ", ".join(layer.name for layer in layers)
+        raise UserError(f"view_layers: {names} differ in their overrides; render them one by one")
+    settings: list[tuple[Any, bool, bool, bool]] = []
+
+    def visit(parts: Sequence[Any]) -> None:
+        shown = [part for part in parts if not part.exclude]
+        settings.append(
+            (
+                parts[0],
+                not shown,
+                bool(shown) and all(part.holdout for part in shown),
+                bool(shown) and all(part.indirect_only for part in shown),
+            )
+        )
+        for children in zip(*(part.children for part in parts), strict=True):
+            visit(children)
+
+    if len(layers) > 1:
+        visit([layer.layer_collection for layer in layers])
+    # From the outside in, for a collection takes those inside it along.
+    for part, exclude, holdout, indirect in settings:
+        if part.exclude != exclude:
+            part.exclude = exclude
+        part.holdout, part.indirect_only = holdout, indirect
 
 
 def path_of(block: Any) -> Path:

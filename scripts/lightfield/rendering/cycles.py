@@ -31,7 +31,7 @@ def set_up(
     out. Raises `UserError` if the scene cannot be opened or the ``device`` is not there.
     """
     left_out = inventory["left_out"] if inventory else []
-    blend_file.open_scene(blend)
+    blend_file.open_scene(blend, lightfield.content.get("scene", {}))
     passes = lightfield.passes
     numbered = [found.name for found in passes if found.kind == "id"]
     if inventory and "hidden_objects" in left_out:
@@ -47,8 +47,14 @@ def set_up(
     _set_output(scene, lightfield, threads)
     _set_passes(scene, passes)
     _use_device(scene, device)
-    _set_camera(scene, lightfield.content)
+    # At this frame a marker may choose the artist's camera, and later none may.
     scene.frame_set(lightfield.frame)
+    focused = scene.camera if lightfield.render.get("depth_of_field") else None
+    for marker in scene.timeline_markers:
+        marker.camera = None
+    _set_camera(scene, lightfield.content)
+    if focused:
+        _set_focus(scene.camera.data.dof, focused)
     if any(found.kind == "motion" for found in passes):
         left_out = [name for name in left_out if name != "animation"]
     pruning.leave_out(left_out)
@@ -61,12 +67,16 @@ def _set_quality(settings: Mapping[str, Any]) -> None:
     cycles = bpy.context.scene.cycles
     cycles.use_animated_seed = False
     cycles.time_limit = 0
+    cycles.use_layer_samples = "IGNORE"
+    cycles.use_sample_subset = False
     if "max_bounces" in settings:
         cycles.max_bounces = settings["max_bounces"]
     if "clamp_indirect" in settings:
         cycles.sample_clamp_indirect = settings["clamp_indirect"]
     if "filter_width" in settings:
         cycles.filter_width = settings["filter_width"]
+    if "motion_blur" in settings:
+        bpy.context.scene.render.use_motion_blur = settings["motion_blur"]
 
 
 def _set_output(scene: Any, lightfield: LightField, threads: int) -> None:
@@ -83,6 +93,8 @@ def _set_output(scene: Any, lightfield: LightField, threads: int) -> None:
     render.use_multiview = False
     render.use_compositing = False
     render.use_sequencer = False
+    render.use_freestyle = False
+    render.film_transparent = False
     render.use_overwrite = True
     output = render.image_settings
     output.media_type = "MULTI_LAYER_IMAGE"
@@ -210,6 +222,17 @@ def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
     camera_object.rotation_mode = "XYZ"
     scene.collection.objects.link(camera_object)
     scene.camera = camera_object
+
+
+def _set_focus(lens: Any, camera: Any) -> None:
+    """Give a camera the aperture and focus of the artist's ``camera`` at the present frame."""
+    own = camera.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.dof
+    for name in ("aperture_fstop", "aperture_blades", "aperture_rotation", "aperture_ratio"):
+        setattr(lens, name, getattr(own, name))
+    lens.focus_object = camera.data.dof.focus_object
+    lens.focus_subtarget = camera.data.dof.focus_subtarget
+    lens.focus_distance = own.focus_distance
+    lens.use_dof = True
 
 
 def view_layer(scene: Any) -> Any:

@@ -92,6 +92,7 @@ def _geometry_settings(wanted: Iterable[str]) -> Iterator[None]:
         for name, value in _SAMPLING.items():
             stack.enter_context(_changed(scene.cycles, name, value))
         stack.enter_context(_changed(scene.render, "use_motion_blur", False))
+        stack.enter_context(_changed(scene.camera.data.dof, "use_dof", False))
         for found in PASSES.values():
             for name in found.needed if found.of_colour else ():
                 stack.enter_context(_changed(*pass_property(layer, name), False))

@@ -1,13 +1,12 @@
 """What a scene contains: geometry, materials, textures, what moves, and which files it reads."""
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import bpy
 
 from lightfield.rendering import pruning
-from lightfield.rendering.blend_file import path_of
+from lightfield.rendering.external_files import external_files, problems
 
 # Shader nodes by the feature that they give a material; the Principled BSDF by its inputs.
 SHADERS = {
@@ -39,13 +38,19 @@ SIMULATIONS = {
 
 
 def inventory() -> dict[str, Any]:
-    """Return what the open scene contains; it is left without its hidden objects."""
+    """Return what the open scene contains; the file is left with that alone."""
     scene = bpy.context.scene
+    others = [other for other in bpy.data.scenes if other not in (scene, scene.background_set)]
+    for other in others:
+        bpy.data.scenes.remove(other)
+    if others:
+        pruning.remove_unused()
     hidden = pruning.removable_objects()
     pruning.remove_objects(hidden)
     objects = list(bpy.data.objects)
     materials = sorted(
-        {slot.material for thing in objects for slot in thing.material_slots if slot.material},
+        {slot.material for thing in objects for slot in thing.material_slots if slot.material}
+        | set_by_nodes(),
         key=lambda material: material.name_full,
     )
     lights = {thing.data for thing in objects if thing.type == "LIGHT"}
@@ -63,9 +68,6 @@ def inventory() -> dict[str, Any]:
     ):
         features["hair"].add("objects")
     features["volumes"] |= {thing.name_full for thing in objects if thing.type == "VOLUME"}
-    external = sorted(
-        {str(Path(path).resolve()) for path in bpy.utils.blend_paths(absolute=True, packed=False)}
-    )
     return {
         **triangles(),
         "lights": len(lights),
@@ -75,8 +77,8 @@ def inventory() -> dict[str, Any]:
         "animated": sorted(owner.name_full for owner, _ in pruning.animated()),
         "moving": moving(objects),
         "motion_blur": bool(scene.render.use_motion_blur),
-        "external_files": external,
-        "missing": missing_files(images),
+        "external_files": external_files(),
+        "missing": problems(images),
     }
 
 
@@ -98,6 +100,13 @@ def triangles() -> dict[str, int]:
         "triangles": sum(meshes.values()),
         "triangles_with_instances": total,
     }
+
+
+def set_by_nodes() -> set[Any]:
+    """Return the materials that geometry nodes give to what they make."""
+    users = bpy.data.user_map(subset=list(bpy.data.materials))
+    kind = bpy.types.GeometryNodeTree
+    return {material for material in users if any(isinstance(u, kind) for u in users[material])}
 
 
 def surface_features(shader: Any) -> Iterator[tuple[str | None, Any]]:
@@ -159,25 +168,3 @@ def keeps_time(modifier: Any) -> bool:
         for node in modifier.node_group.nodes
         for node in (contributing(node) if node.bl_idname == "NodeGroupOutput" else ())
     )
-
-
-def missing_files(images: set[Any]) -> list[str]:
-    """Return the textures and libraries that the scene needs and that are not there."""
-    missing = [
-        f"the library {library.name_full} at {path_of(library)}"
-        for library in bpy.data.libraries
-        if not library.packed_file and not path_of(library).is_file()
-    ]
-    missing += [
-        f"the texture {image.name_full} at {path_of(image)}"
-        for image in images
-        if image.source in ("FILE", "SEQUENCE", "MOVIE")
-        and not image.packed_files
-        and not path_of(image).is_file()
-    ]
-    missing += [
-        f"the volume {volume.name_full} at {path_of(volume)}"
-        for volume in bpy.data.volumes
-        if volume.users and not volume.packed_file and not path_of(volume).is_file()
-    ]
-    return sorted(missing)

@@ -73,8 +73,13 @@ def remove_objects(names: Collection[str]) -> None:
             for collection in thing.users_collection:
                 collection.objects.unlink(thing)
     if names:
-        with quiet():
-            bpy.ops.outliner.orphans_purge(do_recursive=True)
+        remove_unused()
+
+
+def remove_unused() -> None:
+    """Unload what nothing uses."""
+    with quiet():
+        bpy.ops.outliner.orphans_purge(do_recursive=True)
 
 
 def leave_out(names: Collection[str]) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.dataset import blend
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.splits import SPLITS
 from lightfield.geometry import rigs
@@ -37,6 +38,8 @@ class Origin:
     command: str
     has_panorama: bool
     measurements: Sequence[Path] = ()
+    # What the scene's .blend says, for a user's own.
+    inventory: Mapping[str, Any] | None = None
 
 
 def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
@@ -63,6 +66,7 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
         middle=None if origin.has_panorama else lightfield.views[middle_view(rig)].name,
         pictures={stem: page.photo(report / f"{stem}.png", WIDEST) for stem in PICTURES},
         plots={stem: page.plot(report / stem) for stem in PLOTS},
+        taken=_taken(origin, lightfield),
         looks=looks,
         reprojected=list(_reprojected(folder)),
         render=lightfield.render,
@@ -80,6 +84,14 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
         yaml=origin.yaml,
         command=origin.command,
     )
+
+
+def _taken(origin: Origin, lightfield: LightField) -> list[str]:
+    """Return what was taken of the user's own .blend and what was not; nothing without one."""
+    if origin.inventory is None:
+        return []
+    own_camera = isinstance(origin.rig, rigs.BlendCamera)
+    return blend.taken(origin.inventory, [lightfield.frame], lightfield.render, own_camera)
 
 
 def _failed(validation: Mapping[str, Any] | None) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -141,7 +153,7 @@ def rig_text(rig: rigs.Rig, places: views.Array) -> str:
     kind = rig.type
     if isinstance(rig, rigs.Grid):
         kind += " " + " × ".join(map(str, rig.cameras))
-    is_loose = isinstance(rig, rigs.Poses | rigs.Path)
+    is_loose = isinstance(rig, rigs.Poses | rigs.Path | rigs.BlendCamera)
     size = tuple(np.ptp(places, axis=0).tolist()) if is_loose else rig.size
     if isinstance(size, tuple):
         return f"{kind}, {' × '.join(f'{side:.4g}' for side in size)} m"

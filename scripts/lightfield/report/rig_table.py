@@ -87,11 +87,12 @@ class Setup:
 
 
 def read_setups(scenes: Sequence[Path]) -> list[Setup]:
-    """Compute the line of every rig of the scene YAMLs."""
+    """Compute the line of every rig of the scene YAMLs but those that a .blend's camera is."""
     return [
         _setup(path.stem, name, rig)
         for path in scenes
         for name, rig in config.read_scene(path).rigs.items()
+        if not isinstance(rig, rigs.BlendCamera)
     ]
 
 

@@ -11,6 +11,7 @@ from typing_extensions import TypeAliasType
 from lightfield.core.errors import UserError
 from lightfield.core.settings import checked
 from lightfield.geometry.lenses.base import LENSES, Array, Lens, LensSettings, pair
+from lightfield.geometry.lenses.rectilinear import FileSettings
 
 __all__ = ["LENSES", "Array", "CameraSettings", "Lens", "from_camera", "from_lightfield"]
 
@@ -20,7 +21,7 @@ for _module in pkgutil.iter_modules(__path__):
 if TYPE_CHECKING:
     CameraSettings = LensSettings
 else:
-    _MODELS = tuple(lens.Settings for lens in LENSES.values() if lens.Settings)
+    _MODELS = (*(lens.Settings for lens in LENSES.values() if lens.Settings), FileSettings)
     # Named, so that the JSON schema has it once.
     CameraSettings = TypeAliasType(
         "CameraSettings",

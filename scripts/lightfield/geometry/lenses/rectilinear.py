@@ -43,6 +43,19 @@ class RectilinearSettings(LensSettings):
         return {"focal_length": width / 2 / math.tan(math.radians(self.fov) / 2)}
 
 
+class FileSettings(LensSettings):
+    """The perspective lens of a .blend's own camera.
+
+    Until that is read, 50 mm stand in for its focal length.
+    """
+
+    lens: Literal["file"]
+
+    def make(self) -> "Rectilinear":
+        width, height = self.resolution
+        return Rectilinear(width=width, height=height, focal_length=50)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Rectilinear(RadialLens):
     """r = f tan θ, ``focal_length`` in mm. Source: the pinhole camera."""

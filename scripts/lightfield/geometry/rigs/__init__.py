@@ -11,6 +11,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field, TypeAdapter
 
 from lightfield.core.settings import checked
+from lightfield.geometry.rigs.blend_camera import BlendCamera
 from lightfield.geometry.rigs.cuboid import Cuboid
 from lightfield.geometry.rigs.cylinder import Cylinder
 from lightfield.geometry.rigs.grid import Grid
@@ -27,6 +28,7 @@ from lightfield.geometry.rigs.spiral import Spiral
 
 __all__ = [
     "AnyRig",
+    "BlendCamera",
     "Grid",
     "Path",
     "Pose",
@@ -48,7 +50,8 @@ AnyRig = Annotated[
     | Spiral
     | Path
     | Random
-    | Poses,
+    | Poses
+    | BlendCamera,
     Field(discriminator="type"),
 ]
 _SETTINGS: TypeAdapter[Rig] = TypeAdapter(AnyRig, config=ConfigDict(defer_build=True))

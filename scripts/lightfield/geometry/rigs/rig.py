@@ -166,6 +166,11 @@ class Rig(Settings):
         raise NotImplementedError
 
     @property
+    def sequence(self) -> Frames | None:
+        """The frames of which each is a dataset of its own."""
+        return self.frames
+
+    @property
     def lf_type(self) -> str:
         """What lightfield.json calls the rig."""
         return self.shape

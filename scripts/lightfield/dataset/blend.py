@@ -1,0 +1,157 @@
+"""What a dataset takes from a user's .blend, and in words what it takes and what it does not.
+
+What the .blend says is in the scene's inventory: under ``blend`` what `lightfield.rendering`'s
+``blend_facts`` found, and under ``missing`` which of its files are not there.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from lightfield.core.errors import UserError
+from lightfield.geometry.lenses.rectilinear import RectilinearSettings
+
+Settings = Mapping[str, Any]
+
+ENGINES = {
+    "BLENDER_EEVEE": "EEVEE",
+    "BLENDER_EEVEE_NEXT": "EEVEE",
+    "BLENDER_WORKBENCH": "Workbench",
+}
+
+
+def camera_of(blend: Settings) -> Settings:
+    """Return the .blend's camera; raises `UserError` where its scene has none."""
+    if blend["camera"] is None:
+        raise UserError(
+            f"the .blend's scene {blend['scene']} has no camera, which blend_camera and "
+            "depth_of_field need"
+        )
+    camera: Settings = blend["camera"]
+    return camera
+
+
+def lens_of(blend: Settings, resolution: tuple[int, int]) -> RectilinearSettings:
+    """Return the lens of the .blend's own camera, for images of another resolution.
+
+    Raises `UserError` unless it is a perspective one.
+    """
+    camera = camera_of(blend)
+    lens = camera["lens"]
+    if lens["type"] != "PERSP":
+        raise UserError(
+            f"the .blend's camera {camera['name']} is no perspective one; instead of lens: file, "
+            "give the rig's camera its lens"
+        )
+    width, height = resolution
+    fit = lens["sensor_fit"]
+    # AUTO fits the sensor's width, whichever side of the image is the longer.
+    across = fit == "HORIZONTAL" or (fit == "AUTO" and width >= height)
+    side = width if across else height
+    millimetres = lens["sensor_height" if fit == "VERTICAL" else "sensor_width"] / side
+    point = None
+    if lens["shift_x"] or lens["shift_y"]:
+        # Blender shifts by parts of the side that the sensor is fitted to, and up.
+        point = (width / 2 - lens["shift_x"] * side, height / 2 + lens["shift_y"] * side)
+    return RectilinearSettings(
+        lens="rectilinear",
+        focal_length=lens["lens"],
+        sensor_size=(width * millimetres, height * millimetres),
+        resolution=(width, height),
+        principal_point=point,
+    )
+
+
+def taken(
+    inventory: Settings,
+    frames: Sequence[int],
+    render: Settings,
+    own_camera: bool,
+) -> list[str]:
+    """Return in words, one entry a fact, what is taken of a .blend and what is not.
+
+    ``frames`` of it are rendered, as this ``render`` block has it; ``own_camera`` says whether by a
+    rig of the .blend's own camera.
+    """
+    blend = inventory["blend"]
+    layers = blend["layers"]
+    words = []
+    if len(blend["scenes"]) > 1:
+        words.append(f"scene {blend['scene']} of {len(blend['scenes'])}")
+    words.append(_frames(frames, blend["frame"]))
+    if blend["view_layers"] > 1:
+        together = "" if len(layers) == 1 else " in one picture"
+        name = "view layer" if len(layers) == 1 else "view layers"
+        words.append(f"{name} {' and '.join(layers)} of {blend['view_layers']}{together}")
+    if blend["engine"] != "CYCLES":
+        made_for = ENGINES.get(blend["engine"], blend["engine"])
+        words.append(f"made for {made_for}, rendered with Cycles")
+    if isinstance(render.get("samples"), int):
+        words.append(_samples(render["samples"], blend["samples"]))
+    elif "samples" in render:
+        words.append(_samples(blend["samples"], blend["samples"]))
+    if camera := blend["camera"]:
+        lens = camera["lens"]
+        length = f" ({lens['lens']:g} mm)" if lens["type"] == "PERSP" else ""
+        words.append(f"camera {camera['name']}{length} {'taken' if own_camera else 'ignored'}")
+    words += [f"{name} ignored" for name in ("compositor", "sequencer") if blend[name]]
+    threshold = render.get("adaptive_threshold")
+    focus = bool(blend["camera"] and blend["camera"]["lens"]["depth_of_field"])
+    blur = render.get("motion_blur", blend["motion_blur"])
+    for name, here, there in (
+        ("adaptive sampling", bool(threshold), blend["adaptive_sampling"]),
+        ("denoising", bool(render.get("denoise")), blend["denoising"]),
+        ("depth of field", bool(render.get("depth_of_field")), focus),
+        ("motion blur", blur, blend["motion_blur"]),
+    ):
+        if here or there:
+            words.append(f"{name} {'ON' if here else 'off'}")
+    words.append(f"view transform {blend['view_transform']} ignored")
+    if blend["look"] != "None":
+        words.append(f"look {blend['look']} ignored")
+    if blend["exposure"]:
+        words.append(f"view exposure {blend['exposure']:+g} ignored")
+    if blend["gamma"] != 1:
+        words.append(f"view gamma {blend['gamma']:g} ignored")
+    if blend["curves"]:
+        words.append("view curves ignored")
+    if blend["film_transparent"]:
+        words.append("film transparent on, ignored")
+    for name, title in (
+        ("border", "render border"),
+        ("stereoscopy", "stereoscopy"),
+        ("freestyle", "Freestyle lines"),
+    ):
+        if blend[name]:
+            words.append(f"{title} ignored")
+    if blend["simplify"]:
+        words.append("simplify ON")
+    if blend["unit_scale"] != 1:
+        words.append(f"unit scale {blend['unit_scale']:g} ignored")
+    if blend["scripts"]:
+        words.append("scripts and drivers in Python not run")
+    return words + list(_missing(inventory["missing"]))
+
+
+def _frames(frames: Sequence[int], own: int) -> str:
+    text = f"frame {frames[0]}" if len(frames) == 1 else f"frames {frames[0]} to {frames[-1]}"
+    return f"{text}, the file's" if list(frames) == [own] else f"{text} (the file is at {own})"
+
+
+def _samples(samples: int, own: int) -> str:
+    text = f"{samples} {'sample' if samples == 1 else 'samples'} a pixel"
+    return f"{text}, the file's" if samples == own else f"{text} (the file has {own})"
+
+
+def _missing(missing: Sequence[Settings]) -> list[str]:
+    """Return what is missing, or cannot be read, by kind: ``2 textures missing: a.png, b.png``."""
+    names: dict[tuple[str, str], list[str]] = {}
+    for entry in missing:
+        names.setdefault((entry["kind"], entry["problem"]), []).append(entry["path"])
+    return [
+        f"{len(paths)} {_plural(kind) if len(paths) > 1 else kind} {problem}: {', '.join(paths)}"
+        for (kind, problem), paths in names.items()
+    ]
+
+
+def _plural(kind: str) -> str:
+    return f"{kind[:-1]}ies" if kind.endswith("y") else f"{kind}s"

@@ -1,0 +1,91 @@
+"""What a .blend says of its rendering: `lightfield.dataset.blend` takes it, or says it does not."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import bpy
+
+from lightfield.core.errors import UserError
+from lightfield.rendering.cycles import view_layer
+
+
+def facts(frames: Iterable[int | None]) -> dict[str, Any]:
+    """Return what the open .blend says, with its camera at ``frames``; None is the file's own.
+
+    Raises `UserError` where the camera has not the same lens at all of them.
+    """
+    scene = bpy.context.scene
+    layer, render, cycles = view_layer(scene), scene.render, scene.cycles
+    view, frame = scene.view_settings, scene.frame_current
+    nodes = scene.compositing_node_group
+    camera = _camera([frame if number is None else number for number in frames] or [frame])
+    scene.frame_set(frame)
+    return {
+        "scenes": [other.name for other in bpy.data.scenes],
+        "scene": scene.name,
+        "frame": frame,
+        "view_layers": len(scene.view_layers),
+        "engine": render.engine,
+        "samples": _samples(cycles, layer),
+        "adaptive_sampling": bool(cycles.use_adaptive_sampling),
+        "denoising": bool(cycles.use_denoising and layer.cycles.use_denoising),
+        "motion_blur": bool(render.use_motion_blur),
+        "compositor": bool(render.use_compositing and nodes and nodes.nodes),
+        "sequencer": bool(
+            render.use_sequencer and scene.sequence_editor and scene.sequence_editor.strips
+        ),
+        "film_transparent": bool(render.film_transparent),
+        "view_transform": view.view_transform,
+        "look": view.look,
+        "exposure": round(view.exposure, 4),
+        "gamma": round(view.gamma, 4),
+        "curves": bool(view.use_curve_mapping),
+        "border": bool(render.use_border),
+        "stereoscopy": bool(render.use_multiview),
+        "freestyle": bool(render.use_freestyle),
+        "simplify": bool(render.use_simplify),
+        "unit_scale": round(scene.unit_settings.scale_length, 6),
+        "scripts": bool(bpy.app.autoexec_fail),
+        "camera": camera,
+    }
+
+
+def _samples(cycles: Any, layer: Any) -> int:
+    """Return the samples of a pixel; a view layer may have a number, or a bound, of its own."""
+    own, all_layers = int(layer.samples), int(cycles.samples)
+    if not own or cycles.use_layer_samples == "IGNORE":
+        return all_layers
+    return min(own, all_layers) if cycles.use_layer_samples == "BOUNDED" else own
+
+
+def _camera(frames: list[int]) -> dict[str, Any] | None:
+    """Return the camera's lens, and its camera-to-world matrices (4, 4) by frame.
+
+    None where the scene has no camera. A marker may change the camera with the frame.
+    """
+    scene = bpy.context.scene
+    lenses, matrices, names = [], {}, []
+    for frame in sorted(set(frames)):
+        scene.frame_set(frame)
+        if scene.camera is None:
+            return None
+        camera = scene.camera.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        names.append(scene.camera.name)
+        lenses.append(_lens(camera.data))
+        matrices[str(frame)] = [list(row) for row in camera.matrix_world.normalized()]
+        if lenses[-1] != lenses[0]:
+            raise UserError(
+                f"the camera {names[-1]} has another lens at frame {frame} than at frame "
+                f"{min(frames)}, and all views of a dataset have one lens; choose frames with one"
+            )
+    return {"name": names[0], "lens": lenses[0], "matrices": matrices}
+
+
+def _lens(camera: Any) -> dict[str, Any]:
+    numbers = ("lens", "sensor_width", "sensor_height", "shift_x", "shift_y")
+    return {
+        "type": camera.type,
+        "sensor_fit": camera.sensor_fit,
+        "depth_of_field": bool(camera.dof.use_dof),
+        **{name: round(getattr(camera, name), 6) for name in numbers},
+    }

@@ -1,0 +1,151 @@
+"""Files beside a .blend of which its pixels are made, and what is wrong with them."""
+
+import glob
+import os
+import re
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import OpenImageIO as oiio
+
+from lightfield.core.files import sha256
+from lightfield.rendering.blend_file import path_of
+from lightfield.rendering.quiet import quiet
+
+# What a file is called by the type of the data-block that reads it. Sounds, texts (scripts) and
+# movie clips make no pixel.
+KINDS = {
+    "Image": "texture",
+    "Volume": "volume",
+    "VectorFont": "font",
+    "Library": "library",
+    "CacheFile": "cache",
+    "Object": "simulation cache",
+    # Light profiles (IES).
+    "PointLight": "light profile",
+    "SpotLight": "light profile",
+    "SunLight": "light profile",
+    "AreaLight": "light profile",
+    "Material": "light profile",
+    "World": "light profile",
+    "ShaderNodeTree": "light profile",
+}
+
+
+def external_files() -> list[dict[str, Any]]:
+    """Return each file that the open .blend reads: ``path`` from its folder, size, time, SHA-256.
+
+    A file that is not there has None for these: that it has come is noticed, too.
+    """
+    home = Path(bpy.data.filepath).parent
+    found = {file for block, path in _read() for file in _files(block, path)}
+    return [_entry(file, home) for file in sorted(found)]
+
+
+def problems(images: Collection[Any]) -> list[dict[str, str]]:
+    """Return what of the scene's files is missing or cannot be read.
+
+    Each has ``kind`` and ``name`` of what reads it, its ``path`` from the .blend's folder, and
+    ``problem``. Of images count those that shading reads, ``images``, and those of modifiers.
+    """
+    home = Path(bpy.data.filepath).parent
+    found = []
+
+    def note(block: Any, kind: str, path: Path, problem: str) -> None:
+        name = {"kind": kind, "name": block.name}
+        found.append(name | {"path": _from(home, path), "problem": problem})
+
+    for block, path in _read():
+        if not _is_needed(block, images):
+            continue
+        for file in _files(block, path):
+            problem = _problem(block, file)
+            if problem:
+                note(block, KINDS[type(block).__name__], file, problem)
+    for block in bpy.data.user_map():
+        if block.library and block.is_missing and path_of(block.library).is_file():
+            library = path_of(block.library)
+            note(block, f"linked {type(block).__name__.lower()}", library, "not in its library")
+    return sorted(found, key=lambda entry: (entry["kind"], entry["path"], entry["name"]))
+
+
+def _read() -> Iterator[tuple[Any, str]]:
+    """Yield each data-block that reads a file, and the path as Blender has it, absolute."""
+    for library in bpy.data.libraries:
+        if not library.packed_file:
+            yield library, str(path_of(library))
+    for block, paths in bpy.data.file_path_map().items():
+        if type(block).__name__ in KINDS and not _is_packed(block):
+            for path in sorted(paths):
+                yield block, bpy.path.abspath(path, library=block.library)
+    folder = Path(bpy.data.filepath).parent / f"blendcache_{Path(bpy.data.filepath).stem}"
+    for thing in bpy.data.objects:
+        caches = [getattr(modifier, "point_cache", None) for modifier in thing.modifiers]
+        caches += [system.point_cache for system in thing.particle_systems]
+        if any(cache and cache.use_disk_cache and not cache.use_external for cache in caches):
+            yield thing, str(folder)
+
+
+def _is_packed(block: Any) -> bool:
+    if isinstance(block, bpy.types.Image):
+        return bool(block.packed_files) or block.source in ("GENERATED", "VIEWER")
+    return isinstance(block, bpy.types.Library) or bool(getattr(block, "packed_file", None))
+
+
+def _is_needed(block: Any, images: Collection[Any]) -> bool:
+    if isinstance(block, bpy.types.Image):
+        modifiers = (bpy.types.Texture, bpy.types.GeometryNodeTree)
+        users = bpy.data.user_map(subset=[block])[block]
+        return block in images or any(isinstance(user, modifiers) for user in users)
+    return isinstance(block, bpy.types.Library) or block.users > block.use_fake_user
+
+
+def _files(block: Any, path: str) -> list[Path]:
+    """Return the files that a path stands for: itself, where there is none of them."""
+    folder = Path(path)
+    if folder.is_dir():
+        return sorted(file for file in folder.rglob("*") if file.is_file()) or [folder]
+    if isinstance(block, bpy.types.Image) and block.source == "TILED":
+        return [Path(path.replace("<UDIM>", str(tile.number))) for tile in block.tiles]
+    sequence = getattr(block, "source", "") == "SEQUENCE" or getattr(block, "is_sequence", False)
+    if sequence:
+        stem = glob.escape(re.sub(r"\d+$", "", folder.stem))
+        return sorted(folder.parent.glob(f"{stem}*{folder.suffix}")) or [folder]
+    return [folder]
+
+
+def _problem(block: Any, path: Path) -> str | None:
+    """Return what is wrong with a file, as far as Blender would only say it to its terminal."""
+    if not path.exists():
+        return "missing"
+    readable = True
+    if isinstance(block, bpy.types.Image) and block.source != "MOVIE":
+        # As Cycles reads it; Blender 5.0 crashes at some broken EXRs.
+        readable = bool(oiio.ImageBuf(str(path)).read(force=True))
+    elif isinstance(block, bpy.types.Volume):
+        readable = block.grids.load()
+    elif isinstance(block, bpy.types.VectorFont):
+        try:
+            with quiet():
+                bpy.data.fonts.remove(bpy.data.fonts.load(str(path)))
+        except RuntimeError:
+            readable = False
+    return None if readable else "cannot be read"
+
+
+def _entry(path: Path, home: Path) -> dict[str, Any]:
+    entry: dict[str, Any] = {"path": _from(home, path)}
+    if not path.is_file():
+        return entry | dict.fromkeys(("bytes", "mtime_ns", "sha256"))
+    status = path.stat()
+    return entry | {
+        "bytes": status.st_size,
+        "mtime_ns": status.st_mtime_ns,
+        "sha256": sha256(path),
+    }
+
+
+def _from(home: Path, path: Path) -> str:
+    return Path(os.path.relpath(path, home)).as_posix()
