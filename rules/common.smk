@@ -54,6 +54,13 @@ try:
 except UserError as error:
     sys.exit(f"error: {error}")
 
+# A shard's views are not among the outputs that Snakemake would bring to and from a job.
+if SharedFSUsage.INPUT_OUTPUT not in workflow.storage_settings.shared_fs_usage:
+    sys.exit(
+        "error: shared-fs-usage: is without input-output; jobs must see one folder of results "
+        "and work: mount it on every node (a volume, NFS) and let shared-fs-usage hold input-output"
+    )
+
 RESULTS = SETTINGS.results
 WORK = SETTINGS.work
 # Those that are not chosen may test what is trained on the chosen ones.

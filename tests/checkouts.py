@@ -1,9 +1,12 @@
 """Copies of the repository, in which a test runs Snakemake on scene YAMLs of its own."""
 
+import filecmp
+import json
 import re
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -12,6 +15,7 @@ PARTS = ("Snakefile", "config.yaml", "configs", "envs", "profiles", "captions", 
 
 def checkout(folder, **scenes):
     """Copy what Snakemake needs to ``folder``, with ``scenes``' YAML texts in configs/scenes/."""
+    folder.mkdir(parents=True, exist_ok=True)
     for name in PARTS:
         source = ROOT / name
         if source.is_dir():
@@ -23,10 +27,24 @@ def checkout(folder, **scenes):
     return folder
 
 
+def _words(arguments):
+    return [Path(sys.executable).with_name("snakemake"), "--cores", "1", *arguments]
+
+
+def start_snakemake(folder, *arguments, **options):
+    """Start Snakemake in a checkout, in a session of its own; return the process."""
+    return subprocess.Popen(
+        _words(arguments),
+        cwd=folder,
+        start_new_session=True,
+        **{"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL} | options,
+    )
+
+
 def snakemake(folder, *arguments):
     """Run Snakemake in a checkout; return its CompletedProcess."""
     return subprocess.run(
-        [Path(sys.executable).with_name("snakemake"), "--cores", "1", *arguments],
+        _words(arguments),
         cwd=folder,
         capture_output=True,
         text=True,
@@ -40,3 +58,33 @@ def planned(folder, *arguments):
     assert result.returncode == 0, result.stdout + result.stderr
     table = (result.stdout + result.stderr).split("Job stats:")[1].split("total")[0]
     return {name: int(count) for name, count in re.findall(r"^(\w+)\s+(\d+)$", table, re.M)}
+
+
+def published(folder, dataset=""):
+    """Return the files of all datasets, or of one, but for their reports, by relative path."""
+    results = folder / "results"
+    return {
+        path.relative_to(results): path
+        for path in sorted((results / dataset).rglob("*"))
+        if path.is_file()
+        and "report" not in path.relative_to(results).parts
+        # The index of all reports.
+        and path.parent != results
+    }
+
+
+def assert_same_bytes(one, other, dataset=""):
+    first, second = published(one, dataset), published(other, dataset)
+    assert list(first) == list(second)
+    different = [n for n in first if not filecmp.cmp(first[n], second[n], shallow=False)]
+    assert not different
+
+
+def rendered(folder):
+    """Return how often each view has been rendered, by journal and name."""
+    counts = Counter()
+    for journal in folder.glob("work/**/*.journal.jsonl"):
+        lines = [json.loads(line) for line in journal.read_text().splitlines()]
+        # Shards of other sizes have journals of their own for the same views.
+        counts.update((journal.parent, line["view"]) for line in lines if "view" in line)
+    return counts

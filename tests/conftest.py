@@ -6,9 +6,17 @@ import sys
 from pathlib import Path
 
 import pytest
+from checkouts import checkout, snakemake
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = ROOT / "scripts"
+
+
+def pytest_collection_modifyitems(items):
+    """Mark as slow what runs a program; other tests say it themselves."""
+    for item in items:
+        if "run_program" in item.fixturenames:
+            item.add_marker("slow")
 
 
 @pytest.fixture(scope="session")
@@ -38,3 +46,12 @@ def room(tmp_path_factory, run_program):
     path = tmp_path_factory.mktemp("room") / "room.blend"
     run_program("build_scene.py", "--builder", "room", "--output", path)
     return path
+
+
+@pytest.fixture(scope="session")
+def smoke(tmp_path_factory):
+    """A checkout in which the smoke dataset has been built."""
+    folder = checkout(tmp_path_factory.mktemp("smoke") / "plenoforge")
+    result = snakemake(folder, "--cores", "2", "smoke")
+    assert result.returncode == 0, result.stdout + result.stderr
+    return folder

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 import yaml
+from checkouts import ROOT, snakemake
 
-ROOT = Path(__file__).parents[1]
 STATUS = ROOT / "profiles/cluster-generic/status.sh"
 PROFILES = ["slurm", "cluster-generic"]
 # The rules whose jobs go to the cluster; all others are a matter of seconds.
@@ -97,6 +97,14 @@ def test_the_submit_command_asks_for_all_four_resources():
     command = settings("cluster-generic")["cluster-generic-submit-cmd"]
     for part in ("{threads}", "{resources.mem_mb}M", "{resources.runtime}", "{resources.gpu}"):
         assert part in command
+
+
+def test_nodes_without_a_shared_folder_are_refused_before_the_first_job(tmp_path):
+    run = snakemake(ROOT, "--directory", tmp_path, "--shared-fs-usage", "none", "--", "smoke")
+    assert run.returncode == 1
+    assert "Traceback" not in run.stderr
+    last = (run.stdout + run.stderr).splitlines()[-1]
+    assert last.startswith("error: shared-fs-usage: is without input-output")
 
 
 @pytest.mark.parametrize(

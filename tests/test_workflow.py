@@ -1,14 +1,11 @@
 """The whole workflow through real bpy: a tiny dataset, every stage, and what can go wrong."""
 
-import filecmp
 import json
 import os
-import random
 import re
 import shutil
 import signal
 import subprocess
-import sys
 import tarfile
 import time
 import zipfile
@@ -17,84 +14,32 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from checkouts import assert_same_bytes, checkout, rendered, snakemake, start_snakemake
 
 from lightfield.core.files import sha256, write_json
 from lightfield.imaging import images
 
-ROOT = Path(__file__).resolve().parents[1]
-SNAKEMAKE = Path(sys.executable).with_name("snakemake")
-NOT_PART = shutil.ignore_patterns(
-    ".git", ".venv", ".snakemake", "results", "work", "__pycache__", ".*_cache"
-)
 CUBOID = Path("results/smoke/LFCuboid_1x1x1")
+# All in one process: it builds the smoke dataset once for them.
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("smoke")]
 
 
-@pytest.fixture(scope="session")
-def checkout(tmp_path_factory):
-    """Return a function that makes a fresh copy of the repository."""
-
-    def make(name):
-        folder = tmp_path_factory.mktemp(name) / "plenoforge"
-        shutil.copytree(ROOT, folder, ignore=NOT_PART)
-        return folder
-
-    return make
+@pytest.fixture
+def other(tmp_path):
+    """A checkout in which nothing has been built."""
+    return checkout(tmp_path / "other")
 
 
-def snakemake(folder, *arguments):
-    result = run_snakemake(folder, *arguments)
+def succeeding(folder, *arguments):
+    result = snakemake(folder, *arguments)
     assert result.returncode == 0, result.stdout + result.stderr
     return result.stdout + result.stderr
 
 
-def failing_snakemake(folder, *arguments):
-    result = run_snakemake(folder, *arguments)
+def failing(folder, *arguments):
+    result = snakemake(folder, *arguments)
     assert result.returncode == 1, result.stdout + result.stderr
     return result.stdout + result.stderr
-
-
-def run_snakemake(folder, *arguments):
-    return subprocess.run(
-        [SNAKEMAKE, *arguments], cwd=folder, capture_output=True, text=True, check=False
-    )
-
-
-@pytest.fixture(scope="session")
-def smoke(checkout):
-    """A checkout in which the smoke dataset has been built."""
-    folder = checkout("smoke")
-    snakemake(folder, "--cores", "2", "smoke")
-    return folder
-
-
-def published(folder):
-    """Return the files of all datasets but for their reports, by relative path."""
-    results = folder / "results"
-    return {
-        path.relative_to(results): path
-        for path in sorted(results.rglob("*"))
-        if path.is_file()
-        and "report" not in path.relative_to(results).parts
-        # The index of all reports.
-        and path.parent != results
-    }
-
-
-def assert_same_bytes(one, other):
-    first, second = published(one), published(other)
-    assert list(first) == list(second)
-    different = [n for n in first if not filecmp.cmp(first[n], second[n], shallow=False)]
-    assert not different
-
-
-def rendered(folder):
-    """Return how often each view has been rendered, by journal and name."""
-    counts = Counter()
-    for journal in folder.glob("work/**/*.journal.jsonl"):
-        lines = [json.loads(line) for line in journal.read_text().splitlines()]
-        # Shards of other sizes have journals of their own for the same views.
-        counts.update((journal.parent, line["view"]) for line in lines if "view" in line)
-    return counts
 
 
 def files(folder):
@@ -121,16 +66,15 @@ def test_every_dataset_is_valid_and_its_checksums_hold(smoke):
 
 
 def test_a_second_run_does_nothing(smoke):
-    assert "Nothing to be done" in snakemake(smoke, "--cores", "2", "smoke")
+    assert "Nothing to be done" in succeeding(smoke, "--cores", "2", "smoke")
 
 
-def test_shards_and_cores_do_not_change_a_byte(smoke, checkout):
-    other = checkout("other")
-    snakemake(other, "--cores", "1", "--config", "views_per_shard=2", "--", "smoke")
+def test_shards_and_cores_do_not_change_a_byte(smoke, other):
+    succeeding(other, "--cores", "1", "--config", "views_per_shard=2", "--", "smoke")
     assert_same_bytes(smoke, other)
 
 
-def test_a_deleted_and_a_truncated_view_are_made_again_alone(smoke, checkout, tmp_path):
+def test_a_deleted_and_a_truncated_view_are_made_again_alone(smoke, tmp_path):
     folder = tmp_path / "copy"
     shutil.copytree(smoke, folder)
     before = rendered(folder)
@@ -140,9 +84,9 @@ def test_a_deleted_and_a_truncated_view_are_made_again_alone(smoke, checkout, tm
     image = folder / CUBOID / "perspective/view_l0000f.png"
     os.truncate(image, image.stat().st_size // 2)
     found = files(folder)
-    assert re.search(r"^render +1$", snakemake(folder, "-n", "--cores", "2", "smoke"), re.M)
+    assert re.search(r"^render +1$", succeeding(folder, "-n", "--cores", "2", "smoke"), re.M)
     assert files(folder) == found
-    snakemake(folder, "--cores", "2", "smoke")
+    succeeding(folder, "--cores", "2", "smoke")
     again = rendered(folder) - before
     assert sorted(name for _, name in again.elements()) == ["view_b0000f", "view_u0000f"]
     assert_same_bytes(smoke, folder)
@@ -166,9 +110,9 @@ def test_what_was_changed_beside_a_missing_file_is_made_again_alone(smoke, tmp_p
     one = folder / CUBOID / "perspective/view_f0000f.png"
     one.write_bytes((folder / CUBOID / "perspective/view_r0000f.png").read_bytes())
     found = files(folder)
-    assert re.search(r"^render +1$", snakemake(folder, "-n", "--cores", "2", "smoke"), re.M)
+    assert re.search(r"^render +1$", succeeding(folder, "-n", "--cores", "2", "smoke"), re.M)
     assert files(folder) == found
-    snakemake(folder, "--cores", "2", "smoke")
+    succeeding(folder, "--cores", "2", "smoke")
     again = rendered(folder) - before
     assert sorted(name for _, name in again.elements()) == ["view_b0000f", "view_u0000f"]
     assert_same_bytes(smoke, folder)
@@ -200,7 +144,7 @@ def test_an_invalid_dataset_gets_its_page_and_no_checksums_until_it_is_mended(sm
     archive = "results/smoke/smoke_LFCuboid_1x1x1.tar"
     # A second run mends nothing, so it validates and fails again.
     for _ in range(2):
-        terminal = failing_snakemake(folder, "--cores", "2", "smoke", archive)
+        terminal = failing(folder, "--cores", "2", "smoke", archive)
         assert terminal.splitlines()[-2:] == [
             f"checksums failed: error: smoke/{CUBOID.name} is not valid: {nan}: see {page_path}",
             f"  log: work/logs/smoke/{CUBOID.name}/checksums.log",
@@ -215,17 +159,17 @@ def test_an_invalid_dataset_gets_its_page_and_no_checksums_until_it_is_mended(sm
         assert not (dataset / "notes.txt").exists()
     assert list((folder / "work/removed").rglob("notes.txt"))
     view.unlink()
-    snakemake(folder, "--cores", "2", "smoke", archive)
+    succeeding(folder, "--cores", "2", "smoke", archive)
     for suffix in (".tar", ".json"):
         (folder / archive).with_suffix(suffix).unlink()
     assert_same_bytes(smoke, folder)
     assert "This dataset failed" not in (dataset / "report/index.html").read_text()
-    assert "Nothing to be done" in snakemake(folder, "--cores", "2", "smoke")
+    assert "Nothing to be done" in succeeding(folder, "--cores", "2", "smoke")
 
 
 def test_a_package_unfolds_to_one_folder_named_after_scene_and_rig(smoke):
     package = smoke / "results/smoke/smoke_LFCuboid_1x1x1.tar"
-    snakemake(smoke, "--cores", "1", package.relative_to(smoke))
+    succeeding(smoke, "--cores", "1", package.relative_to(smoke))
     with tarfile.open(package) as file:
         names = {Path(name) for name in file.getnames()}
     package.unlink()
@@ -235,15 +179,14 @@ def test_a_package_unfolds_to_one_folder_named_after_scene_and_rig(smoke):
     assert not any("report" in name.parts for name in names)
 
 
-def test_rig_tables_are_printed_each_time(checkout):
-    folder = checkout("tables")
+def test_rig_tables_are_printed_each_time(other):
     for _ in range(2):
-        told = snakemake(folder, "--cores", "1", "rig_tables", "--config", "scenes=smoke")
-        assert "| smoke | LFLattice_2panos | 2 (–) |" in told
+        printed = succeeding(other, "--cores", "1", "rig_tables", "--config", "scenes=smoke")
+        assert "| smoke | LFLattice_2panos | 2 (–) |" in printed
 
 
 def test_snakemakes_own_report_holds_the_figures_and_their_captions(smoke, tmp_path):
-    snakemake(smoke, "--cores", "1", "smoke", "--report", str(tmp_path / "report.zip"))
+    succeeding(smoke, "--cores", "1", "smoke", "--report", str(tmp_path / "report.zip"))
     with zipfile.ZipFile(tmp_path / "report.zip") as file:
         html = file.read("report/report.html").decode()
         pictures = Counter(Path(name).name for name in file.namelist())
@@ -260,28 +203,29 @@ def test_snakemakes_own_report_holds_the_figures_and_their_captions(smoke, tmp_p
     assert not re.findall(r"<(?:script|link|img)[^>]*(?:src|href)=.?(?:https?:)?//", html)
 
 
-def test_killed_at_any_moment_the_next_run_goes_on(smoke, checkout):
-    folder = checkout("killed")
-    moments = random.Random(7)
-    for _ in range(4):
-        run = subprocess.Popen(
-            [SNAKEMAKE, "--cores", "2", "--config", "views_per_shard=3", "--", "smoke"],
-            cwd=folder,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-        time.sleep(moments.uniform(2, 12))
+def test_killed_while_it_renders_the_next_run_goes_on(smoke, other):
+    words = ["--cores", "2", "--config", "views_per_shard=3", "--", "smoke"]
+    journals = "work/smoke/*/render/*.journal.jsonl"
+    for views in (1, 4, 8):
+        run = start_snakemake(other, *words)
+        while sum(path.read_text().count('"view"') for path in other.glob(journals)) < views:
+            assert run.poll() is None
+            time.sleep(0.02)
         os.killpg(run.pid, signal.SIGKILL)
         run.wait()
-        snakemake(folder, "--unlock", "smoke")
-    snakemake(folder, "--cores", "2", "--config", "views_per_shard=3", "--", "smoke")
-    assert max(rendered(folder).values()) == 1
-    assert_same_bytes(smoke, folder)
+        # A shard had begun, and had not come to its end.
+        assert any(
+            not Path(str(path)[: -len("journal.jsonl")] + "json").exists()
+            for path in other.glob(journals)
+        )
+        succeeding(other, "--unlock", "smoke")
+    succeeding(other, *words)
+    assert max(rendered(other).values()) == 1
+    assert_same_bytes(smoke, other)
 
 
 @pytest.mark.parametrize("preset", ["tiny", "full"])
-def test_the_default_scene_plans_its_stages(preset, checkout, smoke):
-    plan = snakemake(smoke, "-n", "--cores", "1", "--config", f"preset={preset}")
+def test_the_default_scene_plans_its_stages(preset, smoke):
+    plan = succeeding(smoke, "-n", "--cores", "1", "--config", f"preset={preset}")
     assert "build_scene" in plan
     assert "check_blend" not in plan

@@ -1,0 +1,171 @@
+"""A Slurm cluster of one node, this machine, from Debian's packages: start it, use it, stop it.
+
+    python tests/slurm_node.py FOLDER COMMAND ...
+
+installs what is missing (as root, by apt), starts the daemons with all that they write in FOLDER,
+runs the command against them, and stops them. Everything listens on the loopback address. The one
+file outside FOLDER is /etc/slurm/slurm.conf, where a job's steps find the cluster; it goes again.
+"""
+
+import argparse
+import os
+import secrets
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+PACKAGES = {
+    "slurmctld": "slurmctld",
+    "slurmd": "slurmd",
+    "sbatch": "slurm-client",
+    "munged": "munge",
+}
+# Where Slurm's commands look by themselves: the executor hides SLURM_CONF from a job's steps.
+CONFIGURED = Path("/etc/slurm/slurm.conf")
+# Debian puts daemons where not every user looks.
+PATH = f"{os.environ['PATH']}:/usr/sbin:/sbin"
+
+CONFIGURATION = """ClusterName=plenoforge
+SlurmctldHost={host}(127.0.0.1)
+SlurmctldPort={controller_port}
+SlurmdPort={node_port}
+SlurmUser=root
+AuthInfo=socket={folder}/munge.socket
+CredType=cred/munge
+StateSaveLocation={folder}/state
+SlurmdSpoolDir={folder}/spool
+SlurmctldPidFile={folder}/slurmctld.pid
+SlurmdPidFile={folder}/slurmd.pid
+SlurmctldLogFile={folder}/slurmctld.log
+SlurmdLogFile={folder}/slurmd.log
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_CPU_Memory
+# A job that takes more memory than it asked for is killed within a second.
+JobAcctGatherType=jobacct_gather/linux
+JobAcctGatherFrequency=1
+JobAcctGatherParams=OverMemoryKill
+# A node that does not answer is down soon, and up again when it does.
+SlurmdTimeout=10
+ReturnToService=2
+KillWait=2
+MinJobAge=600
+NodeName={host} NodeAddr=127.0.0.1 CPUs={cpus} RealMemory={memory} State=UNKNOWN
+PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
+"""
+
+
+def install() -> None:
+    """Install the packages that are not there; exits with the line to run if that cannot be."""
+    missing = [name for program, name in PACKAGES.items() if not shutil.which(program, path=PATH)]
+    if not missing:
+        return
+    command = ["apt-get", "--quiet=2", "install", "--yes", "--no-install-recommends", *missing]
+    if os.geteuid() != 0:
+        sys.exit(f"error: Slurm is missing; on Debian or Ubuntu: sudo {' '.join(command)}")
+    environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
+    for words in (["apt-get", "--quiet=2", "update"], command):
+        subprocess.run(words, env=environment, check=True, stdout=subprocess.DEVNULL)
+
+
+class Node:
+    """One node and its controller; ``environment`` is what a command needs to use them."""
+
+    def __init__(self, folder: Path, memory: int = 16000) -> None:
+        """``memory`` is how many MB the node says it has."""
+        self.folder = folder
+        for name in ("state", "spool"):
+            (folder / name).mkdir(parents=True, exist_ok=True)
+        (folder / "munge.key").write_bytes(secrets.token_bytes(1024))
+        (folder / "munge.key").chmod(0o400)
+        self.host = socket.gethostname().split(".")[0]
+        content = CONFIGURATION.format(
+            host=self.host,
+            folder=folder,
+            memory=memory,
+            cpus=os.cpu_count(),
+            controller_port=_free_port(),
+            node_port=_free_port(),
+        )
+        if CONFIGURED.exists():
+            sys.exit(f"error: {CONFIGURED} is there: this machine belongs to a cluster already")
+        CONFIGURED.write_text(content)
+        self.environment = os.environ | {"PATH": PATH}
+        self.daemons: dict[str, subprocess.Popen[bytes]] = {}
+
+    def __enter__(self) -> "Node":
+        folder = self.folder
+        munge = [f"--{name}-file={folder}/munge.{name}" for name in ("key", "pid", "log", "seed")]
+        self.start("munged", "--force", f"--socket={folder}/munge.socket", *munge)
+        self.start("slurmctld", "-D")
+        self.start_node()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.run("scancel", "--state=RUNNING", "--full")
+        for daemon in reversed(self.daemons.values()):
+            daemon.terminate()
+        for daemon in self.daemons.values():
+            daemon.wait(30)
+        CONFIGURED.unlink()
+
+    def start(self, daemon: str, *arguments: str) -> None:
+        """Start a daemon in the foreground, as a child of this process."""
+        words = [daemon, *arguments, *(["--foreground"] if daemon == "munged" else [])]
+        with (self.folder / f"{daemon}.out").open("ab") as output:
+            self.daemons[daemon] = subprocess.Popen(
+                words, env=self.environment, stdout=output, stderr=output
+            )
+
+    def start_node(self) -> None:
+        """Start the node's own daemon, and wait until the controller knows it."""
+        self.start("slurmd", "-D")
+        self.wait_for(lambda: self.state() in ("idle", "mixed", "allocated"), "the node")
+
+    def kill_node(self) -> None:
+        """Kill the node's daemon and its jobs, as a power cut does."""
+        subprocess.run(["pkill", "--signal=KILL", "--full", "slurmstepd:"], check=False)
+        self.daemons["slurmd"].kill()
+        self.daemons["slurmd"].wait()
+
+    def run(self, *words: str) -> str:
+        """Run one of Slurm's commands; returns what it prints."""
+        done = subprocess.run(
+            words, env=self.environment, capture_output=True, text=True, check=False
+        )
+        return done.stdout.strip()
+
+    def state(self) -> str:
+        return self.run("sinfo", "--noheader", "--format=%T").rstrip("*")
+
+    def wait_for(self, condition, what: str, seconds: float = 60) -> None:
+        """Wait until ``condition`` holds; raises `TimeoutError`."""
+        end = time.monotonic() + seconds
+        while not condition():
+            if time.monotonic() > end:
+                raise TimeoutError(f"{what}: not there after {seconds} s; see {self.folder}")
+            time.sleep(0.2)
+
+
+def _free_port() -> int:
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="for all that the daemons write")
+    parser.add_argument("command", nargs=argparse.REMAINDER, help="what to run against them")
+    arguments = parser.parse_args()
+    install()
+    with Node(arguments.folder.resolve()) as node:
+        sys.exit(subprocess.run(arguments.command, env=node.environment, check=False).returncode)
+
+
+if __name__ == "__main__":
+    main()

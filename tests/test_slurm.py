@@ -1,0 +1,60 @@
+"""A build on a real Slurm node, to which happens what happens on clusters."""
+
+import os
+import time
+from pathlib import Path
+
+import pytest
+from checkouts import assert_same_bytes, checkout, rendered, start_snakemake
+from slurm_node import Node, install
+
+CUBOID = "smoke/LFCuboid_1x1x1"
+WORDS = [
+    *(
+        "--profile",
+        "profiles/slurm",
+        "--cores",
+        "2",
+        "--slurm-init-seconds-before-status-checks",
+        "2",
+    ),
+    # A panorama is given too little memory first.
+    *("--set-resources", "render_panorama:mem_mb=100 if attempt == 1 else 4000"),
+    *("--config", "scenes=smoke", "rigs=LFCuboid_1x1x1", "preset=full", "views_per_shard=3"),
+]
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.xdist_group("smoke"),
+    pytest.mark.skipif(os.geteuid() != 0, reason="Slurm's daemons are root's"),
+]
+
+
+def test_no_view_is_lost_or_made_twice_whatever_happens_on_the_cluster(smoke, tmp_path):
+    install()
+    folder = checkout(tmp_path / "cluster")
+    with Node(tmp_path / "node") as node:
+        log = folder / "terminal.log"
+        with log.open("wb") as terminal:
+            run = start_snakemake(
+                folder, *WORDS, env=node.environment, stdout=terminal, stderr=terminal
+            )
+        wait_for_views(folder, 1, run)
+        node.run("scancel", "--state=RUNNING", "--full", "--user=root")
+        wait_for_views(folder, 4, run)
+        node.kill_node()
+        node.wait_for(lambda: node.state() == "down", "a node that is down")
+        node.start_node()
+        assert run.wait(1800) == 0, log.read_text()
+        states = node.run("squeue", "--states=all", "--noheader", "--format=%T").split()
+    assert {"COMPLETED", "CANCELLED", "FAILED"} <= set(states)
+    assert "exceeded memory limit" in (tmp_path / "node/slurmd.log").read_text()
+    assert set(rendered(folder).values()) == {1}
+    assert_same_bytes(smoke, folder, CUBOID)
+
+
+def wait_for_views(folder: Path, count: int, run) -> None:
+    """Wait until the journals have so many views."""
+    journals = f"work/{CUBOID}/render/*.journal.jsonl"
+    while sum(path.read_text().count('"view"') for path in folder.glob(journals)) < count:
+        assert run.poll() is None, (folder / "terminal.log").read_text()
+        time.sleep(0.05)
