@@ -293,7 +293,17 @@ def test_a_bare_word_is_a_list_of_one():
 def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
     folders = (f"results={tmp_path}/results", f"work={tmp_path}/work")
     plan = subprocess.run(
-        [SNAKEMAKE, "--cores", "1", "--dry-run", "--config", *folders, *arguments],
+        [
+            SNAKEMAKE,
+            "--cores",
+            "1",
+            "--dry-run",
+            "--quiet",
+            "host",
+            "--config",
+            *folders,
+            *arguments,
+        ],
         cwd=config.ROOT,
         capture_output=True,
         text=True,

@@ -17,6 +17,7 @@ from lightfield.core.files import broken, read_json, set_aside, sha256
 from lightfield.dataset import ledger
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.dataset.splits import SPLITS
 from lightfield.validation.files import CARD, IMAGES, README, REPORT, SUMS
 
 # Made as the work went on, and of it alone: nothing can make them again, and no dataset needs them.
@@ -46,6 +47,8 @@ class Integrity:
         depth = 3 if re.fullmatch(r"f\d{5,7}", dataset.name) else 2
         self._name = "/".join(dataset.absolute().parts[-depth:])
         self._scene = dataset.absolute().parts[-depth]
+        # Beside the folders of the scene's rigs.
+        self._splits = self.dataset.parents[depth - 2] / SPLITS
 
     def faults(self) -> Iterator[Fault]:
         """Yield every fault, one for each file."""
@@ -152,7 +155,7 @@ class Integrity:
 
     def _is_own(self, path: Path) -> bool:
         """Whether a file of the ledger is the dataset's, or its scene's."""
-        if path.is_relative_to(self.dataset):
+        if path.is_relative_to(self.dataset) or path == self._splits:
             return True
         if not self.work or not path.is_relative_to(self.work):
             return False
