@@ -511,14 +511,15 @@ def export_words(wildcards):
         exclude_unset=True, exclude={"sources"}
     )
     words = ["--source", name or VIEWS, "--suffix", suffix, "--options", options]
-    for other in tested_by(dataset):
+    for other in tested_by(dataset, wildcards.format):
         words += ["--tested-by", other.rig_name, other.folder]
     return shlex.join(words)
 
 
-def tested_by(dataset):
-    """Return the datasets whose views test what is trained on this one."""
-    return [DATASETS[dataset.scene_folder, rig] for rig in dataset.tested_by]
+def tested_by(dataset, format):
+    """Return the datasets whose views go into an export of this one, to test with."""
+    rigs = dataset.tested_by if dataset.exports.wanted[format].is_for_training else ()
+    return [DATASETS[dataset.scene_folder, rig] for rig in rigs]
 
 
 def exported_views(wildcards):
@@ -528,7 +529,7 @@ def exported_views(wildcards):
     """
     dataset = dataset_of(wildcards)
     files = [*dataset.records("render"), *records(wildcards)]
-    for other in tested_by(dataset):
+    for other in tested_by(dataset, wildcards.format):
         files += [*other.records("render"), *other.records(stage_of(wildcards))]
         files += [
             f"{other.folder}/{name}lightfield.json" for name in ("", wildcards.source)

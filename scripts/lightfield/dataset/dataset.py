@@ -707,7 +707,7 @@ def scene_datasets(
                 update={"sources": [s for s in export.sources if s in (VIEWS, *reprojections)]}
             )
             # What a rig tests is exported with what is trained on.
-            if rig.split not in TESTED_WITH or key == "instant_ngp"
+            if rig.split not in TESTED_WITH or not export.is_for_training
             else None
             for key, export in written.exports.wanted.items()
         }

@@ -6,7 +6,7 @@ cannot open and how it can be had. What the options do is written in `lightfield
 
 import math
 import shutil
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -29,6 +29,9 @@ TO_RECTILINEAR = "reproject to rectilinear"
 
 class Export(Settings):
     """``exposure`` and ``reinhard`` are for EXR sources: a PNG is developed already."""
+
+    # Whether views of other rigs, which test what is trained on these, belong to it.
+    is_for_training: ClassVar[bool] = False
 
     sources: list[str] = Field(
         min_length=1,
@@ -123,6 +126,8 @@ class InstantNgp(Export):
 class Colmap(Developed):
     """A COLMAP model, for gsplat, 3DGRUT, the original 3D Gaussian splatting."""
 
+    is_for_training: ClassVar[bool] = True
+
     format: Literal["binary", "text"] = "binary"
     points: PointCount = Field(50000, description="Points lifted from depth, at most.")
     depth: bool = Field(False, description="Depth maps too, from sources with depth.")
@@ -139,6 +144,8 @@ class Colmap(Developed):
 
 class Nerfstudio(Developed):
     """A nerfstudio dataset."""
+
+    is_for_training: ClassVar[bool] = True
 
     points: PointCount = Field(50000, description="Points of the point cloud, at most.")
     depth: bool = Field(False, description="Depth maps too, from sources with depth.")
@@ -158,6 +165,8 @@ class Nerfstudio(Developed):
 
 class NerfSynthetic(Developed):
     """The layout of NeRF's synthetic scenes: RGBA, three lists."""
+
+    is_for_training: ClassVar[bool] = True
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         return _centred_pinhole(lens)
@@ -206,6 +215,8 @@ class Hci(Developed):
 
 class ScanNetPP(Developed):
     """ScanNet++'s layout of a fisheye camera, for 3DGRUT and Fisheye-GS."""
+
+    is_for_training: ClassVar[bool] = True
 
     points: PointCount = Field(50000, description="Points lifted from depth, at most.")
 
