@@ -46,7 +46,6 @@ def task_of(job):
         Path(job.log[0]),
         views=views,
         seconds=seconds,
-        shown=job.rule.name in ("check_blend", "inventory"),
     )
 
 
@@ -73,9 +72,14 @@ def is_quiet_about(kind):
 
 
 def passes(record):
-    """Let Snakemake's warnings be logged under a display, and more only where it is not quiet."""
-    if record.levelno < logging.WARNING and is_quiet_about("PROGRESS"):
-        return False
+    """Let Snakemake's warnings be logged under a display, and more only where it is not quiet.
+
+    Its own words for a job that failed are the whole command; why is said without them.
+    """
+    if is_quiet_about("PROGRESS"):
+        failed_job = record.getMessage().startswith("RuleException")
+        if record.levelno < logging.WARNING or failed_job:
+            return False
     DISPLAY.clear()
     return True
 

@@ -85,14 +85,6 @@ def test_warnings_are_shown_once_and_other_lines_not(run):
     assert not any("coarse" in line for line in run.shown())
 
 
-def test_the_whole_log_of_a_job_is_shown_where_it_is_for_the_user(run):
-    run.tasks["a"].shown = True
-    run.log("a", "what the scene has")
-    run.log("a", "render scene a: 8 views to do")
-    shown = run.shown(running=["a"])
-    assert [line for line in shown if " left" not in line] == ["what the scene has"]
-
-
 def test_a_failure_is_shown_at_once_where_others_go_on(run):
     run.shown(running=["a", "b"])
     run.log("a", "error: no room")

@@ -29,7 +29,7 @@ _FOR_THE_USER = re.compile(r"warning: |note: ")
 
 @dataclass
 class Task:
-    """A job: its rule, ``name``, phase and log; ``shown`` is whether all its log is for the user.
+    """A job: its rule, ``name``, phase and log.
 
     ``seconds`` of one core are what its renders are expected to take, of ``views`` views, which are
     0 where none of a dataset's own is rendered.
@@ -41,7 +41,6 @@ class Task:
     log: Path
     views: int = 0
     seconds: float = 0.0
-    shown: bool = False
     began: float | None = None
     ended: float | None = None
     # As its log has it: pieces of work that were done before, those done since, and all of them.
@@ -161,10 +160,10 @@ class RunDisplay:
             if said:
                 task.kept = task.kept if said.already is None else said.already
                 task.done, task.total = said.done, said.total + task.kept
-            elif (task.shown or _FOR_THE_USER.match(line)) and line not in self._seen:
+            elif _FOR_THE_USER.match(line) and line not in self._seen:
                 self._seen.add(line)
-                kind, colon, text = line.partition(": ")
-                self._say(line if task.shown else f"{kind}{colon}{task.name}: {text}")
+                kind, _, text = line.partition(": ")
+                self._say(f"{kind}: {task.name}: {text}")
 
     def _report_failed(self, failed: set[Hashable], running: set[Hashable]) -> None:
         """Say at once why a job failed, where others go on: all is said again at the end."""
