@@ -68,8 +68,10 @@ def test_one_line_says_how_far_the_whole_run_is(run):
     (line,) = run.shown(40)
     assert line.startswith("1 of 4 jobs · 4 of 20 views, 3 a minute · ")
     assert line.endswith(" left · views")
+    run.log("a", "render scene a: 8 of 8 views, 20 s each, done in 180 s")
+    run.log("b", "render scene b: 10 of 10 views, 20 s each, done in 200 s")
     run.shown(160, finished=["a", "b"], running=["panorama"])
-    # 18 views took 400 s instead of 180 s, two at a time: 50 s become 111 s, and these 56 s.
+    # Views took 20 s instead of 10 s: 50 s become 100 s, of which 1.8 are done in a second.
     assert run.display.line(run.now) == "3 of 4 jobs · 20 of 20 views · 56 s left · report"
     assert run.shown(50, finished=["panorama"]) == ["report: 1 job in 50 s"]
 
@@ -115,4 +117,5 @@ def test_what_progress_says_can_be_read(capsys):
     first, last = map(progress.read, capsys.readouterr().err.splitlines())
     assert (first.done, first.total, first.already) == (0, 2, 3)
     assert (last.done, last.total, last.already) == (2, 2, None)
+    assert 0 <= last.each < 1
     assert progress.read("3 of 4 views") is None

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 
 _BEGIN = re.compile(r".*: (\d+) \w+ to do(?:, (\d+) already done)?")
-_NOW = re.compile(r".*: (\d+) of (\d+) \w+, ")
+_NOW = re.compile(r".*: (\d+) of (\d+) \w+, ([\d.e+-]+) s each")
 
 
 def duration(seconds: float) -> str:
@@ -21,14 +21,15 @@ def duration(seconds: float) -> str:
 
 @dataclass(frozen=True)
 class Said:
-    """What a line of `Progress` says: pieces ``done`` of ``total``, and ``already`` done before.
+    """What a line of `Progress` says: pieces ``done`` of ``total``, and seconds for ``each``.
 
-    That is None but for the first line.
+    The first line knows no seconds, and alone how many were ``already`` done before.
     """
 
     done: int
     total: int
     already: int | None = None
+    each: float | None = None
 
 
 def read(line: str) -> Said | None:
@@ -36,7 +37,7 @@ def read(line: str) -> Said | None:
     if found := _BEGIN.fullmatch(line):
         return Said(0, int(found[1]), int(found[2] or 0))
     if found := _NOW.match(line):
-        return Said(int(found[1]), int(found[2]))
+        return Said(int(found[1]), int(found[2]), each=float(found[3]))
     return None
 
 

@@ -43,10 +43,12 @@ class Task:
     seconds: float = 0.0
     began: float | None = None
     ended: float | None = None
-    # As its log has it: pieces of work that were done before, those done since, and all of them.
+    # As its log has it: pieces of work that were done before, those done since, all of them, and the
+    # seconds for each.
     kept: int = 0
     done: int = 0
     total: int = 0
+    each: float | None = None
     read: int = field(default=0, repr=False)
 
     @property
@@ -159,7 +161,7 @@ class RunDisplay:
             said = progress.read(line)
             if said:
                 task.kept = task.kept if said.already is None else said.already
-                task.done, task.total = said.done, said.total + task.kept
+                task.done, task.total, task.each = said.done, said.total + task.kept, said.each
             elif _FOR_THE_USER.match(line) and line not in self._seen:
                 self._seen.add(line)
                 kind, _, text = line.partition(": ")
@@ -216,8 +218,8 @@ class RunDisplay:
         tasks = self._tasks.values()
         spent = expected = 0.0
         for task in tasks:
-            if task.views_made and task.began is not None:
-                spent += (task.ended or now) - task.began
+            if task.views_made and task.each is not None:
+                spent += task.each * task.views_made
                 expected += task.seconds * task.views_made / task.views
         factor = spent / expected if expected else 1.0
         done = left = 0.0
