@@ -10,7 +10,7 @@ PIP = .venv/bin/pip -qq --disable-pip-version-check
 VERSION = $$(.venv/bin/python -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 LOCK = uv pip compile --generate-hashes --no-emit-index-url --no-header --quiet
 
-.PHONY: all test check consumers locks
+.PHONY: all test check consumers soak locks
 
 all: .venv/complete
 	snakemake --cores $(CORES)
@@ -36,6 +36,10 @@ consumers: .venv/complete .venv-consumers/complete
 	.venv-consumers/bin/pip -q install -r envs/requirements-consumers.txt
 	.venv-consumers/bin/pip -q install --no-deps nerfstudio==1.1.5
 	@touch $@
+
+# Builds that are killed, damaged and left without room: under an hour on two cores.
+soak: .venv/complete
+	python benchmarks/soak.py
 
 # PYTHON names an interpreter; without it the best that is there is taken.
 .venv/complete: envs/requirements-3.13.txt envs/requirements-3.11.txt

@@ -5,61 +5,12 @@ import random
 import shutil
 from pathlib import Path
 
-import numpy as np
 import pytest
 import simulated
 from checkouts import checkout
 
-from lightfield.imaging import images
 from lightfield.validation.integrity import Integrity
-
-
-def flip(path, rng):
-    content = bytearray(path.read_bytes())
-    content[rng.randrange(len(content))] ^= 1 << rng.randrange(8)
-    path.write_bytes(content)
-
-
-def truncate(path, rng):
-    path.write_bytes(path.read_bytes()[: rng.randrange(1, path.stat().st_size)])
-
-
-def empty(path, rng):
-    path.write_bytes(b"")
-
-
-def delete(path, rng):
-    path.unlink()
-
-
-def replace(path, rng):
-    pixels = np.full((4, 4), rng.randrange(100, 200), np.uint8)
-    if path.suffix == ".exr":
-        images.write_exr(path, {"R": pixels.astype(np.float16)}, {images.KEY_ATTRIBUTE: "render"})
-    elif path.suffix == ".png":
-        images.write_png(path, pixels)
-    else:
-        path.write_bytes(path.read_bytes()[::-1] + b"\n")
-
-
-def folder(path, rng):
-    path.unlink()
-    (path / "inside").mkdir(parents=True)
-
-
-def unreadable(path, rng):
-    path.unlink()
-    path.symlink_to(path.name)
-
-
-KINDS = [flip, truncate, empty, delete, replace, folder, unreadable]
-
-
-def spoil(path, kind, rng):
-    """Spoil a file and keep its time where it stays a file."""
-    kind(path, rng)
-    if path.is_file():
-        os.utime(path, (simulated.WHEN, simulated.WHEN))
+from soak import KINDS, replace, spoil
 
 
 @pytest.fixture(scope="module")
