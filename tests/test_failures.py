@@ -97,6 +97,7 @@ class Failing:
         """Run the job of each rule alone; return what the terminal says."""
         # One content and one time that pass for a record, a calibration, and a checked .blend.
         content = {"files": {}, "cost_samples": 4, "bytes": 200, "mtime_ns": WHEN * 10**9}
+        content |= {"external_files": []}
         for file in self.files:
             path = self.folder / file
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -43,7 +43,7 @@ class Task:
     seconds: float = 0.0
     began: float | None = None
     ended: float | None = None
-    # As its log has it: pieces of work that were done before, those done since, all of them, and the
+    # As its log has it: pieces of work that were done before, those done since, all, and the
     # seconds for each.
     kept: int = 0
     done: int = 0
