@@ -157,7 +157,7 @@ def print_forecast():
     if is_quiet_about("PROGRESS"):
         print(workflow.dag.stats()[0])
     if works:
-        print(forecast(list(works.values())))
+        print(forecast([works[name] for name in sorted(works)]))
 
 
 atexit.register(print_forecast)
