@@ -81,13 +81,15 @@ def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path, monkey
     for path in (empty, full, young):
         path.mkdir()
     (full / "picture.png").write_bytes(b"an artist's")
+    own = tmp_path / "plenoforge-checkout"
+    own.mkdir()
     old = time.time() - 2 * leftovers.BLENDER_AGE
-    for path in (live, dead, *paths, full / "picture.png", empty, full):
+    for path in (live, dead, *paths, full / "picture.png", empty, full, own):
         os.utime(path, (old, old))
     os.utime(paths[2])
     found = leftovers.remove([tmp_path / "results"])
     assert {path for path in found if path.is_relative_to(tmp_path)} == {dead, *paths[:2], empty}
     assert not any(path.exists() for path in found)
-    assert all(path.exists() for path in (live / "view.exr", *paths[2:], full, young))
+    assert all(path.exists() for path in (live / "view.exr", *paths[2:], full, young, own))
     keepers[0].kill()
     keepers[0].wait()

@@ -10,7 +10,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-PREFIX = "plenoforge-"
+# Nobody calls a folder of his own so: it would be removed.
+PREFIX = "plenoforge-temporary-"
 # Blender makes itself such a folder as long as it runs, an artist's Blender, too.
 BLENDERS = "blender_*"
 # The names of `atomic_path`.
