@@ -3,7 +3,7 @@
 Runs in a process of its own, because bpy keeps one global state. Argument: a folder. Output in it,
 for each lens: a dataset <lens>/, its record <lens>.json and journal <lens>.jsonl, and in
 objects.npz as <lens> the name of the object that Blender's own ray casts find behind each pixel of
-its first view. "plain" is the first of the lenses without passes.
+its first view. "plain" is the first of the lenses without passes, "transparent" the fisheye.
 """
 
 import json
@@ -132,6 +132,7 @@ def main(folder: Path) -> None:
         render(name, lightfield(name))
         objects[name] = cast(lightfield(name))
     np.savez(folder / "objects.npz", **objects)
+    render("transparent", lightfield("fisheye", transparent=True), "0:1")
     bare = lightfield("perspective")
     settings = {key: value for key, value in RENDER.items() if key != "passes"}
     render("plain", bare.changed(render=settings), "0:1")

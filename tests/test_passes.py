@@ -117,6 +117,21 @@ def test_colour_and_depth_are_the_same_without_passes(made):
     assert {path.name for path in (made / "plain").iterdir()} == {"exr", "lightfield.json"}
 
 
+def test_a_transparent_view_has_alpha_where_another_has_the_world(made):
+    image = images.read_image(made / "transparent" / "exr" / "view_0000f.exr")
+    alpha, opaque = image.channels["A"], read(made / "fisheye", "exr")
+    assert alpha.dtype == np.float16
+    cast = np.load(made / "objects.npz")["fisheye"]
+    seen = np.isfinite(LightField.read(made / "fisheye/lightfield.json").lens.pixel_rays()[..., 0])
+    assert np.median(alpha[cast == "wall"]) == 1 and np.median(alpha[seen & (cast == "")]) == 0
+    assert ((alpha > 0) & (alpha < 1)).sum() > 20
+    # Associated: over the world it is the opaque view.
+    parts = {name: read(made / "transparent", name).astype(np.float64) for name in PARTS_OF_LIGHT}
+    world = parts.pop("environment")
+    np.testing.assert_allclose(image.colour + world, opaque, rtol=2**-9, atol=1e-6)
+    np.testing.assert_allclose(sum(parts.values()), image.colour, rtol=2**-10, atol=1e-6)
+
+
 def test_a_view_is_finished_when_all_of_its_files_are(made):
     lines = map(json.loads, (made / "perspective.jsonl").read_text().splitlines())
     rendered = [line["view"] for line in lines if "view" in line]

@@ -114,7 +114,9 @@ def taken(
         words.append(f"view gamma {blend['gamma']:g} ignored")
     if blend["curves"]:
         words.append("view curves ignored")
-    if blend["film_transparent"]:
+    if render.get("transparent"):
+        words.append("film transparent ON")
+    elif blend["film_transparent"]:
         words.append("film transparent on, ignored")
     for name, title in (
         ("border", "render border"),

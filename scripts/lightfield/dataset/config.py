@@ -323,6 +323,9 @@ class Render(Settings):
         description="Of the views' EXR files, lossless: zip, which every program reads, unless "
         "given. htj2k and zstd are smaller, for archives and scratch.",
     )
+    transparent: bool | None = Field(
+        None, description="Leave out the world behind the scene, and write how much is covered (A)."
+    )
     passes: PassNames | None = Field(
         None, description="What else of a view is written, each into a folder of its own."
     )
@@ -337,13 +340,18 @@ class Render(Settings):
         return self
 
 
+Stops = Annotated[float, Field(ge=-100, le=100)]
+
+
 class Reprojection(Settings):
-    """The same views through another lens."""
+    """The same views through another lens, or as other files."""
 
     rigs: list[str] | None = Field(
         None, min_length=1, description="The rigs it is made for; without it, every one of them."
     )
-    camera: CameraSettings
+    camera: CameraSettings | None = Field(
+        None, description="Without it, the rig's own: the pixels are those of the views."
+    )
     cube_map: bool = Field(False, description="Six faces of each view, each a 90 degree view.")
     rotation: Vector = Field((0, 0, 0), description="Pan, pitch and roll in degrees.")
     format: Literal["png", "exr"] = Field("png", description="EXR has depth.")
@@ -351,7 +359,10 @@ class Reprojection(Settings):
         "adaptive", description="How colour is resampled."
     )
     samples: int = Field(1, ge=1, le=64, description="n x n samples a pixel.")
-    exposure: float = Field(0, ge=-100, le=100, description="In stops.")
+    bits: Literal[8, 16] = Field(8, description="Of a PNG's values.")
+    exposure: Stops | Annotated[list[Stops], Field(min_length=1, max_length=32)] = Field(
+        0, description="In stops; of a list each makes a folder, as in png_ev-2 and png_ev0."
+    )
     reinhard: Annotated[float, Field(gt=0, le=1e9)] | None = Field(
         None, description="Reinhard tone mapping with this maximum."
     )
@@ -359,20 +370,31 @@ class Reprojection(Settings):
         None, description="Those of render.passes that are reprojected, too, as EXR."
     )
 
+    @model_validator(mode="after")
+    def _has_use(self) -> Self:
+        for name in ("cube_map", "rotation", "filter", "samples"):
+            if self.camera is None and name in self.model_fields_set:
+                raise ValueError(f"{name}: goes with camera; without one nothing is resampled")
+        if self.format == "exr" and self.bits != 8:
+            raise ValueError("bits: goes with format png; an EXR has halves")
+        return self
+
     @property
     def suffix(self) -> str:
         """Of the images' names."""
         return f".{self.format}"
 
-    @property
-    def lens(self) -> Lens:
-        """The lens of the images."""
-        size = self.camera.resolution[0]
-        return CubeMap(width=6 * size, height=size).face if self.cube_map else self.camera.make()
+    def lens(self, rendered: CameraSettings) -> Lens:
+        """Return the lens of the images that are made of what a camera has ``rendered``."""
+        camera = self.camera or rendered
+        size = camera.resolution[0]
+        return CubeMap(width=6 * size, height=size).face if self.cube_map else camera.make()
 
     @property
     def optics(self) -> str:
         """The words that say to scripts/reproject.py where each pixel comes from."""
+        if self.camera is None:
+            return "--no-reproject"
         if self.cube_map:
             words = ["--cubemap", str(self.camera.resolution[0])]
         else:
@@ -393,6 +415,7 @@ class Reprojection(Settings):
             "samples": self.samples,
             "exposure": self.exposure,
             "reinhard": 1 if self.reinhard is None else self.reinhard,
+            **({"bits": self.bits} if self.bits != 8 else {}),
         }
 
     @property
@@ -401,6 +424,8 @@ class Reprojection(Settings):
         words = [f"--{self.format}", "--exposure", str(self.exposure)]
         if self.reinhard is not None:
             words += ["--reinhard", str(self.reinhard)]
+        if self.bits != 8:
+            words += ["--bits", str(self.bits)]
         if self.passes:
             words += ["--passes", ",".join(self.passes)]
         return shlex.join(words)
@@ -416,6 +441,21 @@ class Report(Settings):
     )
 
 
+def _bracketed(reprojections: dict[str, Reprojection]) -> dict[str, Reprojection]:
+    """Return each reprojection of several exposures as so many, named by their stops."""
+    found: dict[str, Reprojection] = {}
+    for name, reprojection in reprojections.items():
+        if not isinstance(reprojection.exposure, list):
+            found[name] = reprojection
+            continue
+        for stops in reprojection.exposure:
+            key = f"{name}_ev{stops:g}"
+            if key in found or key in reprojections:
+                raise ValueError(f"must not name {key} twice")
+            found[key] = reprojection.model_copy(update={"exposure": stops})
+    return found
+
+
 class Scene(Settings):
     """One scene: where it is from, how it is rendered, by which rigs, and what the views become."""
 
@@ -429,7 +469,7 @@ class Scene(Settings):
         min_length=1,
         description="The camera setups, by the names of their folders; scene.dataset has its own.",
     )
-    reprojections: dict[Name, Reprojection] = Field(
+    reprojections: Annotated[dict[Name, Reprojection], AfterValidator(_bracketed)] = Field(
         {}, description="The same views through other lenses, by the names of their folders."
     )
     exports: Exports = Field(Exports(), description="Files for trainers.")
@@ -464,7 +504,7 @@ class Scene(Settings):
                 raise ValueError("render.depth_of_field: goes with scene.blend, for its camera")
         for name, reprojection in self.reprojections.items():
             key = f"reprojections.{name}"
-            if reprojection.camera.lens == FILE:
+            if reprojection.camera and reprojection.camera.lens == FILE:
                 raise ValueError(f"{key}.camera.lens: file goes with a rig of type blend_camera")
             _check_name(key, name, REPROJECTION_NEIGHBOURS)
             for rig_name in reprojection.rigs or ():
@@ -513,7 +553,8 @@ class Scene(Settings):
             if source == VIEWS:
                 cameras = {rig.camera for rig in self.rigs.values()}
             else:
-                cameras = {self.reprojections[source].camera}
+                camera = self.reprojections[source].camera
+                cameras = {camera} if camera else {rig.camera for rig in self.rigs.values()}
                 has_depth &= self.reprojections[source].format == "exr"
                 rigs = self.reprojections[source].rigs or rigs
             for camera in cameras:
@@ -562,7 +603,7 @@ class Scene(Settings):
 def _check_cube_map(key: str, settings: Rig | Reprojection) -> None:
     """Check that a camera can be that of a cube map's face, where it has to."""
     camera = settings.camera
-    if not settings.cube_map:
+    if camera is None or not settings.cube_map:
         return
     if (camera.lens, getattr(camera, "fov", None)) != ("rectilinear", 90):
         raise ValueError(f"{key}.camera: must be rectilinear with fov 90 with cube_map")

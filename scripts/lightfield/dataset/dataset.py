@@ -188,7 +188,7 @@ class Dataset:
             yield own
         for name, reprojection in self.reprojections.items():
             path = f"{self.folder}/{name}/{NAME}"
-            expected = reprojection.lens.to_lightfield()
+            expected = reprojection.lens(self.rig.camera).to_lightfield()
             if _differs(path, expected | {"reprojection": reprojection.recorded}):
                 yield from (path, *self.lens_maps(name), *self.records(name))
         if any(
@@ -530,7 +530,8 @@ class Dataset:
         except (OSError, ValueError, LookupError, TypeError, StopIteration):
             pass
         width = {"float": 4, "rounded": 3, "half": 2}[self.render["depth_precision"]]
-        size = self._pixels * (6 + width * bool(self.depth)) * COMPRESSED
+        width = 6 + width * bool(self.depth) + sum(p.bytes for p in passes.wanted(self.render))
+        size = self._pixels * width * COMPRESSED
         return self._pixels * self.expected_samples * SECONDS_PER_SAMPLE, size
 
     @property
@@ -538,8 +539,9 @@ class Dataset:
         """Bytes of a view and of what it is reprojected to."""
         sizes = {"exr": 10 * COMPRESSED, "png": PNG_BYTES}
         return self.expected_view[1] + sum(
-            math.prod(reprojection.camera.resolution)
+            math.prod((reprojection.camera or self.rig.camera).resolution)
             * sizes[reprojection.format]
+            * (reprojection.bits / 8)
             * len(self.lens_maps(name))
             for name, reprojection in self.reprojections.items()
         )
@@ -698,7 +700,9 @@ def scene_datasets(
     found = []
     for name, rig in written.rigs.items():
         reprojections = {
-            key: reprojection.model_copy(update={"camera": _limited(reprojection.camera, limits)})
+            key: reprojection.model_copy(
+                update={"camera": reprojection.camera and _limited(reprojection.camera, limits)}
+            )
             for key, reprojection in written.reprojections.items()
             if name in (reprojection.rigs or written.rigs)
         }

@@ -215,6 +215,11 @@ class LightField:
         render = self.content.get("render", {})
         return passes.wanted(self.content if "passes" in self.content else render)
 
+    @property
+    def transparent(self) -> bool:
+        """Whether the views' channel A is how much of a pixel the scene covers."""
+        return bool(self.content.get("render", {}).get("transparent"))
+
     def _key(self, key: str) -> Any:
         if key not in self.content:
             raise UserError(f"{self.path}: {key}: is missing; scripts/make_lightfield.py writes it")

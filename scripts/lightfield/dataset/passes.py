@@ -42,6 +42,11 @@ class Pass:
         """All of Cycles' passes that it follows from."""
         return (*self.cycles, self.factor) if self.factor else self.cycles
 
+    @property
+    def bytes(self) -> int:
+        """Of a pixel, uncompressed."""
+        return len(self.channels) * (2 if self.dtype == "float16" else 4)
+
     def path(self, folder: Path, view: str) -> Path:
         """Return a view's file of this pass; ``folder`` is that of lightfield.json."""
         return folder / self.name / f"{view}.exr"

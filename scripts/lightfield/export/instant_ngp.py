@@ -266,7 +266,10 @@ class _Writer:
             )
 
     def copied_exr(self, source: Path) -> Path:
-        """Copy R, G, B as half floats, with −1 in pixels that instant-ngp must not train on."""
+        """Copy R, G, B as half floats, with −1 in pixels that instant-ngp must not train on.
+
+        Of transparent views A too, as it is: associated.
+        """
         channels = images.read_image(source).channels
         missing = [name for name in "RGB" if name not in channels]
         if missing:
@@ -274,10 +277,10 @@ class _Writer:
         self.check_size(source, channels["R"])
         hidden = self.blind | np.isnan(channels.get("Z", np.zeros(1)))
         target = self.exr_dir / source.name
-        images.write_exr(
-            target,
-            {name: np.where(hidden, -1, channels[name]).astype(np.float16) for name in "RGB"},
-        )
+        copied = {name: np.where(hidden, -1, channels[name]).astype(np.float16) for name in "RGB"}
+        if self.lightfield.transparent:
+            copied["A"] = channels["A"]
+        images.write_exr(target, copied)
         return target
 
     def write_mask(self, view: View, image: Path) -> None:
@@ -286,7 +289,7 @@ class _Writer:
         if image.is_file():
             channels = images.read_image(image).channels
             self.check_size(image, next(iter(channels.values())))
-            if "A" in channels:
+            if "A" in channels and not self.lightfield.transparent:
                 hidden = hidden | (channels["A"] == 0)
         if hidden.any():
             mask = np.where(hidden, 255, 0).astype(np.uint8)

@@ -36,8 +36,8 @@ def export(source: Source, settings: NerfSynthetic, folder: Path) -> None:
             if view.name in frames:
                 continue
             path = f"{part}/{view.name}"
-            alpha = source.valid(view).astype(np.uint8) * 255
-            images.write_png(folder / f"{path}.png", np.dstack([source.colour(view), alpha]))
+            pixels = np.dstack([source.colour(view), source.alpha(view)])
+            images.write_png(folder / f"{path}.png", pixels)
             frames[view.name] = {
                 "file_path": f"./{path}",
                 "transform_matrix": view.matrix.tolist(),

@@ -86,8 +86,22 @@ class Source:
         """Return a view's sRGB pixels, (height, width, 3)."""
         image = images.read_image(self.path(view))
         if self.suffix == ".png":
-            return np.stack([image.channels[name] for name in "RGB"], axis=-1)
-        return to_8_bit(tone_map(image.colour, self.exposure, self.reinhard))
+            pixels = np.stack([image.channels[name] for name in "RGB"], axis=-1)
+            return np.asarray(np.rint(pixels / (257 if self._has_16_bits else 1)), np.uint8)
+        colour = image.colour
+        if self.lightfield.transparent:
+            alpha = image.channels["A"][..., None].astype(np.float32)
+            colour /= np.where(alpha > 0, alpha, 1)
+        return to_8_bit(tone_map(colour, self.exposure, self.reinhard))
+
+    def alpha(self, view: View) -> NDArray[np.uint8]:
+        """Return how much of each pixel (height, width) is covered; 0 where there is no light."""
+        covered = self.valid(view).astype(np.float32)
+        if self.lightfield.transparent:
+            alpha = images.read_image(self.path(view), ["A"]).channels["A"]
+            scale = np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1
+            covered *= alpha.astype(np.float32) / scale
+        return np.asarray(np.rint(covered * 255), np.uint8)
 
     def encoded(self, view: View) -> Floats:
         """Return a view's sRGB-encoded colour, (height, width, 3), 0 to 1, not rounded."""
@@ -102,7 +116,7 @@ class Source:
         inside: Bools = np.isfinite(self._rays[..., 0])
         if self.name:
             channels = images.read_image(self.path(view)).channels
-            if "A" in channels:
+            if "A" in channels and not self.lightfield.transparent:
                 inside = inside & (channels["A"] > 0)
             elif "Z" in channels:
                 inside = inside & ~np.isnan(channels["Z"])
@@ -118,11 +132,20 @@ class Source:
         return _depth_of(self.path(view), self.lightfield, self._rays, meaning)
 
     def write_image(self, view: View, target: Path) -> None:
-        """Write a view as an 8-bit PNG; one that is a PNG becomes a second name of that file."""
-        if self.suffix == ".png":
+        """Write a view as an 8-bit PNG; one that is such a PNG becomes a second name of that file.
+
+        It is RGBA if the views are transparent.
+        """
+        if self.suffix == ".png" and not self._has_16_bits:
             second_name(self.path(view), target)
+        elif self.lightfield.transparent:
+            images.write_png(target, np.dstack([self.colour(view), self.alpha(view)]))
         else:
             images.write_png(target, self.colour(view))
+
+    @property
+    def _has_16_bits(self) -> bool:
+        return bool(self.lightfield.content.get("reprojection", {}).get("bits") == 16)
 
     @cached_property
     def _rays(self) -> Floats:

@@ -1,4 +1,4 @@
-"""From scene-linear light to 8-bit pixels and back: exposure, Reinhard, sRGB."""
+"""From scene-linear light to 8-bit and 16-bit pixels and back: exposure, Reinhard, sRGB."""
 
 import functools
 
@@ -67,6 +67,12 @@ def to_8_bit(color: Array) -> Array:
     out = np.empty(color.shape, np.uint8)
     _encode(np.ascontiguousarray(color).reshape(-1), _thresholds(), _first_guess(), out.reshape(-1))
     return out
+
+
+def to_16_bit(color: Array) -> Array:
+    """Return linear (..., C) float32 colour as sRGB uint16, rounded to nearest; NaN becomes 0."""
+    encoded = encode_srgb(np.nan_to_num(color.astype(np.float64)))
+    return np.asarray(np.rint(encoded * 65535), np.uint16)
 
 
 @kernel

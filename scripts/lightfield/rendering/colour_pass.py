@@ -18,7 +18,7 @@ _COUNTS = "Debug Sample Count"
 
 @dataclass(frozen=True)
 class Colour:
-    """The colour of a view, (height, width, 3) float32, scene-linear.
+    """The colour of a view, (height, width, 3 or 4) float32, scene-linear, alpha associated.
 
     ``passes`` are those that were asked for, by name, each as the colour itself.
     ``render_seconds`` and ``synchronization_seconds`` are Cycles' own. ``samples``,
@@ -34,7 +34,9 @@ class Colour:
     synchronization_seconds: float
 
 
-def render_colour(world_matrix: Array, seed: int, passes: Iterable[Pass] = ()) -> Colour:
+def render_colour(
+    world_matrix: Array, seed: int, passes: Iterable[Pass] = (), alpha: bool = False
+) -> Colour:
     """Render the view of a camera at ``world_matrix``, (4, 4) camera-to-world.
 
     Of the ``passes`` those are made that are of colour, for which Cycles has been set up.
@@ -42,10 +44,9 @@ def render_colour(world_matrix: Array, seed: int, passes: Iterable[Pass] = ()) -
     watched = view_layer(bpy.context.scene).cycles.pass_debug_sample_count
     _reports.clear()
     wanted = [found for found in passes if found.of_colour]
-    needed = ("Combined", *(name for found in wanted for name in found.needed))
-    found = render_view(
-        world_matrix, seed, dict.fromkeys(needed, "RGB") | ({_COUNTS: "X"} if watched else {})
-    )
+    needed = dict.fromkeys([name for found in wanted for name in found.needed], "RGB")
+    needed |= {"Combined": "RGBA" if alpha else "RGB"} | ({_COUNTS: "X"} if watched else {})
+    found = render_view(world_matrix, seed, needed)
     samples = None
     if watched:
         # The pass holds each pixel's part of all samples.

@@ -94,7 +94,7 @@ def _set_output(scene: Any, lightfield: LightField, threads: int) -> None:
     render.use_compositing = False
     render.use_sequencer = False
     render.use_freestyle = False
-    render.film_transparent = False
+    render.film_transparent = lightfield.transparent
     render.use_overwrite = True
     output = render.image_settings
     output.media_type = "MULTI_LAYER_IMAGE"

@@ -169,7 +169,9 @@ def _render_views(
         # Of the same pose one after the other: Cycles keeps the scene as it is.
         geometry = render_geometry(view.matrix, motion) if has_geometry else None
         geometry_seconds = time.perf_counter() - began
-        colour = render_colour(view.matrix, keys.view_seed(seed, view.name), wanted)
+        colour = render_colour(
+            view.matrix, keys.view_seed(seed, view.name), wanted, lightfield.transparent
+        )
         parts = [part for part in (geometry, colour) if part]
         channels, attributes = colour_channels(colour.pixels)
         if geometry and lightfield.depth:
@@ -209,7 +211,7 @@ def depth_rays(lightfield: LightField) -> Array | None:
 
 
 def colour_channels(colour: Array) -> tuple[dict[str, Array], dict[str, images.Attribute]]:
-    """Turn colour (height, width, 3) into the channels and attributes of a view's EXR.
+    """Turn colour (height, width, 3 or 4) into the channels and attributes of a view's EXR.
 
     Colour beyond the half range is clamped and counted; what is not a number is counted and kept,
     so that validation finds it.
@@ -217,7 +219,7 @@ def colour_channels(colour: Array) -> tuple[dict[str, Array], dict[str, images.A
     nan = int(np.isnan(colour).sum())
     clamped = int((np.abs(colour) > images.HALF_MAX).sum())
     half = np.clip(colour, -images.HALF_MAX, images.HALF_MAX).astype(np.float16)
-    channels = {name: half[:, :, index] for index, name in enumerate("RGB")}
+    channels = {name: half[:, :, index] for index, name in enumerate("RGBA"[: half.shape[2]])}
     return channels, {images.CLAMPED_ATTRIBUTE: clamped, images.NAN_ATTRIBUTE: nan}
 
 

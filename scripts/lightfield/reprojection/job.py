@@ -38,7 +38,8 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     files.add_argument("-o", "--output-dir", type=Path, required=True, help="folder to write to")
     files.add_argument("--output-cfg", type=Path, metavar="JSON", help="lightfield.json to write")
     files.add_argument("--exr", action="store_true", help="write EXR: colour and depth")
-    files.add_argument("--png", action="store_true", help="write PNG: colour, 8-bit sRGB")
+    files.add_argument("--png", action="store_true", help="write PNG: colour, sRGB")
+    files.add_argument("--bits", type=int, choices=[8, 16], default=8, help="of a PNG, default 8")
     files.add_argument(
         "--depth-png",
         type=float,
@@ -164,6 +165,7 @@ class Job:
             "samples": self.geometry.samples,
             "exposure": self.arguments.exposure,
             "reinhard": self.arguments.reinhard,
+            **({"bits": 16} if self.arguments.bits == 16 else {}),
         }
 
     @property
@@ -189,6 +191,9 @@ class Job:
             "depth_png": self.arguments.depth_png,
             "depth": self.lightfield.content.get("depth"),
             "source": identity,
+            # Not said where it is as it has always been, for keys to stay as they are.
+            **({"bits": 16} if self.arguments.bits == 16 else {}),
+            **({"transparent": True} if self.lightfield.transparent else {}),
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 

@@ -19,7 +19,7 @@ from lightfield.imaging.images import (
     write_exr,
     write_png,
 )
-from lightfield.imaging.tonemap import decode_srgb, to_8_bit, tone_map
+from lightfield.imaging.tonemap import decode_srgb, to_8_bit, to_16_bit, tone_map
 from lightfield.reprojection.colour import colour_strips
 from lightfield.reprojection.depth import resample_depth
 from lightfield.reprojection.job import Job, SourceView
@@ -66,6 +66,9 @@ class Source:
         channels = {name: array[:, columns] for name, array in image.channels.items()}
         alpha, depth = channels.get("A"), channels.get("Z")
         colour = _linear([channels[name] for name in colours], alpha)
+        if alpha is not None and not job.lightfield.transparent:
+            # What is wholly transparent is no sample.
+            colour[alpha == 0] = np.nan
         if depth is not None and depth.dtype != np.float16:
             depth = depth.astype(np.float32, copy=False)
         return colour, depth, alpha is not None, image.attributes.get(DEPTH_ATTRIBUTE)
@@ -94,11 +97,7 @@ def _linear(planes: list[Array], alpha: Array | None) -> Array:
             alpha = alpha.astype(np.float32) / np.float32(largest)
             planes = [plane * alpha for plane in planes]
     red, green, blue = planes
-    colour = widen(red, green, blue, alpha)
-    if alpha is not None:
-        # What is wholly transparent is no sample.
-        colour[alpha == 0] = np.nan
-    return colour
+    return widen(red, green, blue, alpha)
 
 
 def write(
@@ -112,22 +111,33 @@ def write(
     """Resample a view through one lens map and write its files."""
     arguments = job.arguments
     as_z = target.lens.has_z_depth
+    transparent = job.lightfield.transparent
+    if transparent and not source.has_alpha:
+        raise UserError("has no channel A, although --input-cfg says that it is transparent")
     strips, depth = _resampled(job, made, source, as_z)
     size = made.target_cos.shape
     empty = np.empty(size, bool)
     half = np.empty((3, *size), np.float16)
-    pixels = np.empty((*size, 3), np.uint8)
+    encode = to_8_bit if arguments.bits == 8 else to_16_bit
+    pixels = np.empty((*size, 3), f"uint{arguments.bits}")
+    covered = np.empty(size, np.float32)
     for rows, strip in strips:
         empty[rows] = np.isnan(strip[:, :, 0])
+        alpha = strip[:, :, 3:]
+        if transparent:
+            covered[rows] = alpha[:, :, 0].clip(0, 1)
+            # Where there is light alone, nothing is covered.
+            alpha = np.where(covered[rows] > 0, covered[rows], np.float32(1))[:, :, None]
         if source.has_alpha:
             with np.errstate(invalid="ignore", divide="ignore"):
-                strip[:, :, :3] /= strip[:, :, 3:]
+                strip[:, :, :3] /= alpha
         strip = tone_map(strip[:, :, :3], arguments.exposure, arguments.reinhard)
-        if "exr" in outputs:
-            half[:, rows] = narrow(strip, 3)
         if "png" in outputs:
-            pixels[rows] = to_8_bit(strip)
+            pixels[rows] = encode(strip)
+        if "exr" in outputs:
+            half[:, rows] = narrow(strip * alpha if transparent else strip, 3)
     marked = bool(empty.any())
+    covered[empty] = 0
     if marked:
         half[:, empty] = 0
         if depth is not None:
@@ -142,12 +152,16 @@ def write(
                 if depth is not None:
                     channels["Z"] = depth
                     attributes = attributes | {DEPTH_ATTRIBUTE: "z" if as_z else "distance"}
-                elif marked:
+                if transparent:
+                    channels["A"] = covered.astype(np.float16)
+                elif marked and depth is None:
                     channels["A"] = (~empty).astype(np.float16)
                 write_exr(path, channels, attributes)
             case "png":
-                if marked:
-                    pixels = np.dstack([pixels, np.where(empty, 0, 255).astype(np.uint8)])
+                if marked or transparent:
+                    opacity = covered if transparent else (~empty).astype(np.float32)
+                    opacity = np.rint(opacity * np.iinfo(pixels.dtype).max)
+                    pixels = np.dstack([pixels, opacity.astype(pixels.dtype)])
                 write_png(path, pixels, {**attributes, **PNG_OPTIONS})
             case "depth":
                 if depth is None:

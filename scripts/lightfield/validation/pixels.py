@@ -113,17 +113,24 @@ class Examiner:
         seen, outside = self._of_lens(image_set.lightfield.lens)
         depth = image.channels.get("Z")
         empty = depth is not None and bool(np.isposinf(depth).all())
+        transparent = image_set.lightfield.transparent
+        invisible = transparent and not image.channels["A"].any()
+        if transparent and file.path.endswith(".exr"):
+            alpha = image.channels["A"]
+            wrong = int((~((alpha >= 0) & (alpha <= 1))).sum())
+            facts.fault("colour", f"{wrong} values of alpha are not between 0 and 1", wrong)
         colour = np.stack([image.channels[name] for name in "RGB"])
         nan = int(np.isnan(colour).sum())
         facts.fault("colour", f"{nan} values are not a number", nan)
         infinite = int(np.isinf(colour).sum())
         facts.fault("colour", f"{infinite} values are infinite", infinite)
-        facts.fault("colour", "is black", not colour.any())
+        facts.fault("colour", "is black", not colour.any() and not invisible)
         middle = colour[:, colour.shape[1] // 2, colour.shape[2] // 2]
         others = ((colour != middle[:, np.newaxis, np.newaxis]) & seen).sum(axis=(1, 2)).max()
         constant = bool(others <= FEW * seen.sum())
         facts.constant = constant and not is_rendered
-        facts.fault("colour", "has one colour everywhere", constant and is_rendered and not empty)
+        alone = constant and is_rendered and not empty and not invisible
+        facts.fault("colour", "has one colour everywhere", alone)
         # Cycles leaves a few values of 1e-6 there, and its denoiser a little more.
         if is_rendered and outside.any():
             lit = (colour[:, outside] > FAINT).mean() > MOST_LIT_OUTSIDE
@@ -179,6 +186,7 @@ class Examiner:
     def _compare_marks(self, file: File, image: images.Image, facts: Facts) -> None:
         """Compare the pixels that are marked as without source with what the two lenses say."""
         regions = self._of_source(file)
+        target = self.sets[file.set].lightfield
         if regions is None:
             return
         with_source, without = regions
@@ -190,6 +198,8 @@ class Examiner:
             marked = np.zeros(without.shape, bool)
         facts.marked = True
         missing, wrong = int((without & ~marked).sum()), int((with_source & marked).sum())
+        if target.transparent and "Z" not in image.channels:
+            wrong = 0  # nothing is there
         facts.fault("marks", f"{missing} pixels without a source are not marked", missing)
         facts.fault("marks", f"{wrong} pixels with a source are marked as without", wrong)
         coloured = any(image.channels[name][without].any() for name in "RGB")
@@ -313,7 +323,9 @@ def _inner(region: Bools) -> Bools:
 def _format_problem(file: File, image_set: ImageSet, image: images.Image) -> str | None:
     """Say which channels a view has and should have, if they differ in name or type."""
     found = {name: pixels.dtype for name, pixels in image.channels.items()}
-    colour = [*"RGB", *(["A"] if "A" in found and image_set.name else [])]
+    transparent = image_set.lightfield.transparent
+    has_alpha = transparent or ("A" in found and image_set.name)
+    colour = [*"RGB", *(["A"] if has_alpha else [])]
     if file.path.endswith(".png"):
         wanted = dict.fromkeys(colour, "uint16" if found.get("R") == "uint16" else "uint8")
     else:
