@@ -82,7 +82,7 @@ def test_warnings_are_shown_once_and_other_lines_not(run):
     shown = run.shown(running=["a", "b"])
     assert [line for line in shown if " left" not in line] == [
         "warning: scene/a: coarse",
-        "note: scene/a: so and so",
+        "note: so and so",
     ]
     assert not any("coarse" in line for line in run.shown())
 

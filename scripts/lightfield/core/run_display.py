@@ -164,8 +164,9 @@ class RunDisplay:
                 task.done, task.total, task.each = said.done, said.total + task.kept, said.each
             elif _FOR_THE_USER.match(line) and line not in self._seen:
                 self._seen.add(line)
-                kind, _, text = line.partition(": ")
-                self._say(f"{kind}: {task.name}: {text}")
+                # A note names what it is about; a warning is the program's, whatever it works on.
+                text = line.removeprefix("warning: ")
+                self._say(line if text == line else f"warning: {task.name}: {text}")
 
     def _report_failed(self, failed: set[Hashable], running: set[Hashable]) -> None:
         """Say at once why a job failed, where others go on: all is said again at the end."""
