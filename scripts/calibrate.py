@@ -38,7 +38,8 @@ def main() -> None:
         write_json(arguments.seconds, seconds)
     target, error, found = (record[k] for k in ("target_error", "probe_error", "held_out_error"))
     print(
-        f"note: {arguments.lightfield.parent.name}: {record['way']}, {record['choice']}: error {error:.3g} on the probe views and "
+        f"note: {arguments.lightfield.parent.name}: {record['way']}, {record['choice']}: "
+        f"error {error:.3g} on the probe views and "
         f"{found:.3g} ± {record['held_out_standard_error']:.1g} on others, "
         f"wanted {target:g}; {record['times_fewer_samples']:.1f} times cheaper than plain path "
         "tracing at equal error; the worst thousandth of pixels left out, with which it is "
