@@ -29,7 +29,7 @@ def cloth(scene: Scene) -> None:
     on_top = start + v[:, None] * across
     # How far it is along the cloth, from each place of its upper end, to the edge.
     ahead = on_top @ along
-    edge = -ahead + np.sqrt(ahead**2 - (on_top**2).sum(-1) + (RADIUS - 0.012) ** 2)
+    edge = -ahead + np.sqrt(ahead**2 - (on_top**2).sum(-1) + (RADIUS - 0.003) ** 2)
     beyond = np.maximum(s - edge, 0)
     angle = np.minimum(beyond / bend, np.pi / 2)
     fall = np.maximum(beyond - bend * np.pi / 2, 0)

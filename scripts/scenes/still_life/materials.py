@@ -11,7 +11,6 @@ FLESH = (1.0, 0.5, 0.22)
 
 
 def palette() -> dict[str, bpy.types.Material]:
-    glass = {"Roughness": 0.0, "Transmission_Weight": 1.0}
     wax = {"Subsurface_Weight": 1.0, "Subsurface_Radius": FLESH, "Subsurface_Scale": 0.02}
     pearl = {"Subsurface_Weight": 0.4, "Subsurface_Radius": FLESH, "Subsurface_Scale": 0.002}
     return by_name(
@@ -21,8 +20,8 @@ def palette() -> dict[str, bpy.types.Material]:
             hammered("Copper", (0.93, 0.42, 0.25), 0.17),
             metal("Brass", (0.80, 0.53, 0.19), 0.16),
             metal("Silver", (0.90, 0.89, 0.87), 0.09),
-            plain("Glass", (0.975, 0.985, 0.98), IOR=1.5, **glass),
-            plain("Wine", (0.40, 0.012, 0.03), IOR=1.34, **glass),
+            clear("Glass", (0.975, 0.985, 0.98), 1.5),
+            clear("Wine", (0.40, 0.012, 0.03), 1.34),
             linen("Linen", (0.74, 0.69, 0.60)),
             linen("Blue linen", (0.035, 0.075, 0.19)),
             plain("Porcelain", (0.84, 0.84, 0.82), Roughness=0.1, Coat_Weight=0.5),
@@ -43,6 +42,15 @@ def palette() -> dict[str, bpy.types.Material]:
             down(),
         ]
     )
+
+
+def clear(name: str, color: Color, ior: float) -> bpy.types.Material:
+    """Glass or wine that lamps shine through: their light would otherwise come as noise alone."""
+    graph = MaterialGraph(name)
+    body = graph.principled(Base_Color=color, IOR=ior, Roughness=0.0, Transmission_Weight=1.0)
+    through = graph.add("ShaderNodeBsdfTransparent", {"Color": color})
+    to_a_lamp = graph.add("ShaderNodeLightPath").outputs["Is Shadow Ray"]
+    return graph.finish(graph.mix_shaders(to_a_lamp, body, through))
 
 
 def hammered(name: str, color: Color, roughness: float) -> bpy.types.Material:
