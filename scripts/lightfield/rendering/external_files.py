@@ -3,7 +3,7 @@
 import glob
 import os
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +51,7 @@ def problems(images: Collection[Any]) -> list[dict[str, str]]:
     ``problem``. Of images count those that shading reads, ``images``, and those of modifiers.
     """
     home = Path(bpy.data.filepath).parent
+    users = bpy.data.user_map()
     found = []
 
     def note(block: Any, kind: str, path: Path, problem: str) -> None:
@@ -58,13 +59,13 @@ def problems(images: Collection[Any]) -> list[dict[str, str]]:
         found.append(name | {"path": _from(home, path), "problem": problem})
 
     for block, path in _read():
-        if not _is_needed(block, images):
+        if not _is_needed(block, images, users):
             continue
         for file in _files(block, path):
             problem = _problem(block, file)
             if problem:
                 note(block, KINDS[type(block).__name__], file, problem)
-    for block in bpy.data.user_map():
+    for block in users:
         if block.library and block.is_missing and path_of(block.library).is_file():
             library = path_of(block.library)
             note(block, f"linked {type(block).__name__.lower()}", library, "not in its library")
@@ -94,11 +95,10 @@ def _is_packed(block: Any) -> bool:
     return isinstance(block, bpy.types.Library) or bool(getattr(block, "packed_file", None))
 
 
-def _is_needed(block: Any, images: Collection[Any]) -> bool:
+def _is_needed(block: Any, images: Collection[Any], users: Mapping[Any, Any]) -> bool:
     if isinstance(block, bpy.types.Image):
         modifiers = (bpy.types.Texture, bpy.types.GeometryNodeTree)
-        users = bpy.data.user_map(subset=[block])[block]
-        return block in images or any(isinstance(user, modifiers) for user in users)
+        return block in images or any(isinstance(user, modifiers) for user in users[block])
     return isinstance(block, bpy.types.Library) or block.users > block.use_fake_user
 
 
