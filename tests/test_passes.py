@@ -91,6 +91,16 @@ def test_motion_across_the_seam_of_a_panorama_is_the_short_one():
     assert [plane.item() for plane in channels.values()] == [-4, 1, 2.5, 2]
 
 
+def test_what_is_not_a_number_is_counted_and_becomes_0():
+    wrong = np.array([[[np.nan, np.nan, np.nan], [0, 0, 1]]], np.float32)
+    lens = lenses.from_camera(LENSES["panorama"])
+    for name in ("normal", "diffuse_light"):
+        found = SimpleNamespace(normal=wrong, passes={name: wrong})
+        channels, attributes = shard.pass_channels(PASSES[name], found, found, lens)
+        assert attributes[images.NAN_ATTRIBUTE] == 3
+        assert [plane[0].tolist() for plane in channels.values()] == [[0, 0], [0, 0], [0, 1]]
+
+
 @pytest.mark.parametrize("lens", LENSES)
 def test_the_parts_of_light_add_up_to_the_colour(lens, made):
     parts = {name: read(made / lens, name).astype(np.float64) for name in PARTS_OF_LIGHT}

@@ -226,13 +226,19 @@ def colour_channels(colour: Array) -> tuple[dict[str, Array], dict[str, images.A
 def pass_channels(
     wanted: Pass, geometry: "Geometry | None", colour: "Colour", lens: Lens
 ) -> tuple[dict[str, Array], dict[str, images.Attribute]]:
-    """Return the channels and attributes of the EXR of one of a view's passes."""
+    """Return the channels and attributes of the EXR of one of a view's passes.
+
+    What is not a number is counted and becomes 0: Cycles leaves it out of the colour alone.
+    """
     if wanted.of_colour:
-        return colour_channels(colour.passes[wanted.name])
+        channels, attributes = colour_channels(colour.passes[wanted.name])
+        return {name: np.nan_to_num(plane, nan=0) for name, plane in channels.items()}, attributes
     assert geometry
+    attributes = {}
     match wanted.name:
         case "normal":
-            pixels = geometry.normal
+            pixels = np.nan_to_num(geometry.normal, nan=0)
+            attributes[images.NAN_ATTRIBUTE] = int(np.isnan(geometry.normal).sum())
         case "object":
             pixels = geometry.objects[..., None]
         case "material":
@@ -245,7 +251,7 @@ def pass_channels(
                 turn = lens.width * 2 * np.pi / (lens.longitude[1] - lens.longitude[0])
                 pixels[..., ::2] -= turn * np.rint(pixels[..., ::2] / turn)
     planes = np.moveaxis(pixels.astype(wanted.dtype), -1, 0)
-    return dict(zip(wanted.channels, planes, strict=True)), {}
+    return dict(zip(wanted.channels, planes, strict=True)), attributes
 
 
 def depth_channel(cycles_depth: Array, lightfield: LightField, rays: Array | None) -> Array:
