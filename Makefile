@@ -37,7 +37,7 @@ consumers: .venv/complete .venv-consumers/complete
 	.venv-consumers/bin/pip -q install --no-deps nerfstudio==1.1.5
 	@touch $@
 
-# Builds that are killed, damaged and left without room: under an hour on two cores.
+# Builds that are killed, damaged and left without room.
 soak: .venv/complete
 	python benchmarks/soak.py
 

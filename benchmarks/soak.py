@@ -120,7 +120,8 @@ class Build:
             if limit:
                 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
-        command = ["snakemake", "--snakefile", str(ROOT / "Snakefile"), "--quiet", "all"]
+        snakemake = str(Path(sys.executable).with_name("snakemake"))
+        command = [snakemake, "--snakefile", str(ROOT / "Snakefile"), "--quiet", "all"]
         return subprocess.Popen(
             [*command, "--cores", str(os.cpu_count() or 1), *words],
             cwd=self.root,
