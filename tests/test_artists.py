@@ -12,6 +12,9 @@ from conftest import ROOT
 from lightfield.core.files import sha256
 from lightfield.imaging import images
 
+# One process builds them, and all tests are of that build.
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("artists")]
+
 SCENES = {
     "interior": """
 scene: {blend: interior.blend, allow_missing: true}
