@@ -4,7 +4,6 @@ import json
 import math
 import os
 import shlex
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -582,8 +581,7 @@ def check_room():
         pixels = max(math.prod(d.rig.camera.resolution) for d in datasets.values())
         at_once = min(len(jobs), max(1, workflow.cores // jobs[0].threads))
         size = at_once * pixels * memory.PASSES_PIXEL_BYTES
-        shared = Path("/dev/shm")
-        if not shared.is_dir() or shutil.disk_usage(shared).free < size:
+        if not room.fast_folder(size):
             needs.append((Path(tempfile.gettempdir()), size))
     for warning in room.check(needs):
         print(f"warning: {warning}", file=sys.stderr)

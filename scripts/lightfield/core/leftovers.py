@@ -10,6 +10,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from lightfield.core.room import SHARED_MEMORY
+
 # Nobody calls a folder of his own so: it would be removed.
 PREFIX = "plenoforge-temporary-"
 # Blender makes itself such a folder as long as it runs, an artist's Blender, too.
@@ -46,7 +48,7 @@ def remove(folders: Iterable[Path] = ()) -> list[Path]:
     found = [path for folder in folders for path in _files(folder)]
     for path in found:
         path.unlink(missing_ok=True)
-    for parent in {Path(tempfile.gettempdir()), Path("/dev/shm")}:
+    for parent in {Path(tempfile.gettempdir()), SHARED_MEMORY}:
         for path in parent.glob(f"{PREFIX}*"):
             if path.is_dir() and _is_old(path, FOLDER_AGE) and not _is_in_use(path):
                 shutil.rmtree(path, ignore_errors=True)

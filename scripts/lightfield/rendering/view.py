@@ -1,7 +1,6 @@
 """One render of one view with Cycles, as `lightfield.rendering.cycles` has set it up."""
 
 import math
-import os
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ import bpy
 import mathutils
 import numpy as np
 
+from lightfield.core import room
 from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_MEMORY
 from lightfield.core.leftovers import temporary_folder
@@ -49,7 +49,7 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
         for name, channels in passes.items()
     }
     pixels = scene.render.resolution_x * scene.render.resolution_y
-    with temporary_folder(_fast_folder(pixels)) as folder:
+    with temporary_folder(room.fast_folder(pixels * PASSES_PIXEL_BYTES)) as folder:
         path = folder / "view.exr"
         scene.render.filepath = str(path)
         try:
@@ -76,14 +76,6 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
         _seconds(image.attributes[f"cycles.{layer}.render_time"]),
         _seconds(image.attributes[f"cycles.{layer}.synchronization_time"]),
     )
-
-
-def _fast_folder(pixels: int) -> str | None:
-    """Return a folder in memory for Cycles' own output, where there is one with room for it."""
-    folder = "/dev/shm"
-    if not os.access(folder, os.W_OK | os.X_OK):
-        return None
-    return folder if shutil.disk_usage(folder).free > pixels * PASSES_PIXEL_BYTES else None
 
 
 def _seconds(text: images.Attribute) -> float:
