@@ -217,7 +217,7 @@ def test_a_missing_file_gives_the_page_and_the_place(scene):
 
 
 # What an original has of its own.
-OWN = {"scene", "description"}
+OWN = {"scene", "description", "licence", "credit"}
 
 
 @pytest.mark.parametrize("name", ["garden", "lone_monk", "barbershop"])

@@ -116,8 +116,8 @@ def smallest_move(lens, pixel) -> mpf:
 def test_cameras_a_million_metres_from_the_origin_see_the_same_point(name) -> None:
     lens = stability.extreme_lenses()[name]
     place, distance = (1e6, -1e6, 1e6), 2.0
-    first = rigs.Pose("a", 0, place, (0.3, 1.2, -0.7))
-    second = rigs.Pose("b", 1, (place[0] + 0.1, place[1], place[2] - 0.05), (0.35, 1.1, -0.6))
+    first = rigs.Pose("a", 0, place, (0.3, 1.2, -0.7), None)
+    second = rigs.Pose("b", 1, (place[0] + 0.1, place[1], place[2] - 0.05), (0.35, 1.1, -0.6), None)
     x, y = 0.45 * lens.width, 0.55 * lens.height
     seen = (
         np.linalg.inv(second.matrix()) @ first.matrix() @ np.append(lens.rays(x, y) * distance, 1)
