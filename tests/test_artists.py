@@ -13,7 +13,7 @@ from lightfield.core.files import sha256
 from lightfield.imaging import images
 
 # One process builds them, and all tests are of that build.
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("artists")]
+pytestmark = pytest.mark.slow
 
 SCENES = {
     "interior": """

@@ -24,7 +24,6 @@ WORDS = [
 ]
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.xdist_group("smoke"),
     pytest.mark.skipif(os.geteuid() != 0, reason="Slurm's daemons are root's"),
 ]
 

@@ -20,8 +20,7 @@ from lightfield.core.files import sha256, write_json
 from lightfield.imaging import images
 
 CUBOID = Path("results/smoke/LFCuboid_1x1x1")
-# All in one process: it builds the smoke dataset once for them.
-pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("smoke")]
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
