@@ -12,7 +12,6 @@ from conftest import ROOT
 from lightfield.core.files import sha256
 from lightfield.imaging import images
 
-# One process builds them, and all tests are of that build.
 pytestmark = pytest.mark.slow
 
 SCENES = {

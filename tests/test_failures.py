@@ -10,12 +10,13 @@ from pathlib import Path
 
 import pytest
 from checkouts import checkout
+from sphere import write_views
 
 from lightfield.core.cli import run
 from lightfield.core.failures import cause, failure_report
 
 ROOT = Path(__file__).parents[1]
-# A scene that needs what the smoke scene does not: a download, and a calibration.
+# A scene that needs what the smoke scene does not: a download, a calibration, and free places.
 BROUGHT = """
 scene:
   blend: scene.blend
@@ -27,14 +28,20 @@ rigs:
     type: plane
     cameras: [2, 1]
     camera: {lens: equidistant, fov: 180, resolution: [16, 16]}
+  anywhere:
+    type: random
+    count: 2
+    size: 1
+    camera: {lens: equidistant, fov: 180, resolution: [16, 16]}
 exports:
   instant_ngp: {sources: [views]}
 """
+IMPORTED = "scene: {dataset: published}"
 TARGETS = [
     *("all", "smoke", "package", "rig_tables", "plan", "status"),
     *("error_vs_time", "reprojection_benchmark", "stability", "render_overhead"),
 ]
-CHOSEN = ["--config", "scenes=[brought]", "rigs=all", "preset=full"]
+CHOSEN = ["--config", "scenes=[brought,imported]", "rigs=all", "preset=full"]
 RULES = [
     *("fetch_brought",),
     *(
@@ -63,7 +70,10 @@ class Failing:
     """A checkout whose programs fail; every file that a job reads or writes is there."""
 
     def __init__(self, folder):
-        self.folder = checkout(folder, brought=BROUGHT)
+        self.folder = checkout(folder, brought=BROUGHT, imported=IMPORTED)
+        plane = {"type": "plane", "cameras": [2, 1]}
+        camera = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
+        write_views(self.folder / "published/LFPlane", camera, plane)
         programs = [*(ROOT / "scripts").glob("*.py"), *(ROOT / "benchmarks").glob("*.py")]
         for program in programs:
             stand_in = self.folder / program.relative_to(ROOT)
@@ -73,6 +83,7 @@ class Failing:
         (self.folder / "bin/tar").write_text(FAILING)
         (self.folder / "bin/tar").chmod(0o755)
         plan = self.run("--dry-run", "--forceall", "--logger", "jobs", *CHOSEN, "--", *TARGETS)
+        assert plan.returncode == 0, plan.stdout
         jobs = [json.loads(line) for line in plan.stdout.splitlines() if line.startswith("{")]
         self.jobs = {job["rule"]: job for job in jobs if job["log"]}
         self.files = {file for job in jobs for file in (*job["input"], *job["output"])}

@@ -135,7 +135,7 @@ def test_less_detail_is_a_part_of_the_triangles():
 
 
 def test_builders_are_the_folders_beside_the_library():
-    assert config.builders() == ["barbershop", "garden", "lone_monk", "room"]
+    assert config.builders() == ["barbershop", "garden", "lone_monk", "room", "still_life"]
 
 
 @pytest.mark.parametrize(
