@@ -330,6 +330,7 @@ def test_a_blend_newer_than_bpy_is_an_error_that_names_both_versions(newer, run_
     assert f"Blender {version('bpy')}" in told
 
 
+@pytest.mark.slow
 def test_a_blend_needs_no_builder_and_a_builder_no_blend(server, tmp_path):
     folder = checkout(
         tmp_path,

@@ -61,6 +61,7 @@ def run(folder, *arguments):
     return told
 
 
+@pytest.mark.slow
 def test_what_is_broken_is_planned_again_and_set_aside(tmp_path):
     folder = checkout(tmp_path)
     datasets = simulated.build(folder)
@@ -102,6 +103,7 @@ def test_what_is_broken_is_planned_again_and_set_aside(tmp_path):
     assert noted[f"{one.work}/cameras.json"] == before[f"{one.work}/cameras.json"]
 
 
+@pytest.mark.slow
 def test_a_reprojection_that_does_not_say_how_it_was_made_is_made_anew_alone(tmp_path):
     folder = checkout(tmp_path)
     one, *_ = simulated.build(folder)
@@ -119,6 +121,7 @@ def test_a_reprojection_that_does_not_say_how_it_was_made_is_made_anew_alone(tmp
     assert not files & {*one.records("render"), *one.records("perspective_hdr")}
 
 
+@pytest.mark.slow
 def test_what_views_are_made_from_is_verified_before_it_is_used(tmp_path):
     simulated.build(checkout(tmp_path))
     paths = ["work/smoke/inventory.json", "work/smoke/scene.blend"]

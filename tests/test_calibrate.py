@@ -112,6 +112,7 @@ def test_a_scene_may_be_calibrated_without_a_denoiser(tmp_path, monkeypatch):
         assert dataset.render["denoise"] is False
 
 
+@pytest.mark.slow
 def test_what_calibration_will_cost_is_said_beforehand(tmp_path):
     told = snakemake(
         checkout(tmp_path, aimed=SCENE.format(render="target_error: 0.02")), "-n", *ASKED
@@ -155,6 +156,7 @@ def test_effort_follows_from_what_lies_on_both_sides_of_the_target():
     assert effort_for(0.9, points) == 1
 
 
+@pytest.mark.slow
 def test_only_a_scene_with_a_target_is_calibrated(tmp_path):
     aimed = SCENE.format(render="target_error: 0.02")
     counted = SCENE.format(render="samples: 4")
@@ -168,6 +170,7 @@ def test_only_a_scene_with_a_target_is_calibrated(tmp_path):
     assert jobs == others
 
 
+@pytest.mark.slow
 def test_what_was_chosen_is_what_is_rendered_and_shards_stay(tmp_path):
     folder = checkout(tmp_path, aimed=SCENE.format(render="target_error: 0.05"))
     record = folder / "work/aimed/calibration.json"

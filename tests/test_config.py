@@ -290,6 +290,7 @@ def test_a_bare_word_is_a_list_of_one():
         (["scenes=smoke"], {"LFCuboid_1x1x1", "LFPlane_3x2_equisolid", "LFLattice_2panos"}),
     ],
 )
+@pytest.mark.slow
 def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
     folders = (f"results={tmp_path}/results", f"work={tmp_path}/work")
     plan = subprocess.run(
@@ -327,6 +328,7 @@ def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
         (["results=."], "results: is '.'; must be a folder of its own"),
     ],
 )
+@pytest.mark.slow
 def test_snakemake_ends_with_one_line_and_no_job(arguments, expected, tmp_path):
     result = subprocess.run(
         [SNAKEMAKE, "--cores", "1", "--config", *arguments],

@@ -383,6 +383,7 @@ def test_pixels_without_a_source_and_misses_are_none_and_far_to_miv():
     assert disparity.levels(depth, (1, 1000), 16, 1).tolist() == [[65535, 32735], [1, 0]]
 
 
+@pytest.mark.slow
 def test_opendibr_takes_lossless_h265_where_there_is_ffmpeg(dataset, tmp_path, monkeypatch):
     lens = LightField.read(dataset / "perspective" / "lightfield.json").lens
     settings = settings_of("opendibr").model_validate({"sources": ["views"], "format": "h265"})

@@ -150,6 +150,7 @@ def mapping_of(name):
 
 @pytest.mark.parametrize("value", [65504.0, 1e-41, 0.0])
 @pytest.mark.parametrize("name", FILTERS)
+@pytest.mark.slow
 def test_an_even_image_stays_even_from_denormals_to_the_half_limit(name, value) -> None:
     made, shape, _ = mapping_of(name)
     out = resample_colour(np.full((*shape, 4), value, np.float32), made)
@@ -176,6 +177,7 @@ def test_one_pixel_that_is_no_number_changes_nothing_far_from_it(name, value) ->
 
 
 @pytest.mark.parametrize("depth", [1e-6, 1.0, 1e9, math.inf])
+@pytest.mark.slow
 def test_a_sphere_of_any_depth_stays_one(depth) -> None:
     made, shape, _ = mapping_of(DEFAULT_FILTER)
     out = resample_depth(np.full(shape, depth, np.float32), False, False, made)

@@ -138,6 +138,7 @@ def last_words(failing, *rules):
 
 
 @pytest.mark.parametrize("rule", RULES)
+@pytest.mark.slow
 def test_a_program_that_fails_after_its_work_fails_its_job(failing, rule):
     terminal = failing.fail(rule)
     assert "MissingOutputException" not in terminal
@@ -147,6 +148,7 @@ def test_a_program_that_fails_after_its_work_fails_its_job(failing, rule):
     assert not any((failing.folder / file).exists() for file in job["output"])
 
 
+@pytest.mark.slow
 def test_every_job_that_failed_is_named_at_the_end(failing):
     terminal = failing.fail("stability", "rig_tables")
     assert terminal.endswith(last_words(failing, "rig_tables", "stability")), terminal
@@ -154,6 +156,7 @@ def test_every_job_that_failed_is_named_at_the_end(failing):
 
 # Of the two jobs of this group the second waits for the first; it did not fail.
 @pytest.mark.parametrize("groups", [[], ["--groups", "render=shard", "reproject=shard"]])
+@pytest.mark.slow
 def test_a_job_that_fails_on_a_cluster_is_named_at_the_end(failing, groups):
     submit = failing.folder / "submit.sh"
     submit.write_text('bash "$1" > node.log 2>&1 && echo success || echo failed\n')
@@ -183,6 +186,7 @@ def test_the_cause_is_the_last_error_or_else_the_last_line(tmp_path):
     ("signal", "advice"),
     [("KILL", "memory ran out: lower --cores"), ("BUS", "make room in /dev/shm and TMPDIR")],
 )
+@pytest.mark.slow
 def test_a_signal_is_named_with_what_to_lower(failing, signal, advice):
     program = failing.folder / "scripts/render_shard.py"
     program.write_text(f"import os, signal; os.kill(os.getpid(), signal.SIG{signal})")
@@ -195,6 +199,7 @@ def test_a_signal_is_named_with_what_to_lower(failing, signal, advice):
     assert log.startswith("  log: work/logs/")
 
 
+@pytest.mark.slow
 def test_a_device_that_is_not_there_is_reported_before_the_first_job(failing):
     shutil.copy(ROOT / "scripts/check_device.py", failing.folder / "scripts")
     terminal = failing.fail("render", config=["device=metal"])

@@ -148,6 +148,7 @@ def assert_refused(write, path):
 
 
 @pytest.mark.parametrize(("write", "name"), WRITERS)
+@pytest.mark.slow
 def test_no_byte_is_lost_unseen(write, name, tmp_path):
     path = tmp_path / "folder" / name
     write(path, 1)

@@ -265,6 +265,7 @@ sys.exit(status)
         (None, []),
     ],
 )
+@pytest.mark.slow
 def test_a_hostile_plan_ends_with_one_line_and_little_memory(text, arguments, tmp_path):
     """In a user's own folder, where config.yaml is the user's: without a scene it is a bomb."""
     (tmp_path / "configs/scenes").mkdir(parents=True)

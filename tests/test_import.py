@@ -80,6 +80,7 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
     assert validation["valid"], validation["summary"]
 
 
+@pytest.mark.slow
 def test_nothing_is_rendered_of_it(published, tmp_path):
     jobs = planned(
         tmp_path, "--snakefile", ROOT / "Snakefile", "--config", "scenes=theirs", "preset=full"

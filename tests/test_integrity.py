@@ -137,6 +137,7 @@ def test_what_is_mended_is_planned_and_nothing_else(copy, run_program):
     assert Path("work/removed", one.folder, "notes.txt").read_text() == "a stray"
 
 
+@pytest.mark.slow
 def test_what_was_made_from_other_settings_is_planned_without_snakemakes_memory(copy):
     one, two, three = copy
     assert not Path(".snakemake", "metadata").exists()

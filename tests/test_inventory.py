@@ -177,6 +177,7 @@ exports: {instant_ngp: {sources: [views]}}
 """
 
 
+@pytest.mark.slow
 def test_a_minimal_scene_plans_its_own_stages_only(tmp_path):
     folder = checkout(tmp_path, minimal=MINIMAL)
     jobs = planned(folder, "--config", "scenes=[minimal]", "rigs=all", "preset=full")

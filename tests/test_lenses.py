@@ -139,6 +139,7 @@ def cycles(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize("name", CAMERAS)
+@pytest.mark.slow
 def test_rays_and_pixels_are_those_of_cycles(name: str, cycles: dict[str, np.ndarray]) -> None:
     lens = CAMERAS[name]
     hit = cycles[name + ".rays"]
@@ -679,6 +680,7 @@ assert (geometry.source.fov, geometry.targets[0].lens.description) == (1, "halve
 """
 
 
+@pytest.mark.slow
 def test_a_new_lens_is_one_file(tmp_path: Path) -> None:
     library = Path(__file__).parents[1] / "scripts" / "lightfield"
     shutil.copytree(library, tmp_path / "lightfield")

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[1]
 
 SCENE = """
@@ -18,6 +20,7 @@ rigs:
 """
 
 
+@pytest.mark.slow
 def test_scenes_poses_results_and_work_are_in_the_users_folder(tmp_path):
     (tmp_path / "configs" / "scenes").mkdir(parents=True)
     (tmp_path / "configs/scenes/mine.yaml").write_text(SCENE)

@@ -58,6 +58,7 @@ def planned(tmp_path_factory):
 
 
 @pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.slow
 def test_every_job_says_what_it_needs(planned, profile):
     jobs = planned(profile, "cpu")
     assert {job["rule"] for job in jobs} >= SUBMITTED
@@ -68,12 +69,14 @@ def test_every_job_says_what_it_needs(planned, profile):
         assert job["gpu"] == 0, job
 
 
+@pytest.mark.slow
 def test_renders_take_every_cpu_that_a_job_may_have(planned):
     for job in planned("slurm", "cpu"):
         if job["rule"] in ("render", "render_panorama"):
             assert job["cpus"] == settings("slurm")["cores"]
 
 
+@pytest.mark.slow
 def test_renders_alone_ask_for_a_gpu_where_the_device_is_one(planned):
     gpus = {(job["rule"], job["gpu"]) for job in planned("slurm", "optix")}
     assert {rule for rule, count in gpus if count} == {"render", "render_panorama"}
@@ -99,6 +102,7 @@ def test_the_submit_command_asks_for_all_four_resources():
         assert part in command
 
 
+@pytest.mark.slow
 def test_nodes_without_a_shared_folder_are_refused_before_the_first_job(tmp_path):
     run = snakemake(ROOT, "--directory", tmp_path, "--shared-fs-usage", "none", "--", "smoke")
     assert run.returncode == 1

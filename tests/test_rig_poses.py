@@ -124,6 +124,7 @@ def free_places(blend, rig, output):
     )
 
 
+@pytest.mark.slow
 def test_free_places_are_in_the_room_and_clear_of_all_that_stands_in_it(tmp_path):
     blend = tmp_path / "room.blend"
     subprocess.run([sys.executable, "-c", BUILD, SCRIPTS, blend], check=True, capture_output=True)

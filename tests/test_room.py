@@ -52,6 +52,7 @@ def test_what_is_written_to_one_disk_is_added_up(sizes, expected, tmp_path, monk
     assert [warning.startswith(text) for warning in warnings] == [True] * (expected == "warning")
 
 
+@pytest.mark.slow
 def test_a_run_that_cannot_fit_ends_before_its_first_job(tmp_path):
     folder = checkout(tmp_path, huge=HUGE)
     result = snakemake(folder, "--config", "scenes=huge", "preset=full")

@@ -69,6 +69,7 @@ def fingerprint(seed: int, image: Path, hash_seed: str) -> list[str]:
     return lines[0].split()[1:]
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_garden_and_pixels(tmp_path):
     first = fingerprint(7, tmp_path / "first.exr", "1")
     again = fingerprint(7, tmp_path / "again.exr", "2")
@@ -98,11 +99,13 @@ def world_vertices(data, matrix):
     return vertices.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
+@pytest.mark.slow
 def test_it_has_the_triangles_of_a_full_scene(scene):
     stored = sum(len(m.loops) - 2 * len(m.polygons) for m in bpy.data.meshes)
     assert stored >= 300_000
 
 
+@pytest.mark.slow
 def test_two_seeds_give_two_gardens(scene):
     def heights(seed):
         bamboo = bamboo_culm(Scene(seed, 0.1, {}), 0)
@@ -122,6 +125,7 @@ def rig_points():
     return np.concatenate([cube, 0.85 * ball, 0.25 * ball]) + np.array([0, 0, 1])
 
 
+@pytest.mark.slow
 def test_no_camera_of_its_rigs_is_within_5_cm_of_anything(scene):
     vertices, polygons, start = [], [], 0
     for _, data, matrix in evaluated_meshes():

@@ -83,6 +83,7 @@ def scene():
     return bpy.context.evaluated_depsgraph_get()
 
 
+@pytest.mark.slow
 def test_same_seed_same_geometry():
     first = fingerprint(3, "1")
     assert fingerprint(3, "2") == first

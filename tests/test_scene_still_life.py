@@ -75,6 +75,7 @@ def things():
     return built(1.0)
 
 
+@pytest.mark.slow
 def test_same_seed_same_geometry():
     first = fingerprint(3, "1")
     assert fingerprint(3, "2") == first

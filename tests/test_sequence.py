@@ -79,6 +79,7 @@ def test_a_reprojection_cannot_take_a_frames_folder(moving):
         config.read_scene(moving)
 
 
+@pytest.mark.slow
 def test_every_stage_is_planned_for_every_frame(tmp_path):
     folder = checkout(tmp_path, moving=SCENE)
     jobs = planned(folder, "package", "--config", "scenes=[moving]", "rigs=all", "preset=full")

@@ -97,6 +97,7 @@ def test_what_is_no_split_is_refused(path, value, expected):
         checked(TypeAdapter(config.Scene), content, "scene.yaml")
 
 
+@pytest.mark.slow
 def test_what_one_rig_tests_is_exported_with_what_another_trains(tmp_path, monkeypatch):
     (tmp_path / "two.yaml").write_text(json.dumps(SCENE))
     monkeypatch.setattr(config, "SCENES", tmp_path)

@@ -149,6 +149,7 @@ def test_all_chosen_datasets_are_added_up(dataset):
     )
 
 
+@pytest.mark.slow
 def test_snakemake_says_it_without_a_lock(tmp_path):
     folders = (f"results={tmp_path / 'results'}", f"work={tmp_path / 'work'}")
     words = ("--quiet", "all", "--nolock", "status", "--config", *folders, "preset=tiny")

@@ -344,6 +344,7 @@ def test_wrong_set_fails_its_geometry(case: str, dataset: Path) -> None:
 
 
 @pytest.mark.parametrize("case", WRONG_VIEWS)
+@pytest.mark.slow
 def test_wrong_view_is_named_and_no_other(case: str, dataset: Path) -> None:
     WRONG_VIEWS[case](dataset)
     result = validate(dataset)
