@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from lightfield.core.settings import as_list
-from lightfield.geometry.rigs.rig import Rig, UnitPoses, circle, stack
+from lightfield.geometry.rigs.rig import CountedRig, UnitPoses, circle, stack
 from lightfield.geometry.rotations import Floats, looking_at, matrix_to_euler
 
 Elevation = Annotated[float, Field(ge=-90, le=90)]
@@ -23,23 +23,17 @@ def _growing(limits: tuple[float, float]) -> tuple[float, float]:
 Elevations = Annotated[tuple[Elevation, Elevation], as_list(2), AfterValidator(_growing)]
 
 
-class Orbit(Rig):
+class Orbit(CountedRig):
     """``size`` is the sphere's diameter."""
 
     shape = "SPHERE"
     is_round = True
-
-    count: int = Field(ge=1, le=100000, description="Cameras.")
 
     @model_validator(mode="after")
     def _faces_inside_already(self) -> Self:
         if self.face_inside:
             raise ValueError(f"face_inside: goes without type {self.type}, which looks inside")
         return self
-
-    @property
-    def positions(self) -> int:
-        return self.count
 
     @abstractmethod
     def directions(self) -> Floats:
@@ -48,9 +42,6 @@ class Orbit(Rig):
     def unit_poses(self) -> UnitPoses:
         places = self.directions() / 2
         return UnitPoses.of_sides(("", places, matrix_to_euler(looking_at(places, np.zeros(3)))))
-
-    def _thinned_to(self, positions: int) -> Self | None:
-        return self.model_copy(update={"count": positions}) if positions else None
 
     def unit_outline(self) -> list[Floats]:
         cosine, sine = circle()

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from lightfield.core.settings import Settings, Vector, as_list
-from lightfield.geometry.rigs.rig import Rig, UnitPoses
+from lightfield.geometry.rigs.rig import CountedRig, UnitPoses
 from lightfield.geometry.rotations import Floats, looking_at, matrix_to_euler
 
 # Pieces between two keys by which the curve's length is measured: it errs by less than 1e-6 of it.
@@ -33,13 +33,12 @@ class Key(Settings):
         return self.rotation is not None or self.quaternion_wxyz is not None
 
 
-class Path(Rig):
+class Path(CountedRig):
     """Keys without rotations let the cameras look along the path, upright."""
 
     shape = "PLANE"
 
     type: Literal["path"]
-    count: int = Field(ge=1, le=100000, description="Cameras, evenly spaced along the path.")
     keys: list[Key] = Field(
         min_length=2, max_length=1000, description="Poses that the path goes through, in order."
     )
@@ -52,13 +51,6 @@ class Path(Rig):
         if (np.linalg.norm(np.diff(self._places(), axis=0), axis=-1) < 1e-9).any():
             raise ValueError("keys: two in a row are at one place")
         return self
-
-    @property
-    def positions(self) -> int:
-        return self.count
-
-    def _thinned_to(self, positions: int) -> Self | None:
-        return self.model_copy(update={"count": positions}) if positions else None
 
     def unit_poses(self) -> UnitPoses:
         # SciPy takes long to import, and no plan needs it.

@@ -9,14 +9,14 @@ from pydantic.json_schema import SkipJsonSchema
 
 from lightfield.core.files import read_json
 from lightfield.geometry.rigs.grid import box_outline
-from lightfield.geometry.rigs.rig import Rig, UnitPoses, stack
+from lightfield.geometry.rigs.rig import CountedRig, UnitPoses, stack
 from lightfield.geometry.rotations import Floats
 
 # What the places follow from, besides the scene.
 BOX = {"count", "seed", "clearance", "size", "center", "rotation"}
 
 
-class Random(Rig):
+class Random(CountedRig):
     """Each view has a sequence of places of its own, so a thinned rig is the first of its views.
 
     ``file`` is for no scene YAML: there scripts/free_places.py writes the places that it found.
@@ -27,7 +27,6 @@ class Random(Rig):
     unit_volume = 1.0
 
     type: Literal["random"]
-    count: int = Field(ge=1, le=100000, description="Cameras.")
     seed: int = Field(0, ge=0, le=2**31 - 1)
     clearance: float = Field(
         0.2, gt=0, le=1000, description="Metres to the nearest surface, at least."
@@ -39,13 +38,6 @@ class Random(Rig):
         if self.frames is not None:
             raise ValueError("frames: goes without type random, whose places are of one frame")
         return self
-
-    @property
-    def positions(self) -> int:
-        return self.count
-
-    def _thinned_to(self, positions: int) -> Self | None:
-        return self.model_copy(update={"count": positions}) if positions else None
 
     def placed(self, file: Path | str) -> Self:
         """Return the rig with its cameras at the places that a file has."""

@@ -295,3 +295,16 @@ def circle() -> tuple[Floats, Floats]:
     """Return cosine and sine of a closed circle of diameter 1, to draw."""
     angle = np.linspace(0, 2 * np.pi, 73)
     return np.cos(angle) / 2, np.sin(angle) / 2
+
+
+class CountedRig(Rig):
+    """A rig of any number of cameras, of which fewer are such a rig again."""
+
+    count: int = Field(ge=1, le=100000, description="Cameras.")
+
+    @property
+    def positions(self) -> int:
+        return self.count
+
+    def _thinned_to(self, positions: int) -> Self | None:
+        return self.model_copy(update={"count": positions}) if positions else None
