@@ -73,6 +73,17 @@ def test_shards_and_cores_do_not_change_a_byte(smoke, other):
     assert_same_bytes(smoke, other)
 
 
+def assert_two_views_are_made_again(smoke, folder, before):
+    """A plan says so and changes nothing; a run renders them alone, to the same bytes."""
+    found = files(folder)
+    assert re.search(r"^render +1$", succeeding(folder, "-n", "--cores", "2", "smoke"), re.M)
+    assert files(folder) == found
+    succeeding(folder, "--cores", "2", "smoke")
+    again = rendered(folder) - before
+    assert sorted(name for _, name in again.elements()) == ["view_b0000f", "view_u0000f"]
+    assert_same_bytes(smoke, folder)
+
+
 def test_a_deleted_and_a_truncated_view_are_made_again_alone(smoke, tmp_path):
     folder = tmp_path / "copy"
     shutil.copytree(smoke, folder)
@@ -82,13 +93,7 @@ def test_a_deleted_and_a_truncated_view_are_made_again_alone(smoke, tmp_path):
     os.truncate(half, half.stat().st_size // 2)
     image = folder / CUBOID / "perspective/view_l0000f.png"
     os.truncate(image, image.stat().st_size // 2)
-    found = files(folder)
-    assert re.search(r"^render +1$", succeeding(folder, "-n", "--cores", "2", "smoke"), re.M)
-    assert files(folder) == found
-    succeeding(folder, "--cores", "2", "smoke")
-    again = rendered(folder) - before
-    assert sorted(name for _, name in again.elements()) == ["view_b0000f", "view_u0000f"]
-    assert_same_bytes(smoke, folder)
+    assert_two_views_are_made_again(smoke, folder, before)
     # Both runs count, and what the second made again is told.
     costs = json.loads((folder / CUBOID / "report/costs.json").read_text())
     (shard,) = costs["shards"]
@@ -108,13 +113,7 @@ def test_what_was_changed_beside_a_missing_file_is_made_again_alone(smoke, tmp_p
     (folder / CUBOID / "perspective/view_l0000f.png").unlink()
     one = folder / CUBOID / "perspective/view_f0000f.png"
     one.write_bytes((folder / CUBOID / "perspective/view_r0000f.png").read_bytes())
-    found = files(folder)
-    assert re.search(r"^render +1$", succeeding(folder, "-n", "--cores", "2", "smoke"), re.M)
-    assert files(folder) == found
-    succeeding(folder, "--cores", "2", "smoke")
-    again = rendered(folder) - before
-    assert sorted(name for _, name in again.elements()) == ["view_b0000f", "view_u0000f"]
-    assert_same_bytes(smoke, folder)
+    assert_two_views_are_made_again(smoke, folder, before)
 
 
 def test_an_invalid_dataset_gets_its_page_and_no_checksums_until_it_is_mended(smoke, tmp_path):
