@@ -106,7 +106,7 @@ wildcard_constraints:
     scene="[A-Za-z0-9_-]+",
     # A sequence's datasets lie a folder deeper, one for each frame.
     rig=r"[A-Za-z0-9_.-]+(/f\d{5,7})?",
-    reprojection=r"(?!f\d{5,7}/)[A-Za-z0-9_.-]+",
+    reprojection=r"(?!f\d{5,7}/|flow/)[A-Za-z0-9_.-]+",
     # Of an export: nothing for the views, or a reprojection's name and a slash.
     source=r"((?!f\d{5,7}/)[A-Za-z0-9_.-]+/)?",
     format="[a-z_]+",
@@ -265,10 +265,12 @@ def is_false(dataset, record):
     return DATASETS[dataset].is_false(record)
 
 
-def renewal(wildcards):
+def renewal(wildcards, stage=None):
     """Return no input, but let a shard's record be made anew if its files are not on disk."""
     dataset = dataset_of(wildcards)
-    record = dataset.record(stage_of(wildcards), wildcards.first, wildcards.end)
+    record = dataset.record(
+        stage or stage_of(wildcards), wildcards.first, wildcards.end
+    )
     if is_false((wildcards.scene, wildcards.rig), record):
         made_anew(record)
     return []

@@ -1,7 +1,8 @@
-"""Compute the optical flow from each view of a dataset to the view whose camera is nearest.
+"""Compute the optical flow from views of a dataset to their neighbours, keeping what is right.
 
+Each frame of lightfield.json names its neighbour, as scripts/make_lightfield.py chose it. Of a view
 FOLDER/<view>_to_<other>.exr has channels X and Y, in pixels to the right and down, and V, 1 where
-the other view sees the same point. X and Y are NaN where it has no ray for it.
+the other view sees the same point. All are 0 where it has no ray for it.
 """
 
 import argparse
@@ -9,10 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from lightfield.core.cli import run
+from lightfield.core.cli import run, view_slice
 from lightfield.core.errors import UserError
+from lightfield.core.files import sha256
 from lightfield.core.progress import Progress
-from lightfield.dataset.lightfield import NAME
+from lightfield.dataset import keys
+from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.passes import FLOW
+from lightfield.dataset.records import ShardRecord
 from lightfield.export.source import Source
 from lightfield.geometry.flow import flow
 from lightfield.imaging import images
@@ -20,26 +25,44 @@ from lightfield.imaging import images
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("dataset", type=Path, help="folder of a dataset with depth")
-    parser.add_argument("--reprojection", default="", help="of its views (default: as rendered)")
+    parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
+    parser.add_argument(
+        "--views",
+        metavar="FIRST:END",
+        default=":",
+        help="a slice of lightfield.json's frames (default: all of them)",
+    )
     parser.add_argument("--output", required=True, type=Path, metavar="FOLDER")
+    parser.add_argument("--record", type=Path, help="JSON of the files' sizes and checksums")
     arguments = parser.parse_args()
-    source = Source(arguments.dataset, arguments.reprojection, ".exr")
-    views = source.lightfield.views
-    if len(views) < 2:
-        raise UserError(f"{arguments.dataset / arguments.reprojection / NAME}: has one view alone")
-    progress = Progress(len(views), "flow", "views")
-    places = source.lightfield.matrices[:, :3, 3]
-    for index, view in enumerate(views):
-        away = np.linalg.norm(places - places[index], axis=1)
-        away[index] = np.inf
-        other = views[int(away.argmin())]
-        depths = [source.depth(each, "distance") for each in (view, other)]
-        found, visible = flow(source.lens, view.matrix, other.matrix, *depths)
-        x, y = np.moveaxis(found.astype(np.float32), -1, 0)
-        path = arguments.output / f"{view.name}_to_{other.name}.exr"
-        images.write_exr(path, {"X": x, "Y": y, "V": visible.astype(np.float16)})
+
+    lightfield = LightField.read(arguments.lightfield)
+    source = Source(lightfield.folder, "", ".exr")
+    chosen = lightfield.views[view_slice(arguments.views, len(lightfield.views))]
+    named = {view.name: view for view in lightfield.views}
+    record = ShardRecord(arguments.record, arguments.output)
+    progress = Progress(len(chosen), f"flow {lightfield.folder} {arguments.views}".rstrip(": "))
+    paths = []
+    for view in chosen:
+        other = named.get(view.others.get("flow", ""))
+        if other is None:
+            raise UserError(f"{arguments.lightfield}: frames: {view.name}: flow: must name a view")
+        path = arguments.output / f"{view.flow}.exr"
+        sums = [sha256(source.path(each)) for each in (view, other)]
+        key = keys.flow_key(lightfield, view, other, sums)
+        if not record.is_finished(path, key):
+            depths = [source.depth(each, "distance") for each in (view, other)]
+            found, visible = flow(source.lens, view.matrix, other.matrix, *depths)
+            planes = [*np.moveaxis(np.nan_to_num(found), -1, 0), visible]
+            channels = {
+                name: plane.astype(FLOW.dtype)
+                for name, plane in zip(FLOW.channels, planes, strict=True)
+            }
+            images.write_exr(path, channels, {images.KEY_ATTRIBUTE: key})
+            record.add(path, key)
+        paths.append(path)
         progress.done()
+    record.write(paths)
 
 
 if __name__ == "__main__":

@@ -71,11 +71,10 @@ def main() -> None:
         dataset = replace(dataset, rig=dataset.rig.placed(arguments.places))
     if arguments.calibration:
         render = calibrated(render, read_json(arguments.calibration))
-    LightField.from_rig(
-        dataset.rig,
-        dataset.rig.camera.make(),
-        **dataset.origin(render),
-    ).write(arguments.output)
+    made = LightField.from_rig(dataset.rig, dataset.rig.camera.make(), **dataset.origin(render))
+    if dataset.flow and not arguments.panorama:
+        made = made.with_flow()
+    made.write(arguments.output)
 
 
 def panorama_rig(rig: rigs.Rig, width: int) -> rigs.Rig:

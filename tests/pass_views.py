@@ -3,7 +3,8 @@
 Runs in a process of its own, because bpy keeps one global state. Argument: a folder. Output in it,
 for each lens: a dataset <lens>/, its record <lens>.json and journal <lens>.jsonl, and in
 objects.npz as <lens> the name of the object that Blender's own ray casts find behind each pixel of
-its first view. "plain" is the first of the lenses without passes, "transparent" the fisheye.
+its first view. "plain" is the first of the lenses without passes, "transparent" the fisheye, and
+matte.exr what Blender's compositor reads in the perspective's Cryptomatte of the wall.
 """
 
 import json
@@ -107,6 +108,26 @@ def cast(content):
     return names
 
 
+def read_matte(path, name, target):
+    """Let Blender's own Cryptomatte node read a file, and write the matte of an object."""
+    blend_file.new_scene()
+    scene = bpy.context.scene
+    scene.render.engine, scene.cycles.samples = "CYCLES", 1
+    scene.render.resolution_x = scene.render.resolution_y = SIZE
+    scene.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    scene.collection.objects.link(scene.camera)
+    tree = bpy.data.node_groups.new("matte", "CompositorNodeTree")
+    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+    reader = tree.nodes.new("CompositorNodeCryptomatteV2")
+    reader.source, reader.image, reader.matte_id = "IMAGE", bpy.data.images.load(str(path)), name
+    tree.links.new(reader.outputs["Matte"], tree.nodes.new("NodeGroupOutput").inputs[0])
+    scene.compositing_node_group = tree
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_depth = "32"
+    scene.render.filepath = str(target)
+    bpy.ops.render.render(write_still=True)
+
+
 def main(folder: Path) -> None:
     blend = folder / "scene.blend"
     blend_file.new_scene()
@@ -144,6 +165,7 @@ def main(folder: Path) -> None:
     render("perspective", lightfield("perspective"))
     same = {file: (folder / "perspective" / file).read_bytes() == made[file] for file in files}
     (folder / "again.json").write_text(json.dumps(same))
+    read_matte(folder / "perspective/cryptomatte/view_0000f.exr", "wall", folder / "matte.exr")
 
 
 if __name__ == "__main__":

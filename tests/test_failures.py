@@ -33,6 +33,7 @@ rigs:
     count: 2
     size: 1
     camera: {lens: equidistant, fov: 180, resolution: [16, 16]}
+flow: {pairs: neighbours}
 exports:
   instant_ngp: {sources: [views]}
 """

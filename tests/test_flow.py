@@ -3,13 +3,23 @@
 The scene is the inside of a textured sphere, with a ball in it.
 """
 
+import shutil
+
 import numpy as np
 import pytest
+from checkouts import checkout, snakemake
 from sphere import RADIUS, colour_of, look, write_views
 
+from lightfield.core.errors import UserError
+from lightfield.dataset.config import Scene
+from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.geometry.flow import flow
 from lightfield.imaging import images
+from lightfield.validation.validate import validate
+
+ROW = {"type": "lattice", "cameras": [3, 1, 1], "size": 0.4}
+YAML = "{scene: {dataset: published}, flow: {pairs: neighbours}}"
 
 BALL, SIZE = np.array([0.3, 1.5, 0.1]), 0.5
 LENSES = {
@@ -66,25 +76,65 @@ def test_flow_leads_to_the_same_point_unless_it_is_hidden(name):
     assert np.ptp(colour_of(points[wall])) > 50
 
 
-def test_the_program_writes_flow_to_the_nearest_view(tmp_path, run_program):
-    rig = {"type": "lattice", "cameras": [3, 1, 1], "size": 0.4}
-    write_views(tmp_path / "dataset", LENSES["fisheye"] | {"resolution": [48, 48]}, rig)
-    run_program("flow.py", tmp_path / "dataset", "--output", tmp_path / "flow")
-    files = sorted(path.name for path in (tmp_path / "flow").iterdir())
-    assert files[0] == "view_0000f_to_view_0001f.exr" and len(files) == 3
-    there = images.read_image(tmp_path / "flow" / files[0]).channels
-    assert {name: str(plane.dtype) for name, plane in there.items()} == {
-        "X": "float32",
-        "Y": "float32",
-        "V": "float16",
-    }
-    # Warped by bilinear interpolation, away from the rim.
-    views = [
-        images.read_image(tmp_path / "dataset" / "exr" / f"view_000{n}f.exr").colour for n in (0, 1)
+def test_a_neighbour_is_the_nearest_of_another_place_that_looks_most_alike():
+    lens = lenses.from_camera(LENSES["perspective"] | {"fov": 90})
+    found = LightField.from_rig(ROW, lens).with_flow()
+    assert [view.flow for view in found.views] == [
+        "view_0000f_to_view_0001f",
+        "view_0001f_to_view_0000f",
+        "view_0002f_to_view_0001f",
     ]
-    rows, columns = np.nonzero(there["V"] == 1)
-    x = columns + there["X"][rows, columns]
-    y = rows + there["Y"][rows, columns]
+    faces = LightField.from_rig(ROW | {"cube_map": True}, lens).with_flow()
+    assert faces.views[1].others["flow"] == faces.views[1].name.replace("0000f", "0001f")
+    with pytest.raises(UserError, match="flow: all views are from one place"):
+        LightField.from_rig(ROW | {"cameras": [1, 1, 1], "cube_map": True}, lens).with_flow()
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A checkout with views that are there already, of which flow is asked for."""
+    folder = checkout(tmp_path / "plenoforge", theirs=YAML)
+    write_views(folder / "published/dataset", LENSES["perspective"] | {"resolution": [48, 48]}, ROW)
+    (folder / "published/dataset").rename(folder / "published/row")
+    return folder
+
+
+@pytest.mark.slow
+def test_flow_is_a_part_of_the_dataset_as_long_as_the_yaml_asks_for_it(folder):
+    def build():
+        made = snakemake(folder, "--config", "scenes=theirs", "preset=full")
+        assert made.returncode == 0, made.stdout + made.stderr
+
+    build()
+    dataset = folder / "results/theirs/row"
+    files = sorted((dataset / "flow").iterdir())
+    assert files[0].name == "view_0000f_to_view_0001f.exr" and len(files) == 3
+    assert "flow/view_0000f_to_view_0001f.exr" in (dataset / "sha256sums.txt").read_text()
+    assert "flow" in (dataset / "lightfield.json").read_text()
+    there = images.read_image(files[0]).channels
+    assert {name: str(plane.dtype) for name, plane in there.items()} == dict.fromkeys(
+        "XYV", "float32"
+    )
+    check_warp(dataset, there)
+    # One that is missing is made again alone, to the same bytes.
+    made, kept = files[1].read_bytes(), files[0].stat().st_mtime_ns
+    files[1].unlink()
+    build()
+    assert (files[1].read_bytes(), files[0].stat().st_mtime_ns) == (made, kept)
+    # Out of the YAML, out of the dataset.
+    (folder / "configs/scenes/theirs.yaml").write_text("scene: {dataset: published}")
+    build()
+    assert not (dataset / "flow").exists()
+    assert "flow" not in (dataset / "lightfield.json").read_text()
+    assert len(list((folder / "work/removed").rglob("flow/*.exr"))) == 3
+
+
+def check_warp(dataset, flow):
+    """Check that the other view's colour, by bilinear interpolation, is this one's."""
+    views = [images.read_image(dataset / "exr" / f"view_000{n}f.exr").colour for n in (0, 1)]
+    rows, columns = np.nonzero(flow["V"] == 1)
+    x = columns + flow["X"][rows, columns]
+    y = rows + flow["Y"][rows, columns]
     j, i = np.floor(x).astype(int).clip(0, 46), np.floor(y).astype(int).clip(0, 46)
     fx, fy = (x - j)[:, None], (y - i)[:, None]
     top = views[1][i, j] * (1 - fx) + views[1][i, j + 1] * fx
@@ -92,3 +142,48 @@ def test_the_program_writes_flow_to_the_nearest_view(tmp_path, run_program):
     error = np.abs(top * (1 - fy) + bottom * fy - views[0][rows, columns])
     assert len(rows) > 1000
     assert np.median(error) < 1e-3
+
+
+SPOILED = {
+    "missing": (None, "is missing"),
+    "mask": ({"V": 0.5}, "2304 values of V are neither 0 nor 1"),
+    "frame": ({"X": 100.0}, "visible points are out of the frame"),
+    "number": ({"Y": np.nan}, "2304 values are not finite"),
+}
+
+
+@pytest.fixture(scope="module")
+def computed(tmp_path_factory, run_program):
+    folder = tmp_path_factory.mktemp("flow") / "dataset"
+    write_views(folder, LENSES["fisheye"] | {"resolution": [48, 48]}, ROW)
+    LightField.read(folder / "lightfield.json").with_flow().write(folder / "lightfield.json")
+    run_program("flow.py", "--lightfield", folder / "lightfield.json", "--output", folder / "flow")
+    assert found(folder).passed
+    return folder
+
+
+@pytest.mark.parametrize("what", SPOILED)
+def test_validation_knows_what_flow_must_hold(what, computed, tmp_path):
+    folder = shutil.copytree(computed, tmp_path / "dataset")
+    path = folder / "flow/view_0000f_to_view_0001f.exr"
+    wrong, problem = SPOILED[what]
+    if wrong is None:
+        path.unlink()
+    else:
+        channels = dict(images.read_image(path).channels)
+        planes = {name: np.full((48, 48), value, np.float32) for name, value in wrong.items()}
+        images.write_exr(path, channels | planes)
+    (said,) = found(folder).problems
+    assert said.startswith("flow/view_0000f_to_view_0001f.exr: ") and problem in said
+
+
+def found(folder):
+    return next(check for check in validate(folder).checks if check.name == "passes")
+
+
+def test_flow_without_depth_is_refused():
+    rig = {"type": "lattice", "cameras": [2, 1, 1], "camera": LENSES["fisheye"]}
+    content = {"scene": {"builder": "room"}, "rigs": {"one": rig}, "flow": {"pairs": "neighbours"}}
+    with pytest.raises(ValueError, match=r"flow: follows from depth, but"):
+        Scene.model_validate(content | {"render": {"samples": 1, "depth": "none"}})
+    Scene.model_validate(content | {"render": {"samples": 1}})

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from pass_views import LENSES, RENDER, SIZE, WALL
+from scipy.ndimage import binary_dilation, binary_erosion
 
 from lightfield.core.files import read_json, sha256
 from lightfield.dataset import passes
@@ -101,6 +102,59 @@ def test_what_is_not_a_number_is_counted_and_becomes_0():
         assert [plane[0].tolist() for plane in channels.values()] == [[0, 0], [0, 0], [0, 1]]
 
 
+def mattes(folder):
+    """Return the part (h, w) that each object covers of each pixel, by name."""
+    channels = read(folder, "cryptomatte")
+    header = images.read_header(PASSES["cryptomatte"].path(folder, "view_0000f")).attributes
+    manifest = json.loads(header["cryptomatte/3ae39a5/manifest"])
+    hashes = {name: np.array(int(text, 16), np.uint32) for name, text in manifest.items()}
+    return {
+        name: (channels[..., 1::2] * (channels[..., ::2].view(np.uint32) == number)).sum(axis=-1)
+        for name, number in hashes.items()
+    }
+
+
+def seen_by_fisheye(made):
+    lens = LightField.read(made / "fisheye/lightfield.json").lens
+    return np.isfinite(lens.pixel_rays()[..., 0])
+
+
+def in_fog(folder):
+    """Return the pixels in which a path may have met the fog."""
+    return binary_dilation(read(folder, "volume_light").any(axis=-1), iterations=2)
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_a_matte_is_the_part_of_the_samples_that_saw_the_object(lens, made):
+    found, cast = mattes(made / lens), np.load(made / "objects.npz")[lens]
+    clear = ~in_fog(made / lens)
+    for name in ("floor", "wall", "ball", "metal"):
+        samples = found[name][clear] * RENDER["samples"]
+        np.testing.assert_allclose(samples, np.rint(samples), atol=1e-5)
+        # Where it also is all around there is nothing else in the pixel.
+        inside = clear & binary_erosion(cast == name, np.ones((5, 5)))
+        assert (found[name][inside] == 1).all()
+        assert found[name][cast == name].mean() > 0.7
+    covered = sum(found.values())
+    np.testing.assert_array_less(covered[clear], 1 + 1e-6)
+    edges = (found["wall"] > 0) & (found["wall"] < 1) & clear
+    assert edges.sum() > 20
+
+
+def test_alpha_is_what_mattes_cover_and_other_programs_read_them(made):
+    alpha = images.read_image(made / "transparent/exr/view_0000f.exr").channels["A"]
+    found = mattes(made / "transparent")
+    # Of glass, too, alpha is less; and Cycles calls opaque what the lens does not see.
+    solid = binary_erosion(seen_by_fisheye(made)) & (found["ball"] == 0)
+    solid &= ~in_fog(made / "transparent")
+    np.testing.assert_allclose(sum(found.values())[solid], alpha[solid], atol=1e-3)
+    # Blender's compositor, by the hash of the name.
+    read_there = images.read_image(made / "matte.exr", ["R"]).channels["R"]
+    wall = mattes(made / "perspective")["wall"]
+    np.testing.assert_array_equal(read_there, wall)
+    assert 0.3 < wall.mean() < 0.9
+
+
 @pytest.mark.parametrize("lens", LENSES)
 def test_the_parts_of_light_add_up_to_the_colour(lens, made):
     parts = {name: read(made / lens, name).astype(np.float64) for name in PARTS_OF_LIGHT}
@@ -132,8 +186,9 @@ def test_a_transparent_view_has_alpha_where_another_has_the_world(made):
     alpha, opaque = image.channels["A"], read(made / "fisheye", "exr")
     assert alpha.dtype == np.float16
     cast = np.load(made / "objects.npz")["fisheye"]
-    seen = np.isfinite(LightField.read(made / "fisheye/lightfield.json").lens.pixel_rays()[..., 0])
-    assert np.median(alpha[cast == "wall"]) == 1 and np.median(alpha[seen & (cast == "")]) == 0
+    seen = seen_by_fisheye(made)
+    assert not alpha[~seen].any() and np.median(alpha[cast == "wall"]) == 1
+    assert np.median(alpha[seen & (cast == "")]) == 0
     assert ((alpha > 0) & (alpha < 1)).sum() > 20
     # Associated: over the world it is the opaque view.
     parts = {name: read(made / "transparent", name).astype(np.float64) for name in PARTS_OF_LIGHT}
@@ -168,6 +223,14 @@ def spoil_light(folder):
     images.write_exr(folder / "emission" / "view_0001f.exr", planes)
 
 
+def spoil_matte(folder):
+    path = folder / "cryptomatte" / "view_0001f.exr"
+    image = images.read_image(path)
+    planes = image.channels | {"CryptoObject00.R": np.ones((SIZE, SIZE), np.float32)}
+    header = {name: text for name, text in image.attributes.items() if "cryptomatte" in name}
+    images.write_exr(path, planes, header)
+
+
 SPOILED = {
     "nothing": (lambda folder: None, None),
     "missing": (
@@ -177,6 +240,10 @@ SPOILED = {
     "ids": (spoil_ids, "object/view_0000f.exr: has [99], which object/names.json does not have"),
     "normals": (spoil_normals, "normal/view_0001f.exr: 1024 normals are no unit vectors"),
     "light": (spoil_light, "emission/view_0001f.exr: 3072 values are not finite"),
+    "matte": (
+        spoil_matte,
+        "cryptomatte/view_0001f.exr: has 1 objects that its manifest does not have",
+    ),
     "kind": (
         lambda folder: shutil.copy(folder / "normal/view_0000f.exr", folder / "object"),
         "object/view_0000f.exr: has the channels B:float32 G:float32 R:float32; must have Y:uint32",
@@ -218,10 +285,15 @@ def test_reprojected_ids_are_kept_normals_unit_and_light_still_adds_up(made, tmp
     files = read_json(tmp_path / "record.json")["files"]
     assert len(files) == 2 * (1 + len(names))
     assert "perspective/normal/view_0000f.exr" in files
+    numbers = read_json(source / "object" / "names.json")
     ids, truth = (read(folder, "object")[..., 0] for folder in (target, made / "perspective"))
     assert set(np.unique(ids)) <= set(np.unique(read(source, "object")))
     # A source pixel is three of these wide, and where it has an edge they differ.
     assert (ids == truth).mean() > 0.85
+    matte, original = (read(folder, "cryptomatte") for folder in (target, source))
+    pairs = {tuple(pair) for pair in original.reshape(-1, 12)[:, :2].tolist()}
+    assert {tuple(pair) for pair in matte.reshape(-1, 12)[:, :2].tolist()} - pairs == set()
+    assert mattes(target)["wall"][truth == numbers["wall"]].mean() > 0.9
     normal, known = read(target, "normal"), read(made / "perspective", "normal")
     np.testing.assert_allclose(np.linalg.norm(normal, axis=-1)[truth > 0], 1, atol=1e-5)
     cosine = np.sum(normal * known, axis=-1)

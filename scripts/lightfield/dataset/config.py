@@ -27,7 +27,7 @@ from lightfield.core.files import read_json, sha256, write_json
 from lightfield.core.settings import AS_WRITTEN, Name, Settings, Vector, checked, suggestion
 from lightfield.dataset import published
 from lightfield.dataset.exports import VIEWS, Export, Exports
-from lightfield.dataset.passes import PASSES, in_order
+from lightfield.dataset.passes import FLOW, PASSES, in_order
 from lightfield.geometry.lenses import LENSES, CameraSettings, Lens
 from lightfield.geometry.lenses.cube_map import CubeMap
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
@@ -43,7 +43,7 @@ BUILDERS = ROOT / "scripts" / "scenes"
 # What already has these names beside a scene's folder, a rig's, and a reprojection's.
 SCENE_NEIGHBOURS = {"benchmarks", "logs", "removed", "tables"}
 RIG_NEIGHBOURS = {"trials"}
-REPROJECTION_NEIGHBOURS = {"exr", "exports", "panorama", "render", "report", *PASSES}
+REPROJECTION_NEIGHBOURS = {"exr", "exports", "panorama", "render", "report", FLOW.name, *PASSES}
 # Files lie there, too, and folders of a sequence's frames.
 OTHER_NEIGHBOURS = re.compile(r"f\d{5,7}|.*\.(blend|html|json|txt)")
 # More of them have no use, and planning them would take hours.
@@ -431,6 +431,14 @@ class Reprojection(Settings):
         return shlex.join(words)
 
 
+class Flow(Settings):
+    """Where another view sees what a view sees."""
+
+    pairs: Literal["neighbours"] = Field(
+        description="From each view to the one whose camera is nearest."
+    )
+
+
 class Report(Settings):
     """What a dataset's page shows."""
 
@@ -472,6 +480,7 @@ class Scene(Settings):
     reprojections: Annotated[dict[Name, Reprojection], AfterValidator(_bracketed)] = Field(
         {}, description="The same views through other lenses, by the names of their folders."
     )
+    flow: Flow | None = Field(None, description="From depth and poses, of what stands still.")
     exports: Exports = Field(Exports(), description="Files for trainers.")
     report: Report = Field(Report(), description="What a dataset's page shows.")
 
@@ -519,6 +528,8 @@ class Scene(Settings):
                     raise ValueError(f"{key}.passes: motion is in pixels of the rendered lens")
         for name, export in self.exports.wanted.items():
             self._check_export(f"exports.{name}.sources", export)
+        if self.flow and self.render and self.render.depth == "none":
+            raise ValueError("flow: follows from depth, but render.depth is none")
         self._check_whole_rigs()
         return self
 

@@ -73,6 +73,7 @@ class Dataset:
     render: dict[str, Any]
     rig: Rig
     reprojections: dict[str, config.Reprojection]
+    flow: config.Flow | None
     exports: Exports
     # For the report, from the rig's centre.
     has_panorama: bool
@@ -184,7 +185,8 @@ class Dataset:
                 return
         own = f"{self.folder}/{NAME}"
         expected = self.origin(render) | self.rig.camera.make().to_lightfield()
-        if Path(own).exists() and _differs(own, expected, self.placed_rig.poses()):
+        poses = self.placed_rig.poses()
+        if Path(own).exists() and _differs(own, expected, poses, bool(self.flow)):
             yield own
         for name, reprojection in self.reprojections.items():
             path = f"{self.folder}/{name}/{NAME}"
@@ -328,6 +330,7 @@ class Dataset:
             for name, reprojection in self.reprojections.items()
             for pass_name in reprojection.passes or ()
         ]
+        own += [passes.FLOW] if self.flow else []
         return ["exr", *(found.name for found in own), *self.reprojections, *reprojected]
 
     @property
@@ -371,16 +374,21 @@ class Dataset:
         return f"{self.folder}/report/index.html"
 
     def record(self, stage: str, first: int, end: int) -> str:
-        """The record of a shard at a stage: ``render``, or a reprojection's name."""
+        """The record of a shard at one of the ``stages``."""
         return f"{self.work}/{stage}/{first}-{end}.json"
 
     def records(self, stage: str) -> list[str]:
         return [self.record(stage, first, end) for first, end in self.shards]
 
     @property
+    def stages(self) -> list[str]:
+        """The stages that make the dataset's images, shard by shard."""
+        return ["render", *self.reprojections, *([passes.FLOW.name] if self.flow else [])]
+
+    @property
     def all_records(self) -> list[str]:
-        """The records of every stage that makes the dataset's images."""
-        return [file for stage in ("render", *self.reprojections) for file in self.records(stage)]
+        """The records of all of these."""
+        return [file for stage in self.stages for file in self.records(stage)]
 
     @property
     def files(self) -> list[str]:
@@ -450,11 +458,7 @@ class Dataset:
             if problem := broken(Path(path)):
                 yield path, problem
         views = (view for name in self.image_folders for view in _entries(self.folder, name))
-        journals = (
-            journal
-            for stage in ("render", *self.reprojections)
-            for journal in _entries(self.work, stage)
-        )
+        journals = (journal for stage in self.stages for journal in _entries(self.work, stage))
         for entry in (*views, *journals):
             if entry.is_dir() and entry.name.endswith((".exr", ".png", ".jsonl")):
                 yield entry.path, "is a folder"
@@ -536,9 +540,11 @@ class Dataset:
 
     @property
     def expected_view_bytes(self) -> float:
-        """Bytes of a view and of what it is reprojected to."""
+        """Bytes of a view, its flow, and what it is reprojected to."""
         sizes = {"exr": 10 * COMPRESSED, "png": PNG_BYTES}
-        return self.expected_view[1] + sum(
+        own = self.expected_view[1]
+        own += passes.FLOW.bytes * COMPRESSED * self._pixels if self.flow else 0
+        return own + sum(
             math.prod((reprojection.camera or self.rig.camera).resolution)
             * sizes[reprojection.format]
             * (reprojection.bits / 8)
@@ -606,10 +612,12 @@ def _scene_memory(inventory: Path, _changed: int) -> int:
         return memory.UNKNOWN_SCENE
 
 
-def _differs(path: str, expected: dict[str, Any], poses: Sequence[Pose] = ()) -> bool:
+def _differs(
+    path: str, expected: dict[str, Any], poses: Sequence[Pose] = (), flow: bool = False
+) -> bool:
     """Whether a JSON file is there and says something else than is ``expected`` of its keys.
 
-    Its frames must be the ``poses``, if there are any.
+    Its frames must be the ``poses``, if there are any, and have flow or not.
     """
     others = iter(poses)
 
@@ -619,7 +627,8 @@ def _differs(path: str, expected: dict[str, Any], poses: Sequence[Pose] = ()) ->
             return mapping
         pose = next(others)
         found = (mapping["name"], *mapping["position"], *mapping["rotation"], mapping.get("split"))
-        return found == (pose.name, *pose.position, *pose.rotation, pose.split)
+        same = found == (pose.name, *pose.position, *pose.rotation, pose.split)
+        return same and ("flow" in mapping) == flow
 
     try:
         content = json.loads(Path(path).read_bytes(), object_hook=is_pose)
@@ -729,6 +738,7 @@ def scene_datasets(
                     render=_limited_render(written.render, rig, limits),
                     rig=_limited_rig(rig, limits, written.render is not None),
                     reprojections=reprojections,
+                    flow=written.flow,
                     exports=written.exports.model_copy(update=exports),
                     has_panorama=has_panorama,
                     limits=limits,

@@ -17,8 +17,10 @@ from lightfield.dataset import published
 from lightfield.dataset.config import BUILDERS, Source
 from lightfield.dataset.lightfield import LightField, View
 
-# Raised when the program that renders changes what it writes for the same settings.
+# Raised when the program that renders changes what it writes for the same settings, and that which
+# computes flow.
 RENDER_VERSION = 3
+FLOW_VERSION = 1
 
 
 # Looked up in the package's files, which takes a millisecond.
@@ -58,6 +60,12 @@ def render_key(lightfield: LightField, view: View) -> str:
 def names_key(lightfield: LightField) -> str:
     """Return the key of the numbers that a light field's objects and materials have."""
     return _digest([RENDER_VERSION, version("bpy"), lightfield.content.get("scene")])
+
+
+def flow_key(lightfield: LightField, view: View, other: View, sums: Sequence[str]) -> str:
+    """Return the key of the flow between two views of these SHA-256 checksums."""
+    poses = [view.matrix.tolist(), other.matrix.tolist()]
+    return _digest([FLOW_VERSION, lightfield.lens.to_lightfield(), poses, list(sums)])
 
 
 def view_seed(seed: int, name: str) -> int:

@@ -2,8 +2,9 @@
 
 The keys are SILVR's (``camera``, ``lf_type``, ``resolution``, ``sensor_size``, ``frames``) and ours
 beside them: ``depth``, what channel Z of the views means, ``frame`` of the scene, ``scene`` and
-``render``, what was rendered and how. ``passes``, of a
-reprojection, are those of ``render`` that it has. Files that SILVR's tools wrote are read too.
+``render``, what was rendered and how. ``passes``, of a reprojection, are those of ``render`` that
+it has. A frame's ``split`` is what the view is for, and its ``flow`` the view to which its flow
+leads. Files that SILVR's tools wrote are read too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,6 +21,7 @@ from lightfield.core.files import read_json, write_json
 from lightfield.dataset import passes
 from lightfield.dataset.passes import Pass
 from lightfield.geometry import lenses, rigs, rotations
+from lightfield.geometry.flow import neighbours
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
@@ -53,6 +55,11 @@ class View:
     def split(self) -> str | None:
         """What the view is for: ``train``, ``validate`` or ``test``; None where none is said."""
         return self.others.get("split")
+
+    @property
+    def flow(self) -> str | None:
+        """The name of the view's flow, if it has any: <its own>_to_<the other's>."""
+        return f"{self.name}_to_{self.others['flow']}" if "flow" in self.others else None
 
     def to_json(self) -> dict[str, Any]:
         return {
@@ -175,6 +182,16 @@ class LightField:
             self,
             content={**self.content, **intrinsics, **keys},
             views=self.views if views is None else views,
+        )
+
+    def with_flow(self) -> "LightField":
+        """Return a copy in which each view has a neighbour to which its flow leads."""
+        others = [self.views[number].name for number in neighbours(self.matrices)]
+        return self.changed(
+            views=[
+                replace(view, others={**view.others, "flow": other})
+                for view, other in zip(self.views, others, strict=True)
+            ]
         )
 
     @property

@@ -4,6 +4,7 @@ They lie in a folder of the pass's name beside lightfield.json: normal/view_0000
 is the only one: settings, rendering, validation and reprojection follow it.
 """
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,14 +19,15 @@ class Pass:
     """One pass.
 
     ``kind`` is how it is resampled: "light" as colour is, a "normal" too, but it is made a unit
-    vector again, an "id" is that of the source pixel that the ray falls in, and "motion", which
-    counts in pixels of its own lens, is not resampled at all. ``cycles`` are the passes of Cycles
-    that it is the sum of, times Cycles' pass ``factor`` if it has one. Those of colour are means
-    over all samples, the others are of the surface at the pixel's centre, as depth is.
+    vector again, an "id" and a "matte" are those of the source pixel that the ray falls in, and
+    "motion" and "flow", which count in pixels of their own lens, are not resampled at all.
+    ``cycles`` are the passes of Cycles that it is the sum of, times Cycles' pass ``factor`` if it
+    has one; a matte is made of them side by side. Those of colour are means over all samples, the
+    others are of the surface at the pixel's centre, as depth is.
     """
 
     name: str
-    kind: Literal["light", "normal", "id", "motion"]
+    kind: Literal["light", "matte", "normal", "id", "motion", "flow"]
     channels: tuple[str, ...]
     dtype: str
     meaning: str
@@ -35,7 +37,7 @@ class Pass:
     @property
     def of_colour(self) -> bool:
         """Whether it comes from the samples of the colour, and not from the geometry."""
-        return self.kind == "light"
+        return self.kind in ("light", "matte")
 
     @property
     def needed(self) -> tuple[str, ...]:
@@ -59,6 +61,14 @@ def _light(name: str, meaning: str, *cycles: str, factor: str | None = None) -> 
 def _id(name: str, cycles: str) -> Pass:
     meaning = f"the {name}'s number in {NAMES}; 0 where nothing is hit"
     return Pass(name, "id", ("Y",), "uint32", meaning, (cycles,))
+
+
+def _matte(*cycles: str) -> Pass:
+    channels = tuple(f"{name}.{letter}" for name in cycles for letter in "RGBA")
+    meaning = (
+        "the six objects that cover most of the pixel, each its hash and its part, greatest first"
+    )
+    return Pass("cryptomatte", "matte", channels, "float32", meaning, cycles)
 
 
 def _scattered(name: str) -> Pass:
@@ -85,6 +95,7 @@ PASSES = {
         ),
         _id("object", "Object Index"),
         _id("material", "Material Index"),
+        _matte("CryptoObject00", "CryptoObject01", "CryptoObject02"),
         Pass(
             "motion",
             "motion",
@@ -103,6 +114,34 @@ PASSES = {
         _light("environment", "light of the world, seen directly", "Environment"),
     )
 }
+
+# Not rendered but made of depth and poses: see `lightfield.geometry.flow`. Its files have the names
+# of two views, as in view_0000f_to_view_0001f.exr.
+FLOW = Pass(
+    "flow",
+    "flow",
+    ("X", "Y", "V"),
+    "float32",
+    "where the other view has what is here, in pixels from here, x to the right and y down, and "
+    "whether it is visible there (1) or hidden or out of its frame (0)",
+    (),
+)
+
+# In the header of a matte, by the specification of Cryptomatte: a layer's key is the beginning of
+# the hash of its name, and the manifest a JSON of the objects' names and hashes.
+_LAYER = "cryptomatte/3ae39a5/"
+MANIFEST = f"{_LAYER}manifest"
+
+
+def matte_header(manifest: Mapping[str, str]) -> dict[str, str | int | float]:
+    """Return the attributes of a matte's EXR, by which other programs read it."""
+    return {
+        f"{_LAYER}name": "CryptoObject",
+        f"{_LAYER}hash": "MurmurHash3_32",
+        f"{_LAYER}conversion": "uint32_to_float32",
+        MANIFEST: json.dumps(manifest),
+    }
+
 
 # Their sum is the view's colour.
 PARTS_OF_LIGHT = (

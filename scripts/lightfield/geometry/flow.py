@@ -2,11 +2,33 @@
 
 import numpy as np
 
+from lightfield.core.errors import UserError
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 
 # A point is hidden if the other view sees a surface that is nearer by more than this part of it.
 HIDDEN = 0.01
+# Two cameras are equally near if their distances differ by less than this part.
+AS_NEAR = 1e-6
+
+
+def neighbours(matrices: Array) -> list[int]:
+    """Return, for each of the views at ``matrices`` (n, 4, 4), the number of its neighbour.
+
+    That is the one whose camera is nearest, and of equally near ones the one that looks most alike.
+    Views from the very same place are none, for between these nothing is hidden. Raises `UserError`
+    where there are no others.
+    """
+    places, ahead = matrices[:, :3, 3], matrices[:, :3, 2]
+    found = []
+    for place, look in zip(places, ahead, strict=True):
+        away = np.linalg.norm(places - place, axis=1)
+        away[away < AS_NEAR] = np.inf
+        if np.isinf(away.min()):
+            raise UserError("flow: all views are from one place; must be two or more")
+        near = np.flatnonzero(away <= away.min() * (1 + AS_NEAR))
+        found.append(int(near[np.argmax(np.round(ahead[near] @ look, 6))]))
+    return found
 
 
 def flow(
@@ -37,8 +59,23 @@ def flow(
     expected = np.where(far, np.inf, np.linalg.norm(offset, axis=-1))
     visible = inside & (expected <= (1 + HIDDEN) * farthest)
     found = pixels - (np.indices(distance.shape)[::-1].transpose(1, 2, 0) + 0.5)
-    if isinstance(lens, Equirectangular):
-        # The shorter of the two paths around.
-        turn = lens.width * 2 * np.pi / (lens.longitude[1] - lens.longitude[0])
-        found[..., 0] -= turn * np.rint(found[..., 0] / turn)
+    found[..., 0] = shorter(lens, found[..., 0])
     return found, visible
+
+
+def shorter(lens: Lens, across: Array) -> Array:
+    """Return a motion to the right in pixels by the shorter of the two paths around a panorama."""
+    if not isinstance(lens, Equirectangular):
+        return across
+    return np.asarray(across - lens.turn * np.rint(across / lens.turn))
+
+
+def in_frame(lens: Lens, found: Array) -> Array:
+    """Return where flow (2, h, w) leads to a place in the frame, (h, w), but for rounding."""
+    y, x = np.indices(found.shape[1:]) + 0.5 + found[::-1]
+    if isinstance(lens, Equirectangular):
+        x %= lens.turn
+    rounding = 0.01
+    sides = ((x, lens.width), (y, lens.height))
+    inside = [(-rounding < at) & (at < side + rounding) for at, side in sides]
+    return np.asarray(inside[0] & inside[1])

@@ -50,7 +50,7 @@ from typing import Any
 
 from lightfield.dataset import journal
 from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.dataset.passes import PASSES
+from lightfield.dataset.passes import FLOW, PASSES
 from lightfield.measurement.sampling import DENOISING_SAMPLES, cost_in_samples, standard_error
 
 # The stages that every dataset has, in the order of the work; others come between.
@@ -323,7 +323,7 @@ def extrapolation(
     # Processor time beside a graphics card's is a part of the machine's.
     processor = all(on_processor(run) for run in runs if run.views)
     part = 1 if processor else 1 / tariff.cores
-    growing = {"validate", *reprojections}
+    growing = {"validate", FLOW.name, *reprojections}
     each_view = mean(view.rest for view in latest) + part / here * sum(
         stage.cpu_seconds for name, stage in stages.items() if name in growing
     )

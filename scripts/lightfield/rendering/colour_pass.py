@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 
 from lightfield.dataset.passes import Pass
+from lightfield.imaging.images import Attribute
 from lightfield.rendering.cycles import view_layer
 from lightfield.rendering.view import Array, render_view
 
@@ -20,7 +21,8 @@ _COUNTS = "Debug Sample Count"
 class Colour:
     """The colour of a view, (height, width, 3 or 4) float32, scene-linear, alpha associated.
 
-    ``passes`` are those that were asked for, by name, each as the colour itself.
+    ``passes`` are those that were asked for, by name, each as the colour itself; ``manifest`` has
+    the hashes of the objects in a matte.
     ``render_seconds`` and ``synchronization_seconds`` are Cycles' own. ``samples``,
     (height, width), is how many each pixel took, and ``worked_seconds`` the processor time, of all
     threads, of those ``render_seconds``; None unless `watch_samples` asked for them.
@@ -28,6 +30,7 @@ class Colour:
 
     pixels: Array
     passes: dict[str, Array]
+    manifest: dict[str, str]
     samples: Array | None
     render_seconds: float
     worked_seconds: float | None
@@ -44,7 +47,9 @@ def render_colour(
     watched = view_layer(bpy.context.scene).cycles.pass_debug_sample_count
     _reports.clear()
     wanted = [found for found in passes if found.of_colour]
-    needed = dict.fromkeys([name for found in wanted for name in found.needed], "RGB")
+    needed = {
+        name: "rgba" if each.kind == "matte" else "RGB" for each in wanted for name in each.needed
+    }
     needed |= {"Combined": "RGBA" if alpha else "RGB"} | ({_COUNTS: "X"} if watched else {})
     found = render_view(world_matrix, seed, needed)
     samples = None
@@ -54,6 +59,7 @@ def render_colour(
     return Colour(
         pixels=found.passes["Combined"],
         passes={each.name: _composed(each, found.passes) for each in wanted},
+        manifest=_manifest(found.attributes),
         samples=samples,
         worked_seconds=_reports[-1][0] - _reports[0][0] if _reports else None,
         render_seconds=found.render_seconds,
@@ -63,8 +69,17 @@ def render_colour(
 
 def _composed(wanted: Pass, passes: Mapping[str, Array]) -> Array:
     """Return a pass of ours from those of Cycles, by name."""
-    total = np.sum([passes[name] for name in wanted.cycles], axis=0)
+    parts = [passes[name] for name in wanted.cycles]
+    if wanted.kind == "matte":
+        return np.concatenate(parts, axis=-1)
+    total = np.sum(parts, axis=0)
     return np.asarray(total * passes[wanted.factor] if wanted.factor else total)
+
+
+def _manifest(attributes: Mapping[str, Attribute]) -> dict[str, str]:
+    """Return the objects' names and hashes, which Cycles writes without escaping a quote."""
+    text = next((str(text) for name, text in attributes.items() if name.endswith("/manifest")), "")
+    return dict(sorted(re.findall(r'"(.*?)":"([0-9a-f]{8})"(?:,|}$)', text)))
 
 
 def watch_samples() -> None:

@@ -112,6 +112,8 @@ def _set_passes(scene: Any, passes: Iterable[Pass]) -> None:
                 setattr(owner, name, False)
     for name in ("Combined", *(name for p in passes if p.of_colour for name in p.needed)):
         setattr(*pass_property(layer, name), True)
+    # Two objects in each of its passes.
+    layer.pass_cryptomatte_depth = 6
     layer.cycles.denoising_store_passes = False
     layer.cycles.pass_debug_sample_count = False
     # Passes of the artist's own, and those of light groups.
@@ -123,6 +125,8 @@ def _set_passes(scene: Any, passes: Iterable[Pass]) -> None:
 def pass_property(layer: Any, name: str) -> tuple[Any, str]:
     """Return where a view layer is asked for Cycles' pass of a name: the owner, its attribute."""
     owner = layer.cycles if name.startswith("Volume ") else layer
+    if name.startswith("CryptoObject"):
+        return owner, "use_pass_cryptomatte_object"
     short = {"Depth": "z", "Emission": "emit"}.get(name, name.lower().replace(" ", "_"))
     return owner, f"use_pass_{short}"
 

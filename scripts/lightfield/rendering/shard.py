@@ -28,8 +28,8 @@ from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.passes import Pass
 from lightfield.dataset.records import ShardRecord
 from lightfield.geometry import depth
+from lightfield.geometry.flow import shorter
 from lightfield.geometry.lenses import Lens
-from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.imaging import images
 
 if TYPE_CHECKING:
@@ -157,6 +157,7 @@ def _render_views(
     from lightfield.rendering.geometry_pass import render_geometry
 
     rays = depth_rays(lightfield)
+    blind = ~np.isfinite(lightfield.lens.pixel_rays()[..., 0]) if lightfield.transparent else None
     wanted = lightfield.passes
     seed = lightfield.render["seed"]
     compression = lightfield.render.get("compression", "zip")
@@ -172,6 +173,9 @@ def _render_views(
         colour = render_colour(
             view.matrix, keys.view_seed(seed, view.name), wanted, lightfield.transparent
         )
+        if blind is not None:
+            # Cycles calls opaque what the lens does not see.
+            colour.pixels[blind, 3] = 0
         parts = [part for part in (geometry, colour) if part]
         channels, attributes = colour_channels(colour.pixels)
         if geometry and lightfield.depth:
@@ -230,6 +234,10 @@ def pass_channels(
 
     What is not a number is counted and becomes 0: Cycles leaves it out of the colour alone.
     """
+    if wanted.kind == "matte":
+        planes = np.moveaxis(colour.passes[wanted.name], -1, 0)
+        named = dict(zip(wanted.channels, planes, strict=True))
+        return named, passes.matte_header(colour.manifest)
     if wanted.of_colour:
         channels, attributes = colour_channels(colour.passes[wanted.name])
         return {name: np.nan_to_num(plane, nan=0) for name, plane in channels.items()}, attributes
@@ -246,10 +254,7 @@ def pass_channels(
         case _:
             assert geometry.motion is not None
             pixels = geometry.motion.copy()
-            if isinstance(lens, Equirectangular):
-                # The shorter of the two paths around.
-                turn = lens.width * 2 * np.pi / (lens.longitude[1] - lens.longitude[0])
-                pixels[..., ::2] -= turn * np.rint(pixels[..., ::2] / turn)
+            pixels[..., ::2] = shorter(lens, pixels[..., ::2])
     planes = np.moveaxis(pixels.astype(wanted.dtype), -1, 0)
     return dict(zip(wanted.channels, planes, strict=True)), attributes
 

@@ -26,11 +26,12 @@ Array = np.ndarray[Any, Any]
 class Rendered:
     """What Cycles made of a view, in float32.
 
-    ``passes`` are (height, width, channels) by Cycles' names for them.
+    ``passes`` are (height, width, channels) by Cycles' names for them, ``attributes`` the header.
     ``render_seconds`` and ``synchronization_seconds`` are Cycles' own.
     """
 
     passes: dict[str, Array]
+    attributes: dict[str, images.Attribute]
     render_seconds: float
     synchronization_seconds: float
 
@@ -73,6 +74,7 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
             name: np.stack([image.channels[channel] for channel in group], axis=-1)
             for name, group in names.items()
         },
+        image.attributes,
         _seconds(image.attributes[f"cycles.{layer}.render_time"]),
         _seconds(image.attributes[f"cycles.{layer}.synchronization_time"]),
     )

@@ -292,6 +292,8 @@ def _find(folder: Path, name: str, lens: Lens) -> tuple[Path, ...]:
 
 def _turned(view: lightfield.View, target: Target) -> lightfield.View:
     name = view.name + target.suffix
+    # Its flow counts in pixels of its own lens.
+    view = replace(view, others={k: v for k, v in view.others.items() if k != "flow"})
     if np.array_equal(target.rotation, np.eye(3)):
         return replace(view, name=name)
     matrix = view.matrix.copy()

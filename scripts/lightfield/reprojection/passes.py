@@ -1,4 +1,4 @@
-"""Passes through a lens map: light as colour, normals made unit vectors again, ids as they are."""
+"""Passes through a lens map: light as colour, normals unit vectors, ids and mattes as they are."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,10 +19,12 @@ def write_pass(
     job: Job, wanted: Pass, view: SourceView, made: LensMap, path: Path, key: str
 ) -> None:
     """Resample one pass of a view through one lens map and write its file; 0 has no source."""
-    channels = read_image(wanted.path(job.lightfield.folder, view.name), wanted.channels).channels
+    image = read_image(wanted.path(job.lightfield.folder, view.name), wanted.channels)
+    channels = image.channels
     if not job.copies:
         planes = [channels[name] for name in wanted.channels]
-        pixels = _resampled(planes, wanted, made)[..., : len(planes)]
+        resampled = [_resampled(planes[i : i + 3], wanted, made) for i in range(0, len(planes), 3)]
+        pixels = np.concatenate(resampled, axis=-1)[..., : len(planes)]
         if wanted.kind == "normal":
             length = np.linalg.norm(pixels, axis=-1, keepdims=True)
             pixels = np.divide(pixels, length, out=np.zeros_like(pixels), where=length > 1e-6)
@@ -30,7 +32,8 @@ def write_pass(
             pixels = pixels.clip(-HALF_MAX, HALF_MAX)
         planes = list(np.moveaxis(pixels.astype(wanted.dtype), -1, 0))
         channels = dict(zip(wanted.channels, planes, strict=True))
-    write_exr(path, channels, {KEY_ATTRIBUTE: key})
+    header = {k: v for k, v in image.attributes.items() if k.startswith("cryptomatte/")}
+    write_exr(path, channels, header | {KEY_ATTRIBUTE: key})
     job.record.add(path, key)
 
 
@@ -38,7 +41,7 @@ def _resampled(planes: list[Array], wanted: Pass, made: LensMap) -> Array:
     row, end_row, column, end_column = made.window
     # A float has all numbers that an id can be.
     source = widen(*(plane[row:end_row, column:end_column] for plane in (planes * 3)[:3]))
-    if wanted.kind == "id":
+    if wanted.kind in ("id", "matte"):
         # Of each target pixel the one ray through its centre.
         seen = ~np.isnan(made.centers[..., 0])
         made = replace(

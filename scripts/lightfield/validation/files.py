@@ -15,7 +15,7 @@ import numpy as np
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, read_json, set_aside, sha256
 from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.dataset.passes import NAMES
+from lightfield.dataset.passes import FLOW, NAMES, Pass
 from lightfield.geometry import rotations
 from lightfield.geometry.lenses import Lens
 from lightfield.validation.consistency import Camera
@@ -94,13 +94,13 @@ class File:
     """An image file: ``path`` relative to the dataset, and the set and view that it is of.
 
     What is no view (a mask, a depth map, a picture for a trainer) has ``view`` −1, and has only to
-    be readable and of its set's size. ``of_pass`` is the name of the pass that it holds of a view.
+    be readable and of its set's size. ``of_pass`` is the pass that it holds of a view.
     """
 
     path: str
     set: int
     view: int = -1
-    of_pass: str | None = None
+    of_pass: Pass | None = None
 
 
 def read_sets(dataset: Path, reprojections: Iterable[str]) -> tuple[list[ImageSet], list[Check]]:
@@ -191,16 +191,23 @@ def of_views(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[
 
 
 def of_passes(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], dict[str, str]]:
-    """Return the files of the views' passes, and what is wrong with those that are not there."""
-    files = [
-        File(found.path(Path(image_set.name), view).as_posix(), number, index, found.name)
-        for number, image_set in enumerate(sets)
-        for found in image_set.lightfield.passes
-        for index, view in enumerate(image_set.views)
-    ]
+    """Return the files of the views' passes and flow, and what is wrong with those not there."""
+    files = _of_passes(sets)
     present = [file for file in files if (dataset / file.path).is_file()]
     missing = {file.path for file in files} - {file.path for file in present}
     return present, dict.fromkeys(sorted(missing), "is missing")
+
+
+def _of_passes(sets: Sequence[ImageSet]) -> list[File]:
+    return [
+        File(found.path(Path(image_set.name), name).as_posix(), number, index, found)
+        for number, image_set in enumerate(sets)
+        for index, view in enumerate(image_set.lightfield.views)
+        for found, name in (
+            *((found, view.name) for found in image_set.lightfield.passes),
+            *([(FLOW, view.flow)] if view.flow else []),
+        )
+    ]
 
 
 def names(sets: Sequence[ImageSet]) -> list[str]:
@@ -333,8 +340,9 @@ def checksums(
     # Masks and pictures for trainers are not the renderer's.
     own = rendered(sets)
     views = own.views if own else []
-    folders = [IMAGES, *(found.name for found in (own.lightfield.passes if own else []))]
-    for path in sorted(f"{folder}/{view}.exr" for folder in folders for view in views):
+    own_files = [f"{IMAGES}/{view}.exr" for view in views]
+    own_files += [file.path for file in _of_passes(sets[:1])] if own else []
+    for path in sorted(own_files):
         if path in found and path not in recorded:
             faults[path] = "has no record"
     detail = f"{len(recorded)} of {len(found)} images have a record"

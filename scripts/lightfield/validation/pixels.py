@@ -1,5 +1,6 @@
 """What each image of a dataset shows by itself: is it whole, and does it hold what it must?"""
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,7 +12,8 @@ from scipy.ndimage import binary_erosion
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256
-from lightfield.dataset.passes import NAMES, PASSES, Pass
+from lightfield.dataset.passes import MANIFEST, NAMES, Pass
+from lightfield.geometry.flow import in_frame
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.validation import consistency
@@ -88,7 +90,7 @@ class Examiner:
             text = f"is {width} × {height}; must be {lens.width} × {lens.height}"
             facts.fault(check, text)
         elif file.of_pass:
-            self._examine_pass(PASSES[file.of_pass], image, facts)
+            self._examine_pass(file.of_pass, lens, image, facts)
         elif file.view >= 0:
             problem = _format_problem(file, image_set, image)
             if problem:
@@ -156,7 +158,7 @@ class Examiner:
             facts.clamped = int(image.attributes.get(images.CLAMPED_ATTRIBUTE, 0))
             facts.fault("counts", f"{facts.nan} rendered values were not a number", facts.nan)
 
-    def _examine_pass(self, wanted: Pass, image: images.Image, facts: Facts) -> None:
+    def _examine_pass(self, wanted: Pass, lens: Lens, image: images.Image, facts: Facts) -> None:
         problem = _channels_problem(image, dict.fromkeys(wanted.channels, wanted.dtype))
         if problem:
             facts.fault("passes", problem)
@@ -172,6 +174,19 @@ class Examiner:
             unknown = sorted(set(np.unique(pixels).tolist()) - self._numbers(wanted))
             path = f"{wanted.name}/{NAMES}"
             facts.fault("passes", f"has {unknown[:4]}, which {path} does not have", bool(unknown))
+        if wanted.kind == "matte":
+            part = pixels[1::2]
+            wrong = int(((part < 0) | (np.diff(part, axis=0, append=0) > 0)).any(axis=0).sum())
+            facts.fault("passes", f"{wrong} pixels have parts below 0 or not in order", wrong)
+            found = set(np.unique(pixels[::2][part > 0]).tolist())
+            strange = len(found - _hashes(image))
+            facts.fault("passes", f"has {strange} objects that its manifest does not have", strange)
+        if wanted.kind == "flow":
+            visible = pixels[2] == 1
+            wrong = int((~visible & (pixels[2] != 0)).sum())
+            facts.fault("passes", f"{wrong} values of V are neither 0 nor 1", wrong)
+            wrong = int((visible & ~in_frame(lens, pixels[:2])).sum())
+            facts.fault("passes", f"{wrong} visible points are out of the frame", wrong)
 
     def _numbers(self, wanted: Pass) -> set[int]:
         """Return the numbers that the names file of a pass has; none if it cannot be read."""
@@ -312,6 +327,18 @@ def with_extras(exports: Check, extras: Mapping[File, Facts]) -> Check:
     ]
     passed = False if problems else exports.passed
     return replace(exports, passed=passed, problems=exports.problems + problems)
+
+
+def _hashes(image: images.Image) -> set[float]:
+    """Return the hashes that a matte's manifest has, as floats; none if it cannot be read."""
+    try:
+        texts = json.loads(str(image.attributes.get(MANIFEST))).values()
+        bits = np.array([int(text, 16) for text in texts], np.uint32)
+    except (ValueError, AttributeError, TypeError, OverflowError):
+        return set()
+    # The exponent is kept from those of 0 and infinity.
+    exponent = ((bits >> 23) & 255).clip(1, 254)
+    return set(((bits & 0x807FFFFF) | exponent << 23).view(np.float32).tolist())
 
 
 def _inner(region: Bools) -> Bools:

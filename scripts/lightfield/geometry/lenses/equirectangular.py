@@ -78,6 +78,11 @@ class Equirectangular(Lens):
         )
         return all(abs(a - b) <= ANGLE_SLACK for a, b in zip(given, full, strict=True))
 
+    @property
+    def turn(self) -> float:
+        """The pixels that 360 degrees take."""
+        return self.width * 2 * math.pi / (self.longitude[1] - self.longitude[0])
+
     def _rays(self, x: Array, y: Array) -> Array:
         (west, east), (south, north) = self.longitude, self.latitude
         longitude = west + (east - west) * (x / self.width)

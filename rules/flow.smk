@@ -1,0 +1,28 @@
+# Where each view's neighbour sees what it sees.
+
+
+rule flow:
+    input:
+        # A neighbour may be of another shard.
+        records=records,
+        lightfield=f"{DATASET}/lightfield.json",
+        renewal=lambda wildcards: renewal(wildcards, "flow"),
+    output:
+        f"{MADE}/flow/{{first}}-{{end}}.json",
+    log:
+        log_of("{scene}/{rig}/flow/{first}-{end}"),
+    benchmark:
+        times_of("{scene}/{rig}/flow/{first}-{end}")
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+    params:
+        folder=f"{DATASET}/flow",
+    message:
+        "Computing the flow of views {wildcards.first} to {wildcards.end} of"
+        " {wildcards.scene}/{wildcards.rig}"
+    shell:
+        f"python {SCRIPTS}/flow.py"
+        " --lightfield {input.lightfield} --views {wildcards.first}:{wildcards.end}"
+        " --output {params.folder} --record {output} > {log} 2>&1"
