@@ -1,4 +1,7 @@
-"""The SHA-256 of all that a builder makes: `python scene_fingerprint.py BUILDER SEED` prints it."""
+"""The SHA-256 of all that a builder makes, and if asked of a small render of it.
+
+`python scene_fingerprint.py BUILDER SEED [pixels]` prints them.
+"""
 
 import hashlib
 import importlib
@@ -6,20 +9,42 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def fingerprint(builder, seed, hash_seed):
+def fingerprint(builder, seed, hash_seed, pixels=False):
     """Build in a process whose sets and dictionaries are hashed by ``hash_seed``."""
     result = subprocess.run(
-        [sys.executable, __file__, builder, str(seed)],
+        [sys.executable, __file__, builder, str(seed), *(["pixels"] if pixels else [])],
         capture_output=True,
         text=True,
         check=True,
         env=os.environ | {"PYTHONPATH": str(ROOT / "scripts"), "PYTHONHASHSEED": hash_seed},
     )
-    return result.stdout.split("fingerprint ")[1].split()[0]
+    return result.stdout.split("fingerprint ")[1].splitlines()[0].split()
+
+
+def rendered():
+    """Return the pixels of a panorama from 1 m above the origin."""
+    import bpy
+    import numpy as np
+
+    scene = bpy.context.scene
+    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(scene.camera)
+    scene.camera.location, scene.camera.rotation_euler = (0, 0, 1), (1.5, 0, 0)
+    scene.camera.data.type, scene.camera.data.panorama_type = "PANO", "EQUIRECTANGULAR"
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x, scene.render.resolution_y = 48, 24
+    scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.max_bounces = 2, False, 3
+    scene.render.threads_mode, scene.render.threads = "FIXED", 1
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    with TemporaryDirectory() as folder:
+        scene.render.filepath = f"{folder}/image.exr"
+        bpy.ops.render.render(write_still=True)
+        return np.array(bpy.data.images.load(scene.render.filepath).pixels[:], np.float32).tobytes()
 
 
 def main():
@@ -31,7 +56,7 @@ def main():
         collection.foreach_get(name, found)
         return found.tobytes()
 
-    builder, seed = sys.argv[1:]
+    builder, seed, *pixels = sys.argv[1:]
     bpy.ops.wm.read_factory_settings(use_empty=True)
     importlib.import_module(f"scenes.{builder}").build({"seed": int(seed), "detail": 0.05})
     digest = hashlib.sha256()
@@ -43,7 +68,10 @@ def main():
             digest.update(values(thing.data.polygons, "material_index", 1, np.int32))
         elif thing.type == "CURVES":
             digest.update(values(thing.data.points, "position", 3, np.float32))
-    print("fingerprint", digest.hexdigest())
+    found = [digest.hexdigest()]
+    if pixels:
+        found.append(hashlib.sha256(rendered()).hexdigest())
+    print("fingerprint", *found)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ import shutil
 
 import numpy as np
 import pytest
-from scene_fingerprint import fingerprint
 
 from lightfield.dataset import config, keys
 from lightfield.dataset.config import Source
@@ -159,11 +158,3 @@ def test_a_fingerprint_is_of_the_library_and_the_builders_own_files(
     with (builders / file).open("a") as text:
         text.write("# changed\n")
     assert (keys.scene_fingerprint(source) != before) == changes
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("builder", ["barbershop", "lone_monk", "still_life"])
-def test_same_seed_same_geometry(builder):
-    first = fingerprint(builder, 3, "1")
-    assert fingerprint(builder, 3, "2") == first
-    assert fingerprint(builder, 4, "1") != first
