@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -50,6 +51,16 @@ def snakemake(folder, *arguments):
         text=True,
         check=False,
     )
+
+
+def wait_until(condition, process, seconds=600, log=None):
+    """Wait until a condition holds while a process runs, whose ``log`` says why it does not."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert process.poll() is None, log.read_text() if log else f"{process.args} has ended"
+        if time.monotonic() > end:
+            raise TimeoutError(f"{process.args}: what was waited for is not there yet")
+        time.sleep(0.02)
 
 
 def planned(folder, *arguments):

@@ -14,8 +14,9 @@ import shutil
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
+
+from checkouts import wait_until
 
 PACKAGES = {
     "slurmctld": "slurmctld",
@@ -124,7 +125,8 @@ class Node:
     def start_node(self) -> None:
         """Start the node's own daemon, and wait until the controller knows it."""
         self.start("slurmd", "-D")
-        self.wait_for(lambda: self.state() in ("idle", "mixed", "allocated"), "the node")
+        up = ("idle", "mixed", "allocated")
+        wait_until(lambda: self.state() in up, self.daemons["slurmd"], 60)
 
     def kill_node(self) -> None:
         """Kill the node's daemon and its jobs, as a power cut does."""
@@ -141,14 +143,6 @@ class Node:
 
     def state(self) -> str:
         return self.run("sinfo", "--noheader", "--format=%T").rstrip("*")
-
-    def wait_for(self, condition, what: str, seconds: float = 60) -> None:
-        """Wait until ``condition`` holds; raises `TimeoutError`."""
-        end = time.monotonic() + seconds
-        while not condition():
-            if time.monotonic() > end:
-                raise TimeoutError(f"{what}: not there after {seconds} s; see {self.folder}")
-            time.sleep(0.2)
 
 
 def _free_port() -> int:

@@ -1,11 +1,10 @@
 """A build on a real Slurm node, to which happens what happens on clusters."""
 
 import os
-import time
 from pathlib import Path
 
 import pytest
-from checkouts import assert_same_bytes, checkout, rendered, start_snakemake
+from checkouts import assert_same_bytes, checkout, rendered, start_snakemake, wait_until
 from slurm_node import Node, install
 
 CUBOID = "smoke/LFCuboid_1x1x1"
@@ -41,7 +40,7 @@ def test_no_view_is_lost_or_made_twice_whatever_happens_on_the_cluster(smoke, tm
         node.run("scancel", "--state=RUNNING", "--full", "--user=root")
         wait_for_views(folder, 4, run)
         node.kill_node()
-        node.wait_for(lambda: node.state() == "down", "a node that is down")
+        wait_until(lambda: node.state() == "down", node.daemons["slurmctld"], 60)
         node.start_node()
         assert run.wait(1800) == 0, log.read_text()
         states = node.run("squeue", "--states=all", "--noheader", "--format=%T").split()
@@ -54,6 +53,8 @@ def test_no_view_is_lost_or_made_twice_whatever_happens_on_the_cluster(smoke, tm
 def wait_for_views(folder: Path, count: int, run) -> None:
     """Wait until the journals have so many views."""
     journals = f"work/{CUBOID}/render/*.journal.jsonl"
-    while sum(path.read_text().count('"view"') for path in folder.glob(journals)) < count:
-        assert run.poll() is None, (folder / "terminal.log").read_text()
-        time.sleep(0.05)
+    wait_until(
+        lambda: sum(path.read_text().count('"view"') for path in folder.glob(journals)) >= count,
+        run,
+        log=folder / "terminal.log",
+    )

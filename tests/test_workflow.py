@@ -7,14 +7,13 @@ import shutil
 import signal
 import subprocess
 import tarfile
-import time
 import zipfile
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
-from checkouts import assert_same_bytes, checkout, rendered, snakemake, start_snakemake
+from checkouts import assert_same_bytes, checkout, rendered, snakemake, start_snakemake, wait_until
 
 from lightfield.core.files import sha256, write_json
 from lightfield.imaging import images
@@ -216,11 +215,13 @@ def test_killed_while_it_renders_the_next_run_goes_on(smoke, other):
     landed = 0
     for views in (1, 4, 8):
         run = start_snakemake(other, *words)
-        while len(list(other.glob("results/smoke/*/exr/*.exr"))) < views or not unfinished_shards(
-            other
-        ):
-            assert run.poll() is None
-            time.sleep(0.01)
+        wait_until(
+            lambda views=views: (
+                unfinished_shards(other)
+                and len(list(other.glob("results/smoke/*/exr/*.exr"))) >= views
+            ),
+            run,
+        )
         os.killpg(run.pid, signal.SIGKILL)
         run.wait()
         landed += bool(unfinished_shards(other))
