@@ -13,6 +13,35 @@ from lightfield.imaging.tonemap import decode_srgb, to_8_bit
 
 RADIUS = 3.0
 
+# One of each kind that a consumer may have, of pixels for tests.
+LENSES = {
+    "perspective": {"lens": "rectilinear", "fov": 70, "resolution": [64, 48]},
+    "shifted": {
+        "lens": "rectilinear",
+        "focal_length": 20,
+        "sensor_size": [36, 30],
+        "principal_point": [29.5, 26.25],
+        "resolution": [64, 48],
+    },
+    "fisheye": {"lens": "equidistant", "fov": 170, "resolution": [64, 60]},
+    "opencv": {
+        "lens": "kannala_brandt",
+        "focal_length": 9,
+        "coefficients": [0.02, -0.01, 0.003, -0.001],
+        "fov": 150,
+        "resolution": [64, 64],
+    },
+    "wide": {"lens": "equidistant", "fov": 220, "resolution": [64, 64]},
+    "panorama": {"lens": "equirectangular", "resolution": [64, 32]},
+    "half": {"lens": "equirectangular", "longitude": [-90, 90], "resolution": [32, 32]},
+}
+
+
+def enlarged(camera, factor):
+    """Return a camera with so many times the pixels along each side."""
+    pixels = {key: camera[key] for key in ("resolution", "principal_point") if key in camera}
+    return camera | {key: [factor * side for side in pair] for key, pair in pixels.items()}
+
 
 def colour_of(points):
     """The sRGB colour, 0 to 255, of places on the sphere."""

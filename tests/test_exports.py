@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 from scipy.spatial.transform import Rotation
-from sphere import RADIUS, colour_of, write_views
+from sphere import LENSES, RADIUS, colour_of, write_views
 
 from lightfield import export
 from lightfield.core.errors import UserError
@@ -29,27 +29,6 @@ from lightfield.validation import files as validation_files
 
 RIG = {"type": "plane", "cameras": [4, 3], "size": 1.2, "center": [0.3, -0.2, 0.1]}
 VIEWS = {"lens": "equidistant", "fov": 180, "resolution": [96, 96]}
-LENSES = {
-    "perspective": {"lens": "rectilinear", "fov": 70, "resolution": [64, 48]},
-    "shifted": {
-        "lens": "rectilinear",
-        "focal_length": 20,
-        "sensor_size": [36, 30],
-        "principal_point": [29.5, 26.25],
-        "resolution": [64, 48],
-    },
-    "fisheye": {"lens": "equidistant", "fov": 170, "resolution": [64, 60]},
-    "opencv": {
-        "lens": "kannala_brandt",
-        "focal_length": 9,
-        "coefficients": [0.02, -0.01, 0.003, -0.001],
-        "fov": 150,
-        "resolution": [64, 64],
-    },
-    "wide": {"lens": "equidistant", "fov": 220, "resolution": [64, 64]},
-    "panorama": {"lens": "equirectangular", "resolution": [64, 32]},
-    "half": {"lens": "equirectangular", "longitude": [-90, 90], "resolution": [32, 32]},
-}
 
 
 @pytest.fixture(scope="module")
