@@ -273,3 +273,29 @@ def test_a_scenes_fingerprint_is_its_files_or_its_builders(
             (tmp_path / folder / "__init__.py").write_text(text)
         found.add(keys.scene_fingerprint(Source(builder="room", parameters={"seed": seed})))
     assert len(found) == 4 and all(len(key) == 64 for key in found)
+
+
+def test_keys_stay_what_they_were(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A view that is finished under these keys is not rendered again by another version of ours."""
+    monkeypatch.setattr(keys, "version", lambda _: "5.0.1")
+    monkeypatch.setattr(keys, "BUILDERS", tmp_path)
+    for name in ("library/shapes.py", "room/__init__.py"):
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).write_text(name)
+    scene, render = {"name": "a"}, {"samples": 4, "seed": 0}
+    first = LightField.from_rig(PLANE, FISHEYE, depth="z", frame=1, scene=scene, render=render)
+    blend = Source(blend="a.blend", sha256="ab" * 32)
+    found = [
+        keys.render_key(first, first.views[1]),
+        keys.names_key(first),
+        keys.scene_fingerprint(Source(builder="room")),
+        keys.scene_fingerprint(blend, [("a.png", "cd" * 32), ("b.png", None)]),
+    ]
+    assert [key[:12] for key in found] == [
+        "4f1a9456ca9b",
+        "a397b843b228",
+        "5cba495d5265",
+        "2a16a9a77496",
+    ]
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        keys.render_key(first.changed(render={"exposure": math.nan}), first.views[0])

@@ -1,0 +1,33 @@
+"""Shards' records: which file is finished, and what a record says of it."""
+
+from pathlib import Path
+
+from lightfield.core.files import read_json, sha256
+from lightfield.dataset.records import ShardRecord, checksums
+
+
+def test_a_file_is_finished_with_its_key_and_bytes_whichever_shard_made_it(tmp_path: Path) -> None:
+    folder = tmp_path / "exr"
+    folder.mkdir()
+    files = [folder / name for name in ("a.exr", "b.exr")]
+    for file, shard in zip(files, ("0-1", "1-2"), strict=True):
+        file.write_bytes(file.name.encode())
+        ShardRecord(tmp_path / f"{shard}.json", folder).add(file, "key")
+    other_bounds = ShardRecord(tmp_path / "0-2.json", folder)
+    assert all(other_bounds.is_finished(file, "key") for file in files)
+    assert ShardRecord(tmp_path / "0-1.json", folder).is_finished(files[0], "key")
+    assert not other_bounds.is_finished(files[0], "another key")
+    files[1].write_bytes(b"c.exr")
+    assert not other_bounds.is_finished(files[1], "key")
+    assert not other_bounds.is_finished(folder / "gone.exr", "key")
+
+
+def test_a_record_lists_files_that_were_not_looked_at_too(tmp_path: Path) -> None:
+    file = tmp_path / "exr" / "a.exr"
+    file.parent.mkdir()
+    file.write_bytes(b"12345")
+    path = tmp_path / "0-1.json"
+    ShardRecord(path, file.parent).write([file], counts={"views": 1})
+    entry = {"bytes": 5, "sha256": sha256(file)}
+    assert read_json(path) == {"files": {"exr/a.exr": entry}, "counts": {"views": 1}}
+    assert checksums(path) == {"exr/a.exr": entry["sha256"]}
