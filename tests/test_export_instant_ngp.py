@@ -296,6 +296,10 @@ def test_exr_views_become_files_that_the_loader_accepts(dataset: Dataset) -> Non
             "RGB", np.dtype(np.float16)
         )
         np.testing.assert_array_equal(channels["R"], np.where(outside, -1, 0.25))
+    elsewhere = dataset.folder / "elsewhere"
+    transforms = dataset.export("--image-suffix", ".exr", "--exr-dir", elsewhere)
+    assert transforms["frames"][0]["file_path"] == "elsewhere/view_0000f.exr"
+    assert len(list(elsewhere.iterdir())) == 6
 
 
 def test_a_depth_map_counts_millimetres_and_is_0_where_there_is_none() -> None:
@@ -362,6 +366,14 @@ def test_a_rig_that_looks_inward_fills_the_cube_around_what_it_looks_at(
     assert np.abs(apart).max() == pytest.approx(0.5, abs=1e-6)
 
 
+def test_a_point_farther_away_than_the_rig_reaches_is_not_what_it_looks_at() -> None:
+    cameras = np.array([[98.0, 0, 0], [100, 0, 0], [102, 0, 0], [100, 0, 1]])
+    for away, expected in ((2.5, None), (1.5, [100, 1.5, 0])):
+        axes = np.array([100, away, 0]) - cameras
+        found = instant_ngp.looked_at(cameras, axes / np.linalg.norm(axes, axis=1, keepdims=True))
+        assert found is None if expected is None else np.allclose(found, expected)
+
+
 def test_fitted_to_depth_the_scene_is_within_the_cube(dataset: Dataset) -> None:
     rig = {"type": "sphere", "subdivisions": 1, "size": 0.02, "center": [1, -2, 3]}
     content = dataset.write(FISHEYE, rig, depth="distance")
@@ -375,9 +387,14 @@ def test_fitted_to_depth_the_scene_is_within_the_cube(dataset: Dataset) -> None:
     assert in_unit_cube(loader, [1, -2, 3] + 0.85 * 4.0 * corners)
 
 
-def test_split_gives_odd_sequence_numbers_to_the_test_file(dataset: Dataset) -> None:
+def test_split_gives_odd_sequence_numbers_to_the_test_file(
+    dataset: Dataset, capsys: pytest.CaptureFixture[str]
+) -> None:
     dataset.write(FISHEYE)
     everything = dataset.export()
+    said = [line.split(", scale")[0] for line in capsys.readouterr().out.splitlines()]
+    counts = {"transforms": 6, "transforms_train": 3, "transforms_test": 3}
+    assert said == [f"{dataset.folder / name}.json: {counts[name]} frames" for name in counts]
     parts = {}
     for part in ("train", "test"):
         parts[part] = dataset.read(f"transforms_{part}.json")
@@ -416,6 +433,7 @@ def test_the_yaml_asks_for_all_that_the_program_can_do(dataset: Dataset) -> None
     model = TypeAdapter(InstantNgp).validate_python(settings | {"render_aabb": box})
     transforms = dataset.export("--image-suffix", ".exr", *model.words(str(dataset.folder)))
     assert transforms["scale"] == dataset.export("--depth-bounds")["scale"]
+    assert transforms["options"] == model.recorded
     assert transforms["render_aabb"] == box
     assert transforms["aabb_scale"] == 2
     depth = dataset.folder / transforms["frames"][0]["depth_path"]
@@ -425,22 +443,28 @@ def test_the_yaml_asks_for_all_that_the_program_can_do(dataset: Dataset) -> None
         TypeAdapter(InstantNgp).validate_python(settings | {"scale": 0.1})
 
 
-@pytest.mark.parametrize("lens", ["equisolid", "stereographic"])
-def test_other_fisheyes_are_followed_to_a_quarter_of_a_pixel(lens: str, dataset: Dataset) -> None:
-    camera: dict[str, Any] = {"lens": lens, "resolution": [512, 512], "fov": 180}
+@pytest.mark.parametrize(
+    ("lens", "fov"), [("equisolid", 180), ("stereographic", 180), ("stereographic", 300)]
+)
+def test_other_fisheyes_are_followed_to_a_quarter_of_a_pixel(
+    lens: str, fov: float, dataset: Dataset
+) -> None:
+    camera: dict[str, Any] = {"lens": lens, "resolution": [512, 512], "fov": fov}
     if lens == "equisolid":
         camera |= {"focal_length": 36 / 2 / 2 / math.sin(math.pi / 4)}
     dataset.write(camera)
     loader = Loader(dataset.export())
-    for x in np.linspace(258, 509, 40):
-        radius = (x - 256) / 256
+    # Where a ray of 90 degrees appears.
+    rim = 256 * math.tan(math.radians(45)) / math.tan(math.radians(fov / 4))
+    for x in 256 + np.linspace(2, rim - 3, 40):
+        radius = (x - 256) / rim
         if lens == "equisolid":
             angle = 2 * math.asin(radius * math.sin(math.pi / 4))
         else:
             angle = 2 * math.atan(radius)
         axes, _ = loader.camera(0)
         _, direction = loader.ray(0, x, 256)
-        pixel = 2 * math.sin(math.pi / 4) / math.cos(angle / 2) / 256
+        pixel = 2 * math.sin(math.pi / 4) / math.cos(angle / 2) / rim
         assert abs(angle_between(direction, axes[:, 2]) - angle) < 0.25 * pixel
 
 
@@ -466,6 +490,24 @@ def test_what_cannot_be_exported_is_an_error(
     assert [path.name for path in dataset.folder.iterdir()] == ["lightfield.json"]
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "required: --input-cfg, --output"),
+        (["--image-suffix", ".jpg"], "--image-suffix: invalid choice: '.jpg'"),
+        (["--aabb-scale", "3"], "--aabb-scale: invalid choice: 3"),
+    ],
+)
+def test_what_the_command_line_cannot_say(
+    words: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    parser = argparse.ArgumentParser()
+    instant_ngp.add_arguments(parser)
+    with pytest.raises(SystemExit):
+        parser.parse_args(words)
+    assert message in capsys.readouterr().err
+
+
 def test_one_camera_has_no_extent_to_fit(dataset: Dataset) -> None:
     dataset.write(FISHEYE, {"type": "plane", "cameras": [1, 1], "center": [1, 2, 3]})
     with pytest.raises(UserError, match="extent is zero"):
@@ -482,6 +524,9 @@ def test_views_of_another_size_or_of_unknown_depth_are_named(dataset: Dataset) -
         images.write_exr(dataset.folder / f"{frame['name']}.exr", dict.fromkeys("RGBZ", small))
     with pytest.raises(UserError, match=r"view_0000f.exr: is 8 × 8, but .* says 64 × 64"):
         dataset.export("--image-suffix", ".exr")
+    images.write_png(dataset.folder / "view_0000f.png", np.zeros((9, 8, 3), np.uint8))
+    with pytest.raises(UserError, match=r"view_0000f.png: is 8 × 9, but .* says 64 × 64"):
+        dataset.export()
     black = np.zeros((64, 64), np.float16)
     for frame in content["frames"]:
         images.write_exr(dataset.folder / f"{frame['name']}.exr", dict.fromkeys("RGBZ", black))

@@ -1,5 +1,6 @@
 """Lens maps: geometry against closed forms, and the file."""
 
+import json
 import math
 
 import numpy as np
@@ -64,6 +65,7 @@ def test_a_lens_maps_onto_itself():
     inside = np.hypot(x - 50.5, y - 50.5) <= 50.5
     seen = ~np.isnan(made.centers[..., 0])
     assert np.array_equal(seen, inside)
+    assert made.summary["covered"] == pytest.approx(inside.mean())
     assert np.abs(full_centers(made) - np.stack([x, y], axis=-1))[seen].max() < 1e-4
     assert np.nanmax(np.abs(made.magnification[2:-2, 2:-2] - 1)) < 1e-3
 
@@ -92,9 +94,10 @@ def test_how_sources_continue():
 
     low = Equirectangular(width=64, height=16, latitude=(-math.pi / 2, 0))
     slice_ = Equirectangular(width=64, height=32, longitude=(-1, 1))
+    high_slice = Equirectangular(width=64, height=1024, longitude=(-1, 1))
     assert topology(Equirectangular(width=64, height=32)) == (True, True, True)
     assert topology(low) == (True, False, True)
-    assert topology(slice_) == (False, False, False)
+    assert topology(slice_) == topology(high_slice) == (False, False, False)
     assert topology(FISHEYE) == (False, False, False)
     assert topology(CubeMap(width=96, height=16)) == (False, False, False)
 
@@ -115,7 +118,7 @@ def test_what_the_source_does_not_see_is_marked():
     away = lens_map.rotation_matrix(180, 0, 0)
     made = lens_map.compute(FISHEYE, rectilinear(16), away)
     assert not made.flags.any() and np.isnan(made.centers).all()
-    assert made.summary["covered"] == 0
+    assert made.summary == dict.fromkeys(("min", "median", "max", "covered"), 0)
     assert "sees nothing" in lens_map.warnings(made)[0]
 
 
@@ -147,6 +150,15 @@ def test_a_file_gives_back_what_was_saved(tmp_path, name, samples):
     first = path.read_bytes()
     lens_map.save(path, made)
     assert path.read_bytes() == first
+
+
+def test_maps_of_other_lenses_rotations_filters_or_samples_have_other_settings():
+    asked = (FISHEYE, rectilinear(20), IDENTITY, "bicubic", 1)
+    others = (rectilinear(9), rectilinear(21), -IDENTITY, "nearest", 2)
+    found = [asked, *(asked[:i] + others[i : i + 1] + asked[i + 1 :] for i in range(5))]
+    settings = [json.dumps(lens_map.settings(*arguments)) for arguments in found]
+    assert len(set(settings)) == 6
+    assert lens_map.compute(*asked).settings == lens_map.settings(*asked)
 
 
 def test_any_other_file_is_refused(tmp_path):

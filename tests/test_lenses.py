@@ -29,6 +29,7 @@ from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.equisolid import Equisolid
+from lightfield.geometry.lenses.increasing_polynomial import IncreasingPolynomial
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.orthographic import Orthographic
 from lightfield.geometry.lenses.polynomial import Polynomial
@@ -65,6 +66,7 @@ EXAMPLES: dict[str, Lens] = {
     ),
     "equirectangular": Equirectangular(**SIZE),
     "equirectangular part": Equirectangular(**SIZE, longitude=(-1, 2.5), latitude=(-0.5, 1.2)),
+    "equirectangular part to the left": Equirectangular(**SIZE, longitude=(-2, 1)),
     "cube map": CubeMap(width=6 * 512, height=512),
 }
 
@@ -139,7 +141,6 @@ def cycles(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize("name", CAMERAS)
-@pytest.mark.slow
 def test_rays_and_pixels_are_those_of_cycles(name: str, cycles: dict[str, np.ndarray]) -> None:
     lens = CAMERAS[name]
     hit = cycles[name + ".rays"]
@@ -331,6 +332,15 @@ def test_polynomial_ends_at_its_turning_point(turning: tuple[float, float]) -> N
             root = mpmath.polyroots([-theta, a, 0, b], maxsteps=500, extraprec=200, asc=True)
             expected = min(float(r.real) for r in root if r.real > 0)
             assert math.isclose((pixel[0] - 100) / millimetre, expected, rel_tol=1e-9)
+
+
+def test_a_polynomial_that_falls_and_rises_again_ends_where_it_first_turns() -> None:
+    # t³ / 3 − 7 t² / 2 + 12 t turns at 3 and at 4.
+    rising = IncreasingPolynomial((0, 12, -3.5, 1 / 3), math.inf)
+    assert math.isclose(rising.end, 3)
+    values = rising.value(np.array([0, 1.5, 3 - 1e-3]))
+    np.testing.assert_allclose(rising.inverse(values), [0, 1.5, 3 - 1e-3], atol=1e-9)
+    assert np.isnan(rising.inverse(np.array([14.0]))).all()
 
 
 def test_kannala_brandt_ends_at_its_turning_point() -> None:
