@@ -12,10 +12,14 @@ ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = ROOT / "scripts"
 
 
+# Fixtures that start programs, a browser, Blender or Snakemake.
+SLOW = {"run_program", "smoke", "blender", "browser", "cycles", "planned", "renders"}
+
+
 def pytest_collection_modifyitems(items):
-    """Mark as slow what runs a program; other tests say it themselves."""
+    """Mark as slow what uses these fixtures; other tests say it themselves."""
     for item in items:
-        if "run_program" in item.fixturenames:
+        if SLOW & set(item.fixturenames):
             item.add_marker("slow")
 
 

@@ -58,7 +58,6 @@ def planned(tmp_path_factory):
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-@pytest.mark.slow
 def test_every_job_says_what_it_needs(planned, profile):
     jobs = planned(profile, "cpu")
     assert {job["rule"] for job in jobs} >= SUBMITTED
@@ -69,14 +68,12 @@ def test_every_job_says_what_it_needs(planned, profile):
         assert job["gpu"] == 0, job
 
 
-@pytest.mark.slow
 def test_renders_take_every_cpu_that_a_job_may_have(planned):
     for job in planned("slurm", "cpu"):
         if job["rule"] in ("render", "render_panorama"):
             assert job["cpus"] == settings("slurm")["cores"]
 
 
-@pytest.mark.slow
 def test_renders_alone_ask_for_a_gpu_where_the_device_is_one(planned):
     gpus = {(job["rule"], job["gpu"]) for job in planned("slurm", "optix")}
     assert {rule for rule, count in gpus if count} == {"render", "render_panorama"}

@@ -177,7 +177,6 @@ def frame_of(tab, canvas):
     return tab.locator(f"#{canvas}").bounding_box()
 
 
-@pytest.mark.slow
 def test_the_page_loads_whole_from_one_file(sphere, show):
     tab = show(sphere.page)
     pixels(tab, "viewer")
@@ -284,7 +283,6 @@ def test_the_epipolar_image_is_drawn_and_pointed_at(sphere, show):
 
 
 @pytest.mark.parametrize("width", [320, 390])
-@pytest.mark.slow
 def test_a_phone_does_not_scroll_sideways(sphere, show, width):
     tab = show(sphere.page, width)
     pixels(tab, "viewer")
@@ -321,7 +319,6 @@ def test_the_scenes_points_are_drawn_where_the_views_see_them(sphere, show):
     assert (pixels(tab, "rig") != shown).any(axis=-1).sum() > 1000
 
 
-@pytest.mark.slow
 def test_cameras_have_the_colour_of_their_part_of_the_dataset(show, tmp_path):
     rig = {**LINE, "split": "odd"}
     write_dataset(tmp_path, rig)

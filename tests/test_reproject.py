@@ -600,7 +600,6 @@ def renders(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", [name for name in LENSES if name != "fisheye"])
-@pytest.mark.slow
 def test_a_reprojection_is_what_cycles_renders_through_that_lens(renders, name):
     lens, _, angles = LENSES[name]
     source = LENSES["fisheye"][0]
