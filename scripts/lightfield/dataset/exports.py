@@ -149,8 +149,14 @@ class Nerfstudio(Developed):
 
     points: PointCount = Field(50000, description="Points of the point cloud, at most.")
     depth: bool = Field(False, description="Depth maps too, from sources with depth.")
+    # Changes nothing of what is written.
+    splatfacto: bool = Field(
+        False, exclude=True, description="Refuse what splatfacto cannot train on."
+    )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if self.splatfacto and not isinstance(lens, Rectilinear):
+            return f"would be taken for a pinhole by splatfacto; {TO_RECTILINEAR}"
         if isinstance(lens, Equidistant | KannalaBrandt):
             middle = lens.center[0] % 1 == 0.5 and lens.center[1] % 1 == 0.5
             if middle:
