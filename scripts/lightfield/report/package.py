@@ -85,7 +85,7 @@ def _loaders(folder: Path, view: str) -> Iterator[tuple[str, str]]:
 
 
 def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None) -> list[Path]:
-    """Write a folder as ``target`` and, if it has more than ``most`` bytes, further parts.
+    """Write a folder as ``target`` and, where that would be over ``most`` bytes, further parts.
 
     These are named <target's stem>.2.tar and so on; those of an earlier package are removed.
     """
@@ -102,7 +102,8 @@ def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None
     for old in target.parent.glob(f"{target.stem}.*.tar"):
         old.unlink()
     written = []
-    for number, part in enumerate(_parts(paths, most), 1):
+    card_size = sum(_size(len(text.encode())) for text in texts.values())
+    for number, part in enumerate(_parts(paths, most, card_size), 1):
         name = target if number == 1 else target.with_name(f"{target.stem}.{number}.tar")
         progress = Progress(len(part), name.name, "files")
         with atomic_path(name) as temporary, tarfile.open(temporary, "w") as archive:
@@ -121,18 +122,26 @@ def listed(paths: Sequence[Path]) -> list[dict[str, Any]]:
     return [{"file": p.name, "bytes": p.stat().st_size, "sha256": sha256(p)} for p in paths]
 
 
-def _parts(paths: Sequence[Path], most: float | None) -> Iterator[list[Path]]:
-    """Yield runs of files of at most so many bytes together, or of one file that has more."""
+def _parts(paths: Sequence[Path], most: float | None, first: int) -> Iterator[list[Path]]:
+    """Yield runs of files whose tar has at most so many bytes, or of one file that has more.
+
+    The first tar holds ``first`` bytes beside its files.
+    """
     part: list[Path] = []
-    size = 0
+    size = tarfile.RECORDSIZE + first
     for path in paths:
-        needed = path.stat().st_size + 2 * tarfile.BLOCKSIZE
+        needed = _size(path.stat().st_size)
         if part and most is not None and size + needed > most:
             yield part
-            part, size = [], 0
+            part, size = [], tarfile.RECORDSIZE
         part.append(path)
         size += needed
     yield part
+
+
+def _size(content: int) -> int:
+    """Return how many bytes of a tar a file takes at most: with its header, in whole blocks."""
+    return content + 2 * tarfile.BLOCKSIZE
 
 
 def _add(archive: tarfile.TarFile, name: str, content: Path | bytes) -> None:
