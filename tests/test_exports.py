@@ -82,19 +82,28 @@ class Colmap:
         self.colours = {int(row[0]): np.array(row[4:7], int) for row in points}
         self.tracks = {int(row[0]): np.array(row[8:], int).reshape(-1, 2) for row in points}
 
-    def project(self, points, turn, shift):
-        """Project world points with OpenCV, whose pixel centres are whole numbers."""
-        vector = cv2.Rodrigues(turn)[0]
-        if self.model == "PINHOLE":
-            fx, fy, cx, cy = self.parameters
-            matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
-            return cv2.projectPoints(points, vector, shift, matrix, None)[0][:, 0]
-        assert self.model == "OPENCV_FISHEYE"
         fx, fy, cx, cy, *distortion = self.parameters
-        matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
-        return cv2.fisheye.projectPoints(
-            points[:, None], vector, shift[:, None], matrix, np.array(distortion)
-        )[0][:, 0]
+        self.matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+        self.distortion = np.array(distortion) if distortion else None
+        assert self.model == ("OPENCV_FISHEYE" if distortion else "PINHOLE")
+
+    def project(self, points, turn, shift):
+        """Project world points to pixels with OpenCV."""
+        vector = cv2.Rodrigues(turn)[0]
+        if self.distortion is None:
+            return cv2.projectPoints(points, vector, shift, self.matrix, None)[0][:, 0]
+        points, shift = points[:, None], shift[:, None]
+        return cv2.fisheye.projectPoints(points, vector, shift, self.matrix, self.distortion)[0][
+            :, 0
+        ]
+
+    def lift(self, pixels, z):
+        """Return the points (n, 3) in the camera's frame that OpenCV finds in pixels (n, 2)."""
+        if self.distortion is None:
+            found = cv2.undistortPoints(pixels, self.matrix, None)
+        else:
+            found = cv2.fisheye.undistortPoints(pixels[:, None], self.matrix, self.distortion)
+        return np.column_stack([found.reshape(-1, 2), np.ones(len(z))]) * z[:, None]
 
 
 @pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "opencv", "png"])
@@ -177,16 +186,21 @@ def test_colmap_binary_says_what_its_text_says(dataset, tmp_path):
     assert place == len(content)
 
 
-def test_colmap_depth_maps_are_z_in_metres(dataset, tmp_path):
-    folder = exported(dataset, "colmap", "perspective", tmp_path, depth=True, points=50)
-    for name, matrix in matrices(dataset, "perspective").items():
-        content = (folder / "stereo/depth_maps" / f"{name}.png.geometric.bin").read_bytes()
-        assert content.startswith(b"64&48&1&")
-        z = np.frombuffer(content[8:], "<f4").reshape(48, 64)
-        focal = 32 / math.tan(math.radians(35))
-        y, x = np.mgrid[:48, :64] + 0.5
-        local = np.stack([(x - 32) / focal * z, -(y - 24) / focal * z, -z], axis=-1)
-        on_sphere(local @ matrix[:3, :3].T + matrix[:3, 3], 1e-5)
+@pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "opencv"])
+def test_colmap_depth_maps_are_z_in_metres(dataset, tmp_path, source):
+    options = {"depth": True, "format": "text", "points": 50}
+    folder = exported(dataset, "colmap", source, tmp_path, **options)
+    model = Colmap(folder / "sparse" / "0")
+    size = "&".join(map(str, LENSES[source]["resolution"]))
+    for name, turn, shift in model.images.values():
+        content = (folder / "stereo/depth_maps" / f"{name}.geometric.bin").read_bytes()
+        assert content.startswith(f"{size}&1&".encode())
+        width, height = LENSES[source]["resolution"]
+        z = np.frombuffer(content[len(f"{size}&1&") :], "<f4").reshape(height, width)
+        row, column = np.nonzero(z)
+        assert len(row) > 1000
+        local = model.lift(np.stack([column, row], axis=-1) + 0.5, z[row, column])
+        on_sphere((local - shift) @ turn, 1e-5)
 
 
 def nerfstudio_rays(content):
@@ -400,6 +414,9 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
     assert (columns, rows) == (3, 4)
     assert extrinsics.getfloat("baseline_mm") == pytest.approx(200)
     focal = intrinsics.getfloat("focal_length_mm") / intrinsics.getfloat("sensor_size_mm") * 64
+    center = [extrinsics.getfloat(f"center_cam_{axis}_m") for axis in "xyz"]
+    angles = [extrinsics.getfloat(f"center_cam_r{axis}_rad") for axis in "xyz"]
+    turn = Rotation.from_euler("xyz", angles).as_matrix()
     disparities = []
     for number in range(12):
         name = f"Cam{number:03}.pfm"
@@ -407,6 +424,11 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
         disparity = pfm(found / f"gt_disp_lowres_{name}")
         np.testing.assert_allclose(disparity, 0.2 * focal / z, rtol=1e-6)
         disparities.append(disparity)
+        # A camera is the middle one moved by whole baselines, right and down.
+        right, down = number % columns - columns // 2, number // columns - rows // 2
+        y, x = np.mgrid[:48, :64] + 0.5
+        local = [(x - 32) / focal * z + 0.2 * right, -(y - 24) / focal * z - 0.2 * down, -z]
+        on_sphere(np.stack(local, axis=-1) @ turn.T + center, 1e-5)
     low, high = (config["meta"].getfloat(f"disp_{end}") for end in ("min", "max"))
     assert low == pytest.approx(np.min(disparities))
     assert high == pytest.approx(np.max(disparities))
@@ -423,7 +445,6 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
         assert np.abs(moved.astype(float) - pictures[number][y, x]).max() <= 1.5
     middle = found / "gt_disp_lowres.pfm"
     assert middle.read_bytes() == (found / "gt_disp_lowres_Cam007.pfm").read_bytes()
-    center = [extrinsics.getfloat(f"center_cam_{axis}_m") for axis in "xyz"]
     names = {tuple(np.round(m[:3, 3], 9)): name for name, m in matrices(folder, ".").items()}
     assert names[tuple(np.round(center, 9))] == "view_0007f"
 
@@ -436,8 +457,8 @@ def test_hci_is_for_regular_grids(dataset, tmp_path):
 def test_scannetpp_is_a_text_model_beside_fisheyes_with_masks(dataset, tmp_path):
     folder = exported(dataset, "scannetpp", "fisheye", tmp_path, points=200)
     model = Colmap(folder / "colmap")
-    assert model.model == "OPENCV_FISHEYE"
     assert model.parameters[4:] == [0, 0, 0, 0]
+    on_sphere(np.array([*model.positions.values()]), 1e-5)
     for image, rows in model.seen.items():
         places = np.array([model.positions[int(number)] for number in rows[:, 2]])
         expected = model.project(places, *model.images[image][1:])
@@ -554,6 +575,7 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
             {},
             "is a part of a panorama",
         ),
+        ("nerfstudio", "views", VIEWS, {"splatfacto": True}, "taken for a pinhole by splatfacto"),
         ("nerf_synthetic", "views", VIEWS, {}, "is no pinhole camera"),
         ("nerf_synthetic", "views", LENSES["shifted"], {}, "off centre"),
         ("opendibr", "views", VIEWS | {"principal_point": [40, 48]}, {}, "axis off centre"),
