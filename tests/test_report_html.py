@@ -15,6 +15,7 @@ from sphere import RADIUS, colour_of, look
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.dataset.passes import FLOW, PASSES
 from lightfield.geometry import lenses, overview, rigs
 from lightfield.geometry.depth import z_from_distance
 from lightfield.imaging import images, pictures
@@ -345,6 +346,46 @@ def test_each_reprojection_is_shown(show, tmp_path):
     source = tab.get_attribute("img[alt='The views as small']", "src")
     # Developed already, it is shown as it is.
     assert abs(decoded(source)[50, 50].astype(int) - 200).max() <= 2
+
+
+def test_each_pass_of_the_middle_view_is_shown(show, tmp_path):
+    rig = {**LINE, "cameras": [2, 1]}
+    lightfield = write_dataset(tmp_path, rig).with_flow()
+    lens, shown = lightfield.lens, ["normal", "object", "cryptomatte", "motion", "albedo", "flow"]
+    render = {**lightfield.render, "passes": shown[:-1]}
+    lightfield.changed(render=render).write(tmp_path / "lightfield.json")
+    left = (np.indices((lens.height, lens.width))[1] < lens.width / 2).astype(float)
+    # All else is 0.
+    holds = {
+        "normal": {"B": left},
+        "object": {"Y": 2 - left},
+        "cryptomatte": {"CryptoObject00.R": 7, "CryptoObject00.G": left / 2},
+        "motion": {"next.X": left},
+        "albedo": {"R": left},
+        "flow": {"X": 1, "V": left},
+    }
+    for view in lightfield.views:
+        for found in (*(PASSES[name] for name in shown[:-1]), FLOW):
+            name = view.flow if found == FLOW else view.name
+            planes = {
+                channel: (0 * left + holds[found.name].get(channel, 0)).astype(found.dtype)
+                for channel in found.channels
+            }
+            images.write_exr(found.path(tmp_path, name), planes)
+    tab = show(make_page(tmp_path, rig))
+    pictures = {
+        name: decoded(tab.get_attribute(f"img[alt^='{name} of view']", "src"))[4, [4, -4]].tolist()
+        for name in shown
+    }
+    assert tab.locator(".passes img").count() == len(shown)
+    assert pictures["normal"] == [[128, 128, 255], [0, 0, 0]]
+    one, other = pictures["object"]
+    assert one != other and max(one) > 100 and max(other) > 100
+    assert max(pictures["cryptomatte"][0]) > 40 and pictures["cryptomatte"][1] == [0, 0, 0]
+    assert pictures["motion"] == [[255, 0, 0], [255, 255, 255]]
+    assert pictures["albedo"] == [[255, 0, 0], [0, 0, 0]]
+    assert pictures["flow"] == [[255, 0, 0], [102, 0, 0]]
+    assert "normal/" in tab.locator("#files").inner_text()
 
 
 def test_an_index_leads_to_every_page(sphere, run_program, show):

@@ -10,12 +10,13 @@ import numpy as np
 
 from lightfield.dataset import blend
 from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.dataset.passes import FLOW
 from lightfield.dataset.splits import SPLITS
 from lightfield.geometry import rigs
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
 from lightfield.imaging import images
-from lightfield.report import contact_sheet, faults, page, tables, views
+from lightfield.report import contact_sheet, faults, page, pass_pictures, tables, views
 from lightfield.report.packing import webp
 from lightfield.validation.files import IMAGES, REPORT, SUMS
 
@@ -50,6 +51,7 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
     lightfield, rig = LightField.read(folder / NAME), origin.rig
     validation = tables.validation(folder / "validation.json")
     looks = views.collect(folder / IMAGES, lightfield, rig, _unreadable(validation))
+    middle = lightfield.views[middle_view(rig)]
     report = folder / REPORT
     found = origin.measurements
     measured = {
@@ -63,11 +65,13 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
         name=name,
         home="../" * (name.count("/") + 2) + "index.html",
         facts=facts(folder, lightfield, rig, looks.missed),
-        middle=None if origin.has_panorama else lightfield.views[middle_view(rig)].name,
+        middle=None if origin.has_panorama else middle.name,
+        passes_of=middle.name,
         pictures={stem: page.photo(report / f"{stem}.png", WIDEST) for stem in PICTURES},
         plots={stem: page.plot(report / stem) for stem in PLOTS},
         taken=_taken(origin, lightfield),
         looks=looks,
+        passes=list(pass_pictures.collect(folder, lightfield, middle, looks.data["exposure"])),
         reprojected=list(_reprojected(folder)),
         render=lightfield.render,
         validation=validation,
@@ -200,6 +204,8 @@ def files(folder: Path, lightfield: LightField, valid: bool) -> list[tuple[str, 
         (f"{IMAGES}/{first}.exr …", f"the views: scene-linear Rec. 709 R, G, B as half{depth}"),
         ("lightfield.json", "the lens once; position, rotation, and world_matrix of each view"),
     ]
+    wanted = [*lightfield.passes, *([FLOW] if lightfield.views[0].flow else [])]
+    found += [(f"{one.name}/", one.meaning) for one in wanted]
     if (folder.parent / SPLITS).is_file():
         found.append((f"../{SPLITS}", "which of the scene's views train, and which test"))
     for inner in sorted(folder.glob(f"*/{NAME}")):
