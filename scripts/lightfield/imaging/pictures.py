@@ -1,12 +1,10 @@
 """Pictures of views, made to be looked at: exposed, tone-mapped, in sRGB."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
 
-from lightfield.imaging import images
 from lightfield.imaging.tonemap import to_8_bit, tone_map
 
 Array = np.ndarray[Any, Any]
@@ -17,11 +15,6 @@ MIDDLE_GREY = 0.18
 WHITE = 5.0
 # More views than this are thinned evenly, so that each can still be recognised.
 MOST_VIEWS = 120
-
-
-def read_colour(path: Path) -> Array:
-    """Read an image's scene-linear colour as (height, width, 3) float32."""
-    return images.read_image(path, "RGB").colour
 
 
 def luminance(colour: Array) -> Array:
