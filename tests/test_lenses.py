@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import mpmath
@@ -531,6 +532,10 @@ CAMERA_YAML = [
         "fov: 90, sensor_size: 24, principal_point: [40, 30]",
         Rectilinear(**SENSOR, focal_length=12, principal_point=(40, 30)),
     ),
+    (
+        "fov: 90, sensor_size: [0.5, 0.6]",
+        Rectilinear(**LANDSCAPE, focal_length=0.25, sensor_size=(0.5, 0.6)),
+    ),
     ("fov: 90", Rectilinear(**LANDSCAPE, focal_length=18)),
     ("fov: 180", Equidistant(**LANDSCAPE, fov=math.pi)),
     ("fov: 180, focal_length: 10.5", Equisolid(**LANDSCAPE, fov=math.pi, focal_length=10.5)),
@@ -560,6 +565,50 @@ def test_scene_yaml(keys: str, expected: Lens) -> None:
     assert lens.sensor == expected.sensor
     x, y = grid(lens, np.float64, 17)
     np.testing.assert_allclose(lens.rays(x, y), expected.rays(x, y), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", [name for name in EXAMPLES if name != "cube map"])
+def test_a_scene_yaml_can_have_every_lens(name: str) -> None:
+    lens = EXAMPLES[name]
+    again = from_camera(lens.settings())
+    assert type(again) is type(lens)
+    x, y = grid(lens, np.float64, 17)
+    np.testing.assert_allclose(again.rays(x, y), lens.rays(x, y), atol=1e-9)
+
+
+def test_angles_in_a_scene_yaml_are_as_round_as_they_are_meant() -> None:
+    camera = {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT"}
+    for fov, degrees in ((np.float32(math.pi), 180), (1, math.degrees(1))):
+        image = {"resolution": [64, 64], "camera": camera | {"fisheye_fov": float(fov)}}
+        assert from_lightfield(image).settings()["fov"] == degrees
+
+
+def test_cycles_has_lenses_of_blenders_cameras() -> None:
+    known = {name for name, lens in LENSES.items() if lens.in_cycles}
+    assert known == {"rectilinear", "equidistant", "equisolid", "polynomial", "equirectangular"}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"width": 0, "height": 0}, "is not an image"),
+        ({"sensor_size": (36, 0)}, "must be positive millimetres"),
+        ({"sensor_size": (math.inf, 1)}, "must be positive millimetres"),
+        ({"principal_point": (math.nan, 1)}, "must be finite pixels"),
+    ],
+)
+def test_every_lens_refuses_an_image_that_is_none(
+    change: dict[str, Any], message: str, name: str
+) -> None:
+    with pytest.raises(UserError, match=message):
+        replace(EXAMPLES[name], **change)
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_smallest_image(name: str) -> None:
+    size = (6, 1) if name == "cube map" else (1, 1)
+    assert EXAMPLES[name].resized(*size).pixel_rays().shape == (size[1], size[0], 3)
 
 
 @pytest.mark.parametrize(
