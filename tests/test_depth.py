@@ -70,6 +70,12 @@ def test_half_depths_widen_to_the_rays() -> None:
     np.testing.assert_allclose(z, 65504 * 0.8, rtol=1e-6)
 
 
+def test_what_a_half_cannot_hold_is_as_far_as_a_miss() -> None:
+    found = with_precision(np.array([1e6, 2, -1e6], np.float32), "half")
+    assert found.dtype == np.float16
+    np.testing.assert_array_equal(found, [np.inf, 2, -np.inf])
+
+
 def test_rounded_depth_is_the_nearest_float_of_17_digits() -> None:
     depth = (10 ** np.random.default_rng(2).uniform(-6, 9, 1000)).astype(np.float32)
     found = with_precision(depth, "rounded")

@@ -257,6 +257,43 @@ def test_cube_map_faces_look_along_six_axes_of_the_camera() -> None:
         assert np.linalg.det(matrix[:3, :3]) == pytest.approx(1)
 
 
+@pytest.mark.parametrize(
+    ("kind", "cameras", "expected"),
+    [
+        ("plane", [7, 5], [(x, 0, 0) for x in np.linspace(-1, 1, 7)]),
+        ("cuboid", [5, 2, 3], [(x, 1, 0) for x in np.linspace(-1, 1, 5)]),
+        ("cuboid", [2, 5, 3], [(-1, y, 0) for y in np.linspace(-1, 1, 5)]),
+        ("cylinder", [4, 3], [(0, 1, 0), (1, 0, 0), (0, -1, 0), (-1, 0, 0)]),
+    ],
+)
+def test_the_row_in_the_middle(kind: str, cameras: list[int], expected: Any) -> None:
+    rig = from_settings({"type": kind, "cameras": cameras, "size": 2})
+    places = np.array([pose.position for pose in rig.poses()])
+    np.testing.assert_allclose(places[rig.middle_row(places)], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("kind", "own"),
+    [
+        ("plane", {"cameras": [3, 3]}),
+        ("cuboid", {"cameras": [3, 3, 3]}),
+        ("lattice", {"cameras": [3, 3, 3]}),
+        ("cylinder", {"cameras": [4, 3]}),
+        ("sphere", {"subdivisions": 4}),
+    ],
+)
+def test_an_outline_reaches_as_far_as_the_rig(kind: str, own: Any) -> None:
+    size = 2 if kind == "sphere" else [2, 4, 6]
+    rig = from_settings({"type": kind, "size": size, "center": [1, 1, 1], **own})
+    corners = np.concatenate(rig.outline())
+    places = np.array([pose.position for pose in rig.poses()])
+    assert rig.is_round == (kind in ("cylinder", "sphere"))
+    # A sphere's cameras need not be at its outermost points.
+    tolerance = 0.03 if kind == "sphere" else 1e-9
+    np.testing.assert_allclose(corners.min(0), places.min(0), atol=tolerance)
+    np.testing.assert_allclose(corners.max(0), places.max(0), atol=tolerance)
+
+
 def test_more_than_9999_views_keep_one_name_each() -> None:
     rig = from_settings({"type": "plane", "cameras": [101, 101]})
     names = [view.name for view in rig.poses()]
