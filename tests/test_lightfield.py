@@ -275,6 +275,24 @@ def test_a_scenes_fingerprint_is_its_files_or_its_builders(
     assert len(found) == 4 and all(len(key) == 64 for key in found)
 
 
+def test_the_key_of_a_flow_changes_with_lens_poses_and_views(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    first = LightField.from_rig(PLANE, FISHEYE, depth="z")
+    one, other = first.views
+    found = [
+        keys.flow_key(first, one, other, ["a", "b"]),
+        keys.flow_key(first, other, one, ["a", "b"]),
+        keys.flow_key(first, one, one, ["a", "b"]),
+        keys.flow_key(first, other, other, ["a", "b"]),
+        keys.flow_key(first, one, other, ["b", "a"]),
+        keys.flow_key(first.changed(lens=WIDE, depth="distance"), one, other, ["a", "b"]),
+    ]
+    monkeypatch.setattr(keys, "FLOW_VERSION", 2)
+    found.append(keys.flow_key(first, one, other, ["a", "b"]))
+    assert len(set(found)) == len(found)
+
+
 def test_keys_stay_what_they_were(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A view that is finished under these keys is not rendered again by another version of ours."""
     monkeypatch.setattr(keys, "version", lambda _: "5.0.1")
