@@ -108,6 +108,73 @@ def cast(content):
     return names
 
 
+def build_instances():
+    """Balls that collections and geometry nodes repeat, each behind a card that is cut away."""
+    paint = material("paint")
+    invisible = material("invisible", Alpha=0.0)
+    ball = add("ball", "uv_sphere", paint, radius=0.3, location=(0, 3, 0.6))
+    # Cycles' own surface is of no material.
+    bare = add("bare", "uv_sphere", paint, radius=0.3, location=(-1, 3, 1.6))
+    bare.data.materials.clear()
+    card = add("card", "plane", invisible, size=1.2, location=(0, 2, 0.6), rotation=(1.5, 0, 0))
+    group = bpy.data.collections.new("group")
+    for thing in (ball, card):
+        group.objects.link(thing)
+        bpy.context.scene.collection.objects.unlink(thing)
+    for number, place in enumerate([(-1.2, 0, 0), (0, 0.5, 0.2), (1.2, 0, 0)]):
+        empty = bpy.data.objects.new(f"place {number}", None)
+        empty.instance_type, empty.instance_collection = "COLLECTION", group
+        empty.location = place
+        bpy.context.scene.collection.objects.link(empty)
+    tree = bpy.data.node_groups.new("row", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    line = tree.nodes.new("GeometryNodeMeshLine")
+    line.inputs["Count"].default_value, line.inputs["Offset"].default_value = 3, (0.7, 0, 0)
+    what = tree.nodes.new("GeometryNodeObjectInfo")
+    what.inputs["Object"].default_value, what.inputs["As Instance"].default_value = ball, True
+    there = tree.nodes.new("GeometryNodeInstanceOnPoints")
+    tree.links.new(line.outputs[0], there.inputs["Points"])
+    tree.links.new(what.outputs["Geometry"], there.inputs["Instance"])
+    tree.links.new(there.outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0])
+    row = bpy.data.objects.new("row", bpy.data.meshes.new("row"))
+    row.location = (-0.5, 3.5, 1.8)
+    row.modifiers.new("row", "NODES").node_group = tree
+    bpy.context.scene.collection.objects.link(row)
+    rough = material("rough")
+    nodes, link = rough.node_tree.nodes, rough.node_tree.links.new
+    bump = nodes.new("ShaderNodeBump")
+    link(nodes.new("ShaderNodeTexNoise").outputs[0], bump.inputs["Height"])
+    link(bump.outputs[0], nodes["Principled BSDF"].inputs["Normal"])
+    add("floor", "plane", rough, size=40)
+
+
+def cast_instances(content):
+    """Return the name of the instance behind each pixel (h, w) of the first view, by its place."""
+    view, depsgraph = content.views[0], bpy.context.evaluated_depsgraph_get()
+    names = {}
+    for entry in depsgraph.object_instances:
+        name = entry.object.name
+        if entry.is_instance:
+            places = " ".join(str(place) for place in entry.persistent_id if place < 2**31 - 1)
+            name = f"{entry.parent.name} > {name} {places}"
+        names[entry.object.name, tuple(np.round(entry.matrix_world.translation, 3).tolist())] = name
+    rays = content.lens.pixel_rays() @ view.matrix[:3, :3].T
+    found = np.full(rays.shape[:2], "", dtype="U24")
+    for pixel in zip(*np.nonzero(np.isfinite(rays[..., 0])), strict=True):
+        origin, direction, thing = Vector(view.position), Vector(rays[pixel]), None
+        while thing is None or thing.name == "card":
+            hit, origin, _, _, thing, matrix = bpy.context.scene.ray_cast(
+                depsgraph, origin, direction
+            )
+            if not hit:
+                found[pixel] = ""
+                break
+            origin = origin + 1e-4 * direction
+            place = tuple(np.round(matrix.translation, 3).tolist())
+            found[pixel] = names[thing.name, place]
+    return found
+
+
 def read_matte(path, name, target):
     """Let Blender's own Cryptomatte node read a file, and write the matte of an object."""
     blend_file.new_scene()
@@ -165,6 +232,15 @@ def main(folder: Path) -> None:
     render("perspective", lightfield("perspective"))
     same = {file: (folder / "perspective" / file).read_bytes() == made[file] for file in files}
     (folder / "again.json").write_text(json.dumps(same))
+    blend_file.new_scene()
+    build_instances()
+    blend_file.save_scene(blend)
+    for name in ("fisheye", "perspective"):
+        content = lightfield(name, passes=["normal", "object", "instance"])
+        render(f"instances_{name}", content)
+        np.save(folder / f"instances_{name}.npy", cast_instances(content))
+    bare = content.changed(render={k: v for k, v in content.render.items() if k != "passes"})
+    render("instances_plain", bare, "0:1")
     read_matte(folder / "perspective/cryptomatte/view_0000f.exr", "wall", folder / "matte.exr")
 
 

@@ -102,6 +102,55 @@ def test_what_is_not_a_number_is_counted_and_becomes_0():
         assert [plane[0].tolist() for plane in channels.values()] == [[0, 0], [0, 0], [0, 1]]
 
 
+# The same whatever the process, the machine, and the version of Blender.
+INSTANCES = {
+    "bare": 2,
+    "floor": 4,
+    "place 0 > ball 0": 3259591936,
+    "place 0 > card 1": 1834902912,
+    "place 1 > ball 0": 4012807424,
+    "place 1 > card 1": 1077517824,
+    "place 2 > ball 0": 3691149568,
+    "place 2 > card 1": 1930785280,
+    "row": 5,
+    "row > ball 0 0": 3292252672,
+    "row > ball 0 1": 3466653184,
+    "row > ball 0 2": 1478244096,
+}
+
+
+@pytest.mark.parametrize("lens", ["fisheye", "perspective"])
+def test_instances_are_apart_also_behind_what_is_cut_out(lens, made):
+    folder = made / f"instances_{lens}"
+    assert read_json(folder / "instance" / "names.json") == INSTANCES
+    cast = np.load(made / f"instances_{lens}.npy")
+    balls = {name for name in INSTANCES if "ball" in name}
+    assert {"bare", "floor", *balls} <= set(cast.ravel())
+    expected = np.vectorize(lambda name: INSTANCES.get(str(name), 0))(cast)
+    np.testing.assert_array_equal(read(folder, "instance")[..., 0], expected)
+
+
+def test_instances_are_nothing_to_the_colour(made):
+    colour, plain = (read(made / f"instances_{name}", "exr") for name in ("perspective", "plain"))
+    np.testing.assert_array_equal(colour, plain)
+
+
+@pytest.mark.parametrize("lens", ["fisheye", "perspective"])
+def test_a_bump_has_no_normal_at_the_rim_of_an_image_circle_and_validation_says_so(lens, made):
+    """Cycles bumps by the rays of the neighbouring pixels, of which some see nothing there."""
+    folder = made / f"instances_{lens}"
+    hit = read(folder, "instance")[..., 0] > 0
+    lost = hit & ~read(folder, "normal").any(axis=-1)
+    seen = np.isfinite(LightField.read(folder / "lightfield.json").lens.pixel_rays()[..., 0])
+    assert not lost[binary_erosion(seen, iterations=2, border_value=1)].any()
+    count = images.attribute(folder / "normal/view_0000f.exr", images.NAN_ATTRIBUTE)
+    assert count == 3 * lost.sum() and lost.any() == (lens == "fisheye")
+    (check,) = (check for check in validate(folder).checks if check.name == "passes")
+    (warning,) = check.warnings or [None]
+    assert check.passed and (warning is None) == (lens == "perspective")
+    assert warning is None or "in normal were not numbers" in warning
+
+
 def mattes(folder):
     """Return the part (h, w) that each object covers of each pixel, by name."""
     channels = read(folder, "cryptomatte")
@@ -203,7 +252,7 @@ def test_a_view_is_finished_when_all_of_its_files_are(made):
     assert rendered == ["view_0000f", "view_0001f", "view_0001f"]
     assert set(read_json(made / "again.json").values()) == {True}
     files = read_json(made / "perspective.json")["files"]
-    assert len(files) == 2 * (1 + len(PASSES)) + 2
+    assert len(files) == 2 * (1 + len(PASSES)) + 3
     for name, entry in files.items():
         assert entry["sha256"] == sha256(made / "perspective" / name)
 

@@ -95,6 +95,7 @@ PASSES = {
         ),
         _id("object", "Object Index"),
         _id("material", "Material Index"),
+        _id("instance", "Random"),
         _matte("CryptoObject00", "CryptoObject01", "CryptoObject02"),
         Pass(
             "motion",

@@ -10,7 +10,7 @@ from lightfield.core import gpus
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.passes import Pass
-from lightfield.rendering import blend_file, ids, pruning
+from lightfield.rendering import blend_file, ids, instances, pruning
 
 # In the order in which `auto` tries them.
 GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
@@ -39,7 +39,7 @@ def set_up(
     elif numbered and not inventory:
         # So that their numbers are the same.
         pruning.remove_objects(pruning.removable_objects())
-    for kind in numbered:
+    for kind in {"object" if kind == "instance" else kind for kind in numbered}:
         ids.assign(kind)
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
@@ -49,6 +49,9 @@ def set_up(
     _use_device(scene, device)
     # At this frame a marker may choose the artist's camera, and later none may.
     scene.frame_set(lightfield.frame)
+    if "instance" in numbered:
+        instances.set_up(view_layer(scene))
+        instances.shown()
     focused = scene.camera if lightfield.render.get("depth_of_field") else None
     for marker in scene.timeline_markers:
         marker.camera = None

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from lightfield.dataset.passes import PASSES
+from lightfield.rendering import instances
 from lightfield.rendering.cycles import pass_property, view_layer
 from lightfield.rendering.view import Array, render_view
 
@@ -45,9 +46,10 @@ class Geometry:
     ``depth``, (height, width) float32 in metres, is inf where nothing is hit: Z-depth for a
     perspective camera and distance for any other. ``normal``, (height, width, 3) float32, is the
     shading normal in world space on the camera's side. ``objects`` and ``materials``,
-    (height, width) uint16, are their pass indices. ``motion``, (height, width, 4) float32 if it was
-    asked for, is where the surface is in the previous and in the next frame: x and y of both in
-    pixels from here, to the right and down. These are 0 where nothing is hit.
+    (height, width) uint16, are their pass indices. Of what may be asked for, ``instances``,
+    (height, width) uint32, are the numbers of `lightfield.rendering.instances`, and ``motion``,
+    (height, width, 4) float32, is where the surface is in the previous and in the next frame: x and
+    y of both in pixels from here, to the right and down. These are 0 where nothing is hit.
     ``render_seconds`` and ``synchronization_seconds`` are Cycles' own.
     """
 
@@ -55,16 +57,21 @@ class Geometry:
     normal: Array
     objects: Array
     materials: Array
+    instances: Array | None
     motion: Array | None
     render_seconds: float
     synchronization_seconds: float
 
 
-def render_geometry(world_matrix: Array, motion: bool = False) -> Geometry:
-    """Render the geometry that a camera at ``world_matrix``, (4, 4) camera-to-world, sees."""
+def render_geometry(world_matrix: Array, motion: bool = False, apart: bool = False) -> Geometry:
+    """Render the geometry that a camera at ``world_matrix``, (4, 4) camera-to-world, sees.
+
+    With ``motion``, and with instances ``apart``, for which Cycles has been set up.
+    """
     wanted = _PASSES | (_MOTION if motion else {})
     with _geometry_settings(wanted):
-        found = render_view(world_matrix, 0, wanted)
+        asked = wanted | (instances.CYCLES_PASSES if apart else {})
+        found = render_view(world_matrix, 0, asked)
     depth = found.passes["Depth"]
     # Cycles leaves values that are not a number where the lens sees nothing.
     hit = depth < MISS
@@ -77,6 +84,7 @@ def render_geometry(world_matrix: Array, motion: bool = False) -> Geometry:
         normal,
         objects[..., 0].astype(np.uint16),
         materials[..., 0].astype(np.uint16),
+        instances.decoded(found.passes, objects[..., 0].astype(int)) if apart else None,
         np.where(hit, found.passes["Vector"] * _MOTION_SIGNS, np.float32(0)) if motion else None,
         found.render_seconds,
         found.synchronization_seconds,

@@ -1,7 +1,8 @@
 """The numbers by which the passes of objects and materials name them: the same in every view.
 
 They are places in the sorted list of full names, from 1, and so follow from the .blend alone.
-Cycles gives all instances of one object the number of that object.
+Cycles gives all instances of one object the number of that object; what keeps them apart is in
+`lightfield.rendering.instances`.
 """
 
 from typing import Any
@@ -37,4 +38,9 @@ def names(kind: str) -> dict[str, int]:
 def _blocks(kind: str) -> list[Any]:
     if kind == "material":
         return list(bpy.data.materials)
-    return [thing for thing in bpy.data.objects if thing.type not in _WITHOUT_SURFACE]
+    return [thing for thing in bpy.data.objects if not has_no_surface(thing)]
+
+
+def has_no_surface(thing: Any) -> bool:
+    """Whether an object is of a type that no ray can meet."""
+    return thing.type in _WITHOUT_SURFACE

@@ -113,9 +113,9 @@ def _files(folder: Path, view: View, wanted: Iterable[Pass]) -> list[Path]:
 
 
 def _names(kind: str) -> dict[str, int]:
-    from lightfield.rendering import ids
+    from lightfield.rendering import ids, instances
 
-    return ids.names(kind)
+    return instances.shown().names if kind == "instance" else ids.names(kind)
 
 
 def _refuse_what_does_not_fit(
@@ -161,14 +161,18 @@ def _render_views(
     wanted = lightfield.passes
     seed = lightfield.render["seed"]
     compression = lightfield.render.get("compression", "zip")
-    motion = any(found.kind == "motion" for found in wanted)
+    names = {found.name for found in wanted}
     has_geometry = lightfield.depth or not all(found.of_colour for found in wanted)
     process = psutil.Process()
     progress.begin()
     for view in views:
         began, began_cpu = time.perf_counter(), time.process_time()
         # Of the same pose one after the other: Cycles keeps the scene as it is.
-        geometry = render_geometry(view.matrix, motion) if has_geometry else None
+        geometry = (
+            render_geometry(view.matrix, "motion" in names, "instance" in names)
+            if has_geometry
+            else None
+        )
         geometry_seconds = time.perf_counter() - began
         colour = render_colour(
             view.matrix, keys.view_seed(seed, view.name), wanted, lightfield.transparent
@@ -251,6 +255,9 @@ def pass_channels(
             pixels = geometry.objects[..., None]
         case "material":
             pixels = geometry.materials[..., None]
+        case "instance":
+            assert geometry.instances is not None
+            pixels = geometry.instances[..., None]
         case _:
             assert geometry.motion is not None
             pixels = geometry.motion.copy()

@@ -1,6 +1,7 @@
 """What each image of a dataset shows by itself: is it whole, and does it hold what it must?"""
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -163,6 +164,7 @@ class Examiner:
         if problem:
             facts.fault("passes", problem)
             return
+        facts.nan = int(image.attributes.get(images.NAN_ATTRIBUTE, 0))
         pixels = np.stack([image.channels[name] for name in wanted.channels])
         wrong = int((~np.isfinite(pixels)).sum())
         facts.fault("passes", f"{wrong} values are not finite", wrong)
@@ -314,7 +316,17 @@ def of_passes(own: Mapping[File, Facts], missing: Mapping[str, str]) -> Check:
     }
     count = len(own) + len(missing)
     detail = f"{count - len(faults)} of {count} are there and hold what they must"
-    return Check.of_files("passes", faults, detail)
+    check = Check.of_files("passes", faults, detail)
+    lost: Counter[str] = Counter()
+    for file, fact in own.items():
+        if file.of_pass and fact.nan:
+            lost[file.of_pass.name] += fact.nan
+    for name, number in lost.items():
+        check.warnings.append(
+            f"{number} values in {name} were not numbers to Cycles and are 0, as those of bumped "
+            "surfaces at the rim of an image circle"
+        )
+    return check
 
 
 def with_extras(exports: Check, extras: Mapping[File, Facts]) -> Check:
