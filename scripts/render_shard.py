@@ -33,6 +33,9 @@ def main() -> None:
         help="what Cycles renders on (default: auto)",
     )
     parser.add_argument("--threads", type=int, help="CPU threads (default: all cores)")
+    parser.add_argument(
+        "--stall", type=int, default=0, metavar="S", help="seconds for a view, or it is killed"
+    )
     arguments = parser.parse_args()
     shard.render(
         LightField.read(arguments.lightfield),
@@ -44,6 +47,7 @@ def main() -> None:
         threads=arguments.threads,
         record=arguments.record,
         journal=arguments.journal,
+        stall=arguments.stall,
     )
 
 

@@ -15,15 +15,22 @@ that was really spent. Times of day are seconds since 1970. A process's lines ar
 import os
 import socket
 import time
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import psutil
 
 from lightfield.core import memory
 from lightfield.core.files import append_json_line, read_json_lines
+
+# A machine that has failed so often, one time after the other, is avoided.
+MOST_FAILURES = 3
+# A view is suspect that was rendered in so small a part of the time of so many others at least.
+SUSPECT_PART, SUSPECT_AFTER = 0.02, 3
 
 # What every line of a kind has, after the key that says which kind it is.
 _LINES: dict[str, dict[str, type]] = {
@@ -139,6 +146,31 @@ def read(path: Path) -> list[Run]:
         else:
             runs[-1].views.append(entry)
     return runs
+
+
+def avoided(shard: Sequence[Run], others: Iterable[Sequence[Run]]) -> list[str]:
+    """Return the hosts to avoid when a shard is submitted again, whose runs are all over.
+
+    That is where it failed last, and where the last `MOST_FAILURES` runs of all failed. Of the
+    ``others`` the last run may still be at work. No host is avoided while no other one has ended
+    a run: it may be the only one.
+    """
+    over = [(run.start["started"], run.start["host"], bool(run.end)) for run in shard]
+    for runs in others:
+        known = [*runs[:-1], *(run for run in runs[-1:] if run.end)]
+        over += [(run.start["started"], run.start["host"], bool(run.end)) for run in known]
+    ended: dict[str, list[bool]] = defaultdict(list)
+    for _, host, has_ended in sorted(over):
+        ended[host].append(has_ended)
+    failing = {host for host, past in ended.items() if not any(past[-MOST_FAILURES:])}
+    found = {host for host in failing if len(ended[host]) >= MOST_FAILURES}
+    found |= {run.start["host"] for run in shard[-1:] if not run.end}
+    return sorted(found) if any(any(ended[host]) for host in ended.keys() - found) else []
+
+
+def is_suspect(seconds: float, others: Sequence[float]) -> bool:
+    """Whether a view took implausibly few seconds, beside the ``others`` of its shard."""
+    return len(others) >= SUSPECT_AFTER and seconds < SUSPECT_PART * median(others)
 
 
 def _is_sound(entry: dict[str, Any]) -> bool:

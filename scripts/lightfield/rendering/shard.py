@@ -6,11 +6,13 @@ settings give is left as it is, so that a shard, killed and started again, rende
 missing. Its journal, one JSON line a rendered view, says what was done and how fast.
 """
 
+import signal
 import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +25,7 @@ from lightfield.core.files import read_json, write_json
 from lightfield.core.memory import available
 from lightfield.core.progress import Progress
 from lightfield.dataset import keys, memory, passes
-from lightfield.dataset.journal import Journal
+from lightfield.dataset.journal import Journal, is_suspect
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.passes import Pass
 from lightfield.dataset.records import ShardRecord
@@ -50,12 +52,14 @@ def render(
     threads: int | None,
     record: Path | None = None,
     journal: Path | None = None,
+    stall: int = 0,
 ) -> None:
     """Render into ``folder`` those of the ``views``, FIRST:END, that are missing there.
 
     Their passes go into folders beside it, with the names of what has a number in them.
     ``blend`` is the scene and ``inventory`` a JSON of what it contains; ``threads`` None are all.
-    ``record`` and ``journal`` may be None.
+    ``record`` and ``journal`` may be None. A view that takes more than ``stall`` seconds, if not
+    0, ends the process by SIGALRM.
     Raises `UserError` where the scene cannot be opened, the ``device`` is not there, or a file
     cannot be written.
     """
@@ -99,7 +103,7 @@ def render(
         for path in nameless:
             write_json(path, _names(path.parent.name))
             sums.add(path, names_key)
-        _render_views(missing, lightfield, folder, sums, log, progress)
+        _render_views(missing, lightfield, folder, sums, log, progress, stall)
     sums.write([*names, *(path for view in chosen for path in paths[view.name])])
     log.end()
 
@@ -151,6 +155,7 @@ def _render_views(
     record: ShardRecord,
     journal: Journal,
     progress: Progress,
+    stall: int,
 ) -> None:
     """Render ``views`` one after the other, in the scene that is set up for them."""
     from lightfield.rendering.colour_pass import render_colour
@@ -164,8 +169,11 @@ def _render_views(
     names = {found.name for found in wanted}
     has_geometry = lightfield.depth or not all(found.of_colour for found in wanted)
     process = psutil.Process()
+    past: list[float] = []
     progress.begin()
     for view in views:
+        # The system's own timer: what hangs need not run any Python.
+        signal.alarm(stall)
         began, began_cpu = time.perf_counter(), time.process_time()
         # Of the same pose one after the other: Cycles keeps the scene as it is.
         geometry = (
@@ -208,7 +216,15 @@ def _render_views(
                 "memory_bytes": process.memory_info().rss,
             },
         )
+        if is_suspect(colour.render_seconds, past):
+            print(
+                f"warning: {folder}/{view.name}.exr took {colour.render_seconds:.3g} s, and others "
+                f"some {median(past):.3g} s: look at it",
+                file=sys.stderr,
+            )
+        past.append(colour.render_seconds)
         progress.done()
+    signal.alarm(0)
 
 
 def depth_rays(lightfield: LightField) -> Array | None:
