@@ -30,6 +30,7 @@ report: "captions/workflow.rst"
 
 
 include: "rules/common.smk"
+include: "rules/storage.smk"
 include: "rules/display.smk"
 include: "rules/scene.smk"
 include: "rules/rig.smk"
@@ -50,6 +51,8 @@ onstart:
     try:
         check_device()
         check_room()
+        if STORE:
+            ViewStore(STORE).check()
         remove_leftovers()
         for path in BROKEN:
             set_aside(Path(path), Path(REMOVED))

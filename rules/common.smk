@@ -14,27 +14,32 @@ from pathlib import Path
 # From the folder that Snakemake works in, which may be a user's own.
 SCRIPTS = os.path.relpath(Path(workflow.current_basedir).parent / "scripts")
 BENCHMARKS = os.path.relpath(Path(workflow.current_basedir).parent / "benchmarks")
-# A prefix takes the place of Snakemake's own, strict mode and all. The rules call `python`: let
-# that be the one that runs Snakemake, and a signal that ends it be named in the job's log.
-shell.prefix(
-    "set -euo pipefail;"
-    f" export PATH={shlex.quote(str(Path(sys.executable).parent))}:$PATH;"
-    ' python() {{ command python "$@" || {{ local status=$?; if ((status > 128)); then'
-    ' echo "error: killed by SIG$(kill -l $status)" >&2; fi; return $status; }}; }}; '
-)
 
 from lightfield.core import leftovers, room
 from lightfield.core.failures import failure_report
 from lightfield.core.files import read_json, set_aside
 from lightfield.core.gpus import visible
 from lightfield.core.memory import available
-from lightfield.dataset import ledger, memory
+from lightfield.dataset import journal, ledger, memory
 from lightfield.dataset.config import accept_blend, load_config, load_scene, scene_path
 from lightfield.dataset.dataset import PICTURES, PLOTS, load_datasets, scene_datasets
 from lightfield.dataset.exports import MANIFEST, VIEWS
 from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.view_store import VARIABLE, ViewStore
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.measurement.sampling import calibrated
+
+# Where machines see no common folder: what is declared lies in Snakemake's own storage there, and
+# views in the view store.
+STORE = workflow.storage_settings.default_storage_prefix or ""
+# A prefix takes the place of Snakemake's own, strict mode and all. The rules call `python`: let
+# that be the one that runs Snakemake, and a signal that ends it be named in the job's log.
+shell.prefix(
+    f"set -euo pipefail; export {VARIABLE}={shlex.quote(STORE)};"
+    f" export PATH={shlex.quote(str(Path(sys.executable).parent))}:$PATH;"
+    ' python() {{ command python "$@" || {{ local status=$?; if ((status > 128)); then'
+    ' echo "error: killed by SIG$(kill -l $status)" >&2; fi; return $status; }}; }}; '
+)
 
 # The rigs that config.yaml names are those of the scene that it names.
 if "scenes" in GIVEN and "rigs" not in GIVEN:
@@ -52,13 +57,6 @@ try:
     SMOKE = scene_datasets("smoke", settings=SETTINGS)
 except UserError as error:
     sys.exit(f"error: {error}")
-
-# A shard's views are not among the outputs that Snakemake would bring to and from a job.
-if SharedFSUsage.INPUT_OUTPUT not in workflow.storage_settings.shared_fs_usage:
-    sys.exit(
-        "error: shared-fs-usage: is without input-output; jobs must see one folder of results "
-        "and work: mount it on every node (a volume, NFS) and let shared-fs-usage hold input-output"
-    )
 
 RESULTS = SETTINGS.results
 WORK = SETTINGS.work
@@ -173,7 +171,7 @@ def made_anew(path):
     Snakemake itself only sees whether it is there, and how old it is. Nothing is removed before
     its job runs: a dry run shows the job and leaves the file.
     """
-    workflow.dag.forcefiles.add(path)
+    workflow.dag.forcefiles.add(stored(path))
 
 
 def note_sums():
@@ -181,6 +179,8 @@ def note_sums():
 
     Only a run in which a job ran comes to this.
     """
+    if STORE:
+        return
     made, others = set(), set()
     for job in workflow.dag.jobs:
         files = {*map(str, job.output), *([job.benchmark] if job.benchmark else [])}
@@ -252,7 +252,7 @@ def whole(datasets):
             for path in outdated(dataset):
                 made_anew(path)
             # A run without a job would note no checksums.
-            if not Path(SUMS).exists():
+            if not (STORE or Path(SUMS).exists()):
                 made_anew(dataset.page)
         return []
 
@@ -266,7 +266,12 @@ def is_false(dataset, record):
 
 
 def renewal(wildcards, stage=None):
-    """Return no input, but let a shard's record be made anew if its files are not on disk."""
+    """Return no input, but let a shard's record be made anew if its files are not on disk.
+
+    What is in a store is looked at by the job that takes it.
+    """
+    if STORE:
+        return []
     dataset = dataset_of(wildcards)
     record = dataset.record(
         stage or stage_of(wildcards), wildcards.first, wildcards.end
@@ -334,6 +339,39 @@ def shard_minutes(wildcards):
     return 30 + math.ceil(5 * seconds / 60)
 
 
+def stall_seconds(wildcards):
+    """Return after how long a view is taken to hang: ten times what one core needs, and more.
+
+    On this machine, where a build may be stopped and continued by hand, none is.
+    """
+    seconds = dataset_of(wildcards).expected_view[0]
+    return 1800 + math.ceil(10 * seconds) if workflow.remote_exec else 0
+
+
+@cache
+def failing_nodes(record, attempt):
+    """Return the nodes that a shard avoids, by the journals of it and its dataset's others.
+
+    In the first attempt, in which there may be thousands of shards, of the others' alone.
+    """
+    folder = Path(record).parent
+    own = Path(record).with_suffix(".journal.jsonl") if attempt > 1 else None
+    journals = {path: journal.read(path) for path in folder.glob("*.journal.jsonl")}
+    return journal.avoided(journals.pop(own, []), journals.values())
+
+
+def avoided_nodes(wildcards, attempt):
+    """Return the words by which Slurm leaves out the nodes that a shard avoids, and the user's."""
+    defaults = workflow.resource_settings._parsed_default_resources
+    words = [str(defaults["slurm_extra"].value)] if "slurm_extra" in defaults else []
+    if not workflow.local_exec:
+        dataset = dataset_of(wildcards)
+        bounds = (wildcards.first, wildcards.end) if attempt > 1 else (0, 0)
+        nodes = failing_nodes(dataset.record("render", *bounds), attempt)
+        words += [f"--exclude={','.join(nodes)}"] if nodes else []
+    return " ".join(words) or None
+
+
 @cache
 def full_datasets(name):
     """Return a scene YAML's datasets at full size, by rig."""
@@ -375,8 +413,17 @@ def packed(wildcards):
 
 
 def packed_sums(wildcards):
-    """Return the checksums that say that everything in an archive is finished."""
-    return [f"{dataset.folder}/sha256sums.txt" for dataset in packed(wildcards)]
+    """Return the checksums that say that everything in an archive is finished.
+
+    With a store also what is in it, and what lists it.
+    """
+    datasets = packed(wildcards)
+    files = [f"{dataset.folder}/sha256sums.txt" for dataset in datasets]
+    if STORE:
+        for dataset in datasets:
+            files += [f"{dataset.folder}/validation.json", *dataset.published]
+            files += dataset.all_records
+    return files
 
 
 def packed_scene(wildcards):
@@ -609,4 +656,8 @@ def failed_jobs():
         for job in group.jobs
         if Path(job.log[0]).exists() and not all(map(os.path.exists, job.output))
     ]
+    if STORE:
+        for job in failed:
+            name = os.path.relpath(job.log[0], stored(WORK))
+            ViewStore(STORE).bring(f"{WORK}/{name}")
     return sorted((job.rule.name, Path(job.log[0])) for job in failed)

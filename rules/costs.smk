@@ -36,7 +36,7 @@ rule costs:
     message:
         "Adding up what {wildcards.scene}/{wildcards.rig} has cost"
     shell:
-        f"python {SCRIPTS}/costs.py"
+        f"{taking('input')}python {SCRIPTS}/costs.py"
         " --dataset {params.dataset} --journals {params.journals}"
         " --benchmarks {params.benchmarks} --scene-benchmarks {params.scene_benchmarks}"
         " {params.blend} --energy {params.energy:q} --full {params.full:q}"

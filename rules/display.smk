@@ -41,7 +41,7 @@ def task_of(job):
     views, seconds = rendering(job)
     return Task(
         job.rule.name,
-        str(Path(job.log[0]).relative_to(f"{WORK}/logs").with_suffix("")),
+        str(Path(job.log[0]).relative_to(stored(f"{WORK}/logs")).with_suffix("")),
         PHASES.get(stem, stem),
         Path(job.log[0]),
         views=views,

@@ -20,7 +20,7 @@ rule export_views_to_instant_ngp:
     message:
         "Exporting {wildcards.scene}/{wildcards.rig} for instant-ngp"
     shell:
-        f"python {SCRIPTS}/export_instant_ngp.py"
+        f"{taking('input.records')}python {SCRIPTS}/export_instant_ngp.py"
         " --input-cfg {input.lightfield}"
         " --image-dir {params.views} --image-suffix .exr {params.options} --output {output}"
         " > {log} 2>&1"
@@ -45,7 +45,7 @@ rule export_reprojection_to_instant_ngp:
     message:
         "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection} for instant-ngp"
     shell:
-        f"python {SCRIPTS}/export_instant_ngp.py"
+        f"{taking('input.records')}python {SCRIPTS}/export_instant_ngp.py"
         " --input-cfg {input.lightfield}"
         " --image-suffix {params.suffix} {params.options} --output {output} > {log} 2>&1"
 
@@ -73,6 +73,6 @@ rule export:
     message:
         "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for {wildcards.format}"
     shell:
-        f"python {SCRIPTS}/export.py"
+        f"{taking('input.views')}python {SCRIPTS}/export.py"
         " {wildcards.format} --dataset {params.dataset} {params.words}"
         " --output {params.folder} > {log} 2>&1"

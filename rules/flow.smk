@@ -23,6 +23,6 @@ rule flow:
         "Computing the flow of views {wildcards.first} to {wildcards.end} of"
         " {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/flow.py"
+        f"{taking('input.records')}python {SCRIPTS}/flow.py"
         " --lightfield {input.lightfield} --views {wildcards.first}:{wildcards.end}"
         " --output {params.folder} --record {output} > {log} 2>&1"

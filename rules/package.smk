@@ -22,6 +22,6 @@ rule pack:
     message:
         "Packing {output.archive}"
     shell:
-        f"python {SCRIPTS}/package.py"
+        f"{taking('input')}python {SCRIPTS}/package.py"
         " --scene {params.name} --folder {params.folder} {params.size} --output {output.archive}"
         " > {log} 2>&1"

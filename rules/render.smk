@@ -50,6 +50,8 @@ rule render:
         mem_mb=shard_memory,
         runtime=shard_minutes,
         gpu=GPUS,
+        slurm_extra=avoided_nodes,
+        stall_seconds=stall_seconds,
     params:
         folder=f"{DATASET}/exr",
         journal=f"{MADE}/render/{{first}}-{{end}}.journal.jsonl",
@@ -62,4 +64,5 @@ rule render:
         " --inventory {input.inventory}"
         " --views {wildcards.first}:{wildcards.end} --device {params.device} --threads {threads}"
         " --output {params.folder} --journal {params.journal} --record {output}"
+        " --stall {resources.stall_seconds}"
         " > {log} 2>&1"

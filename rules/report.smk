@@ -89,7 +89,7 @@ rule figures:
     message:
         "Drawing the pictures of {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/report_figures.py"
+        f"{taking('input.records')}python {SCRIPTS}/report_figures.py"
         " --dataset {params.dataset} --rig {params.rig:q}"
         " --panorama {input.panorama} --output {params.dataset}/report > {log} 2>&1"
 
@@ -125,7 +125,7 @@ rule page:
     message:
         "Making the page of {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/report_html.py"
+        f"{taking('input')}python {SCRIPTS}/report_html.py"
         " --dataset {params.dataset}"
         " --name {wildcards.scene}/{wildcards.rig} --rig {params.rig:q}"
         " --yaml {params.yaml:q} --command {params.command:q}"

@@ -72,6 +72,8 @@ rule reproject:
         ENVIRONMENT
     resources:
         mem_mb=2000,
+        # In a group with the renders, whose jobs must agree.
+        slurm_extra=avoided_nodes,
     params:
         views=f"{DATASET}/exr",
         lens_map=LENS_MAP,
@@ -82,7 +84,7 @@ rule reproject:
         "Reprojecting views {wildcards.first} to {wildcards.end} of"
         " {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
-        f"python {SCRIPTS}/reproject.py"
+        f"{taking('input.record')}python {SCRIPTS}/reproject.py"
         " {params.optics} {params.development}"
         " --lens-map {params.lens_map} --input-cfg {input.lightfield} --input-dir {params.views}"
         " --views {wildcards.first}:{wildcards.end} --output-dir {params.folder}"

@@ -30,7 +30,7 @@ rule validate:
     message:
         "Validating {wildcards.scene}/{wildcards.rig}"
     shell:
-        f"python {SCRIPTS}/validate.py"
+        f"{taking('input')}python {SCRIPTS}/validate.py"
         " {params.dataset} {params.reprojections}"
         " --records {input.records} {params.optional} --processes {threads}"
         " --removed {params.removed}"

@@ -93,6 +93,18 @@ def test_the_profiles_differ_in_their_executor_alone():
     assert {key: slurm[key] for key in shared} == {key: generic[key] for key in shared}
 
 
+def test_on_kubernetes_pods_see_one_volume_and_a_gpu_only_where_it_is_asked_for():
+    kubernetes, slurm = settings("kubernetes"), settings("slurm")
+    shared = {key for key in kubernetes.keys() & slurm.keys() if "default" not in key}
+    assert {key: kubernetes[key] for key in shared - {"executor"}} == {
+        key: slurm[key] for key in shared - {"executor"}
+    }
+    _, mounted = kubernetes["kubernetes-persistent-volumes"].split(":")
+    assert kubernetes["default-storage-prefix"] == mounted
+    # The executor asks for the number that is given, and no node has 0 of what it does not have.
+    assert kubernetes["default-resources"].keys() == slurm["default-resources"].keys() - {"gpu"}
+
+
 def test_the_submit_command_asks_for_all_four_resources():
     command = settings("cluster-generic")["cluster-generic-submit-cmd"]
     for part in ("{threads}", "{resources.mem_mb}M", "{resources.runtime}", "{resources.gpu}"):
@@ -106,6 +118,7 @@ def test_nodes_without_a_shared_folder_are_refused_before_the_first_job(tmp_path
     assert "Traceback" not in run.stderr
     last = (run.stdout + run.stderr).splitlines()[-1]
     assert last.startswith("error: shared-fs-usage: is without input-output")
+    assert "--default-storage-prefix" in last
 
 
 @pytest.mark.parametrize(

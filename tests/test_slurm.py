@@ -1,6 +1,8 @@
 """A build on a real Slurm node, to which happens what happens on clusters."""
 
+import json
 import os
+import signal
 from pathlib import Path
 
 import pytest
@@ -37,17 +39,34 @@ def test_no_view_is_lost_or_made_twice_whatever_happens_on_the_cluster(smoke, tm
                 folder, *WORDS, env=node.environment, stdout=terminal, stderr=terminal
             )
         wait_for_views(folder, 1, run)
+        began = processes(folder)
         node.run("scancel", "--state=RUNNING", "--full", "--user=root")
+        # What is submitted in its place hangs, until its time is over.
+        wait_until(lambda: processes(folder) - began, run, log=log)
+        for process in processes(folder) - began:
+            os.kill(process, signal.SIGSTOP)
+        for job in node.run("squeue", "--states=RUNNING", "--noheader", "--format=%i").split():
+            node.run("scontrol", "update", f"JobId={job}", "EndTime=now")
         wait_for_views(folder, 4, run)
         node.kill_node()
         wait_until(lambda: node.state() == "down", node.daemons["slurmctld"], 60)
         node.start_node()
         assert run.wait(1800) == 0, log.read_text()
         states = node.run("squeue", "--states=all", "--noheader", "--format=%T").split()
-    assert {"COMPLETED", "CANCELLED", "FAILED"} <= set(states)
+    assert {"COMPLETED", "CANCELLED", "TIMEOUT", "FAILED"} <= set(states)
     assert "exceeded memory limit" in (tmp_path / "node/slurmd.log").read_text()
     assert set(rendered(folder).values()) == {1}
     assert_same_bytes(smoke, folder, CUBOID)
+
+
+def processes(folder: Path) -> set[int]:
+    """Return the processes that have worked on a shard."""
+    lines = [
+        json.loads(line)
+        for journal in folder.glob(f"work/{CUBOID}/render/*.journal.jsonl")
+        for line in journal.read_text().splitlines()
+    ]
+    return {line["pid"] for line in lines if "pid" in line}
 
 
 def wait_for_views(folder: Path, count: int, run) -> None:

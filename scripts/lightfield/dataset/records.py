@@ -5,6 +5,7 @@ The record is a JSON of the shard's files, written when all are finished: "files
 one JSON line for each file, "file", "key" (of the settings that made it), "bytes" and "sha256",
 added at the moment when the file is finished. It outlives the record, which is removed when its
 files are no longer those on disk: a file is finished if its bytes are those that were logged.
+Where machines see no common folder, the view store takes the log's place.
 """
 
 import os
@@ -15,6 +16,7 @@ from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import append_json_line, read_json, read_json_lines, sha256, write_json
+from lightfield.dataset.view_store import ViewStore
 from lightfield.imaging import images
 
 _LOG_SUFFIX = ".sums.jsonl"
@@ -31,11 +33,14 @@ class ShardRecord:
         self._path, self._folder = path, folder
         self._dataset_folder = folder.resolve().name
         self._finished: dict[str, dict[str, Any]] = {}
+        self._store = ViewStore.configured()
 
     def is_finished(self, file: Path, key: str) -> bool:
         """Whether a file has the bytes that it had when it was made by the settings of ``key``."""
         if self._path is None:
             return images.is_finished(file, key)
+        if self._store:
+            self._take(file, key)
         if not file.is_file():
             return False
         name, sums = self._name(file), _sums(file)
@@ -51,8 +56,22 @@ class ShardRecord:
         if self._path is None:
             return
         name, sums = self._name(file), _sums(file)
+        if self._store:
+            self._store.put_view(file, name, key, sums["sha256"])
         append_json_line(_log(self._path), {"file": name, "key": key, **sums})
         self._finished[name] = sums
+
+    def _take(self, file: Path, key: str) -> None:
+        """Take the file from the store that the settings of ``key`` made, if there is one."""
+        assert self._store and self._path
+        name = self._name(file)
+        for other, digest in self._store.listed(key):
+            if other == name and self._store.take(digest, file):
+                entry = (name, key, digest)
+                if entry not in self._logged_here:
+                    append_json_line(_log(self._path), {"file": name, "key": key, **_sums(file)})
+                    self._logged_here.add(entry)
+                return
 
     def write(self, files: Iterable[Path], **more: Any) -> None:
         """Write the record of ``files``, and what else it shall hold."""

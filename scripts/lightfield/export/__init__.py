@@ -13,6 +13,7 @@ from pathlib import Path
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.dataset.exports import MANIFEST, Export
+from lightfield.dataset.view_store import ViewStore
 from lightfield.export import instant_ngp
 from lightfield.export.source import Source
 from lightfield.validation.files import Manifest
@@ -33,6 +34,8 @@ def run(name: str, source: Source, settings: Export, folder: Path) -> dict[str, 
     files = {path.relative_to(folder).as_posix(): sha256(path) for path in paths}
     options = settings.model_dump(mode="json", exclude={"sources"})
     write_json(folder / MANIFEST, {"format": name, "options": options, "files": files})
+    if store := ViewStore.configured():
+        store.put_list(folder / MANIFEST, paths)
     return files
 
 

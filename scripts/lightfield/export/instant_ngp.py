@@ -33,6 +33,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.dataset.view_store import ViewStore
 from lightfield.export.source import DEPTH_UNIT, millimetres
 from lightfield.geometry.depth import distance_from_z, z_from_distance
 from lightfield.geometry.lenses import Lens
@@ -151,6 +152,8 @@ def export(arguments: argparse.Namespace) -> None:
     for path, names in parts.items():
         write_json(path, common | {"frames": [frames[name] for name in names]})
         print(f"{path}: {len(names)} frames, scale {scale:.6g}, offset {offset}")
+    if store := ViewStore.configured():
+        store.put_list(arguments.output, [*writer.pictures, *list(parts)[1:]])
 
 
 def _asked(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -182,6 +185,8 @@ class _Writer:
         self.rays = self.lens.pixel_rays()
         self.blind = blind_pixels(self.lens)
         self.image_dir: Path = arguments.image_dir or lightfield.folder
+        # Those that have been written.
+        self.pictures: list[Path] = []
         self.exr_dir: Path = arguments.exr_dir or arguments.output.parent / "instant_ngp"
 
     def placement(self) -> tuple[float, list[float]]:
@@ -229,6 +234,7 @@ class _Writer:
             if self.arguments.depth_dir:
                 path = self.arguments.depth_dir / f"{view.name}.png"
                 images.write_png(path, depth_map(*self.depth(view), self.lens, self.rays))
+                self.pictures.append(path)
                 frame["depth_path"] = self.relative(path)
             frames[view.name] = frame
             progress.done()
@@ -281,6 +287,7 @@ class _Writer:
         if self.lightfield.transparent:
             copied["A"] = channels["A"]
         images.write_exr(target, copied)
+        self.pictures.append(target)
         return target
 
     def write_mask(self, view: View, image: Path) -> None:
@@ -293,7 +300,8 @@ class _Writer:
                 hidden = hidden | (channels["A"] == 0)
         if hidden.any():
             mask = np.where(hidden, 255, 0).astype(np.uint8)
-            images.write_png(image.with_name(MASK.format(view=view.name)), mask)
+            self.pictures.append(image.with_name(MASK.format(view=view.name)))
+            images.write_png(self.pictures[-1], mask)
 
 
 def transform_matrix(view: View) -> Floats:

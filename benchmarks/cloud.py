@@ -1,0 +1,238 @@
+"""Build where machines see no common folder, against an S3 server here, and kill; compare bytes.
+
+Each job works in an empty folder of its own that has the program alone; whatever it needs, it gets
+from the storage, and whatever is to stay of it goes there. A build that nothing disturbs, on one
+disk, says what bytes are right. Prints how often jobs and the whole run were killed, and what was
+lost or made twice. Needs, beside the environment:
+
+    pip install snakemake-storage-plugin-s3 universal-pathlib s3fs 'moto[server]'
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from collections import Counter
+from pathlib import Path
+
+import psutil
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
+
+from lightfield.core.files import sha256
+from lightfield.dataset.view_store import ViewStore
+from soak import DATASET, ROOT, SCENE, Build, write_text
+
+BUCKET, STORE = "plenoforge", "s3://plenoforge"
+# Exports write files that are not declared one by one either.
+EXPORTS = """
+exports:
+  instant_ngp: {sources: [views, perspective]}
+  poses_csv: {sources: [views]}
+"""
+# Of the repository, what an image for a cloud has.
+PROGRAM = (
+    "Snakefile",
+    "config.yaml",
+    "configs",
+    "rules",
+    "scripts",
+    "envs",
+    "captions",
+    "profiles",
+)
+SUBMIT = """#!/bin/sh
+# Run a job in a folder of its own, and print its number.
+set -e
+job=$(mktemp -d {jobs}/XXXXXX)
+cd "$job"
+cp -R {root}/program {root}/configs {root}/config.yaml .
+setsid sh -c 'sh "$1" > terminal.log 2>&1; echo $? > status' sh "$1" > /dev/null 2>&1 &
+echo $! > pid
+basename "$job"
+"""
+STATUS = """#!/bin/sh
+cd {jobs}/"$1"
+if [ -e status ]; then
+    [ "$(cat status)" = 0 ] && echo success || echo failed
+elif kill -0 "$(cat pid)" 2> /dev/null; then
+    echo running
+else
+    echo failed
+fi
+"""
+
+
+class Disk(Build):
+    """A build on one disk, with exports."""
+
+    def __init__(self, root: Path, views: int) -> None:
+        super().__init__(root, views)
+        write_text(root / "configs/scenes/soak.yaml", SCENE.format(views=views) + EXPORTS)
+
+
+class Cloud(Disk):
+    """A build whose jobs see nothing of each other but what lies in an S3 server."""
+
+    def __init__(self, root: Path, views: int) -> None:
+        super().__init__(root, views)
+        self.jobs = root.with_name("jobs")
+        self.jobs.mkdir()
+        program = root / "program"
+        program.mkdir()
+        for name in PROGRAM:
+            subprocess.run(["cp", "-R", ROOT / name, program], check=True)
+        for name, text in (("submit", SUBMIT), ("status", STATUS)):
+            script = root / f"{name}.sh"
+            write_text(script, text.format(jobs=self.jobs, root=root))
+            script.chmod(0o755)
+
+    def start(self, *words: str, limit: int | None = None) -> subprocess.Popen[str]:
+        """Start the run."""
+        command = [
+            *(Path(sys.executable).with_name("snakemake"), "--snakefile", "program/Snakefile"),
+            *("--executor", "cluster-generic", "--shared-fs-usage", "none", "--retries", "3"),
+            *("--cluster-generic-submit-cmd", self.root / "submit.sh"),
+            *("--cluster-generic-status-cmd", self.root / "status.sh"),
+            *("--default-storage-provider", "s3", "--default-storage-prefix", STORE),
+            *("--jobs", "2", "--cores", "1", "--seconds-between-status-checks", "1"),
+            *("--latency-wait", "10", *words),
+        ]
+        return subprocess.Popen(
+            command,
+            cwd=self.root,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+
+    def running(self) -> list[int]:
+        """Return the process groups of the jobs that are running."""
+        groups = [int(path.read_text()) for path in self.jobs.glob("*/pid")]
+        return [group for group in groups if psutil.pid_exists(group)]
+
+    def published(self) -> dict[str, str]:
+        """Return the SHA-256 of each published file, of the bytes that lie in the storage."""
+        store = ViewStore(STORE)
+        with contextlib.chdir(self.root):
+            store.bring(str(DATASET / "sha256sums.txt"))
+            for name, digest in super().published().items():
+                if not store.take(digest, DATASET / name):
+                    store.bring(str(DATASET / name))
+        return {name: sha256(self.root / DATASET / name) for name in super().published()}
+
+    def made(self) -> Counter[str]:
+        """Return how often each view was rendered, by the journals that all jobs have left."""
+        lines = [
+            line
+            for journal in self.jobs.rglob("render/*.journal.jsonl")
+            for line in journal.read_text(errors="replace").splitlines()
+        ]
+        return Counter(json.loads(line)["view"] for line in lines if line.startswith('{"view"'))
+
+
+def serve(folder: Path) -> tuple[subprocess.Popen[bytes], dict[str, str]]:
+    """Start an S3 server with a bucket; return it and the environment by which it is found."""
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        port = one.getsockname()[1]
+    url = f"http://127.0.0.1:{port}"
+    with (folder / "server.log").open("wb") as log:
+        server = subprocess.Popen(
+            [sys.executable, "-m", "moto.server", "-p", str(port)], stdout=log, stderr=log
+        )
+    bucket = urllib.request.Request(f"{url}/{BUCKET}", method="PUT")
+    for _ in range(120):
+        try:
+            urllib.request.urlopen(bucket)
+            break
+        except OSError:
+            time.sleep(0.5)
+    keys = {"AWS_ACCESS_KEY_ID": "test", "AWS_SECRET_ACCESS_KEY": "test"}
+    return server, {"AWS_ENDPOINT_URL": url, "AWS_DEFAULT_REGION": "us-east-1", **keys}
+
+
+def kill_group(group: int) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(group, signal.SIGKILL)
+
+
+def kill(build: Cloud, count: int, seconds: float, rng: random.Random) -> Counter[str]:
+    """Kill a job, or all of them and the run, at random moments; the last run finishes.
+
+    A run fails where one of its jobs was killed more often than it is submitted, and goes on.
+    """
+    killed: Counter[str] = Counter()
+    process = build.start()
+    while killed.total() < count:
+        time.sleep(rng.uniform(0.1, 1.0) * seconds)
+        if process.poll() == 0:
+            break
+        if process.poll() is not None:
+            process.communicate()
+            process = build.start()
+        elif rng.random() < 0.5 and (running := build.running()):
+            kill_group(rng.choice(running))
+            killed["a job"] += 1
+        else:
+            for group in (process.pid, *build.running()):
+                kill_group(group)
+            process.communicate()
+            killed["the run and its jobs"] += 1
+            build.run("--unlock")
+            process = build.start()
+    said, _ = process.communicate()
+    if process.returncode:
+        print(said, file=sys.stderr)
+        build.finish()
+    return killed
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--views", type=int, default=6, help="of the dataset (default: 6)")
+    parser.add_argument("--kills", type=int, default=20, help="default: 20")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--folder", type=Path, help="for all of it, kept (default: a temporary one)"
+    )
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = (arguments.folder or Path(name)).resolve()
+        folder.mkdir(parents=True, exist_ok=True)
+        began = time.monotonic()
+        undisturbed = Disk(folder / "disk", arguments.views)
+        undisturbed.finish()
+        seconds = (time.monotonic() - began) / 4
+        server, environment = serve(folder)
+        os.environ.update(environment)
+        try:
+            build = Cloud(folder / "cloud", arguments.views)
+            killed = kill(build, arguments.kills, seconds, random.Random(arguments.seed))
+            same = build.published() == undisturbed.published()
+        finally:
+            server.terminate()
+            server.wait()
+        made = build.made()
+    for what, times in sorted(killed.items()):
+        print(f"killed {what}: {times} times")
+    again = made.total() - len(made)
+    print(
+        f"{len(made)} views, {again} of them made twice, in {len(list(build.jobs.iterdir()))} jobs"
+    )
+    if again or not same or len(made) != arguments.views:
+        sys.exit("error: not all bytes are those of a build on one disk, or something was lost")
+    print("all published bytes are those of a build on one disk")
+
+
+if __name__ == "__main__":
+    main()

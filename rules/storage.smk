@@ -1,0 +1,77 @@
+# Where jobs see no common folder: Snakemake's own storage has what is declared, and the view store,
+# at the same place, views, of which there are too many to declare.
+
+# A shard's views are not among the outputs that Snakemake would bring to and from a job.
+if not (
+    STORE or SharedFSUsage.INPUT_OUTPUT in workflow.storage_settings.shared_fs_usage
+):
+    sys.exit(
+        "error: shared-fs-usage: is without input-output; give --default-storage-provider and "
+        "--default-storage-prefix, where views are then put, too, or let all nodes see one folder "
+        "of results and work (a volume, NFS), and shared-fs-usage hold input-output"
+    )
+
+
+def stored(path):
+    """Return where Snakemake has its copy of a file or folder; without a store that is itself."""
+    return str(workflow.modifier.path_modifier.apply_default_storage(path))
+
+
+def taking(lists):
+    """Return the command that takes from the store what a job's ``lists`` name."""
+    words = f"--results {RESULTS} --work {WORK} {{{lists}}}"
+    return f"python {SCRIPTS}/take_views.py {words} > {{log}} 2>&1; " if STORE else ""
+
+
+def check_storage():
+    """Refuse what jobs could not find in a storage; raises `UserError`."""
+    if "://" not in STORE and not Path(STORE).is_absolute():
+        raise UserError(
+            f"default-storage-prefix: {STORE}: must be a URL, or a path from /"
+        )
+    for key in ("results", "work"):
+        if Path(config[key]).is_absolute() or ".." in Path(config[key]).parts:
+            raise UserError(
+                f"{key}: {config[key]}: must lie here, for the storage has its copy"
+            )
+    for dataset in CHOSEN:
+        if not dataset.source.builder:
+            raise UserError(
+                f"{dataset.scene_name}: is made of files that are in no storage; only built "
+                "scenes can be rendered so, or let all nodes see one folder"
+            )
+
+
+def use_copies(folder):
+    """Let ``folder`` be that of Snakemake's copies; raises `UserError` where it is another."""
+    copies = Path(stored(folder)).absolute()
+    copies.mkdir(parents=True, exist_ok=True)
+    link = Path(folder)
+    if not (link.is_symlink() or link.exists()):
+        link.parent.mkdir(parents=True, exist_ok=True)
+        link.symlink_to(copies)
+    if link.resolve() != copies.resolve():
+        raise UserError(
+            f"{folder}: is no link to {copies}; each run and job with a storage needs a folder of "
+            "its own: move what is there away"
+        )
+
+
+def bring_settings():
+    """Bring here what says from what the stored files were made: each run may begin with none."""
+    for dataset in CHOSEN:
+        perhaps = (dataset.inventory, dataset.calibration, dataset.places)
+        for path in (*perhaps, *dataset.published):
+            if isinstance(path, str):
+                ViewStore(STORE).bring(path)
+
+
+if STORE:
+    try:
+        check_storage()
+        use_copies(RESULTS)
+        use_copies(WORK)
+        if workflow.is_main_process:
+            bring_settings()
+    except UserError as error:
+        sys.exit(f"error: {error}")

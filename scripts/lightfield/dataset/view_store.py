@@ -1,0 +1,143 @@
+"""The view store: finished views where machines that see no common folder find them.
+
+A shard's views are not among the outputs that Snakemake brings to and from a job. So each is put
+here the moment it is finished, and taken from here by whoever needs it. The store lies at a URL
+such as s3://bucket/name, or in a folder:
+
+- ``views/sums/<SHA-256>`` is a file;
+- ``views/keys/<render key>/<its path in the dataset, with @ for />@<SHA-256>``, empty, says which
+  file these settings have made. It is written last, so that what is listed is there. Of what an
+  export wrote beside the file that names it, the SHA-256 of that file stands for the key.
+
+A file that is taken is compared with its checksum, so that one cut short is none.
+"""
+
+import hashlib
+import os
+import shutil
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import atomic_path, sha256
+
+# The environment variable by which the workflow says to its programs where the store is.
+VARIABLE = "PLENOFORGE_STORE"
+
+
+class ViewStore:
+    """The store at a URL or in a folder; each method raises `UserError` where it cannot be used."""
+
+    def __init__(self, url: str) -> None:
+        self.url = url
+
+    @classmethod
+    def configured(cls) -> Self | None:
+        """Return the store of this process's environment; None where all see one folder."""
+        url = os.environ.get(VARIABLE)
+        return cls(url) if url else None
+
+    def _place(self, name: str) -> Any:
+        """Return the place of that name, which has a path's methods."""
+        if "://" not in self.url:
+            return Path(self.url, name)
+        from upath import UPath
+
+        return UPath(self.url, use_listings_cache=False) / name
+
+    @cached_property
+    def _root(self) -> Any:
+        return self._place("views")
+
+    def check(self) -> None:
+        """Raise `UserError` where the store cannot be read."""
+        self.listed("")
+
+    def bring(self, path: str) -> None:
+        """Bring here what Snakemake has stored under a path, as old as it is.
+
+        Nothing is brought if there is nothing, or if it is empty, as a log may be.
+        """
+        with self._answering():
+            stored = self._place(path)
+            try:
+                time, content = stored.stat().st_mtime, stored.read_bytes()
+            except FileNotFoundError:
+                return
+            if not content:
+                return
+            with atomic_path(path) as temporary:
+                temporary.write_bytes(content)
+            os.utime(path, (time, time))
+
+    def put(self, file: Path, digest: str) -> None:
+        """Put a file, whose SHA-256 is given."""
+        with self._answering():
+            target = self._root / "sums" / digest
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with file.open("rb") as source, target.open("wb") as stored:
+                shutil.copyfileobj(source, stored, 1 << 20)
+
+    def put_view(self, file: Path, name: str, key: str, digest: str) -> None:
+        """Put a dataset's file, and note that the settings of ``key`` made it under ``name``."""
+        self.put(file, digest)
+        with self._answering():
+            note = self._root / "keys" / key / f"{name.replace('/', '@')}@{digest}"
+            note.parent.mkdir(parents=True, exist_ok=True)
+            note.write_bytes(b"")
+
+    def put_list(self, listing: Path, files: Iterable[Path]) -> None:
+        """Put the files that a job made beside the one that names them, by whose SHA-256."""
+        key = sha256(listing)
+        for file in files:
+            name = os.path.relpath(file, listing.parent)
+            self.put_view(file, name, key, sha256(file))
+
+    def listed(self, key: str) -> list[tuple[str, str]]:
+        """Return name and SHA-256 of each file that the settings of ``key`` have made."""
+        with self._answering():
+            try:
+                notes = sorted(entry.name for entry in (self._root / "keys" / key).iterdir())
+            except (FileNotFoundError, NotADirectoryError):
+                return []
+        return [
+            (name.replace("@", "/"), digest)
+            for name, separator, digest in (note.rpartition("@") for note in notes)
+            if separator
+        ]
+
+    def take(self, digest: str, target: Path) -> bool:
+        """Make ``target`` the file of a SHA-256, unless it is; return False where there is none."""
+        if target.is_file() and sha256(target) == digest:
+            return True
+        with self._answering():
+            try:
+                stored = (self._root / "sums" / digest).open("rb")
+            except FileNotFoundError:
+                return False
+            with stored, atomic_path(target) as temporary, temporary.open("wb") as file:
+                found = hashlib.sha256()
+                while block := stored.read(1 << 20):
+                    found.update(block)
+                    file.write(block)
+                if found.hexdigest() == digest:
+                    return True
+            target.unlink()
+        return False
+
+    @contextmanager
+    def _answering(self) -> Iterator[None]:
+        """Turn what a storage's own package raises into a `UserError`."""
+        try:
+            yield
+        except UserError:
+            raise
+        except ImportError as error:
+            raise UserError(
+                f"{self.url}: needs {error.name}: pip install universal-pathlib, and for s3:// s3fs"
+            ) from None
+        except Exception as error:
+            raise UserError(f"{self.url}: the view store cannot be used: {error}") from None

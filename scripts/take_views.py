@@ -1,0 +1,56 @@
+"""Take from the view store the views of shards, by their records, and what exports wrote.
+
+Each file goes where its list says, into the dataset that the list belongs to. What is there
+already, with the same bytes, is left as it is. Files that are no lists are left out.
+"""
+
+import argparse
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import sha256
+from lightfield.core.progress import Progress
+from lightfield.dataset import records
+from lightfield.dataset.view_store import VARIABLE, ViewStore
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("lists", nargs="+", type=Path, help="files that list others")
+    parser.add_argument("--store", help=f"URL or folder of the store (default: ${VARIABLE})")
+    parser.add_argument("--results", required=True, type=Path, help="folder of all datasets")
+    parser.add_argument("--work", required=True, type=Path, help="folder of their records")
+    arguments = parser.parse_args()
+    store = ViewStore(arguments.store) if arguments.store else ViewStore.configured()
+    if store is None:
+        raise UserError(f"--store: is not given, and ${VARIABLE} is not set")
+    wanted = {
+        target: (digest, path)
+        for path in arguments.lists
+        for target, digest in _listed(store, path, arguments.results, arguments.work)
+    }
+    progress = Progress(len(wanted), "take", "files")
+    for target, (digest, path) in wanted.items():
+        if not store.take(digest, target):
+            raise UserError(
+                f"{target}: is not in the view store {store.url}; delete {path} in the storage, "
+                "for it to be made again"
+            )
+        progress.done()
+
+
+def _listed(store: ViewStore, path: Path, results: Path, work: Path) -> Iterable[tuple[Path, str]]:
+    """Yield each file that a list names, and its SHA-256."""
+    if re.fullmatch(r"\d+-\d+\.json", path.name):
+        stage = path.resolve().parent.relative_to(work.resolve())
+        folder, files = results / stage.parent, records.checksums(path).items()
+    else:
+        folder, files = path.parent, store.listed(sha256(path))
+    return [(folder / name, digest) for name, digest in files]
+
+
+if __name__ == "__main__":
+    run(main)

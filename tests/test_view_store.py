@@ -1,0 +1,125 @@
+"""The view store, in a folder: nothing is taken for a file but its own bytes."""
+
+import os
+import shutil
+import sys
+
+import pytest
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import sha256, write_json
+from lightfield.dataset.records import ShardRecord
+from lightfield.dataset.view_store import VARIABLE, ViewStore
+
+KEY = "0" * 64
+# What a job's own folder has: the dataset's views, and the record of a shard.
+VIEW, PASS = "results/s/rig/exr/a.exr", "results/s/rig/normal/a.exr"
+RECORD = "work/s/rig/render/0-1.json"
+
+
+@pytest.fixture
+def store(tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "store"))
+    return ViewStore.configured()
+
+
+@pytest.fixture
+def shard(tmp_path, store):
+    """Return a function that makes or opens the shard's record in a job's folder of its own."""
+
+    def work_in(name):
+        folder = tmp_path / name
+        return folder, ShardRecord(folder / RECORD, folder / "results/s/rig/exr")
+
+    return work_in
+
+
+def make(folder, record, name, content):
+    (folder / name).parent.mkdir(parents=True, exist_ok=True)
+    (folder / name).write_bytes(content)
+    record.add(folder / name, KEY)
+
+
+def test_another_job_takes_what_one_has_finished(shard):
+    folder, record = shard("one")
+    make(folder, record, VIEW, b"view")
+    make(folder, record, PASS, b"pass")
+    other, again = shard("other")
+    assert again.is_finished(other / VIEW, KEY)
+    assert again.is_finished(other / PASS, KEY)
+    assert (other / VIEW).read_bytes() == b"view"
+    assert (other / PASS).read_bytes() == b"pass"
+    assert not again.is_finished(other / "results/s/rig/exr/b.exr", KEY)
+    assert not again.is_finished(other / VIEW, "1" * 64)
+
+
+def test_a_file_here_that_is_not_as_it_was_finished_is_taken_anew(shard):
+    folder, record = shard("one")
+    make(folder, record, VIEW, b"view")
+    (folder / VIEW).write_bytes(b"weiv")
+    _, again = shard("one")
+    assert again.is_finished(folder / VIEW, KEY)
+    assert (folder / VIEW).read_bytes() == b"view"
+
+
+@pytest.mark.parametrize("spoil", [lambda path: path.write_bytes(b"vie"), lambda p: p.unlink()])
+def test_what_the_store_has_lost_is_made_again(shard, store, tmp_path, spoil):
+    folder, record = shard("one")
+    make(folder, record, VIEW, b"view")
+    spoil(tmp_path / "store/views/sums" / sha256(folder / VIEW))
+    other, again = shard("other")
+    assert not again.is_finished(other / VIEW, KEY)
+    assert not (other / VIEW).exists()
+    make(other, again, VIEW, b"view")
+    third, last = shard("third")
+    assert last.is_finished(third / VIEW, KEY)
+
+
+def test_consumers_take_what_records_and_manifests_list(shard, store, run_program):
+    folder, record = shard("one")
+    make(folder, record, VIEW, b"view")
+    record.write([folder / VIEW])
+    other, _ = shard("other")
+    shutil.copytree(folder / "work", other / "work")
+    export = "results/s/rig/exports/colmap"
+    exported = other / export / "export.json"
+    for each in (folder, other):
+        write_json(each / export / "export.json", {"format": "colmap"})
+    (folder / export / "images").mkdir()
+    (folder / export / "images/a.exr").write_bytes(b"copy")
+    store.put_list(folder / export / "export.json", [folder / export / "images/a.exr"])
+    words = ("--results", "results", "--work", "work", RECORD, exported)
+    run_program("take_views.py", *words, cwd=other)
+    assert (other / VIEW).read_bytes() == b"view"
+    assert (exported.parent / "images/a.exr").read_bytes() == b"copy"
+
+    (other / VIEW).unlink()
+    write_json(other / RECORD, {"files": {"exr/a.exr": {"bytes": 4, "sha256": "f" * 64}}})
+    failed = run_program("take_views.py", *words, cwd=other, check=False)
+    assert failed.returncode == 1
+    assert failed.stderr.splitlines()[-1].startswith(f"error: {VIEW}: is not in the view")
+
+
+def test_an_unusable_store_is_one_line(tmp_path):
+    (tmp_path / "store").symlink_to("store")
+    with pytest.raises(UserError, match="the view store cannot be used"):
+        ViewStore(str(tmp_path / "store")).check()
+
+
+def test_a_package_that_is_missing_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "upath", None)
+    with pytest.raises(UserError, match="pip install universal-pathlib"):
+        ViewStore("s3://bucket").check()
+
+
+def test_what_is_stored_under_a_path_is_brought_with_its_time(tmp_path, monkeypatch, store):
+    stored = tmp_path / "store/results/lightfield.json"
+    stored.parent.mkdir(parents=True)
+    stored.write_text("{}")
+    os.utime(stored, (1000, 1000))
+    monkeypatch.chdir(tmp_path)
+    store.bring("results/lightfield.json")
+    store.bring("results/missing.json")
+    found = tmp_path / "results/lightfield.json"
+    assert (found.read_text(), found.stat().st_mtime) == ("{}", 1000)
+    assert not (tmp_path / "results/missing.json").exists()
