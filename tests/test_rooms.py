@@ -1,0 +1,53 @@
+"""The library's rooms are those of docs/architecture.md, and import only those above them."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+LIBRARY = ROOT / "scripts" / "lightfield"
+ROOMS = re.findall(r"^\| (\w+) \|", (ROOT / "docs/architecture.md").read_text(), re.M)[1:]
+
+
+def imported(file):
+    """Return all that a file imports, anywhere in it, with dots."""
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, file
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def test_each_room_has_a_door_that_says_what_lives_there():
+    assert {path.parent.name for path in LIBRARY.glob("*/__init__.py")} == set(ROOMS)
+    for room in ROOMS:
+        assert ast.get_docstring(ast.parse((LIBRARY / room / "__init__.py").read_text())), room
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_room_imports_only_rooms_above_it(room):
+    allowed = ROOMS[: ROOMS.index(room) + 1]
+    for file in (LIBRARY / room).rglob("*.py"):
+        own = {name.split(".")[1] for name in imported(file) if name.startswith("lightfield.")}
+        assert own <= set(allowed), file
+        blenders = {"bpy", "mathutils", "bmesh"} & {name.split(".")[0] for name in imported(file)}
+        assert not blenders or room == "rendering", file
+
+
+def test_no_files_import_each_other_in_a_circle():
+    arrows = {}
+    for path in LIBRARY.rglob("*.py"):
+        name = ".".join(("lightfield", *path.relative_to(LIBRARY).with_suffix("").parts))
+        found = imported(path)
+        # What is imported may be a file or a name in one.
+        arrows[name.removesuffix(".__init__")] = found | {n.rpartition(".")[0] for n in found}
+    arrows = {name: others & arrows.keys() - {name} for name, others in arrows.items()}
+    while free := [name for name, others in arrows.items() if not others & arrows.keys()]:
+        for name in free:
+            del arrows[name]
+    assert not arrows
