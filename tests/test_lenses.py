@@ -697,6 +697,21 @@ def test_flags(text: str, lens: Lens) -> None:
             type(lens).from_flag(wrong, 96, 64)
 
 
+@pytest.mark.parametrize(
+    ("ranges", "message"),
+    [
+        ({"longitude": (-4, 3)}, "longitude: the range is more than 360 degrees"),
+        ({"longitude": (1, 1)}, "longitude: 57.2958 to 57.2958 degrees is not a range"),
+        ({"latitude": (-1.6, 0)}, "latitude: -91.6732 to 0 degrees is not a range"),
+        ({"latitude": (0, 1.6)}, "latitude: 0 to 91.6732 degrees is not a range"),
+    ],
+)
+def test_a_panorama_has_no_place_twice(ranges: dict[str, Any], message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        Equirectangular(**SIZE, **ranges)
+    assert Equirectangular(**SIZE, longitude=(-4, 2)).width == 2048
+
+
 def test_a_cube_map_is_six_squares_wide() -> None:
     with pytest.raises(UserError, match="width is 6 times its height"):
         CubeMap(width=96, height=64)
