@@ -57,3 +57,47 @@ rule render_overhead:
         "Measuring what the workflow adds to Cycles' own render time"
     shell:
         f"python {BENCHMARKS}/render_overhead.py" " > {output} 2> {log}"
+
+
+rule check_gpu:
+    input:
+        check=of_first("blend_check"),
+        blend=of_first("blend"),
+        inventory=of_first("inventory"),
+        lightfield=f"{WORK}/{{scene}}/probes.json",
+        calibration=of_first("calibration"),
+    output:
+        multiext(f"{MEASURED}/gpu_check/{{scene}}", ".json", ".md"),
+    log:
+        log_of("{scene}/gpu_check"),
+    conda:
+        ENVIRONMENT
+    # Alone on the machine, so that nothing else is in the times.
+    threads: lambda wildcards: workflow.cores or 1
+    resources:
+        mem_mb=6000,
+        runtime=60,
+        gpu=GPUS,
+    params:
+        device=SETTINGS.device,
+        cache=of_first("trials"),
+        calibration=calibration_words,
+        full=full_sizes,
+        stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
+    message:
+        "Comparing what the GPU and the processor make of {wildcards.scene}"
+    shell:
+        f"python {SCRIPTS}/gpu_check.py"
+        " --blend {input.blend:q} --inventory {input.inventory}"
+        " --lightfield {input.lightfield} {params.calibration} --device {params.device}"
+        " --threads {threads} --full {params.full:q}"
+        " --cache {params.cache} --output {params.stem} > {log} 2>&1"
+
+
+# Without a GPU it says so before the first job.
+rule gpu_check:
+    input:
+        [
+            f"{MEASURED}/gpu_check/{name}.json"
+            for name in dict.fromkeys(d.scene_name for d in CHOSEN if not d.imported)
+        ],

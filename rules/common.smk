@@ -394,6 +394,19 @@ def full_size(wildcards):
     )
 
 
+def full_sizes(wildcards):
+    """Return the views and the resolution of each rig of a scene at full size, as JSON."""
+    return json.dumps(
+        {
+            name: {
+                "views": dataset.view_count,
+                "resolution": dataset.rig.camera.resolution,
+            }
+            for name, dataset in full_datasets(wildcards.scene).items()
+        }
+    )
+
+
 def status_words():
     """Return the words that name each chosen dataset to scripts/status.py."""
     words = []
@@ -609,9 +622,13 @@ def check_device():
 
     Raises `UserError`.
     """
-    renders = any(job.resources.get("gpu") for job in workflow.dag.needrun_jobs())
+    jobs = list(workflow.dag.needrun_jobs())
+    device = SETTINGS.device
+    if device == "auto" and any(job.rule.name == "check_gpu" for job in jobs):
+        device = "gpu"
+    renders = device == "gpu" or any(job.resources.get("gpu") for job in jobs)
     if renders and workflow.local_exec:
-        words = [sys.executable, f"{SCRIPTS}/check_device.py", SETTINGS.device]
+        words = [sys.executable, f"{SCRIPTS}/check_device.py", device]
         checked = subprocess.run(words, capture_output=True, text=True)
         if checked.returncode:
             *_, problem = checked.stderr.strip().splitlines() or ["it said nothing"]

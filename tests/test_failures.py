@@ -40,7 +40,7 @@ exports:
 IMPORTED = "scene: {dataset: published}"
 TARGETS = [
     *("all", "smoke", "package", "rig_tables", "plan", "status"),
-    *("error_vs_time", "reprojection_benchmark", "stability", "render_overhead"),
+    *("error_vs_time", "reprojection_benchmark", "stability", "render_overhead", "gpu_check"),
 ]
 CHOSEN = ["--config", "scenes=[brought,imported]", "rigs=all", "preset=full"]
 RULES = [
@@ -80,6 +80,8 @@ class Failing:
             stand_in = self.folder / program.relative_to(ROOT)
             stand_in.parent.mkdir(exist_ok=True)
             stand_in.write_text(FAILING)
+        # No job's program: it runs before the first one.
+        (self.folder / "scripts/check_device.py").write_text("")
         (self.folder / "bin").mkdir()
         (self.folder / "bin/tar").write_text(FAILING)
         (self.folder / "bin/tar").chmod(0o755)
@@ -201,10 +203,25 @@ def test_a_signal_is_named_with_what_to_lower(failing, signal, advice):
 
 
 @pytest.mark.slow
-def test_a_device_that_is_not_there_is_reported_before_the_first_job(failing):
-    shutil.copy(ROOT / "scripts/check_device.py", failing.folder / "scripts")
-    terminal = failing.fail("render", config=["device=metal"])
-    assert terminal.splitlines()[-1].startswith("error: device: this machine has no metal device")
+@pytest.mark.parametrize(
+    ("rule", "config", "said"),
+    [
+        ("render", ["device=metal"], "error: device: this machine has no metal device"),
+        ("check_gpu", [], "error: device: this machine has no GPU that Cycles can use"),
+    ],
+)
+def test_a_device_that_is_not_there_is_reported_before_the_first_job(
+    failing, monkeypatch, rule, config, said
+):
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "-1")
+    monkeypatch.setenv("HIP_VISIBLE_DEVICES", "-1")
+    program = failing.folder / "scripts/check_device.py"
+    shutil.copy(ROOT / "scripts/check_device.py", program)
+    try:
+        terminal = failing.fail(rule, config=config)
+    finally:
+        program.write_text("")
+    assert terminal.splitlines()[-1].startswith(said)
     assert "views" not in terminal
 
 

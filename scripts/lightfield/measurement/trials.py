@@ -21,6 +21,7 @@ from lightfield.core import processors
 from lightfield.core.files import read_json
 from lightfield.dataset import keys, passes
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.measurement.metrics import Mask, Reference, make_reference
 from lightfield.measurement.sampling import PLAIN, WINDOW_SIZE, without_target
@@ -106,6 +107,16 @@ class Trials:
             arguments.threads,
             arguments.cache,
         )
+
+    def on(self, device: str, lens: Lens) -> "Trials":
+        """Return what renders the same views on another device and through another lens."""
+        there = self.lightfield.changed(lens)
+        return Trials(self._blend, self._inventory, there, device, self._threads, self._cache)
+
+    @property
+    def whole(self) -> Window:
+        """The first view, all of it."""
+        return Window(self.lightfield.views[0], 0, 0, self.lens.width, self.lens.height)
 
     def render(self, window: Window, seed: int, sampling: Mapping[str, Any]) -> Trial:
         """Render a window under the render settings that ``sampling`` changes."""

@@ -165,16 +165,21 @@ def set_window(x: int, y: int, width: int, height: int) -> None:
 def gpu(device: str) -> str | None:
     """Return Cycles' name of the kind of GPU that a ``device`` means, or None for the processor.
 
-    Raises `UserError` where one is asked for by name that is not there.
+    "gpu" is any kind. Raises `UserError` where one is asked for that is not there.
     """
     preferences = bpy.context.preferences.addons["cycles"].preferences
-    for name in {"auto": GPU_DEVICES, "cpu": ()}.get(device, (device,)):
+    for name in {"auto": GPU_DEVICES, "gpu": GPU_DEVICES, "cpu": ()}.get(device, (device,)):
         try:
             found = list(preferences.get_devices_for_type(name.upper()) or ())
         except (TypeError, ValueError):
             continue
         if any(entry.type == name.upper() for entry in found):
             return name.upper()
+    if device == "gpu":
+        raise UserError(
+            f"device: this machine has no GPU that Cycles can use ({', '.join(GPU_DEVICES)}), so "
+            "there is nothing to check"
+        )
     if device not in ("auto", "cpu"):
         raise UserError(
             f"device: this machine has no {device} device that Cycles can use; "

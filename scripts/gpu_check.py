@@ -1,0 +1,63 @@
+"""Check that a GPU renders what the processor does, and say how long full datasets take on it."""
+
+import argparse
+import json
+from pathlib import Path
+
+from lightfield.core import processors
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json, write_json, write_text
+from lightfield.dataset.lightfield import LightField
+from lightfield.measurement import gpu_check, trials
+from lightfield.measurement.sampling import calibrated
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    trials.add_arguments(parser, "lightfield.json")
+    parser.add_argument(
+        "--calibration", type=Path, help="what scripts/calibrate.py chose for a target error"
+    )
+    parser.add_argument(
+        "--full",
+        type=json.loads,
+        default={},
+        help="JSON: views and resolution of each dataset at full size, by name",
+    )
+    parser.add_argument("--output", required=True, type=Path, help="stem of the .json and .md")
+    arguments = parser.parse_args()
+
+    # Where there is none, nothing is rendered.
+    with processors.only(arguments.threads):
+        from lightfield.rendering import cycles
+
+    device = {"auto": "gpu"}.get(arguments.device, arguments.device)
+    if not cycles.gpu(device):
+        raise UserError("device: is cpu; gpu_check wants auto, or the name of a GPU's kind")
+    lightfield = LightField.read(arguments.lightfield)
+    render = lightfield.render
+    if arguments.calibration:
+        render = calibrated(render, read_json(arguments.calibration))
+    maker = trials.Trials.of(arguments, lightfield)
+    found = gpu_check.check(maker, device, render, arguments.full)
+    name = arguments.output.name
+    text = gpu_check.table(name, found)
+    print(text)
+    if not found["same"]:
+        raise UserError(
+            f"{name}: the GPU renders another picture than the processor: colours differ by "
+            f"{found['colour']:.2f} of what noise makes, all light by {found['light']:.1f} "
+            f"standard errors, and {found['depth']:.2%} of the depths; try another driver, or "
+            "render with device=cpu"
+        )
+    write_text(arguments.output.with_suffix(".md"), text)
+    write_json(arguments.output.with_suffix(".json"), found)
+    print(
+        f"note: {name}: the GPU renders the same picture; all datasets at full size take "
+        f"{sum(found['hours'].values()):.3g} hours of it"
+    )
+
+
+if __name__ == "__main__":
+    run(main)

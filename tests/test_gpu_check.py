@@ -1,0 +1,122 @@
+"""The GPU check: what it calls the same picture, and how many hours it reckons; none is needed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
+from lightfield.measurement import gpu_check
+from lightfield.measurement.trials import Trial
+
+CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [96, 96]}
+RIG = {"type": "plane", "cameras": [2, 1], "size": 0.3}
+NOISE = 0.3
+PROGRAM = """
+import json, sys
+from pathlib import Path
+from lightfield.dataset.lightfield import LightField
+from lightfield.measurement import gpu_check, trials
+lightfield = LightField.read("lightfield.json")
+maker = trials.Trials(*sys.argv[1:], lightfield, "cpu", 1, Path("cache"))
+print(json.dumps(gpu_check.check(maker, "cpu", lightfield.render, {})))
+"""
+
+
+class Simulated:
+    """Trials that cost no render: noise of their seeds on a picture that is known."""
+
+    def __init__(self, lens, device="cpu"):
+        self.lens, self.device, self.lightfield = lens, device, None
+        self.whole = lens
+
+    def on(self, device, lens):
+        return Simulated(lens, device)
+
+    def mask(self, window):
+        return np.isfinite(self.lens.pixel_rays()[..., 0])
+
+    def render(self, window, seed, sampling):
+        height, width = self.lens.height, self.lens.width
+        light = np.linspace(0.1, 2, width * height * 3, dtype=np.float32)
+        light = light.reshape(height, width, 3)
+        random = np.random.default_rng(seed)
+        # As path tracing has it: now and then a bright path.
+        noise = random.exponential(NOISE, light.shape) - NOISE
+        noise += (random.random(light.shape) < 1e-3) * 5 - 0.005
+        depth = np.where(light[..., 0] < 1.5, light[..., 0] + 1, np.inf)
+        samples = sampling["samples"]
+        seconds = width * height * samples * 1e-6 / (10 if self.device == "gpu" else 1)
+        colour = (light * (1 + noise)).astype(np.float32)
+        return Trial(colour, depth.astype(np.float32), samples, seconds, self.device.upper())
+
+
+@pytest.fixture(scope="module")
+def trials():
+    maker = Simulated(lenses.from_camera(CAMERA))
+    made = [maker.render(maker.whole, seed, {"samples": 4}) for seed in range(8)]
+    return made[:4], made[4:], maker.mask(maker.whole)
+
+
+def test_renders_of_other_seeds_are_the_same_picture(trials):
+    one, other, mask = trials
+    found = gpu_check.compare(one, other, mask)
+    assert found.same
+    assert found.colour == pytest.approx(1, abs=0.5)
+    assert found.depth == 0
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda trial: replace(trial, colour=trial.colour * np.float32(1.02)),
+        lambda trial: replace(trial, colour=trial.colour[::-1]),
+        lambda trial: replace(trial, colour=trial.colour * np.float32([1.05, 1, 0.95])),
+        lambda trial: replace(trial, depth=trial.depth * np.float32(1.0002)),
+        lambda trial: replace(trial, depth=np.roll(trial.depth, 4, axis=1)),
+        lambda trial: replace(trial, depth=np.full_like(trial.depth, np.inf)),
+    ],
+    ids=["exposure", "mirrored", "tinted", "depth", "shifted", "misses"],
+)
+def test_another_picture_is_not_the_same(trials, change):
+    one, other, mask = trials
+    assert not gpu_check.compare(one, [change(trial) for trial in other], mask).same
+
+
+def test_hours_are_those_of_the_views_pixels_and_samples():
+    full = {"big": {"views": 10, "resolution": [2000, 1000]}}
+    maker = Simulated(lenses.from_camera(CAMERA))
+    found = gpu_check.check(maker, "gpu", {"samples": 256}, full)
+    assert found["devices"] == ["CPU", "GPU"]
+    assert found["core_seconds"] == pytest.approx(1)
+    assert found["gpu_seconds"] == pytest.approx(0.1)
+    assert found["hours"]["big"] == pytest.approx(10 * 2e6 * 256 * 1e-7 / 3600)
+    assert "times as fast as on one core" in gpu_check.table("garden", found)
+
+
+def test_the_processor_agrees_with_itself(tmp_path, run_program, room):
+    """The real renders, with the processor in place of the GPU."""
+    content = LightField.from_rig(
+        RIG | {"center": [0, 0, 1.5]},
+        lenses.from_camera(CAMERA | {"resolution": [48, 48]}),
+        depth="z",
+        frame=1,
+        render={"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0},
+    )
+    content.write(tmp_path / "lightfield.json")
+    run_program("inventory.py", "--blend", room, "--output", tmp_path / "inventory.json")
+    program = tmp_path / "check.py"
+    program.write_text(PROGRAM)
+    found = run_program(program, room, tmp_path / "inventory.json", cwd=tmp_path)
+    assert '"same": true' in found.stdout
+    # The program itself says so in one line, without a file.
+    words = ["--blend", room, "--inventory", tmp_path / "inventory.json"]
+    words += ["--lightfield", tmp_path / "lightfield.json", "--cache", tmp_path / "cache"]
+    words += ["--output", tmp_path / "room"]
+    for device, said in (("cpu", "device: is cpu"), ("metal", "has no metal device")):
+        refused = run_program("gpu_check.py", *words, "--device", device, check=False)
+        assert refused.returncode == 1
+        assert refused.stderr.count("error: ") == 1
+        assert said in refused.stderr
+    assert not (tmp_path / "room.json").exists()
