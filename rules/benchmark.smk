@@ -45,6 +45,21 @@ rule stability:
         f"python {BENCHMARKS}/stability.py" " --output {params.folder} > {log} 2>&1"
 
 
+rule extremes:
+    output:
+        multiext(f"{MEASURED}/extremes", ".csv", ".md"),
+    log:
+        log_of("extremes"),
+    conda:
+        ENVIRONMENT
+    params:
+        folder=lambda wildcards, output: str(Path(output[0]).parent),
+    message:
+        "Rendering what is hard for a renderer"
+    shell:
+        f"python {BENCHMARKS}/extremes.py" " --output {params.folder} > {log} 2>&1"
+
+
 rule render_overhead:
     output:
         f"{MEASURED}/render_overhead.md",

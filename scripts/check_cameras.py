@@ -1,6 +1,7 @@
-"""Find the cameras of a dataset that stand inside geometry, before any of them is rendered."""
+"""Find cameras of a dataset that stand inside geometry, or would show it wrong, before a render."""
 
 import argparse
+import sys
 from pathlib import Path
 
 import bpy
@@ -12,6 +13,7 @@ from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.rendering import blend_file
 from lightfield.rendering.clearance import REACH, TOUCHING, clearances, enclosing_objects
+from lightfield.rendering.limits import warnings
 
 
 def main() -> None:
@@ -44,6 +46,8 @@ def main() -> None:
             "move the rig or make it smaller (center and size in the scene YAML)"
         )
     write_json(arguments.output, {"views": views})
+    for warning in warnings(positions, distances):
+        print(f"warning: {warning}", file=sys.stderr)
     nearest = min(distances)
     told = f"{nearest:.3f} m" if nearest < REACH else f"more than {REACH} m"
     print(f"{len(names)} cameras, none inside geometry; the nearest surface is {told} away")

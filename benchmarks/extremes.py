@@ -1,0 +1,712 @@
+"""Render what is hard for a renderer in 32-bit floats, and compare it with what is known exactly.
+
+One row a case: what its truth follows from, the largest relative errors of colour and depth, what
+Plenoforge says about it, and a verdict: right within the case's bound, warned of, refused, as the
+scene's own settings ask for, or WRONG without a word, which fails the run. Scenes are of planes and
+boxes, seen through the same code as the views of datasets. Writes extremes.csv and extremes.md into
+--output.
+"""
+
+import argparse
+import math
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
+
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_csv, write_text
+from lightfield.core.progress import Progress
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
+from lightfield.imaging import images
+from lightfield.rendering import blend_file, cycles, limits, shard
+from lightfield.rendering.clearance import TOUCHING, clearances
+from lightfield.rendering.colour_pass import render_colour
+from lightfield.rendering.geometry_pass import render_geometry
+
+Array = np.ndarray[Any, Any]
+Vector = tuple[float, float, float]
+
+PANORAMA = {"lens": "equirectangular", "resolution": [32, 16]}
+AROUND = {"lens": "equidistant", "fov": 360, "resolution": [24, 24]}
+AHEAD = {"lens": "rectilinear", "fov": 60, "resolution": [16, 16]}
+NARROW = {"lens": "rectilinear", "fov": 1, "resolution": [16, 16]}
+RENDER = {"adaptive_threshold": 0, "denoise": False, "seed": 0, "clamp_indirect": 0}
+# Half floats have 11 binary digits.
+HALF = 2.0**-11
+# Relative error of a depth at right incidence, and of one that is worth a warning.
+SHARP, COARSE = 2e-6, 10.0**-limits.DIGITS
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a case's view shows: colour (h, w, 3), depth (h, w); rays (h, w, 3) in world space."""
+
+    colour: Array
+    depth: Array
+    rays: Array
+    origin: Array
+
+
+# Of what is seen, the errors that a case's truth finds: relative, the largest of the pixels'.
+Truth = Callable[[Seen], Mapping[str, float]]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One scene and one camera, which looks along +Y.
+
+    ``bound`` is what the errors may be where nothing is said; ``basis`` what the truth is from.
+    ``asked`` is true of settings that give up truth for less noise, of which Blender says so.
+    """
+
+    name: str
+    basis: str
+    build: Callable[[], None]
+    truth: Truth
+    bound: Mapping[str, float]
+    camera: Mapping[str, Any] = field(default_factory=lambda: PANORAMA)
+    place: Vector = (0, 0, 0)
+    samples: int = 4
+    frame: int = 1
+    render: Mapping[str, Any] = field(default_factory=dict)
+    asked: bool = False
+
+
+# Scenes.
+
+
+def nodes(name: str) -> tuple[Any, Callable[..., Any], Any]:
+    """Return a material, what adds a node to it, linked to its output, and its node tree."""
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    tree = made.node_tree
+    tree.nodes.remove(tree.nodes["Principled BSDF"])
+    output = tree.nodes["Material Output"]
+
+    def add(kind: str, to: Any = None, **inputs: Any) -> Any:
+        node = tree.nodes.new(kind)
+        for key, value in inputs.items():
+            node.inputs[key].default_value = value
+        if to is not None:
+            tree.links.new(node.outputs[0], to if hasattr(to, "links") else output.inputs[to])
+        return node
+
+    return made, add, tree
+
+
+def grey(value: float) -> tuple[float, float, float, float]:
+    return (value, value, value, 1)
+
+
+def emission(strength: float) -> Any:
+    made, add, _ = nodes("emission")
+    add("ShaderNodeEmission", "Surface", Strength=strength)
+    made.cycles.emission_sampling = "NONE"
+    return made
+
+
+def furnace(kind: str, albedo: float, **inputs: Any) -> Any:
+    """A surface that emits what it absorbs: in a closed room of it light is 1.
+
+    Of n bounces it is 1 − albedoⁿ⁺²: Cycles counts what the path of the last one meets.
+    """
+    made, add, _ = nodes("furnace")
+    both = add("ShaderNodeAddShader", "Surface")
+    add(kind, both.inputs[0], Color=grey(albedo), **inputs)
+    add("ShaderNodeEmission", both.inputs[1], Strength=1 - albedo)
+    made.cycles.emission_sampling = "NONE"
+    return made
+
+
+def surface(kind: str, **inputs: Any) -> Any:
+    made, add, _ = nodes(kind)
+    add(kind, "Surface", **inputs)
+    return made
+
+
+def fog(kind: str, density: float, colour: float) -> Any:
+    made, add, _ = nodes("fog")
+    add(kind, "Volume", Density=density, Color=grey(colour))
+    return made
+
+
+def box(half: float, material: Any, center: Vector = (0, 0, 0)) -> Any:
+    bpy.ops.mesh.primitive_cube_add(size=2 * half, location=center)
+    return painted(material)
+
+
+def wall(
+    y: float, material: Any, size: float = 1e3, turn: float = 90, x: float = 0, z: float = 0
+) -> Any:
+    bpy.ops.mesh.primitive_plane_add(
+        size=size, location=(x, y, z), rotation=(math.radians(turn), 0, 0)
+    )
+    return painted(material)
+
+
+def painted(material: Any) -> Any:
+    thing = bpy.context.object
+    thing.data.materials.append(material)
+    return thing
+
+
+def sun(strength: float, degrees: float) -> None:
+    """Shine along +Y."""
+    light = bpy.data.lights.new("sun", "SUN")
+    light.energy, light.angle = strength, math.radians(degrees)
+    thing = bpy.data.objects.new("sun", light)
+    thing.rotation_euler = (math.radians(90), 0, 0)
+    bpy.context.scene.collection.objects.link(thing)
+
+
+def bounces(**most: int) -> None:
+    """Let paths bounce so often; Blender's own limits are 12, and 4 diffuse and glossy ones."""
+    for kind, number in most.items():
+        setattr(bpy.context.scene.cycles, f"{kind}_bounces", number)
+
+
+def world(strength: float) -> None:
+    made = bpy.data.worlds.new("world")
+    made.use_nodes = True
+    made.node_tree.nodes["Background"].inputs["Color"].default_value = grey(1)
+    made.node_tree.nodes["Background"].inputs["Strength"].default_value = strength
+    bpy.context.scene.world = made
+
+
+def sliding(first: int, frame: int) -> None:
+    """A square 2 m wide slides by 4 m a frame, and is ahead of the camera at ``frame``."""
+    wall(20, emission(0.25))
+    square = wall(10, emission(1), size=2)
+    moving(square, 0, {at: 4 * (at - frame) for at in (first, frame, frame + 1)})
+    bpy.context.scene.render.use_motion_blur = True
+
+
+def moving(thing: Any, axis: int, places: Mapping[int, float]) -> None:
+    """Let an object be at ``places`` by frame, and between them go evenly."""
+    for frame, place in places.items():
+        thing.location[axis] = place
+        thing.keyframe_insert("location", index=axis, frame=frame)
+    (bag,) = thing.animation_data.action.layers[0].strips[0].channelbags
+    for key in bag.fcurves[0].keyframe_points:
+        key.interpolation = "LINEAR"
+
+
+# Truths.
+
+
+def largest(found: Array, truth: Array | float) -> float:
+    """Return the largest relative error; nothing where nothing is right, inf where only one is."""
+    found, truth = np.broadcast_arrays(np.asarray(found, np.float64), np.asarray(truth))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        error = np.abs(found / truth - 1)
+    return float(np.where(found == truth, 0, np.where(np.isfinite(error), error, np.inf)).max())
+
+
+def in_box(seen: Seen, half: float, center: Vector = (0, 0, 0)) -> tuple[Array, Array]:
+    """Return the distances to the walls of a box, (h, w), and the cosines of incidence."""
+    with np.errstate(divide="ignore"):
+        each = (np.sign(seen.rays) * half - (seen.origin - center)) / seen.rays
+    nearest = each.argmin(axis=-1)[..., None]
+    cosine = np.abs(np.take_along_axis(seen.rays, nearest, -1))[..., 0]
+    return np.take_along_axis(each, nearest, -1)[..., 0], cosine
+
+
+def of_box(
+    half: float, light: float, center: Vector = (0, 0, 0), density: float = 0, even: bool = True
+) -> Truth:
+    """A box of even light, around the camera, in a fog that absorbs.
+
+    Where chance ends paths light is not ``even``, but on average.
+    """
+
+    def truth(seen: Seen) -> Mapping[str, float]:
+        distance, cosine = in_box(seen, half, center)
+        expected = light * np.exp(-density * distance)[..., None]
+        error = np.abs(seen.depth / distance - 1) * cosine
+        colour = seen.colour if even else seen.colour.mean()
+        return {"colour": largest(colour, expected), "depth": float(error.max())}
+
+    return truth
+
+
+def of_wall(y: float, light: float, density: float = 0, fog_depth: float = 0) -> Truth:
+    """A wall ahead, of even light, behind a fog that absorbs, ``fog_depth`` thick."""
+
+    def truth(seen: Seen) -> Mapping[str, float]:
+        ahead = seen.rays[..., 1]
+        expected = light * np.exp(-density * fog_depth / ahead)[..., None]
+        z = y - seen.origin[1]
+        return {"colour": largest(seen.colour, expected), "depth": largest(seen.depth, z)}
+
+    return truth
+
+
+def mean_light(light: float) -> Truth:
+    return lambda seen: {"colour": abs(float(seen.colour.mean()) / light - 1)}
+
+
+def grazing(seen: Seen) -> Mapping[str, float]:
+    """A floor 1 m below, up to the horizon: Z-depth, and its error times the cosine."""
+    down = -seen.rays[..., 2]
+    below = down > 0
+    distance = 1 / down[below]
+    z = distance * seen.rays[..., 1][below]
+    error = np.abs(seen.depth[below] / z - 1)
+    missed = np.isfinite(seen.depth[~below]).any()
+    return {"depth": math.inf if missed else float((error * down[below]).max())}
+
+
+def one_of_two(seen: Seen) -> Mapping[str, float]:
+    """Of two surfaces in one place each pixel shows the one or the other, whose lights are 1, 3."""
+    other = np.minimum(np.abs(seen.colour - 1), np.abs(seen.colour - 3)).max()
+    return {"colour": float(other), "depth": largest(seen.depth, 2)}
+
+
+def one_pixel(seen: Seen) -> Mapping[str, float]:
+    """A square as large as a pixel, of light 1 before black: all light together is one pixel's."""
+    hit = np.isfinite(seen.depth)
+    depth = largest(seen.depth[hit], 10) if hit.sum() == 1 else math.inf
+    return {"colour": abs(float(seen.colour[..., 0].sum()) - 1), "depth": depth}
+
+
+def slid(seen: Seen) -> Mapping[str, float]:
+    """The part of the half frame that the shutter is open in which the square is in the way."""
+    x = seen.rays[..., 0] / seen.rays[..., 1] * 10
+    tall = np.abs(seen.rays[..., 2] / seen.rays[..., 1] * 10) < 1
+    begin, end = np.clip((x - 1) / 4, -0.25, 0.25), np.clip((x + 1) / 4, -0.25, 0.25)
+    covered = np.where(tall, (end - begin) / 0.5, 0)
+    truth = (0.25 + 0.75 * covered)[..., None]
+    # Pixels whose centre is on the square's edge are either.
+    sure = np.abs(np.abs(x) - 1) > 1e-3
+    z = np.where(tall & (np.abs(x) < 1), 10, 20)
+    error = np.abs(seen.colour - truth).max()
+    return {"colour": float(error), "depth": largest(seen.depth[sure], z[sure])}
+
+
+# Cases.
+
+
+def sizes() -> Iterator[Case]:
+    for size, name in ((1e-3, "1 mm"), (1.0, "1 m"), (1e5, "100 km")):
+
+        def build(size: float = size) -> None:
+            bounces(max=8, diffuse=8)
+            box(size / 2, furnace("ShaderNodeBsdfDiffuse", 0.5))
+
+        yield Case(
+            f"a room of {name}",
+            "closed form, furnace of 8 bounces",
+            build,
+            of_box(size / 2, 1 - 0.5**10, even=False),
+            {"colour": 0.01, "depth": SHARP},
+            place=(0.1 * size, -0.2 * size, 0.05 * size),
+            samples=64,
+        )
+
+
+def far() -> Iterator[Case]:
+    for power in range(3, 8):
+        # A rig's centre is at most 1e7 m away.
+        away = 10.0**power - 1
+        center = (away, -away, away)
+
+        def build(center: Vector = center) -> None:
+            box(2, emission(1), center)
+
+        yield Case(
+            f"a room of 4 m, 1e{power} m from the origin",
+            "closed form",
+            build,
+            of_box(2, 1, center),
+            {"colour": HALF, "depth": COARSE},
+            place=(away + 0.1, -away - 0.2, away + 0.3),
+        )
+
+
+def lights() -> Iterator[Case]:
+    def sunny() -> None:
+        sun(5e4 * math.pi / 0.5, 0)
+        wall(10, surface("ShaderNodeBsdfDiffuse", Color=grey(0.5)))
+        shade = wall(5, emission(5e-3), size=2)
+        shade.visible_shadow = False
+
+    def in_sun(seen: Seen) -> Mapping[str, float]:
+        away = np.abs(seen.rays / seen.rays[..., 1:2])[..., [0, 2]].max(axis=-1) * 5
+        inside, outside = away < 0.6, away > 1.4
+        return {
+            "colour": max(largest(seen.colour[inside], 5e-3), largest(seen.colour[outside], 5e4)),
+            "depth": max(largest(seen.depth[inside], 5), largest(seen.depth[outside], 10)),
+        }
+
+    yield Case(
+        "a sun 1e7 times the shade",
+        "closed form",
+        sunny,
+        in_sun,
+        {"colour": 2 * HALF, "depth": SHARP},
+        camera=AHEAD,
+    )
+    for strength in (6.5e4, 1e6, 1e-6):
+
+        def bright(strength: float = strength) -> None:
+            wall(10, emission(strength))
+
+        bound = HALF if strength > 6e-5 else 2.0**-25 / strength
+        yield Case(
+            f"light of {strength:g}",
+            "closed form",
+            bright,
+            of_wall(10, strength),
+            {"colour": bound, "depth": SHARP},
+            camera=AHEAD,
+        )
+
+
+def surfaces() -> Iterator[Case]:
+    for distance in (0.002, 1e-4, 5e-5):
+
+        def near(distance: float = distance) -> None:
+            wall(distance, emission(1), size=1)
+
+        yield Case(
+            f"a surface {distance:g} m ahead",
+            "closed form",
+            near,
+            of_wall(distance, 1),
+            {"colour": HALF, "depth": 2 * SHARP},
+            camera=AHEAD,
+        )
+
+    def coincident() -> None:
+        wall(2, emission(1))
+        wall(2, emission(3))
+
+    yield Case(
+        "two surfaces in one place",
+        "each pixel shows one of them",
+        coincident,
+        one_of_two,
+        {"colour": 3 * HALF, "depth": SHARP},
+        camera=AHEAD,
+        samples=1,
+    )
+
+    def dot() -> None:
+        pixel = 2 * 10 * math.tan(math.radians(0.5)) / 16
+        wall(10, emission(1), size=pixel, x=pixel / 2, z=pixel / 2)
+
+    yield Case(
+        "a surface of one pixel",
+        "closed form",
+        dot,
+        one_pixel,
+        {"colour": 0.02, "depth": SHARP},
+        camera=NARROW,
+        samples=1024,
+    )
+
+    def floor() -> None:
+        bpy.ops.mesh.primitive_plane_add(size=1e5, location=(0, 0, -1))
+        painted(emission(1))
+
+    yield Case(
+        "a floor up to 89.98° of incidence",
+        "closed form; error × cosine",
+        floor,
+        grazing,
+        {"depth": SHARP},
+        camera=NARROW,
+    )
+
+
+def layers() -> Iterator[Case]:
+    for count, limit in ((8, 8), (1000, 1024), (1000, 8)):
+
+        def build(count: int = count, limit: int = limit) -> None:
+            bpy.context.scene.cycles.transparent_max_bounces = limit
+            clear = surface("ShaderNodeBsdfTransparent", Color=grey(0.9999))
+            corners = ((-50, -50), (50, -50), (50, 50), (-50, 50))
+            mesh = bpy.data.meshes.new("layers")
+            mesh.from_pydata(
+                [(x, 2 + 0.01 * number, z) for number in range(count) for x, z in corners],
+                [],
+                [tuple(range(4 * number, 4 * number + 4)) for number in range(count)],
+            )
+            mesh.materials.append(clear)
+            thing = bpy.data.objects.new("layers", mesh)
+            bpy.context.scene.collection.objects.link(thing)
+            wall(20, emission(1))
+
+        yield Case(
+            f"{count:,} transparent layers, of {limit:,} that may be",
+            "closed form",
+            build,
+            mean_light(0.9999**count),
+            {"colour": 0.05},
+            camera=NARROW,
+            samples=16,
+        )
+
+
+def fogs() -> Iterator[Case]:
+    for density in (1e-4, 1.0, 12.0):
+
+        def build(density: float = density) -> None:
+            wall(10, emission(1))
+            bpy.ops.mesh.primitive_cube_add(size=1, location=(0, 5, 0), scale=(100, 1, 100))
+            painted(fog("ShaderNodeVolumeAbsorption", density, 0))
+
+        yield Case(
+            f"fog of optical depth {density:g}",
+            "Beer–Lambert",
+            build,
+            of_wall(10, 1, density, 1),
+            # In halves light of 6e-6 has steps of 1 %.
+            {"colour": 2 * HALF if density < 10 else 0.01, "depth": SHARP},
+            camera={**AHEAD, "fov": 15},
+            samples=1,
+            render={"filter_width": 0.01},
+        )
+
+    def scattering(density: float, most: int) -> None:
+        bounces(max=most, volume=most)
+        world(1)
+        box(1, fog("ShaderNodeVolumeScatter", density, 1), (0, 5, 0))
+
+    for density, most in ((0.01, 32), (5.0, 256)):
+        yield Case(
+            f"fog that scatters all light, optical depth {2 * density:g}",
+            "furnace",
+            lambda density=density, most=most: scattering(density, most),
+            mean_light(1),
+            {"colour": 0.02},
+            camera={**AHEAD, "fov": 15},
+            samples=64,
+        )
+    for name, camera in (("poles of a panorama", PANORAMA), ("rim of a 360° lens", AROUND)):
+
+        def around() -> None:
+            box(2, emission(1))
+            fogged = bpy.data.worlds.new("world")
+            fogged.use_nodes = True
+            tree = fogged.node_tree
+            tree.nodes["Background"].inputs["Strength"].default_value = 0
+            absorbing = tree.nodes.new("ShaderNodeVolumeAbsorption")
+            absorbing.inputs["Color"].default_value = grey(0)
+            absorbing.inputs["Density"].default_value = 0.5
+            tree.links.new(absorbing.outputs[0], tree.nodes["World Output"].inputs["Volume"])
+            bpy.context.scene.world = fogged
+
+        yield Case(
+            f"{name}, in fog",
+            "Beer–Lambert",
+            around,
+            of_box(2, 1, density=0.5),
+            # The filter takes light from beside a pixel's centre.
+            {"colour": 4 * HALF, "depth": SHARP},
+            camera=camera,
+            place=(0.1, -0.2, 0.3),
+            samples=1,
+            render={"filter_width": 0.01},
+        )
+
+
+def paths() -> Iterator[Case]:
+    for most in (12, 1000):
+
+        def mirrors(most: int = most) -> None:
+            bounces(max=most, glossy=most)
+            box(1, furnace("ShaderNodeBsdfGlossy", 0.9, Roughness=0.0))
+
+        yield Case(
+            f"mirrors facing mirrors, {most:,} bounces",
+            f"furnace of {most:,} bounces",
+            mirrors,
+            of_box(1, 1 - 0.9 ** (most + 2), even=False),
+            {"colour": 0.01, "depth": SHARP},
+            place=(0.1, -0.2, 0.3),
+            samples=256,
+        )
+
+    def dielectrics() -> None:
+        bounces(max=256, transmission=256, glossy=256)
+        world(1)
+        for half, index in ((1, 1.5), (0.7, 1.33), (0.4, 2.4)):
+            box(half, surface("ShaderNodeBsdfGlass", IOR=index, Roughness=0.0), (0, 5, 0))
+
+    yield Case(
+        "glass in water in glass",
+        "furnace",
+        dielectrics,
+        mean_light(1),
+        {"colour": 0.01},
+        camera={**AHEAD, "fov": 15},
+        samples=64,
+    )
+    # Blender's Filter Glossy, 1 in a new file, takes smooth glass for rough after a diffuse bounce.
+    for degrees, blur, clamp in ((0, 0, 0), (10, 0, 0), (10, 1, 0), (10, 0, 1)):
+
+        def caustic(degrees: int = degrees, blur: int = blur) -> None:
+            bounces(max=64, transmission=64, glossy=64)
+            bpy.context.scene.cycles.blur_glossy = blur
+            sun(1, degrees)
+            wall(10, surface("ShaderNodeBsdfDiffuse", Color=grey(0.1)))
+            bpy.ops.mesh.primitive_cube_add(size=1, location=(0, 8, 0), scale=(60, 0.1, 60))
+            painted(surface("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0)).visible_camera = False
+
+        # The wall is dark, for the pane sends back a tenth of what it sees of it.
+        through = 2 * 1.5 / (1.5**2 + 1)
+        yield Case(
+            f"a sun of {degrees:g}° through glass, filter glossy {blur:g}, clamped at {clamp:g}",
+            "Fresnel's equations",
+            caustic,
+            mean_light(0.1 / math.pi * through),
+            {"colour": 0.05},
+            camera={**AHEAD, "fov": 15},
+            samples=1024,
+            render={"clamp_indirect": clamp},
+            asked=bool(blur or clamp),
+        )
+
+
+def frames() -> Iterator[Case]:
+    for first, frame in ((1, 2), (1048570, 1048573)):
+        yield Case(
+            f"motion blur at frame {frame}",
+            "closed form, pixels' centres",
+            lambda first=first, frame=frame: sliding(first, frame),
+            slid,
+            {"colour": 0.03, "depth": SHARP},
+            camera={**AHEAD, "resolution": [32, 16]},
+            frame=frame,
+            samples=1024,
+            render={"filter_width": 0.01},
+        )
+
+    def moved() -> None:
+        moving(wall(2, emission(1)), 1, {1048572: 2, 1048574: 4})
+
+    yield Case(
+        "frame 1048574, the last one",
+        "closed form",
+        moved,
+        of_wall(4, 1),
+        {"colour": HALF, "depth": SHARP},
+        camera=AHEAD,
+        frame=1048574,
+    )
+
+
+def cases() -> Iterator[Case]:
+    """Yield every case."""
+    for kind in (sizes, far, lights, surfaces, layers, fogs, paths, frames):
+        yield from kind()
+
+
+def render(case: Case, folder: Path) -> tuple[Seen, list[str], list[str]]:
+    """Render a case as a dataset's view; return it, what it is warned of and why it is refused."""
+    blend_file.new_scene()
+    case.build()
+    path = folder / "scene.blend"
+    blend_file.save_scene(path)
+    lens = lenses.from_camera(dict(case.camera))
+    lightfield = LightField.from_rig(
+        {"type": "lattice", "cameras": [1, 1, 1], "center": list(case.place)},
+        lens,
+        depth=lens.usual_depth,
+        frame=case.frame,
+        render=RENDER | {"samples": case.samples, "depth_precision": "float"} | dict(case.render),
+    )
+    view = lightfield.views[0]
+    cycles.set_up(path, None, lightfield, "cpu", 1)
+    positions = view.position[None]
+    distances = clearances(positions)
+    warned = list(limits.warnings(positions, distances))
+    refused = ["inside geometry"] if distances[0] < TOUCHING else []
+    geometry = render_geometry(view.matrix)
+    channels, attributes = shard.colour_channels(render_colour(view.matrix, 1).pixels)
+    clamped = int(attributes[images.CLAMPED_ATTRIBUTE])
+    if clamped:
+        warned.append(f"{clamped} values were clamped to the half range")
+    depth = shard.depth_channel(geometry.depth, lightfield, shard.depth_rays(lightfield))
+    rays = lens.pixel_rays()
+    sees = np.isfinite(rays[..., 0])
+    colour = np.stack([channels[name] for name in "RGB"], axis=-1)
+    # What the lens sees, as one row.
+    seen = Seen(
+        colour[sees][None].astype(np.float64),
+        depth[sees][None].astype(np.float64),
+        (rays @ view.matrix[:3, :3].T)[sees][None],
+        view.position,
+    )
+    return seen, warned, refused
+
+
+def measure(chosen: list[Case]) -> Iterator[dict[str, Any]]:
+    """Yield a row for each case."""
+    progress = Progress(len(chosen), "extremes", "cases")
+    with tempfile.TemporaryDirectory() as name:
+        for case in chosen:
+            seen, warned, refused = render(case, Path(name))
+            errors = case.truth(seen)
+            right = all(errors[what] <= case.bound[what] for what in errors)
+            verdict = "right" if right else "WRONG"
+            if refused:
+                verdict = "refused"
+            elif not right and warned:
+                verdict = "warned"
+            elif not right and case.asked:
+                verdict = "as asked"
+            yield {
+                "case": case.name,
+                "truth": case.basis,
+                "colour": errors.get("colour"),
+                "depth": errors.get("depth"),
+                "verdict": verdict,
+                "said": "; ".join([*refused, *warned]),
+            }
+            progress.done()
+
+
+def table(rows: list[dict[str, Any]]) -> str:
+    """Return the rows in Markdown."""
+
+    def number(value: float | None) -> str:
+        return "" if value is None else f"{value:.1e}"
+
+    lines = ["| case | truth | colour | depth | verdict |", "| --- | --- | ---: | ---: | --- |"]
+    lines += [
+        f"| {row['case']} | {row['truth']} | {number(row['colour'])} | {number(row['depth'])} "
+        f"| {row['verdict']} |"
+        for row in rows
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--output", required=True, type=Path, help="folder for the results")
+    folder = parser.parse_args().output
+    rows = list(measure(list(cases())))
+    write_csv(folder / "extremes.csv", rows)
+    write_text(folder / "extremes.md", table(rows))
+    print(table(rows))
+    wrong = [row["case"] for row in rows if row["verdict"] == "WRONG"]
+    if wrong:
+        raise UserError(
+            f"{len(wrong)} of {len(rows)} cases are wrong without a word: {', '.join(wrong)}"
+        )
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,100 @@
+"""What Cycles renders wrong without a word: far from the origin, behind layers, through glass."""
+
+from collections.abc import Iterator, Set
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Vector
+from numpy.typing import NDArray
+
+from lightfield.geometry.rigs.sphere import icosphere
+from lightfield.rendering.clearance import REACH
+from lightfield.rendering.inventory import contributing, surface_features
+
+Floats = NDArray[np.float64]
+
+# Decimal digits that a depth shall have at least.
+DIGITS = 3
+# Of so many cameras the rays are followed through what is transparent.
+MOST_CAMERAS = 8
+
+
+def warnings(positions: Floats, distances: Floats) -> Iterator[str]:
+    """Yield a line for each thing in the open scene that the views will show wrong.
+
+    ``positions`` (n, 3) are the cameras', and ``distances`` (n,) those to their nearest surfaces,
+    inf beyond `REACH`.
+    """
+    # Cycles computes in float32, in world space.
+    steps = np.spacing(np.abs(positions).max(axis=1).astype(np.float32)).astype(np.float64)
+    digits = -np.log10(steps / np.minimum(distances, REACH))
+    worst = int(np.argmin(digits))
+    if digits[worst] < DIGITS:
+        far = np.abs(positions[worst]).max()
+        yield (
+            f"cameras are up to {far:.3g} m from the origin, where Cycles' numbers are "
+            f"{100 * steps[worst]:.2g} cm apart: shapes and depths are as coarse; move the scene "
+            "and the rig to the origin"
+        )
+    limit = bpy.context.scene.cycles.transparent_max_bounces
+    step = max(1, len(positions) // MOST_CAMERAS)
+    clear = {material.name_full for material in bpy.data.materials if _is_transparent(material)}
+    some = positions[::step][:MOST_CAMERAS]
+    if clear and any(_meets_more(limit, position, clear) for position in some):
+        yield (
+            f"more than {limit} transparent surfaces lie behind each other, and what is behind "
+            f"{limit} may be black: raise Max Bounces: Transparent in the .blend's Light Paths"
+        )
+    glass = sorted(material.name_full for material in bpy.data.materials if _is_glass(material))
+    small = sorted(thing.name_full for thing in bpy.context.scene.objects if _has_no_size(thing))
+    # Filter Glossy lets it through, and more dimly.
+    if glass and small and not bpy.context.scene.cycles.blur_glossy:
+        yield (
+            f"{', '.join(small[:8])}: lights without a size, whose light comes through no glass "
+            f"({', '.join(glass[:8])}): give them an angle or a radius"
+        )
+
+
+def _meets_more(limit: int, position: Floats, clear: Set[str]) -> bool:
+    """Return whether a ray from a camera meets more than ``limit`` of the ``clear`` materials."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    for vertex in icosphere(2):
+        place, direction = Vector(position), Vector(vertex).normalized()
+        for _ in range(limit + 1):
+            hit, place, _, index, thing, _ = bpy.context.scene.ray_cast(depsgraph, place, direction)
+            mesh = thing.evaluated_get(depsgraph).data if hit else None
+            if not mesh or not mesh.materials:
+                break
+            material = mesh.materials[mesh.polygons[index].material_index]
+            if not material or material.name_full not in clear:
+                break
+            # On from just behind it.
+            place = place + direction * 1e-5 * (1 + place.length)
+        else:
+            return True
+    return False
+
+
+def _is_transparent(material: Any) -> bool:
+    return "transparency" in (feature for feature, _ in surface_features(material))
+
+
+def _is_glass(material: Any) -> bool:
+    output = material.node_tree.get_output_node("CYCLES") if material.node_tree else None
+    for node in contributing(output) if output else ():
+        transmission = node.inputs.get("Transmission Weight")
+        if node.bl_idname in ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction") or (
+            transmission and (transmission.is_linked or transmission.default_value)
+        ):
+            return True
+    return False
+
+
+def _has_no_size(thing: Any) -> bool:
+    """Whether an object is a light that shines from a point or a direction alone."""
+    if thing.type != "LIGHT" or thing.hide_render:
+        return False
+    light = thing.data
+    size = {"SUN": "angle", "POINT": "shadow_soft_size", "SPOT": "shadow_soft_size"}.get(light.type)
+    return size is not None and getattr(light, size) == 0

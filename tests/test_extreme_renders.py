@@ -1,0 +1,94 @@
+"""Extreme renders: none of them is wrong without a word, and the check of cameras says the word."""
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
+
+ROOT = Path(__file__).parents[1]
+# Builds a scene of benchmarks/extremes.py, named by its case, as a .blend.
+BUILD = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import extremes
+from pathlib import Path
+from lightfield.rendering import blend_file
+case = next(case for case in extremes.cases() if case.name == sys.argv[2])
+blend_file.new_scene()
+case.build()
+blend_file.save_scene(Path(sys.argv[3]))
+"""
+# Measures one case whose truth is another one.
+UNTRUE = """
+import dataclasses, sys
+sys.path.insert(0, sys.argv[1])
+import extremes
+from lightfield.core.cli import run
+case = next(case for case in extremes.cases() if case.name == "light of 65000")
+wrong = dataclasses.replace(case, truth=extremes.of_wall(10, 64000))
+extremes.cases = lambda: [case, wrong]
+sys.argv[1:] = ["--output", sys.argv[2]]
+run(extremes.main)
+"""
+
+
+def test_no_case_is_wrong_without_a_word(tmp_path, run_program):
+    run_program(ROOT / "benchmarks/extremes.py", "--output", tmp_path)
+    with (tmp_path / "extremes.csv").open() as file:
+        rows = {row["case"]: row for row in csv.DictReader(file)}
+    found = {kind: [] for kind in ("right", "warned", "refused", "as asked")}
+    for name, row in rows.items():
+        found[row["verdict"]].append(name)
+    assert len(found["right"]) >= 25
+    assert found["warned"] == [
+        *(f"a room of 4 m, 1e{power} m from the origin" for power in (5, 6, 7)),
+        "light of 1e+06",
+        "1,000 transparent layers, of 8 that may be",
+        "a sun of 0° through glass, filter glossy 0, clamped at 0",
+    ]
+    assert found["refused"] == [
+        "a room of 1 mm",
+        "a surface 0.0001 m ahead",
+        "a surface 5e-05 m ahead",
+    ]
+    assert all(rows[name]["said"] for kind in ("warned", "refused") for name in found[kind])
+    assert len(found["as asked"]) == 2
+    assert (tmp_path / "extremes.md").read_text().count("\n") == len(rows) + 2
+
+
+def test_a_wrong_case_fails_the_run(tmp_path, run_program):
+    program = tmp_path / "untrue.py"
+    program.write_text(UNTRUE)
+    result = run_program(program, ROOT / "benchmarks", tmp_path, check=False)
+    assert result.returncode == 1
+    assert "error: 1 of 2 cases are wrong without a word: light of 65000" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("case", "place", "said"),
+    [
+        ("a room of 4 m, 1e6 m from the origin", [1e6, -1e6, 1e6], "6.2 cm apart"),
+        ("1,000 transparent layers, of 8 that may be", [0, 0, 0], "more than 8 transparent"),
+        ("8 transparent layers, of 8 that may be", [0, 0, 0], None),
+        ("light of 65000", [0, 0, 0], None),
+    ],
+)
+def test_the_check_of_cameras_warns(tmp_path, run_program, case, place, said):
+    program, blend = tmp_path / "build.py", tmp_path / "scene.blend"
+    program.write_text(BUILD)
+    run_program(program, ROOT / "benchmarks", case, blend)
+    lens = lenses.from_camera({"lens": "equirectangular", "resolution": [32, 16]})
+    rig = {"type": "lattice", "cameras": [1, 1, 1], "center": place}
+    content = LightField.from_rig(rig, lens, depth="distance", frame=1)
+    content.write(tmp_path / "lightfield.json")
+    result = run_program(
+        "check_cameras.py",
+        *("--blend", blend, "--lightfield", tmp_path / "lightfield.json"),
+        *("--output", tmp_path / "cameras.json"),
+    )
+    warnings = [line for line in result.stderr.splitlines() if line.startswith("warning: ")]
+    assert len(warnings) == (said is not None)
+    assert said is None or said in warnings[0]
