@@ -362,8 +362,8 @@ def failing_nodes(record, attempt):
 
 def avoided_nodes(wildcards, attempt):
     """Return the words by which Slurm leaves out the nodes that a shard avoids, and the user's."""
-    defaults = workflow.resource_settings._parsed_default_resources
-    words = [str(defaults["slurm_extra"].value)] if "slurm_extra" in defaults else []
+    given = workflow.resource_settings._parsed_default_resources.get("slurm_extra")
+    words = [str(given.raw).strip("'\"")] if given else []
     if not workflow.local_exec:
         dataset = dataset_of(wildcards)
         bounds = (wildcards.first, wildcards.end) if attempt > 1 else (0, 0)
