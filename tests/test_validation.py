@@ -11,6 +11,7 @@ import shutil
 import subprocess
 from collections.abc import Callable, Mapping
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from scipy.ndimage import binary_erosion
 
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.dataset.lightfield import NAME, LightField, View
+from lightfield.dataset.passes import NAMES, PASSES, matte_header
 from lightfield.export import MANIFESTS
 from lightfield.geometry import lenses, rotations
 from lightfield.imaging import images
@@ -693,6 +695,106 @@ def test_exports_own_what_they_list(small_dataset: Path) -> None:
         "transforms_train.json: is no JSON with frames, each with a file_path",
         "pictures/one.png: is 64 × 10; must be 64 × 64",
     ]
+
+
+# ---- passes ---------------------------------------------------------------------------------
+
+
+def add_passes(dataset: Path) -> None:
+    """Add passes of one thing that is everywhere, of which each holds what it must."""
+    wanted = [PASSES[name] for name in ("normal", "object", "cryptomatte", "emission")]
+    render = {"passes": [one.name for one in wanted]}
+    rewrite(dataset, lambda held: held.update(render=render))
+    write_json(dataset / "object" / NAMES, {"thing": 1})
+    for view, one in product(names(dataset), wanted):
+        planes = {channel: np.zeros((64, 64), one.dtype) for channel in one.channels}
+        header = {}
+        if one.name in ("normal", "object"):
+            planes["B" if one.name == "normal" else "Y"][8:56, 8:56] = 1
+        if one.name == "cryptomatte":
+            planes["CryptoObject00.R"][:], planes["CryptoObject00.G"][:] = 1, 0.6
+            planes["CryptoObject00.B"][:], planes["CryptoObject00.A"][:] = 2, 0.4
+            header = matte_header({"one": "3f800000", "two": "40000000"})
+        images.write_exr(one.path(dataset, view), planes, header)
+
+
+def in_pass(name: str, **pixels: float) -> Spoil:
+    """Change one pixel of a pass."""
+
+    def spoil(dataset: Path) -> None:
+        path = PASSES[name].path(dataset, names(dataset)[BAD])
+        image = images.read_image(path)
+        planes = {channel: plane.copy() for channel, plane in image.channels.items()}
+        for channel, value in pixels.items():
+            planes[channel.replace("_", ".")][30, 31] = value
+        kept = {key: value for key, value in image.attributes.items() if "cryptomatte" in key}
+        images.write_exr(path, planes, kept)
+
+    return spoil
+
+
+def of_pass(name: str, change: Callable[[Path], Any]) -> Spoil:
+    return lambda dataset: change(PASSES[name].path(dataset, names(dataset)[BAD]))
+
+
+OUT_OF_ORDER = "1 pixels have parts below 0 or not in order"
+BROKEN_PASSES: dict[str, tuple[Spoil, str]] = {
+    "missing": (of_pass("emission", Path.unlink), "is missing"),
+    "truncated": (of_pass("emission", truncate), "no image that can be read"),
+    "small": (
+        of_pass("object", lambda path: images.write_exr(path, {"Y": np.zeros((64, 32), "u4")})),
+        "is 32 × 64; must be 64 × 64",
+    ),
+    "other channels": (
+        of_pass("object", lambda path: images.write_exr(path, {"Y": np.zeros((64, 64), "f4")})),
+        "has the channels Y:float32; must have Y:uint32",
+    ),
+    "not finite": (in_pass("emission", R=np.nan, G=np.inf), "2 values are not finite"),
+    "long normal": (in_pass("normal", B=1.00015), "1 normals are no unit vectors"),
+    "short normal": (in_pass("normal", B=0.99985), "1 normals are no unit vectors"),
+    "unknown object": (in_pass("object", Y=7), "has [7], which object/names.json does not have"),
+    "unknown matte": (
+        in_pass("cryptomatte", CryptoObject00_R=3),
+        "has 1 objects that its manifest does not have",
+    ),
+    "negative part": (in_pass("cryptomatte", CryptoObject02_A=-0.1), OUT_OF_ORDER),
+    "parts out of order": (in_pass("cryptomatte", CryptoObject00_A=0.7), OUT_OF_ORDER),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN_PASSES)
+def test_a_broken_pass_is_named(case: str, small_dataset: Path) -> None:
+    spoil, text = BROKEN_PASSES[case]
+    add_passes(small_dataset)
+    spoil(small_dataset)
+    result = validate(small_dataset)
+    assert failed(result) == ["passes"]
+    (problem,) = check(result, "passes").problems
+    path, said = problem.split(": ", 1)
+    assert Path(path).name == f"{names(small_dataset)[BAD]}.exr"
+    assert text in said
+
+
+def test_right_passes_are_valid_and_what_cycles_had_no_number_for_is_a_warning(
+    small_dataset: Path,
+) -> None:
+    add_passes(small_dataset)
+    in_pass("normal", B=1.00005)(small_dataset)
+    # What covers nothing need not be known.
+    in_pass("cryptomatte", CryptoObject01_R=3)(small_dataset)
+    for view in names(small_dataset)[:2]:
+        path = PASSES["normal"].path(small_dataset, view)
+        images.write_exr(path, images.read_image(path).channels, {images.NAN_ATTRIBUTE: 3})
+    result = validate(small_dataset)
+    assert failed(result) == []
+    found = check(result, "passes")
+    assert found.detail == "24 of 24 are there and hold what they must"
+    (warning,) = found.warnings
+    assert warning.startswith("6 values in normal were not numbers to Cycles and are 0")
+    assert {"normal/view_0000f.exr", f"object/{NAMES}"} <= result.checksums.keys()
+    (small_dataset / "object" / NAMES).unlink()
+    problems = check(validate(small_dataset), "passes").problems
+    assert f"object/view_0000f.exr: has [0, 1], which object/{NAMES} does not have" in problems
 
 
 # ---- reprojections --------------------------------------------------------------------------
