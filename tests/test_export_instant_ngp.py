@@ -515,6 +515,8 @@ def test_one_camera_has_no_extent_to_fit(dataset: Dataset) -> None:
     # Where it is given, the mean camera lies in the middle.
     transforms = dataset.export("--scale", 2)
     np.testing.assert_allclose(Loader(transforms).camera(0)[1], 0.5)
+    model = TypeAdapter(InstantNgp).validate_python({"sources": ["views"], "scale": 2})
+    assert transforms["options"] == model.recorded
 
 
 def test_views_of_another_size_or_of_unknown_depth_are_named(dataset: Dataset) -> None:
