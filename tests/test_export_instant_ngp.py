@@ -296,6 +296,11 @@ def test_exr_views_become_files_that_the_loader_accepts(dataset: Dataset) -> Non
             "RGB", np.dtype(np.float16)
         )
         np.testing.assert_array_equal(channels["R"], np.where(outside, -1, 0.25))
+    # Views may be without depth.
+    for frame in content["frames"]:
+        path = dataset.folder / f"{frame['name']}.exr"
+        colour = images.read_image(path, "RGB").channels
+        images.write_exr(path, {name: colour[name] for name in "RGB"})
     elsewhere = dataset.folder / "elsewhere"
     transforms = dataset.export("--image-suffix", ".exr", "--exr-dir", elsewhere)
     assert transforms["frames"][0]["file_path"] == "elsewhere/view_0000f.exr"
