@@ -1,9 +1,14 @@
 """What the passes of a scene's view hold, against what else is known of it, and what they cost.
 
-For each lens: the largest difference between the colour and the sum of its parts of light, as a
-part of the colour; how many pixels have the object that Blender's ray casts find; and the angles
-in degrees, their median and third quartile, between normals and the faces' that these find. Then
-the seconds and the bytes of a view with more and more passes.
+For each lens, of the first view: by how much of the colour its parts of light add up to another,
+at most; how many pixels have the object that Blender's ray casts find, and how many have it first
+in their Cryptomatte; by how much of it depth differs from the ray casts' there, in the median and
+the 99th percentile; the angles in degrees, their median and third quartile, between normals and
+those of the faces that these find, and those of planes through neighbouring depths; motion in
+pixels, of what stands still; values that were not a number, and how many of them not at the rim of
+an image circle; and from it to a second view, 5 cm beside it, how many pixels are visible there,
+and by how much their albedo differs, in the mean, from its own where flow leads, and where it does
+not. Then the seconds and the bytes of a view with more and more passes.
 """
 
 import argparse
@@ -16,14 +21,17 @@ from typing import Any
 import bpy
 import numpy as np
 from mathutils import Vector
+from scipy.ndimage import binary_erosion
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
 from lightfield.core.cli import run
 from lightfield.dataset.journal import read
-from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
+from lightfield.dataset.lightfield import NAME, LightField, View
+from lightfield.dataset.passes import MANIFEST, PARTS_OF_LIGHT, PASSES
+from lightfield.export.source import Source, Surface
 from lightfield.geometry import lenses
+from lightfield.geometry.flow import flow
 from lightfield.imaging import images
 from lightfield.rendering import shard
 
@@ -34,9 +42,17 @@ LENSES = {
     "fisheye": {"lens": "equidistant", "fov": 180},
     "panorama": {"lens": "equirectangular"},
 }
-GEOMETRY, MOTION = ["normal", "object", "material"], ["motion"]
-LIGHT = [found.name for found in PASSES.values() if found.of_colour]
-STEPS = {"none": [], "geometry": GEOMETRY, "and motion": GEOMETRY + MOTION, "all": list(PASSES)}
+# Metres.
+BESIDE = 0.05
+GEOMETRY = ["normal", "object", "material"]
+STEPS = {
+    "none": [],
+    "geometry": GEOMETRY,
+    "and motion": [*GEOMETRY, "motion"],
+    "and instance": [*GEOMETRY, "motion", "instance"],
+    "and cryptomatte": [*GEOMETRY, "motion", "instance", "cryptomatte"],
+    "all": list(PASSES),
+}
 
 
 def main() -> None:
@@ -51,6 +67,7 @@ def main() -> None:
         for lens in LENSES:
             content = _content(given, lens, arguments.size, arguments.samples, list(PASSES))
             folder = Path(name, lens)
+            content.write(folder / NAME)
             _render(content, arguments.blend, folder)
             print(lens, json.dumps(_figures(content, folder)), flush=True)
         for step, passes in STEPS.items():
@@ -67,8 +84,13 @@ def _content(
     wide = 2 if lens == "panorama" else 1
     made = lenses.from_camera({**LENSES[lens], "resolution": [wide * size, size]})
     render = {**given.render, "samples": samples, "denoise": False, "passes": passes}
+    render |= {"transparent": False}
     # The first view's time has some of the start-up in it.
-    return given.changed(made, given.views[:3], depth=made.usual_depth, render=render)
+    first, _, last = given.views[:3]
+    matrix = first.matrix.copy()
+    matrix[:3, 3] += BESIDE * matrix[:3, 0]
+    views = [first, View.placed("beside", matrix), last]
+    return given.changed(made, views, depth=made.usual_depth or "distance", render=render)
 
 
 def _render(content: LightField, blend: Path, folder: Path) -> float:
@@ -88,50 +110,86 @@ def _render(content: LightField, blend: Path, folder: Path) -> float:
     return float(np.mean([view["wall_seconds"] for view in made.views[1:]]))
 
 
-def _figures(content: LightField, folder: Path) -> dict[str, float]:
-    view = content.views[0]
-    image = images.read_image(folder / "exr" / f"{view.name}.exr")
-    found = {
-        name: np.stack(
-            list(
-                images.read_image(
-                    PASSES[name].path(folder, view.name), PASSES[name].channels
-                ).channels.values()
-            ),
-            axis=-1,
-        ).astype(np.float64)
-        for name in PASSES
-    }
-    colour = image.colour.astype(np.float64)
-    total = np.sum([found[name] for name in PARTS_OF_LIGHT], axis=0)
+def _read(folder: Path, name: str, view: str) -> tuple[Array, int]:
+    """Return a pass (h, w, channels) and how many of its values were not a number."""
+    image = images.read_image(PASSES[name].path(folder, view), PASSES[name].channels)
+    planes = [image.channels[channel] for channel in PASSES[name].channels]
+    return np.stack(planes, axis=-1), int(image.attributes.get(images.NAN_ATTRIBUTE, 0))
+
+
+def _figures(content: LightField, folder: Path) -> dict[str, Any]:
+    view, beside = content.views[:2]
+    read = {name: _read(folder, name, view.name) for name in PASSES}
+    found = {name: pixels for name, (pixels, _) in read.items()}
+    source = Source(folder, "", ".exr")
+    distance, there = source.depth(view, "distance"), source.depth(beside, "distance")
+    colour = images.read_image(source.path(view)).colour.astype(np.float64)
+    total = np.sum([found[name].astype(np.float64) for name in PARTS_OF_LIGHT], axis=0)
+    rays = content.lens.pixel_rays()
+    seen = np.isfinite(rays[..., 0])
+    inside = binary_erosion(seen, iterations=2, border_value=1)
+    different = np.abs(total - colour) / np.maximum(colour, 1e-3)
+    objects = found["object"][..., 0]
     numbers = json.loads((folder / "object" / "names.json").read_text())
-    names, normals = _cast(content)
+    names, normals, away = _cast(content)
     cast = np.vectorize(lambda name: numbers.get(name, 0))(names)
-    seen = np.isfinite(content.lens.pixel_rays()[..., 0])
-    same = seen & (cast > 0) & (cast == found["object"][..., 0])
-    cosine = np.sum(normals * found["normal"], axis=-1)[same].clip(-1, 1)
-    turned = np.degrees(np.arccos(cosine))
+    same = seen & (cast > 0) & (cast == objects)
+    manifest = json.loads(
+        images.read_header(PASSES["cryptomatte"].path(folder, view.name)).attributes[MANIFEST]
+    )
+    first = found["cryptomatte"][..., 0].astype(np.float32).view(np.uint32)
+    hashed = {number: int(manifest.get(name, "0"), 16) for name, number in numbers.items()}
+    expected = np.vectorize(lambda number: hashed.get(number, 0))(objects)
+    _, planes = Surface(content.lens, view, rays, distance).points(1)
+    hit = np.isfinite(distance) & (distance > 0)
+    led, visible = flow(content.lens, view.matrix, beside.matrix, distance, there)
+    albedo, other = found["albedo"], _read(folder, "albedo", beside.name)[0]
+    row, column = np.nonzero(visible & hit)
+    across, down = led[row, column].T
+    x = np.floor(column + 0.5 + across).astype(int) % content.lens.width
+    y = np.floor(row + 0.5 + down).astype(int)
     return {
-        "sum": float((np.abs(total - colour) / np.maximum(colour, 1e-3)).max()),
-        "objects": float((found["object"][..., 0] == cast)[seen].mean()),
-        "normals": np.quantile(turned, (0.5, 0.75)).round(2).tolist(),
+        "sum": float(different.max()),
+        "sum inside": float(different[inside].max()),
+        "objects": float((objects == cast)[seen].mean()),
+        "mattes": float((first == expected)[hit].mean()),
+        "depth": np.quantile(np.abs(distance / away - 1)[same], (0.5, 0.99)).tolist(),
+        "normals": _angles(normals[same], found["normal"][same]),
+        "depth gradients": _angles(planes, found["normal"][hit]),
+        "motion": float(np.abs(found["motion"]).max()),
+        "nan": {name: lost for name, (_, lost) in read.items() if lost},
+        "lost inside": int((hit & inside & ~found["normal"].any(axis=-1)).sum()),
+        "visible": float((visible & hit).sum() / hit.sum()),
+        "warped": float(np.abs(albedo[row, column] - other[y, x]).mean()),
+        "not warped": float(np.abs(albedo[row, column] - other[row, column]).mean()),
     }
 
 
-def _cast(content: LightField) -> tuple[Array, Array]:
-    """Return name (h, w) and face normal (h, w, 3) of what is behind the first view's pixels."""
+def _angles(one: Array, other: Array) -> list[float]:
+    """Return the median and the third quartile of the degrees between normals (n, 3)."""
+    cosine = np.sum(one * other, axis=-1)
+    known = np.isfinite(cosine) & other.any(axis=-1)
+    turned = np.degrees(np.arccos(cosine[known].clip(-1, 1)))
+    found: list[float] = np.quantile(turned, (0.5, 0.75)).round(2).tolist() if known.any() else []
+    return found
+
+
+def _cast(content: LightField) -> tuple[Array, Array, Array]:
+    """Return name (h, w), normal (h, w, 3) and distance (h, w) of the faces in the first view."""
     view, scene = content.views[0], bpy.context.scene
     rays = content.lens.pixel_rays() @ view.matrix[:3, :3].T
     depsgraph = bpy.context.evaluated_depsgraph_get()
     names, normals = np.full(rays.shape[:2], "", dtype=object), np.zeros(rays.shape)
+    away = np.full(rays.shape[:2], np.inf)
     for pixel in zip(*np.nonzero(np.isfinite(rays[..., 0])), strict=True):
-        hit, _, normal, _, thing, _ = scene.ray_cast(
+        hit, place, normal, _, thing, _ = scene.ray_cast(
             depsgraph, Vector(view.position), Vector(rays[pixel])
         )
         if hit:
             names[pixel] = thing.name_full
             normals[pixel] = -np.sign(np.dot(normal, rays[pixel])) * np.array(normal)
-    return names, normals
+            away[pixel] = np.linalg.norm(np.array(place) - view.position)
+    return names, normals, away
 
 
 if __name__ == "__main__":
