@@ -3,8 +3,9 @@
 Runs in a process of its own, because bpy keeps one global state. Argument: a folder. Output in it,
 for each lens: a dataset <lens>/, its record <lens>.json and journal <lens>.jsonl, and in
 objects.npz as <lens> the name of the object that Blender's own ray casts find behind each pixel of
-its first view. "plain" is the first of the lenses without passes, "transparent" the fisheye, and
-matte.exr what Blender's compositor reads in the perspective's Cryptomatte of the wall.
+its first view. "plain" is the first of the lenses without passes, "denoised" the same with some,
+"transparent" the fisheye, and matte.exr what Blender's compositor reads in the perspective's
+Cryptomatte of the wall.
 """
 
 import json
@@ -221,6 +222,8 @@ def main(folder: Path) -> None:
         objects[name] = cast(lightfield(name))
     np.savez(folder / "objects.npz", **objects)
     render("transparent", lightfield("fisheye", transparent=True), "0:1")
+    names = ["normal", "object", "material", "cryptomatte"]
+    render("denoised", lightfield("perspective", passes=names, denoise=True))
     bare = lightfield("perspective")
     settings = {key: value for key, value in RENDER.items() if key != "passes"}
     render("plain", bare.changed(render=settings), "0:1")

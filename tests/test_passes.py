@@ -220,6 +220,13 @@ def test_the_parts_of_light_add_up_to_the_colour(lens, made):
     assert np.median(red[:, 0]) > 3 * np.median(red[:, 1])
 
 
+@pytest.mark.parametrize("view", ["view_0000f", "view_0001f"])
+def test_geometry_is_the_same_beside_a_denoised_colour(view, made):
+    for name in ("normal", "object", "material"):
+        found = read(made / "denoised", name, view)
+        np.testing.assert_array_equal(found, read(made / "perspective", name, view))
+
+
 def test_colour_and_depth_are_the_same_without_passes(made):
     one, other = (
         images.read_image(made / name / "exr" / "view_0000f.exr").channels

@@ -95,7 +95,7 @@ PASSES = {
         ),
         _id("object", "Object Index"),
         _id("material", "Material Index"),
-        _id("instance", "Random"),
+        _id("instance", "Object Index"),
         _matte("CryptoObject00", "CryptoObject01", "CryptoObject02"),
         Pass(
             "motion",

@@ -17,6 +17,9 @@ GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
 
 CAMERA_NAME = "plenoforge_camera"
 
+# What of Cycles' passes a view's geometry is, and their channels.
+GEOMETRY_PASSES = {"Depth": "Z", "Normal": "XYZ", "Object Index": "X", "Material Index": "X"}
+
 
 def set_up(
     blend: Path,
@@ -107,13 +110,18 @@ def _set_output(scene: Any, lightfield: LightField, threads: int) -> None:
 
 
 def _set_passes(scene: Any, passes: Iterable[Pass]) -> None:
-    """Make colour and what ``passes`` need of it, and nothing else that the artist had on."""
+    """Make colour and what ``passes`` need, and nothing else that the artist had on.
+
+    With them geometry and colour are rendered with the same passes: Cycles, which keeps the scene,
+    mixes some up when others come and go, as normals with numbers beside denoising.
+    """
     layer = view_layer(scene)
     for owner in (layer, layer.cycles):
         for name in dir(owner):
             if name.startswith("use_pass_"):
                 setattr(owner, name, False)
-    for name in ("Combined", *(name for p in passes if p.of_colour for name in p.needed)):
+    needed = [name for found in passes for name in found.needed]
+    for name in ("Combined", *needed, *(GEOMETRY_PASSES if needed else ())):
         setattr(*pass_property(layer, name), True)
     # Two objects in each of its passes.
     layer.pass_cryptomatte_depth = 6

@@ -13,9 +13,8 @@ from typing import Any
 import bpy
 import numpy as np
 
-from lightfield.dataset.passes import PASSES
 from lightfield.rendering import instances
-from lightfield.rendering.cycles import pass_property, view_layer
+from lightfield.rendering.cycles import GEOMETRY_PASSES, pass_property, view_layer
 from lightfield.rendering.view import Array, render_view
 
 # Cycles gives this depth to a ray that hits nothing.
@@ -33,7 +32,6 @@ _SAMPLING = {
     "filter_width": 0.01,
     "max_bounces": 0,
 }
-_PASSES = {"Depth": "Z", "Normal": "XYZ", "Object Index": "X", "Material Index": "X"}
 _MOTION = {"Vector": "XYZW"}
 # Cycles has the next place with the other sign, and y upwards.
 _MOTION_SIGNS = np.array([1, -1, -1, 1], np.float32)
@@ -68,7 +66,7 @@ def render_geometry(world_matrix: Array, motion: bool = False, apart: bool = Fal
 
     With ``motion``, and with instances ``apart``, for which Cycles has been set up.
     """
-    wanted = _PASSES | (_MOTION if motion else {})
+    wanted = GEOMETRY_PASSES | (_MOTION if motion else {})
     with _geometry_settings(wanted):
         asked = wanted | (instances.CYCLES_PASSES if apart else {})
         found = render_view(world_matrix, 0, asked)
@@ -101,9 +99,6 @@ def _geometry_settings(wanted: Iterable[str]) -> Iterator[None]:
             stack.enter_context(_changed(scene.cycles, name, value))
         stack.enter_context(_changed(scene.render, "use_motion_blur", False))
         stack.enter_context(_changed(scene.camera.data.dof, "use_dof", False))
-        for found in PASSES.values():
-            for name in found.needed if found.of_colour else ():
-                stack.enter_context(_changed(*pass_property(layer, name), False))
         for name in wanted:
             stack.enter_context(_changed(*pass_property(layer, name), True))
         stack.enter_context(_changed(layer, "pass_alpha_threshold", OPACITY))
