@@ -697,6 +697,48 @@ def test_exports_own_what_they_list(small_dataset: Path) -> None:
     ]
 
 
+# ---- transparent views ----------------------------------------------------------------------
+
+
+def alpha(value: float) -> Callable[[Any], dict[str, np.ndarray]]:
+    """Give a view an alpha of 1, but for one pixel."""
+
+    def change(channels: Any) -> dict[str, np.ndarray]:
+        covered = np.ones((64, 64), np.float16)
+        covered[30, 31] = value
+        return {**channels, "A": covered}
+
+    return change
+
+
+def nothing_seen(channels: Any) -> dict[str, np.ndarray]:
+    black = {name: np.zeros((64, 64), np.float16) for name in "RGBA"}
+    return {**black, "Z": np.full((64, 64), np.inf, np.float32)}
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (alpha(0.5), None),
+        (nothing_seen, None),
+        (alpha(1.001), "1 values of alpha are not between 0 and 1"),
+        (alpha(-0.001), "1 values of alpha are not between 0 and 1"),
+        (alpha(np.nan), "1 values of alpha are not between 0 and 1"),
+        (lambda c: {**alpha(1)(c), **{n: c[n] * 0 for n in "RGB"}}, "is black"),
+        (dict, "must have A:float16 B:float16"),
+    ],
+)
+def test_transparent_views_have_alpha_and_may_be_empty(
+    change: Any, problem: str | None, small_dataset: Path
+) -> None:
+    rewrite(small_dataset, lambda held: held.update(render={"transparent": True}))
+    painted(alpha(1), slice(BAD))(small_dataset)
+    painted(change, ONE)(small_dataset)
+    result = validate(small_dataset)
+    problems = [one for name in ("images", "colour") for one in check(result, name).problems]
+    assert [problem in one for one in problems] == ([True] if problem else [])
+
+
 # ---- passes ---------------------------------------------------------------------------------
 
 
