@@ -1,12 +1,15 @@
 """What several tests share: the programs in scripts/, run as a user runs them."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from checkouts import checkout, snakemake
+from playwright.sync_api import sync_playwright
 
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = ROOT / "scripts"
@@ -59,3 +62,41 @@ def smoke(tmp_path_factory):
     result = snakemake(folder, "--cores", "2", "smoke")
     assert result.returncode == 0, result.stdout + result.stderr
     return folder
+
+
+@pytest.fixture(scope="session")
+def browser():
+    path = shutil.which("chromium")
+    if not path:
+        pytest.fail("these tests need Chromium: sudo apt-get install chromium")
+    words = ["--no-sandbox", "--disable-background-networking", "--use-angle=swiftshader"]
+    words += ["--enable-unsafe-swiftshader", "--js-flags=--expose-gc"]
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=words)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def show(browser):
+    """Open a page; when the test is over, nothing may have gone wrong on any."""
+    seen = SimpleNamespace(errors=[], requests=[])
+    contexts = []
+
+    def show(path, width=1280, **options):
+        size = {"width": width, "height": 900}
+        context = browser.new_context(viewport=size, **options)
+        contexts.append(context)
+        tab = context.new_page()
+        tab.on("console", lambda message: seen.errors.append(message.text))
+        tab.on("pageerror", lambda error: seen.errors.append(str(error)))
+        tab.on("request", lambda request: seen.requests.append(request.url))
+        tab.goto(path.as_uri())
+        return tab
+
+    yield show
+    for context in contexts:
+        context.close()
+    assert not seen.errors
+    assert seen.requests
+    assert all(url.startswith(("file:", "data:")) for url in seen.requests)

@@ -1,4 +1,4 @@
-"""Views of a scene whose every point is known: the inside of a sphere around the origin.
+"""Views of a scene whose every point is known: the inside of a sphere around the origin, or a ball.
 
 Its colour follows from the place.
 """
@@ -12,6 +12,8 @@ from lightfield.imaging import images
 from lightfield.imaging.tonemap import decode_srgb, to_8_bit
 
 RADIUS = 3.0
+BALL, BALL_RADIUS = np.array([0.0, 1.8, 0.0]), 0.5
+RED = np.array([0.8, 0.05, 0.05])
 
 # One of each kind that a consumer may have, of pixels for tests.
 LENSES = {
@@ -57,7 +59,19 @@ def look(lens, matrix):
     return np.nan_to_num(colour), distance
 
 
-def write_views(folder, camera, rig, suffix=".exr"):
+def look_at_ball(lens, matrix):
+    """What a camera sees of the sphere and of a ball in it."""
+    colour, distance = look(lens, matrix)
+    rays = lens.pixel_rays() @ matrix[:3, :3].T
+    to_ball = BALL - matrix[:3, 3]
+    along = rays @ to_ball
+    with np.errstate(invalid="ignore"):
+        nearest = along - np.sqrt(BALL_RADIUS**2 - (to_ball @ to_ball - along**2))
+        hit = nearest > 0
+    return np.where(hit[..., None], RED, colour), np.where(hit, nearest, distance)
+
+
+def write_views(folder, camera, rig, suffix=".exr", see=look):
     lens = lenses.from_camera(camera)
     depth = "z" if lens.has_z_depth else "distance"
     lightfield = LightField.from_rig(rig, lens, depth=depth)
@@ -65,7 +79,7 @@ def write_views(folder, camera, rig, suffix=".exr"):
     images_folder.mkdir(parents=True)
     lightfield.write(folder / "lightfield.json")
     for view in lightfield.views:
-        colour, distance = look(lens, view.matrix)
+        colour, distance = see(lens, view.matrix)
         z = z_from_distance(distance, lens.pixel_rays()) if depth == "z" else distance
         channels = {name: colour[..., i].astype(np.float16) for i, name in enumerate("RGB")}
         if suffix == ".png":

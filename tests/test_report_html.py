@@ -3,13 +3,11 @@
 import base64
 import io
 import json
-import shutil
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import sync_playwright
 from sphere import RADIUS, colour_of, look
 
 from lightfield.core.errors import UserError
@@ -71,42 +69,6 @@ def make_page(folder, rig, *measurements, name="ball/LFSphere", panorama=False):
 
 def draw(folder, rig, output, panorama=None):
     figures.draw(folder, rigs.from_settings(rig), panorama, output)
-
-
-@pytest.fixture(scope="module")
-def browser():
-    path = shutil.which("chromium")
-    if not path:
-        pytest.fail("these tests need Chromium: sudo apt-get install chromium")
-    words = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=words)
-        yield browser
-        browser.close()
-
-
-@pytest.fixture
-def show(browser):
-    """Open a page; when the test is over, nothing may have gone wrong on any."""
-    seen = SimpleNamespace(errors=[], requests=[])
-    contexts = []
-
-    def show(path, width=1280):
-        context = browser.new_context(viewport={"width": width, "height": 900})
-        contexts.append(context)
-        tab = context.new_page()
-        tab.on("console", lambda message: seen.errors.append(message.text))
-        tab.on("pageerror", lambda error: seen.errors.append(str(error)))
-        tab.on("request", lambda request: seen.requests.append(request.url))
-        tab.goto(path.as_uri())
-        return tab
-
-    yield show
-    for context in contexts:
-        context.close()
-    assert not seen.errors
-    assert seen.requests
-    assert all(url.startswith(("file:", "data:")) for url in seen.requests)
 
 
 @pytest.fixture(scope="module")

@@ -33,8 +33,10 @@ def write(output: Path, template: str, **content: Any) -> None:
     )
     environment.filters |= {"number": number, "cell": cell, "measure": measure, "named": title}
     # These are the project's own files, not somebody's text.
-    css, js = (Markup((TEMPLATES / name).read_text("utf-8")) for name in ("page.css", "page.js"))
-    write_text(output, environment.get_template(template).render(css=css, js=js, **content))
+    for name in ("page.css", "page.js", "walk.js"):
+        own = Markup((TEMPLATES / name).read_text("utf-8"))
+        environment.globals[name.replace(".", "_")] = own
+    write_text(output, environment.get_template(template).render(**content))
 
 
 def photo(path: Path, widest: int) -> str | None:

@@ -18,7 +18,7 @@ from lightfield.geometry.overview import middle_view
 from lightfield.geometry.rigs import Rig
 from lightfield.imaging import images, pictures
 from lightfield.measurement.noise import relative_noise
-from lightfield.report import epipolar
+from lightfield.report import epipolar, walk
 from lightfield.report.packing import (
     DEPTH_STEPS,
     depth_range,
@@ -138,6 +138,7 @@ def collect(
         # The one most like that in the middle.
         "first": int(np.argmin(np.abs(matrices[shown] - middle).sum(axis=(1, 2)))),
         "row": None,
+        "walk": None if depths is None else walk.collect(small, matrices[:, :3, 3]),
     }
     kept: list[int] = []
     if row:

@@ -1,0 +1,53 @@
+"""Pictures as a video, by ffmpeg where it is installed."""
+
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import atomic_path
+from lightfield.imaging.pictures import Array
+
+
+@contextmanager
+def video(path: Path, size: tuple[int, int], rate: int) -> Iterator[Callable[[Array], None]]:
+    """Yield what appends an sRGB picture (h, w, 3) uint8 to an MP4 (H.264) of ``size`` (w, h).
+
+    The file is there once the block has ended without an error. Raises `UserError` where ffmpeg is
+    missing or cannot write it.
+    """
+    command = ["ffmpeg", "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"]
+    command += ["-s", f"{size[0]}x{size[1]}", "-r", str(rate), "-i", "-"]
+    # H.264 codes 2 × 2 pixels at once.
+    command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "18"]
+    command += ["-pix_fmt", "yuv420p", "-f", "mp4"]
+    with atomic_path(path) as temporary:
+        try:
+            ffmpeg = subprocess.Popen(
+                [*command, str(temporary)], stdin=subprocess.PIPE, stderr=subprocess.PIPE
+            )
+        except FileNotFoundError:
+            raise UserError(f"{path}: a video needs ffmpeg, which is not installed") from None
+
+        def finish() -> None:
+            _, said = ffmpeg.communicate()
+            if ffmpeg.returncode:
+                problem = " ".join(said.decode(errors="replace").split())
+                raise UserError(f"{path}: ffmpeg cannot write it: {problem}")
+
+        def add(picture: Array) -> None:
+            assert ffmpeg.stdin
+            try:
+                ffmpeg.stdin.write(np.ascontiguousarray(picture))
+            except BrokenPipeError:
+                finish()
+
+        try:
+            yield add
+            finish()
+        finally:
+            ffmpeg.kill()
+            ffmpeg.wait()

@@ -1,0 +1,81 @@
+"""What the page's walk inside a light field needs beside the views: their rays, and their room.
+
+How views are chosen, drawn and blended is that of `synthesis.view`, once more in a browser
+(templates/walk.js): its constants are handed over here.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from lightfield.geometry.lenses import Lens
+from lightfield.report.packing import packed_bytes
+from lightfield.synthesis import kernels
+from lightfield.synthesis import view as synthesis
+
+Array = NDArray[Any]
+
+# The side of the octahedral map in which directions are that the lens sees, in pixels.
+SIGHT = 64
+
+
+def collect(lens: Lens, places: Array) -> dict[str, Any]:
+    """Return what the walk needs of the embedded views' ``lens`` and of all ``places`` (n, 3).
+
+    ``rays`` are those of the pixels, row by row, octahedral in two times 16 bits; ``sight`` has a
+    byte for each direction of an octahedral map, 1 where the lens sees it; ``planes`` (m, 4) bound
+    the volume between the cameras: n · p + c ≤ 0.
+    """
+    steps = (np.arange(SIGHT) + 0.5) / SIGHT
+    x, y = np.meshgrid(steps, steps)
+    pixels = lens.pixels(_direction(np.stack([x, y], axis=-1)))
+    with np.errstate(invalid="ignore"):
+        sees = ((pixels >= 0) & (pixels < (lens.width, lens.height))).all(axis=-1)
+    coded = np.round(_octahedral(np.nan_to_num(lens.pixel_rays())) * 65535).astype("<u2")
+    return {
+        "rays": packed_bytes(coded.tobytes()),
+        "sight": packed_bytes(sees.astype(np.uint8).tobytes()),
+        "side": SIGHT,
+        "planes": np.round(_bounds(places), 6).tolist(),
+        "steepest": float(synthesis.steepest(lens)),
+        "directions": synthesis.DIRECTIONS,
+        "distance": synthesis.DISTANCE,
+        "sharp": synthesis.SHARP,
+        "torn": synthesis.TORN_WEIGHT,
+        "even": float(kernels.EVEN),
+        "same": float(kernels.SAME),
+        "far": float(kernels.FAR),
+    }
+
+
+def _octahedral(rays: Array) -> Array:
+    """Return unit vectors (..., 3) as points (..., 2) of the unit square.
+
+    Source: Cigolle et al. 2014, "A Survey of Efficient Representations for Independent Unit
+    Vectors", section 2.
+    """
+    scaled = rays / np.maximum(np.abs(rays).sum(axis=-1, keepdims=True), 1e-12)
+    plane = scaled[..., :2]
+    folded = (1 - np.abs(plane[..., ::-1])) * np.where(plane >= 0, 1, -1)
+    return np.where(rays[..., 2:] >= 0, plane, folded) / 2 + 0.5
+
+
+def _direction(points: Array) -> Array:
+    """Return the vectors (..., 3), not of unit length, of `_octahedral` points (..., 2)."""
+    plane = 2 * points - 1
+    z = 1 - np.abs(plane).sum(axis=-1)
+    folded = (1 - np.abs(plane[..., ::-1])) * np.where(plane >= 0, 1, -1)
+    return np.concatenate([np.where(z[..., None] >= 0, plane, folded), z[..., None]], axis=-1)
+
+
+def _bounds(places: Array) -> Array:
+    """Return the planes (n, 4) around all places (m, 3): their hull, or a box where it is flat."""
+    try:
+        return np.unique(np.round(ConvexHull(places).equations, 9), axis=0)
+    except QhullError:
+        low, high = places.min(axis=0), places.max(axis=0)
+        slack = 0.1 * max(float(np.linalg.norm(high - low)), 0.1)
+        sides = np.concatenate([np.eye(3), -np.eye(3)])
+        return np.column_stack([sides, np.concatenate([-high, low]) - slack])

@@ -1,0 +1,264 @@
+"""A view from anywhere: the surfaces that the best of a dataset's views see, drawn and blended.
+
+Each of the chosen views is drawn as a surface that is torn where depth jumps; at each pixel the
+nearest surface counts, and the views that see it are blended by angle and distance, as in Buehler
+et al. 2001, "Unstructured Lumigraph Rendering". What no view sees stays a hole.
+"""
+
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from lightfield.core.errors import UserError
+from lightfield.dataset.lightfield import View
+from lightfield.export.source import Source
+from lightfield.geometry.depth import z_from_distance
+from lightfield.geometry.lenses import Array, Lens
+from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.imaging import images
+from lightfield.synthesis import kernels
+
+# A view is chosen by how well it sees points in so many directions across and down the picture, at
+# the distance that is typical of the scene.
+DIRECTIONS = 12
+# Of a source's penalty: the weight of its distance from the surface beside that of its angle.
+DISTANCE = 0.1
+# An angle in radians that is as good as none.
+SHARP = 0.01
+# The tangent of the angle of incidence beyond which neighbours are taken for different surfaces.
+STEEPEST = 6.0
+# Vertices beside a tear have the colour of two surfaces: they count where there is nothing else.
+TORN_WEIGHT = 1e-3
+
+
+@dataclass(frozen=True)
+class Synthesised:
+    """A picture: linear ``colour`` (h, w, 3), NaN in its holes; ``distance`` (h, w) in metres, inf
+    where nothing was hit; ``count`` (h, w), the number of views that were blended.
+    """
+
+    colour: Array
+    distance: Array
+    count: Array
+
+    @property
+    def holes(self) -> Array:
+        """Which pixels (h, w) no view sees, or the lens does not."""
+        return np.equal(self.count, 0)
+
+    def hole_fraction(self, rays: Array) -> float:
+        """Return the part of the lens's ``rays`` (h, w, 3) that no view sees."""
+        return float(self.holes[np.isfinite(rays[..., 0])].mean())
+
+    def channels(self, depth: str, rays: Array) -> dict[str, Array]:
+        """Return R, G, B, A and Z, which is "z" or "distance", as an EXR has them."""
+        with np.errstate(over="ignore"):
+            colour = np.nan_to_num(self.colour.clip(max=images.HALF_MAX)).astype(np.float16)
+        distance = z_from_distance(self.distance, rays) if depth == "z" else self.distance
+        named = dict(zip("RGB", np.moveaxis(colour, -1, 0), strict=True))
+        return named | {"A": (~self.holes).astype(np.float16), "Z": distance.astype(np.float32)}
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A view as it is drawn: ``inverse`` distance (h, w) and ``colour`` (h, w, 3).
+
+    ``right`` and ``down`` (h, w) are where neighbours are of one surface. The vertices ``torn``
+    (h, w) have one that is not; ``corners`` (n, 4, 3) are the rays of their pixels' corners.
+    """
+
+    inverse: Array
+    colour: Array
+    right: Array
+    down: Array
+    torn: Array
+    corners: Array
+
+    @property
+    def certainty(self) -> Array:
+        """How much vertices (h, w) count: little beside a tear."""
+        return np.where(self.torn, TORN_WEIGHT, 1).astype(np.float32)
+
+
+Reader = Callable[[View], tuple[Array, Array]]
+
+
+def reader(source: Source) -> Reader:
+    """Return what reads views of a dataset for `Sources`; raises `UserError` without depth."""
+    if source.lightfield.depth is None:
+        raise UserError(f"{source.lightfield.path}: depth: is null; a synthesis needs it")
+
+    def read(view: View) -> tuple[Array, Array]:
+        colour = images.read_image(source.path(view), "RGB").colour
+        return colour, source.depth(view, "distance")
+
+    return read
+
+
+class Sources:
+    """The ``views`` that pictures are made of, through one ``lens``; ``most`` are held in memory.
+
+    ``read`` returns a view's linear colour (h, w, 3), and its distances (h, w) in metres.
+    """
+
+    def __init__(self, lens: Lens, views: Sequence[View], read: Reader, most: int = 32) -> None:
+        self.lens = lens
+        self.views = views
+        self.read = read
+        self.most = most
+        self.matrices: Array = np.array([view.matrix for view in views])
+        self._held: OrderedDict[int, Surface] = OrderedDict()
+
+    @cached_property
+    def rays(self) -> Array:
+        return self.lens.pixel_rays().astype(np.float32)
+
+    @cached_property
+    def typical_distance(self) -> float:
+        """The harmonic mean of distances in some of the views, in metres."""
+        some = range(0, len(self.views), max(1, len(self.views) // 4))
+        means = [float(np.nanmean(self.surface(index).inverse)) for index in some]
+        return 1 / max(float(np.mean(means)), 1e-6)
+
+    def surface(self, index: int) -> Surface:
+        """Return a view as a surface, from memory if it was one of the last."""
+        if index not in self._held:
+            self._held[index] = self._surface(*self.read(self.views[index]))
+            if len(self._held) > self.most:
+                self._held.popitem(last=False)
+        self._held.move_to_end(index)
+        return self._held[index]
+
+    def _surface(self, colour: Array, distance: Array) -> Surface:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inverse = np.where(distance > 0, 1 / distance, np.nan).astype(np.float32)
+        inverse[~np.isfinite(colour).all(axis=-1)] = np.nan
+        right, down = np.empty(inverse.shape, bool), np.empty(inverse.shape, bool)
+        kernels.link(inverse, steepest(self.lens), right, down)
+        torn = np.isfinite(inverse) & ~_is_amid(right, down)
+        row, column = np.nonzero(torn)
+        corners = self.lens.rays(
+            column[:, None] + np.array([0.0, 1, 1, 0]), row[:, None] + np.array([0.0, 0, 1, 1])
+        )
+        return Surface(inverse, colour, right, down, torn, corners.astype(np.float32))
+
+    def best(self, target: Array, lens: Lens, count: int) -> list[int]:
+        """Return the ``count`` views that together see best what a ``target`` (4, 4) looks at.
+
+        One after the other is taken that most improves the best view of each direction, by a
+        logarithm, so that seeing all directions counts for more than seeing some perfectly.
+        """
+        x = (np.arange(DIRECTIONS) + 0.5) * lens.width / DIRECTIONS
+        y = (np.arange(DIRECTIONS) + 0.5) * lens.height / DIRECTIONS
+        rays = lens.rays(x[None, :], y[:, None]).reshape(-1, 3)
+        rays = rays[np.isfinite(rays[:, 0])] @ target[:3, :3].T
+        away = rays * self.typical_distance
+        points = target[:3, 3] + away
+        quality = np.zeros((len(self.views), len(points)))
+        for index, matrix in enumerate(self.matrices):
+            offset = points - matrix[:3, 3]
+            pixels = self.lens.pixels(offset @ matrix[:3, :3])
+            with np.errstate(invalid="ignore"):
+                seen = (pixels >= 0).all(axis=-1) & (
+                    pixels < (self.lens.width, self.lens.height)
+                ).all(axis=-1)
+            quality[index] = np.where(seen, np.log1p(1 / penalty(away, offset)), 0)
+        chosen: list[int] = []
+        reached = np.zeros(len(points))
+        for _ in range(min(count, len(self.views))):
+            gains = np.maximum(quality, reached).sum(axis=1)
+            gains[chosen] = -1
+            chosen.append(int(np.argmax(gains)))
+            reached = np.maximum(reached, quality[chosen[-1]])
+        return chosen
+
+    def synthesise(self, target: Array, lens: Lens, count: int = 6) -> Synthesised:
+        """Return the picture of a camera at ``target`` (4, 4), made of the ``count`` best views."""
+        return self.blended(target, lens, self.best(target, lens, count))
+
+    def blended(self, target: Array, lens: Lens, chosen: Sequence[int]) -> Synthesised:
+        """Return the picture of a camera at ``target`` (4, 4), made of the ``chosen`` views."""
+        shape = (lens.height, lens.width)
+        inverses = np.full((len(chosen), *shape), -1, np.float32)
+        drawn = np.zeros((len(chosen), *shape, 4), np.float32)
+        for place, index in enumerate(chosen):
+            surface = self.surface(index)
+            self._draw(surface, self.matrices[index], target, lens, inverses[place], drawn[place])
+        colour, inverse = np.empty((*shape, 3), np.float32), np.empty(shape, np.float32)
+        blended = np.empty(shape, np.uint8)
+        kernels.blend(inverses, drawn, colour, inverse, blended)
+        outside = np.isnan(lens.pixel_rays()[..., 0])
+        colour[outside], inverse[outside], blended[outside] = np.nan, np.nan, 0
+        with np.errstate(divide="ignore"):
+            return Synthesised(colour, 1 / inverse, blended)
+
+    def _draw(
+        self,
+        surface: Surface,
+        here: Array,
+        target: Array,
+        lens: Lens,
+        inverse: Array,
+        drawn: Array,
+    ) -> None:
+        """Draw what a view ``here`` (4, 4) sees; ``inverse`` and ``drawn`` as in `kernels.draw`."""
+        wraps = isinstance(lens, Equirectangular) and lens.is_full
+        pixels, seen = self._projected(self.rays, surface.inverse, here, target, lens)
+        length = np.linalg.norm(seen, axis=-1)
+        weight = surface.certainty / penalty(seen, self.rays @ _turn(here)) ** 2
+        values = np.dstack([surface.inverse / length, surface.colour, weight])
+        values = values.astype(np.float32, copy=False)
+        kernels.draw(pixels, values, surface.right, surface.down, wraps, inverse, drawn)
+        corners, _ = self._projected(
+            surface.corners, surface.inverse[surface.torn][:, None], here, target, lens
+        )
+        kernels.draw_pixels(corners, values[surface.torn], wraps, inverse, drawn)
+
+    def _projected(
+        self, rays: Array, inverse: Array, here: Array, target: Array, lens: Lens
+    ) -> tuple[Array, Array]:
+        """Return the pixels (..., 2) of points at 1 / ``inverse`` (...) along ``rays`` (..., 3).
+
+        And the points as the target sees them, in units of their distances ``here``, so that
+        infinity is a number as any.
+        """
+        offset = (here[:3, 3] - target[:3, 3]).astype(np.float32)
+        seen = rays @ _turn(here) + inverse[..., None] * offset
+        pixels: Array = lens.pixels(seen @ _turn(target).T)
+        return pixels.astype(np.float32, copy=False), seen
+
+
+def _turn(matrix: Array) -> Array:
+    """Return what turns a camera's vectors (..., 3), as rows, into the world's."""
+    return np.asarray(matrix[:3, :3].T, np.float32)
+
+
+def steepest(lens: Lens) -> np.float32:
+    """Return the part by which a surface's distances may differ from one pixel to the next."""
+    here, there = lens.rays(lens.center[0] + np.array([0.0, 1.0]), np.array(lens.center[1]))
+    return np.float32(STEEPEST * np.linalg.norm(there - here))
+
+
+def penalty(seen: Array, source: Array) -> Array:
+    """Return how unlike (...) a point looks from a source that sees it along ``source`` (..., 3).
+
+    ``seen`` (..., 3) is from the target's camera to the point, in the same unit.
+    """
+    here, there = np.linalg.norm(seen, axis=-1), np.linalg.norm(source, axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        angle = np.linalg.norm(seen / here[..., None] - source / there[..., None], axis=-1)
+        farther: Array = np.maximum(there / here - 1, 0)
+    return angle + DISTANCE * farther + SHARP
+
+
+def _is_amid(right: Array, down: Array) -> Array:
+    """Return which vertices (h, w) are of one surface with all four neighbours that they have."""
+    whole = np.ones(right.shape, bool)
+    whole[:, :-1] &= right[:, :-1]
+    whole[:, 1:] &= right[:, :-1]
+    whole[:-1] &= down[:-1]
+    whole[1:] &= down[:-1]
+    return whole

@@ -1,0 +1,104 @@
+"""Synthesise views from anywhere in a dataset, from the nearest of its views and their depth.
+
+OUTPUT gets lightfield.json, exr/<view>.exr (R, G, B, A, and Z as a dataset has it) and
+png/<view>.png. What no view of the dataset sees is a hole: black, alpha 0, Z NaN.
+
+Examples:
+
+  # what the evaluation sphere saw, as far as the views of the dataset show it
+  synthesize.py results/garden/LFSphere_e100cm_d170cm --output work/walk \\
+    --poses results/garden/LFSphere_e100cm_d50cm/lightfield.json
+  # a walk: rig.yaml has type: path, count, keys, and a camera, in the words of a scene YAML
+  synthesize.py results/garden/LFSphere_e100cm_d170cm --poses rig.yaml --video --output work/walk
+"""
+
+import argparse
+from contextlib import nullcontext
+from pathlib import Path
+
+import numpy as np
+
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
+from lightfield.core.progress import Progress
+from lightfield.dataset.config import read_yaml
+from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.export.source import Source
+from lightfield.export.splits import splits
+from lightfield.geometry import rigs
+from lightfield.imaging import images, pictures
+from lightfield.imaging.video import video
+from lightfield.synthesis.view import Sources, reader
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add = parser.add_argument
+    add("dataset", type=Path, help="folder of a dataset with depth")
+    add("--reprojection", default="", help="of its views, as EXR (default: as rendered)")
+    add(
+        "--poses",
+        type=Path,
+        help="a lightfield.json, or a YAML of a rig with its camera (default: the views that the "
+        "dataset's split has to test with, from the others)",
+    )
+    add("--best", type=int, default=6, metavar="K", help="views a picture is made of (default: 6)")
+    add("--exposure", type=float, help="of the PNGs, in stops (default: by the first picture)")
+    add("--video", action="store_true", help="write walk.mp4, too, with ffmpeg")
+    add("--rate", type=int, default=25, help="pictures a second of the video (default: 25)")
+    add("--output", type=Path, required=True, metavar="FOLDER")
+    arguments = parser.parse_args()
+    if arguments.best < 1:
+        raise UserError(f"--best: is {arguments.best}; must be 1 or more")
+
+    source = Source(arguments.dataset, arguments.reprojection, ".exr")
+    views, targets = source.lightfield.views, poses(arguments.poses)
+    if targets is None:
+        parts = splits(source.lightfield)
+        views, targets = parts.train, source.lightfield.changed(views=parts.test)
+    sources = Sources(source.lens, views, reader(source), most=4 * arguments.best)
+    lens, depth = targets.lens, targets.lens.usual_depth
+    targets.changed(depth=depth).write(arguments.output / NAME)
+    rays, exposure, holes = lens.pixel_rays(), arguments.exposure, []
+    path = arguments.output / "walk.mp4"
+    progress = Progress(len(targets.views), "synthesize", "views")
+    size = (lens.width, lens.height)
+    with video(path, size, arguments.rate) if arguments.video else nullcontext() as add_to_video:
+        for view in targets.views:
+            made = sources.synthesise(view.matrix, lens, arguments.best)
+            if exposure is None:
+                exposure = pictures.exposure_for(made.colour[~made.holes])
+            images.write_exr(
+                arguments.output / "exr" / f"{view.name}.exr", made.channels(depth, rays)
+            )
+            picture = pictures.develop(np.nan_to_num(made.colour), exposure)
+            opaque = np.where(made.holes, 0, 255).astype(np.uint8)
+            images.write_png(
+                arguments.output / "png" / f"{view.name}.png", np.dstack([picture, opaque])
+            )
+            if add_to_video:
+                add_to_video(picture)
+            holes.append(made.hole_fraction(rays))
+            progress.done()
+    print(
+        f"{len(holes)} views of {arguments.best} each; holes: {np.mean(holes):.3%} of their "
+        f"pixels, at most {max(holes):.3%} of one"
+    )
+
+
+def poses(path: Path | None) -> LightField | None:
+    """Return the cameras of a lightfield.json or of a rig's YAML; None without a file."""
+    if path is None:
+        return None
+    if path.suffix == ".json":
+        return LightField.read(path)
+    rig = rigs.from_settings(read_yaml(path, str(path)))
+    if rig.camera is None:
+        raise UserError(f"{path}: camera: is missing; it is what the views are seen through")
+    return LightField.from_rig(rig, rig.camera.make())
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,190 @@
+"""Synthesised views against a scene whose every point is known: a ball inside a sphere."""
+
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+import yaml
+from scipy.ndimage import binary_dilation
+from sphere import look, look_at_ball, write_views
+
+from lightfield.core.errors import UserError
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
+from lightfield.imaging import images
+from lightfield.imaging.tonemap import encode_srgb
+from lightfield.imaging.video import video
+from lightfield.synthesis.view import Sources
+
+FISHEYE = {"lens": "equidistant", "fov": 180, "resolution": [96, 96]}
+RIG = {"type": "sphere", "subdivisions": 2, "size": 1.0}
+# The eye is off the centre, and looks along +Y.
+EYE = np.array([[1, 0, 0, 0.2], [0, 0, -1, -0.1], [0, 1, 0, 0.1], [0, 0, 0, 1.0]])
+EYES = {
+    "perspective": {"lens": "rectilinear", "fov": 70, "resolution": [80, 64]},
+    "fisheye": {"lens": "equidistant", "fov": 200, "resolution": [72, 72]},
+    "panorama": {"lens": "equirectangular", "resolution": [128, 64]},
+}
+
+
+def sources(see, camera=FISHEYE, rig=RIG):
+    lens = lenses.from_camera(camera)
+    return Sources(lens, LightField.from_rig(rig, lens).views, lambda view: see(lens, view.matrix))
+
+
+def errors(made, see, lens, matrix=EYE):
+    """The difference in sRGB and the relative one in distance, each pixel's, where there is one."""
+    colour, distance = see(lens, matrix)
+    seen = np.isfinite(distance) & ~made.holes
+    difference = encode_srgb(made.colour[seen]) - encode_srgb(colour[seen])
+    return difference, made.distance[seen] / distance[seen] - 1
+
+
+@pytest.mark.parametrize("name", EYES)
+def test_a_view_from_between_the_cameras_is_what_is_there(name):
+    lens = lenses.from_camera(EYES[name])
+    made = sources(look).synthesise(EYE, lens, 12)
+    colour, distance = errors(made, look, lens)
+    # A triangle at the rim has no place for the corner that the lens does not see.
+    outside = np.isnan(lens.pixel_rays()[..., 0])
+    rim = binary_dilation(np.pad(outside, 1, constant_values=name == "fisheye"), np.ones((3, 3)))
+    assert not (made.holes & ~rim[1:-1, 1:-1]).any()
+    assert np.sqrt((colour**2).mean()) < 0.005
+    assert np.abs(distance).max() < 0.005
+    assert np.isnan(made.colour[outside]).all()
+
+
+def test_it_tears_where_depth_jumps():
+    lens = lenses.from_camera(EYES["perspective"])
+    made = sources(look_at_ball).synthesise(EYE, lens)
+    colour, distance = errors(made, look_at_ball, lens)
+    assert made.hole_fraction(lens.pixel_rays()) < 0.02
+    # Of the silhouette, a pixel or two are on its other side; none is between ball and sphere.
+    assert (np.abs(distance) > 0.02).mean() < 0.05
+    between = (made.distance > 2.0) & (made.distance < 2.4)
+    assert not between.any()
+    assert np.median(np.abs(colour)) < 0.005
+
+
+def test_what_no_view_sees_is_a_hole():
+    one = {"type": "plane", "cameras": [1, 1], "size": 0}
+    made = sources(look_at_ball, rig=one).synthesise(EYE, lenses.from_camera(EYES["panorama"]))
+    lens = lenses.from_camera(EYES["panorama"])
+    colour, _ = errors(made, look_at_ball, lens)
+    # A single fisheye of 180 degrees sees half, and what lies behind the ball not at all.
+    assert 0.4 < made.hole_fraction(lens.pixel_rays()) < 0.6
+    assert np.median(np.abs(colour)) < 0.01
+
+
+def test_a_view_at_a_source_is_that_source():
+    field = sources(look_at_ball)
+    made = field.blended(field.matrices[3], field.lens, [3])
+    colour, distance = look_at_ball(field.lens, field.matrices[3])
+    amid = ~field.surface(3).torn & ~made.holes
+    assert amid.mean() > 0.6
+    np.testing.assert_allclose(made.colour[amid], colour[amid], atol=1e-4)
+    np.testing.assert_allclose(made.distance[amid], distance[amid], rtol=1e-4)
+
+
+def test_a_slanted_plane_does_not_tear():
+    field = sources(look)
+    surface = field.surface(0)
+    seen = np.isfinite(surface.inverse)
+    assert (surface.torn[1:-1, 1:-1] & seen[1:-1, 1:-1]).mean() < 0.05
+
+
+def test_the_best_views_look_where_the_eye_does():
+    field = sources(look)
+    for index in field.best(EYE, lenses.from_camera(EYES["perspective"]), 4):
+        ahead = -field.matrices[index, :3, 2]
+        assert ahead @ -EYE[:3, 2] > 0.4
+    assert len(set(field.best(EYE, lenses.from_camera(EYES["panorama"]), 6))) == 6
+
+
+def test_what_is_infinitely_far_is_drawn():
+    def sky(lens, matrix):
+        rays = lens.pixel_rays() @ matrix[:3, :3].T
+        return np.nan_to_num(0.5 + 0.4 * rays), np.where(np.isnan(rays[..., 0]), np.nan, np.inf)
+
+    lens = lenses.from_camera(EYES["perspective"])
+    made = sources(sky).synthesise(EYE, lens)
+    assert np.isposinf(made.distance).all()
+    expected, _ = sky(lens, EYE)
+    np.testing.assert_allclose(made.colour, expected, atol=0.002)
+
+
+def test_few_views_are_held_in_memory():
+    field = sources(look)
+    field.most = 3
+    for index in range(10):
+        field.surface(index)
+    assert list(field._held) == [7, 8, 9]
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("synthesis") / "dataset"
+    write_views(folder, FISHEYE, RIG | {"subdivisions": 1})
+    return folder
+
+
+def test_the_program_writes_a_dataset_and_a_video(dataset, tmp_path, run_program):
+    keys = [{"position": [0, 0, 0]}, {"position": [0.2, 0.1, 0]}]
+    rig = {"type": "path", "count": 3, "keys": keys, "camera": EYES["perspective"]}
+    (tmp_path / "rig.yaml").write_text(yaml.safe_dump(rig))
+    words = [dataset, "--poses", tmp_path / "rig.yaml", "--output", tmp_path / "walk"]
+    result = run_program("synthesize.py", *words)
+    assert "3 views of 6 each; holes: 0.000%" in result.stdout
+    lightfield = LightField.read(tmp_path / "walk" / "lightfield.json")
+    for view in lightfield.views:
+        found = images.read_image(tmp_path / "walk" / "exr" / f"{view.name}.exr")
+        assert set(found.channels) == {*"RGBAZ"}
+        colour, distance = look(lightfield.lens, view.matrix)
+        z = distance * -lightfield.lens.pixel_rays()[..., 2]
+        np.testing.assert_allclose(found.channels["Z"], z, rtol=0.02)
+        assert np.abs(found.colour - colour).max() < 0.05
+        assert (tmp_path / "walk" / "png" / f"{view.name}.png").is_file()
+
+
+def test_the_test_views_of_a_split_come_from_the_others(dataset, tmp_path, run_program):
+    result = run_program("synthesize.py", dataset, "--output", tmp_path)
+    held_out = json.loads((tmp_path / "lightfield.json").read_text())["frames"]
+    assert f"{len(held_out)} views" in result.stdout
+    assert 0 < len(held_out) < len(LightField.read(dataset / "lightfield.json").views)
+
+
+@pytest.mark.parametrize(
+    ("words", "problem"),
+    [
+        (["--best", "0"], "--best: is 0; must be 1 or more"),
+        (["--poses", "rig.yaml"], "camera: is missing"),
+        (["--poses", "none.json"], "none.json"),
+    ],
+)
+def test_mistakes_are_one_line(dataset, tmp_path, run_program, words, problem):
+    (tmp_path / "rig.yaml").write_text("type: plane\ncameras: [2, 2]\nsize: 1\n")
+    words = [word.replace("rig.yaml", str(tmp_path / "rig.yaml")) for word in words]
+    result = run_program("synthesize.py", dataset, *words, "--output", tmp_path, check=False)
+    assert result.returncode == 1
+    assert problem in result.stderr.splitlines()[-1]
+    assert "Traceback" not in result.stderr
+
+
+def test_a_video_needs_ffmpeg(tmp_path, monkeypatch):
+    path = tmp_path / "walk.mp4"
+    picture = np.full((5, 7, 3), 200, np.uint8)
+    if shutil.which("ffmpeg"):
+        with video(path, (7, 5), 25) as add:
+            for _ in range(4):
+                add(picture)
+        command = ["ffmpeg", "-v", "error", "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+        frames = np.frombuffer(subprocess.check_output(command), np.uint8).reshape(4, 6, 8, 3)
+        assert np.abs(frames[:, :5, :7].astype(int) - 200).max() <= 8
+        path.unlink()
+    monkeypatch.setenv("PATH", "")
+    missing = pytest.raises(UserError, match="needs ffmpeg, which is not installed")
+    with missing, video(path, (7, 5), 25):
+        pass
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,181 @@
+"""The walk inside a light field, in a real browser: what its canvas shows, and how it is moved."""
+
+import base64
+import io
+import math
+
+import numpy as np
+import pytest
+from PIL import Image
+from sphere import look_at_ball, write_views
+
+from lightfield.dataset.lightfield import LightField
+from lightfield.export.source import Source
+from lightfield.geometry import lenses, rigs
+from lightfield.imaging import pictures
+from lightfield.report import dataset_page
+from lightfield.synthesis.view import Sources, reader
+
+RIG = {
+    "type": "sphere",
+    "subdivisions": 2,
+    "size": 1.0,
+    "camera": {"lens": "equidistant", "fov": 180, "resolution": [128, 128]},
+}
+WIDTH, HEIGHT = 160, 90
+EYE = {"lens": "rectilinear", "fov": 80, "resolution": [WIDTH, HEIGHT]}
+VIEWS = 4
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("walk") / "dataset"
+    write_views(folder, RIG["camera"], RIG, see=look_at_ball)
+    field = LightField.read(folder / "lightfield.json")
+    field.changed(frame=1, scene={"name": "ball"}, render={"samples": 1}).write(field.path)
+    origin = dataset_page.Origin(rigs.from_settings(RIG), "", "snakemake", False)
+    dataset_page.write(folder / "index.html", folder, "ball/sphere", origin)
+    return folder
+
+
+@pytest.fixture
+def tab(dataset, show):
+    """The page, with a canvas of a known size, once it can be walked."""
+
+    def tab(**options):
+        tab = show(dataset / "index.html", **options)
+        for _ in range(300):
+            if tab.evaluate("Boolean(walk.ready && walk.frames)"):
+                return tab
+            tab.wait_for_timeout(100)
+        raise AssertionError("the walk did not begin")
+
+    return tab
+
+
+def look_from(tab, place, yaw, pitch):
+    """Return what the canvas shows, (HEIGHT, WIDTH, 3) in sRGB from 0 to 1."""
+    uri = tab.evaluate(
+        """([at, yaw, pitch, width, height]) => {
+            Object.assign(walk.canvas, { width, height });
+            Object.assign(walk, { at, yaw, pitch });
+            drawWalk();
+            return walk.canvas.toDataURL("image/png");
+        }""",
+        [place, yaw, pitch, WIDTH, HEIGHT],
+    )
+    picture = Image.open(io.BytesIO(base64.b64decode(uri.partition(",")[2]))).convert("RGB")
+    return np.asarray(picture) / 255
+
+
+def matrix_of(place, yaw, pitch):
+    """The eye's camera-to-world: yaw turns it to the left of +Y, pitch up."""
+    back = -np.array(
+        [-math.sin(yaw) * math.cos(pitch), math.cos(yaw) * math.cos(pitch), math.sin(pitch)]
+    )
+    right = np.array([math.cos(yaw), math.sin(yaw), 0])
+    matrix = np.eye(4)
+    matrix[:3, :4] = np.column_stack([right, np.cross(back, right), back, place])
+    return matrix
+
+
+def psnr(one, other):
+    return -10 * math.log10(((one - other) ** 2).mean())
+
+
+def test_the_canvas_shows_what_is_synthesised_and_what_is_true(dataset, tab):
+    opened = tab()
+    exposure = opened.evaluate("viewer.exposure")
+    source, lens = Source(dataset, "", ".exr"), lenses.from_camera(EYE)
+    field = Sources(source.lens, source.lightfield.views, reader(source), most=99)
+    random = np.random.default_rng(3)
+    for _ in range(10):
+        place = random.uniform(-0.15, 0.15, 3)
+        yaw, pitch = random.uniform(-math.pi, math.pi), random.uniform(-0.8, 0.8)
+        shown = look_from(opened, place.tolist(), yaw, pitch)
+        matrix = matrix_of(place, yaw, pitch)
+        made = field.synthesise(matrix, lens, VIEWS)
+        true, _ = look_at_ball(lens, matrix)
+        expected, truth = (
+            pictures.develop(np.nan_to_num(c).astype(np.float32), exposure) / 255
+            for c in (made.colour, true)
+        )
+        assert psnr(shown, expected) >= 35
+        assert psnr(shown, truth) >= 28
+
+
+def test_it_is_walked_by_keys_by_mouse_and_by_touch(tab):
+    opened = tab(has_touch=True)
+    state = "[...walk.at, walk.yaw, walk.pitch]"
+    home = opened.evaluate(state)
+    overlay = opened.locator("#walk-overlay")
+    overlay.scroll_into_view_if_needed()
+    overlay.focus()
+    opened.evaluate("walk.yaw = 0")
+    for key, axis in (("w", 1), ("d", 0), ("e", 2)):
+        before = opened.evaluate(state)
+        opened.keyboard.down(key)
+        for _ in range(100):
+            if opened.evaluate(state)[axis] > before[axis]:
+                break
+            opened.wait_for_timeout(100)
+        opened.keyboard.up(key)
+        assert opened.evaluate(state)[axis] > before[axis]
+    box = overlay.bounding_box()
+    middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    opened.mouse.move(*middle)
+    opened.mouse.down()
+    opened.mouse.move(middle[0] + 60, middle[1] + 30)
+    opened.mouse.up()
+    turned = opened.evaluate(state)
+    assert turned[3] != home[3]
+    assert turned[4] != home[4]
+    opened.locator("#walk-home").tap()
+    assert opened.evaluate(state) == home
+
+
+def test_nobody_leaves_the_volume(tab):
+    opened = tab()
+    opened.evaluate("moved(5, 0, 0)")
+    assert -1e-6 < opened.evaluate("room(walk.at)") < 0.01
+    assert "m to the edge" in opened.locator("#walk-readout").inner_text()
+
+
+@pytest.mark.parametrize("mode", ["depth", "holes", "sources"])
+def test_other_modes_show_something_else(tab, mode):
+    opened = tab()
+    colour = look_from(opened, [0, 0, 0], 0, 0)
+    opened.locator(f"#walk-{mode}").click()
+    other = look_from(opened, [0, 0, 0], 0, 0)
+    assert np.abs(other - colour).mean() > 0.02
+    if mode == "depth":
+        # The ball, ahead, is nearer than what is beside it.
+        assert np.abs(other[HEIGHT // 2, WIDTH // 2] - other[HEIGHT // 2, 5]).max() > 0.1
+
+
+def test_a_thousand_frames_leak_nothing(tab):
+    opened = tab()
+    look_from(opened, [0, 0, 0], 0, 0)
+    walk_on = """(frames) => {
+        Object.assign(walk.canvas, { width: 32, height: 18 });
+        walk.sources = 1;
+        for (let frame = 0; frame < frames; frame++) {
+            walk.yaw += 0.02;
+            drawWalk();
+        }
+        walk.gl.finish();
+        gc();
+        return [performance.memory.usedJSHeapSize, walk.gl.getError()];
+    }"""
+    before, _ = opened.evaluate(walk_on, 100)
+    after, problem = opened.evaluate(walk_on, 1000)
+    assert problem == 0
+    assert after < before + 2e6
+
+
+def test_a_phone_has_it_too(tab):
+    opened = tab(width=390)
+    box = opened.locator("#walk-overlay").bounding_box()
+    assert box["x"] >= 0
+    assert box["x"] + box["width"] <= 390
+    assert opened.evaluate("document.documentElement.scrollWidth") <= 390
