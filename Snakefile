@@ -45,6 +45,7 @@ include: "rules/package.smk"
 include: "rules/plan.smk"
 include: "rules/benchmark.smk"
 include: "rules/error.smk"
+include: "rules/synthesis.smk"
 
 
 onstart:

@@ -463,8 +463,9 @@ def measurements(wildcards):
 
     They are no input, for a page must never start a measurement: that takes an hour.
     """
-    name = dataset_of(wildcards).scene_name
-    stems = ["reprojection", "stability", f"error_vs_time/{name}"]
+    dataset = dataset_of(wildcards)
+    stems = ["reprojection", "stability", f"error_vs_time/{dataset.scene_name}"]
+    stems.append(f"synthesis/{dataset.scene_folder}/{dataset.rig_folder}")
     files = [
         Path(RESULTS, "benchmarks", f"{stem}{suffix}")
         for stem in stems

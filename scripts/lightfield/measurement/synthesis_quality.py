@@ -22,6 +22,7 @@ from lightfield.measurement import metrics
 from lightfield.synthesis.view import Sources, reader
 
 BEST = 6
+MEANS = ("psnr", "ssim", "flip", "holes", "source_bytes")
 # At the rig's centre a picture is inside, and towards the edge beyond this part of the radius.
 INNER = 0.5
 
@@ -123,16 +124,13 @@ def compare(
 
 
 def means(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return one row for each variant: the means over its views."""
+    """Return one row for each variant: the means over its views, of numbers or their texts."""
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for row in rows:
         groups.setdefault((row["variant"], row["value"]), []).append(row)
     return [
         {"variant": variant, "value": value}
-        | {
-            name: float(np.mean([row[name] for row in group]))
-            for name in ("psnr", "ssim", "flip", "holes", "source_bytes")
-        }
+        | {name: float(np.mean([float(row[name]) for row in group])) for name in MEANS}
         for (variant, value), group in groups.items()
     ]
 

@@ -56,6 +56,7 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
     found = origin.measurements
     measured = {
         "error_vs_time": tables.error_vs_time(found, str(lightfield.scene["name"])),
+        "synthesis": tables.synthesis(found, f"{folder.parent.name}/{folder.name}"),
         "reprojection": tables.reprojection(found),
         "stability": tables.stability(found),
     }

@@ -9,6 +9,7 @@ from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
+from lightfield.measurement import synthesis_quality
 from lightfield.report import page
 
 # Of the stability table, so many of the cases that use most of their bound are shown at once.
@@ -121,6 +122,30 @@ def stability(files: Sequence[Path]) -> Measurement | None:
         },
         {f"All {len(rows)} cases": Table(columns, [list(row.values()) for row in rows])},
         [("cases", str(len(rows))), ("outside their bound", str(failed))],
+    )
+
+
+def synthesis(files: Sequence[Path], folder: str) -> Measurement | None:
+    """Return how well views are synthesised from a dataset, which is in ``folder``: scene/rig."""
+    path = _named(files, f"synthesis/{folder}.csv")
+    if path is None:
+        return None
+    rows = _read_csv(path)
+    columns = ["variant", "value", *synthesis_quality.MEANS]
+    means = [[row[name] for name in columns] for row in synthesis_quality.means(rows)]
+    by_place = [
+        [place, *(row[name] for name in synthesis_quality.MEANS)]
+        for place in ("inside", "edge")
+        for row in synthesis_quality.means([row for row in rows if row["place"] == place])[:1]
+    ]
+    return Measurement(
+        page.plot(path.with_suffix("")),
+        {
+            "Views that were held out, synthesised from this dataset's": Table(columns, means),
+            "Inside, and towards the edge of the cameras": Table(
+                ["place", *synthesis_quality.MEANS], by_place
+            ),
+        },
     )
 
 
