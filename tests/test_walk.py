@@ -24,7 +24,7 @@ RIG = {
 }
 WIDTH, HEIGHT = 160, 90
 EYE = {"lens": "rectilinear", "fov": 80, "resolution": [WIDTH, HEIGHT]}
-VIEWS = 4
+VIEWS = 6
 
 
 @pytest.fixture(scope="module")
