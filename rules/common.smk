@@ -489,6 +489,39 @@ def measurement_times(wildcards):
     return [file.stat().st_mtime_ns for file in measurements(wildcards)]
 
 
+def reach(dataset):
+    """Return how far a rig's cameras are from their middle, in metres."""
+    places = [pose.position for pose in dataset.rig.poses()]
+    middle = [sum(axis) / len(places) for axis in zip(*places)]
+    return max(math.dist(place, middle) for place in places)
+
+
+def held_out(dataset):
+    """Return the dataset whose cameras are between those of a light field, None if none is.
+
+    Of the scene's chosen datasets that is the one whose cameras reach least far. A rig whose
+    cameras span no surface has no inside.
+    """
+    scene = [other for other in CHOSEN if other.scene_folder == dataset.scene_folder]
+    around = [other for other in scene if other.rig.cells() is not None]
+    if dataset not in around:
+        return None
+    inner = min(around, key=reach)
+    return inner if reach(inner) < reach(dataset) else None
+
+
+def truth_words(wildcards):
+    """Return the words that name the dataset with which synthesised views are compared."""
+    truth = held_out(dataset_of(wildcards))
+    return ["--truth", truth.folder] if truth else []
+
+
+def truth_records(wildcards):
+    """Return the records of that dataset's views."""
+    truth = held_out(dataset_of(wildcards))
+    return truth.records("render") if truth else []
+
+
 @cache
 def first_dataset(folder):
     """Return the dataset of a scene's first rig, whose views are its probes.

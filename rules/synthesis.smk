@@ -1,37 +1,5 @@
 # What a light field is worth to whoever walks inside it; asked for by name, no part of a dataset.
 
-import numpy as np
-
-
-def reach(dataset):
-    """Return how far a rig's cameras are from their middle, in metres."""
-    places = np.array([pose.position for pose in dataset.rig.poses()])
-    return float(np.linalg.norm(places - places.mean(axis=0), axis=1).max())
-
-
-def held_out(dataset):
-    """Return the dataset whose cameras are between those of a light field, None if none is.
-
-    Of the scene's chosen datasets that is the one whose cameras reach least far. A rig whose
-    cameras span no surface has no inside.
-    """
-    scene = [other for other in CHOSEN if other.scene_folder == dataset.scene_folder]
-    around = [other for other in scene if other.rig.cells() is not None]
-    if dataset not in around:
-        return None
-    inner = min(around, key=reach)
-    return inner if reach(inner) < reach(dataset) else None
-
-
-def truth_words(wildcards):
-    truth = held_out(dataset_of(wildcards))
-    return ["--truth", truth.folder] if truth else []
-
-
-def truth_records(wildcards):
-    truth = held_out(dataset_of(wildcards))
-    return truth.records("render") if truth else []
-
 
 rule measure_synthesis:
     input:
@@ -49,7 +17,7 @@ rule measure_synthesis:
     resources:
         mem_mb=4000,
     params:
-        dataset=DATASET,
+        dataset=lambda wildcards, input: str(Path(input.lightfield).parent),
         truth=truth_words,
         stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
     message:

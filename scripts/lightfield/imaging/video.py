@@ -5,8 +5,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
-
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path
 from lightfield.imaging.pictures import Array
@@ -41,7 +39,7 @@ def video(path: Path, size: tuple[int, int], rate: int) -> Iterator[Callable[[Ar
         def add(picture: Array) -> None:
             assert ffmpeg.stdin
             try:
-                ffmpeg.stdin.write(np.ascontiguousarray(picture))
+                ffmpeg.stdin.write(picture.tobytes())
             except BrokenPipeError:
                 finish()
 

@@ -59,7 +59,8 @@ def _octahedral(rays: Array) -> Array:
     scaled = rays / np.maximum(np.abs(rays).sum(axis=-1, keepdims=True), 1e-12)
     plane = scaled[..., :2]
     folded = (1 - np.abs(plane[..., ::-1])) * np.where(plane >= 0, 1, -1)
-    return np.where(rays[..., 2:] >= 0, plane, folded) / 2 + 0.5
+    points: Array = np.where(rays[..., 2:] >= 0, plane, folded) / 2 + 0.5
+    return points
 
 
 def _direction(points: Array) -> Array:
@@ -67,7 +68,9 @@ def _direction(points: Array) -> Array:
     plane = 2 * points - 1
     z = 1 - np.abs(plane).sum(axis=-1)
     folded = (1 - np.abs(plane[..., ::-1])) * np.where(plane >= 0, 1, -1)
-    return np.concatenate([np.where(z[..., None] >= 0, plane, folded), z[..., None]], axis=-1)
+    side = np.where(z[..., None] >= 0, plane, folded)
+    vectors: Array = np.concatenate([side, z[..., None]], axis=-1)
+    return vectors
 
 
 def _bounds(places: Array) -> Array:

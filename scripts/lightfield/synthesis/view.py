@@ -251,7 +251,8 @@ def penalty(seen: Array, source: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         angle = np.linalg.norm(seen / here[..., None] - source / there[..., None], axis=-1)
         farther: Array = np.maximum(there / here - 1, 0)
-    return angle + DISTANCE * farther + SHARP
+    unlike: Array = angle + DISTANCE * farther + SHARP
+    return unlike
 
 
 def _is_amid(right: Array, down: Array) -> Array:
