@@ -756,7 +756,9 @@ def add_passes(dataset: Path) -> None:
         if one.name == "cryptomatte":
             planes["CryptoObject00.R"][:], planes["CryptoObject00.G"][:] = 1, 0.6
             planes["CryptoObject00.B"][:], planes["CryptoObject00.A"][:] = 2, 0.4
-            header = matte_header({"one": "3f800000", "two": "40000000"})
+            # The last two are no numbers as floats, and are written as others.
+            hashes = ("3f800000", "40000000", "00000001", "ff800001")
+            header = matte_header(dict(zip("abcd", hashes, strict=True)))
         images.write_exr(one.path(dataset, view), planes, header)
 
 
@@ -822,6 +824,9 @@ def test_right_passes_are_valid_and_what_cycles_had_no_number_for_is_a_warning(
 ) -> None:
     add_passes(small_dataset)
     in_pass("normal", B=1.00005)(small_dataset)
+    for_floats = np.array([0x00800001, 0xFF000001], np.uint32).view(np.float32)
+    own = dict(zip(("CryptoObject00_R", "CryptoObject00_B"), for_floats, strict=True))
+    in_pass("cryptomatte", **own)(small_dataset)
     # What covers nothing need not be known.
     in_pass("cryptomatte", CryptoObject01_R=3)(small_dataset)
     for view in names(small_dataset)[:2]:
@@ -895,6 +900,10 @@ def test_a_reprojected_view_of_one_colour_is_a_warning(small_dataset: Path) -> N
 
 WRONG_REPROJECTIONS: dict[str, tuple[Callable[[dict[str, np.ndarray]], Any], str]] = {
     "unmarked": (lambda c: {**c, "Z": np.nan_to_num(c["Z"], nan=3.0)}, "marks"),
+    "unmarked at the edge": (
+        lambda c: {**c, "Z": np.where(np.arange(48)[:, None] * 96 + np.arange(96) < 4, 3, c["Z"])},
+        "marks",
+    ),
     "smeared": (lambda c: {**c, "R": np.where(c["R"] == 0, np.float16(0.1), c["R"])}, "marks"),
     "marked too much": (
         lambda c: {**c, "Z": np.where(np.arange(96) < 60, c["Z"], np.float32(np.nan))},
