@@ -197,7 +197,7 @@ def read_matte(path, name, target):
 
 
 def main(folder: Path) -> None:
-    blend = folder / "scene.blend"
+    blend = folder / "everything.blend"
     blend_file.new_scene()
     build()
     blend_file.save_scene(blend)
@@ -237,6 +237,7 @@ def main(folder: Path) -> None:
     (folder / "again.json").write_text(json.dumps(same))
     blend_file.new_scene()
     build_instances()
+    blend = folder / "instances.blend"
     blend_file.save_scene(blend)
     for name in ("fisheye", "perspective"):
         content = lightfield(name, passes=["normal", "object", "instance"])
