@@ -8,7 +8,7 @@ those of the faces that these find, and those of planes through neighbouring dep
 pixels, of what stands still; values that were not a number, and how many of them not at the rim of
 an image circle; and from it to a second view, 5 cm beside it, how many pixels are visible there,
 and by how much their albedo differs, in the mean, from its own where flow leads, and where it does
-not. Then the seconds and the bytes of a view with more and more passes.
+not. Then the seconds of a core and the bytes of a view with more and more passes.
 """
 
 import argparse
@@ -75,7 +75,7 @@ def main() -> None:
             folder = Path(name, step)
             seconds = _render(content, arguments.blend, folder)
             sizes = {path.parent.name: path.stat().st_size for path in folder.rglob("view_*.exr")}
-            print(step, f"{seconds:.2f} s a view,", json.dumps(sizes), flush=True)
+            print(step, f"{seconds:.2f} core seconds a view,", json.dumps(sizes), flush=True)
 
 
 def _content(
@@ -94,7 +94,7 @@ def _content(
 
 
 def _render(content: LightField, blend: Path, folder: Path) -> float:
-    """Render the views and return the seconds that one of them took."""
+    """Render the views and return the seconds of a core that one of them took."""
     journal = folder / "journal.jsonl"
     shard.render(
         content,
@@ -107,7 +107,7 @@ def _render(content: LightField, blend: Path, folder: Path) -> float:
         journal=journal,
     )
     (made,) = read(journal)
-    return float(np.mean([view["wall_seconds"] for view in made.views[1:]]))
+    return float(np.mean([view["cpu_seconds"] for view in made.views[1:]]))
 
 
 def _read(folder: Path, name: str, view: str) -> tuple[Array, int]:
