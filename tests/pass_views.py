@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.dataset.passes import PASSES
 from lightfield.geometry import lenses
 from lightfield.rendering import blend_file, shard
@@ -35,14 +35,16 @@ RENDER = {
 }
 
 
-def lightfield(camera, **render):
+def lightfield(camera, pair=None, **render):
     lens = lenses.from_camera(LENSES[camera])
     rig = {"type": "lattice", "cameras": [2, 1, 1], "size": 0.3, "center": [0.2, -0.4, 1.1]}
     rig["rotation"] = [8, -5, 12]
     depth = "z" if lens.has_z_depth else "distance"
-    scene = {"fingerprint": "0"}
-    content = {**RENDER, **render}
-    return LightField.from_rig(rig, lens, depth=depth, frame=2, scene=scene, render=content)
+    keys = {"depth": depth, "frame": 2, "scene": {"fingerprint": "0"}}
+    if pair:
+        rig |= {"cameras": [1, 1, 1], **pair}
+        keys |= {"depth": None, OMNIDIRECTIONAL: pair["stereo"]["distance"]}
+    return LightField.from_rig(rig, lens, **keys, render={**RENDER, **render})
 
 
 def material(name, **inputs):
@@ -93,14 +95,21 @@ def build():
     bpy.context.object.data.energy = 200
 
 
-def cast(content):
-    """Return the name of the object behind each pixel (h, w) of the first view."""
-    view, scene = content.views[0], bpy.context.scene
-    rays = content.lens.pixel_rays() @ view.matrix[:3, :3].T
+def cast(content, number=0, aside=0.0):
+    """Return the name of the object behind each pixel (h, w) of a view.
+
+    Rays start ``aside`` of the camera, to the right as they look along the horizon.
+    """
+    view, scene = content.views[number], bpy.context.scene
+    rays = content.lens.pixel_rays()
+    level = np.linalg.norm(rays[..., ::2], axis=-1, keepdims=True)
+    right = np.stack([-rays[..., 2], 0 * rays[..., 0], rays[..., 0]], axis=-1) / level
+    starts = view.position + aside * right @ view.matrix[:3, :3].T
+    rays = rays @ view.matrix[:3, :3].T
     depsgraph = bpy.context.evaluated_depsgraph_get()
     names = np.full(rays.shape[:2], "", dtype="U8")
     for pixel in zip(*np.nonzero(np.isfinite(rays[..., 0])), strict=True):
-        origin, direction, name = Vector(view.position), Vector(rays[pixel]), "fog"
+        origin, direction, name = Vector(starts[pixel]), Vector(rays[pixel]), "fog"
         while name == "fog":
             hit, origin, _, _, thing, _ = scene.ray_cast(depsgraph, origin, direction)
             origin = origin + 1e-4 * direction
@@ -220,6 +229,10 @@ def main(folder: Path) -> None:
     for name in LENSES:
         render(name, lightfield(name))
         objects[name] = cast(lightfield(name))
+    pair = {"stereo": {"distance": 0.4, "omnidirectional": True}, "center": [0.2, -0.4, 1.1]}
+    render("eyes", lightfield("panorama", pair, depth="none", passes=["object"]))
+    for number, side in enumerate((-0.2, 0.2)):
+        objects[f"eye {number}"] = cast(lightfield("panorama", pair), number, side)
     np.savez(folder / "objects.npz", **objects)
     render("transparent", lightfield("fisheye", transparent=True), "0:1")
     names = ["normal", "object", "material", "cryptomatte"]

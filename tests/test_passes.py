@@ -2,6 +2,7 @@
 
 import filecmp
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -15,11 +16,13 @@ from conftest import SCRIPTS
 from pass_views import LENSES, RENDER, SIZE, WALL
 from scipy.ndimage import binary_dilation, binary_erosion
 
+from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256
 from lightfield.dataset import passes
 from lightfield.dataset.config import Scene
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
+from lightfield.export.source import Source
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.rendering import shard
@@ -154,6 +157,32 @@ def test_a_bump_has_no_normal_at_the_rim_of_an_image_circle_and_validation_says_
     (warning,) = check.warnings or [None]
     assert check.passed and (warning is None) == (lens == "perspective")
     assert warning is None or "in normal were not numbers" in warning
+
+
+@pytest.mark.parametrize("eye", [0, 1])
+def test_the_eyes_of_an_omnidirectional_pair_go_round_their_place(eye, made):
+    """Cycles' rays start where those of Ishiguro et al. 1992 do, on a circle that they touch."""
+    view = f"view_0000f_{('left', 'right')[eye]}"
+    numbers, casts = read_json(made / "eyes/object/names.json"), np.load(made / "objects.npz")
+    expected = np.vectorize(lambda name: numbers.get(name, 0))(casts[f"eye {eye}"])
+    found = read(made / "eyes", "object", view)[..., 0]
+    assert (found == expected).mean() > 0.998
+    centre = np.vectorize(lambda name: numbers.get(name, 0))(casts[f"eye {1 - eye}"])
+    assert (found == centre).mean() < 0.97
+    assert "Z" not in images.read_header(made / f"eyes/exr/{view}.exr").channels
+
+
+def test_views_without_a_centre_are_not_reprojected_nor_exported(made, tmp_path, run_program):
+    source = made / "eyes"
+    refused = run_program(
+        *("reproject.py", "--input-dir", source / "exr", "--output-dir", tmp_path, "--png"),
+        *("--input-cfg", source / "lightfield.json", "--rectilinear", "18,36"),
+        check=False,
+    )
+    assert refused.returncode == 1
+    assert "omnidirectional_stereo: its views have no centre" in refused.stderr
+    with pytest.raises(UserError, match="its views have no centre"):
+        _ = Source(source, "", ".exr").lightfield
 
 
 def mattes(folder):
@@ -392,6 +421,39 @@ def test_reprojected_ids_are_kept_normals_unit_and_light_still_adds_up(made, tmp
     # All values are rounded before and after.
     colour = images.read_image(target / "view_0000f.exr").colour
     np.testing.assert_allclose(total, colour, rtol=2**-9, atol=1e-6)
+
+
+EYES = {"stereo": {"distance": 0.06, "omnidirectional": True}}
+
+
+@pytest.mark.parametrize(
+    ("lens", "more", "problem"),
+    [
+        ("fisheye", {}, "rigs.one.stereo.omnidirectional: goes with the lens equirectangular"),
+        ("panorama", {"flow": {"pairs": "neighbours"}}, "flow: goes without rigs.one.stereo"),
+        (
+            "panorama",
+            {"render": {"samples": 1, "passes": ["motion"]}},
+            "render.passes: motion goes without rigs.one.stereo",
+        ),
+        (
+            "panorama",
+            {"reprojections": {"flat": {"camera": LENSES["perspective"]}}},
+            "reprojections.flat: goes without rigs.one.stereo",
+        ),
+        (
+            "panorama",
+            {"exports": {"poses_csv": {"sources": ["views"]}}},
+            "views is of the rig one, without a centre",
+        ),
+    ],
+)
+def test_what_needs_a_centre_goes_without_an_omnidirectional_pair(lens, more, problem):
+    rig = {"type": "lattice", "cameras": [1, 1, 1], "camera": LENSES[lens], **EYES}
+    content = {"scene": {"builder": "room"}, "render": {"samples": 1}, "rigs": {"one": rig}}
+    with pytest.raises(ValueError, match=re.escape(problem)):
+        Scene.model_validate(content | more)
+    Scene.model_validate(content | {"rigs": {"one": rig | {"camera": LENSES["panorama"]}}})
 
 
 def scene(**render):

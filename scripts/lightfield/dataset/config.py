@@ -505,7 +505,7 @@ class Scene(Settings):
                 raise ValueError(f"is missing the key {key}")
         for name, rig in self.rigs.items():
             _check_name(f"rigs.{name}", name, RIG_NEIGHBOURS)
-            self._check_rig(f"rigs.{name}", rig)
+            self._check_rig(f"rigs.{name}", name, rig)
         if self.render and self.scene.blend is None:
             if self.render.samples == FILE:
                 raise ValueError("render.samples: file goes with scene.blend")
@@ -573,11 +573,13 @@ class Scene(Settings):
                 if refusal:
                     raise ValueError(f"{key}: {source} {refusal}")
             for rig in rigs:
+                if self.rigs[rig].is_omnidirectional:
+                    raise ValueError(f"{key}: {source} is of the rig {rig}, without a centre")
                 refusal = export.rig_refusal(self.rigs[rig])
                 if refusal:
                     raise ValueError(f"{key}: {source} is of the rig {rig}, which {refusal}")
 
-    def _check_rig(self, key: str, rig: Rig) -> None:
+    def _check_rig(self, key: str, name: str, rig: Rig) -> None:
         """Check what of a rig depends on its camera, its file and the depth."""
         camera = rig.camera
         if camera is None:
@@ -594,8 +596,8 @@ class Scene(Settings):
                 f"{key}: has {frames} frames of {rig.view_count} views; must be at most "
                 f"{MOST_FRAMES} frames and {MOST_VIEWS} views in all"
             )
-        for name in _unknown_names(rig):
-            raise ValueError(f"{key}.split: there is no view {name!r}")
+        for view in _unknown_names(rig):
+            raise ValueError(f"{key}.split: there is no view {view!r}")
         lens = camera.make()
         if self.render and not lens.in_cycles:
             known = ", ".join(name for name, lens in LENSES.items() if lens.in_cycles)
@@ -609,6 +611,21 @@ class Scene(Settings):
                 "must be auto, distance or none"
             )
         _check_cube_map(key, rig)
+        if rig.is_omnidirectional:
+            self._check_without_centre(key, name)
+
+    def _check_without_centre(self, key: str, name: str) -> None:
+        """Check that nothing is asked of a rig's views for which they would need a centre."""
+        if self.rigs[name].camera.lens != "equirectangular":
+            raise ValueError(f"{key}.stereo.omnidirectional: goes with the lens equirectangular")
+        without = f"without {key}.stereo.omnidirectional, whose views have no centre"
+        if self.flow:
+            raise ValueError(f"flow: goes {without}")
+        if self.render and "motion" in (self.render.passes or ()):
+            raise ValueError(f"render.passes: motion goes {without}")
+        for other, reprojection in self.reprojections.items():
+            if reprojection.camera and name in (reprojection.rigs or self.rigs):
+                raise ValueError(f"reprojections.{other}: goes {without}")
 
 
 def _check_cube_map(key: str, settings: Rig | Reprojection) -> None:

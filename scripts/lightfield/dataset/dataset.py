@@ -26,7 +26,7 @@ from lightfield.dataset.config import (
 )
 from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
 from lightfield.dataset.keys import scene_fingerprint
-from lightfield.dataset.lightfield import NAME
+from lightfield.dataset.lightfield import NAME, OMNIDIRECTIONAL
 from lightfield.dataset.splits import SPLITS
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
@@ -138,8 +138,10 @@ class Dataset:
     def depth(self) -> str | None:
         """What channel Z of the rendered views means: ``z``, ``distance``, or None for no depth.
 
-        Z-depth is unusable for lenses that see beyond 180 degrees.
+        Z-depth is unusable for lenses that see beyond 180 degrees, and depth without a centre.
         """
+        if self.rig.is_omnidirectional:
+            return None
         match self.render["depth"]:
             case "none":
                 return None
@@ -162,6 +164,11 @@ class Dataset:
         """Return what lightfield.json says of what is rendered, and how: by this ``render``."""
         return {
             "depth": self.depth,
+            **(
+                {OMNIDIRECTIONAL: self.rig.stereo.distance}
+                if self.rig.stereo and self.rig.is_omnidirectional
+                else {}
+            ),
             "frame": self.source.frame,
             "scene": {
                 "name": self.scene_name,

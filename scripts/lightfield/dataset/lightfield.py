@@ -28,6 +28,8 @@ from lightfield.geometry.lenses.rectilinear import Rectilinear
 Floats = NDArray[np.float64]
 
 NAME = "lightfield.json"
+# Where this key is, metres between the eyes of a pair, the views have no centre.
+OMNIDIRECTIONAL = "omnidirectional_stereo"
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,6 +238,14 @@ class LightField:
     def transparent(self) -> bool:
         """Whether the views' channel A is how much of a pixel the scene covers."""
         return bool(self.content.get("render", {}).get("transparent"))
+
+    def require_centre(self) -> None:
+        """Raise `UserError` where the rays of a view do not start from one point."""
+        if OMNIDIRECTIONAL in self.content:
+            raise UserError(
+                f"{self.path}: {OMNIDIRECTIONAL}: its views have no centre, so that no other lens "
+                "sees what they do, and no other program reads their poses"
+            )
 
     def _key(self, key: str) -> Any:
         if key not in self.content:

@@ -55,6 +55,7 @@ class Source:
 
     def _read(self, name: str) -> LightField:
         own = LightField.read(self.dataset / name / NAME)
+        own.require_centre()
         views = list(own.views)
         for rig, folder in self.beside.items():
             for view in LightField.read(folder / name / NAME).views:

@@ -8,8 +8,9 @@ import bpy
 
 from lightfield.core import gpus
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.dataset.passes import Pass
+from lightfield.geometry.rigs.rig import EYES
 from lightfield.rendering import blend_file, ids, instances, pruning
 
 # In the order in which `auto` tries them.
@@ -59,6 +60,8 @@ def set_up(
     for marker in scene.timeline_markers:
         marker.camera = None
     _set_camera(scene, lightfield.content)
+    if OMNIDIRECTIONAL in lightfield.content:
+        _set_eyes(scene, lightfield.content[OMNIDIRECTIONAL])
     if focused:
         _set_focus(scene.camera.data.dof, focused)
     if any(found.kind == "motion" for found in passes):
@@ -242,6 +245,22 @@ def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
     camera_object.rotation_mode = "XYZ"
     scene.collection.objects.link(camera_object)
     scene.camera = camera_object
+
+
+def _set_eyes(scene: Any, distance: float) -> None:
+    """Let the camera be a pair of eyes that go round its place, metres apart."""
+    scene.render.use_multiview, scene.render.views_format = True, "STEREO_3D"
+    scene.render.views["right"].use = False
+    eyes = scene.camera.data.stereo
+    eyes.use_spherical_stereo, eyes.use_pole_merge = True, False
+    eyes.interocular_distance, eyes.convergence_mode, eyes.pivot = distance, "PARALLEL", "CENTER"
+
+
+def choose_eye(name: str) -> None:
+    """Render the next view, of this ``name``, with the eye that it is of, if it is of one."""
+    render = bpy.context.scene.render
+    for eye in EYES if render.use_multiview else ():
+        render.views[eye].use = name.endswith(f"_{eye}")
 
 
 def _set_focus(lens: Any, camera: Any) -> None:

@@ -159,6 +159,7 @@ def _render_views(
 ) -> None:
     """Render ``views`` one after the other, in the scene that is set up for them."""
     from lightfield.rendering.colour_pass import render_colour
+    from lightfield.rendering.cycles import choose_eye
     from lightfield.rendering.geometry_pass import render_geometry
 
     rays = depth_rays(lightfield)
@@ -175,6 +176,7 @@ def _render_views(
         # The system's own timer: what hangs need not run any Python.
         signal.alarm(stall)
         began, began_cpu = time.perf_counter(), time.process_time()
+        choose_eye(view.name)
         # Of the same pose one after the other: Cycles keeps the scene as it is.
         geometry = (
             render_geometry(view.matrix, "motion" in names, "instance" in names)

@@ -51,8 +51,7 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
     }
     pixels = scene.render.resolution_x * scene.render.resolution_y
     with temporary_folder(room.fast_folder(pixels * PASSES_PIXEL_BYTES)) as folder:
-        path = folder / "view.exr"
-        scene.render.filepath = str(path)
+        scene.render.filepath = str(folder / "view.exr")
         try:
             with quiet():
                 bpy.ops.render.render(write_still=True)
@@ -61,6 +60,8 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
             advice = f": {LESS_MEMORY}" if "memory" in text.lower() else ""
             raise UserError(f"Cycles cannot render the view: {text}{advice}") from None
         try:
+            # Of one eye of a pair it is view_L.exr or view_R.exr.
+            path = next(folder.glob("*.exr"), folder / "view.exr")
             channels = [channel for group in names.values() for channel in group]
             image = images.read_image(path, channels)
         except UserError as error:

@@ -51,6 +51,8 @@ def find_row(rig: Rig, matrices: Array) -> Row | None:
     ``matrices`` (views, 4, 4) are the poses of all its views. A grid's is its front's middle row;
     a sphere's is the level of cameras nearest the equator.
     """
+    if rig.is_omnidirectional:
+        return None
     faces = rig.views_a_position
     local = (matrices[::faces, :3, 3] - np.array(rig.center)) @ rig.turn
     numbers = rig.middle_row(local)

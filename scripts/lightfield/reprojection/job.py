@@ -110,6 +110,8 @@ class Job:
             raise UserError(f"--depth-png {arguments.depth_png:g}: must be positive")
         if arguments.no_configs and arguments.output_cfg:
             raise UserError("--output-cfg: needs --input-cfg, which --no-configs excludes")
+        if not self.copies:
+            self.lightfield.require_centre()
         self.passes = self._passes_wanted(arguments.passes)
         self.record = ShardRecord(arguments.record, arguments.output_dir)
 

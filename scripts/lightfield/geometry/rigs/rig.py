@@ -100,6 +100,11 @@ class Stereo(Settings):
     distance: float = Field(
         gt=0, le=1000, description="Metres between the eyes, on both sides of the position."
     )
+    omnidirectional: bool = Field(
+        False,
+        description="Of panoramas: each eye goes round the position and looks along its circle, so "
+        "that to all sides the pair is right; such a view has no centre.",
+    )
 
 
 def _require_camera(schema: dict[str, Any]) -> None:
@@ -171,6 +176,11 @@ class Rig(Settings):
         return self.frames
 
     @property
+    def is_omnidirectional(self) -> bool:
+        """Whether its views have no centre from which all of their rays start."""
+        return self.stereo is not None and self.stereo.omnidirectional
+
+    @property
     def lf_type(self) -> str:
         """What lightfield.json calls the rig."""
         return self.shape
@@ -240,6 +250,8 @@ class Rig(Settings):
         if self.stereo:
             aside = euler_to_matrix(rotations)[:, None, :, 0] * self.stereo.distance / 2
             sides = np.array(list(EYES.values()))[:, None]
+            # Of an omnidirectional pair the renderer knows where the eyes are.
+            sides = sides * (not self.stereo.omnidirectional)
             positions = (positions[:, None] + sides * aside).reshape(-1, 3)
             names = [f"{name}_{eye}" for name in names for eye in EYES]
             numbers = np.repeat(numbers, len(EYES))
