@@ -553,6 +553,11 @@ def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(da
     assert not checked()[2].passed
     points.unlink()
     assert "is no file of the dataset" in checked()[2].problems[0]
+    outside = tmp_path / "outside.txt"
+    outside.touch()
+    listed = {"files": {"../../../../outside.txt": sha256(outside)}}
+    (target / "export.json").write_text(json.dumps(listed))
+    assert "outside.txt is no file of the dataset" in checked()[2].problems[0]
 
 
 def test_a_failed_export_leaves_nothing(dataset, tmp_path):
