@@ -1014,6 +1014,21 @@ def test_strays_are_moved_before_they_make_a_dataset_invalid(
     assert files.remove_strays(folder, [], MANIFESTS, Path("removed")) == 0
 
 
+@pytest.mark.parametrize("broken", [NAME, "transforms.json", f"panorama/{NAME}", None])
+def test_nothing_is_moved_of_a_dataset_that_is_not_understood(
+    broken: str | None, small_dataset: Path, tmp_path: Path
+) -> None:
+    add_passes(small_dataset)
+    add_panoramas(small_dataset)
+    (small_dataset / "stray").touch()
+    if broken:
+        (small_dataset / broken).write_text("{")
+    sets = [] if broken == NAME else ["panorama"]
+    moved = files.remove_strays(small_dataset, sets, MANIFESTS, tmp_path / "removed")
+    assert moved == (0 if broken else 1)
+    assert (small_dataset / "stray").exists() == bool(broken)
+
+
 def test_program_names_what_is_wrong_and_publishes_no_sums(dataset: Path, run_program: Any) -> None:
     (dataset / "sha256sums.txt").write_text("of an earlier validation")
     on_file(truncate)(dataset)
