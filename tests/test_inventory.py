@@ -3,6 +3,8 @@
 import json
 from pathlib import Path
 
+import numpy as np
+import OpenImageIO as oiio
 import pytest
 from checkouts import checkout, planned
 
@@ -142,7 +144,10 @@ def test_what_is_missing_or_cannot_be_read_is_an_error(run_program, tmp_path):
     bark, font = tmp_path / "bark.png", tmp_path / "font.woff2"
     texture = f"the texture bark at {bark}"
     letters = f"the font DejaVu Sans Mono Book at {font}"
-    bark.write_text("no picture")
+    # Of a photograph that was not copied to its end, Cycles would show a part.
+    photograph = tmp_path / "photograph.jpg"
+    oiio.ImageBuf(np.zeros((64, 64, 3), np.uint8)).write(str(photograph))
+    bark.write_bytes(photograph.read_bytes()[:-100])
     font.write_text("no letters")
     start = (
         f"error: {tmp_path}/{{}}.blend: {{}} of the files that it shows are missing or cannot be"

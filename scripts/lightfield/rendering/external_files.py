@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-import OpenImageIO as oiio
 
 from lightfield.core.files import sha256
+from lightfield.imaging.images import is_whole
 from lightfield.rendering.blend_file import path_of
 from lightfield.rendering.quiet import quiet
 
@@ -122,8 +122,8 @@ def _problem(block: Any, path: Path) -> str | None:
         return "missing"
     readable = True
     if isinstance(block, bpy.types.Image) and block.source != "MOVIE":
-        # As Cycles reads it; Blender 5.0 crashes at some broken EXRs.
-        readable = bool(oiio.ImageBuf(str(path)).read(force=True))
+        # Not by Blender: 5.0 crashes at some broken EXRs.
+        readable = is_whole(path)
     elif isinstance(block, bpy.types.Volume):
         readable = block.grids.load()
     elif isinstance(block, bpy.types.VectorFont):
