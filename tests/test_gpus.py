@@ -5,12 +5,15 @@ No GPU is needed: what is taken is its name.
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from conftest import SCRIPTS
 
 from lightfield.core import gpus
 from lightfield.core.gpus import CUDA, HIP, Gpu
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
 
 FAKE = [Gpu(CUDA, "GPU-a"), Gpu(CUDA, "GPU-b")]
 
@@ -86,3 +89,30 @@ def test_a_process_sees_the_gpu_alone_that_it_took(tmp_path, monkeypatch):
     assert (gpus.os.environ[CUDA], gpus.os.environ[HIP]) == ("GPU-b", "-1")
     for taken in (lock, *gpus._taken):
         taken.close()
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        "System is out of GPU memory",
+        "Out of memory in cuMemAlloc_v2(&device_pointer, size) (device_impl.cpp:601)",
+    ],
+)
+def test_a_gpu_without_room_is_reported_with_what_to_lower(message, room, run_program, tmp_path):
+    lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [16, 16]})
+    sampling = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0}
+    rig = {"type": "plane", "cameras": [1, 1]}
+    lightfield = LightField.from_rig(rig, lens, depth=None, frame=1, render=sampling)
+    lightfield.write(tmp_path / "lightfield.json")
+    found = run_program(
+        *(Path(__file__).with_name("full_gpu.py"), message, "--blend", room, "--device", "cuda"),
+        *("--lightfield", tmp_path / "lightfield.json", "--output", tmp_path / "exr"),
+        check=False,
+    )
+    assert found.returncode == 1
+    assert found.stderr.splitlines()[-1] == (
+        f"error: Cycles cannot render the view: {message}: lower resolution, shrink the scene's "
+        "textures, end what else uses the GPU, or take device=cpu"
+    )
+    assert "Traceback" not in found.stderr
+    assert not list(tmp_path.rglob("*.exr"))

@@ -5,6 +5,9 @@ from pathlib import Path
 
 # What takes less memory, wherever it ran out.
 LESS_MEMORY = "lower --cores, for fewer shards at once, or resolution"
+LESS_GPU_MEMORY = (
+    "lower resolution, shrink the scene's textures, end what else uses the GPU, or take device=cpu"
+)
 # What a signal that ends a program most likely means.
 _SIGNALS = {
     "SIGKILL": f"most likely memory ran out: {LESS_MEMORY}",

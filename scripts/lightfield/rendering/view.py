@@ -12,7 +12,7 @@ import numpy as np
 
 from lightfield.core import room
 from lightfield.core.errors import UserError
-from lightfield.core.failures import LESS_MEMORY
+from lightfield.core.failures import LESS_GPU_MEMORY, LESS_MEMORY
 from lightfield.core.leftovers import temporary_folder
 from lightfield.dataset.memory import PASSES_PIXEL_BYTES
 from lightfield.imaging import images
@@ -56,9 +56,14 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
             with quiet():
                 bpy.ops.render.render(write_still=True)
         except RuntimeError as error:
-            text = " ".join(str(error).removeprefix("Error:").split())
-            advice = f": {LESS_MEMORY}" if "memory" in text.lower() else ""
-            raise UserError(f"Cycles cannot render the view: {text}{advice}") from None
+            # Cycles' errors are reported by itself, and again at the end of the render.
+            lines = [line.removeprefix("Error:").strip() for line in str(error).splitlines()]
+            text = "; ".join(dict.fromkeys(filter(None, lines)))
+            on_gpu = scene.cycles.device == "GPU"
+            advice = f": {LESS_GPU_MEMORY if on_gpu else LESS_MEMORY}"
+            raise UserError(
+                f"Cycles cannot render the view: {text}{advice if 'memory' in text.lower() else ''}"
+            ) from None
         try:
             # Of one eye of a pair it is view_L.exr or view_R.exr.
             path = next(folder.glob("*.exr"), folder / "view.exr")
