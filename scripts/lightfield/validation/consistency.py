@@ -13,9 +13,9 @@ view looked through the place where the first one saw a surface. A relation of t
 tried both ways, so whatever is wrong makes contradictions in one of them.
 
 Errors too small for single points (a fraction of a pixel) show in the mean: `displacement` gives
-the rigid motion between two views that their residuals ask for, `scales` the error of field of view
-and of depth that all pairs together ask for; both are first-order least squares on point-to-plane
-distances (Chen and Medioni 1992).
+the rigid motion between two views that their residuals ask for, and how large that is expected to
+be where nothing is wrong; `scales` the error of field of view and of depth that all pairs together
+ask for; both are first-order least squares on point-to-plane distances (Chen and Medioni 1992).
 """
 
 from collections.abc import Sequence
@@ -179,7 +179,8 @@ class Comparison:
     verdict (n,): AGREE, OCCLUDED or CONTRADICT, or UNKNOWN beside pixels without a source. Where
     the answer is a smooth patch too, ``fine`` is true, ``asked`` and ``found`` are the patches, and
     ``residual`` (n,) is how far the one's centre lies in front of the other's plane, in units of
-    ``footprint`` (n,), metres.
+    ``footprint`` (n,), metres; ``expected`` (n,) is the standard deviation of that, in the same
+    units, by how well the planes fit and what the files resolve.
     """
 
     verdict: NDArray[np.int64]
@@ -188,6 +189,7 @@ class Comparison:
     found: Patches
     residual: Array
     footprint: Array
+    expected: Array
 
     def measuring(self) -> "Comparison | None":
         """Return the part that says how far the surfaces are apart; None if it is too small."""
@@ -239,8 +241,12 @@ def compare(asked: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison:
     verdict[rough[farthest < expected - slack]] = OCCLUDED
     verdict[rough[nearest > expected + slack]] = CONTRADICT
     verdict[rough[np.isnan(nearest)]] = UNKNOWN
-    scaled = residual / np.maximum(footprint, np.finfo(np.float64).tiny)
-    return Comparison(verdict, smooth, asked, found, scaled, footprint)
+    # Of an error that may be anything up to its bound, as a number's last digit.
+    resolved = (asked.error**2 + found.error**2) / 12
+    finest = TOLERANCE_FOOTPRINTS * footprint / TOLERANCE_DEVIATIONS
+    expected = np.sqrt(deviation**2 + finest**2 + resolved)
+    unit = np.maximum(footprint, np.finfo(np.float64).tiny)
+    return Comparison(verdict, smooth, asked, found, residual / unit, footprint, expected / unit)
 
 
 def _recorded_range(
@@ -257,25 +263,31 @@ def _recorded_range(
     return distance.min(axis=1), distance.max(axis=1)
 
 
-def displacement(measured: Comparison, camera: Camera) -> float:
+def displacement(measured: Comparison, camera: Camera) -> tuple[float, float]:
     """Return by how many pixels the asked patches must move to lie on the found ones.
 
     The rigid motion about ``camera``, which found them, that makes the residuals least, in the
-    directions that they determine; its root mean square over the points, in pixel footprints.
+    directions that they determine; its root mean square over the points, in pixel footprints. The
+    second value is the root mean square that residuals as large as expected lead to.
     """
-    residual, normals = measured.residual, measured.found.normals
-    footprint = measured.footprint[:, np.newaxis]
-    arms = (measured.asked.points - camera.position) / footprint
+    residual, footprint = measured.residual, measured.footprint
+    arms = (measured.asked.points - camera.position) / footprint[:, np.newaxis]
     # Unknowns of like size: both in pixels, the rotation as seen at the median distance.
     arms /= np.median(np.linalg.norm(arms, axis=1))
-    size = np.median(footprint)
-    rows = np.hstack([normals * size / footprint, np.cross(arms, normals)])
+    # How each point moves with the six unknowns: (n, 3, 6).
+    across = np.eye(3) * (np.median(footprint) / footprint)[:, np.newaxis, np.newaxis]
+    around = np.cross(np.eye(3), arms[:, np.newaxis]).swapaxes(1, 2)
+    moves = np.concatenate([across, around], axis=2)
+    rows = np.einsum("ni,nij->nj", measured.found.normals, moves)
     motion = np.zeros(6)
     for _ in range(5):
         root = np.sqrt(_huber(residual + rows @ motion))
-        motion = np.linalg.lstsq(rows * root[:, np.newaxis], -residual * root, rcond=0.1)[0]
-    shifts = motion[:3] * size / footprint + np.cross(motion[3:], arms)
-    return float(np.sqrt((shifts**2).sum(axis=1).mean()))
+        solution = np.linalg.pinv(rows * root[:, np.newaxis], rcond=0.1) * root
+        motion = -solution @ residual
+    spread = solution * measured.expected
+    found = np.einsum("nij,jk,nik->n", moves, np.outer(motion, motion), moves)
+    expected = np.einsum("nij,jk,nik->n", moves, spread @ spread.T, moves)
+    return float(np.sqrt(found.mean())), float(np.sqrt(expected.mean()))
 
 
 def _huber(residual: Array) -> Array:
@@ -349,14 +361,16 @@ def view_pairs(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tu
 class Answer:
     """What one view says of another's patches, or two of each other's, in a few numbers.
 
-    Counts of points by verdict; ``displacement`` as that function gives it, in pixels, or None;
-    ``moments`` (3, 3) of the ``measured`` points that `scales` uses.
+    Counts of points by verdict; ``displacement`` and what of it is ``expected`` where nothing is
+    wrong, as that function gives them, in pixels, or None; ``moments`` (3, 3) of the ``measured``
+    points that `scales` uses.
     """
 
     agree: int = 0
     occluded: int = 0
     contradict: int = 0
     displacement: float | None = None
+    expected: float | None = None
     moments: Array = field(default_factory=lambda: np.zeros((3, 3)))
     measured: int = 0
 
@@ -367,15 +381,20 @@ class Answer:
         return self.contradict / decided if decided >= FEWEST_POINTS else None
 
     def __add__(self, other: "Answer") -> "Answer":
-        known = [x.displacement for x in (self, other) if x.displacement is not None]
         return Answer(
             self.agree + other.agree,
             self.occluded + other.occluded,
             self.contradict + other.contradict,
-            fmean(known) if known else None,
+            _mean(self.displacement, other.displacement),
+            _mean(self.expected, other.expected),
             self.moments + other.moments,
             self.measured + other.measured,
         )
+
+
+def _mean(*values: float | None) -> float | None:
+    known = [value for value in values if value is not None]
+    return fmean(known) if known else None
 
 
 NOTHING = Answer()
@@ -390,9 +409,11 @@ def ask(patches: Patches, asking: Camera, answering: Camera, depth: NDArray[Any]
     measured = comparison.measuring()
     if measured is None:
         return answer
+    moved, expected = displacement(measured, answering)
     return replace(
         answer,
-        displacement=displacement(measured, answering),
+        displacement=moved,
+        expected=expected,
         moments=scale_moments(measured, asking, answering),
         measured=len(measured.residual),
     )
