@@ -204,6 +204,24 @@ def test_text_that_is_no_scene_is_told_so(text, expected, tmp_path):
     assert "\n" not in str(caught.value)
 
 
+def test_a_rig_can_take_over_another_rigs_settings(tmp_path):
+    path = tmp_path / "merged.yaml"
+    path.write_text(
+        "scene: {builder: room}\n"
+        "render: {samples: 1}\n"
+        "rigs:\n"
+        "  near: &near\n"
+        "    type: sphere\n"
+        "    subdivisions: 1\n"
+        "    size: 1\n"
+        "    camera: {lens: equidistant, fov: 180, resolution: [8, 8]}\n"
+        "  far: {<<: *near, size: 3}\n"
+    )
+    near, far = config.read_scene(path).rigs.values()
+    assert (near.size, far.size) == (1, 3)
+    assert near.camera == far.camera
+
+
 def test_defaults_and_limits_are_applied(tmp_path, monkeypatch):
     (tmp_path / "right.yaml").write_text(yaml.safe_dump(RIGHT, sort_keys=False))
     monkeypatch.setattr(config, "SCENES", tmp_path)
