@@ -1027,8 +1027,12 @@ def test_strays_are_moved_before_they_make_a_dataset_invalid(
     shutil.copy(folder / NAME, folder / "former" / NAME)
     shutil.copy(folder / "exr" / f"{names(dataset)[0]}.exr", folder / "exr" / "view_9999f.exr")
     before = len(list((folder / "exr").iterdir()))
+    (folder / "report").mkdir()
+    for name in ("index.html", "panorama.png"):
+        (folder / "report" / name).write_text("of an older program")
     assert not check(validate(folder), "files").passed
-    assert files.remove_strays(folder, [], MANIFESTS, Path("removed")) == before + 1
+    assert files.remove_strays(folder, [], MANIFESTS, Path("removed")) == before + 2
+    assert [path.name for path in (folder / "report").iterdir()] == ["index.html"]
     assert check(validate(folder), "files").passed
     assert not (folder / "former").exists()
     assert Path("removed/room/sphere/exr/view_9999f.exr").is_file()

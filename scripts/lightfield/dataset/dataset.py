@@ -52,9 +52,11 @@ SOURCE_KEYS = {"builder", "parameters", "scene_name", "view_layers", "frame"}
 # Parts of a split that a rig may be as a whole beside one that trains.
 TESTED_WITH = ("validation", "test")
 
-# Pictures of a report, and those of them that are plots, which are .svg too.
+# Pictures of a report, those of them that are plots, which are .svg too, and all its files.
 PICTURES = ("overview", "contact_sheet", "rig", "depth", "noise")
 PLOTS = ("rig", "depth", "noise")
+PICTURE_FILES = (*(f"{name}.png" for name in PICTURES), *(f"{name}.svg" for name in PLOTS))
+REPORT_FILES = (*PICTURE_FILES, "costs.json", "index.html")
 
 
 @dataclass(frozen=True)
@@ -362,8 +364,7 @@ class Dataset:
 
     @property
     def pictures(self) -> list[str]:
-        names = [*(f"{name}.png" for name in PICTURES), *(f"{name}.svg" for name in PLOTS)]
-        return [f"{self.folder}/report/{name}" for name in names]
+        return [f"{self.folder}/report/{name}" for name in PICTURE_FILES]
 
     @property
     def panorama(self) -> str | list[str]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, read_json, set_aside, sha256
+from lightfield.dataset.dataset import REPORT_FILES
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, NAMES, Pass
 from lightfield.geometry import rotations
@@ -292,8 +293,9 @@ def remove_strays(
 ) -> int:
     """Move the files that are not the dataset's own into ``folder``; return how many they were.
 
-    Such are the views of a rig that had more cameras, and reprojections that there were. Nothing
-    is moved of a dataset with a lightfield.json or an export that cannot be understood.
+    Such are the views of a rig that had more cameras, reprojections that there were, and what an
+    older program drew for the report. Nothing is moved of a dataset with a lightfield.json or an
+    export that cannot be understood.
     """
     sets, _ = read_sets(dataset, reprojections)
     if len(sets) <= len(reprojections):
@@ -305,6 +307,9 @@ def remove_strays(
         return 0
     known = {*lists, *names(sets), *(file.path for file in [*views, *extras])}
     _, strays = _sorted_out(dataset, sets, known)
+    # Hidden is what is being drawn at this moment.
+    drawn = {path.name for path in (dataset / REPORT).glob("[!.]*")}
+    strays += [f"{REPORT}/{name}" for name in sorted(drawn - {*REPORT_FILES})]
     for name in strays:
         set_aside(dataset / name, folder)
         for parent in (dataset / name).parents:
