@@ -2,20 +2,22 @@
 import sys
 from pathlib import Path
 
-sys.path.insert(0, f"{workflow.basedir}/scripts")
+# Of this workflow, which may be a module of another one.
+FOLDER = Path(workflow.current_basedir)
+sys.path.insert(0, str(FOLDER / "scripts"))
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.config import read_config
 
-# What the command line says; config.yaml fills in the rest.
+# What the command line says, or the workflow whose module this is; config.yaml fills in the rest.
 GIVEN = set(config)
 
 
 # The defaults, and what a user's own folder says instead.
-configfile: f"{workflow.basedir}/config.yaml"
+configfile: f"{FOLDER}/config.yaml"
 
 
-if Path("config.yaml").exists() and Path.cwd() != Path(workflow.basedir):
+if Path("config.yaml").exists() and Path.cwd() != FOLDER:
 
     # Snakemake loads it without a limit.
     try:
@@ -24,6 +26,11 @@ if Path("config.yaml").exists() and Path.cwd() != Path(workflow.basedir):
         sys.exit(f"error: {error}")
 
     configfile: "config.yaml"
+
+
+# Snakemake reads no file for a module that is given its configuration.
+for key, value in read_config(FOLDER / "config.yaml").items():
+    config.setdefault(key, value)
 
 
 report: "captions/workflow.rst"
@@ -99,22 +106,6 @@ rule smoke:
     input:
         [[*dataset.files, *dataset.intermediates] for dataset in SMOKE],
         whole(SMOKE),
-
-
-# What its jobs are is not known before: it reads what is there, also of an unfinished build.
-rule verify:
-    log:
-        log_of("verify"),
-    conda:
-        ENVIRONMENT
-    params:
-        folders=shlex.join(dataset.folder for dataset in CHOSEN),
-        work=WORK,
-    message:
-        "Checking every byte of the chosen datasets"
-    shell:
-        f"python {SCRIPTS}/verify.py"
-        " {params.folders} --work {params.work} > {log} 2>&1"
 
 
 rule package:

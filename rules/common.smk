@@ -12,11 +12,11 @@ from importlib.metadata import version
 from pathlib import Path
 
 # From the folder that Snakemake works in, which may be a user's own.
-SCRIPTS = os.path.relpath(Path(workflow.current_basedir).parent / "scripts")
-BENCHMARKS = os.path.relpath(Path(workflow.current_basedir).parent / "benchmarks")
+SCRIPTS = os.path.relpath(FOLDER / "scripts")
+BENCHMARKS = os.path.relpath(FOLDER / "benchmarks")
 
-from lightfield.core import leftovers, room
-from lightfield.core.failures import failure_report
+from lightfield.core import leftovers, processors, room
+from lightfield.core.failures import batch_log, cause, failure_report, is_newer
 from lightfield.core.files import read_json, set_aside
 from lightfield.core.gpus import visible
 from lightfield.core.memory import available
@@ -44,6 +44,11 @@ shell.prefix(
 # The rigs that config.yaml names are those of the scene that it names.
 if "scenes" in GIVEN and "rigs" not in GIVEN:
     config["rigs"] = "all"
+
+# Locally, without --cores and --jobs, all that this process may use.
+if (workflow.resource_settings.cores, workflow.resource_settings.nodes) == (None, None):
+    workflow.resource_settings.cores = processors.available()
+    workflow.register_resource("_cores", processors.available())
 
 # Several for each job that runs at once, so that none waits long for the last.
 config.setdefault(
@@ -112,26 +117,22 @@ wildcard_constraints:
     end=r"\d+",
 
 
-# Jobs of seconds: too short to queue for on a cluster, they run where Snakemake does.
-localrules:
-    check_blend,
-    checksums,
-    costs,
-    export_reprojection_to_instant_ngp,
-    export_views_to_instant_ngp,
-    figures,
-    index,
-    lens_map,
-    lens_maps,
-    lightfield,
-    page,
-    panorama_lightfield,
-    plan,
-    probe_cameras,
-    reprojected_lightfield,
-    splits,
-    rig_tables,
-    status,
+# Where these rules are a module of another workflow, that may have given them other names.
+RENDER, RENDER_PANORAMA, CALIBRATE, CHECK_GPU = map(
+    workflow.modifier.modify_rulename,
+    ("render", "render_panorama", "calibrate", "check_gpu"),
+)
+
+
+def own(jobs):
+    """Return those jobs that are of these rules: another workflow may have some of its own."""
+    jobs = [job for job in jobs if not job.is_group()]
+    return [job for job in jobs if Path(job.rule.snakefile).is_relative_to(FOLDER)]
+
+
+def needed_jobs():
+    """Return the jobs of these rules that this run needs, those that are finished too."""
+    return own(workflow.dag.needrun_jobs(exclude_finished=False))
 
 
 def log_of(job):
@@ -182,7 +183,7 @@ def note_sums():
     if STORE:
         return
     made, others = set(), set()
-    for job in workflow.dag.jobs:
+    for job in own(workflow.dag.jobs):
         files = {*map(str, job.output), *([job.benchmark] if job.benchmark else [])}
         for path in map(Path, job.output):
             # A shard's log of checksums and journal lie beside its record.
@@ -477,7 +478,7 @@ def measurements(wildcards):
 def rebuilding(wildcards):
     """Return the command that makes a dataset, to be shown on its page."""
     dataset = dataset_of(wildcards)
-    snakefile = os.path.relpath(Path(workflow.basedir, "Snakefile"))
+    snakefile = os.path.relpath(FOLDER / "Snakefile")
     words = [] if snakefile == "Snakefile" else ["-s", snakefile]
     choice = [f"scenes={dataset.scene_name}", f"rigs={dataset.rig_name}"]
     words += ["--cores", "all", "--config", *choice, f"preset={dataset.preset}"]
@@ -656,9 +657,9 @@ def check_device():
 
     Raises `UserError`.
     """
-    jobs = list(workflow.dag.needrun_jobs())
+    jobs = needed_jobs()
     device = SETTINGS.device
-    if device == "auto" and any(job.rule.name == "check_gpu" for job in jobs):
+    if device == "auto" and any(job.rule.name == CHECK_GPU for job in jobs):
         device = "gpu"
     renders = device == "gpu" or any(job.resources.get("gpu") for job in jobs)
     if renders and workflow.local_exec:
@@ -671,7 +672,7 @@ def check_device():
 
 def check_room():
     """Compare the room on the disks with what this run writes, and warn; raises `UserError`."""
-    jobs = [job for job in workflow.dag.needrun_jobs() if job.rule.name == "render"]
+    jobs = [job for job in needed_jobs() if job.rule.name == RENDER]
     datasets = {d.folder: d for d in (dataset_of(job.wildcards) for job in jobs)}
     needs = [(Path(RESULTS), d.missing_bytes) for d in datasets.values()]
     # A built scene, at most.
@@ -698,17 +699,30 @@ def remove_leftovers():
 
 
 def failed_jobs():
-    """Return rule and log of each job that failed; of a group's, of those that began in vain."""
-    failed = [job for job in workflow.scheduler.failed if not job.is_group()]
-    failed += [
-        job
-        for group in workflow.scheduler.failed
-        if group.is_group()
-        for job in group.jobs
-        if Path(job.log[0]).exists() and not all(map(os.path.exists, job.output))
-    ]
-    if STORE:
-        for job in failed:
-            name = os.path.relpath(job.log[0], stored(WORK))
+    """Return rule and log of each job that failed; of a group's, of those that said why.
+
+    Of a job that said nothing, as one that never began, it is the batch system's log, if there is.
+    """
+    found = []
+    # Clocks of nodes differ.
+    start = workflow.start_time.timestamp() - 5
+    for failed in workflow.scheduler.failed:
+        jobs = own([failed])
+        if failed.is_group():
+            jobs = [
+                job
+                for job in own(failed.jobs)
+                if not all(map(os.path.exists, job.output))
+            ]
+        logs = [(job.rule.name, Path(job.log[0])) for job in jobs]
+        for _, log in logs if STORE else ():
+            name = os.path.relpath(log, stored(WORK))
             ViewStore(STORE).bring(f"{WORK}/{name}")
-    return sorted((job.rule.name, Path(job.log[0])) for job in failed)
+        spoke = [
+            (name, log) for name, log in logs if is_newer(log, start) and cause(log)
+        ]
+        if logs and not spoke:
+            name, log = min(logs)
+            spoke = [(name, batch_log(failed.name, start) or log)]
+        found += spoke
+    return sorted(found)

@@ -13,6 +13,7 @@ rule costs:
         f"{DATASET}/report/costs.json",
     log:
         log_of("{scene}/{rig}/costs"),
+    localrule: True
     conda:
         ENVIRONMENT
     params:
@@ -47,6 +48,7 @@ rule costs:
 rule status:
     log:
         log_of("status"),
+    localrule: True
     conda:
         ENVIRONMENT
     params:

@@ -22,16 +22,17 @@ PHASES = {
 
 def rendering(job):
     """Return how many views of a dataset a job renders, and for how long, in seconds of a core."""
-    match job.rule.name:
-        case "render":
-            views = int(job.wildcards.end) - int(job.wildcards.first)
-            seconds = dataset_of(job.wildcards).expected_view[0]
-            return views, START_UP_SECONDS + views * seconds
-        case "render_panorama":
-            return 0, dataset_of(job.wildcards).panorama_seconds
-        case "calibrate":
-            samples = first_dataset(job.wildcards.scene).planned_samples
-            return 0, calibration_seconds(samples)
+    if job.rule.name == RENDER:
+        views = int(job.wildcards.end) - int(job.wildcards.first)
+        seconds = dataset_of(job.wildcards).expected_view[0]
+        return views, START_UP_SECONDS + views * seconds
+    if job.rule.name == RENDER_PANORAMA:
+        return 0, dataset_of(job.wildcards).panorama_seconds
+    if job.rule.name == CALIBRATE:
+        dataset = first_dataset(job.wildcards.scene)
+        target, most = map(dataset.render.get, ("target_error", "most_samples"))
+        size = min(dataset.rig.camera.resolution)
+        return 0, calibration_seconds(target, size, most)
     return 0, 0.0
 
 
@@ -91,7 +92,7 @@ def begin_display():
         if not isinstance(handler, logging.FileHandler):
             handler.addFilter(passes)
     # What has no output is asked for to be read, and takes seconds.
-    jobs = [job for job in workflow.dag.needrun_jobs() if job.log and job.output]
+    jobs = [job for job in needed_jobs() if job.log and job.output]
     if jobs and not is_quiet_about("ALL"):
         announce_calibrations(jobs)
         TASKS.update({job: task_of(job) for job in jobs})
@@ -104,11 +105,11 @@ def begin_display():
 def announce_calibrations(jobs):
     """Print what each calibration is expected to cost, and what the datasets that it is for."""
     for job in jobs:
-        if job.rule.name == "calibrate":
+        if job.rule.name == CALIBRATE:
             datasets = [
                 rendering(other)[1]
                 for other in jobs
-                if other.rule.name == "render"
+                if other.rule.name == RENDER
                 and other.wildcards.scene == job.wildcards.scene
             ]
             print(
@@ -122,7 +123,7 @@ def announce_calibrations(jobs):
 def end_display():
     """Show no more how far the run is, but what jobs without output say: they are asked to."""
     DISPLAY.stop()
-    for job in workflow.dag.needrun_jobs(exclude_finished=False):
+    for job in needed_jobs():
         if job.log and not job.output and Path(job.log[0]).exists():
             print(Path(job.log[0]).read_text(), end="", flush=True)
 
@@ -142,11 +143,11 @@ def print_forecast():
     if not (workflow.dryrun and workflow.scheduler and len(workflow.dag)):
         return
     works = {}
-    for job in workflow.dag.needrun_jobs(exclude_finished=False):
+    for job in needed_jobs():
         views, seconds = rendering(job)
         if seconds:
             name, size = f"calibration of {job.wildcards.scene}", 0.0
-            if job.rule.name != "calibrate":
+            if job.rule.name != CALIBRATE:
                 dataset = dataset_of(job.wildcards)
                 name = f"{dataset.scene_folder}/{dataset.rig_name}"
                 size = views * dataset.expected_view_bytes

@@ -10,6 +10,7 @@ rule probe_cameras:
         f"{WORK}/{{scene}}/probes.json",
     log:
         log_of("{scene}/probe_cameras"),
+    localrule: True
     conda:
         ENVIRONMENT
     params:

@@ -12,6 +12,7 @@ rule export_views_to_instant_ngp:
         log_of("{scene}/{rig}/export_instant_ngp"),
     benchmark:
         times_of("{scene}/{rig}/export/views")
+    localrule: True
     conda:
         ENVIRONMENT
     params:
@@ -37,6 +38,7 @@ rule export_reprojection_to_instant_ngp:
         log_of("{scene}/{rig}/{reprojection}/export_instant_ngp"),
     benchmark:
         times_of("{scene}/{rig}/export/{reprojection}")
+    localrule: True
     conda:
         ENVIRONMENT
     params:

@@ -5,11 +5,12 @@
 rule rig_tables:
     input:
         [
-            f"configs/scenes/{name}.yaml"
+            os.path.relpath(scene_path(name))
             for name in dict.fromkeys(d.scene_name for d in CHOSEN)
         ],
     log:
         log_of("rig_tables"),
+    localrule: True
     conda:
         ENVIRONMENT
     params:
@@ -56,6 +57,7 @@ rule plan:
         [probe for _, _, probe in probes()],
     log:
         log_of("plan"),
+    localrule: True
     conda:
         ENVIRONMENT
     params:

@@ -11,6 +11,7 @@ rule panorama_lightfield:
         log_of("{scene}/{rig}/panorama/lightfield"),
     benchmark:
         times_of("{scene}/{rig}/panorama/lightfield")
+    localrule: True
     conda:
         ENVIRONMENT
     params:
@@ -81,6 +82,7 @@ rule figures:
         log_of("{scene}/{rig}/figures"),
     benchmark:
         times_of("{scene}/{rig}/report/figures")
+    localrule: True
     conda:
         ENVIRONMENT
     params:
@@ -108,6 +110,7 @@ rule page:
         log_of("{scene}/{rig}/page"),
     benchmark:
         times_of("{scene}/{rig}/report/page")
+    localrule: True
     conda:
         ENVIRONMENT
     params:
@@ -140,6 +143,7 @@ rule index:
         f"{RESULTS}/index.html",
     log:
         log_of("index"),
+    localrule: True
     conda:
         ENVIRONMENT
     params:

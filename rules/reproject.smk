@@ -10,6 +10,7 @@ rule reprojected_lightfield:
         log_of("{scene}/{rig}/{reprojection}/lightfield"),
     benchmark:
         times_of("{scene}/{rig}/{reprojection}/lightfield")
+    localrule: True
     conda:
         ENVIRONMENT
     params:
@@ -35,6 +36,7 @@ rule lens_map:
         log_of("{scene}/{rig}/{reprojection}/lens_map"),
     benchmark:
         times_of("{scene}/{rig}/{reprojection}/lens_map")
+    localrule: True
     conda:
         ENVIRONMENT
     params:

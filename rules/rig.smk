@@ -43,6 +43,7 @@ rule lightfield:
         log_of("{scene}/{rig}/lightfield"),
     benchmark:
         times_of("{scene}/{rig}/cameras/lightfield")
+    localrule: True
     conda:
         ENVIRONMENT
     params:
@@ -95,6 +96,7 @@ rule splits:
         f"{RESULTS}/{{scene}}/{SPLITS}",
     log:
         log_of("{scene}/splits"),
+    localrule: True
     conda:
         ENVIRONMENT
     message:

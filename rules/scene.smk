@@ -37,6 +37,7 @@ rule check_blend:
         log_of("{name}/check_blend"),
     benchmark:
         times_of("{name}/check_blend")
+    localrule: True
     conda:
         ENVIRONMENT
     params:

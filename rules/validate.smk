@@ -47,6 +47,7 @@ rule checksums:
         f"{DATASET}/sha256sums.txt",
     log:
         log_of("{scene}/{rig}/checksums"),
+    localrule: True
     conda:
         ENVIRONMENT
     message:
@@ -55,3 +56,19 @@ rule checksums:
         f"python {SCRIPTS}/publish_checksums.py"
         " --validation {input.validation} --page {input.page}"
         " --sums {input.sums} --output {output} > {log} 2>&1"
+
+
+# What its jobs are is not known before: it reads what is there, also of an unfinished build.
+rule verify:
+    log:
+        log_of("verify"),
+    conda:
+        ENVIRONMENT
+    params:
+        folders=shlex.join(dataset.folder for dataset in CHOSEN),
+        work=WORK,
+    message:
+        "Checking every byte of the chosen datasets"
+    shell:
+        f"python {SCRIPTS}/verify.py"
+        " {params.folders} --work {params.work} > {log} 2>&1"
