@@ -118,8 +118,9 @@ def test_what_calibration_will_cost_is_said_beforehand(tmp_path):
         checkout(tmp_path, aimed=SCENE.format(render="target_error: 0.02")), "-n", *ASKED
     )
     table = told.stdout.split("to render")[1]
-    # 16 windows of 64², 14 times 256 samples of 6 µs, and a start.
-    assert re.search(r"^calibration of aimed +0\.39 +$", table, re.M), table
+    # 16 windows of 24²: two references of 256 samples, which suffice for 50, 85 plain ones and 125
+    # others, 6 µs each; 41 renders of 70 ms; and a start.
+    assert re.search(r"^calibration of aimed +0\.025 +$", table, re.M), table
 
 
 class SimulatedBench:

@@ -173,6 +173,27 @@ def test_a_job_that_fails_on_a_cluster_is_named_at_the_end(failing, groups):
     assert terminal.endswith(last_words(failing, "render")), terminal
 
 
+@pytest.mark.parametrize(
+    ("groups", "name"), [([], "render"), (["--groups", "render=shard", "reproject=shard"], "shard")]
+)
+@pytest.mark.slow
+def test_of_a_job_that_never_began_the_batch_systems_log_is_named(failing, groups, name):
+    submit = failing.folder / "submit.sh"
+    said = "slurmstepd: error: execve(): python: No such file or directory"
+    submit.write_text(f"echo '{said}' > .snakemake/{name}-17.log; echo failed\n")
+    earlier = failing.folder / failing.jobs["render"]["log"][0]
+    earlier.parent.mkdir(parents=True, exist_ok=True)
+    earlier.write_text("error: of an earlier run\n")
+    os.utime(earlier, (WHEN, WHEN))
+    options = [
+        *("--executor", "cluster-generic", "--jobs", "1", "--cluster-generic-status-cmd", "echo"),
+        *("--cluster-generic-submit-cmd", "bash submit.sh", "--seconds-between-status-checks", "1"),
+        *groups,
+    ]
+    terminal = failing.fail("render", options=options)
+    assert terminal.endswith(f"render failed: {said}\n  log: .snakemake/{name}-17.log\n"), terminal
+
+
 def test_the_cause_is_the_last_error_or_else_the_last_line(tmp_path):
     log = tmp_path / "log"
     assert cause(log) is None

@@ -49,3 +49,20 @@ def failure_report(jobs: Iterable[tuple[str, Path]]) -> str:
         + (f" (and {len(paths) - 1} more with the same cause)" if paths[1:] else "")
         for (rule, why), paths in logs.items()
     )
+
+
+def is_newer(path: Path, time: float) -> bool:
+    """Return whether there is a file that was written since ``time``, in seconds since 1970."""
+    return path.is_file() and path.stat().st_mtime >= time
+
+
+def batch_log(name: str, since: float) -> Path | None:
+    """Return the newest log that a batch system wrote of a job or group of this name, if any.
+
+    It is looked for where the profiles let Slurm write it, and is no older than ``since``, in
+    seconds since 1970.
+    """
+    folder = Path(".snakemake")
+    logs = [*folder.glob(f"slurm_logs/*_{name}/**/*.log"), *folder.glob(f"{name}-*.log")]
+    found = [log for log in logs if is_newer(log, since)]
+    return max(found, key=lambda log: log.stat().st_mtime, default=None)

@@ -8,7 +8,18 @@ from typing import Any
 
 from lightfield.core import processors
 from lightfield.dataset.dataset import SECONDS_PER_SAMPLE, START_UP_SECONDS
+from lightfield.measurement.calibration import (
+    FEWEST_SEEDS,
+    MOST_SEEDS,
+    PLAIN_SAMPLES,
+    REFERENCE_PART,
+    REFERENCE_SAMPLES,
+)
 from lightfield.measurement.sampling import PROBES, WINDOW_SIZE, standard_error
+
+# Measured in the courtyard: how many renders a calibration's search makes of each window, how many
+# of the samples that the target needs, and what a render of a window takes beside its samples.
+SEARCH_RENDERS, SEARCH_PART, WINDOW_SECONDS = 9, 2.5, 0.07
 
 HEAD = "| dataset | views | resolution | samples | s a view | hours | GB |"
 
@@ -76,14 +87,22 @@ def forecast(works: Sequence[Work]) -> str:
     return "\n".join([head, *rows, "Expected from pixels and samples, or from probes: see `plan`."])
 
 
-def calibration_seconds(samples: int) -> float:
-    """Estimate how long one core calibrates where ``samples`` a pixel would reach the target.
+def calibration_seconds(target: float, size: int, most: int | None = None) -> float:
+    """Estimate how long one core calibrates for a ``target`` error with views of ``size``².
 
-    A reference takes five times as many, and the search about twice as many; then both again, for
-    the views that are held out.
+    Path tracing of N samples a pixel has an error of about 1 / N (0.4 / N in the courtyard, 1.4 / N
+    in the barbershop, 2.6 / N in the garden), and a preset may allow no more than ``most`` samples.
     """
-    pixels = PROBES * WINDOW_SIZE**2
-    return START_UP_SECONDS + pixels * 2 * (5 + 2) * samples * SECONDS_PER_SAMPLE
+    needed, seeds = 1 / target, FEWEST_SEEDS
+    while seeds < MOST_SEEDS and seeds * REFERENCE_SAMPLES * REFERENCE_PART < needed:
+        seeds *= 2
+    # References for the windows and for those held out, plain path tracing, and what else is tried.
+    tried = sum(PLAIN_SAMPLES) + SEARCH_PART * min(needed, most or needed)
+    samples = 2 * seeds * REFERENCE_SAMPLES + tried
+    renders = 2 * seeds + SEARCH_RENDERS
+    pixels = min(size, WINDOW_SIZE) ** 2
+    window = renders * WINDOW_SECONDS + pixels * samples * SECONDS_PER_SAMPLE
+    return START_UP_SECONDS + PROBES * window
 
 
 def _figure(value: float) -> str:
