@@ -174,20 +174,21 @@ def test_a_job_that_fails_on_a_cluster_is_named_at_the_end(failing, groups):
 
 
 @pytest.mark.parametrize(
-    ("groups", "name"), [([], "render"), (["--groups", "render=shard", "reproject=shard"], "shard")]
+    ("groups", "name"), [([], "render"), (["--groups", "render=shard"], "shard_render")]
 )
 @pytest.mark.slow
 def test_of_a_job_that_never_began_the_batch_systems_log_is_named(failing, groups, name):
     submit = failing.folder / "submit.sh"
     said = "slurmstepd: error: execve(): python: No such file or directory"
-    submit.write_text(f"echo '{said}' > .snakemake/{name}-17.log; echo failed\n")
+    submit.write_text(f"echo '{said}' > .snakemake/$1-17.log; echo failed\n")
     earlier = failing.folder / failing.jobs["render"]["log"][0]
     earlier.parent.mkdir(parents=True, exist_ok=True)
     earlier.write_text("error: of an earlier run\n")
     os.utime(earlier, (WHEN, WHEN))
     options = [
         *("--executor", "cluster-generic", "--jobs", "1", "--cluster-generic-status-cmd", "echo"),
-        *("--cluster-generic-submit-cmd", "bash submit.sh", "--seconds-between-status-checks", "1"),
+        *("--cluster-generic-submit-cmd", "bash submit.sh {name}"),
+        *("--seconds-between-status-checks", "1"),
         *groups,
     ]
     terminal = failing.fail("render", options=options)
