@@ -370,7 +370,8 @@ def avoided_nodes(wildcards, attempt):
         bounds = (wildcards.first, wildcards.end) if attempt > 1 else (0, 0)
         nodes = failing_nodes(dataset.record("render", *bounds), attempt)
         words += [f"--exclude={','.join(nodes)}"] if nodes else []
-    return " ".join(words) or None
+    # Of a group's jobs Slurm's executor takes no None.
+    return " ".join(words)
 
 
 @cache
