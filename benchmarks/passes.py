@@ -127,7 +127,7 @@ def _figures(content: LightField, folder: Path) -> dict[str, Any]:
     total = np.sum([found[name].astype(np.float64) for name in PARTS_OF_LIGHT], axis=0)
     rays = content.lens.pixel_rays()
     seen = np.isfinite(rays[..., 0])
-    inside = binary_erosion(seen, iterations=2, border_value=1)
+    inside = binary_erosion(seen, np.ones((3, 3)), iterations=2, border_value=1)
     different = np.abs(total - colour) / np.maximum(colour, 1e-3)
     objects = found["object"][..., 0]
     numbers = json.loads((folder / "object" / "names.json").read_text())
