@@ -261,8 +261,8 @@ def test_cube_map_faces_look_along_six_axes_of_the_camera() -> None:
     ("kind", "cameras", "expected"),
     [
         ("plane", [7, 5], [(x, 0, 0) for x in np.linspace(-1, 1, 7)]),
-        ("cuboid", [5, 2, 3], [(x, 1, 0) for x in np.linspace(-1, 1, 5)]),
-        ("cuboid", [2, 5, 3], [(-1, y, 0) for y in np.linspace(-1, 1, 5)]),
+        ("cuboid", [5, 2, 5], [(x, 1, 0) for x in np.linspace(-1, 1, 5)]),
+        ("cuboid", [2, 5, 5], [(-1, y, 0) for y in np.linspace(-1, 1, 5)]),
         ("cylinder", [4, 3], [(0, 1, 0), (1, 0, 0), (0, -1, 0), (-1, 0, 0)]),
     ],
 )
