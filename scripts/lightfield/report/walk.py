@@ -76,7 +76,8 @@ def _direction(points: Array) -> Array:
 def _bounds(places: Array) -> Array:
     """Return the planes (n, 4) around all places (m, 3): their hull, or a box where it is flat."""
     try:
-        return np.unique(np.round(ConvexHull(places).equations, 9), axis=0)
+        planes: Array = np.unique(np.round(ConvexHull(places).equations, 9), axis=0)
+        return planes
     except QhullError:
         low, high = places.min(axis=0), places.max(axis=0)
         slack = 0.1 * max(float(np.linalg.norm(high - low)), 0.1)
