@@ -90,6 +90,13 @@ def test_a_fault_in_a_copy_is_found_without_the_folder_of_work(copy):
         assert faults([dataset], work=None).keys() == {str(path) for path in chosen}
 
 
+def test_a_name_that_leaves_the_dataset_is_none_of_its_files(copy):
+    with Path(copy[0].folder, "sha256sums.txt").open("a") as sums:
+        for name in ("../outside.txt", "exr/../../outside.txt", "/outside.txt", ""):
+            sums.write(f"{'0' * 64}  {name}\n")
+    assert faults(copy[:1], work=None) == {}
+
+
 def test_a_damaged_ledger_is_named_and_noted_anew(copy):
     path = Path("work/sums.json")
     path.write_text(path.read_text().replace("0", "1", 1))

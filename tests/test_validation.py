@@ -388,10 +388,12 @@ def test_swapped_views_are_both_named(dataset: Path) -> None:
     assert sorted(check(result, "geometry").views) == [right_names[2], right_names[7]]
 
 
-@pytest.mark.parametrize("fov", [185.4, 174.6])
-def test_small_error_of_the_lens_shows_in_all_pairs_together(fov: float, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("fov", "center"), [(185.4, [0, 0, 0]), (174.6, [0.6, -1, 0.4])])
+def test_small_error_of_the_lens_shows_in_all_pairs_together(
+    fov: float, center: list[float], tmp_path: Path
+) -> None:
     # Parallel views near each other hardly disagree under a lens 3 % wrong: only the mean tells.
-    rig = {"type": "plane", "cameras": [3, 3], "size": 0.5}
+    rig = {"type": "plane", "cameras": [3, 3], "size": 0.5, "center": center}
     dataset = make_dataset(tmp_path / "room" / "plane", rig, FISHEYE, "distance")
     relist(dataset, recamera({"fov": fov}))
     found = check(validate(dataset), "geometry")
@@ -399,6 +401,15 @@ def test_small_error_of_the_lens_shows_in_all_pairs_together(fov: float, tmp_pat
     assert found.views == []
     assert len(found.problems) == 1
     assert "all angles" in found.problems[0]
+
+
+def test_what_geometry_finds_does_not_depend_on_where_the_world_begins(small_dataset: Path) -> None:
+    relist(small_dataset, recamera({"fov": 177}))
+    here = check(validate(small_dataset), "geometry").figures
+    for view in range(6):
+        relist(small_dataset, move(view, (3, -2, 1)))
+    there = check(validate(small_dataset), "geometry").figures
+    assert there == pytest.approx(here, rel=1e-3)
 
 
 def test_two_views_that_disagree_are_both_named(tmp_path: Path) -> None:
