@@ -36,6 +36,7 @@ def main() -> None:
     write_json(arguments.output, record)
     if arguments.seconds:
         write_json(arguments.seconds, seconds)
+    reached = (f"{name} {found['error']:.2g}" for name, found in record["strata"].items())
     target, error, found = (record[k] for k in ("target_error", "probe_error", "held_out_error"))
     print(
         f"note: {arguments.lightfield.parent.name}: {record['way']}, {record['choice']}: "
@@ -43,7 +44,8 @@ def main() -> None:
         f"{found:.3g} ± {record['held_out_standard_error']:.1g} on others, "
         f"wanted {target:g}; {record['times_fewer_samples']:.1f} times cheaper than plain path "
         "tracing at equal error; the worst thousandth of pixels left out, with which it is "
-        f"{record['probe_error_of_all_pixels']:.3g}"
+        f"{record['probe_error_of_all_pixels']:.3g}; by the light that pixels show most of: "
+        f"{', '.join(reached)}"
     )
     wrong = None
     if not record["reached"] and error <= target:

@@ -20,8 +20,8 @@ def main() -> None:
     parser.add_argument(
         "--probes",
         type=int,
-        default=3,
-        help="windows of views to render, beside that of the first one's neighbour (default: 3)",
+        default=1,
+        help="windows of each stratum, beside that of the first one's neighbour (default: 1)",
     )
     parser.add_argument(
         "--octaves", type=int, default=8, help="of sample counts, beginning at 1 (default: 8)"

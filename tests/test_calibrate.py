@@ -83,6 +83,10 @@ def test_other_views_confirm_the_choice(once):
     good = [c for c in record["candidates"] if c["error"] <= TARGET * 1.05]
     assert min(c["cost"] for c in good) == record["cost_samples"]
     assert max(record["references"]["own_error"]) < TARGET / 4
+    # In a room of diffuse walls that is the error of nearly all pixels.
+    reached = record["strata"]["diffuse"]
+    assert reached["area"] > 0.5 and reached["error"] == pytest.approx(TARGET, rel=0.5)
+    assert f"most of: diffuse {reached['error']:.2g}" in told.stdout
     seconds = json.loads((folder / "seconds.json").read_text())
     assert len(seconds["candidates"]) == len(record["candidates"])
 

@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.dataset.passes import PARTS_OF_LIGHT
 from lightfield.geometry import lenses
 from lightfield.imaging import images
-from lightfield.measurement import trials
+from lightfield.measurement import strata, trials
 from lightfield.measurement.metrics import Reference
+from lightfield.measurement.strata import STRATA
+from lightfield.measurement.trials import Window
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
 RIG = {"type": "plane", "cameras": [4, 1], "size": 0.3, "center": [0, 0, 1.5]}
@@ -84,6 +87,55 @@ def test_every_way_is_measured_and_the_scenes_own_is_known(content):
     assert own["relative_mse"] == same["relative_mse"]
 
 
+def test_whole_views_are_made_of_their_strata(content):
+    """The room has lamps and diffuse walls; what is no light of it is no stratum."""
+    strata = content["strata"]
+    assert set(strata) <= set(STRATA) and "diffuse" in strata and "volume" not in strata
+    total = sum(found["area"] for found in strata.values())
+    assert total == pytest.approx(1, abs=0.01)
+    for number, point in enumerate(content["points"]):
+        parts = [(found["area"], found["points"][number]) for found in strata.values()]
+        assert all(part["method"] == point["method"] for _, part in parts)
+        mean = sum(area * part["relative_mse"] for area, part in parts) / total
+        assert point["relative_mse"] == pytest.approx(mean)
+    assert -1.4 < strata["diffuse"]["slopes"]["plain"]["over_samples"]["slope"] < -0.8
+
+
+class SimulatedPilot:
+    """A pilot that costs no render: a fire in one corner of the views, before a diffuse wall."""
+
+    def __init__(self, lens):
+        self.lens, self.lightfield, self.mask = lens, lightfield(), trial_maker().mask
+
+    def pilot(self, lens):
+        return self
+
+    def render(self, window, seed, sampling):
+        shape = (window.height, window.width)
+        fire = np.zeros(shape, dtype=np.float32)
+        fire[20:26, 40:48] = 5
+        parts = {name: np.full(shape, 0.1, np.float32) for name in PARTS_OF_LIGHT}
+        parts |= {"diffuse_light": np.ones(shape, np.float32), "volume_light": fire}
+        noise = np.random.default_rng(seed).uniform(0.5, 1.5, (*shape, 1))
+        colour = np.repeat(sum(parts.values())[..., None] * noise, 3, axis=-1)
+        return trials.Trial(colour.astype(np.float32), None, 4, 1.0, "CPU", parts)
+
+
+def test_a_small_fire_gets_windows_of_its_own():
+    maker = SimulatedPilot(lenses.from_camera(CAMERA))
+    windows, areas = strata.choose(maker, 16, 2)
+    assert set(areas) == {"diffuse", "volume"}
+    circle = np.pi / 4 * 64 * 64
+    assert areas["volume"] == pytest.approx(48 / circle, rel=0.02)
+    assert len(windows) == 4
+    for window in windows[2:]:
+        assert window.x < 41 and window.x + 16 > 47 and window.y < 21 and window.y + 16 > 25
+    whole = Window(windows[0].view, 0, 0, 64, 64)
+    kinds, _ = strata.classes(maker, whole)
+    assert (kinds == STRATA.index("volume")).sum() == 48
+    assert ((kinds == strata.NONE) == ~maker.mask(whole)).all()
+
+
 def test_nothing_on_the_pareto_front_is_beaten(content):
     front = content["pareto_front"]
     assert front
@@ -116,15 +168,18 @@ def test_methods_are_compared_at_equal_time_and_at_equal_error(measured, content
     )
     assert denoised["bias"] > 0.1 * denoised["relative_mse_whole"]
     assert abs(plain["bias"]) < 0.1 * plain["relative_mse_whole"]
-    table = (measured.folder / "room.md").read_text()
-    assert all(table.count(f"| {method} |") == 2 for method in methods)
+    table = (measured.folder / "room.md").read_text().splitlines()
+    assert all(sum(row.startswith(f"| {m} |") for row in table) == 2 for m in methods)
+    assert sum(row.startswith("| diffuse |") for row in table) == 1
 
 
 def test_files_can_be_read_by_others(measured, content):
     rows = list(csv.DictReader((measured.folder / "room.csv").open()))
-    assert len(rows) == len(content["points"])
+    strata = content["strata"].values()
+    assert len(rows) == len(content["points"]) + sum(len(found["points"]) for found in strata)
     assert float(rows[0]["relative_mse"]) == content["points"][0]["relative_mse"]
-    assert sum(row["pareto"] == "True" for row in rows) == len(content["pareto_front"])
+    whole = [row for row in rows if row["stratum"] == "whole views"]
+    assert sum(row["pareto"] == "True" for row in whole) == len(content["pareto_front"])
     assert ElementTree.parse(measured.folder / "room.svg").getroot().tag.endswith("svg")
     assert images.read_image(measured.folder / "room.png").channels
 

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, replace
 from statistics import fmean
 from typing import Any
 
-from lightfield.measurement import metrics
+from lightfield.measurement import metrics, strata
 from lightfield.measurement.sampling import (
     DENOISING_SAMPLES,
     PLAIN,
@@ -246,6 +246,9 @@ def calibrate(
     windows = maker.windows(size, count)
     views = [view for view in maker.lightfield.views if view not in [w.view for w in windows]]
     others = [replace(w, view=nearest_view(views, w.view) or w.view) for w in windows]
+    # Before all others: Cycles is set up for the parts of light.
+    pilot = maker.pilot()
+    kinds = [strata.classes(pilot, window)[0] for window in (*windows, *others)]
     known = Bench(maker, windows, PROBE_SEED, target)
     search = Search(known, target, render.get("most_samples"), render.get("denoise"))
     choice = search.choose()
@@ -278,6 +281,7 @@ def calibrate(
             {"probe": window.name, "error": value}
             for window, value in zip(others, errors, strict=True)
         ],
+        "strata": by_stratum([known, held_out], kinds, choice.settings),
         "references": {
             "samples": [bench.seeds * REFERENCE_SAMPLES for bench in (known, held_out)],
             "own_error": [bench.own_error for bench in (known, held_out)],
@@ -296,6 +300,28 @@ def calibrate(
         ],
     }
     return record, seconds
+
+
+def by_stratum(
+    benches: Sequence[Bench], kinds: Sequence[strata.Classes], settings: Mapping[str, Any]
+) -> dict[str, dict[str, float]]:
+    """Return the error that a choice has in each stratum of all windows, and its part of them."""
+    places = [(bench, number) for bench in benches for number in range(len(bench.windows))]
+    total = sum(int((kind != strata.NONE).sum()) for kind in kinds)
+    found = {}
+    for number, name in enumerate(strata.STRATA):
+        errors, pixels = [], []
+        for (bench, place), kind in zip(places, kinds, strict=True):
+            reference = replace(bench.references[place], part=kind == number)
+            count = int(reference.counted.sum())
+            if count >= strata.FEWEST_PIXELS:
+                render = bench.maker.render(bench.windows[place], bench.seed, settings)
+                errors.append(metrics.relative_mse(render.colour, reference))
+                pixels.append(count)
+        if errors:
+            error = fmean(errors, weights=pixels)
+            found[name] = {"area": sum(pixels) / total, "error": error}
+    return found
 
 
 def effort_for(target: float, points: Sequence[tuple[float, float]]) -> float:

@@ -14,6 +14,7 @@ larger errors. Adaptive sampling and denoising are biased, so theirs are flatter
 """
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -23,7 +24,7 @@ from typing import Any
 from lightfield.core.files import write_csv, write_json, write_text
 from lightfield.core.progress import Progress
 from lightfield.imaging import plots
-from lightfield.measurement import metrics
+from lightfield.measurement import metrics, strata
 from lightfield.measurement.sampling import PLAIN as PLAIN_SAMPLING
 from lightfield.measurement.sampling import standard_error
 from lightfield.measurement.trials import Trial, Trials, Window, both_see, nearest_view
@@ -102,32 +103,43 @@ def measure(
     seeds: int,
     name: str,
 ) -> dict[str, Any]:
-    """Measure every way at so many ``windows`` of ``size``² pixels, and at the first's neighbour's.
+    """Measure every way at so many ``windows`` of ``size``² pixels of each stratum.
 
-    ``render`` is the scene's own. Sample counts are 1 to 2^``octaves``, each rendered with
-    ``seeds`` seeds; ``name`` is for the progress that is printed.
+    And at that of the first one's neighbour. Errors of whole views are those of the strata,
+    weighted by their parts of the views. ``render`` is the scene's own. Sample counts are 1 to
+    2^``octaves``, each rendered with ``seeds`` seeds; ``name`` is for the progress that is printed.
     """
-    chosen = maker.windows(size, windows)
+    chosen, areas = strata.choose(maker, size, windows)
     near = nearest_view(maker.lightfield.views, chosen[0].view)
     if near:
         chosen.insert(1, replace(chosen[0], view=near))
+    # Before all others: Cycles is set up for the parts of light.
+    pilot = maker.pilot()
+    kinds = [strata.classes(pilot, window)[0] for window in chosen]
     progress = Progress(len(chosen), f"{name}: references")
     made = []
     for window in chosen:
         made.append(maker.reference(window, REFERENCE_SEEDS, reference_samples // REFERENCE_SEEDS))
         progress.done()
     references = metrics.exposed_alike(made)
+    parts = parted(references, kinds, areas)
+    own = weighted({s: own_error(list(places.values())) for s, places in parts.items()}, areas)
 
     on_cpu = maker.render(chosen[0], 1, {"samples": 1}).device == "CPU"
     ways = all_ways(render, octaves, guiding=on_cpu)
     progress = Progress(len(ways) * len(chosen) * seeds, f"{name}: trials", "renders")
-    points, pairs = [], []
+    points: list[Point] = []
+    by_stratum: dict[str, list[Point]] = {stratum: [] for stratum in parts}
+    pairs = []
     for method, settings in ways:
         renders = []
         for window in chosen:
             renders.append([maker.render(window, 1 + seed, settings) for seed in range(seeds)])
             progress.done(seeds)
-        points.append(compared(method, settings, renders, references))
+        for stratum, places in parts.items():
+            inside = [renders[index] for index in places]
+            by_stratum[stratum].append(compared(method, settings, inside, list(places.values())))
+        points.append(together({s: found[-1] for s, found in by_stratum.items()}, areas, own))
         if near and references[0].depth is not None:
             apart = disagreement(maker, chosen, references, renders)
             pairs.append({"method": method, "settings": settings, **apart})
@@ -141,7 +153,15 @@ def measure(
             "device": "CPU" if on_cpu else "GPU",
             "path_guiding": "measured" if on_cpu else "Cycles has it only on processors",
         },
-        **evaluated(points, references),
+        **evaluated(points, own),
+        "strata": {
+            stratum: {
+                "area": areas[stratum],
+                "pixels": sum(int(place.counted.sum()) for place in places.values()),
+                **evaluated(by_stratum[stratum], own_error(list(places.values()))),
+            }
+            for stratum, places in parts.items()
+        },
         "neighbouring_views": pairs,
     }
 
@@ -203,12 +223,64 @@ def compared(
     )
 
 
+def parted(
+    references: Sequence[metrics.Reference],
+    kinds: Sequence[strata.Classes],
+    areas: Mapping[str, float],
+) -> dict[str, dict[int, metrics.Reference]]:
+    """Return for each stratum the windows' references, by number, of which its pixels count."""
+    found = {}
+    for stratum in areas:
+        masks = [kind == strata.STRATA.index(stratum) for kind in kinds]
+        places = {
+            index: replace(reference, part=mask)
+            for index, (reference, mask) in enumerate(zip(references, masks, strict=True))
+            if (reference.mask & mask).sum() >= strata.FEWEST_PIXELS
+        }
+        if places:
+            found[stratum] = places
+    return found
+
+
+def weighted(values: Mapping[str, float], areas: Mapping[str, float]) -> float:
+    """Return the mean of the strata's values, by their parts of the whole views."""
+    return sum(areas[s] * value for s, value in values.items()) / sum(areas[s] for s in values)
+
+
+def together(points: Mapping[str, Point], areas: Mapping[str, float], own: float) -> Point:
+    """Return what one way gives in whole views, of its points in the strata.
+
+    ``own`` is the references' own error.
+    """
+    names = ("samples", "seconds", *COMPARED, "bias", "variance")
+    mean = {
+        name: weighted({s: getattr(point, name) for s, point in points.items()}, areas)
+        for name in names
+    }
+    total = sum(areas[s] for s in points)
+    errors = [areas[s] * point.standard_error / total for s, point in points.items()]
+    depths = {s: p.depth_error for s, p in points.items() if p.depth_error is not None}
+    one = next(iter(points.values()))
+    return Point(
+        method=one.method,
+        settings=one.settings,
+        **mean,
+        mse_seconds=mean["relative_mse_whole"] * mean["seconds"],
+        standard_error=math.hypot(*errors),
+        resolved=mean["relative_mse"] > own,
+        depth_error=weighted(depths, areas) if depths else None,
+    )
+
+
 def own_error(references: Sequence[metrics.Reference]) -> float:
     return fmean(reference.own_error for reference in references)
 
 
-def evaluated(points: Sequence[Point], references: Sequence[metrics.Reference]) -> dict[str, Any]:
-    """Return what follows from the points: slopes, the Pareto front, and what each way saves."""
+def evaluated(points: Sequence[Point], own: float) -> dict[str, Any]:
+    """Return what follows from the points: slopes, the Pareto front, and what each way saves.
+
+    ``own`` is the references' own error.
+    """
     seen = [point for point in points if point.resolved]
     lines = {
         method: fitted([point for point in seen if point.method == method])
@@ -230,7 +302,7 @@ def evaluated(points: Sequence[Point], references: Sequence[metrics.Reference]) 
         ]
     front = metrics.pareto([p.seconds for p in seen], [p.relative_mse for p in seen])
     return {
-        "reference_error": own_error(references),
+        "reference_error": own,
         "slopes": {
             method: {name: asdict(line) for name, line in found.items()}
             for method, found in lines.items()
@@ -323,13 +395,14 @@ def disagreement(
 def write(stem: Path, content: Mapping[str, Any]) -> None:
     """Write the points as ``stem``.csv, a plot as .svg and .png, tables as .md, all as .json."""
     rows = []
-    for point in content["points"]:
-        settings = {**PLAIN_SAMPLING, **point["settings"]}
-        limits = {"most_samples": settings["samples"]}
-        limits |= {name: settings[name] for name in ("adaptive_threshold", "denoise")}
-        figures = {name: value for name, value in point.items() if name not in WAY}
-        on_front = point in content["pareto_front"]
-        rows.append({"method": point["method"], **limits, **figures, "pareto": on_front})
+    for stratum, measured in {"whole views": content, **content["strata"]}.items():
+        for point in measured["points"]:
+            settings = {**PLAIN_SAMPLING, **point["settings"]}
+            limits = {"most_samples": settings["samples"]}
+            limits |= {name: settings[name] for name in ("adaptive_threshold", "denoise")}
+            figures = {name: value for name, value in point.items() if name not in WAY}
+            way = {"stratum": stratum, "method": point["method"], **limits}
+            rows.append({**way, **figures, "pareto": point in measured["pareto_front"]})
     write_csv(stem.with_name(stem.name + ".csv"), rows)
     _draw(stem, content)
     write_text(stem.with_name(stem.name + ".md"), tables(stem.name, content))
@@ -373,6 +446,21 @@ def tables(name: str, content: Mapping[str, Any]) -> str:
         figures = [point[figure] for figure in FIGURES]
         key = (point["method"], json.dumps(point["settings"]))
         lines.append(_row(point["method"], *figures, common.get(key)))
+    lines += [
+        "",
+        "By stratum, the light that pixels show most of: its part of the views; the slope of plain",
+        "path tracing over time; the error of the scene's own settings; and how many times faster",
+        "each method is at the stratum's own equal error.",
+        "",
+        f"| stratum | part | slope | own settings | {' | '.join(m['method'] for m in methods)} |",
+        "| --- " + "| ---: " * (3 + len(methods)) + "|",
+    ]
+    for stratum, found in content["strata"].items():
+        slope = found["slopes"].get(PLAIN, {}).get("over_time", {}).get("slope")
+        own = found["settings"][0]["relative_mse"]
+        faster = {entry["method"]: entry["times_faster"] for entry in found["methods"]}
+        each = [faster.get(method["method"]) for method in methods]
+        lines.append(_row(stratum, found["area"], slope, own, *each))
     return "\n".join([*lines, ""])
 
 
@@ -387,7 +475,7 @@ def _draw(stem: Path, content: Mapping[str, Any]) -> None:
     def figures(name: str, points: Sequence[Mapping[str, Any]]) -> list[float]:
         return [point[name] for point in points]
 
-    with plots.plot(stem, size=(8, 5.5)) as axes:
+    with plots.plot(stem, 1, 2, size=(14, 5.5)) as (axes, beside):
         methods = dict.fromkeys(p["method"] for p in content["points"] if p["method"] != OWN)
         for method, colour, marker in zip(methods, plots.COLOURS, plots.MARKERS, strict=False):
             own = [p for p in content["points"] if p["method"] == method and p["resolved"]]
@@ -433,6 +521,28 @@ def _draw(stem: Path, content: Mapping[str, Any]) -> None:
             ylabel="relative mean squared error of all but the worst thousandth of pixels",
         )
         axes.legend(fontsize=8)
+        strata_and_looks = zip(
+            content["strata"].items(), plots.COLOURS, plots.MARKERS, strict=False
+        )
+        for (stratum, found), colour, marker in strata_and_looks:
+            for method, line in ((PLAIN, "-"), (DENOISED, ":")):
+                own = [p for p in found["points"] if p["method"] == method and p["resolved"]]
+                beside.plot(
+                    *(figures(name, own) for name in ("seconds", "relative_mse")),
+                    color=colour,
+                    marker=marker,
+                    linestyle=line,
+                    linewidth=1,
+                    label=f"{stratum}, {found['area']:.1%} of the views, {method}"
+                    + _slopes(found["slopes"].get(method, {})),
+                )
+        beside.set(
+            xscale="log",
+            yscale="log",
+            title="by the light that pixels show most of",
+            xlabel=axes.get_xlabel(),
+        )
+        beside.legend(fontsize=8)
 
 
 def _slopes(lines: Mapping[str, Mapping[str, float]]) -> str:

@@ -53,7 +53,8 @@ class Reference:
 
     colour (h, w, 3): scene-linear, the mean of the renders; variance (h, w, 3): the estimated
     variance of that mean; depth (h, w): the median of the renders' depths, inf for a miss, or None;
-    mask (h, w): pixels that the lens has a ray for; exposure: stops at which it is looked at.
+    mask (h, w): pixels that the lens has a ray for; exposure: stops at which it is looked at;
+    part (h, w): of these, the ones that count, or None for all.
     """
 
     colour: Array
@@ -61,24 +62,30 @@ class Reference:
     depth: Array | None
     mask: Mask
     exposure: float
+    part: Mask | None = None
+
+    @property
+    def counted(self) -> Mask:
+        """The pixels that every metric counts, (h, w)."""
+        return self.mask if self.part is None else self.mask & self.part
 
     @property
     def weights(self) -> Array:
         """What a squared difference of each pixel and channel is multiplied by, (n, 3)."""
         gain = 4.0**self.exposure
-        weights: Array = gain / (gain * self.colour[self.mask] ** 2 + EPSILON)
+        weights: Array = gain / (gain * self.colour[self.counted] ** 2 + EPSILON)
         return weights
 
     @property
     def unexposed_weights(self) -> tuple[Array, Array]:
         """The same of the unexposed relative mean squared error, and of pbrt's MRSE."""
-        truth = self.colour[self.mask]
+        truth = self.colour[self.counted]
         return 1 / (truth**2 + EPSILON), 1 / (truth + EPSILON) ** 2
 
     @property
     def own_error(self) -> float:
         """Expected relative mean squared error of the reference itself."""
-        own = (self.variance[self.mask] * self.weights).mean(axis=-1)
+        own = (self.variance[self.counted] * self.weights).mean(axis=-1)
         return float(own[_inliers(own)].mean())
 
 
@@ -131,7 +138,7 @@ def compare(
     colour: NDArray[np.float32], depth: NDArray[np.float32] | None, reference: Reference
 ) -> Errors:
     """Compare an image, (h, w, 3) scene-linear with depth (h, w), with its reference."""
-    mask = reference.mask
+    mask = reference.counted
     shown, truth = (developed(x, reference) for x in (colour, reference.colour))
     with np.errstate(divide="ignore"):
         psnr = peak_signal_noise_ratio(truth[mask], shown[mask], data_range=1.0)
@@ -185,7 +192,7 @@ def relative_mse(
     ``left_out`` is the part of the pixels that does not count, those with the largest errors.
     """
     found = (_squares(colour, reference) * reference.weights).mean(axis=-1)
-    own = (reference.variance[reference.mask] * reference.weights).mean(axis=-1)
+    own = (reference.variance[reference.counted] * reference.weights).mean(axis=-1)
     kept = _inliers(found, left_out)
     return float((found - own)[kept].mean())
 
@@ -199,10 +206,10 @@ def bias_and_variance(
     mean's square holds the bias's, an n-th of the variance, and the reference's own; so the bias is
     known to about an n-th of the variance, and below 0 by chance where it is smaller.
     """
-    stack = np.stack([colour[reference.mask] for colour in colours]).astype(np.float64)
+    stack = np.stack([colour[reference.counted] for colour in colours]).astype(np.float64)
     variance = stack.var(axis=0, ddof=1)
-    apart = (stack.mean(axis=0) - reference.colour[reference.mask]) ** 2
-    bias = apart - variance / len(stack) - reference.variance[reference.mask]
+    apart = (stack.mean(axis=0) - reference.colour[reference.counted]) ** 2
+    bias = apart - variance / len(stack) - reference.variance[reference.counted]
     weights = reference.weights
     return float((bias * weights).mean()), float((variance * weights).mean())
 
@@ -233,7 +240,7 @@ def bias_correlation(
 
 def _squares(colour: NDArray[np.float32], reference: Reference) -> Array:
     """Return the squared differences of the pixels that count, (n, 3)."""
-    found: Array = (colour.astype(np.float64) - reference.colour)[reference.mask] ** 2
+    found: Array = (colour.astype(np.float64) - reference.colour)[reference.counted] ** 2
     return found
 
 

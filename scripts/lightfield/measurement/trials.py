@@ -10,7 +10,7 @@ took, so that what is interrupted goes on where it was and what is repeated cost
 import argparse
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +59,7 @@ class Window:
 class Trial:
     """One render: colour (h, w, 3) scene-linear; depth (h, w) metres as Cycles gives it, or None.
 
+    ``parts`` are those of its light, each (h, w), by their passes' names, of a pilot alone.
     ``samples`` is the mean number that the pixels of the image circle took. ``seconds`` is the time
     from Cycles' first sample to its being finished, denoising included and synchronization not: on
     processors their working time, which other load is not in and in which cores add up, and on a
@@ -70,12 +71,14 @@ class Trial:
     samples: float
     seconds: float
     device: str
+    parts: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
 
 
 class Trials:
     """Renders windows of the dataset of a lightfield.json, or takes them from ``cache``.
 
-    Blender starts only when something has to be rendered.
+    Blender starts only when something has to be rendered, and in a process one after the other:
+    after another has rendered, this one must not. With ``parts`` it is a pilot.
     """
 
     def __init__(
@@ -86,12 +89,14 @@ class Trials:
         device: str,
         threads: int,
         cache: Path,
+        parts: bool = False,
     ) -> None:
         self.lens = lightfield.lens
         # How many samples are taken, and why, is for each trial to say.
-        self.lightfield = lightfield.changed(
-            render=passes.without(without_target(lightfield.render))
-        )
+        render = passes.without(without_target(lightfield.render))
+        if parts:
+            render["passes"] = list(passes.PARTS_OF_LIGHT)
+        self.lightfield = lightfield.changed(render=render)
         self._blend, self._inventory = blend, inventory
         self._device, self._threads, self._cache = device, threads, cache
         self._started = False
@@ -112,6 +117,12 @@ class Trials:
         """Return what renders the same views on another device and through another lens."""
         there = self.lightfield.changed(lens)
         return Trials(self._blend, self._inventory, there, device, self._threads, self._cache)
+
+    def pilot(self, lens: Lens | None = None) -> "Trials":
+        """Return what renders the same views with the parts of their light, through a lens."""
+        there = self.lightfield.changed(lens)
+        on = (self._device, self._threads, self._cache)
+        return Trials(self._blend, self._inventory, there, *on, parts=True)
 
     @property
     def whole(self) -> Window:
@@ -134,6 +145,7 @@ class Trials:
             samples=float(image.attributes[SAMPLES_ATTRIBUTE]),
             seconds=float(image.attributes[SECONDS_ATTRIBUTE]),
             device=str(image.attributes[DEVICE_ATTRIBUTE]),
+            parts={name: image.channels[f"{name}.Y"] for name in settings.get("passes", ())},
         )
 
     def reference(self, window: Window, seeds: int, samples: int) -> Reference:
@@ -189,11 +201,12 @@ class Trials:
         cycles.set_sampling(settings)
         cycles.set_window(window.x, window.y, window.width, window.height)
         seed = keys.view_seed(settings["seed"], window.view.name)
-        raw = render_colour(window.view.matrix, seed)
+        raw = render_colour(window.view.matrix, seed, self.lightfield.passes)
         assert raw.samples is not None and raw.worked_seconds is not None
         seconds = raw.worked_seconds if self._on == "CPU" else raw.render_seconds
         channels = {name: raw.pixels[:, :, index] for index, name in enumerate("RGB")}
-        if self.lightfield.depth:
+        channels |= {f"{name}.Y": part.mean(axis=-1) for name, part in raw.passes.items()}
+        if self.lightfield.depth and not raw.passes:
             channels["Z"] = render_geometry(window.view.matrix).depth
         images.write_exr(
             path,

@@ -157,7 +157,8 @@ def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
     content = read_json(path)
     if not isinstance(content, Mapping):
         raise UserError(f"{path}: must be a mapping")
-    tables, _ = _tables(content)
+    # The plot beside the tables has the strata.
+    tables, _ = _tables({name: part for name, part in content.items() if name != "strata"})
     known = {name: table for name, table in tables.items() if name in ERROR_TABLES}
     whole = {name: table for name, table in tables.items() if name not in known}
     whole.pop("measured on", None)
