@@ -212,7 +212,7 @@ def main() -> None:
         began = time.monotonic()
         undisturbed = Disk(folder / "disk", arguments.views)
         undisturbed.finish()
-        seconds = (time.monotonic() - began) / 2
+        seconds = (time.monotonic() - began) / 4
         server, environment = serve(folder)
         os.environ.update(environment)
         try:
