@@ -67,6 +67,7 @@ EXAMPLES: dict[str, Lens] = {
     ),
     "equirectangular": Equirectangular(**SIZE),
     "equirectangular part": Equirectangular(**SIZE, longitude=(-1, 2.5), latitude=(-0.5, 1.2)),
+    "equirectangular part ahead": Equirectangular(**SIZE, longitude=(-1.2, 1.2)),
     "equirectangular part to the left": Equirectangular(**SIZE, longitude=(-2, 1)),
     "cube map": CubeMap(width=6 * 512, height=512),
 }
@@ -709,7 +710,8 @@ def test_flags(text: str, lens: Lens) -> None:
 def test_a_panorama_has_no_place_twice(ranges: dict[str, Any], message: str) -> None:
     with pytest.raises(UserError, match=message):
         Equirectangular(**SIZE, **ranges)
-    assert Equirectangular(**SIZE, longitude=(-4, 2)).width == 2048
+    assert not Equirectangular(**SIZE, longitude=(-4, 2)).is_full
+    assert Equirectangular(**SIZE).is_full
 
 
 def test_a_cube_map_is_six_squares_wide() -> None:
