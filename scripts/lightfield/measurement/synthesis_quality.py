@@ -79,7 +79,7 @@ def variants(source: Source, views: Sequence[View]) -> Iterator[Variant]:
         return colour, np.where(np.isnan(distance), np.nan, np.inf)
 
     nearest = Sources(lens, views, flat, most=len(views))
-    nearest.typical_distance = whole.typical_distance
+    nearest.distances = whole.distances
     yield Variant("control", "nearest view alone", nearest, 1, size)
     after = dict(zip([view.name for view in views], [*views[1:], views[0]], strict=True))
 

@@ -22,7 +22,7 @@ from lightfield.imaging import images
 from lightfield.synthesis import kernels
 
 # A view is chosen by how well it sees points in so many directions across and down the picture, at
-# the distance that is typical of the scene.
+# two distances that are typical of the scene.
 DIRECTIONS = 12
 # Of a source's penalty: the weight of its distance from the surface beside that of its angle.
 DISTANCE = 0.1
@@ -117,11 +117,12 @@ class Sources:
         return self.lens.pixel_rays().astype(np.float32)
 
     @cached_property
-    def typical_distance(self) -> float:
-        """The harmonic mean of distances in some of the views, in metres."""
+    def distances(self) -> Array:
+        """The quarter and three quarters of what some of the views see are nearer, in metres."""
         some = range(0, len(self.views), max(1, len(self.views) // 4))
-        means = [float(np.nanmean(self.surface(index).inverse)) for index in some]
-        return 1 / max(float(np.mean(means)), 1e-6)
+        inverse = np.concatenate([self.surface(index).inverse.ravel() for index in some])
+        distances: Array = 1 / np.maximum(np.nanpercentile(inverse, [75, 25]), 1e-4)
+        return distances
 
     def surface(self, index: int) -> Surface:
         """Return a view as a surface, from memory if it was one of the last."""
@@ -148,14 +149,15 @@ class Sources:
     def best(self, target: Array, lens: Lens, count: int) -> list[int]:
         """Return the ``count`` views that together see best what a ``target`` (4, 4) looks at.
 
-        One after the other is taken that most improves the best view of each direction, by a
-        logarithm, so that seeing all directions counts for more than seeing some perfectly.
+        One after the other is taken that adds most to the sum over all directions, by a logarithm
+        of what the views taken so far are worth there: to see all directions counts for more than
+        to see some of them perfectly.
         """
         x = (np.arange(DIRECTIONS) + 0.5) * lens.width / DIRECTIONS
         y = (np.arange(DIRECTIONS) + 0.5) * lens.height / DIRECTIONS
         rays = lens.rays(x[None, :], y[:, None]).reshape(-1, 3)
         rays = rays[np.isfinite(rays[:, 0])] @ target[:3, :3].T
-        away = rays * self.typical_distance
+        away = np.concatenate([distance * rays for distance in self.distances])
         points = target[:3, 3] + away
         quality = np.zeros((len(self.views), len(points)))
         for index, matrix in enumerate(self.matrices):
@@ -165,14 +167,14 @@ class Sources:
                 seen = (pixels >= 0).all(axis=-1) & (
                     pixels < (self.lens.width, self.lens.height)
                 ).all(axis=-1)
-            quality[index] = np.where(seen, np.log1p(1 / penalty(away, offset)), 0)
+            quality[index] = np.where(seen, 1 / penalty(away, offset), 0)
         chosen: list[int] = []
-        reached = np.zeros(len(points))
+        worth = np.zeros(len(points))
         for _ in range(min(count, len(self.views))):
-            gains = np.maximum(quality, reached).sum(axis=1)
+            gains = np.log1p(worth + quality).sum(axis=1)
             gains[chosen] = -1
             chosen.append(int(np.argmax(gains)))
-            reached = np.maximum(reached, quality[chosen[-1]])
+            worth += quality[chosen[-1]]
         return chosen
 
     def synthesise(self, target: Array, lens: Lens, count: int = 6) -> Synthesised:

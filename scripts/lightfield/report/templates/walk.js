@@ -272,7 +272,7 @@ function uploaded(number, [light, depth]) {
     triangles: triangles.length,
     pixels,
     torn: torn.length,
-    mean: known.reduce((sum, value) => sum + value, 0) / Math.max(known.length, 1),
+    known,
   };
 }
 
@@ -286,8 +286,7 @@ function axes() {
   return [right, up, back];
 }
 
-// The views that together see best what the eye looks at: one after the other, that which most
-// improves the best view of each direction.
+// The views that together see best what the eye looks at: one after the other, that which adds most.
 function bestViews(at, [right, up, back], [spreadX, spreadY]) {
   const directions = WALK.directions;
   const points = [];
@@ -300,28 +299,25 @@ function bestViews(at, [right, up, back], [spreadX, spreadY]) {
       points.push(ray.map((value) => value / length));
     }
   }
-  const quality = walk.order.map((entry) => {
-    const { view } = entry;
-    return points.map((ray) => {
-      const way = minus(along(at, ray, walk.typical), view.at);
-      const local = [dot(way, view.right), dot(way, view.up), -dot(way, view.ahead)];
-      if (!isSeen(local)) return 0;
-      const length = Math.hypot(...way);
-      const angle = Math.hypot(...minus(ray, way.map((value) => value / length)));
-      return Math.log1p(1 / (angle + WALK.distance * Math.max(length / walk.typical - 1, 0) + WALK.sharp));
-    });
-  });
+  const quality = walk.order.map(({ view }) => walk.distances.flatMap((distance) => points.map((ray) => {
+    const way = minus(along(at, ray, distance), view.at);
+    const local = [dot(way, view.right), dot(way, view.up), -dot(way, view.ahead)];
+    if (!isSeen(local)) return 0;
+    const length = Math.hypot(...way);
+    const angle = Math.hypot(...minus(ray, way.map((value) => value / length)));
+    return 1 / (angle + WALK.distance * Math.max(length / distance - 1, 0) + WALK.sharp);
+  })));
   const chosen = [];
-  let reached = points.map(() => 0);
+  let worth = quality[0].map(() => 0);
   while (chosen.length < Math.min(walk.sources, walk.order.length)) {
     let best = { gain: -1, number: 0 };
     quality.forEach((own, number) => {
       if (chosen.includes(number)) return;
-      const gain = own.reduce((sum, value, n) => sum + Math.max(value, reached[n]), 0);
+      const gain = own.reduce((sum, value, n) => sum + Math.log1p(worth[n] + value), 0);
       if (gain > best.gain) best = { gain, number };
     });
     chosen.push(best.number);
-    reached = reached.map((value, n) => Math.max(value, quality[best.number][n]));
+    worth = worth.map((value, n) => value + quality[best.number][n]);
   }
   return chosen.map((number) => walk.order[number]);
 }
@@ -639,7 +635,11 @@ async function startWalk() {
     walk.order.push(uploaded(number, await Promise.all([decoded(entry.light), decoded(entry.depth)])));
     element("walk-readout").textContent = `${number + 1} of ${DATA.embedded.length} views`;
   }
-  walk.typical = 1 / Math.max(walk.order.reduce((sum, { mean }) => sum + mean, 0) / walk.order.length, 1e-6);
+  // The quarter and three quarters of what some of the views see are nearer, in metres.
+  const some = walk.order.filter((_, number) => number % Math.max(1, Math.floor(walk.order.length / 4)) === 0);
+  const known = Float32Array.from(some.flatMap((source) => [...source.known])).sort();
+  walk.distances = [0.75, 0.25].map((part) => 1 / Math.max(known[Math.round(part * (known.length - 1))], 1e-4));
+  for (const source of walk.order) delete source.known;
   const places = walk.order.map(({ view }) => view.at);
   walk.extent = Math.max(...places.map((at) => Math.hypot(...minus(at, places[0])))) || 1;
   walk.ready = true;
