@@ -364,7 +364,8 @@ def failing_nodes(record, attempt):
 def avoided_nodes(wildcards, attempt):
     """Return the words by which Slurm leaves out the nodes that a shard avoids, and the user's."""
     given = workflow.resource_settings._parsed_default_resources.get("slurm_extra")
-    words = [str(given.raw).strip("'\"")] if given else []
+    # Snakemake has one without a text where none is given.
+    words = [given.raw.strip("'\"")] if given and given.raw else []
     if not workflow.local_exec:
         dataset = dataset_of(wildcards)
         bounds = (wildcards.first, wildcards.end) if attempt > 1 else (0, 0)
