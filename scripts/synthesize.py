@@ -28,7 +28,7 @@ from lightfield.export.splits import splits
 from lightfield.geometry import rigs
 from lightfield.imaging import images, pictures
 from lightfield.imaging.video import video
-from lightfield.synthesis.view import Sources, reader
+from lightfield.synthesis.view import BEST, Sources, reader
 
 
 def main() -> None:
@@ -44,7 +44,8 @@ def main() -> None:
         help="a lightfield.json, or a YAML of a rig with its camera (default: the views that the "
         "dataset's split has to test with, from the others)",
     )
-    add("--best", type=int, default=6, metavar="K", help="views a picture is made of (default: 6)")
+    help_text = f"views a picture is made of (default: {BEST})"
+    add("--best", type=int, default=BEST, metavar="K", help=help_text)
     add("--exposure", type=float, help="of the PNGs, in stops (default: by the first picture)")
     add("--video", action="store_true", help="write walk.mp4, too, with ffmpeg")
     add("--rate", type=int, default=25, help="pictures a second of the video (default: 25)")

@@ -19,9 +19,8 @@ from lightfield.geometry.lenses import Array, Lens
 from lightfield.imaging import images, pictures, plots
 from lightfield.imaging.tonemap import encode_srgb, tone_map
 from lightfield.measurement import metrics
-from lightfield.synthesis.view import Sources, reader
+from lightfield.synthesis.view import BEST, Sources, reader
 
-BEST = 6
 MEANS = ("psnr", "ssim", "flip", "holes", "source_bytes")
 # At the rig's centre a picture is inside, and towards the edge beyond this part of the radius.
 INNER = 0.5
@@ -43,12 +42,12 @@ def variants(source: Source, views: Sequence[View]) -> Iterator[Variant]:
     lens, read = source.lens, reader(source)
     sizes = {view.name: source.path(view).stat().st_size for view in views}
     size = sum(sizes.values())
-    whole = Sources(lens, views, read, most=len(views))
+    whole = Sources(lens, views, read)
     yield Variant("all", str(len(views)), whole, BEST, size)
     for step in (2, 4, 8):
         some = views[::step]
         if len(some) >= 4:
-            fewer = Sources(lens, some, read, most=len(some))
+            fewer = Sources(lens, some, read)
             yield Variant("views", str(len(some)), fewer, BEST, sum(sizes[v.name] for v in some))
     for best in (1, 2, 4, 8):
         yield Variant("best", str(best), whole, best, size)
@@ -62,7 +61,7 @@ def variants(source: Source, views: Sequence[View]) -> Iterator[Variant]:
                 first::part, first::part
             ][: small.height, : small.width]
 
-        coarse = Sources(small, views, shrunk, most=len(views))
+        coarse = Sources(small, views, shrunk)
         yield Variant(
             "resolution", f"{small.width} × {small.height}", coarse, BEST, size // part**2
         )
@@ -72,13 +71,13 @@ def variants(source: Source, views: Sequence[View]) -> Iterator[Variant]:
             colour, distance = read(view)
             return colour, with_precision(distance, precision)
 
-        yield Variant("depth", precision, Sources(lens, views, held, most=len(views)), BEST, size)
+        yield Variant("depth", precision, Sources(lens, views, held), BEST, size)
 
     def flat(view: View) -> tuple[Array, Array]:
         colour, distance = read(view)
         return colour, np.where(np.isnan(distance), np.nan, np.inf)
 
-    nearest = Sources(lens, views, flat, most=len(views))
+    nearest = Sources(lens, views, flat)
     nearest.distances = whole.distances
     yield Variant("control", "nearest view alone", nearest, 1, size)
     after = dict(zip([view.name for view in views], [*views[1:], views[0]], strict=True))
@@ -86,9 +85,7 @@ def variants(source: Source, views: Sequence[View]) -> Iterator[Variant]:
     def mixed(view: View) -> tuple[Array, Array]:
         return read(view)[0], read(after[view.name])[1]
 
-    yield Variant(
-        "control", "shuffled depth", Sources(lens, views, mixed, most=len(views)), BEST, size
-    )
+    yield Variant("control", "shuffled depth", Sources(lens, views, mixed), BEST, size)
 
 
 def compare(

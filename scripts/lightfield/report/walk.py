@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from lightfield.export.source import pixel_indices
 from lightfield.geometry.lenses import Lens
 from lightfield.report.packing import packed_bytes
 from lightfield.synthesis import kernels
@@ -30,9 +31,7 @@ def collect(lens: Lens, places: Array) -> dict[str, Any]:
     """
     steps = (np.arange(SIGHT) + 0.5) / SIGHT
     x, y = np.meshgrid(steps, steps)
-    pixels = lens.pixels(_direction(np.stack([x, y], axis=-1)))
-    with np.errstate(invalid="ignore"):
-        sees = ((pixels >= 0) & (pixels < (lens.width, lens.height))).all(axis=-1)
+    _, _, sees = pixel_indices(lens, _direction(np.stack([x, y], axis=-1)).reshape(-1, 3))
     coded = np.round(_octahedral(np.nan_to_num(lens.pixel_rays())) * 65535).astype("<u2")
     return {
         "rays": packed_bytes(coded.tobytes()),
@@ -40,6 +39,7 @@ def collect(lens: Lens, places: Array) -> dict[str, Any]:
         "side": SIGHT,
         "planes": np.round(_bounds(places), 6).tolist(),
         "steepest": float(synthesis.steepest(lens)),
+        "best": synthesis.BEST,
         "directions": synthesis.DIRECTIONS,
         "distance": synthesis.DISTANCE,
         "sharp": synthesis.SHARP,

@@ -14,13 +14,15 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import View
-from lightfield.export.source import Source
+from lightfield.export.source import Source, pixel_indices
 from lightfield.geometry.depth import z_from_distance
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.imaging import images
 from lightfield.synthesis import kernels
 
+# So many views a picture is made of, where nothing else is said.
+BEST = 6
 # A view is chosen by how well it sees points in so many directions across and down the picture, at
 # two distances that are typical of the scene.
 DIRECTIONS = 12
@@ -104,7 +106,9 @@ class Sources:
     ``read`` returns a view's linear colour (h, w, 3), and its distances (h, w) in metres.
     """
 
-    def __init__(self, lens: Lens, views: Sequence[View], read: Reader, most: int = 32) -> None:
+    def __init__(
+        self, lens: Lens, views: Sequence[View], read: Reader, most: int = 2 * BEST
+    ) -> None:
         self.lens = lens
         self.views = views
         self.read = read
@@ -162,11 +166,7 @@ class Sources:
         quality = np.zeros((len(self.views), len(points)))
         for index, matrix in enumerate(self.matrices):
             offset = points - matrix[:3, 3]
-            pixels = self.lens.pixels(offset @ matrix[:3, :3])
-            with np.errstate(invalid="ignore"):
-                seen = (pixels >= 0).all(axis=-1) & (
-                    pixels < (self.lens.width, self.lens.height)
-                ).all(axis=-1)
+            _, _, seen = pixel_indices(self.lens, offset @ matrix[:3, :3])
             quality[index] = np.where(seen, 1 / penalty(away, offset), 0)
         chosen: list[int] = []
         worth = np.zeros(len(points))
@@ -177,7 +177,7 @@ class Sources:
             worth += quality[chosen[-1]]
         return chosen
 
-    def synthesise(self, target: Array, lens: Lens, count: int = 6) -> Synthesised:
+    def synthesise(self, target: Array, lens: Lens, count: int = BEST) -> Synthesised:
         """Return the picture of a camera at ``target`` (4, 4), made of the ``count`` best views."""
         return self.blended(target, lens, self.best(target, lens, count))
 

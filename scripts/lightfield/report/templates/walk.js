@@ -4,7 +4,7 @@
 // more, on the graphics card; what DATA.walk holds is said in scripts/lightfield/report/walk.py.
 
 const WALK = DATA.walk;
-const MOST_SOURCES = 6;
+const MOST_SOURCES = WALK ? WALK.best : 0;
 // Of the eye: the nearest that it sees, in metres, and its field of view across the longer side.
 const NEAR = 0.01;
 const WIDE = (80 * Math.PI) / 180;
