@@ -500,29 +500,33 @@ def reach(dataset):
 
 
 def held_out(dataset):
-    """Return the dataset whose cameras are between those of a light field, None if none is.
+    """Return the scene's chosen datasets whose cameras are all nearer together than a light field's.
 
-    Of the scene's chosen datasets that is the one whose cameras reach least far. A rig whose
-    cameras span no surface has no inside.
+    A rig whose cameras span no surface has nothing between them.
     """
-    scene = [other for other in CHOSEN if other.scene_folder == dataset.scene_folder]
-    around = [other for other in scene if other.rig.cells() is not None]
-    if dataset not in around:
-        return None
-    inner = min(around, key=reach)
-    return inner if reach(inner) < reach(dataset) else None
+    if dataset.rig.cells() is None:
+        return []
+    return [
+        other
+        for other in CHOSEN
+        if other.scene_folder == dataset.scene_folder
+        and other.rig.cells() is not None
+        and reach(other) < reach(dataset)
+    ]
 
 
 def truth_words(wildcards):
-    """Return the words that name the dataset with which synthesised views are compared."""
-    truth = held_out(dataset_of(wildcards))
-    return ["--truth", truth.folder] if truth else []
+    """Return the words that name the datasets with which synthesised views are compared."""
+    truths = held_out(dataset_of(wildcards))
+    return (
+        shlex.join(["--truth", *(truth.folder for truth in truths)]) if truths else ""
+    )
 
 
 def truth_records(wildcards):
-    """Return the records of that dataset's views."""
-    truth = held_out(dataset_of(wildcards))
-    return truth.records("render") if truth else []
+    """Return the records of those datasets' views."""
+    truths = held_out(dataset_of(wildcards))
+    return [record for truth in truths for record in truth.records("render")]
 
 
 @cache

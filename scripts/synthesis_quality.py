@@ -1,8 +1,9 @@
 """Measure how well views that were held out are synthesised from a dataset: CSV and a plot.
 
-The truth is another dataset of the scene, whose cameras are between those of the first, or the
-first one's own views to test with. OUTPUT.csv has a row for each variant and view, OUTPUT.svg and
-OUTPUT.png the quality against the size of the views that it is made of.
+The truth are other datasets of the scene, whose cameras are between those of the first, or the
+first one's own views to test with. OUTPUT.csv has a row for each variant, view and region of it,
+which are told apart if the truth has all parts of its light as passes; OUTPUT.svg and OUTPUT.png
+have the quality against number and bytes of the views that it is made of.
 """
 
 import argparse
@@ -23,27 +24,33 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     add = parser.add_argument
     add("dataset", type=Path, help="folder of a dataset with depth")
-    add("--truth", type=Path, help="folder of the dataset that was held out")
-    add("--views", type=int, default=12, help="that are compared, at most (default: 12)")
+    add("--truth", type=Path, nargs="+", help="folders of the datasets that were held out")
+    add("--views", type=int, default=12, help="of each that are compared (default: 12)")
     add("--output", type=Path, required=True, metavar="STEM")
     arguments = parser.parse_args()
 
     source = Source(arguments.dataset, "", ".exr")
+    views, tests = source.lightfield.views, []
     if arguments.truth:
-        truth, views = Source(arguments.truth, "", ".exr"), source.lightfield.views
-        held_out = truth.lightfield.views
+        tests = [Source(folder, "", ".exr") for folder in arguments.truth]
+        held_out = [truth.lightfield.views for truth in tests]
     else:
-        truth, parts = source, splits(source.lightfield)
-        views, held_out = parts.train, parts.test
-    held_out = held_out[:: -(-len(held_out) // arguments.views)]
-    targets = truth.lightfield.changed(views=held_out)
-    colours = np.stack([images.read_image(truth.path(view), "RGB").colour for view in held_out])
-    exposure = pictures.exposure_for(colours)
+        parts = splits(source.lightfield)
+        views, tests, held_out = parts.train, [source], [parts.test]
+    held_out = [some[:: -(-len(some) // arguments.views)] for some in held_out]
+    shown = [
+        images.read_image(truth.path(view), "RGB").colour.reshape(1, -1, 3)
+        for truth, some in zip(tests, held_out, strict=True)
+        for view in some
+    ]
+    exposure = pictures.exposure_for(np.concatenate(shown, axis=1))
     variants = list(synthesis_quality.variants(source, views))
     progress = Progress(len(variants), "synthesis", "variants")
     rows = []
     for variant in variants:
-        rows += synthesis_quality.compare(variant, targets, truth, exposure)
+        for truth, some in zip(tests, held_out, strict=True):
+            targets = truth.lightfield.changed(views=some)
+            rows += synthesis_quality.compare(variant, views, targets, truth, exposure)
         progress.done()
     write_csv(arguments.output.with_name(f"{arguments.output.name}.csv"), rows)
     means = synthesis_quality.means(rows)

@@ -14,6 +14,7 @@ from lightfield.geometry import lenses, rigs
 from lightfield.geometry.interpolation_volume import (
     interpolation_volume,
     neighbour_spacing,
+    parts_to_edge,
     spacing,
 )
 
@@ -140,6 +141,29 @@ def test_loose_poses_span_no_surface(tmp_path: Path) -> None:
     path.write_text("name,x,y,z,rx,ry,rz\na,0,0,0,0,0,0\n")
     rig = {"type": "poses", "file": str(path)}
     assert interpolation_volume(rigs.from_settings(rig), lenses.from_camera(FISHEYE)) is None
+
+
+@pytest.mark.parametrize("camera", [FISHEYE, NARROW, PANORAMA])
+@pytest.mark.parametrize("face_inside", [False, True])
+def test_places_nearer_than_the_edge_are_the_volume(camera: Any, face_inside: bool) -> None:
+    center = np.array([3.0, -2, 1])
+    rig = {"type": "sphere", "subdivisions": 2, "size": 2, "center": center.tolist()}
+    rig |= {"face_inside": face_inside, "camera": camera}
+    matrices = np.stack([pose.matrix() for pose in rigs.from_settings(rig).poses()])
+    places = center + np.random.default_rng(1).uniform(-1, 1, (2000, 3))
+    parts = parts_to_edge(matrices, lenses.from_camera(camera), places)
+    assert 8 * (parts <= 1).mean() == pytest.approx(volume(rig, camera), abs=0.25)
+    halfway = center + (places - center) / 2
+    np.testing.assert_allclose(
+        parts_to_edge(matrices, lenses.from_camera(camera), halfway), parts / 2, atol=1e-6
+    )
+
+
+def test_what_lies_in_a_plane_has_no_inside() -> None:
+    rig = rigs.from_settings({"type": "plane", "cameras": [3, 3], "size": 1})
+    matrices = np.stack([pose.matrix() for pose in rig.poses()])
+    parts = parts_to_edge(matrices, lenses.from_camera(FISHEYE), np.zeros((2, 3)))
+    assert np.isposinf(parts).all()
 
 
 def test_spacing_leaves_out_cameras_at_the_same_place() -> None:

@@ -14,7 +14,7 @@ from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses, rigs
 from lightfield.geometry.rigs import from_settings
-from lightfield.geometry.rigs.sphere import icosphere
+from lightfield.geometry.rigs.sphere import icosphere, nested
 
 # Every dataset of SILVR: the number of views as published, and the rig.
 SILVR: dict[str, tuple[int, dict[str, Any]]] = {
@@ -191,6 +191,17 @@ def test_icosphere_is_blenders(subdivisions: int, blender: dict[str, Any]) -> No
     np.testing.assert_allclose(icosphere(subdivisions), theirs, rtol=0, atol=1e-6)
     rig = from_settings({"type": "sphere", "subdivisions": subdivisions})
     assert rig.view_count == len(theirs)
+
+
+def test_spheres_hold_the_coarser_ones() -> None:
+    found = nested(642)
+    assert [len(numbers) for numbers in found] == [162, 42, 12]
+    for subdivisions, numbers in zip((3, 2), found, strict=False):
+        coarse = icosphere(subdivisions)
+        away = np.linalg.norm(icosphere(4)[numbers][:, None] - coarse, axis=-1)
+        assert sorted(away.argmin(axis=1)) == list(range(len(coarse)))
+        assert away.min(axis=1).max() < 1e-5
+    assert nested(36) == nested(12) == []
 
 
 def test_sphere_cameras_look_outward_and_upright_and_the_poles_face_up_and_down() -> None:

@@ -1,6 +1,8 @@
 """Synthesised views against a scene whose every point is known: a ball inside a sphere."""
 
+import csv
 import json
+import math
 import shutil
 import subprocess
 
@@ -12,10 +14,13 @@ from sphere import look, look_at_ball, write_views
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.imaging.video import video
+from lightfield.measurement import synthesis_quality
+from lightfield.report import tables
 from lightfield.synthesis.view import Sources
 
 FISHEYE = {"lens": "equidistant", "fov": 180, "resolution": [96, 96]}
@@ -153,6 +158,82 @@ def test_the_test_views_of_a_split_come_from_the_others(dataset, tmp_path, run_p
     held_out = json.loads((tmp_path / "lightfield.json").read_text())["frames"]
     assert f"{len(held_out)} views" in result.stdout
     assert 0 < len(held_out) < len(LightField.read(dataset / "lightfield.json").views)
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory, run_program):
+    """What is measured of a sphere of views, compared with a ring in it: rows and their file."""
+    folder = tmp_path_factory.mktemp("measured")
+    around, ring, out = (folder / name / "dataset" for name in ("around", "ring", "out"))
+    write_views(around, FISHEYE, RIG, see=look_at_ball)
+    keys = [{"position": [x, -0.1, 0], "rotation": [90, 0, 0]} for x in (0.05, 0.3)]
+    path = {"type": "path", "count": 2, "keys": keys}
+    write_views(ring, EYES["perspective"], path, see=look_at_ball)
+    field = LightField.read(ring / "lightfield.json")
+    field.changed(render={"passes": [*PARTS_OF_LIGHT]}).write(field.path)
+    for view in field.views:
+        # The ball is a mirror.
+        _, distance = look_at_ball(field.lens, view.matrix)
+        ball = distance < look(field.lens, view.matrix)[1] - 1e-6
+        for name in PARTS_OF_LIGHT:
+            lit = {"glossy_light": ball, "diffuse_light": ~ball}.get(name, np.zeros_like(ball))
+            light = dict.fromkeys("RGB", lit.astype(np.float16))
+            images.write_exr(PASSES[name].path(ring, view.name), light)
+    stem = out.with_name("quality")
+    words = [around, "--truth", ring, "--output", stem]
+    run_program("synthesis_quality.py", *words)
+    assert stem.with_suffix(".svg").is_file()
+    with stem.with_suffix(".csv").open() as file:
+        return list(csv.DictReader(file)), stem.with_suffix(".csv")
+
+
+def test_fewer_views_and_the_controls_are_worse(measured):
+    means = synthesis_quality.means(measured[0])
+    found = {(row["variant"], row["value"]): row for row in means}
+    plain = found["all", "42"]
+    assert plain["psnr"] > found["views", "12"]["psnr"] + 0.5
+    assert plain["source_bytes"] > 3 * found["views", "12"]["source_bytes"]
+    for control in ("nearest view alone", "shuffled depth"):
+        assert plain["psnr"] > found["control", control]["psnr"] + 2
+
+
+def test_regions_are_told_apart_by_the_light_that_pixels_show(measured):
+    rows, _ = measured
+    assert {row["region"] for row in rows} == {"all", "diffuse", "glossy"}
+    (whole,), (diffuse,), (glossy,) = (
+        synthesis_quality.means([row for row in rows if row["variant"] == "all"], region)
+        for region in ("all", "diffuse", "glossy")
+    )
+    assert whole["part"] == 1
+    assert diffuse["part"] + glossy["part"] == pytest.approx(1)
+    assert 0.02 < glossy["part"] < 0.5
+    # All errors are those of its parts, in each view.
+    for view in {row["view"] for row in rows}:
+        part = {
+            row["region"]: (float(row["part"]), 10 ** (-float(row["psnr"]) / 10))
+            for row in rows
+            if row["view"] == view and row["variant"] == "all"
+        }
+        sides = [part[name][0] * part[name][1] for name in ("diffuse", "glossy")]
+        assert sum(sides) == pytest.approx(part["all"][1])
+
+
+def test_places_are_inside_or_towards_the_edge(measured):
+    rows, _ = measured
+    places = {row["view"]: (row["place"], float(row["to_edge"])) for row in rows}
+    (near, near_part), (far, far_part) = (places[name] for name in sorted(places))
+    assert (near, far) == ("inside", "edge")
+    assert near_part < 0.5 < far_part < 1
+
+
+def test_a_page_has_these_tables(measured):
+    _, path = measured
+    folder = path.parent / "synthesis" / "ball"
+    folder.mkdir(parents=True)
+    found = tables.synthesis([shutil.copy(path, folder / "around.csv")], "ball/around")
+    places, regions = list(found.tables.values())[1:]
+    assert [row[:2] for row in places.rows] == [["dataset", "inside"], ["dataset", "edge"]]
+    assert [row[0] for row in regions.rows] == ["all", "diffuse", "glossy"]
 
 
 @pytest.mark.parametrize(

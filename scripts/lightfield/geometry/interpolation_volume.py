@@ -58,21 +58,59 @@ def interpolation_volume(rig: Rig, lens: Lens) -> InterpolationVolume | None:
     positions = matrices[:, :3, 3]
     if not is_closed(mesh, positions):
         return InterpolationVolume(0.0, 0.0)
-    hull = ConvexHull(positions)
+    enclosed = float(ConvexHull(positions).volume)
     if rig.cube_map or sees_all_round(lens):
-        return InterpolationVolume(float(hull.volume), float(hull.volume))
+        return InterpolationVolume(enclosed, enclosed)
+    planes = immersive_planes(mesh, matrices, lens, rig.face_inside)
+    return InterpolationVolume(0.0 if planes is None else _polyhedron_volume(planes), enclosed)
+
+
+def immersive_planes(
+    mesh: list[tuple[int, ...]], matrices: Floats, lens: Lens, face_inside: bool
+) -> Floats | None:
+    """Return the planes (n, 4) around the immersive volume: n · p + c ≤ 0 within.
+
+    ``mesh`` are the cells of a closed surface between cameras (m, 4, 4). None if the lens does not
+    see its own axis: nothing is within.
+    """
+    positions = matrices[:, :3, 3]
+    hull: Floats = ConvexHull(positions).equations
+    if sees_all_round(lens):
+        return hull
     sides = cone_sides(lens)
     if sides is None:
-        return InterpolationVolume(0.0, float(hull.volume))
+        return None
     # Facing inside, a ray runs from the surface through the point: the cone opens towards it.
-    sign = -1.0 if rig.face_inside else 1.0
+    sign = -1.0 if face_inside else 1.0
     normals = sign * sides @ np.swapaxes(matrices[:, :3, :3], 1, 2)
     bounds = np.full(normals.shape[:2], np.inf)
     for camera, corner in neighbours(mesh):
         bounds[camera] = np.minimum(bounds[camera], normals[camera] @ positions[corner])
     planes = np.concatenate([normals, -bounds[..., None]], axis=-1).reshape(-1, 4)
-    inside = _polyhedron_volume(np.concatenate([_tightest(planes), hull.equations]))
-    return InterpolationVolume(inside, float(hull.volume))
+    return np.concatenate([_tightest(planes), hull])
+
+
+def parts_to_edge(matrices: Floats, lens: Lens, places: Floats) -> Floats:
+    """Return how far from the middle of cameras (m, 4, 4) to the edge of their volume places are.
+
+    Of places (n, 3) it is 0 in the middle, 1 at the edge of the immersive volume in that direction,
+    and inf where the middle itself is not within, as among cameras in a plane. The surface between
+    the cameras is taken to be their hull.
+    """
+    positions = matrices[:, :3, 3]
+    middle = positions.mean(axis=0)
+    nowhere = np.full(len(places), np.inf)
+    try:
+        mesh = [tuple(map(int, cell)) for cell in ConvexHull(positions).simplices]
+    except QhullError:
+        return nowhere
+    outward = ((positions - middle) * -matrices[:, :3, 2]).sum() >= 0
+    planes = immersive_planes(mesh, matrices, lens, not outward)
+    if planes is None or (planes[:, :3] @ middle + planes[:, 3] >= 0).any():
+        return nowhere
+    room = -(planes[:, :3] @ middle + planes[:, 3])
+    parts: Floats = ((places - middle) @ planes[:, :3].T / room).max(axis=1)
+    return parts
 
 
 def spacing(positions: Floats) -> float:

@@ -13,17 +13,25 @@ from typing import Any
 import numpy as np
 
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
 from lightfield.export.source import Source
 from lightfield.geometry.depth import with_precision
+from lightfield.geometry.interpolation_volume import parts_to_edge
 from lightfield.geometry.lenses import Array, Lens
+from lightfield.geometry.rigs.sphere import nested
 from lightfield.imaging import images, pictures, plots
 from lightfield.imaging.tonemap import encode_srgb, tone_map
 from lightfield.measurement import metrics
 from lightfield.synthesis.view import BEST, Sources, reader
 
 MEANS = ("psnr", "ssim", "flip", "holes", "source_bytes")
-# At the rig's centre a picture is inside, and towards the edge beyond this part of the radius.
-INNER = 0.5
+# Of all that is between the middle of the cameras and the edge of their interpolation volume, so
+# much is inside, the rest towards the edge, and what is farther out beyond.
+PLACES = {"inside": 0.5, "edge": 1.0, "beyond": np.inf}
+# The region of a picture that is all of it. The others are of the pixels that show most of a kind
+# of light: glossy is that of metal and mirrors, transmission that of glass, volume that of fog and
+# fire.
+WHOLE = "all"
 
 
 @dataclass(frozen=True)
@@ -44,11 +52,9 @@ def variants(source: Source, views: Sequence[View]) -> Iterator[Variant]:
     size = sum(sizes.values())
     whole = Sources(lens, views, read)
     yield Variant("all", str(len(views)), whole, BEST, size)
-    for step in (2, 4, 8):
-        some = views[::step]
-        if len(some) >= 4:
-            fewer = Sources(lens, some, read)
-            yield Variant("views", str(len(some)), fewer, BEST, sum(sizes[v.name] for v in some))
+    for some in subsets(source.lightfield, views):
+        fewer = Sources(lens, some, read)
+        yield Variant("views", str(len(some)), fewer, BEST, sum(sizes[v.name] for v in some))
     for best in (1, 2, 4, 8):
         yield Variant("best", str(best), whole, best, size)
     for part in (2, 4):
@@ -88,73 +94,115 @@ def variants(source: Source, views: Sequence[View]) -> Iterator[Variant]:
     yield Variant("control", "shuffled depth", Sources(lens, views, mixed), BEST, size)
 
 
-def compare(
-    variant: Variant, targets: LightField, truth: Source, exposure: float
-) -> Iterator[dict[str, Any]]:
-    """Yield a row for each view of ``targets``: psnr in decibel, ssim, flip, and part of holes.
+def subsets(lightfield: LightField, views: Sequence[View]) -> Iterator[Sequence[View]]:
+    """Yield fewer and fewer of a dataset's ``views``: those of coarser spheres, or else halves."""
+    coarser = nested(len(views)) if lightfield.content.get("lf_type") == "SPHERE" else []
+    some: list[Sequence[View]] = [[views[number] for number in numbers] for numbers in coarser]
+    yield from some or [views[::step] for step in (2, 4, 8) if len(views[::step]) >= 4]
 
-    Holes are black in the picture and count as what they are. ``place`` says whether the view is
-    well inside the cameras or towards their edge.
+
+def regions(truth: Source, view: View, inside: Array) -> dict[str, Array]:
+    """Return which pixels (h, w) of a true view are of each region, of those ``inside`` the lens.
+
+    The kinds of light are told apart if the view has all of them as passes.
     """
-    places = variant.sources.matrices[:, :3, 3]
-    middle = places.mean(axis=0)
-    radius = np.median(np.linalg.norm(places - middle, axis=-1))
+    found = {WHOLE: inside}
+    if {*PARTS_OF_LIGHT} <= {one.name for one in truth.lightfield.passes}:
+        folder = truth.lightfield.folder
+        paths = [PASSES[name].path(folder, view.name) for name in PARTS_OF_LIGHT]
+        light = np.array([images.read_image(path, "RGB").colour.mean(axis=-1) for path in paths])
+        most = light.argmax(axis=0)
+        for number, name in enumerate(PARTS_OF_LIGHT):
+            found[name.removesuffix("_light")] = inside & (most == number)
+    return {name: pixels for name, pixels in found.items() if pixels.any()}
+
+
+def compare(
+    variant: Variant, around: Sequence[View], targets: LightField, truth: Source, exposure: float
+) -> Iterator[dict[str, Any]]:
+    """Yield a row for each region of each view of ``targets``, which are of the ``truth``.
+
+    A row has psnr in decibel, ssim, flip and the part of holes; ``part`` is the region's of the
+    picture. Holes are black in it and count as what they are. ``to_edge`` is how far the view is
+    from the middle of the views ``around`` it, as a part of what it is to the edge of their volume.
+    """
     rays = targets.lens.pixel_rays()
-    outside = np.isnan(rays[..., 0])
-    for view in targets.views:
+    inside = np.isfinite(rays[..., 0])
+    matrices = np.array([view.matrix for view in around])
+    parts = parts_to_edge(matrices, variant.sources.lens, targets.matrices[:, :3, 3])
+    for view, to_edge in zip(targets.views, parts.tolist(), strict=True):
         made = variant.sources.synthesise(view.matrix, targets.lens, variant.best)
         true = images.read_image(truth.path(view), "RGB").colour
-        one, other = (_developed(colour, exposure, outside) for colour in (true, made.colour))
-        error = float(((one - other)[~outside] ** 2).mean())
-        away = np.linalg.norm(view.matrix[:3, 3] - middle)
-        yield {
-            "variant": variant.name,
-            "value": variant.value,
-            "view": view.name,
-            "place": "inside" if away <= INNER * radius else "edge",
-            "psnr": -10 * float(np.log10(max(error, 1e-10))),
-            "ssim": float(metrics.ssim_map(one, other)[~outside].mean()),
-            "flip": float(metrics.flip_map(one, other)[~outside].mean()),
-            "holes": made.hole_fraction(rays),
-            "source_bytes": variant.size,
-        }
+        one, other = (_developed(colour, exposure, inside) for colour in (true, made.colour))
+        errors, similar = (one - other) ** 2, metrics.ssim_map(one, other)
+        flips = metrics.flip_map(one, other)
+        for region, pixels in regions(truth, view, inside).items():
+            yield {
+                "variant": variant.name,
+                "value": variant.value,
+                "truth": truth.dataset.name,
+                "view": view.name,
+                "to_edge": to_edge,
+                "place": next(name for name, most in PLACES.items() if to_edge <= most),
+                "region": region,
+                "part": float(pixels[inside].mean()),
+                "psnr": -10 * float(np.log10(max(errors[pixels].mean(), 1e-10))),
+                "ssim": float(similar[pixels].mean()),
+                "flip": float(flips[pixels].mean()),
+                "holes": float(made.holes[pixels].mean()),
+                "source_bytes": variant.size,
+            }
 
 
-def means(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return one row for each variant: the means over its views, of numbers or their texts."""
-    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+def means(rows: Sequence[Mapping[str, Any]], region: str = WHOLE) -> list[dict[str, Any]]:
+    """Return one row for each variant: the means over its views, of numbers or their texts.
+
+    Each view counts as much as it has of the ``region``; ``part`` is that of all views.
+    """
+    variants: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for row in rows:
-        groups.setdefault((row["variant"], row["value"]), []).append(row)
-    return [
-        {"variant": variant, "value": value}
-        | {name: float(np.mean([float(row[name]) for row in group])) for name in MEANS}
-        for (variant, value), group in groups.items()
-    ]
+        variants.setdefault((row["variant"], row["value"]), []).append(row)
+    found = []
+    for (variant, value), all_rows in variants.items():
+        some = [row for row in all_rows if row["region"] == region]
+        parts = [float(row["part"]) for row in some]
+        count = sum(row["region"] == WHOLE for row in all_rows)
+        mean: dict[str, Any] = {"variant": variant, "value": value, "part": sum(parts) / count}
+        for name in MEANS:
+            mean[name] = float(np.average([float(row[name]) for row in some], weights=parts))
+        found.append(mean)
+    return found
 
 
 def draw(rows: Sequence[Mapping[str, Any]], stem: Path) -> None:
-    """Plot the `means`: quality against the size of what it is made of, and of how many views."""
+    """Plot the `means`: quality against bytes and number of views, and of how many a picture is."""
     by_name: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
         by_name.setdefault(row["variant"], []).append(row)
     plain = by_name["all"]
-    with plots.plot(stem, 1, 2, (10, 4)) as (size, best):
+    with plots.plot(stem, 1, 3, (14, 4)) as (size, number, best):
         for name, colour in (("views", plots.BLUE), ("resolution", plots.ORANGE)):
             line = sorted([*plain, *by_name.get(name, [])], key=lambda row: row["source_bytes"])
             values = [row["source_bytes"] / 1e6 for row in line]
             size.plot(values, [row["psnr"] for row in line], "o-", color=colour, label=name)
         size.set(xscale="log", xlabel="views that are used, MB", ylabel="PSNR, dB (sRGB)")
+        line = sorted([*plain, *by_name.get("views", [])], key=lambda row: int(row["value"]))
+        counts = [int(row["value"]) for row in line]
+        number.plot(counts, [row["psnr"] for row in line], "o-", color=plots.BLUE)
+        number.set(xscale="log", xlabel="views that are used", ylabel="PSNR, dB (sRGB)")
+        number.set_xticks(counts, counts, minor=False)
+        number.set_xticks([], minor=True)
         line = by_name["best"]
         counts = [int(row["value"]) for row in line]
         best.plot(counts, [row["psnr"] for row in line], "o-", color=plots.BLUE)
         best.set(xlabel="views that a picture is made of", ylabel="PSNR, dB (sRGB)")
         for row, colour in zip(by_name["control"], (plots.GREY, plots.VERMILION), strict=True):
-            for axes in (size, best):
+            for axes in (size, number, best):
                 axes.axhline(row["psnr"], color=colour, linestyle="--", label=row["value"])
         size.legend()
 
 
-def _developed(colour: Array, exposure: float, outside: Array) -> Array:
+def _developed(colour: Array, exposure: float, inside: Array) -> Array:
     shown = encode_srgb(tone_map(np.nan_to_num(colour), exposure, pictures.WHITE))
-    shown[outside] = 0
+    shown[~inside] = 0
     return np.asarray(shown, np.float64)

@@ -131,22 +131,31 @@ def synthesis(files: Sequence[Path], folder: str) -> Measurement | None:
     if path is None:
         return None
     rows = _read_csv(path)
-    columns = ["variant", "value", *synthesis_quality.MEANS]
+    names = synthesis_quality.MEANS
+    columns = ["variant", "value", *names]
     means = [[row[name] for name in columns] for row in synthesis_quality.means(rows)]
-    by_place = [
-        [place, *(row[name] for name in synthesis_quality.MEANS)]
-        for place in ("inside", "edge")
-        for row in synthesis_quality.means([row for row in rows if row["place"] == place])[:1]
+    plain = [row for row in rows if row["variant"] == "all"]
+    by_place = []
+    for place in synthesis_quality.PLACES:
+        for truth in dict.fromkeys(row["truth"] for row in plain if row["place"] == place):
+            some = [row for row in plain if row["place"] == place and row["truth"] == truth]
+            (mean,) = synthesis_quality.means(some)
+            by_place.append([truth, place, *(mean[name] for name in names)])
+    by_region = [
+        [region, mean["part"], *(mean[name] for name in names)]
+        for region in dict.fromkeys(row["region"] for row in plain)
+        for mean in synthesis_quality.means(plain, region)
     ]
-    return Measurement(
-        page.plot(path.with_suffix("")),
-        {
-            "Views that were held out, synthesised from this dataset's": Table(columns, means),
-            "Inside, and towards the edge of the cameras": Table(
-                ["place", *synthesis_quality.MEANS], by_place
-            ),
-        },
-    )
+    found = {
+        "Views that were held out, synthesised from this dataset's": Table(columns, means),
+        "Inside, and towards the edge of the interpolation volume": Table(
+            ["views of", "place", *names], by_place
+        ),
+    }
+    if len(by_region) > 1:
+        title = "Apart for the kind of light that a pixel shows most of"
+        found[title] = Table(["region", "part", *names], by_region)
+    return Measurement(page.plot(path.with_suffix("")), found)
 
 
 def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:

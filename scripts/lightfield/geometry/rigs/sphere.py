@@ -4,6 +4,7 @@ import math
 from typing import Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from lightfield.geometry.rigs.rig import Rig, UnitPoses, circle, stack
@@ -26,18 +27,18 @@ class Sphere(Rig):
 
     @property
     def positions(self) -> int:
-        return int(10 * 4 ** (self.subdivisions - 1) + 2)
+        return vertices(self.subdivisions)
 
     def unit_poses(self) -> UnitPoses:
-        vertices = icosphere(self.subdivisions)
-        normal = _unit(vertices)
+        places = icosphere(self.subdivisions)
+        normal = _unit(places)
         side = np.cross([0.0, 0.0, 1.0], normal)
         poles = np.linalg.norm(side, axis=-1) <= 1e-4
         side[poles] = np.cross([0.0, 1.0, 0.0], normal[poles])
         side = _unit(side)
         up = np.cross(side, normal)
         turns = matrix_to_euler(np.stack([-side, -up, -normal], axis=-1))
-        return UnitPoses.of_sides(("", 0.5 * vertices, turns))
+        return UnitPoses.of_sides(("", 0.5 * places, turns))
 
     def _thinned_to(self, positions: int) -> Self | None:
         for subdivisions in range(self.subdivisions - 1, 0, -1):
@@ -67,6 +68,11 @@ class Sphere(Rig):
         return [stack(cosine, sine, 0.0), stack(cosine, 0.0, sine), stack(0.0, cosine, sine)]
 
 
+def vertices(subdivisions: int) -> int:
+    """Return the number of an icosphere's vertices."""
+    return int(10 * 4 ** (subdivisions - 1) + 2)
+
+
 def icosphere(subdivisions: int) -> Floats:
     """Return the vertices (n, 3) of Blender's icosphere of radius 1, in Blender's order.
 
@@ -80,16 +86,30 @@ def icosphere(subdivisions: int) -> Floats:
         return base
     pieces = 2 ** (subdivisions - 1)
     steps = np.arange(1, pieces)[:, None] / pieces
-    vertices = [_unit(base)]
+    points = [_unit(base)]
     for start, end in _EDGES:
-        vertices.append(_unit(base[start] + (base[end] - base[start]) * steps))
+        points.append(_unit(base[start] + (base[end] - base[start]) * steps))
     for apex, left, right in _FACES:
         row_starts = _unit(base[apex] + (base[left] - base[apex]) * steps)
         row_ends = _unit(base[apex] + (base[right] - base[apex]) * steps)
         for row in range(1, pieces - 1):
             along = np.arange(1, row + 1)[:, None] / (row + 1)
-            vertices.append(_unit(row_starts[row] + (row_ends[row] - row_starts[row]) * along))
-    return np.concatenate(vertices)
+            points.append(_unit(row_starts[row] + (row_ends[row] - row_starts[row]) * along))
+    return np.concatenate(points)
+
+
+def nested(count: int) -> list[NDArray[np.intp]]:
+    """Return the vertices that each coarser icosphere has, too, finest first, by their numbers.
+
+    ``count`` is that of the finest's vertices; what no icosphere has contains none.
+    """
+    # SciPy takes long to import, and no plan needs it.
+    from scipy.spatial import KDTree
+
+    counts = {vertices(level): level for level in range(1, 8)}
+    finest = counts.get(count, 1)
+    tree = KDTree(_unit(icosphere(finest)))
+    return [np.sort(tree.query(_unit(icosphere(level)))[1]) for level in range(finest - 1, 0, -1)]
 
 
 # The icosahedron that Blender starts from: coordinates as rounded in its source
