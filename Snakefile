@@ -83,7 +83,10 @@ onerror:
     note_sums()
     # Snakemake has something to say after this, too: what failed is repeated when it has.
     atexit.register(
-        print, failure_report(failed_jobs()), file=sys.stderr, flush=True
+        print,
+        failure_report(failed_jobs(workflow.scheduler.failed)),
+        file=sys.stderr,
+        flush=True,
     )
 
 

@@ -15,8 +15,16 @@ from pathlib import Path
 SCRIPTS = os.path.relpath(FOLDER / "scripts")
 BENCHMARKS = os.path.relpath(FOLDER / "benchmarks")
 
+from snakemake_interface_executor_plugins.executors.base import SubmittedJobInfo
+
 from lightfield.core import leftovers, processors, room
-from lightfield.core.failures import batch_log, cause, failure_report, is_newer
+from lightfield.core.failures import (
+    batch_log,
+    cause,
+    failure_report,
+    first_sentence,
+    is_newer,
+)
 from lightfield.core.files import read_json, set_aside
 from lightfield.core.gpus import visible
 from lightfield.core.memory import available
@@ -704,31 +712,59 @@ def remove_leftovers():
         )
 
 
-def failed_jobs():
-    """Return rule and log of each job that failed; of a group's, of those that said why.
+# What the executor said of a job or group that failed.
+SAID = {}
 
-    Of a job that said nothing, as one that never began, it is the batch system's log, if there is.
+
+def note_failures():
+    """Note what the executor says of jobs that fail, as that they were refused.
+
+    Snakemake keeps it from the log of a group; and of a group that it does not even submit, as with
+    an account that there is not, Slurm's executor reports nothing, and would wait for ever.
+    """
+    executor = workflow.scheduler._executor
+    forward, run_job = executor.report_job_error, executor.run_job
+
+    def noting(job_info, msg=None, **words):
+        SAID[job_info.job] = msg
+        forward(job_info, msg=msg, **words)
+
+    def running(job):
+        try:
+            run_job(job)
+        except AttributeError as error:
+            if not (job.is_group() and error.__context__):
+                raise
+            noting(SubmittedJobInfo(job), f"not submitted: {error.__context__}")
+
+    executor.report_job_error, executor.run_job = noting, running
+
+
+def failed_jobs(failed):
+    """Return rule, cause and log of each of these jobs; of a group's, of those that said why.
+
+    Of a job that said nothing, as one that never began, it is the batch system's log, if there is,
+    or else what the executor said.
     """
     found = []
     # Clocks of nodes differ.
     start = workflow.start_time.timestamp() - 5
-    for failed in workflow.scheduler.failed:
-        jobs = own([failed])
-        if failed.is_group():
+    for one in failed:
+        jobs = own([one])
+        if one.is_group():
             jobs = [
-                job
-                for job in own(failed.jobs)
-                if not all(map(os.path.exists, job.output))
+                job for job in own(one.jobs) if not all(map(os.path.exists, job.output))
             ]
         logs = [(job.rule.name, Path(job.log[0])) for job in jobs]
         for _, log in logs if STORE else ():
             name = os.path.relpath(log, stored(WORK))
             ViewStore(STORE).bring(f"{WORK}/{name}")
-        spoke = [
-            (name, log) for name, log in logs if is_newer(log, start) and cause(log)
-        ]
+        spoke = [(name, cause(log), log) for name, log in logs if is_newer(log, start)]
+        spoke = [(name, why, log) for name, why, log in spoke if why]
         if logs and not spoke:
             name, log = min(logs)
-            spoke = [(name, batch_log(failed.name, start) or log)]
+            batch = batch_log(one.name, start)
+            why = batch and cause(batch) or first_sentence(SAID.get(one) or "")
+            spoke = [(name, why or "it said nothing", batch or log)]
         found += spoke
     return sorted(found)

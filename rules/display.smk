@@ -64,7 +64,13 @@ def look():
     return jobs_of(running), filter(workflow.dag.finished, TASKS), jobs_of(failed)
 
 
-DISPLAY = RunDisplay(look)
+def explain(jobs):
+    """Return why these jobs failed, and their groups."""
+    failed = list(workflow.scheduler.failed)
+    return failure_report(failed_jobs(one for one in failed if jobs & jobs_of([one])))
+
+
+DISPLAY = RunDisplay(look, explain)
 
 
 def is_quiet_about(kind):
@@ -87,6 +93,7 @@ def passes(record):
 
 def begin_display():
     """Show how far the run is, from now on."""
+    note_failures()
     for handler in logging.getLogger("snakemake.logging").handlers:
         # Snakemake's own log file is for itself.
         if not isinstance(handler, logging.FileHandler):

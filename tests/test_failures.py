@@ -195,6 +195,36 @@ def test_of_a_job_that_never_began_the_batch_systems_log_is_named(failing, group
     assert terminal.endswith(f"render failed: {said}\n  log: .snakemake/{name}-17.log\n"), terminal
 
 
+REFUSAL = "sbatch: error: Batch job submission failed: Invalid partition name specified"
+UNKNOWN = "The given account nobody's appears to be invalid. Available accounts: mine"
+
+
+@pytest.mark.parametrize("groups", [[], ["--groups", "render=shard", "reproject=shard"]])
+@pytest.mark.parametrize(
+    ("account", "said"),
+    [
+        ("mine", f"SLURM sbatch failed. The error message was '{REFUSAL}'."),
+        ("nobody's", UNKNOWN),
+    ],
+)
+@pytest.mark.slow
+def test_why_slurm_takes_no_job_is_said_at_the_end(
+    failing, tmp_path, monkeypatch, groups, account, said
+):
+    commands = dict.fromkeys(["sinfo", "scontrol", "squeue", "sacct"], "")
+    commands |= {"sbatch": f"echo '{REFUSAL}' >&2; exit 1", "sacctmgr": "echo mine"}
+    for name, script in commands.items():
+        (tmp_path / name).write_text(f"#!/bin/sh\n{script}\n")
+        (tmp_path / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+    resources = ("--default-resources", f"slurm_account={account!r}")
+    terminal = failing.fail(
+        "render", options=["--executor", "slurm", "--jobs=1", *resources, *groups]
+    )
+    assert terminal.splitlines()[-2].startswith("render failed: "), terminal
+    assert terminal.splitlines()[-2].endswith(said), terminal
+
+
 def test_the_cause_is_the_last_error_or_else_the_last_line(tmp_path):
     log = tmp_path / "log"
     assert cause(log) is None
@@ -266,14 +296,11 @@ def test_what_the_system_refuses_is_one_line(problem, said):
 
 
 def test_the_same_cause_of_many_jobs_is_said_once(tmp_path):
-    for name, text in (("a", "error: no GPU"), ("b", "error: no GPU"), ("c", "error: full")):
-        (tmp_path / name).write_text(text)
-    jobs = [("render", tmp_path / name) for name in "abcd"]
+    causes = {"a": "error: no GPU", "b": "error: no GPU", "c": "error: full"}
+    jobs = [("render", why, tmp_path / name) for name, why in causes.items()]
     assert failure_report(jobs).splitlines() == [
         "render failed: error: no GPU",
         f"  log: {tmp_path / 'a'} (and 1 more with the same cause)",
         "render failed: error: full",
         f"  log: {tmp_path / 'c'}",
-        "render failed: it said nothing",
-        f"  log: {tmp_path / 'd'}",
     ]

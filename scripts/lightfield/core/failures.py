@@ -1,5 +1,6 @@
 """What a run that failed says last: why, and where the whole of it can be read."""
 
+import itertools
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -39,11 +40,17 @@ def cause(log: Path) -> str | None:
     return f"{said[-1]}: {meaning}" if meaning else said[-1]
 
 
-def failure_report(jobs: Iterable[tuple[str, Path]]) -> str:
-    """Return each cause and a log that has it, of failed jobs given by rule and log."""
+def first_sentence(message: str) -> str:
+    """Return what an executor says of a job, without the command that it quotes below it."""
+    lines = itertools.takewhile(lambda line: not line.startswith(" "), message.splitlines())
+    return " ".join(lines).strip().rstrip(":")
+
+
+def failure_report(jobs: Iterable[tuple[str, str, Path]]) -> str:
+    """Return each cause and a log that has it, of failed jobs given by rule, cause and log."""
     logs: dict[tuple[str, str], list[Path]] = {}
-    for rule, log in jobs:
-        logs.setdefault((rule, cause(log) or "it said nothing"), []).append(log)
+    for rule, why, log in jobs:
+        logs.setdefault((rule, why), []).append(log)
     return "\n".join(
         f"{rule} failed: {why}\n  log: {paths[0]}"
         + (f" (and {len(paths) - 1} more with the same cause)" if paths[1:] else "")

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TextIO
 
 from lightfield.core import progress
-from lightfield.core.failures import failure_report
 from lightfield.core.progress import duration
 
 # What a job takes beside its renders, in seconds: to start a program, to read and write its files.
@@ -91,15 +90,17 @@ class Task:
 class RunDisplay:
     """Shows how far the tasks of a run are.
 
-    ``look`` returns the keys of the jobs that are running, finished and failed.
+    ``look`` returns the keys of the jobs that are running, finished and failed; ``explain`` why
+    those of some keys failed.
     """
 
     def __init__(
         self,
         look: Callable[[], tuple[Iterable[Hashable], Iterable[Hashable], Iterable[Hashable]]],
+        explain: Callable[[set[Hashable]], str],
         stream: TextIO | None = None,
     ) -> None:
-        self._look = look
+        self._look, self._explain = look, explain
         self._stream = stream or sys.stderr
         self._terminal = self._stream.isatty()
         self._failed: set[Hashable] = set()
@@ -170,10 +171,10 @@ class RunDisplay:
 
     def _report_failed(self, failed: set[Hashable], running: set[Hashable]) -> None:
         """Say at once why a job failed, where others go on: all is said again at the end."""
-        new = [self._tasks[key] for key in failed - self._failed if key in self._tasks]
+        new = {key for key in failed - self._failed if key in self._tasks}
         self._failed |= failed
         if new and running:
-            self._say(failure_report((task.rule, task.log) for task in new))
+            self._say(self._explain(new))
 
     def _report_phases(self) -> None:
         waiting = {task.phase for task in self._open.values()}
