@@ -13,6 +13,7 @@ import json
 import os
 import random
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -143,6 +144,11 @@ class Build:
         if not succeeded:
             sys.exit(f"error: a build failed that nothing disturbed:\n{said}")
 
+    def clear(self) -> None:
+        """Remove all that was made."""
+        for name in ("results", "work", ".snakemake"):
+            shutil.rmtree(self.root / name)
+
     def call(self, *words: str) -> str:
         """Run a program in the build's folder; return what it printed."""
         result = subprocess.run(words, cwd=self.root, capture_output=True, text=True, check=False)
@@ -224,23 +230,40 @@ def limit_files(build: Build, count: int) -> Iterator[Row]:
             print(said, file=sys.stderr)
 
 
-def kill(build: Build, count: int, seconds: float, rng: random.Random) -> Row:
-    """Kill a build at random moments; the next one goes on, and the last one finishes."""
-    row = Row("killed at a random moment")
-    for _ in range(count):
-        process = build.start()
-        time.sleep(rng.uniform(0.1, 1.0) * seconds)
-        os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
+def kill(
+    build: Build, count: int, seconds: float, expected: dict[str, str], rng: random.Random
+) -> Row:
+    """Kill a build at random moments; the next one goes on, and the last one finishes.
+
+    ``seconds`` is what a build takes, ``expected`` what it publishes. After one that finishes
+    before it is killed another begins from nothing.
+    """
+    row, killed = Row("killed at a random moment"), 0
+    while True:
         before = build.finished()
-        build.run("--unlock")
+        process = build.start()
+        try:
+            process.communicate(
+                timeout=rng.uniform(0.05, 0.7) * seconds if row.injected < count else None
+            )
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
         row.bytes_lost += lost(before)
-    before = build.finished()
-    build.finish()
-    row.injected = row.found = row.mended = count
-    row.bytes_lost += lost(before)
-    row.made_twice = build.made().total() - len(build.made())
-    return row
+        if process.returncode == -signal.SIGKILL:
+            killed += 1
+            row.injected += 1
+            row.found += 1
+            build.run("--unlock")
+        elif process.returncode == 0:
+            row.mended += killed if build.published() == expected else 0
+            row.made_twice += build.made().total() - len(build.made())
+            killed = 0
+            if row.injected == count:
+                return row
+            build.clear()
+        else:
+            sys.exit("error: a build failed that was not killed")
 
 
 def damage(build: Build, faults: int, rng: random.Random) -> Iterator[Row]:
@@ -286,7 +309,8 @@ def main() -> None:
         undisturbed, build = (Build(Path(name, part), arguments.views) for part in ("a", "b"))
         undisturbed.finish()
         expected, seconds = undisturbed.published(), time.monotonic() - began
-        rows = [*limit_files(build, arguments.limits), kill(build, arguments.kills, seconds, rng)]
+        rows = [*limit_files(build, arguments.limits)]
+        rows.append(kill(build, arguments.kills, seconds, expected, rng))
         same = build.published() == expected
         rows += damage(build, arguments.faults, rng)
         same &= build.published() == expected
