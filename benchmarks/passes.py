@@ -6,9 +6,11 @@ in their Cryptomatte; by how much of it depth differs from the ray casts' there,
 the 99th percentile; the angles in degrees, their median and third quartile, between normals and
 those of the faces that these find, and those of planes through neighbouring depths; motion in
 pixels, of what stands still; values that were not a number, and how many of them not at the rim of
-an image circle; and from it to a second view, 5 cm beside it, how many pixels are visible there,
-and by how much their albedo differs, in the mean, from its own where flow leads, and where it does
-not. Then the seconds of a core and the bytes of a view with more and more passes.
+an image circle or of the picture; which part of its paint the albedo is, in the median, the 5th and
+the 95th percentile, where Blender's nodes say that a surface is nothing but painted; and from it to
+a second view, 5 cm beside it, how many pixels are visible there, and by how much their albedo
+differs, in the mean, from its own where flow leads, and where it does not. Then the seconds of a
+core, those of the geometry among them, and the bytes of a view with more and more passes.
 """
 
 import argparse
@@ -26,6 +28,7 @@ from scipy.ndimage import binary_erosion
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
 from lightfield.core.cli import run
+from lightfield.dataset import keys
 from lightfield.dataset.journal import read
 from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.dataset.passes import MANIFEST, PARTS_OF_LIGHT, PASSES
@@ -34,6 +37,7 @@ from lightfield.geometry import lenses
 from lightfield.geometry.flow import flow
 from lightfield.imaging import images
 from lightfield.rendering import shard
+from lightfield.rendering.colour_pass import render_colour
 
 Array = np.ndarray[Any, Any]
 
@@ -42,6 +46,8 @@ LENSES = {
     "fisheye": {"lens": "equidistant", "fov": 180},
     "panorama": {"lens": "equirectangular"},
 }
+# What is no paint shines with.
+UNPAINTED = 1e4
 # Metres.
 BESIDE = 0.05
 GEOMETRY = ["normal", "object", "material"]
@@ -73,9 +79,10 @@ def main() -> None:
         for step, passes in STEPS.items():
             content = _content(given, "fisheye", arguments.size, arguments.samples, passes)
             folder = Path(name, step)
-            seconds = _render(content, arguments.blend, folder)
+            seconds, geometry = _render(content, arguments.blend, folder)
             sizes = {path.parent.name: path.stat().st_size for path in folder.rglob("view_*.exr")}
-            print(step, f"{seconds:.2f} core seconds a view,", json.dumps(sizes), flush=True)
+            costs = f"{seconds:.2f} core seconds a view, {geometry:.2f} of them for geometry,"
+            print(step, costs, json.dumps(sizes), flush=True)
 
 
 def _content(
@@ -93,8 +100,8 @@ def _content(
     return given.changed(made, views, depth=made.usual_depth or "distance", render=render)
 
 
-def _render(content: LightField, blend: Path, folder: Path) -> float:
-    """Render the views and return the seconds of a core that one of them took."""
+def _render(content: LightField, blend: Path, folder: Path) -> tuple[float, float]:
+    """Render the views; return a view's seconds of a core, and those of its geometry."""
     journal = folder / "journal.jsonl"
     shard.render(
         content,
@@ -107,7 +114,9 @@ def _render(content: LightField, blend: Path, folder: Path) -> float:
         journal=journal,
     )
     (made,) = read(journal)
-    return float(np.mean([view["cpu_seconds"] for view in made.views[1:]]))
+    columns = ("cpu_seconds", "geometry_seconds")
+    seconds, geometry = (np.mean([view[name] for view in made.views[1:]]) for name in columns)
+    return float(seconds), float(geometry)
 
 
 def _read(folder: Path, name: str, view: str) -> tuple[Array, int]:
@@ -127,7 +136,7 @@ def _figures(content: LightField, folder: Path) -> dict[str, Any]:
     total = np.sum([found[name].astype(np.float64) for name in PARTS_OF_LIGHT], axis=0)
     rays = content.lens.pixel_rays()
     seen = np.isfinite(rays[..., 0])
-    inside = binary_erosion(seen, np.ones((3, 3)), iterations=2, border_value=1)
+    inside = binary_erosion(seen, np.ones((3, 3)), iterations=2, border_value=0)
     different = np.abs(total - colour) / np.maximum(colour, 1e-3)
     objects = found["object"][..., 0]
     numbers = json.loads((folder / "object" / "names.json").read_text())
@@ -144,6 +153,8 @@ def _figures(content: LightField, folder: Path) -> dict[str, Any]:
     hit = np.isfinite(distance) & (distance > 0)
     led, visible = flow(content.lens, view.matrix, beside.matrix, distance, there)
     albedo, other = found["albedo"], _read(folder, "albedo", beside.name)[0]
+    paint = _paint(content)
+    painted = ((paint > 0.01) & (paint < UNPAINTED / 2 / content.render["samples"])).all(axis=-1)
     row, column = np.nonzero(visible & hit)
     across, down = led[row, column].T
     x = np.floor(column + 0.5 + across).astype(int) % content.lens.width
@@ -159,10 +170,47 @@ def _figures(content: LightField, folder: Path) -> dict[str, Any]:
         "motion": float(np.abs(found["motion"]).max()),
         "nan": {name: lost for name, (_, lost) in read.items() if lost},
         "lost inside": int((hit & inside & ~found["normal"].any(axis=-1)).sum()),
+        "albedo of paint": np.quantile(albedo[painted] / paint[painted], (0.5, 0.05, 0.95)).tolist()
+        if painted.any()
+        else [],
+        "painted": float(painted.sum() / seen.sum()),
         "visible": float((visible & hit).sum() / hit.sum()),
         "warped": float(np.abs(albedo[row, column] - other[y, x]).mean()),
         "not warped": float(np.abs(albedo[row, column] - other[row, column]).mean()),
     }
+
+
+def _paint(content: LightField) -> Array:
+    """Return the paint (h, w, 3) of the first view's surfaces, much more where one has another.
+
+    Each shines with its paint as Blender's nodes give it, through the same samples as the colour.
+    """
+    for shaded in (*bpy.data.materials, bpy.context.scene.world):
+        if tree := shaded and shaded.node_tree:
+            output = tree.get_output_node("CYCLES")
+            light = tree.nodes.new("ShaderNodeEmission")
+            light.inputs["Color"].default_value = (UNPAINTED, UNPAINTED, UNPAINTED, 1)
+            if output and (paint := _paint_socket(output.inputs["Surface"])):
+                light.inputs["Color"].default_value = paint.default_value
+                if paint.is_linked:
+                    tree.links.new(light.inputs["Color"], paint.links[0].from_socket)
+            if output:
+                tree.links.new(output.inputs["Surface"], light.outputs[0])
+    view = content.views[0]
+    return render_colour(view.matrix, keys.view_seed(content.render["seed"], view.name)).pixels
+
+
+def _paint_socket(surface: Any) -> Any:
+    """Return the colour of a surface that is paint alone, opaque, or None."""
+    shader = surface.links[0].from_node if surface.links else None
+    if shader and shader.type == "BSDF_DIFFUSE":
+        return shader.inputs["Color"]
+    if not shader or shader.type != "BSDF_PRINCIPLED":
+        return None
+    none = ("Metallic", "Transmission Weight", "Subsurface Weight", "Sheen Weight", "Coat Weight")
+    values = [(shader.inputs[name], 0) for name in none] + [(shader.inputs["Alpha"], 1)]
+    pure = all(not socket.is_linked and socket.default_value == value for socket, value in values)
+    return shader.inputs["Base Color"] if pure else None
 
 
 def _angles(one: Array, other: Array) -> list[float]:

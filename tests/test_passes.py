@@ -174,13 +174,16 @@ def test_the_eyes_of_an_omnidirectional_pair_go_round_their_place(eye, made):
 
 def test_views_without_a_centre_are_not_reprojected_nor_exported(made, tmp_path, run_program):
     source = made / "eyes"
-    refused = run_program(
-        *("reproject.py", "--input-dir", source / "exr", "--output-dir", tmp_path, "--png"),
-        *("--input-cfg", source / "lightfield.json", "--rectilinear", "18,36"),
-        check=False,
-    )
-    assert refused.returncode == 1
-    assert "omnidirectional_stereo: its views have no centre" in refused.stderr
+    words = ("--input-cfg", source / "lightfield.json")
+    folders = ("--input-dir", source / "exr", "--output-dir", tmp_path)
+    for program in (
+        ("reproject.py", *words, *folders, "--png", "--rectilinear", "18,36"),
+        ("export_instant_ngp.py", *words, "--output", tmp_path / "transforms.json"),
+    ):
+        refused = run_program(*program, check=False)
+        assert refused.returncode == 1
+        assert "omnidirectional_stereo: its views have no centre" in refused.stderr
+    assert not list(tmp_path.iterdir())
     with pytest.raises(UserError, match="its views have no centre"):
         _ = Source(source, "", ".exr").lightfield
 

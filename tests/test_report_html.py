@@ -18,7 +18,7 @@ from lightfield.geometry import lenses, overview, rigs
 from lightfield.geometry.depth import z_from_distance
 from lightfield.imaging import images, pictures
 from lightfield.imaging.tonemap import decode_srgb
-from lightfield.report import dataset_page, epipolar, faults, figures, packing
+from lightfield.report import dataset_page, epipolar, faults, figures, packing, pass_pictures
 
 SPHERE = {
     "type": "sphere",
@@ -348,6 +348,11 @@ def test_each_pass_of_the_middle_view_is_shown(show, tmp_path):
     assert pictures["albedo"] == [[255, 0, 0], [0, 0, 0]]
     assert pictures["flow"] == [[255, 0, 0], [102, 0, 0]]
     assert "normal/" in tab.locator("#files").inner_text()
+
+
+def test_what_stands_still_is_a_white_picture_of_motion():
+    noise = np.full((2, 2, 4), 1e-5, np.float32)
+    assert (pass_pictures._picture(PASSES["motion"], noise, 0) >= 254).all()
 
 
 def test_an_index_leads_to_every_page(sphere, run_program, show):

@@ -134,6 +134,7 @@ def export(arguments: argparse.Namespace) -> None:
     if arguments.scale is not None and not arguments.scale > 0:
         raise UserError(f"--scale: is {arguments.scale}; must be above 0")
     lightfield = LightField.read(arguments.input_cfg)
+    lightfield.require_centre()
     parts = {arguments.output: [view.name for view in lightfield.views]}
     for part in PARTS:
         if own := [view.name for view in lightfield.views if view.split == part]:

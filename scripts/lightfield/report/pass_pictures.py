@@ -17,6 +17,8 @@ from lightfield.report.packing import webp
 
 # The longer side of a picture in pixels, at most.
 SIDE = 320
+# A motion of fewer pixels is none.
+STILL = 0.01
 # Neighbouring numbers have hues as far apart as can be.
 GOLDEN = (math.sqrt(5) - 1) / 2
 
@@ -76,6 +78,7 @@ def _distinct(numbers: Array) -> Array:
 def _directions(x: Array, y: Array) -> Array:
     """Return a colour (…, 3) for each motion: its hue is where to, its saturation how far."""
     length = np.hypot(x, y)
-    far = np.quantile(length, 0.99) or 1.0
+    # What stands still moves by rounding alone.
+    far = max(np.quantile(length, 0.99), STILL)
     hue = np.arctan2(-y, x) / (2 * np.pi) % 1
     return np.asarray(hsv_to_rgb(np.stack([hue, (length / far).clip(0, 1), np.ones_like(hue)], -1)))
