@@ -61,6 +61,7 @@ onstart:
         check_room()
         if STORE:
             ViewStore(STORE).check()
+        keep_shards()
         remove_leftovers()
         for path in BROKEN:
             set_aside(Path(path), Path(REMOVED))

@@ -28,7 +28,7 @@ from lightfield.core.failures import (
 from lightfield.core.files import read_json, set_aside
 from lightfield.core.gpus import visible
 from lightfield.core.memory import available
-from lightfield.dataset import journal, ledger, memory
+from lightfield.dataset import journal, ledger, memory, shard_counts
 from lightfield.dataset.config import accept_blend, load_config, load_scene, scene_path
 from lightfield.dataset.dataset import PICTURES, PLOTS, load_datasets, scene_datasets
 from lightfield.dataset.exports import MANIFEST, VIEWS
@@ -58,10 +58,12 @@ if (workflow.resource_settings.cores, workflow.resource_settings.nodes) == (None
     workflow.resource_settings.cores = processors.available()
     workflow.register_resource("_cores", processors.available())
 
-# Several for each job that runs at once, so that none waits long for the last.
-config.setdefault(
-    "most_shards", min(max(64, 4 * (workflow.resource_settings.nodes or 0)), 10_000)
-)
+# On a cluster at least one for each job that runs at once, and none waits long for the last.
+if workflow.resource_settings.nodes:
+    config.setdefault(
+        "most_shards", max(64, min(workflow.resource_settings.nodes, 10_000))
+    )
+    config.setdefault("shard_minutes", 20 * (workflow.resource_settings.cores or 1))
 
 try:
     SETTINGS = load_config(config)
@@ -100,6 +102,7 @@ BROKEN = {}
 # Where that is moved to, for nobody to lose anything.
 REMOVED = f"{WORK}/removed"
 SUMS = f"{WORK}/{ledger.NAME}"
+SHARDS = f"{WORK}/{shard_counts.NAME}"
 MEMORY = available()
 # One for each render, and as many renders at once as this machine has GPUs; nodes count their own.
 LOCAL_GPUS = visible() if workflow.local_exec and SETTINGS.device != "cpu" else []
@@ -700,6 +703,17 @@ def check_room():
             needs.append((Path(tempfile.gettempdir()), size))
     for warning in room.check(needs):
         print(f"warning: {warning}", file=sys.stderr)
+
+
+def keep_shards():
+    """Note the shards of the datasets of which this run renders some: they keep these."""
+    jobs = [job for job in needed_jobs() if job.rule.name == RENDER]
+    datasets = {d.name: d for d in (dataset_of(job.wildcards) for job in jobs)}
+    counts = {name: (d.view_count, len(d.shards)) for name, d in datasets.items()}
+    if counts:
+        shard_counts.note(WORK, counts)
+        if STORE:
+            ViewStore(STORE).send(SHARDS)
 
 
 def remove_leftovers():

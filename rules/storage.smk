@@ -71,6 +71,7 @@ if STORE:
         check_storage()
         use_copies(RESULTS)
         use_copies(WORK)
+        ViewStore(STORE).bring(SHARDS)
         if workflow.is_main_process:
             bring_settings()
     except UserError as error:

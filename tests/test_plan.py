@@ -2,9 +2,14 @@
 
 import json
 import re
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
+from checkouts import checkout, planned
 
+from lightfield.core.files import write_json
+from lightfield.dataset import shard_counts
 from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
@@ -54,6 +59,56 @@ def test_a_spheres_name_tells_its_elevation_and_diameter_in_centimetres(scene):
         )
         assert (max(heights) + min(heights)) / 2 == pytest.approx(elevation / 100)
         assert max(heights) - min(heights) == pytest.approx(diameter / 100)
+
+
+@pytest.fixture
+def sphere(tmp_path):
+    """The garden's sphere of 642 views at full size, 6442 s each until a probe says otherwise."""
+    (found,) = (d for d in scene_datasets("garden") if d.rig_name == "LFSphere_e100cm_d170cm")
+    return replace(found, work_root=str(tmp_path))
+
+
+def test_shards_follow_from_the_jobs_of_a_cluster_and_from_a_probe(sphere):
+    def count(**settings):
+        return len(replace(sphere, **settings).shards)
+
+    assert count() == 64
+    assert count(most_shards=100) == 100
+    # Of 16 cores for 20 minutes each: three of them a view.
+    assert count(most_shards=100, shard_minutes=320) == 216
+    assert count(most_shards=100, shard_minutes=1) == 642
+    probe = {"device": "CPU", "resolution": [2048, 2048], "samples": 256}
+    write_json(
+        Path(sphere.work, "probe.json"), probe | {"view_seconds": [6.0], "view_bytes": [1e7]}
+    )
+    # Ten views are the shortest for which start-up is a small part.
+    assert count(most_shards=100, shard_minutes=320) == 65
+    assert count(most_shards=50, shard_minutes=320) == 50
+
+
+def test_a_dataset_that_was_begun_keeps_its_shards(sphere):
+    shard_counts.note(sphere.work_root, {sphere.name: (642, 400), "other/rig": (10, 3)})
+    begun = replace(sphere, most_shards=100)
+    assert len(begun.shards) == 400
+    assert begun.shards[0][0] == 0 and begun.shards[-1][1] == 642
+    assert len(replace(begun, views_per_shard=321).shards) == 2
+    shard_counts.note(sphere.work_root, {sphere.name: (641, 400)})
+    assert len(replace(begun).shards) == 100
+    Path(sphere.work_root, shard_counts.NAME).write_text("{")
+    assert len(replace(begun).shards) == 100
+    shard_counts.note(sphere.work_root, {sphere.name: (642, 7)})
+    assert len(replace(begun).shards) == 7
+
+
+@pytest.mark.slow
+def test_what_a_cluster_has_begun_goes_on_with_the_same_shards_wherever_it_is_planned(tmp_path):
+    folder = checkout(tmp_path)
+    words = ("--config", "rigs=LFSphere_e100cm_d170cm", "preset=full")
+    cluster = ("--executor", "cluster-generic", "--cluster-generic-submit-cmd", "sh")
+    # One core each for 20 minutes is less than a view takes.
+    assert planned(folder, "--jobs", "100", *cluster, *words)["render"] == 642
+    shard_counts.note(str(folder / "work"), {"garden/LFSphere_e100cm_d170cm": (642, 300)})
+    assert planned(folder, *words)["render"] == 300
 
 
 def test_the_table_adds_up_what_the_probes_measured():

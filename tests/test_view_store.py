@@ -108,7 +108,7 @@ def test_an_unusable_store_is_one_line(tmp_path):
 
 def test_a_package_that_is_missing_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "upath", None)
-    with pytest.raises(UserError, match="pip install universal-pathlib"):
+    with pytest.raises(UserError, match="pip install -r envs/requirements-storage"):
         ViewStore("s3://bucket").check()
 
 

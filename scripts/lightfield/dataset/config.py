@@ -130,8 +130,14 @@ class Configuration(Settings):
     )
     most_shards: AtLeastOne = Field(
         64,
-        description="With views_per_shard: auto, the most render jobs of one dataset; without it "
-        "64, or four times the jobs that Snakemake runs at once (--jobs) where that is more.",
+        description="With views_per_shard: auto, the most render jobs of one dataset, unless they "
+        "are long; without it 64, or as many as Snakemake runs at once (--jobs).",
+    )
+    shard_minutes: Annotated[float, Field(gt=0, le=1e6)] | None = Field(
+        None,
+        description="With views_per_shard: auto, a render job that is expected to take longer than "
+        "so many minutes of one core is cut; without it 20 minutes of a cluster's job. A dataset "
+        "that was begun keeps its jobs.",
     )
     accept_blend: Annotated[bool, BeforeValidator(_switch)] = Field(
         False,

@@ -14,7 +14,15 @@ from typing import Any, Literal, Self
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken, read_json
-from lightfield.dataset import blend, config, memory, passes, published, shard_files
+from lightfield.dataset import (
+    blend,
+    config,
+    memory,
+    passes,
+    published,
+    shard_counts,
+    shard_files,
+)
 from lightfield.dataset.config import (
     CHOSEN,
     FILE,
@@ -41,6 +49,8 @@ START_UP_SECONDS = 3.0
 GUESSED_SAMPLES = 256
 # Start-up is kept under this part of a shard's time.
 START_UP_PART = 0.05
+# A longer plan would take longer than it is worth.
+MOST_SHARDS = 10_000
 # Of the bytes of half-float colour and of depth, what an EXR takes: measured in the three scenes.
 COMPRESSED = 0.75
 # A pixel of an 8-bit PNG.
@@ -88,6 +98,8 @@ class Dataset:
     work_root: str = "work"
     views_per_shard: int | Literal["auto"] = "auto"
     most_shards: int = 64
+    # Of one core; longer ones are cut, however many that makes.
+    shard_minutes: float = math.inf
     # Path and SHA-256 of each file that a .blend reads, once its inventory is known.
     external_files: Sequence[tuple[str, str | None]] = ()
 
@@ -530,10 +542,12 @@ class Dataset:
             return self.planned_samples
 
     @cached_property
-    def expected_view(self) -> tuple[float, float]:
-        """Seconds of one core that a view takes, and its bytes: as a probe measured, or guessed."""
+    def _probed_view(self) -> tuple[float, float] | None:
+        """Seconds of one core that a view takes, and its bytes, as a probe measured; None if none.
+
+        A sequence's first frame is probed for all.
+        """
         try:
-            # A sequence's first frame is probed for all.
             rig = Path(self.work_root, self.scene_folder, self.rig_name)
             probe = json.loads(next(rig.glob("**/probe.json")).read_bytes())
             now = [list(self.rig.camera.resolution), self.render.get("samples", probe["samples"])]
@@ -541,6 +555,13 @@ class Dataset:
                 return fmean(probe["view_seconds"]), fmean(probe["view_bytes"])
         except (OSError, ValueError, LookupError, TypeError, StopIteration):
             pass
+        return None
+
+    @cached_property
+    def expected_view(self) -> tuple[float, float]:
+        """Seconds of one core that a view takes, and its bytes: as a probe measured, or guessed."""
+        if self._probed_view:
+            return self._probed_view
         width = {"float": 4, "rounded": 3, "half": 2}[self.render["depth_precision"]]
         width = 6 + width * bool(self.depth) + sum(p.bytes for p in passes.wanted(self.render))
         size = self._pixels * width * COMPRESSED
@@ -595,20 +616,28 @@ class Dataset:
 
     @cached_property
     def shards(self) -> list[tuple[int, int]]:
-        """The views in runs (first, end) of nearly equal length.
+        """The views in runs (first, end) of nearly equal length, as many as there were before.
 
         Automatically, a run is as short as it can be without start-up taking more than its part:
         the shorter, the more processes can work at once. More than ``most_shards`` would only make
-        the plan long, because no more are rendered at once.
+        the plan long, because no more are rendered at once; unless they are long.
         """
         if self.views_per_shard == "auto":
-            length = math.ceil(START_UP_SECONDS / START_UP_PART / self.planned_view_seconds)
-            length = max(length, math.ceil(self.view_count / self.most_shards))
+            count = shard_counts.noted(self.work_root, self.name, self.view_count)
+            count = count or self._shard_count
         else:
-            length = self.views_per_shard
-        count = math.ceil(self.view_count / length)
+            count = math.ceil(self.view_count / self.views_per_shard)
         bounds = [self.view_count * number // count for number in range(count + 1)]
         return list(pairwise(bounds))
+
+    @property
+    def _shard_count(self) -> int:
+        """How many shards a dataset gets of which none has been rendered."""
+        seconds = self._probed_view[0] if self._probed_view else self.planned_view_seconds
+        shortest = math.ceil(START_UP_SECONDS / START_UP_PART / max(seconds, 1e-6))
+        needed = math.ceil(self.view_count * seconds / (60 * self.shard_minutes))
+        most = min(max(self.most_shards, needed), MOST_SHARDS)
+        return min(math.ceil(self.view_count / shortest), most)
 
 
 @lru_cache
@@ -765,6 +794,7 @@ def scene_datasets(
             work_root=settings.work,
             views_per_shard=settings.views_per_shard,
             most_shards=settings.most_shards,
+            shard_minutes=settings.shard_minutes or math.inf,
         )
         for dataset in found
     ]

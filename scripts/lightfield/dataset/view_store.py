@@ -73,6 +73,13 @@ class ViewStore:
                 temporary.write_bytes(content)
             os.utime(path, (time, time))
 
+    def send(self, path: str) -> None:
+        """Store a file under its path, as Snakemake does."""
+        with self._answering():
+            stored = self._place(path)
+            stored.parent.mkdir(parents=True, exist_ok=True)
+            stored.write_bytes(Path(path).read_bytes())
+
     def put(self, file: Path, digest: str) -> None:
         """Put a file, whose SHA-256 is given."""
         with self._answering():
@@ -137,7 +144,7 @@ class ViewStore:
             raise
         except ImportError as error:
             raise UserError(
-                f"{self.url}: needs {error.name}: pip install universal-pathlib, and for s3:// s3fs"
+                f"{self.url}: needs {error.name}: pip install -r envs/requirements-storage.in"
             ) from None
         except Exception as error:
             raise UserError(f"{self.url}: the view store cannot be used: {error}") from None

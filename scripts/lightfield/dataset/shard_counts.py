@@ -1,0 +1,46 @@
+"""Into how many shards the views of each dataset are cut, noted when the first is rendered.
+
+work/shards.json: "views" and "shards" by dataset. What a count follows from may be another later,
+as --jobs or a probe, or not be known where a job runs: a dataset that was begun keeps its own.
+"""
+
+import json
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from lightfield.core.files import write_json
+
+NAME = "shards.json"
+
+
+def noted(work: str, dataset: str, views: int) -> int | None:
+    """Return how many shards a dataset of so many views was given; None if none was begun.
+
+    ``work`` is the folder that has the note; one that is broken says nothing.
+    """
+    path = Path(work, NAME)
+    if not path.is_file():
+        return None
+    try:
+        entry = _read(path, path.stat().st_mtime_ns)[dataset]
+        return max(1, min(int(entry["shards"]), views)) if entry["views"] == views else None
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
+
+
+def note(work: str, counts: dict[str, tuple[int, int]]) -> None:
+    """Note the views and the shards of these datasets, beside those of others."""
+    path = Path(work, NAME)
+    try:
+        known = dict(_read(path, path.stat().st_mtime_ns))
+    except (OSError, ValueError, TypeError):
+        known = {}
+    new = {name: {"views": views, "shards": shards} for name, (views, shards) in counts.items()}
+    if known != known | new:
+        write_json(path, known | new)
+
+
+@lru_cache(maxsize=1)
+def _read(path: Path, _changed: int) -> Any:
+    return json.loads(path.read_bytes())
