@@ -16,7 +16,7 @@ all: .venv/complete
 	snakemake --cores $(CORES)
 
 test: check
-	python envs/check_system.py --browser
+	python envs/check_system.py --tests
 	python -m pytest -n $(CORES)
 
 # Style, types, and Snakemake's own advice.

@@ -1,7 +1,7 @@
 """Install what the environment cannot bring along, as root on Debian or Ubuntu, or say what it is.
 
 That is the libraries that bpy links to, Python's own module for environments, and for the tests a
-browser. Uses the standard library only, because it runs before anything is installed.
+browser and rsync. Uses the standard library only, because it runs before anything is installed.
 """
 
 import argparse
@@ -28,9 +28,9 @@ LIBRARIES = {
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--browser", action="store_true", help="the tests' browser too")
-    browser = parser.parse_args().browser
-    packages = missing(browser)
+    parser.add_argument("--tests", action="store_true", help="what the tests need, too")
+    tests = parser.parse_args().tests
+    packages = missing(tests)
     if not packages:
         return
     if shutil.which("apt-get") and os.geteuid() == 0:
@@ -39,7 +39,7 @@ def main() -> None:
         for words in (["update"], ["install", "--yes", *packages]):
             subprocess.run(["apt-get", "--quiet=2", *words], env=environment, check=False)
         importlib.invalidate_caches()
-        packages = missing(browser)
+        packages = missing(tests)
     if packages:
         sys.exit(
             "error: system packages are missing; on Debian or Ubuntu: "
@@ -47,15 +47,15 @@ def main() -> None:
         )
 
 
-def missing(browser: bool) -> list[str]:
+def missing(tests: bool) -> list[str]:
     """Return the Debian packages of what is not there."""
     packages = []
     if sys.platform == "linux":
         packages = [package for library, package in LIBRARIES.items() if not loads(library)]
     if not importlib.util.find_spec("ensurepip"):
         packages.append("python{}.{}-venv".format(*sys.version_info))
-    if browser and not shutil.which("chromium"):
-        packages.append("chromium")
+    if tests:
+        packages += [name for name in ("chromium", "rsync") if not shutil.which(name)]
     return packages
 
 

@@ -95,11 +95,11 @@ def test_a_named_python_must_run_and_be_of_a_supported_version(machine):
 
 @pytest.fixture
 def check_system(machine, monkeypatch):
-    """Look for a browser where there is none, and an apt-get that writes down what it does."""
-    installs = 'echo "$@" >> "$0.log"; [[ $2 != install ]] || > "${0%/*}/chromium"'
-    machine.add("apt-get", f'{installs}; {shutil.which("chmod")} -f +x "${{0%/*}}/chromium"')
+    """Look for what tests need where it is not, and an apt-get that writes down what it does."""
+    installs = f'> "${{0%/*}}/$name"; {shutil.which("chmod")} +x "${{0%/*}}/$name"'
+    machine.add("apt-get", f'echo "$@" >> "$0.log"; for name in "${{@:4}}"; do {installs}; done')
     monkeypatch.setenv("PATH", str(machine.programs))
-    monkeypatch.setattr(sys, "argv", ["check_system.py", "--browser"])
+    monkeypatch.setattr(sys, "argv", ["check_system.py", "--tests"])
 
     def check(user):
         monkeypatch.setattr(os, "geteuid", lambda: user)
@@ -113,7 +113,7 @@ def test_root_installs_what_is_missing(check_system):
     check_system(0)
     assert check_system.log.read_text().splitlines() == [
         "--quiet=2 update",
-        "--quiet=2 install --yes chromium",
+        "--quiet=2 install --yes chromium rsync",
     ]
     # Once is enough.
     check_system(0)
@@ -121,6 +121,6 @@ def test_root_installs_what_is_missing(check_system):
 
 
 def test_others_are_given_the_line_that_installs_it(check_system):
-    with pytest.raises(SystemExit, match=r"^error: .*: sudo apt-get install chromium$"):
+    with pytest.raises(SystemExit, match=r"^error: .*: sudo apt-get install chromium rsync$"):
         check_system(1000)
     assert not check_system.log.exists()
