@@ -80,10 +80,11 @@ class Disk(Build):
 
 
 class Cloud(Disk):
-    """A build whose jobs see nothing of each other but what lies in an S3 server."""
+    """A build whose jobs see nothing of each other but what lies in ``store``, a URL or folder."""
 
-    def __init__(self, root: Path, views: int) -> None:
+    def __init__(self, root: Path, views: int, store: str) -> None:
         super().__init__(root, views)
+        self.store = store
         self.jobs = root.with_name("jobs")
         self.jobs.mkdir()
         program = root / "program"
@@ -102,7 +103,8 @@ class Cloud(Disk):
             *("--executor", "cluster-generic", "--shared-fs-usage", "none", "--retries", "3"),
             *("--cluster-generic-submit-cmd", self.root / "submit.sh"),
             *("--cluster-generic-status-cmd", self.root / "status.sh"),
-            *("--default-storage-provider", "s3", "--default-storage-prefix", STORE),
+            *("--default-storage-provider", "s3" if "://" in self.store else "fs"),
+            *("--default-storage-prefix", self.store),
             *("--jobs", "2", "--cores", "1", "--seconds-between-status-checks", "1"),
             *("--latency-wait", "10", *words),
         ]
@@ -122,7 +124,7 @@ class Cloud(Disk):
 
     def published(self) -> dict[str, str]:
         """Return the SHA-256 of each published file, of the bytes that lie in the storage."""
-        store = ViewStore(STORE)
+        store = ViewStore(self.store)
         with contextlib.chdir(self.root):
             store.bring(str(DATASET / "sha256sums.txt"))
             for name, digest in super().published().items():
@@ -216,7 +218,7 @@ def main() -> None:
         server, environment = serve(folder)
         os.environ.update(environment)
         try:
-            build = Cloud(folder / "cloud", arguments.views)
+            build = Cloud(folder / "cloud", arguments.views, STORE)
             killed = kill(build, arguments.kills, seconds, random.Random(arguments.seed))
             same = build.published() == undisturbed.published()
         finally:

@@ -19,8 +19,14 @@ def stored(path):
 
 def taking(lists):
     """Return the command that takes from the store what a job's ``lists`` name."""
-    words = f"--results {RESULTS} --work {WORK} {{{lists}}}"
+    words = f"--mend --results {RESULTS} --work {WORK} {{{lists}}}"
     return f"python {SCRIPTS}/take_views.py {words} > {{log}} 2>&1; " if STORE else ""
+
+
+def stored_lists(wildcards):
+    """Return what lists the files in the view store, of all chosen datasets; nothing without one."""
+    datasets = CHOSEN if STORE else []
+    return [file for d in datasets for file in (*d.all_records, *d.published)]
 
 
 def check_storage():
@@ -38,7 +44,7 @@ def check_storage():
         if not dataset.source.builder:
             raise UserError(
                 f"{dataset.scene_name}: is made of files that are in no storage; only built "
-                "scenes can be rendered so, or let all nodes see one folder"
+                "scenes can be rendered so: let all nodes see one folder, and take no storage"
             )
 
 

@@ -58,8 +58,11 @@ rule checksums:
         " --sums {input.sums} --output {output} > {log} 2>&1"
 
 
-# What its jobs are is not known before: it reads what is there, also of an unfinished build.
+# What its jobs are is not known before: it reads what is there, also of an unfinished build. From a
+# view store it takes all that the dataset has there, which compares it with its checksums.
 rule verify:
+    input:
+        stored_lists,
     log:
         log_of("verify"),
     conda:
@@ -70,5 +73,6 @@ rule verify:
     message:
         "Checking every byte of the chosen datasets"
     shell:
-        f"python {SCRIPTS}/verify.py"
+        taking("input")
+        or f"python {SCRIPTS}/verify.py"
         " {params.folders} --work {params.work} > {log} 2>&1"

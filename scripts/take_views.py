@@ -23,6 +23,11 @@ def main() -> None:
     parser.add_argument("--store", help=f"URL or folder of the store (default: ${VARIABLE})")
     parser.add_argument("--results", required=True, type=Path, help="folder of all datasets")
     parser.add_argument("--work", required=True, type=Path, help="folder of their records")
+    parser.add_argument(
+        "--mend",
+        action="store_true",
+        help="remove from the storage what lists a file that is lost, for the next run to make it",
+    )
     arguments = parser.parse_args()
     store = ViewStore(arguments.store) if arguments.store else ViewStore.configured()
     if store is None:
@@ -33,13 +38,24 @@ def main() -> None:
         for target, digest in _listed(store, path, arguments.results, arguments.work)
     }
     progress = Progress(len(wanted), "take", "files")
+    lost: dict[Path, Path] = {}
     for target, (digest, path) in wanted.items():
         if not store.take(digest, target):
-            raise UserError(
-                f"{target}: is not in the view store {store.url}; delete {path} in the storage, "
-                "for it to be made again"
-            )
+            lost[target] = path
         progress.done()
+    if lost:
+        for path in set(lost.values()) if arguments.mend else ():
+            store.remove(_stored(path, arguments.results, arguments.work))
+        raise UserError(
+            f"{len(lost)} files are not in the view store {store.url}, as {min(lost)}; "
+            + ("the next run makes them again" if arguments.mend else "--mend lets a run make them")
+        )
+
+
+def _stored(path: Path, results: Path, work: Path) -> str:
+    """Return under which path Snakemake has stored a list, of which ``path`` is its copy here."""
+    (folder,) = (root for root in (results, work) if path.resolve().is_relative_to(root.resolve()))
+    return str(folder / path.resolve().relative_to(folder.resolve()))
 
 
 def _listed(store: ViewStore, path: Path, results: Path, work: Path) -> Iterable[tuple[Path, str]]:

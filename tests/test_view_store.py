@@ -3,6 +3,7 @@
 import os
 import shutil
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -97,7 +98,27 @@ def test_consumers_take_what_records_and_manifests_list(shard, store, run_progra
     write_json(other / RECORD, {"files": {"exr/a.exr": {"bytes": 4, "sha256": "f" * 64}}})
     failed = run_program("take_views.py", *words, cwd=other, check=False)
     assert failed.returncode == 1
-    assert failed.stderr.splitlines()[-1].startswith(f"error: {VIEW}: is not in the view")
+    assert failed.stderr.splitlines()[-1].startswith("error: 1 files are not in the view store")
+    assert f"as {VIEW}; --mend lets" in failed.stderr
+
+
+def test_what_lists_a_lost_file_is_removed_from_the_storage(shard, store, run_program, monkeypatch):
+    folder, record = shard("one")
+    make(folder, record, VIEW, b"view")
+    record.write([folder / VIEW])
+    # Under the same path in the storage is what Snakemake has brought here.
+    monkeypatch.chdir(folder)
+    store.send(RECORD)
+    stored = Path(store.url, RECORD)
+    assert stored.read_bytes() == (folder / RECORD).read_bytes()
+    (Path(store.url) / "views/sums" / sha256(folder / VIEW)).unlink()
+    (folder / VIEW).unlink()
+    words = ("--results", "results", "--work", "work", RECORD)
+    assert run_program("take_views.py", *words, cwd=folder, check=False).returncode == 1
+    assert stored.exists()
+    failed = run_program("take_views.py", "--mend", *words, cwd=folder, check=False)
+    assert failed.stderr.splitlines()[-1].endswith(f"as {VIEW}; the next run makes them again")
+    assert not stored.exists()
 
 
 def test_an_unusable_store_is_one_line(tmp_path):

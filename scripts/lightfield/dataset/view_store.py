@@ -80,6 +80,11 @@ class ViewStore:
             stored.parent.mkdir(parents=True, exist_ok=True)
             stored.write_bytes(Path(path).read_bytes())
 
+    def remove(self, path: str) -> None:
+        """Remove what Snakemake has stored under a path."""
+        with self._answering():
+            self._place(path).unlink(missing_ok=True)
+
     def put(self, file: Path, digest: str) -> None:
         """Put a file, whose SHA-256 is given."""
         with self._answering():
