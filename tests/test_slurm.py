@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import signal
 from pathlib import Path
 
@@ -11,18 +12,13 @@ from slurm_node import Node, install
 
 CUBOID = "smoke/LFCuboid_1x1x1"
 WORDS = [
-    *(
-        "--profile",
-        "profiles/slurm",
-        "--cores",
-        "2",
-        "--slurm-init-seconds-before-status-checks",
-        "2",
-    ),
+    *("--profile", "profiles/slurm", "--cores", "2", "--retries", "4"),
+    *("--slurm-init-seconds-before-status-checks", "2"),
     # A panorama is given too little memory first.
     *("--set-resources", "render_panorama:mem_mb=100 if attempt == 1 else 4000"),
     *("--config", "scenes=smoke", "rigs=LFCuboid_1x1x1", "preset=full", "views_per_shard=3"),
 ]
+IMPATIENT = Path(__file__).with_name("impatient")
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(os.geteuid() != 0, reason="Slurm's daemons are root's"),
@@ -34,19 +30,22 @@ def test_no_view_is_lost_or_made_twice_whatever_happens_on_the_cluster(smoke, tm
     folder = checkout(tmp_path / "cluster")
     with Node(tmp_path / "node") as node:
         log = folder / "terminal.log"
+        environment = node.environment | {"PYTHONPATH": str(IMPATIENT)}
         with log.open("wb") as terminal:
-            run = start_snakemake(
-                folder, *WORDS, env=node.environment, stdout=terminal, stderr=terminal
-            )
+            run = start_snakemake(folder, *WORDS, env=environment, stdout=terminal, stderr=terminal)
         wait_for_views(folder, 1, run)
         began = processes(folder)
         node.run("scancel", "--state=RUNNING", "--full", "--user=root")
         # What is submitted in its place hangs, until its time is over.
-        wait_until(lambda: processes(folder) - began, run, log=log)
-        for process in processes(folder) - began:
-            os.kill(process, signal.SIGSTOP)
+        began |= stop_next(folder, began, run)
         for job in node.run("squeue", "--states=RUNNING", "--noheader", "--format=%i").split():
             node.run("scontrol", "update", f"JobId={job}", "EndTime=now")
+        # What is submitted in place of that finds a disk that takes no byte more.
+        full = stop_next(folder, began, run)
+        for process in full:
+            resource.prlimit(process, resource.RLIMIT_FSIZE, (1, 1))
+            os.kill(process, signal.SIGCONT)
+        wait_until(lambda: processes(folder) - began - full, run, log=log)
         wait_for_views(folder, 4, run)
         node.kill_node()
         wait_until(lambda: node.state() == "down", node.daemons["slurmctld"], 60)
@@ -67,6 +66,14 @@ def processes(folder: Path) -> set[int]:
         for line in journal.read_text().splitlines()
     ]
     return {line["pid"] for line in lines if "pid" in line}
+
+
+def stop_next(folder: Path, began: set[int], run) -> set[int]:
+    """Wait for processes beside those that ``began``, stop them, and return them."""
+    wait_until(lambda: processes(folder) - began, run, log=folder / "terminal.log")
+    for process in (found := processes(folder) - began):
+        os.kill(process, signal.SIGSTOP)
+    return found
 
 
 def wait_for_views(folder: Path, count: int, run) -> None:
