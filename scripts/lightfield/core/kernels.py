@@ -1,20 +1,27 @@
 """Loops over pixels, compiled by numba."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar, cast
 
-import numba
-from numba.extending import register_jitable
 
-# When this module of numba's is imported, by the first kernel that runs, it looks for scipy's BLAS,
-# which no kernel calls and which takes longer to import than numba. So it does not find it.
-_BLAS = "scipy.linalg.cython_blas"
-if _BLAS not in sys.modules:
-    sys.modules[_BLAS] = None  # type: ignore[assignment]
+@contextmanager
+def _hidden(*names: str) -> Iterator[None]:
+    """Let what is imported in here not find these modules, but for those that are loaded."""
+    hidden = {name: None for name in names if name not in sys.modules}
+    sys.modules.update(hidden)  # type: ignore[arg-type]
+    yield
+    for name in hidden:
+        del sys.modules[name]
+
+
+# Numba looks for options in YAML, for scipy's version, and in the module that its first kernel
+# imports for scipy's BLAS, which takes longer to import than numba. No kernel needs any of them.
+with _hidden("scipy", "scipy.linalg.cython_blas", "yaml"):
+    import numba
     import numba.np.arraymath
-
-    del sys.modules[_BLAS]
+    from numba.extending import register_jitable
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,13 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
 from lightfield.dataset import passes
 from lightfield.dataset.passes import Pass
-from lightfield.geometry import lenses, rigs, rotations
+from lightfield.geometry import lenses, rotations
 from lightfield.geometry.flow import neighbours
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+
+if TYPE_CHECKING:
+    from lightfield.geometry import rigs
 
 Floats = NDArray[np.float64]
 
@@ -103,11 +106,14 @@ class LightField:
             )
 
     @classmethod
-    def from_rig(cls, rig: rigs.Rig | Mapping[str, Any], lens: Lens, **keys: Any) -> "LightField":
+    def from_rig(cls, rig: "rigs.Rig | Mapping[str, Any]", lens: Lens, **keys: Any) -> "LightField":
         """Return what a rig sees through a lens; ``keys`` are further ones of the file.
 
         Raises `UserError` where a cube map's lens is not a 90° rectilinear.
         """
+        # Here, for most programs read a file and need no rig's settings.
+        from lightfield.geometry import rigs
+
         rig = rigs.from_settings(rig)
         intrinsics = lens.to_lightfield()
         if rig.cube_map:

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import OpenImageIO as oiio
 
 from lightfield.core.errors import UserError
 from lightfield.geometry.lenses import Array
@@ -67,6 +66,8 @@ def _with_borders(source: Array, lens_map: LensMap) -> Array:
 
 def _st_warp(source: Array, lens_map: LensMap) -> Array:
     """Resample with OpenImageIO's st_warp and its Catmull-Rom filter."""
+    import OpenImageIO as oiio
+
     height, width = lens_map.target_cos.shape
     valid = np.isfinite(source).all(axis=-1) & ~np.isnan(lens_map.source_cos)
     # A fifth channel counts the weights that fell on valid pixels.
@@ -88,6 +89,8 @@ def _st_warp(source: Array, lens_map: LensMap) -> Array:
 
 
 def _image_buffer(pixels: Array) -> Any:
+    import OpenImageIO as oiio
+
     height, width, count = pixels.shape
     buffer = oiio.ImageBuf(oiio.ImageSpec(width, height, count, "float"))
     buffer.set_pixels(oiio.ROI(0, width, 0, height, 0, 1, 0, count), np.ascontiguousarray(pixels))

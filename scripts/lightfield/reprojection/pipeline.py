@@ -1,12 +1,11 @@
 """Runs a reprojection: each view once, only what is missing, and a record of what was made."""
 
+import os
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
-
-import OpenImageIO as oiio
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
@@ -27,8 +26,8 @@ def run(job: Job) -> None:
         job.output_lightfield().write(arguments.output_cfg)
     if arguments.dry_run:
         return
-    # One view is one thread's work: the libraries shall not add theirs.
-    oiio.attribute("threads", 1)
+    # One view is one thread's work: OpenImageIO, imported where it is needed, shall add none.
+    os.environ["OPENIMAGEIO_THREADS"] = "1"
     maps = job.maps
     # What lens_map.py computed, it has reported.
     if arguments.lens_map is None:
