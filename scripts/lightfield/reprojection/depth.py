@@ -6,8 +6,11 @@ import numpy as np
 
 from lightfield.core.kernels import inline, kernel
 from lightfield.geometry.lenses import Array
+from lightfield.imaging.halves import to_half
 from lightfield.reprojection.kernels import Topology, source_index
 from lightfield.reprojection.lens_map import LensMap
+
+_STRIP = 64  # rows resampled at a time
 
 # Depth is interpolated where its third differences are below this fraction of it, so a step of
 # half as much may remain unseen: 1e-4, or for halves what their own steps are.
@@ -158,7 +161,7 @@ def resample_depth(depth: Array, source_is_z: bool, target_is_z: bool, lens_map:
     smooth surface 1 / distance is interpolated, which is nearly linear for a plane, within the
     range of the four pixels around; elsewhere the pixel that the ray falls in is taken, or beyond
     the rim of the image circle the nearest of those four, so no depth lies between two surfaces.
-    Returns (H, W) float32; a miss (inf) stays inf, NaN marks a pixel without a source.
+    Returns (H, W), half or float; a miss (inf) stays inf, NaN marks a pixel without a source.
     """
     if lens_map.strip is not None:
         # A depth beyond its face's edge would be along another axis, or between two surfaces.
@@ -168,15 +171,19 @@ def resample_depth(depth: Array, source_is_z: bool, target_is_z: bool, lens_map:
     _inverse_distance(
         np.ascontiguousarray(depth, np.float32), lens_map.source_cos, source_is_z, inverse
     )
-    out = np.empty(lens_map.target_cos.shape, np.float32)
-    _pick(
-        inverse,
-        lens_map.source_cos,
-        lens_map.centers,
-        lens_map.target_cos,
-        target_is_z,
-        _SMOOTH[depth.dtype],
-        lens_map.topology,
-        out,
-    )
+    out = np.empty(lens_map.target_cos.shape, depth.dtype)
+    for first in range(0, len(out), _STRIP):
+        rows = slice(first, first + _STRIP)
+        found = np.empty(out[rows].shape, np.float32)
+        _pick(
+            inverse,
+            lens_map.source_cos,
+            lens_map.centers[rows],
+            lens_map.target_cos[rows],
+            target_is_z,
+            _SMOOTH[depth.dtype],
+            lens_map.topology,
+            found,
+        )
+        out[rows] = to_half(found) if out.dtype == np.float16 else found
     return out

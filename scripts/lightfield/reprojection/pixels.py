@@ -187,9 +187,9 @@ def _resampled(
         copy = None if depth is None else _in_frame(depth, made)
         return [(np.s_[:], _in_frame(colour, made))], copy
     if depth is not None:
-        found = resample_depth(depth, source.is_z, as_z, made)
-        precision = "half" if depth.dtype == np.float16 else job.depth_precision
-        depth = with_precision(found, precision)
+        depth = resample_depth(depth, source.is_z, as_z, made)
+        if depth.dtype != np.float16:
+            depth = with_precision(depth, job.depth_precision)
     return colour_strips(colour, made), depth
 
 
