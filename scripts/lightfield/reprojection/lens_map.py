@@ -9,7 +9,7 @@ import math
 import sys
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -21,6 +21,7 @@ from lightfield.core.files import atomic_path
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.reprojection.filters import DEFAULT_FILTER, FILTERS
+from lightfield.reprojection.fold import Fold
 from lightfield.reprojection.footprints import bounds, distance_to_missing, mark, measure
 from lightfield.reprojection.kernels import Topology
 
@@ -51,8 +52,9 @@ def rotation_matrix(pan: float, pitch: float, roll: float) -> Array:
 class LensMap:
     """What it takes to resample a view; (H, W) is the target's size, (h, w) the window's.
 
-    ``settings`` describes what the map is for; ``summary`` has the magnification's min, median and
-    max, and the fraction of the image that has a source (covered). ``window`` is the
+    ``settings`` describes what the map is for; ``summary`` has the min, median and max of the
+    magnification, target pixels to one of the source along a line, and the fraction of the image
+    that has a source (covered). ``window`` is the
     part of the source (row, end row, column, end column) that the map reads at all, and every
     coordinate counts in pixels from that window's corner.
     """
@@ -69,8 +71,6 @@ class LensMap:
     # (h, w) and (H, W) float32: cos θ at each pixel's centre; NaN where it has no ray.
     source_cos: Array
     target_cos: Array
-    # (H, W) float32: target pixels to one of the source, along a line; NaN where it has no source.
-    magnification: Array
     # Of the adaptive filter where anything is minified: (H, W, 2) uint16, how many samples a pixel
     # takes along its row and its column, and (H, W, 2, 2) float32, the (x, y) step from one to the
     # next, the first index being x or y and the second the way.
@@ -127,17 +127,18 @@ def compute(
         )
     reach, covers = FILTERS[filter_name].reach, FILTERS[filter_name].cover is not None
     wraps, _, _ = _topology(source)
-    shape = (target.height, target.width)
+    fold = Fold.of_map(source, target, rotation)
+    height, width = fold.part
     # In float64 until they count from the window's corner, which is not known before.
-    points = np.empty((*shape, 2))
-    target_cos, scale = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    points = np.empty((height, width, 2))
+    target_cos, scale = (np.empty((height, width), np.float32) for _ in range(2))
     # Zeros take no memory as long as nothing else is written.
-    footprints = np.zeros((*shape, 2, 2) if covers else (0, 0, 2, 2), np.float32)
-    counts = np.zeros((*shape, 2) if covers else (0, 0, 2), np.uint16)
+    footprints = np.zeros((height, width, 2, 2) if covers else (0, 0, 2, 2), np.float32)
+    counts = np.zeros((height, width, 2) if covers else (0, 0, 2), np.uint16)
     most, areas = 1, []
-    for rows in _strips(*shape):
+    for rows in _strips(height, width):
         # One pixel more on every side, for central differences at the border too.
-        x = np.arange(-1, target.width + 1) + 0.5
+        x = np.arange(-1, width + 1) + 0.5
         y = np.arange(rows.start - 1, rows.stop + 1) + 0.5
         rays = target.rays(x[None, :], y[:, None])
         target_cos[rows] = -rays[1:-1, 1:-1, 2]
@@ -155,9 +156,11 @@ def compute(
         )
         most = max(most, found)
         areas.append(bounds(points[rows], reach + 1, footprints[rows], counts[rows]))
-    fine = points
+    summary = _summary(fold.unfolded(scale))
+    fine, fine_fold = points, fold
     if samples > 1:
         fine, areas = _samples(source, target, rotation, samples, reach)
+        fine_fold = Fold((len(fine), fine.shape[1]))
     strip = None
     if isinstance(source, CubeMap):
         border = _border(reach + max(area[4] for area in areas))
@@ -166,26 +169,30 @@ def compute(
         source_cos = _face_cosines(source, border)
         window, corner = (0, source.height, 0, source.width), (0, 0)
     else:
-        window = _window(areas, source, wraps)
+        window = _window(areas, fine_fold, source, wraps)
         source_cos = _cosines(source, window)
         corner = (window[2], window[0])
-    centers = _placed(points, corner)
-    coordinates = centers if samples == 1 else _placed(fine, corner)
+    centers = fold.placed(points, corner, source)
+    coordinates = centers if samples == 1 else fine_fold.placed(fine, corner, source)
     del points, fine
+    target_cos = fold.unfolded(target_cos)
+    if most > 1:
+        footprints, counts = fold.steps(footprints), fold.unfolded(counts)
+    else:
+        footprints, counts = footprints[:0], counts[:0]
     distance = np.empty(source_cos.shape, np.int32)
     distance_to_missing(source_cos, distance)
     flags = np.empty(coordinates.shape[:2], np.uint8)
     mark(coordinates, distance, reach, footprints, counts, flags)
     lens_map = LensMap(
         settings=settings(source, target, rotation, filter_name, samples),
-        summary=_summary(scale),
+        summary=summary,
         window=window,
         centers=centers,
         coordinates=coordinates,
         flags=flags,
         source_cos=source_cos,
         target_cos=target_cos,
-        magnification=scale,
         footprints=footprints if most > 1 else None,
         counts=counts if most > 1 else None,
         strip=strip,
@@ -230,13 +237,15 @@ def load(path: Path | str) -> LensMap:
         record = np.load(path, mmap_mode="r")
         description = json.loads(bytes(record["description"][0]))
         arrays = {name: record[name][0] for name in record.dtype.names if name != "description"}
+        # Older files have the magnification, too.
+        known = {field.name for field in fields(LensMap)}
         if description.pop("checksum") != _checksum(description, arrays):
             raise ValueError("it is damaged: its checksum does not hold")
         return LensMap(
             settings=description["settings"],
             summary=description["summary"],
             window=tuple(description["window"]),
-            **({"coordinates": arrays["centers"]} | arrays),
+            **{"coordinates": arrays["centers"]} | {k: v for k, v in arrays.items() if k in known},
         )
     except (OSError, EOFError, ValueError, KeyError, IndexError, TypeError) as error:
         raise UserError(f"{path}: is not a lens map that can be read: {error}") from None
@@ -301,6 +310,7 @@ def report(lens_maps: Sequence[LensMap]) -> None:
 
 
 def _summary(scale: Array) -> dict[str, float]:
+    """Return what a lens map says of its magnification (H, W), NaN where it has no source."""
     seen = scale[np.isfinite(scale)]
     if not seen.size:
         return {"min": 0.0, "median": 0.0, "max": 0.0, "covered": 0.0}
@@ -335,12 +345,17 @@ def _strips(height: int, width: int) -> Iterator[slice]:
 def _cosines(lens: Lens, window: tuple[int, int, int, int]) -> Array:
     """Return cos θ (h, w) float32 at a window's pixel centres; NaN where there is no ray."""
     row, end_row, column, end_column = window
-    out = np.empty((end_row - row, end_column - column), np.float32)
-    x = np.arange(column, end_column) + 0.5
-    for rows in _strips(*out.shape):
+    down, across = lens.mirrors
+    fold = Fold(
+        (end_row - row, end_column - column),
+        (down and row + end_row == lens.height, across and column + end_column == lens.width),
+    )
+    part = np.empty(fold.part, np.float32)
+    x = np.arange(column, column + part.shape[1]) + 0.5
+    for rows in _strips(*part.shape):
         y = np.arange(row + rows.start, row + rows.stop) + 0.5
-        out[rows] = -lens.rays(x[None, :], y[:, None])[..., 2]
-    return out
+        part[rows] = -lens.rays(x[None, :], y[:, None])[..., 2]
+    return fold.unfolded(part)
 
 
 def _strip_with_borders(source: CubeMap, border: int) -> Array:
@@ -379,14 +394,6 @@ def _samples(
         fine[rows] = np.where(inside.all(axis=-1, keepdims=True), pixels, np.nan)
         areas.append(bounds(fine[rows], reach + 1, *none))
     return fine, areas
-
-
-def _placed(points: Array, corner: tuple[int, int]) -> Array:
-    """Return the points in float32, counted from the window's ``corner``."""
-    out = np.empty(points.shape, np.float32)
-    for axis, first in enumerate(corner):
-        np.subtract(points[..., axis], first, out=out[..., axis], casting="same_kind")
-    return out
 
 
 def _border(reach: int) -> int:
@@ -435,16 +442,18 @@ def _widest(source: Lens) -> float:
     return float(source.height) if isinstance(source, CubeMap) else math.inf
 
 
-def _window(areas: list[Any], source: Lens, wraps: bool) -> tuple[int, int, int, int]:
+def _window(areas: list[Any], fold: Fold, source: Lens, wraps: bool) -> tuple[int, int, int, int]:
     """Return the rows and columns [row, end) × [column, end) that the filter may read.
 
-    All columns if the source ``wraps`` around.
+    ``areas`` are those of the fold's part. All columns if the source ``wraps`` around.
     """
     found = np.array([area[:4] for area in areas])
     low, high = found[:, :2].min(axis=0), found[:, 2:].max(axis=0)
     if np.isinf(low).any():
         return 0, 1, 0, 1
     size = np.array([source.width, source.height])
+    low = np.where(fold.mirrors[::-1], np.minimum(low, size - high), low)
+    high = np.where(fold.mirrors[::-1], size - low, high)
     left, top = (int(start) for start in np.clip(np.floor(low), 0, size - 1))
     right, bottom = (int(end) for end in np.clip(np.ceil(high), 1, size))
     if wraps:

@@ -161,6 +161,11 @@ class Lens(ABC):
         """What depth is written as: "z" where the lens can have that, or else "distance"."""
         return "z" if self.has_z_depth else "distance"
 
+    @property
+    def mirrors(self) -> tuple[bool, bool]:
+        """Whether its lower half mirrors the upper one, and its right half the left one."""
+        return False, False
+
     def rays(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Array:
         """Return unit rays (..., 3) of the pixel coordinates ``x``, ``y`` (...).
 
@@ -324,6 +329,10 @@ class RadialLens(Lens):
                 [self.center[0] + u / self._unit[0], self.center[1] - v / self._unit[1]]
             )
         return np.moveaxis(pixels, 0, -1)
+
+    @property
+    def mirrors(self) -> tuple[bool, bool]:
+        return self.center[1] == self.height / 2, self.center[0] == self.width / 2
 
     @property
     def has_z_depth(self) -> bool:

@@ -109,6 +109,10 @@ class Equirectangular(Lens):
         return np.stack([x, y], axis=-1)
 
     @property
+    def mirrors(self) -> tuple[bool, bool]:
+        return sum(self.latitude) == 0, sum(self.longitude) == 0
+
+    @property
     def has_z_depth(self) -> bool:
         return max(-self.longitude[0], self.longitude[1]) <= math.pi / 2 + ANGLE_SLACK
 
