@@ -15,7 +15,8 @@ from lightfield.imaging import images
 from lightfield.measurement import strata, trials
 from lightfield.measurement.metrics import Reference
 from lightfield.measurement.strata import STRATA
-from lightfield.measurement.trials import Window
+from lightfield.measurement.trials import SURFACES, Window
+from lightfield.report import tables
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
 RIG = {"type": "plane", "cameras": [4, 1], "size": 0.3, "center": [0, 0, 1.5]}
@@ -104,8 +105,11 @@ def test_whole_views_are_made_of_their_strata(content):
 class SimulatedPilot:
     """A pilot that costs no render: a fire in one corner of the views, before a diffuse wall."""
 
+    has_volumes = True
+
     def __init__(self, lens):
         self.lens, self.lightfield, self.mask = lens, lightfield(), trial_maker().mask
+        self.changes = {}
 
     def pilot(self, lens):
         return self
@@ -116,6 +120,7 @@ class SimulatedPilot:
         fire[20:26, 40:48] = 5
         parts = {name: np.full(shape, 0.1, np.float32) for name in PARTS_OF_LIGHT}
         parts |= {"diffuse_light": np.ones(shape, np.float32), "volume_light": fire}
+        parts |= {name: np.zeros(shape, np.float32) for name in SURFACES} | self.changes
         noise = np.random.default_rng(seed).uniform(0.5, 1.5, (*shape, 1))
         colour = np.repeat(sum(parts.values())[..., None] * noise, 3, axis=-1)
         return trials.Trial(colour.astype(np.float32), None, 4, 1.0, "CPU", parts)
@@ -134,6 +139,27 @@ def test_a_small_fire_gets_windows_of_its_own():
     kinds, _ = strata.classes(maker, whole)
     assert (kinds == STRATA.index("volume")).sum() == 48
     assert ((kinds == strata.NONE) == ~maker.mask(whole)).all()
+
+
+@pytest.mark.parametrize(
+    ("shows", "stratum"),
+    [
+        ({"translucent": 1}, "translucent"),
+        ({"transparent": 1}, "transparent"),
+        ({"transparent": 1, "glossy_light": 5}, "glossy"),
+        ({"emission": 5, "emitting": 1}, "emission"),
+        ({"emission": 5}, "volume"),
+    ],
+)
+def test_what_a_surface_is_says_what_its_pixels_show(shows, stratum):
+    maker = SimulatedPilot(lenses.from_camera(CAMERA))
+    maker.changes = {name: np.full((64, 64), value, np.float32) for name, value in shows.items()}
+    kinds, _ = strata.classes(maker, Window(maker.lightfield.views[0], 0, 0, 64, 64))
+    assert STRATA[kinds[32, 32]] == stratum
+    # Where nothing is fog or fire, what glows is a lamp too small for its pixel.
+    maker.has_volumes = False
+    kinds, _ = strata.classes(maker, Window(maker.lightfield.views[0], 0, 0, 64, 64))
+    assert STRATA[kinds[32, 32]] == ("emission" if stratum == "volume" else stratum)
 
 
 def test_nothing_on_the_pareto_front_is_beaten(content):
@@ -171,6 +197,21 @@ def test_methods_are_compared_at_equal_time_and_at_equal_error(measured, content
     table = (measured.folder / "room.md").read_text().splitlines()
     assert all(sum(row.startswith(f"| {m} |") for row in table) == 2 for m in methods)
     assert sum(row.startswith("| diffuse |") for row in table) == 1
+
+
+def test_a_datasets_page_has_the_strata_in_a_table(measured, content):
+    folder = measured.folder / "error_vs_time"
+    folder.mkdir()
+    for suffix in (".json", ".svg"):
+        (folder / f"room{suffix}").write_bytes((measured.folder / f"room{suffix}").read_bytes())
+    found = tables.error_vs_time([folder / "room.json"], "room").tables["By what pixels show"]
+    strata = content["strata"]
+    assert [row[:2] for row in found.rows] == [[name, strata[name]["area"]] for name in strata]
+    diffuse = next(dict(zip(found.columns, row, strict=True)) for row in found.rows)
+    assert diffuse["slope"] == strata["diffuse"]["slopes"]["plain"]["over_time"]["slope"]
+    (denoised,) = (m for m in strata["diffuse"]["methods"] if m["method"] == "denoised")
+    assert diffuse["denoised: times faster"] == denoised["times_faster"]
+    assert diffuse["denoised: error at equal time"] == denoised["error"]
 
 
 def test_files_can_be_read_by_others(measured, content):

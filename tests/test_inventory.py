@@ -82,7 +82,8 @@ def test_features_are_told_by_the_materials_that_have_them(scenes):
     names = ("transmission", "subsurface", "transparency", "volumes", "displacement", "emission")
     assert not any(plain[name] for name in names)
     assert plain["objects"] == 6
-    assert plain["lights"] == 1
+    assert len(plain["lights"]) == 1
+    assert plain["sampling"].keys() == {"max_bounces", "clamp_indirect", "light_tree", "guiding"}
 
 
 MISSING = """

@@ -278,8 +278,8 @@ class TargetError(Settings):
 class Render(Settings):
     """What Cycles is asked for.
 
-    Of what is not given here, max_bounces, clamp_indirect, filter_width and motion_blur stay as the
-    .blend has them; everything else has the default that stands here.
+    Of what is not given here, max_bounces, clamp_indirect, light_tree, guiding, filter_width and
+    motion_blur stay as the .blend has them; everything else has the default that stands here.
     """
 
     samples: AtLeastOne | Literal["file"] | None = Field(
@@ -297,6 +297,12 @@ class Render(Settings):
     clamp_indirect: Annotated[float, Field(ge=0, le=1e9), AS_WRITTEN] | None = Field(
         None, description="Largest value of one indirect sample; 0 does not clamp."
     )
+    light_tree: bool | None = Field(
+        None, description="Choose lights for a place by a tree of all of them, or any alike."
+    )
+    guiding: bool | None = Field(
+        None, description="Learn where light comes from while rendering; on processors alone."
+    )
     filter_width: Annotated[float, Field(ge=0.01, le=10), AS_WRITTEN] | None = Field(
         None, description="Width of the pixel filter, in pixels."
     )
@@ -304,6 +310,12 @@ class Render(Settings):
         0, description="Noise at which adaptive sampling stops early; 0 takes every sample."
     )
     denoise: bool = Field(False, description="Denoise each view with OpenImageDenoise.")
+    denoise_quality: Literal["high", "balanced", "fast"] | None = Field(
+        None, description="Of a denoiser's network; high unless given."
+    )
+    denoise_prefilter: Literal["accurate", "fast", "none"] | None = Field(
+        None, description="Of the albedo and normals that guide a denoiser; accurate unless given."
+    )
     motion_blur: bool | None = Field(
         None, description="Blur what moves; without it, as the .blend has it."
     )

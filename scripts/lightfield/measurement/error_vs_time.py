@@ -446,22 +446,36 @@ def tables(name: str, content: Mapping[str, Any]) -> str:
         figures = [point[figure] for figure in FIGURES]
         key = (point["method"], json.dumps(point["settings"]))
         lines.append(_row(point["method"], *figures, common.get(key)))
+    columns, rows = strata_table(content)
     lines += [
         "",
-        "By stratum, the light that pixels show most of: its part of the views; the slope of plain",
-        "path tracing over time; the error of the scene's own settings; and how many times faster",
-        "each method is at the stratum's own equal error.",
+        "By stratum, what pixels show: its part of the views; the slope of plain path tracing over",
+        "time; the error of the scene's own settings; that of plain path tracing in the middle of",
+        "its points; how many times faster each method has that; and its error in that time.",
         "",
-        f"| stratum | part | slope | own settings | {' | '.join(m['method'] for m in methods)} |",
-        "| --- " + "| ---: " * (3 + len(methods)) + "|",
+        f"| {' | '.join(columns)} |",
+        "| --- " + "| ---: " * (len(columns) - 1) + "|",
+        *(_row(*row) for row in rows),
     ]
+    return "\n".join([*lines, ""])
+
+
+def strata_table(content: Mapping[str, Any]) -> tuple[list[str], list[list[Any]]]:
+    """Return the columns and rows of what was measured in each stratum."""
+    methods = [entry["method"] for entry in content["methods"]]
+    columns = ["stratum", "part", "slope", "own settings", "equal error"]
+    columns += [f"{method}: times faster" for method in methods if method != PLAIN]
+    columns += [f"{method}: error at equal time" for method in methods if method != PLAIN]
+    rows = []
     for stratum, found in content["strata"].items():
         slope = found["slopes"].get(PLAIN, {}).get("over_time", {}).get("slope")
-        own = found["settings"][0]["relative_mse"]
-        faster = {entry["method"]: entry["times_faster"] for entry in found["methods"]}
-        each = [faster.get(method["method"]) for method in methods]
-        lines.append(_row(stratum, found["area"], slope, own, *each))
-    return "\n".join([*lines, ""])
+        by_name = {entry["method"]: entry for entry in found["methods"]}
+        row = [stratum, found["area"], slope, found["settings"][0]["relative_mse"]]
+        row.append(by_name.get(PLAIN, {}).get("equal_error"))
+        for figure in ("times_faster", "error"):
+            row += [by_name.get(m, {}).get(figure) for m in methods if m != PLAIN]
+        rows.append(row)
+    return columns, rows
 
 
 def _row(method: str, *figures: float | None) -> str:

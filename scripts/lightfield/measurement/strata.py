@@ -1,8 +1,8 @@
-"""Strata: the pixels of a light field by the kind of light that they show most of.
+"""Strata: the pixels of a light field by what they show that path tracing may find hard.
 
-What path tracing finds hard is not spread evenly: a fire, a mirror or a pane of glass is small, and
-windows spread over the views miss it. A pilot, a few small whole views of few samples with the
-parts of light that add up to the colour, finds where each is, and how noisy.
+That is not spread evenly: a fire, a mirror or a pane of glass is small, and windows spread over the
+views miss it. A pilot, a few small whole views of few samples with the parts of light that add up
+to the colour and with the materials seen, finds where each is, and how noisy.
 """
 
 from collections.abc import Sequence
@@ -15,29 +15,43 @@ from scipy.ndimage import binary_erosion
 from lightfield.dataset.lightfield import View
 from lightfield.dataset.passes import PARTS_OF_LIGHT
 from lightfield.measurement.metrics import Mask
-from lightfield.measurement.trials import FULL_ENOUGH, Trials, Window
+from lightfield.measurement.trials import FULL_ENOUGH, SURFACES, Trials, Window
 
 Classes = NDArray[np.int64]
 
-# In the order of the classes' numbers: glossy light is that of metal and mirrors, transmission that
-# of glass and leaves, volume that of fog, smoke and fire.
-STRATA = [name.removesuffix("_light") for name in PARTS_OF_LIGHT]
+# In the order of the classes' numbers. By the light that a pixel shows most of: glossy is that of
+# metal and mirrors. Of these, leaves and paper are translucent, glass and water transparent.
+BY_LIGHT = ("diffuse", "glossy", "emission", "environment")
+STRATA = [*BY_LIGHT, "translucent", "transparent", "volume"]
+# Fog, smoke or fire that gives so much of a pixel's light is what the pixel shows.
+OF_VOLUME = 0.25
 # A pixel of no stratum: outside the image circle.
 NONE = -1
 
 # The pilot: views, pixels of their longer side, samples of a pixel, renders of each.
-VIEWS, SIZE, SAMPLES, SEEDS = 4, 96, 4, 2
+VIEWS, SIZE, SAMPLES, SEEDS = 8, 96, 4, 2
 # A stratum has at least this part of the pilot's pixels, and of all pixels measured so many.
-SMALLEST_AREA, FEWEST_PIXELS = 0.002, 64
+SMALLEST_AREA, FEWEST_PIXELS = 0.0005, 64
 
 
 def classes(pilot: Trials, window: Window) -> tuple[Classes, NDArray[Any]]:
     """Return the stratum of each pixel of a window, (h, w), and its noise over its light."""
     trials = [pilot.render(window, 1 + seed, {"samples": SAMPLES}) for seed in range(SEEDS)]
-    parts = np.mean([[trial.parts[name] for name in PARTS_OF_LIGHT] for trial in trials], axis=0)
+    parts = {name: np.mean([t.parts[name] for t in trials], axis=0) for name in trials[0].parts}
+    emitting, translucent, transparent = (parts[name] > 0 for name in SURFACES)
+    # What glows and is no surface that emits is a volume.
+    glow = np.where(emitting | (not pilot.has_volumes), 0, parts["emission"])
+    of_volumes = parts["volume_light"] + glow
+    by_light = [parts["diffuse_light"], parts["glossy_light"], parts["emission"] - glow]
+    kinds = np.argmax([*by_light, parts["environment"]], axis=0)
+    mirrors = kinds == STRATA.index("glossy")
+    kinds[translucent & ~mirrors] = STRATA.index("translucent")
+    kinds[transparent & ~mirrors] = STRATA.index("transparent")
+    total = sum(parts[name] for name in PARTS_OF_LIGHT)
+    kinds[(of_volumes > 0) & (of_volumes >= OF_VOLUME * total)] = STRATA.index("volume")
     light = [trial.colour.mean(axis=-1, dtype=np.float64) for trial in trials]
     noise = np.abs(light[0] - light[1]) / (light[0] + light[1] + 1e-6)
-    return np.where(pilot.mask(window), parts.argmax(axis=0), NONE), noise
+    return np.where(pilot.mask(window), kinds, NONE), noise
 
 
 def choose(maker: Trials, size: int, count: int) -> tuple[list[Window], dict[str, float]]:

@@ -34,6 +34,14 @@ R2 = (0.7548776662466927, 0.5698402909980532)
 # A window has at least this part of its pixels in the image circle.
 FULL_ENOUGH = 0.75
 
+# What a pilot says of the surface that a pixel sees: whether its material has one of these features
+# of the scene's inventory.
+SURFACES = {
+    "emitting": ("emission",),
+    "translucent": ("translucency",),
+    "transparent": ("transmission", "transparency"),
+}
+
 SECONDS_ATTRIBUTE = "plenoforge:core_seconds"
 SAMPLES_ATTRIBUTE = "plenoforge:samples"
 DEVICE_ATTRIBUTE = "plenoforge:device"
@@ -59,7 +67,8 @@ class Window:
 class Trial:
     """One render: colour (h, w, 3) scene-linear; depth (h, w) metres as Cycles gives it, or None.
 
-    ``parts`` are those of its light, each (h, w), by their passes' names, of a pilot alone.
+    ``parts``, of a pilot alone, are those of its light, each (h, w), by their passes' names, and 1
+    or 0 for each of `SURFACES`.
     ``samples`` is the mean number that the pixels of the image circle took. ``seconds`` is the time
     from Cycles' first sample to its being finished, denoising included and synchronization not: on
     processors their working time, which other load is not in and in which cores add up, and on a
@@ -95,7 +104,7 @@ class Trials:
         # How many samples are taken, and why, is for each trial to say.
         render = passes.without(without_target(lightfield.render))
         if parts:
-            render["passes"] = list(passes.PARTS_OF_LIGHT)
+            render["passes"] = [*passes.PARTS_OF_LIGHT, "material"]
         self.lightfield = lightfield.changed(render=render)
         self._blend, self._inventory = blend, inventory
         self._device, self._threads, self._cache = device, threads, cache
@@ -125,6 +134,11 @@ class Trials:
         return Trials(self._blend, self._inventory, there, *on, parts=True)
 
     @property
+    def has_volumes(self) -> bool:
+        """Whether there is fog, smoke or fire in the scene."""
+        return bool(read_json(self._inventory)["volumes"])
+
+    @property
     def whole(self) -> Window:
         """The first view, all of it."""
         return Window(self.lightfield.views[0], 0, 0, self.lens.width, self.lens.height)
@@ -145,7 +159,10 @@ class Trials:
             samples=float(image.attributes[SAMPLES_ATTRIBUTE]),
             seconds=float(image.attributes[SECONDS_ATTRIBUTE]),
             device=str(image.attributes[DEVICE_ATTRIBUTE]),
-            parts={name: image.channels[f"{name}.Y"] for name in settings.get("passes", ())},
+            parts={
+                name: image.channels[f"{name}.Y"]
+                for name in ((*passes.PARTS_OF_LIGHT, *SURFACES) if "passes" in settings else ())
+            },
         )
 
     def reference(self, window: Window, seeds: int, samples: int) -> Reference:
@@ -198,7 +215,8 @@ class Trials:
 
         if not self._started:
             self._start(settings)
-        cycles.set_sampling(settings)
+        # What the trial before this has changed is as the .blend has it again.
+        cycles.set_sampling({**read_json(self._inventory)["sampling"], **settings})
         cycles.set_window(window.x, window.y, window.width, window.height)
         seed = keys.view_seed(settings["seed"], window.view.name)
         raw = render_colour(window.view.matrix, seed, self.lightfield.passes)
@@ -206,7 +224,9 @@ class Trials:
         seconds = raw.worked_seconds if self._on == "CPU" else raw.render_seconds
         channels = {name: raw.pixels[:, :, index] for index, name in enumerate("RGB")}
         channels |= {f"{name}.Y": part.mean(axis=-1) for name, part in raw.passes.items()}
-        if self.lightfield.depth and not raw.passes:
+        if raw.passes:
+            channels |= self._surfaces(render_geometry(window.view.matrix).materials)
+        elif self.lightfield.depth:
             channels["Z"] = render_geometry(window.view.matrix).depth
         images.write_exr(
             path,
@@ -218,6 +238,18 @@ class Trials:
                 DEVICE_ATTRIBUTE: self._on,
             },
         )
+
+    def _surfaces(self, materials: NDArray[np.uint16]) -> dict[str, NDArray[np.float32]]:
+        """Return the channels that say of each pixel's material, (h, w), what `SURFACES` has."""
+        from lightfield.rendering import ids
+
+        numbers, inventory = ids.names("material"), read_json(self._inventory)
+        found = {}
+        for surface, features in SURFACES.items():
+            named = {name for feature in features for name in inventory[feature]}
+            members = [number for name, number in numbers.items() if name in named]
+            found[f"{surface}.Y"] = np.isin(materials, members).astype(np.float32)
+        return found
 
     def _start(self, settings: Mapping[str, Any]) -> None:
         from lightfield.rendering import colour_pass, cycles

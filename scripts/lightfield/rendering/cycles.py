@@ -18,6 +18,14 @@ GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
 
 CAMERA_NAME = "plenoforge_camera"
 
+# How paths are traced, by the keys of ``render`` blocks: what they leave out is as in the .blend.
+SAMPLING = {
+    "max_bounces": "max_bounces",
+    "clamp_indirect": "sample_clamp_indirect",
+    "light_tree": "use_light_tree",
+    "guiding": "use_guiding",
+}
+
 # What of Cycles' passes a view's geometry is, and their channels.
 GEOMETRY_PASSES = {"Depth": "Z", "Normal": "XYZ", "Object Index": "X", "Material Index": "X"}
 
@@ -78,10 +86,6 @@ def _set_quality(settings: Mapping[str, Any]) -> None:
     cycles.time_limit = 0
     cycles.use_layer_samples = "IGNORE"
     cycles.use_sample_subset = False
-    if "max_bounces" in settings:
-        cycles.max_bounces = settings["max_bounces"]
-    if "clamp_indirect" in settings:
-        cycles.sample_clamp_indirect = settings["clamp_indirect"]
     if "filter_width" in settings:
         cycles.filter_width = settings["filter_width"]
     if "motion_blur" in settings:
@@ -146,10 +150,7 @@ def pass_property(layer: Any, name: str) -> tuple[Any, str]:
 
 
 def set_sampling(settings: Mapping[str, Any]) -> None:
-    """Set how many samples a pixel takes and what is made of them, as ``render`` blocks have it.
-
-    ``guiding`` turns path guiding on or off; without that key it stays as the .blend has it.
-    """
+    """Set how paths are traced, and what is made of them, as ``render`` blocks have it."""
     cycles = bpy.context.scene.cycles
     cycles.samples = settings["samples"]
     cycles.use_adaptive_sampling = settings["adaptive_threshold"] > 0
@@ -158,10 +159,17 @@ def set_sampling(settings: Mapping[str, Any]) -> None:
     cycles.denoiser = "OPENIMAGEDENOISE"
     # Guided by the surfaces' albedo and normals, which are denoised themselves first.
     cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
-    cycles.denoising_prefilter = "ACCURATE"
-    cycles.denoising_quality = "HIGH"
-    if "guiding" in settings:
-        cycles.use_guiding = settings["guiding"]
+    cycles.denoising_prefilter = settings.get("denoise_prefilter", "accurate").upper()
+    cycles.denoising_quality = settings.get("denoise_quality", "high").upper()
+    for name, attribute in SAMPLING.items():
+        if name in settings:
+            setattr(cycles, attribute, settings[name])
+
+
+def sampling() -> dict[str, Any]:
+    """Return how paths are traced in the open scene, as ``render`` blocks would have it."""
+    cycles = bpy.context.scene.cycles
+    return {name: getattr(cycles, attribute) for name, attribute in SAMPLING.items()}
 
 
 def set_window(x: int, y: int, width: int, height: int) -> None:

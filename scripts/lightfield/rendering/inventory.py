@@ -5,19 +5,23 @@ from typing import Any
 
 import bpy
 
-from lightfield.rendering import pruning
+from lightfield.rendering import cycles, pruning
 from lightfield.rendering.external_files import external_files, problems
 
 # Shader nodes by the feature that they give a material; the Principled BSDF by its inputs.
 SHADERS = {
     "ShaderNodeBsdfGlass": "transmission",
     "ShaderNodeBsdfRefraction": "transmission",
-    "ShaderNodeBsdfTranslucent": "transmission",
+    "ShaderNodeBsdfTranslucent": "translucency",
     "ShaderNodeSubsurfaceScattering": "subsurface",
     "ShaderNodeBsdfHair": "hair",
     "ShaderNodeBsdfHairPrincipled": "hair",
     "ShaderNodeEmission": "emission",
     "ShaderNodeBsdfTransparent": "transparency",
+    **dict.fromkeys(
+        (f"ShaderNodeTex{name}" for name in ("Gabor", "Magic", "Noise", "Voronoi", "Wave")),
+        "procedural",
+    ),
 }
 PRINCIPLED_INPUTS = {
     "Transmission Weight": ("transmission", 0.0),
@@ -70,8 +74,9 @@ def inventory() -> dict[str, Any]:
     features["volumes"] |= {thing.name_full for thing in objects if thing.type == "VOLUME"}
     return {
         **triangles(),
-        "lights": len(lights),
+        "lights": sorted(light.name_full for light in lights),
         **{name: sorted(features[name]) for name in FEATURES},
+        "sampling": cycles.sampling(),
         "textures": sorted(image.name_full for image in images),
         "hidden": hidden,
         "animated": sorted(owner.name_full for owner, _ in pruning.animated()),

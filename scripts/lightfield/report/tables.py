@@ -10,6 +10,7 @@ from typing import Any
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.measurement import synthesis_quality
+from lightfield.measurement.error_vs_time import strata_table as _strata_table
 from lightfield.report import page
 
 # Of the stability table, so many of the cases that use most of their bound are shown at once.
@@ -166,7 +167,7 @@ def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
     content = read_json(path)
     if not isinstance(content, Mapping):
         raise UserError(f"{path}: must be a mapping")
-    # The plot beside the tables has the strata.
+    # Strata have tables of their own.
     tables, _ = _tables({name: part for name, part in content.items() if name != "strata"})
     known = {name: table for name, table in tables.items() if name in ERROR_TABLES}
     whole = {name: table for name, table in tables.items() if name not in known}
@@ -174,9 +175,15 @@ def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
     if "slopes" in known:
         known["slopes"] = _slopes(content["slopes"])
     measured_on = content.get("measured_on")
+    shown = {ERROR_TABLES[name]: known[name] for name in ERROR_TABLES if name in known}
+    if content.get("strata"):
+        try:
+            shown["By what pixels show"] = Table(*_strata_table(content))
+        except (LookupError, TypeError, AttributeError):
+            raise UserError(f"{path}: is not what scripts/error_vs_time.py writes") from None
     return Measurement(
         page.plot(path.with_suffix("")),
-        {ERROR_TABLES[name]: known[name] for name in ERROR_TABLES if name in known},
+        shown,
         {name.capitalize(): table for name, table in whole.items()},
         _with_units(measured_on, "") if isinstance(measured_on, Mapping) else [],
     )
