@@ -314,6 +314,8 @@ def inventory_settings(wildcards):
     written = load_scene(wildcards.name)
     source = written.scene
     return [
+        # Of the list itself: with how paths are traced, and what is translucent.
+        2,
         *(source.scene_name, source.view_layers, source.allow_missing),
         [dataset.camera_frames for dataset in scene_datasets(wildcards.name)],
         written.render.motion_blur,
@@ -470,6 +472,16 @@ def probes():
         (f"{scene}/{rig}", len(datasets), f"{datasets[0].work}/probe.json")
         for (scene, rig), datasets in frames.items()
     ]
+
+
+def advice_words():
+    """Return the words that name to scripts/plan.py what `snakemake advise` has found."""
+    files = {
+        f"{d.scene_folder}/{d.rig_name}": f"{RESULTS}/benchmarks/advise/{d.scene_name}.json"
+        for d in CHOSEN
+    }
+    there = [(name, file) for name, file in files.items() if Path(file).exists()]
+    return shlex.join(word for pair in there for word in ("--advice", *pair))
 
 
 def measurements(wildcards):

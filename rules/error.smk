@@ -109,3 +109,53 @@ rule error_vs_time:
             f"{RESULTS}/benchmarks/error_vs_time/{name}.json"
             for name in dict.fromkeys(dataset.scene_name for dataset in CHOSEN)
         ],
+
+
+rule try_changes:
+    input:
+        check=of_first("blend_check"),
+        blend=of_first("blend"),
+        inventory=of_first("inventory"),
+        lightfield=f"{WORK}/{{scene}}/probes.json",
+        calibration=of_first("calibration"),
+    output:
+        f"{RESULTS}/benchmarks/advise/{{scene}}.json",
+    log:
+        log_of("{scene}/try_changes"),
+    conda:
+        ENVIRONMENT
+    # As above.
+    threads: lambda wildcards: workflow.cores or 1
+    resources:
+        mem_mb=6000,
+        runtime=240,
+        gpu=GPUS,
+    params:
+        device=SETTINGS.device,
+        cache=of_first("trials"),
+        calibration=calibration_words,
+    message:
+        "Trying what could be cheaper in {wildcards.scene}"
+    shell:
+        f"python {SCRIPTS}/try_changes.py"
+        " --blend {input.blend:q} --inventory {input.inventory}"
+        " --lightfield {input.lightfield} {params.calibration} --device {params.device} --threads 1"
+        " --cache {params.cache} --output {output} > {log} 2>&1"
+
+
+# Without output: it is asked for to be read.
+rule advise:
+    input:
+        [
+            f"{RESULTS}/benchmarks/advise/{name}.json"
+            for name in dict.fromkeys(dataset.scene_name for dataset in CHOSEN)
+        ],
+    log:
+        log_of("advise"),
+    localrule: True
+    conda:
+        ENVIRONMENT
+    message:
+        "Saying what could be cheaper"
+    shell:
+        f"python {SCRIPTS}/advise.py" " {input} > {log} 2>&1"

@@ -64,9 +64,10 @@ rule plan:
         datasets=" ".join(
             f"--dataset {name} {frames} {probe}" for name, frames, probe in probes()
         ),
+        advice=advice_words(),
         table=f"{RESULTS}/tables/plan.md",
     message:
         "Adding up what the chosen datasets will take"
     shell:
         f"python {SCRIPTS}/plan.py"
-        " {params.datasets} --output {params.table} > {log} 2>&1"
+        " {params.datasets} {params.advice} --output {params.table} > {log} 2>&1"

@@ -22,10 +22,19 @@ def main() -> None:
         metavar=("NAME", "FRAMES", "PROBE"),
         help="scene/rig, how many frames it has, and its probe's JSON",
     )
+    parser.add_argument(
+        "--advice",
+        action="append",
+        nargs=2,
+        default=[],
+        metavar=("NAME", "JSON"),
+        help="scene/rig, and what scripts/try_changes.py has measured in its scene",
+    )
     parser.add_argument("--output", required=True, type=Path, help="Markdown to write")
     arguments = parser.parse_args()
     text = plan.table(
-        [(name, int(frames), read_json(probe)) for name, frames, probe in arguments.dataset]
+        [(name, int(frames), read_json(probe)) for name, frames, probe in arguments.dataset],
+        {name: read_json(path) for name, path in arguments.advice},
     )
     write_text(arguments.output, text)
     print(text, end="")

@@ -41,7 +41,7 @@ IMPORTED = "scene: {dataset: published}"
 TARGETS = [
     *("all", "smoke", "package", "rig_tables", "plan", "status"),
     *("error_vs_time", "reprojection_benchmark", "stability", "extremes", "render_overhead"),
-    *("gpu_check", "synthesis", "verify"),
+    *("advise", "gpu_check", "synthesis", "verify"),
 ]
 CHOSEN = ["--config", "scenes=[brought,imported]", "rigs=all", "preset=full"]
 RULES = [

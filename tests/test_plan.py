@@ -115,13 +115,33 @@ def test_the_table_adds_up_what_the_probes_measured():
     fisheye = {"resolution": [2048, 2048], "samples": 256, "device": "CPU"}
     fisheye |= {"views": 100, "view_seconds": [30.0, 36.0, 42.0], "view_bytes": [1e7, 1.2e7]}
     panoramas = fisheye | {"views": 8, "resolution": [4096, 2048], "view_seconds": [90.0]}
-    text = plan.table([("garden/LFSphere", 3, fisheye), ("garden/LFCuboid_8panos", 1, panoramas)])
+    datasets = [("garden/LFSphere", 3, fisheye), ("garden/LFCuboid_8panos", 1, panoramas)]
+    text = plan.table(datasets, {})
     # 300 views of 36 ± 12/√12 s are 3 h, and of 11 MB 3.3 GB.
-    assert "| garden/LFSphere | 300 | 2048 × 2048 | 256 | 36 ± 3 | 3 | 3.3 |" in text
-    assert "| garden/LFCuboid_8panos | 8 | 4096 × 2048 | 256 | 90 ± 0 | 0 | 0.1 |" in text
-    assert "| all | 308 | | | | 3 ± 0 | 3 |" in text
+    assert "| garden/LFSphere | 300 | 2048 × 2048 | 256 | 36 ± 3 | 3 | — | — | 3.3 |" in text
+    assert "| garden/LFCuboid_8panos | 8 | 4096 × 2048 | 256 | 90 ± 0 | 0 | — | — | 0.1 |" in text
+    assert "| all | 308 | | | | 3 ± 0 | — | — | 3 |" in text
     assert "Hours of one processor core" in text
-    assert "Hours of the graphics card." in plan.table([("a/b", 1, fisheye | {"device": "GPU"})])
+    assert "Hours of the graphics card." in plan.table(
+        [("a/b", 1, fisheye | {"device": "GPU"})], {}
+    )
+
+
+def test_denoised_and_calibrated_hours_stand_beside_the_plain_ones():
+    """Path tracing has 1 / N, denoised renders half of it at once, and cost three samples more."""
+    unchanged = {
+        way: [{"samples": n, "seconds": n + more, "error": part / n} for n in (4, 8, 16)]
+        for way, more, part in (("path tracing", 0, 1), ("denoised", 3, 0.5))
+    }
+    advice = {"own": {"samples": 256, "denoise": False}, "unchanged": unchanged}
+    denoised, calibrated = plan.cheaper_parts(256, advice)
+    assert denoised == pytest.approx((128 + 3) / 256)
+    assert calibrated == pytest.approx((50 + 3) / 256)
+    assert plan.cheaper_parts(6, advice) == plan.cheaper_parts(256, None) == (None, None)
+    probe = {"resolution": [64, 64], "samples": 256, "device": "CPU", "views": 100}
+    probe |= {"view_seconds": [3600.0], "view_bytes": [1e9]}
+    text = plan.table([("a/b", 1, probe)], {"a/b": advice})
+    assert "| 100 | 51 | 21 | 100.0 |" in text
 
 
 def test_a_probe_foretells_the_size_of_the_views(run_program, room, tmp_path):

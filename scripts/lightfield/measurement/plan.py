@@ -1,13 +1,16 @@
 """What the chosen datasets will take on this machine: views, hours and gigabytes."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import fmean
 from typing import Any
 
+from scipy.stats import linregress
+
 from lightfield.core import processors
 from lightfield.dataset.dataset import SECONDS_PER_SAMPLE, START_UP_SECONDS
+from lightfield.measurement import metrics
 from lightfield.measurement.calibration import (
     FEWEST_SEEDS,
     MOST_SEEDS,
@@ -15,19 +18,26 @@ from lightfield.measurement.calibration import (
     REFERENCE_PART,
     REFERENCE_SAMPLES,
 )
-from lightfield.measurement.sampling import PROBES, WINDOW_SIZE, standard_error
+from lightfield.measurement.sampling import DENOISED, PROBES, TRACED, WINDOW_SIZE, standard_error
 
 # Measured in the courtyard: how many renders a calibration's search makes of each window, how many
 # of the samples that the target needs, and what a render of a window takes beside its samples.
 SEARCH_RENDERS, SEARCH_PART, WINDOW_SECONDS = 9, 2.5, 0.07
 
-HEAD = "| dataset | views | resolution | samples | s a view | hours | GB |"
+HEAD = "| dataset | views | resolution | samples | s a view | hours | denoised | calibrated | GB |"
+
+# The target error that the calibrated hours are for.
+TARGET_ERROR = 0.01
 
 
-def table(datasets: list[tuple[str, int, dict[str, Any]]]) -> str:
-    """Return the table of (name, frames, probe), with the sums below."""
-    lines = ["# What it will take", "", HEAD, "| --- | ---: | ---: | ---: | ---: | ---: | ---: |"]
+def table(datasets: list[tuple[str, int, dict[str, Any]]], advice: Mapping[str, Any]) -> str:
+    """Return the table of (name, frames, probe), with the sums below.
+
+    ``advice`` is what `lightfield.measurement.advice` has found of datasets, by their names.
+    """
+    lines = ["# What it will take", "", HEAD, "| --- " + "| ---: " * (HEAD.count("|") - 2) + "|"]
     total_views, total_hours, total_bytes, variance = 0, 0.0, 0.0, 0.0
+    cheaper: list[list[float | None]] = []
     for name, frames, probe in datasets:
         views = probe["views"] * frames
         seconds = probe["view_seconds"]
@@ -35,17 +45,21 @@ def table(datasets: list[tuple[str, int, dict[str, Any]]]) -> str:
         hours = views * fmean(seconds) / 3600
         size = views * fmean(probe["view_bytes"])
         width, height = probe["resolution"]
+        parts = cheaper_parts(probe["samples"], advice.get(name))
+        cheaper.append([part and part * hours for part in parts])
         lines.append(
             f"| {name} | {views} | {width} × {height} | {probe['samples']} "
-            f"| {fmean(seconds):.0f} ± {error:.0f} | {hours:.0f} | {size / 1e9:.1f} |"
+            f"| {fmean(seconds):.0f} ± {error:.0f} | {hours:.0f} | {_hours(cheaper[-1])} "
+            f"| {size / 1e9:.1f} |"
         )
         total_views += views
         total_hours += hours
         total_bytes += size
         variance += (views * error / 3600) ** 2
+    sums = [None if None in column else sum(column) for column in zip(*cheaper, strict=True)]
     lines.append(
         f"| all | {total_views} | | | | {total_hours:.0f} ± {math.sqrt(variance):.0f} "
-        f"| {total_bytes / 1e9:.0f} |"
+        f"| {_hours(sums)} | {total_bytes / 1e9:.0f} |"
     )
     cores = processors.available()
     if all(probe["device"] == "CPU" for _, _, probe in datasets):
@@ -55,9 +69,45 @@ def table(datasets: list[tuple[str, int, dict[str, Any]]]) -> str:
         lines += ["", "Hours of the graphics card."]
     lines += [
         "Measured on small views, with all their samples; ± is the standard error over these.",
+        "Denoised: to the same error by fewer samples and the denoiser. Calibrated: to the error "
+        f"{TARGET_ERROR:g}, by the cheaper of both. By `snakemake advise`; — where it has not run.",
         "",
     ]
     return "\n".join(lines)
+
+
+def cheaper_parts(
+    samples: int, advice: Mapping[str, Any] | None
+) -> tuple[float | None, float | None]:
+    """Return the parts of the time of plain path tracing that denoised and calibrated views take.
+
+    ``samples`` are those of a pixel. Errors and seconds follow ``advice``: power laws of samples,
+    and fewer than one sample there are not.
+    """
+    if not advice or advice["own"] != {"samples": samples, "denoise": False}:
+        return None, None
+    ways = {}
+    for way, points in advice["unchanged"].items():
+        counts = [point["samples"] for point in points]
+        errors = metrics.fit(counts, [point["error"] for point in points])
+        assert errors is not None
+        seconds = linregress(counts, [point["seconds"] for point in points])
+        ways[way] = errors, seconds
+
+    def seconds_to(error: float, way: str) -> float:
+        errors, seconds = ways[way]
+        return float(seconds.intercept + seconds.slope * max(1.0, math.ceil(errors.inverse(error))))
+
+    errors, seconds = ways[TRACED]
+    plain = float(seconds.intercept + seconds.slope * samples)
+    return (
+        seconds_to(errors.at(samples), DENOISED) / plain,
+        min(seconds_to(TARGET_ERROR, way) for way in ways) / plain,
+    )
+
+
+def _hours(values: Sequence[float | None]) -> str:
+    return " | ".join("—" if value is None else _figure(value) for value in values)
 
 
 @dataclass(frozen=True)

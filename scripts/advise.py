@@ -1,0 +1,24 @@
+"""Say what scenes could be rendered with that is cheaper at equal error.
+
+Reads what scripts/try_changes.py has measured, and writes a table of each scene beside it.
+"""
+
+import argparse
+from pathlib import Path
+
+from lightfield.core.cli import run
+from lightfield.core.files import read_json, write_text
+from lightfield.measurement import advice
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("measured", nargs="+", type=Path, help="JSON of a scene, named after it")
+    for path in parser.parse_args().measured:
+        text = advice.table(path.stem, read_json(path))
+        write_text(path.with_suffix(".md"), text)
+        print(text)
+
+
+if __name__ == "__main__":
+    run(main)

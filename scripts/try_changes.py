@@ -1,0 +1,40 @@
+"""Try on a scene's probes what could be cheaper at equal error; scripts/advise.py says what was."""
+
+import argparse
+from pathlib import Path
+
+from lightfield.core.cli import run
+from lightfield.core.files import read_json, write_json
+from lightfield.dataset.lightfield import LightField
+from lightfield.measurement import advice, trials
+from lightfield.measurement.sampling import calibrated
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    trials.add_arguments(parser, "lightfield.json")
+    parser.add_argument(
+        "--calibration", type=Path, help="what scripts/calibrate.py chose for a target error"
+    )
+    parser.add_argument(
+        "--probes", type=int, default=1, help="windows of each stratum (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--reference", type=int, default=512, help="samples of a reference (default: %(default)s)"
+    )
+    parser.add_argument("--output", required=True, type=Path, help="JSON to write")
+    arguments = parser.parse_args()
+
+    lightfield = LightField.read(arguments.lightfield)
+    if arguments.calibration:
+        render = calibrated(lightfield.render, read_json(arguments.calibration))
+        lightfield = lightfield.changed(render=render)
+    maker = trials.Trials.of(arguments, lightfield)
+    name = arguments.output.stem
+    probes = advice.Probes(maker, arguments.size, arguments.probes, arguments.reference, name)
+    inventory = read_json(arguments.inventory)
+    write_json(arguments.output, advice.tried(maker, lightfield.render, inventory, probes))
+
+
+if __name__ == "__main__":
+    run(main)

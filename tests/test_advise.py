@@ -1,0 +1,135 @@
+"""What could be cheaper at equal error: found where it is known, and by the programs."""
+
+import json
+
+import numpy as np
+import pytest
+
+from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.passes import PARTS_OF_LIGHT
+from lightfield.geometry import lenses
+from lightfield.measurement import advice, trials
+from lightfield.measurement.metrics import make_reference
+
+CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
+RIG = {"type": "plane", "cameras": [4, 1], "size": 0.3, "center": [0, 0, 1.5]}
+RENDER = {"samples": 256, "adaptive_threshold": 0, "denoise": False, "seed": 0}
+SAMPLING = {"max_bounces": 8, "clamp_indirect": 10, "light_tree": True, "guiding": False}
+INVENTORY = {name: [] for name in ("lights", *advice.COSTLY)} | {"sampling": SAMPLING}
+INVENTORY |= {"lights": ["sun"], "volumes": ["Fog"]}
+
+
+def lightfield():
+    lens = lenses.from_camera(CAMERA)
+    return LightField.from_rig(RIG, lens, depth="z", frame=1, render=RENDER)
+
+
+class Simulated:
+    """Renders that cost nothing: noise of N paths on a picture, in times that are known.
+
+    Without the light tree a path takes half as long. Guided, it does too, but one pixel is
+    sixty times too bright. With few bounces a tenth of the light is missing.
+    """
+
+    has_volumes = False
+
+    def __init__(self):
+        self.lightfield = lightfield()
+        self.lens = self.lightfield.lens
+        self.mask = trials.Trials("none.blend", "none.json", self.lightfield, "cpu", 1, "none").mask
+
+    def pilot(self, lens=None):
+        return self
+
+    def reference(self, window, seeds, samples):
+        made = [self.render(window, 1000 + seed, {"samples": samples}) for seed in range(seeds)]
+        return make_reference([trial.colour for trial in made], None, self.mask(window))
+
+    def render(self, window, seed, sampling):
+        shape = (window.height, window.width)
+        random = np.random.default_rng([seed, window.x, window.y])
+        samples = sampling["samples"]
+        noise = random.gamma(samples, 1 / samples, (*shape, 3))
+        light = 0.2 * noise
+        if sampling.get("denoise"):
+            light = 0.8 * light + 0.05
+        if "max_bounces" in sampling:
+            light *= 0.9
+        if sampling.get("guiding"):
+            light[tuple(random.integers(32, size=2))] *= 60
+        fast = sampling.get("light_tree") is False or sampling.get("guiding")
+        seconds = samples * 1e-3 / (2 if fast else 1)
+        parts = {name: np.zeros(shape) for name in (*PARTS_OF_LIGHT, *trials.SURFACES)}
+        parts["diffuse_light"] += 1
+        return trials.Trial(light.astype(np.float32), None, samples, seconds, "CPU", parts)
+
+
+@pytest.fixture(scope="module")
+def simulated():
+    maker = Simulated()
+    found = advice.tried(maker, RENDER, INVENTORY, advice.Probes(maker, 32, 2, 512, "room"))
+    return found, {json.dumps(one["change"]): one for one in found["tried"]}
+
+
+def test_what_saves_is_advised_with_its_yaml(simulated):
+    found, changes = simulated
+    one = changes['{"light_tree": false}']
+    whole = one["savings"]["whole views"]
+    assert whole["times"] == pytest.approx(2, abs=2 * whole["uncertainty"] + 0.02)
+    assert abs(whole["light"]) < 1e-6 and whole["same_picture"] and one["advised"]
+    assert one["savings"]["diffuse"] == whole
+    assert found["yaml"] == {"light_tree": False}
+    text = advice.table("room", found)
+    assert "render:\n  light_tree: false\n" in text
+    assert "- lights: 1, sun" in text and "- volumes: 1, Fog" in text
+    assert "| `light_tree: false` | path tracing | yes | 2.0" in text
+
+
+@pytest.mark.parametrize(
+    "change", ['{"max_bounces": 4}', '{"max_bounces": 2}', '{"denoise": true}']
+)
+def test_another_picture_is_not_advised(simulated, change):
+    one = simulated[1][change]
+    assert not one["savings"]["whole views"]["same_picture"] and not one["advised"]
+    if "max_bounces" in change:
+        assert one["savings"]["whole views"]["light"] == pytest.approx(-0.1, abs=1e-3)
+
+
+def test_what_hides_fireflies_is_not_advised(simulated):
+    one = simulated[1]['{"guiding": true}']
+    whole = one["savings"]["whole views"]
+    assert whole["times"] > 1.5 > 1 > whole["times_of_all_pixels"]
+    assert not one["advised"]
+
+
+def test_a_clamp_is_reported_and_never_advised():
+    (none, quarter) = (t for t in advice.tries(SAMPLING, True) if "clamp_indirect" in t.change)
+    assert (none.change["clamp_indirect"], quarter.change["clamp_indirect"]) == (0, 2.5)
+    saving = advice.Saving(2, 0, 2, 0, 0, 1, 0)
+    assert not advice.is_advised(quarter, saving)
+    assert advice.is_advised(advice.Try(advice.TRACED, {}, {}), saving)
+    assert not any("guiding" in t.change for t in advice.tries(SAMPLING, on_cpu=False))
+
+
+def test_a_scene_is_advised_by_the_programs(run_program, room, tmp_path):
+    lightfield().write(tmp_path / "lightfield.json")
+    inventory, output = tmp_path / "inventory.json", tmp_path / "room.json"
+    run_program("inventory.py", "--blend", room, "--output", inventory)
+    words = ("--blend", room, "--inventory", inventory, "--device", "cpu", "--size", "24")
+    words += ("--lightfield", tmp_path / "lightfield.json", "--cache", tmp_path / "cache")
+    run_program("try_changes.py", *words, "--reference", "128", "--output", output)
+    found = json.loads(output.read_text())
+    assert "diffuse" in found["strata"]
+    tried = {json.dumps(one["change"]): one["savings"] for one in found["tried"]}
+    own = json.loads(inventory.read_text())["sampling"]
+    # A lamp and a closed room: fewer bounces make it darker, and nothing else does.
+    fewer = tried[json.dumps({"max_bounces": own["max_bounces"] // 4})]["whole views"]
+    assert fewer["light"] < -0.01 and not fewer["same_picture"]
+    tree = tried[json.dumps({"light_tree": not own["light_tree"]})]["whole views"]
+    assert 0 < abs(tree["light"]) < 0.02
+    # Each change reaches Cycles: no two make the same pixels.
+    wholes = [saved["whole views"] for change, saved in tried.items() if "clamp" not in change]
+    assert len({(whole["bias"], whole["light"]) for whole in wholes}) == len(wholes)
+    said = run_program("advise.py", output).stdout
+    assert said == output.with_suffix(".md").read_text() + "\n"
+    assert "| `denoise_prefilter: fast` | denoised |" in said
