@@ -8,8 +8,9 @@ asked of denoised renders.
 
 What makes another picture shall not pass for a saving. The mean of the differences that a change
 makes, of renders with equal seeds, is its bias. Where the square of that, of all pixels, is above
-the variance of the reference, the picture is another one, and the change is not advised. Of a clamp
-the bias is said, and nothing is advised.
+the variance of the reference, the picture is another one, and the change is not advised. The light
+tree and guiding only choose other paths, to the same mean. Of a clamp the bias is said, and nothing
+is advised.
 """
 
 import json
@@ -54,13 +55,14 @@ MOST_NAMES = 8
 class Try:
     """A change of a scene's ``render`` block, rendered as ``settings`` have it.
 
-    ``of`` says what it is compared with, and ``may_be_advised`` is False where it is tried to be
-    reported alone.
+    ``of`` says what it is compared with, ``unbiased`` that the picture is known to stay, and
+    ``may_be_advised`` is False where it is tried to be reported alone.
     """
 
     of: str
     change: Mapping[str, Any]
     settings: Mapping[str, Any]
+    unbiased: bool = False
     may_be_advised: bool = True
 
 
@@ -89,17 +91,20 @@ class Saving:
 
 def tries(own: Mapping[str, Any], on_cpu: bool) -> list[Try]:
     """Return what is tried of a scene whose paths are traced as ``own`` says, by `render` keys."""
-    changes: list[dict[str, Any]] = [{"light_tree": not own["light_tree"]}]
     # Elsewhere Cycles has no guiding.
-    changes += [{"guiding": not own["guiding"]}] if on_cpu else []
-    changes += [{"max_bounces": n} for n in (own["max_bounces"] // 2, own["max_bounces"] // 4) if n]
+    switches = ("light_tree", "guiding") if on_cpu else ("light_tree",)
+    bounces = [{"max_bounces": n} for n in (own["max_bounces"] // 2, own["max_bounces"] // 4) if n]
     clamp = own["clamp_indirect"]
     clamps = [{"clamp_indirect": n} for n in ((0, clamp / 4) if clamp else (10,))]
     denoisers = [{"denoise_quality": quality} for quality in ("balanced", "fast")]
     denoisers += [{"denoise_prefilter": prefilter} for prefilter in ("fast", "none")]
     count = {"samples": SAMPLES}
     return [
-        *(Try(TRACED, change, count | change) for change in changes),
+        *(
+            Try(TRACED, {name: not own[name]}, count | {name: not own[name]}, unbiased=True)
+            for name in switches
+        ),
+        *(Try(TRACED, change, count | change) for change in bounces),
         *(Try(TRACED, change, count | change, may_be_advised=False) for change in clamps),
         Try(TRACED, {"adaptive_threshold": ADAPTIVE["adaptive_threshold"]}, ADAPTIVE),
         Try(TRACED, {"denoise": True}, count | {"denoise": True}),
@@ -308,7 +313,7 @@ def is_advised(one: Try, saving: Saving | None) -> bool:
         and saving.times - SURE * saving.uncertainty >= WORTH
         # Not by hiding what is bright and rare.
         and saving.times_of_all_pixels + SURE * saving.uncertainty_of_all_pixels >= 1
-        and (one.of == DENOISED or saving.same_picture)
+        and (one.of == DENOISED or one.unbiased or saving.same_picture)
     )
 
 
@@ -323,7 +328,8 @@ def table(name: str, found: Mapping[str, Any]) -> str:
         f"standard error over {found['seeds']} seeds: of whole views, of all their pixels with the",
         "worst thousandth, and by what pixels show. The bias is that of all pixels, over the noise",
         "of the reference, and light is by what part the whole picture is brighter. Where the bias",
-        "is above 1 it is another picture, and nothing is advised; — is as good as the reference.",
+        "is above 1 it is another picture, and nothing is advised, but of the light tree and of",
+        "guiding, whose mean is the same; — is as good as the reference.",
         "",
         f"| change | of | advised | {columns[0]} | all pixels | bias | light "
         f"| {' | '.join(columns[1:])} |",
