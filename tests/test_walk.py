@@ -3,6 +3,7 @@
 import base64
 import io
 import math
+import shutil
 
 import numpy as np
 import pytest
@@ -40,17 +41,22 @@ def dataset(tmp_path_factory):
 
 @pytest.fixture
 def tab(dataset, show):
-    """The page, with a canvas of a known size, once it can be walked."""
+    """The page, once it can be walked and has all of its views."""
 
     def tab(**options):
         tab = show(dataset / "index.html", **options)
-        for _ in range(300):
-            if tab.evaluate("Boolean(walk.ready && walk.frames)"):
-                return tab
-            tab.wait_for_timeout(100)
-        raise AssertionError("the walk did not begin")
+        wait(tab)
+        return tab
 
     return tab
+
+
+def wait(tab):
+    for _ in range(300):
+        if tab.evaluate("Boolean(walk.frames && walk.order.every((source) => source.isThere))"):
+            return
+        tab.wait_for_timeout(100)
+    raise AssertionError("the walk did not begin")
 
 
 def look_from(tab, place, yaw, pitch):
@@ -139,6 +145,66 @@ def test_nobody_leaves_the_volume(tab):
     opened.evaluate("moved(5, 0, 0)")
     assert -1e-6 < opened.evaluate("room(walk.at)") < 0.01
     assert "m to the edge" in opened.locator("#walk-readout").inner_text()
+
+
+def test_a_sequence_goes_on_from_where_the_eye_was(dataset, show, tmp_path):
+    rig = rigs.from_settings(RIG | {"frames": {"first": 1, "last": 17, "step": 8}})
+    for name in rig.sequence.folders:
+        folder = tmp_path / "ball" / name
+        shutil.copytree(dataset, folder)
+        origin = dataset_page.Origin(rig, "", "snakemake", False)
+        dataset_page.write(folder / "report/index.html", folder, f"ball/{name}", origin)
+    opened = show(tmp_path / "ball/f00001/report/index.html")
+    wait(opened)
+    slider = opened.locator("#walk-frame")
+    assert [slider.get_attribute(key) for key in ("max", "value")] == ["2", "0"]
+    opened.locator("#walk-depth").click()
+    opened.evaluate("Object.assign(walk, { yaw: 1.25, pitch: -0.5 }), moved(0.05, 0.02, 0)")
+    before = opened.evaluate("[...walk.at, walk.yaw, walk.pitch, walk.mode]")
+    slider.focus()
+    with opened.expect_navigation():
+        opened.keyboard.press("ArrowRight")
+    wait(opened)
+    assert "/f00009/report/" in opened.url
+    after = opened.evaluate("[...walk.at, walk.yaw, walk.pitch, walk.mode]")
+    assert after == pytest.approx(before, abs=1e-9)
+    assert opened.locator("#walk-depth").get_attribute("aria-pressed") == "true"
+    assert opened.locator("#walk-frame").input_value() == "1"
+    opened.go_back()
+    wait(opened)
+    assert opened.locator("#walk-frame").input_value() == "0"
+
+
+def test_a_place_that_is_none_is_the_centre(tab):
+    opened = tab()
+    state = "[...walk.at, walk.yaw, walk.pitch, walk.mode]"
+    home = opened.evaluate(state)
+    go = f"(place) => {{ location.hash = place; goWhereItWas(); return {state}; }}"
+    for place in ("", "walk=", "walk=1,a,3,0,0,0", "walk=0,0,0,0,0,9", "walk=0,0,0,0,0,0.5"):
+        assert opened.evaluate(go, place) == home
+    # Nobody leaves the volume so, either.
+    opened.evaluate(go, "walk=9,0,0,0.5,0.2,1")
+    assert -1e-6 < opened.evaluate("room(walk.at)") < 0.01
+    assert opened.evaluate("[walk.yaw, walk.pitch, walk.mode]") == [0.5, 0.2, 1]
+
+
+def test_one_in_motion_is_of_few_views_where_drawing_takes_long(tab):
+    opened = tab()
+    opened.evaluate("clearTimeout(walk.rest)")
+    opened.evaluate(
+        """() => {
+            const draw = drawWalk;
+            window.counts = [];
+            drawWalk = (...words) => { draw(...words); window.counts.push(walk.chosen.length); };
+            walk.slow = true;
+            turned(0.1, 0);
+        }"""
+    )
+    for _ in range(100):
+        if len(counts := opened.evaluate("window.counts")) == 2:
+            break
+        opened.wait_for_timeout(100)
+    assert counts == [2, VIEWS]
 
 
 @pytest.mark.parametrize("mode", ["depth", "holes", "sources"])

@@ -816,8 +816,8 @@ def _frames(name: str, rig: Rig, frame: int | str) -> Iterator[tuple[str, int | 
     if rig.sequence is None:
         yield name, frame
         return
-    for number in rig.sequence.numbers:
-        yield f"{name}/f{number:05d}", number
+    for folder, number in rig.sequence.folders.items():
+        yield f"{name}/{folder}", number
 
 
 def _limited_rig(rig: Rig, limits: Preset, is_rendered: bool) -> Rig:

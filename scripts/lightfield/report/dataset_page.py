@@ -72,6 +72,8 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
         plots={stem: page.plot(report / stem) for stem in PLOTS},
         taken=_taken(origin, lightfield),
         looks=looks,
+        frames=list(rig.sequence.folders) if rig.sequence else [],
+        frame=folder.name,
         passes=list(pass_pictures.collect(folder, lightfield, middle, looks.data["exposure"])),
         reprojected=list(_reprojected(folder)),
         render=lightfield.render,

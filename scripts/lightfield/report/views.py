@@ -97,13 +97,14 @@ def collect(
     limits, exposure = light_range(light), round(pictures.exposure_for(light), 2)
     packed_views = []
     rays = small.pixel_rays()
-    reach = points = missed = None
+    reach = points = missed = walked = None
     if depths is not None:
         depths = np.where(np.isnan(rays[..., 0]), np.nan, depths)
         reach = depth_range(depths)
         known = depths[~np.isnan(depths)]
         missed = float(np.isposinf(known).mean()) if known.size else None
         distances = distance_from_z(depths, rays) if meaning == "z" else depths
+        walked = walk.collect(small, matrices[:, :3, 3], distances)
         points = _points(distances, rays, matrices[shown], pictures.develop(light, exposure))
     for number, view in enumerate(shown):
         entry = {"view": view, "light": webp(pack_light(light[number], limits), LIGHT_QUALITY)}
@@ -138,7 +139,7 @@ def collect(
         # The one most like that in the middle.
         "first": int(np.argmin(np.abs(matrices[shown] - middle).sum(axis=(1, 2)))),
         "row": None,
-        "walk": None if depths is None else walk.collect(small, matrices[:, :3, 3]),
+        "walk": walked,
     }
     kept: list[int] = []
     if row:

@@ -122,11 +122,9 @@ class Sources:
 
     @cached_property
     def distances(self) -> Array:
-        """The quarter and three quarters of what some of the views see are nearer, in metres."""
+        """Those that are typical of what some of the views see."""
         some = range(0, len(self.views), max(1, len(self.views) // 4))
-        inverse = np.concatenate([self.surface(index).inverse.ravel() for index in some])
-        distances: Array = 1 / np.maximum(np.nanpercentile(inverse, [75, 25]), 1e-4)
-        return distances
+        return typical(np.concatenate([self.surface(index).inverse.ravel() for index in some]))
 
     def surface(self, index: int) -> Surface:
         """Return a view as a surface, from memory if it was one of the last."""
@@ -231,6 +229,12 @@ class Sources:
         seen = rays @ _turn(here) + inverse[..., None] * offset
         pixels: Array = lens.pixels(seen @ _turn(target).T)
         return pixels.astype(np.float32, copy=False), seen
+
+
+def typical(inverse: Array) -> Array:
+    """Return two distances in metres: a quarter and three quarters of ``inverse`` are nearer."""
+    distances: Array = 1 / np.maximum(np.nanpercentile(inverse, [75, 25]), 1e-4)
+    return distances
 
 
 def _turn(matrix: Array) -> Array:

@@ -91,6 +91,11 @@ class Frames(Settings):
         """Of the animation's frames, those that are rendered."""
         return range(self.first, self.last + 1, self.step)
 
+    @property
+    def folders(self) -> dict[str, int]:
+        """The numbers by the names of the frames' folders in the rig's."""
+        return {f"f{number:05d}": number for number in self.numbers}
+
 
 # The eyes of a stereo pair: to which side each is of the position, along the camera's +X.
 EYES = {"left": -1, "right": 1}

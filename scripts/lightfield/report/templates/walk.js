@@ -8,6 +8,14 @@ const MOST_SOURCES = WALK ? WALK.best : 0;
 // Of the eye: the nearest that it sees, in metres, and its field of view across the longer side.
 const NEAR = 0.01;
 const WIDE = (80 * Math.PI) / 180;
+// Between the last vertex of a row and the first of the next so many numbers are left out: what draws
+// without a graphics card keeps a vertex by its number modulo 64, where the one below would drop it.
+const APART = 32;
+// Where a whole picture takes more milliseconds than this, one in motion is made of few sources.
+const SLOW = 100;
+const FEW = Math.min(2, MOST_SOURCES);
+// So many milliseconds after the last motion it stands.
+const REST = 200;
 const MODES = ["colour", "depth", "holes", "sources"];
 
 const walk = {
@@ -19,9 +27,10 @@ const walk = {
   mode: 0,
   sources: MOST_SOURCES,
   shows: true,
-  views: new Map(),
   keys: new Set(),
   frames: 0,
+  slow: true,
+  wanted: [],
   chosen: [],
 };
 
@@ -33,7 +42,7 @@ precision highp int;
 precision highp sampler2D;
 uniform sampler2D rays, inverses;
 uniform sampler2D light;
-uniform int width;
+uniform int stride;
 uniform mat3 turn, back;
 uniform vec3 offset;
 uniform vec4 lens;
@@ -47,8 +56,7 @@ vec3 decoded(vec3 code) {
   return mix(vec3(0.0), linear, step(vec3(0.5 / 255.0), code));
 }
 
-void place(int vertex, vec3 ray, float weight) {
-  ivec2 pixel = ivec2(vertex % width, vertex / width);
+void place(ivec2 pixel, vec3 ray, float weight) {
   float inverse = texelFetch(inverses, pixel, 0).r;
   vec3 direction = turn * ray;
   vec3 seen = direction + inverse * offset;
@@ -64,29 +72,28 @@ void place(int vertex, vec3 ray, float weight) {
 
 const SURFACE = `${SHARED}
 void main() {
-  ivec2 pixel = ivec2(gl_VertexID % width, gl_VertexID / width);
+  ivec2 pixel = ivec2(gl_VertexID % stride, gl_VertexID / stride);
   float torn = texelFetch(rays, pixel, 0).a;
-  place(gl_VertexID, texelFetch(rays, pixel, 0).rgb, torn > 0.5 ? tornWeight : 1.0);
+  place(pixel, texelFetch(rays, pixel, 0).rgb, torn > 0.5 ? tornWeight : 1.0);
 }`;
 
 // Pixels beside a tear, one by one: a corner's ray is the mean of those around it.
 const PIXELS = `${SHARED}
-in float vertex;
 // A neighbour that has a ray, or else the pixel itself.
 ivec2 beside(ivec2 pixel, ivec2 way) {
   ivec2 other = clamp(pixel + way, ivec2(0), textureSize(rays, 0) - 1);
   return texelFetch(inverses, other, 0).r < 0.0 ? pixel : other;
 }
 void main() {
-  int number = int(vertex);
-  ivec2 pixel = ivec2(number % width, number / width);
+  int number = gl_VertexID / 4;
+  ivec2 pixel = ivec2(number % stride, number / stride);
   vec3 ray = texelFetch(rays, pixel, 0).rgb;
   ivec2 toLeft = beside(pixel, ivec2(-1, 0)), toRight = beside(pixel, ivec2(1, 0));
   ivec2 above = beside(pixel, ivec2(0, -1)), below = beside(pixel, ivec2(0, 1));
   vec3 across = (texelFetch(rays, toRight, 0).rgb - texelFetch(rays, toLeft, 0).rgb) / float(max(toRight.x - toLeft.x, 1));
   vec3 down = (texelFetch(rays, below, 0).rgb - texelFetch(rays, above, 0).rgb) / float(max(below.y - above.y, 1));
-  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) - 0.5;
-  place(number, normalize(ray + corner.x * across + corner.y * down), tornWeight);
+  vec2 corner = vec2(gl_VertexID & 1, (gl_VertexID >> 1) & 1) - 0.5;
+  place(pixel, normalize(ray + corner.x * across + corner.y * down), tornWeight);
 }`;
 
 const DRAWN = `#version 300 es
@@ -207,15 +214,14 @@ function isOneSurface(before, a, b, after) {
   return Math.abs(a - before - step) < even && Math.abs(after - b - step) < even;
 }
 
-// A view as the graphics card has it: colours, inverse distances, and the triangles that hold.
-function uploaded(number, [light, depth]) {
+// Bring a source onto the graphics card: colours, inverse distances, and the triangles that hold.
+function upload(source, light, depth) {
   const { gl } = walk;
   const [width, height] = DATA.size;
   const inverse = new Float32Array(width * height);
   for (let pixel = 0; pixel < inverse.length; pixel++) {
-    const value = depthOf(depthCode(depth, 4 * pixel), DATA.depth.range);
     const cosine = DATA.depth.meaning === "z" ? -walk.rays[4 * pixel + 2] : 1;
-    inverse[pixel] = value > 0 ? cosine / value : NaN;
+    inverse[pixel] = cosine * walk.inverses[depthCode(depth, 4 * pixel)];
   }
   const at = (i, j) => (i < 0 || j < 0 || i >= height || j >= width ? NaN : inverse[i * width + j]);
   const right = new Uint8Array(width * height);
@@ -227,53 +233,57 @@ function uploaded(number, [light, depth]) {
       down[i * width + j] = isOneSurface(at(i - 1, j), a, at(i + 1, j), at(i + 2, j));
     }
   }
-  const triangles = [];
+  const triangles = new Uint32Array(6 * width * height);
+  let corners = 0;
   const torn = [];
   const marked = walk.rays.slice();
   for (let i = 0; i < height; i++) {
     for (let j = 0; j < width; j++) {
       const here = i * width + j;
       const [next, below] = [here + 1, here + width];
+      const vertex = i * (width + APART) + j;
+      const beneath = vertex + width + APART;
       if (i + 1 < height && j + 1 < width) {
-        if (right[here] && down[here]) triangles.push(here, next, below);
-        if (right[below] && down[next]) triangles.push(next, below + 1, below);
+        if (right[here] && down[here]) for (const corner of [vertex, vertex + 1, beneath]) triangles[corners++] = corner;
+        if (right[below] && down[next]) for (const corner of [vertex + 1, beneath + 1, beneath]) triangles[corners++] = corner;
       }
       const amid = (j + 1 === width || right[here]) && (j === 0 || right[here - 1]) && (i + 1 === height || down[here]) && (i === 0 || down[here - width]);
       if (!amid && !Number.isNaN(inverse[here])) {
-        torn.push(here);
+        for (const corner of [0, 1, 2, 2, 1, 3]) torn.push(4 * vertex + corner);
         marked[4 * here + 3] = 1;
       }
     }
   }
-  const buffer = (kind, values) => {
-    const made = gl.createBuffer();
-    gl.bindBuffer(kind, made);
-    gl.bufferData(kind, values, gl.STATIC_DRAW);
-    return made;
-  };
-  const surface = gl.createVertexArray();
-  gl.bindVertexArray(surface);
-  buffer(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(triangles));
-  const pixels = gl.createVertexArray();
-  gl.bindVertexArray(pixels);
-  buffer(gl.ARRAY_BUFFER, new Float32Array(torn));
-  const vertex = gl.getAttribLocation(walk.pixels.made, "vertex");
-  gl.enableVertexAttribArray(vertex);
-  gl.vertexAttribPointer(vertex, 1, gl.FLOAT, false, 0, 0);
-  gl.vertexAttribDivisor(vertex, 1);
-  gl.bindVertexArray(null);
-  const known = inverse.filter((value) => !Number.isNaN(value));
-  return {
-    view: DATA.views[DATA.embedded[number].view],
+  const [surface, pixels] = [triangles.subarray(0, corners), Uint32Array.from(torn)].map((indices) => {
+    const made = gl.createVertexArray();
+    gl.bindVertexArray(made);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
+    return { made, count: indices.length };
+  });
+  Object.assign(source, {
     light: texture(gl, gl.TEXTURE_2D, gl.RGBA8, width, height, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(light.buffer)),
     inverses: texture(gl, gl.TEXTURE_2D, gl.R32F, width, height, 0, gl.RED, gl.FLOAT, inverse.map((value) => (Number.isNaN(value) ? -1 : value))),
     rays: texture(gl, gl.TEXTURE_2D, gl.RGBA32F, width, height, 0, gl.RGBA, gl.FLOAT, marked),
     surface,
-    triangles: triangles.length,
     pixels,
-    torn: torn.length,
-    known,
-  };
+    isThere: true,
+  });
+}
+
+const missing = () => walk.wanted.find((source) => !source.isThere);
+
+// Bring in all sources one after the other, those first that the eye wants; `begin` as soon as
+// a few are there.
+async function bringSources(begin) {
+  for (let number = 0; number < walk.order.length; number++) {
+    const source = missing() || walk.order.find((other) => !other.isThere);
+    const { light, depth } = source.entry;
+    upload(source, ...(await Promise.all([decoded(light), decoded(depth)])));
+    if (number + 1 === Math.min(FEW, walk.order.length)) begin();
+    if (walk.wanted.includes(source) && !missing()) drawWalkSoon();
+  }
 }
 
 const ahead = () => [-Math.sin(walk.yaw) * Math.cos(walk.pitch), Math.cos(walk.yaw) * Math.cos(walk.pitch), Math.sin(walk.pitch)];
@@ -287,7 +297,7 @@ function axes() {
 }
 
 // The views that together see best what the eye looks at: one after the other, that which adds most.
-function bestViews(at, [right, up, back], [spreadX, spreadY]) {
+function bestViews(sources, count, at, [right, up, back], [spreadX, spreadY]) {
   const directions = WALK.directions;
   const points = [];
   for (let line = 0; line < directions; line++) {
@@ -299,7 +309,7 @@ function bestViews(at, [right, up, back], [spreadX, spreadY]) {
       points.push(ray.map((value) => value / length));
     }
   }
-  const quality = walk.order.map(({ view }) => walk.distances.flatMap((distance) => points.map((ray) => {
+  const quality = sources.map(({ view }) => WALK.distances.flatMap((distance) => points.map((ray) => {
     const way = minus(along(at, ray, distance), view.at);
     const local = [dot(way, view.right), dot(way, view.up), -dot(way, view.ahead)];
     if (!isSeen(local)) return 0;
@@ -309,7 +319,7 @@ function bestViews(at, [right, up, back], [spreadX, spreadY]) {
   })));
   const chosen = [];
   let worth = quality[0].map(() => 0);
-  while (chosen.length < Math.min(walk.sources, walk.order.length)) {
+  while (chosen.length < Math.min(count, sources.length)) {
     let best = { gain: -1, number: 0 };
     quality.forEach((own, number) => {
       if (chosen.includes(number)) return;
@@ -319,7 +329,15 @@ function bestViews(at, [right, up, back], [spreadX, spreadY]) {
     chosen.push(best.number);
     worth = worth.map((value, n) => value + quality[best.number][n]);
   }
-  return chosen.map((number) => walk.order[number]);
+  return chosen.map((number) => sources[number]);
+}
+
+// Choose what an eye wants to be drawn of, and what it is drawn of while some of that is missing.
+function choose(count, ...eye) {
+  walk.wanted = bestViews(walk.order, walk.sources, walk.at, ...eye);
+  const there = walk.order.filter((source) => source.isThere);
+  // They were taken one after the other: the first are the best of fewer, too.
+  walk.chosen = missing() ? bestViews(there, count, walk.at, ...eye) : walk.wanted.slice(0, count);
 }
 
 // One drawing a source in a layer each, of the size of what is looked at.
@@ -377,12 +395,10 @@ function drawEye(at, eyeAxes, lens, chosen, target, corner, width, height) {
     // Columns: the source's axes in the world.
     const turn = [...view.right, ...view.up, ...view.ahead.map((value) => -value)];
     const turnBack = [0, 1, 2].flatMap((axis) => [right[axis], up[axis], back[axis]]);
-    const surface = () => gl.drawElements(gl.TRIANGLES, source.triangles, gl.UNSIGNED_INT, 0);
-    const pixels = () => gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, source.torn);
-    for (const [{ made, names }, vertices, draw] of [[walk.surface, source.surface, surface], [walk.pixels, source.pixels, pixels]]) {
+    for (const [{ made, names }, vertices] of [[walk.surface, source.surface], [walk.pixels, source.pixels]]) {
       gl.useProgram(made);
       bound(names, [["rays", gl.TEXTURE_2D, source.rays], ["inverses", gl.TEXTURE_2D, source.inverses], ["light", gl.TEXTURE_2D, source.light]]);
-      gl.uniform1i(names.width, DATA.size[0]);
+      gl.uniform1i(names.stride, DATA.size[0] + APART);
       gl.uniformMatrix3fv(names.turn, false, turn);
       gl.uniformMatrix3fv(names.back, false, turnBack);
       gl.uniform3fv(names.offset, minus(view.at, at));
@@ -392,8 +408,8 @@ function drawEye(at, eyeAxes, lens, chosen, target, corner, width, height) {
       gl.uniform1f(names.spread, WALK.distance);
       gl.uniform1f(names.sharp, WALK.sharp);
       gl.uniform1f(names.tornWeight, WALK.torn);
-      gl.bindVertexArray(vertices);
-      draw();
+      gl.bindVertexArray(vertices.made);
+      gl.drawElements(gl.TRIANGLES, vertices.count, gl.UNSIGNED_INT, 0);
     }
   });
   gl.bindVertexArray(null);
@@ -433,13 +449,13 @@ function scales(width, height) {
   return width >= height ? [scale, (scale * width) / height] : [(scale * height) / width, scale];
 }
 
-// Draw once, from where the eye is.
-function drawWalk() {
+// Draw once, from where the eye is, of so many sources.
+function drawWalk(count = walk.sources) {
   const { canvas } = walk;
   const [width, height] = [canvas.width, canvas.height];
   const eye = axes();
   const spread = scales(width, height);
-  walk.chosen = bestViews(walk.at, eye, spread);
+  choose(count, eye, spread);
   drawEye(walk.at, eye, [...spread, 0, 0], walk.chosen, null, [0, 0], width, height);
   drawRoom(eye, spread);
   walk.frames += 1;
@@ -479,7 +495,22 @@ function drawRoom([right, up, back], [spreadX, spreadY]) {
     `${walk.at.map((value) => value.toFixed(2)).join(", ")} m   ${metresLeft.toFixed(2)} m to the edge   ${walk.chosen.length} of ${walk.order.length} views`;
 }
 
-const drawWalkSoon = onceAFrame(() => walk.ready && drawWalk());
+const drawWalkSoon = onceAFrame(() => {
+  if (!walk.ready) return;
+  drawWalk(walk.slow ? FEW : walk.sources);
+  clearTimeout(walk.rest);
+  if (walk.slow) walk.rest = setTimeout(drawWhole, REST);
+});
+
+// Draw of all sources, and see how long that takes: it is done when a pixel can be read.
+function drawWhole() {
+  if (missing()) return;
+  const { gl } = walk;
+  const start = performance.now();
+  drawWalk();
+  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+  walk.slow = performance.now() - start > SLOW;
+}
 
 function moved(forward, sideways, upwards) {
   const [right] = axes();
@@ -507,6 +538,12 @@ function walkOn(before) {
     }
     if (walk.keys.size) walkOn(now);
   });
+}
+
+function showMode(mode) {
+  walk.mode = mode;
+  MODES.forEach((name, number) => element(`walk-${name}`).setAttribute("aria-pressed", number === mode));
+  drawWalkSoon();
 }
 
 function listen() {
@@ -543,19 +580,19 @@ function listen() {
   });
   overlay.addEventListener("keyup", (event) => walk.keys.delete(event.key.length === 1 ? event.key.toLowerCase() : event.key));
   overlay.addEventListener("blur", () => walk.keys.clear());
-  MODES.forEach((name, mode) => {
-    element(`walk-${name}`).addEventListener("click", () => {
-      walk.mode = mode;
-      MODES.forEach((other, number) => element(`walk-${other}`).setAttribute("aria-pressed", number === mode));
-      drawWalkSoon();
-    });
-  });
+  MODES.forEach((name, mode) => element(`walk-${name}`).addEventListener("click", () => showMode(mode)));
   element("walk-cameras").addEventListener("click", (event) => {
     walk.shows = !walk.shows;
     event.currentTarget.setAttribute("aria-pressed", walk.shows);
     drawWalkSoon();
   });
   element("walk-home").addEventListener("click", goHome);
+  const slider = element("walk-frame");
+  if (slider) {
+    const name = () => slider.dataset.frames.split(" ")[Number(slider.value)];
+    slider.addEventListener("input", () => { slider.nextElementSibling.textContent = name(); });
+    slider.addEventListener("change", () => { location.href = `../../${name()}/report/index.html${placeHash()}`; });
+  }
   element("exposure").addEventListener("input", drawWalkSoon);
   new ResizeObserver(() => {
     const ratio = Math.min(window.devicePixelRatio || 1, 1.5);
@@ -591,13 +628,26 @@ function listenForHeadset() {
         const eye = [world(0), world(1), world(2)];
         walk.at = kept(minus(start, world(3).map((value) => -value)));
         const p = view.projectionMatrix;
-        walk.chosen = bestViews(walk.at, eye, [p[0], p[5]]);
+        choose(walk.sources, eye, [p[0], p[5]]);
         drawEye(walk.at, eye, [p[0], p[5], p[8], p[9]], walk.chosen, layer.framebuffer, [x, y], width, height);
       }
     };
     session.requestAnimationFrame(draw);
     session.addEventListener("end", drawWalkSoon);
   });
+}
+
+// Another frame of a sequence is another page, which goes on from where the eye was.
+const PLACE = "#walk=";
+const placeHash = () => PLACE + [...walk.at, walk.yaw, walk.pitch, walk.mode].join(",");
+
+function goWhereItWas() {
+  if (!location.hash.startsWith(PLACE)) return;
+  const [x, y, z, yaw, pitch, mode] = location.hash.slice(PLACE.length).split(",").map(Number);
+  if (![x, y, z, yaw, pitch].every(Number.isFinite) || !(mode in MODES)) return;
+  Object.assign(walk, { at: kept([x, y, z]), yaw, pitch });
+  showMode(mode);
+  element("walk-section").scrollIntoView();
 }
 
 function goHome() {
@@ -626,25 +676,20 @@ async function startWalk() {
     walk.rays.set(unfolded(codes[2 * pixel] / 65535, codes[2 * pixel + 1] / 65535), 4 * pixel);
   }
   walk.sight = bytesOf(WALK.sight);
+  walk.inverses = Float32Array.from({ length: DATA.depth.steps }, (_, code) => 1 / depthOf(code, DATA.depth.range));
   const colours = new Uint8Array(256 * 4).fill(255);
   bytesOf(DATA.depth.colours).forEach((value, place) => { colours[4 * Math.floor(place / 3) + (place % 3)] = value; });
   walk.palette = texture(gl, gl.TEXTURE_2D, gl.RGBA8, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, colours);
-  walk.order = [];
-  for (let number = 0; number < DATA.embedded.length; number++) {
-    const entry = DATA.embedded[number];
-    walk.order.push(uploaded(number, await Promise.all([decoded(entry.light), decoded(entry.depth)])));
-    element("walk-readout").textContent = `${number + 1} of ${DATA.embedded.length} views`;
-  }
-  // The quarter and three quarters of what some of the views see are nearer, in metres.
-  const some = walk.order.filter((_, number) => number % Math.max(1, Math.floor(walk.order.length / 4)) === 0);
-  const known = Float32Array.from(some.flatMap((source) => [...source.known])).sort();
-  walk.distances = [0.75, 0.25].map((part) => 1 / Math.max(known[Math.round(part * (known.length - 1))], 1e-4));
-  for (const source of walk.order) delete source.known;
+  walk.order = DATA.embedded.map((entry) => ({ entry, view: DATA.views[entry.view] }));
   const places = walk.order.map(({ view }) => view.at);
   walk.extent = Math.max(...places.map((at) => Math.hypot(...minus(at, places[0])))) || 1;
-  walk.ready = true;
-  listen();
   goHome();
+  goWhereItWas();
+  walk.wanted = bestViews(walk.order, walk.sources, walk.at, axes(), scales(walk.canvas.clientWidth, walk.canvas.clientHeight));
+  await bringSources(() => {
+    walk.ready = true;
+    listen();
+  });
 }
 
 startWalk();
