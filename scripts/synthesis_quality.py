@@ -57,8 +57,8 @@ def main() -> None:
     synthesis_quality.draw(means, arguments.output)
     for row in means:
         print(
-            f"{row['variant']:>10} {row['value']:<20} PSNR {row['psnr']:5.2f} dB  SSIM "
-            f"{row['ssim']:.3f}  FLIP {row['flip']:.3f}  holes {row['holes']:.2%}"
+            f"{row['truth']:<24} {row['variant']:>10} {row['value']:<18} PSNR {row['psnr']:5.2f} "
+            f"dB  SSIM {row['ssim']:.3f}  FLIP {row['flip']:.3f}  holes {row['holes']:.2%}"
         )
 
 

@@ -232,7 +232,7 @@ def test_a_page_has_these_tables(measured):
     found = tables.synthesis([shutil.copy(path, folder / "around.csv")], "ball/around")
     places, regions = list(found.tables.values())[1:]
     assert [row[:2] for row in places.rows] == [["dataset", "inside"], ["dataset", "edge"]]
-    assert [row[0] for row in regions.rows] == ["all", "diffuse", "glossy"]
+    assert [row[1] for row in regions.rows] == ["all", "diffuse", "glossy"]
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ from lightfield.imaging.tonemap import encode_srgb, tone_map
 from lightfield.measurement import metrics
 from lightfield.synthesis.view import BEST, Sources, reader
 
+COLUMNS = ("truth", "variant", "value")
 MEANS = ("psnr", "ssim", "flip", "holes", "source_bytes")
 # Of all that is between the middle of the cameras and the edge of their interpolation volume, so
 # much is inside, the rest towards the edge, and what is farther out beyond.
@@ -155,19 +156,22 @@ def compare(
 
 
 def means(rows: Sequence[Mapping[str, Any]], region: str = WHOLE) -> list[dict[str, Any]]:
-    """Return one row for each variant: the means over its views, of numbers or their texts.
+    """Return one row for each variant and truth: means over views, of numbers or their texts.
 
     Each view counts as much as it has of the ``region``; ``part`` is that of all views.
     """
-    variants: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+    groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for row in rows:
-        variants.setdefault((row["variant"], row["value"]), []).append(row)
+        groups.setdefault(tuple(row[name] for name in COLUMNS), []).append(row)
     found = []
-    for (variant, value), all_rows in variants.items():
-        some = [row for row in all_rows if row["region"] == region]
+    for names, group in groups.items():
+        some = [row for row in group if row["region"] == region]
+        if not some:
+            continue
         parts = [float(row["part"]) for row in some]
-        count = sum(row["region"] == WHOLE for row in all_rows)
-        mean: dict[str, Any] = {"variant": variant, "value": value, "part": sum(parts) / count}
+        count = sum(row["region"] == WHOLE for row in group)
+        mean: dict[str, Any] = dict(zip(COLUMNS, names, strict=True))
+        mean["part"] = sum(parts) / count
         for name in MEANS:
             mean[name] = float(np.average([float(row[name]) for row in some], weights=parts))
         found.append(mean)
@@ -175,10 +179,14 @@ def means(rows: Sequence[Mapping[str, Any]], region: str = WHOLE) -> list[dict[s
 
 
 def draw(rows: Sequence[Mapping[str, Any]], stem: Path) -> None:
-    """Plot the `means`: quality against bytes and number of views, and of how many a picture is."""
+    """Plot the `means`: quality against bytes and number of views, and of how many a picture is.
+
+    Of several truths it is that of the first.
+    """
     by_name: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
-        by_name.setdefault(row["variant"], []).append(row)
+        if row["truth"] == rows[0]["truth"]:
+            by_name.setdefault(row["variant"], []).append(row)
     plain = by_name["all"]
     with plots.plot(stem, 1, 3, (14, 4)) as (size, number, best):
         for name, colour in (("views", plots.BLUE), ("resolution", plots.ORANGE)):

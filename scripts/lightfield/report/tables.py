@@ -133,29 +133,28 @@ def synthesis(files: Sequence[Path], folder: str) -> Measurement | None:
         return None
     rows = _read_csv(path)
     names = synthesis_quality.MEANS
-    columns = ["variant", "value", *names]
+    columns = [*synthesis_quality.COLUMNS, *names]
     means = [[row[name] for name in columns] for row in synthesis_quality.means(rows)]
     plain = [row for row in rows if row["variant"] == "all"]
-    by_place = []
-    for place in synthesis_quality.PLACES:
-        for truth in dict.fromkeys(row["truth"] for row in plain if row["place"] == place):
-            some = [row for row in plain if row["place"] == place and row["truth"] == truth]
-            (mean,) = synthesis_quality.means(some)
-            by_place.append([truth, place, *(mean[name] for name in names)])
+    by_place = [
+        [mean["truth"], place, *(mean[name] for name in names)]
+        for place in synthesis_quality.PLACES
+        for mean in synthesis_quality.means([row for row in plain if row["place"] == place])
+    ]
     by_region = [
-        [region, mean["part"], *(mean[name] for name in names)]
+        [mean["truth"], region, *(mean[name] for name in ("part", *names))]
         for region in dict.fromkeys(row["region"] for row in plain)
         for mean in synthesis_quality.means(plain, region)
     ]
     found = {
         "Views that were held out, synthesised from this dataset's": Table(columns, means),
         "Inside, and towards the edge of the interpolation volume": Table(
-            ["views of", "place", *names], by_place
+            ["truth", "place", *names], by_place
         ),
     }
-    if len(by_region) > 1:
+    if {row["region"] for row in plain} > {synthesis_quality.WHOLE}:
         title = "Apart for the kind of light that a pixel shows most of"
-        found[title] = Table(["region", "part", *names], by_region)
+        found[title] = Table(["truth", "region", "part", *names], by_region)
     return Measurement(page.plot(path.with_suffix("")), found)
 
 
