@@ -30,27 +30,21 @@ def main() -> None:
     arguments = parser.parse_args()
 
     source = Source(arguments.dataset, "", ".exr")
-    views, tests = source.lightfield.views, []
-    if arguments.truth:
-        tests = [Source(folder, "", ".exr") for folder in arguments.truth]
-        held_out = [truth.lightfield.views for truth in tests]
-    else:
-        parts = splits(source.lightfield)
-        views, tests, held_out = parts.train, [source], [parts.test]
+    truths = [Source(folder, "", ".exr") for folder in arguments.truth or [arguments.dataset]]
+    views, held_out = source.lightfield.views, [truth.lightfield.views for truth in truths]
+    if not arguments.truth:
+        views, _, tests = splits(source.lightfield)
+        held_out = [tests]
     held_out = [some[:: -(-len(some) // arguments.views)] for some in held_out]
-    shown = [
-        images.read_image(truth.path(view), "RGB").colour.reshape(1, -1, 3)
-        for truth, some in zip(tests, held_out, strict=True)
-        for view in some
-    ]
-    exposure = pictures.exposure_for(np.concatenate(shown, axis=1))
+    pairs = list(zip(truths, held_out, strict=True))
+    colours = [images.read_image(t.path(view), "RGB").colour for t, some in pairs for view in some]
+    exposure = pictures.exposure_for(np.concatenate([colour.reshape(-1, 3) for colour in colours]))
     variants = list(synthesis_quality.variants(source, views))
     progress = Progress(len(variants), "synthesis", "variants")
     rows = []
     for variant in variants:
-        for truth, some in zip(tests, held_out, strict=True):
-            targets = truth.lightfield.changed(views=some)
-            rows += synthesis_quality.compare(variant, views, targets, truth, exposure)
+        for truth, some in pairs:
+            rows += synthesis_quality.compare(variant, views, some, truth, exposure)
         progress.done()
     write_csv(arguments.output.with_name(f"{arguments.output.name}.csv"), rows)
     means = synthesis_quality.means(rows)

@@ -119,20 +119,19 @@ def regions(truth: Source, view: View, inside: Array) -> dict[str, Array]:
 
 
 def compare(
-    variant: Variant, around: Sequence[View], targets: LightField, truth: Source, exposure: float
+    variant: Variant, around: Sequence[View], views: Sequence[View], truth: Source, exposure: float
 ) -> Iterator[dict[str, Any]]:
-    """Yield a row for each region of each view of ``targets``, which are of the ``truth``.
+    """Yield a row for each region of each of the ``views`` of the ``truth``.
 
     A row has psnr in decibel, ssim, flip and the part of holes; ``part`` is the region's of the
     picture. Holes are black in it and count as what they are. ``to_edge`` is how far the view is
     from the middle of the views ``around`` it, as a part of what it is to the edge of their volume.
     """
-    rays = targets.lens.pixel_rays()
-    inside = np.isfinite(rays[..., 0])
-    matrices = np.array([view.matrix for view in around])
-    parts = parts_to_edge(matrices, variant.sources.lens, targets.matrices[:, :3, 3])
-    for view, to_edge in zip(targets.views, parts.tolist(), strict=True):
-        made = variant.sources.synthesise(view.matrix, targets.lens, variant.best)
+    inside = np.isfinite(truth.lens.pixel_rays()[..., 0])
+    cameras, eyes = (np.array([view.matrix for view in some]) for some in (around, views))
+    parts = parts_to_edge(cameras, variant.sources.lens, eyes[:, :3, 3])
+    for view, to_edge in zip(views, parts.tolist(), strict=True):
+        made = variant.sources.synthesise(view.matrix, truth.lens, variant.best)
         true = images.read_image(truth.path(view), "RGB").colour
         one, other = (_developed(colour, exposure, inside) for colour in (true, made.colour))
         errors, similar = (one - other) ** 2, metrics.ssim_map(one, other)
