@@ -163,3 +163,9 @@ def test_a_probe_foretells_the_size_of_the_views(run_program, room, tmp_path):
     foretold = sum(probe["view_bytes"]) / 3
     # An upper estimate: small views compress worse.
     assert 1 <= foretold / (sum(sizes) / 12) < 1.4
+    # It follows what is asked for.
+    other = render | {"depth_precision": "half"}
+    LightField.from_rig(rig, lens, depth="z", frame=1, render=other).write(lightfield)
+    run_program("probe.py", *shared, "--size", "64", "--output", tmp_path / "probe.json")
+    smaller = json.loads((tmp_path / "probe.json").read_text())
+    assert sum(smaller["view_bytes"]) / 3 < 0.9 * foretold
