@@ -117,7 +117,7 @@ def test_a_scene_is_advised_by_the_programs(run_program, room, tmp_path):
     run_program("inventory.py", "--blend", room, "--output", inventory)
     words = ("--blend", room, "--inventory", inventory, "--device", "cpu", "--size", "24")
     words += ("--lightfield", tmp_path / "lightfield.json", "--cache", tmp_path / "cache")
-    run_program("try_changes.py", *words, "--reference", "128", "--output", output)
+    run_program("try_changes.py", *words, "--reference", "1024", "--output", output)
     found = json.loads(output.read_text())
     assert "diffuse" in found["strata"]
     tried = {json.dumps(one["change"]): one["savings"] for one in found["tried"]}
