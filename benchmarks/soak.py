@@ -122,7 +122,7 @@ class Build:
                 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
         snakemake = str(Path(sys.executable).with_name("snakemake"))
-        command = [snakemake, "--snakefile", str(ROOT / "Snakefile"), "--quiet", "all"]
+        command = [snakemake, "--snakefile", str(ROOT / "Snakefile")]
         return subprocess.Popen(
             [*command, "--cores", str(os.cpu_count() or 1), *words],
             cwd=self.root,

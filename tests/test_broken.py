@@ -61,6 +61,16 @@ def run(folder, *arguments):
     return told
 
 
+def test_a_folder_is_set_aside_where_a_link_that_leads_nowhere_was(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("a.exr").symlink_to("a.exr")
+    set_aside(Path("a.exr"), Path("removed"))
+    Path("a.exr/inside").mkdir(parents=True)
+    assert set_aside(Path("a.exr"), Path("removed")) == Path("removed/a.exr.2")
+    assert Path("removed/a.exr").is_symlink()
+    assert Path("removed/a.exr.2/inside").is_dir()
+
+
 @pytest.mark.slow
 def test_what_is_broken_is_planned_again_and_set_aside(tmp_path):
     folder = checkout(tmp_path)
@@ -85,7 +95,12 @@ def test_what_is_broken_is_planned_again_and_set_aside(tmp_path):
         os.utime(folder / name, (simulated.WHEN, simulated.WHEN))
     view = next((folder / three.folder / "exr").iterdir())
     folder_of(view)
+    # A link to itself: not even whether it is a folder can be asked.
+    loop = Path(one.record("render", *one.shards[0])).with_suffix(".journal.jsonl")
+    (folder / loop).unlink(missing_ok=True)
+    (folder / loop).symlink_to(loop.name)
     told = run(folder, "-n", "smoke")
+    assert f"{loop}: is a link that leads to no file; it is made anew" in told
     for name in [*spoilt, str(view.relative_to(folder))]:
         assert len(re.findall(rf"^{re.escape(name)}: .*; it is made anew$", told, re.M)) == 1
         assert (folder / name).exists()
@@ -94,6 +109,7 @@ def test_what_is_broken_is_planned_again_and_set_aside(tmp_path):
     run(folder, "--until", "lightfield", "--", "smoke")
     for name in [*spoilt, str(view.relative_to(folder))]:
         assert (folder / "work/removed" / name).exists()
+    assert not (folder / loop).is_symlink()
     assert broken(folder / two.folder / "lightfield.json") is None
     # What its job has made is noted, and only that.
     noted = ledger.read(folder / "work/sums.json")

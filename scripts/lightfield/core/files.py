@@ -149,7 +149,7 @@ def set_aside(path: Path, folder: Path) -> Path:
     inside = path.relative_to(path.anchor) if path.is_absolute() else path
     target = folder / inside
     number = 1
-    while target.exists():
+    while os.path.lexists(target):
         number += 1
         target = folder / inside.with_name(f"{path.name}.{number}")
     with writing(target):

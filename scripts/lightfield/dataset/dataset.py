@@ -480,7 +480,12 @@ class Dataset:
         views = (view for name in self.image_folders for view in _entries(self.folder, name))
         journals = (journal for stage in self.stages for journal in _entries(self.work, stage))
         for entry in (*views, *journals):
-            if entry.is_dir() and entry.name.endswith((".exr", ".png", ".jsonl")):
+            if not entry.name.endswith((".exr", ".png", ".jsonl")):
+                continue
+            if entry.is_symlink():
+                if not Path(entry.path).exists():
+                    yield entry.path, "is a link that leads to no file"
+            elif entry.is_dir():
                 yield entry.path, "is a folder"
 
     @property
