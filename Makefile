@@ -1,5 +1,6 @@
 # `make` sets up the environment and builds the default dataset; `make test` sets up and runs the tests.
-# `make consumers` reads exports with the consumers' own code, in an environment of theirs.
+# `make consumers` reads exports with the consumers' own code, in an environment of theirs; `make learn`
+# learns radiance fields from exported files.
 
 CORES ?= $(shell getconf _NPROCESSORS_ONLN)
 
@@ -10,7 +11,7 @@ PIP = .venv/bin/pip -qq --disable-pip-version-check
 VERSION = $$(.venv/bin/python -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 LOCK = uv pip compile --generate-hashes --no-emit-index-url --no-header --quiet
 
-.PHONY: all test check consumers soak locks
+.PHONY: all test check consumers learn soak locks
 
 all: .venv/complete
 	snakemake --cores $(CORES)
@@ -36,6 +37,13 @@ consumers: .venv/complete .venv-consumers/complete
 	.venv-consumers/bin/pip -q install -r envs/requirements-consumers.txt
 	.venv-consumers/bin/pip -q install --no-deps nerfstudio==1.1.5
 	@touch $@
+
+# Twice, for a page shows the measurements that are there when it is planned.
+LEARNED = --config scenes='[garden_learn, object_learn]' rigs=all preset=full
+
+learn: .venv/complete
+	snakemake --cores $(CORES) learn $(LEARNED)
+	snakemake --cores $(CORES) $(LEARNED)
 
 # Builds that are killed, damaged and left without room.
 soak: .venv/complete

@@ -53,6 +53,7 @@ include: "rules/plan.smk"
 include: "rules/benchmark.smk"
 include: "rules/error.smk"
 include: "rules/synthesis.smk"
+include: "rules/learn.smk"
 
 
 onstart:

@@ -491,7 +491,8 @@ def measurements(wildcards):
     """
     dataset = dataset_of(wildcards)
     stems = ["reprojection", "stability", f"error_vs_time/{dataset.scene_name}"]
-    stems.append(f"synthesis/{dataset.scene_folder}/{dataset.rig_folder}")
+    for kind in ("synthesis", "learn"):
+        stems.append(f"{kind}/{dataset.scene_folder}/{dataset.rig_folder}")
     files = [
         Path(RESULTS, "benchmarks", f"{stem}{suffix}")
         for stem in stems
@@ -645,6 +646,13 @@ def tested_by(dataset, format):
     """Return the datasets whose views go into an export of this one, to test with."""
     rigs = dataset.tested_by if dataset.exports.wanted[format].is_for_training else ()
     return [DATASETS[dataset.scene_folder, rig] for rig in rigs]
+
+
+def learned_from(dataset):
+    """Return the manifests of a dataset's exports with depth that benchmarks/learn.py reads."""
+    wanted = dataset.exports.nerfstudio
+    files = dataset.exported if wanted and wanted.depth else []
+    return [path for path in files if path.endswith(f"exports/nerfstudio/{MANIFEST}")]
 
 
 def exported_views(wildcards):

@@ -36,12 +36,13 @@ rigs:
 flow: {pairs: neighbours}
 exports:
   instant_ngp: {sources: [views]}
+  nerfstudio: {sources: [views], depth: true}
 """
 IMPORTED = "scene: {dataset: published}"
 TARGETS = [
     *("all", "smoke", "package", "rig_tables", "plan", "status"),
     *("error_vs_time", "reprojection_benchmark", "stability", "extremes", "render_overhead"),
-    *("advise", "gpu_check", "synthesis", "verify"),
+    *("advise", "gpu_check", "synthesis", "learn", "verify"),
 ]
 CHOSEN = ["--config", "scenes=[brought,imported]", "rigs=all", "preset=full"]
 RULES = [

@@ -105,7 +105,13 @@ def sphere(tmp_path_factory):
         "lens pair,a to b,float32,5.0,1e-6,2e-6,ok\n"
         "lens pair,b to a,float32,5.0,4e-6,2e-6,FAIL\n"
     )
-    page = make_page(folder, SPHERE, *measured.glob("*.csv"), panorama=True)
+    (measured / "learn/ball").mkdir(parents=True)
+    (measured / "learn/ball/LFSphere.csv").write_text(
+        "learned,reading,held_out,step,psnr\n"
+        "fisheye,as exported,fisheye,600,24.0625\n"
+        "fisheye,as exported,fisheye,100,18.5\n"
+    )
+    page = make_page(folder, SPHERE, *measured.rglob("*.csv"), panorama=True)
     return SimpleNamespace(page=page, lightfield=lightfield, folder=folder)
 
 
@@ -155,6 +161,9 @@ def test_the_page_loads_whole_from_one_file(sphere, show):
     assert "±" not in text
     for part in ("180° × 180°", "Frame\n7", "Depth that is inf\n0 %", "snakemake --cores all"):
         assert part in text
+    # Of what was learned, how good it was in the end.
+    assert "24.1" in text
+    assert "18.5" not in text
     assert YAML.strip() in tab.text_content("#rebuild pre >> nth=1")
     # The case that is worst, as part of its bound, comes first.
     assert text.index("200%") < text.index("50%")
@@ -164,7 +173,7 @@ def test_the_page_loads_whole_from_one_file(sphere, show):
 def test_the_page_is_the_same_each_time(sphere):
     before = sphere.page.read_bytes()
     assert make_page(sphere.folder, SPHERE).read_bytes() != before
-    measured = (sphere.folder.parent / "benchmarks").glob("*.csv")
+    measured = (sphere.folder.parent / "benchmarks").rglob("*.csv")
     assert make_page(sphere.folder, SPHERE, *measured, panorama=True).read_bytes() == before
 
 

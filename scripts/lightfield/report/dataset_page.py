@@ -57,6 +57,7 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
     measured = {
         "error_vs_time": tables.error_vs_time(found, str(lightfield.scene["name"])),
         "synthesis": tables.synthesis(found, f"{folder.parent.name}/{folder.name}"),
+        "learning": tables.learning(found, f"{folder.parent.name}/{folder.name}"),
         "reprojection": tables.reprojection(found),
         "stability": tables.stability(found),
     }

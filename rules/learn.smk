@@ -1,0 +1,34 @@
+# Radiance fields learned from exported files; asked for by name, no part of a dataset.
+
+
+rule measure_learning:
+    input:
+        lambda wildcards: learned_from(dataset_of(wildcards)),
+    output:
+        multiext(
+            f"{RESULTS}/benchmarks/learn/{{scene}}/{{rig}}", ".csv", ".svg", ".png"
+        ),
+    log:
+        log_of("{scene}/{rig}/learn"),
+    conda:
+        ENVIRONMENT
+    resources:
+        mem_mb=2000,
+        runtime=120,
+    params:
+        folders=lambda wildcards, input: [str(Path(path).parent) for path in input],
+        stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
+    message:
+        "Learning what the exports of {wildcards.scene}/{wildcards.rig} show"
+    shell:
+        f"python {BENCHMARKS}/learn.py"
+        " {params.folders} --output {params.stem} > {log} 2>&1"
+
+
+rule learn:
+    input:
+        [
+            f"{RESULTS}/benchmarks/learn/{dataset.scene_folder}/{dataset.rig_folder}.csv"
+            for dataset in CHOSEN
+            if learned_from(dataset)
+        ],
