@@ -256,7 +256,10 @@ def tried(
     changes = tries({**inventory["sampling"], **render}, on_cpu)
     probes.render([*BASES[TRACED], *BASES[DENOISED], *(one.settings for one in changes)])
     savings = [(one, probes.saved(one)) for one in changes]
-    taken = [one for one, saved in savings if is_advised(one, saved.get(WHOLE))]
+    good = [pair for pair in savings if is_advised(pair[0], pair[1].get(WHOLE))]
+    # Of several values of one key that which saves most.
+    good.sort(key=lambda pair: pair[1][WHOLE].times)
+    taken = list({tuple(one.change): one for one, _ in good}.values())
     traced = [one for one in taken if one.of == TRACED]
     if len(traced) > 1:
         change = {key: value for one in traced for key, value in one.change.items()}
