@@ -272,11 +272,16 @@ def damage(build: Build, faults: int, rng: random.Random) -> Iterator[Row]:
     verify = [sys.executable, str(ROOT / "scripts/verify.py"), str(DATASET), "--work", "work"]
     while faults:
         files = build.files()
-        chosen = rng.sample(files, min(faults, max(1, len(files) // 4)))
+        chosen = rng.sample(files, min(faults, max(1, len(files) // 3)))
         kinds = {path: KINDS[(faults - number) % len(KINDS)] for number, path in enumerate(chosen)}
         faults -= len(chosen)
         sound = {path: sums for path, sums in build.finished().items() if path not in kinds}
         rendered = build.made()
+        # Views whose own file, or log of checksums, is spoiled are to be made again.
+        spoiled = {path.name.partition(".")[0] for path in kinds}
+        for log in (path for path in kinds if path.name.endswith(".sums.jsonl")):
+            lines = map(json.loads, log.read_text().splitlines())
+            spoiled |= {Path(line["file"]).stem for line in lines}
         for path, kind in kinds.items():
             spoil(path, kind, rng)
         said = build.call(*verify, "--mend")
@@ -287,11 +292,8 @@ def damage(build: Build, faults: int, rng: random.Random) -> Iterator[Row]:
             rows[kind].injected += 1
             rows[kind].found += name in said
             rows[kind].mended += name not in still
-        # Views whose own file, or log of checksums, was spoiled are to be made again.
-        stems = {path.name.partition(".")[0] for path in kinds}
-        again = [view for view in build.made() - rendered if view not in stems]
-        if not any(path.name.endswith(".sums.jsonl") for path in kinds):
-            rows[KINDS[0]].made_twice += len(again)
+        again = [view for view in build.made() - rendered if view not in spoiled]
+        rows[KINDS[0]].made_twice += len(again)
         rows[KINDS[0]].bytes_lost += lost(sound)
     yield from rows.values()
 
