@@ -52,7 +52,9 @@ def test_lens_pairs_are_within_their_bounds(chosen: list[str]) -> None:
     own = [row for row in rows if len(set(row["case"].split(" → "))) == 1]
     for row in own:
         allowed = 0.01 if row["dtype"] == "float32" else 1e-9
-        assert row["round_trip_error"] < allowed, row["case"]
+        # Where a lens turns, one rounding moves a pixel by more, and each processor rounds its own.
+        one_rounding = row["round_trip_bound"] / stability.ROUNDINGS
+        assert row["round_trip_error"] < max(allowed, one_rounding), row["case"]
 
 
 class Careless(Equidistant):
