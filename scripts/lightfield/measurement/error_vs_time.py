@@ -489,7 +489,7 @@ def _draw(stem: Path, content: Mapping[str, Any]) -> None:
     def figures(name: str, points: Sequence[Mapping[str, Any]]) -> list[float]:
         return [point[name] for point in points]
 
-    with plots.plot(stem, 1, 2, size=(14, 5.5)) as (axes, beside):
+    with plots.plot(stem, 1, 2, size=(18, 5.5)) as (axes, beside):
         methods = dict.fromkeys(p["method"] for p in content["points"] if p["method"] != OWN)
         for method, colour, marker in zip(methods, plots.COLOURS, plots.MARKERS, strict=False):
             own = [p for p in content["points"] if p["method"] == method and p["resolved"]]
@@ -553,10 +553,12 @@ def _draw(stem: Path, content: Mapping[str, Any]) -> None:
         beside.set(
             xscale="log",
             yscale="log",
-            title="by the light that pixels show most of",
+            title="by what pixels show",
             xlabel=axes.get_xlabel(),
         )
-        beside.legend(fontsize=8)
+        beside.xaxis.set_minor_formatter("")
+        # Beside the axes: of seven strata it would hide the curves.
+        beside.legend(fontsize=8, loc="center left", bbox_to_anchor=(1, 0.5))
 
 
 def _slopes(lines: Mapping[str, Mapping[str, float]]) -> str:
