@@ -180,7 +180,8 @@ def draw(rows: Sequence[Row], pictures: Mapping[str, Mapping[str, Array]], stem:
             for panel in line[1:]:
                 panel.axis("off")
             line[0].set(title=lens, xlabel="steps", ylabel="PSNR of held-out rays, dB")
-            line[0].legend(fontsize=7)
+            # Between the true reading and the wrong ones.
+            line[0].legend(fontsize=7, loc="center right", bbox_to_anchor=(1, 0.71))
 
 
 def main() -> None:
