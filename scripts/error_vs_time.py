@@ -5,18 +5,14 @@ from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import error_vs_time, trials
-from lightfield.measurement.sampling import calibrated
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     trials.add_arguments(parser, "lightfield.json")
-    parser.add_argument(
-        "--calibration", type=Path, help="what scripts/calibrate.py chose for a target error"
-    )
+    trials.add_calibration(parser)
     parser.add_argument(
         "--probes",
         type=int,
@@ -43,14 +39,7 @@ def main() -> None:
         raise UserError(f"--seeds {arguments.seeds}: must be at least 2")
 
     lightfield = LightField.read(arguments.lightfield)
-    if arguments.calibration:
-        render = calibrated(lightfield.render, read_json(arguments.calibration))
-        lightfield = lightfield.changed(render=render)
-    elif "samples" not in lightfield.render:
-        raise UserError(
-            f"{arguments.lightfield}: render has a target error and no samples; "
-            "give --calibration, what scripts/calibrate.py chose for it"
-        )
+    lightfield = lightfield.changed(render=trials.own_settings(arguments, lightfield))
     maker = trials.Trials.of(arguments, lightfield)
     content = error_vs_time.measure(
         maker,

@@ -7,18 +7,15 @@ from pathlib import Path
 from lightfield.core import processors
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, write_json, write_text
+from lightfield.core.files import write_json, write_text
 from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import gpu_check, trials
-from lightfield.measurement.sampling import calibrated
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     trials.add_arguments(parser, "lightfield.json")
-    parser.add_argument(
-        "--calibration", type=Path, help="what scripts/calibrate.py chose for a target error"
-    )
+    trials.add_calibration(parser)
     parser.add_argument(
         "--full",
         type=json.loads,
@@ -36,9 +33,7 @@ def main() -> None:
     if not cycles.gpu(device):
         raise UserError("device: is cpu; gpu_check wants auto, or the name of a GPU's kind")
     lightfield = LightField.read(arguments.lightfield)
-    render = lightfield.render
-    if arguments.calibration:
-        render = calibrated(render, read_json(arguments.calibration))
+    render = trials.own_settings(arguments, lightfield)
     maker = trials.Trials.of(arguments, lightfield)
     found = gpu_check.check(maker, device, render, arguments.full)
     name = arguments.output.name

@@ -4,18 +4,15 @@ import argparse
 from pathlib import Path
 
 from lightfield.core.cli import run
-from lightfield.core.files import read_json, write_json
+from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import advice, trials
-from lightfield.measurement.sampling import calibrated
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     trials.add_arguments(parser, "lightfield.json")
-    parser.add_argument(
-        "--calibration", type=Path, help="what scripts/calibrate.py chose for a target error"
-    )
+    trials.add_calibration(parser)
     parser.add_argument(
         "--probes", type=int, default=1, help="windows of each stratum (default: %(default)s)"
     )
@@ -26,14 +23,11 @@ def main() -> None:
     arguments = parser.parse_args()
 
     lightfield = LightField.read(arguments.lightfield)
-    if arguments.calibration:
-        render = calibrated(lightfield.render, read_json(arguments.calibration))
-        lightfield = lightfield.changed(render=render)
+    lightfield = lightfield.changed(render=trials.own_settings(arguments, lightfield))
     maker = trials.Trials.of(arguments, lightfield)
     name = arguments.output.stem
     probes = advice.Probes(maker, arguments.size, arguments.probes, arguments.reference, name)
-    inventory = read_json(arguments.inventory)
-    write_json(arguments.output, advice.tried(maker, lightfield.render, inventory, probes))
+    write_json(arguments.output, advice.tried(maker, lightfield.render, maker.inventory, probes))
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ import argparse
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core import processors
+from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.dataset import keys, passes
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.measurement.metrics import Mask, Reference, make_reference
-from lightfield.measurement.sampling import PLAIN, WINDOW_SIZE, without_target
+from lightfield.measurement.sampling import PLAIN, WINDOW_SIZE, calibrated, without_target
 from lightfield.validation.consistency import Camera
 
 # Seeds of references begin here, and those of trials at 1: no trial is part of its reference.
@@ -133,10 +135,15 @@ class Trials:
         on = (self._device, self._threads, self._cache)
         return Trials(self._blend, self._inventory, there, *on, parts=True)
 
+    @cached_property
+    def inventory(self) -> Any:
+        """What the scene contains, and how its .blend traces paths."""
+        return read_json(self._inventory)
+
     @property
     def has_volumes(self) -> bool:
         """Whether there is fog, smoke or fire in the scene."""
-        return bool(read_json(self._inventory)["volumes"])
+        return bool(self.inventory["volumes"])
 
     @property
     def whole(self) -> Window:
@@ -216,7 +223,7 @@ class Trials:
         if not self._started:
             self._start(settings)
         # What the trial before this has changed is as the .blend has it again.
-        cycles.set_sampling({**read_json(self._inventory)["sampling"], **settings})
+        cycles.set_sampling({**self.inventory["sampling"], **settings})
         cycles.set_window(window.x, window.y, window.width, window.height)
         seed = keys.view_seed(settings["seed"], window.view.name)
         raw = render_colour(window.view.matrix, seed, self.lightfield.passes)
@@ -243,10 +250,10 @@ class Trials:
         """Return the channels that say of each pixel's material, (h, w), what `SURFACES` has."""
         from lightfield.rendering import ids
 
-        numbers, inventory = ids.names("material"), read_json(self._inventory)
+        numbers = ids.names("material")
         found = {}
         for surface, features in SURFACES.items():
-            named = {name for feature in features for name in inventory[feature]}
+            named = {name for feature in features for name in self.inventory[feature]}
             members = [number for name, number in numbers.items() if name in named]
             found[f"{surface}.Y"] = np.isin(materials, members).astype(np.float32)
         return found
@@ -256,7 +263,7 @@ class Trials:
 
         self._on = cycles.set_up(
             self._blend,
-            read_json(self._inventory),
+            self.inventory,
             self.lightfield.changed(render=settings),
             self._device,
             self._threads,
@@ -280,6 +287,28 @@ def add_arguments(parser: argparse.ArgumentParser, lightfield: str) -> None:
     parser.add_argument("--device", default="auto", help="what Cycles renders on (default: auto)")
     parser.add_argument("--threads", type=int, default=1, help="CPU threads (default: 1)")
     parser.add_argument("--cache", required=True, type=Path, help="folder of what was rendered")
+
+
+def add_calibration(parser: argparse.ArgumentParser) -> None:
+    """Add what `own_settings` reads."""
+    parser.add_argument(
+        "--calibration", type=Path, help="what scripts/calibrate.py chose for a target error"
+    )
+
+
+def own_settings(arguments: argparse.Namespace, lightfield: LightField) -> Mapping[str, Any]:
+    """Return a dataset's ``render`` block, with what was chosen for its target error.
+
+    Raises `UserError` where it has one, and nothing says what was.
+    """
+    if arguments.calibration:
+        return calibrated(lightfield.render, read_json(arguments.calibration))
+    if "samples" not in lightfield.render:
+        raise UserError(
+            f"{arguments.lightfield}: render has a target error and no samples; "
+            "give --calibration, what scripts/calibrate.py chose for it"
+        )
+    return lightfield.render
 
 
 def nearest_view(views: Sequence[View], view: View) -> View | None:
