@@ -25,7 +25,7 @@ import numpy as np
 from lightfield.core.progress import Progress
 from lightfield.measurement import metrics, strata
 from lightfield.measurement.calibration import effort_for
-from lightfield.measurement.error_vs_time import REFERENCE_SEEDS, Renders, parted, weighted
+from lightfield.measurement.error_vs_time import Renders, referenced, weighted
 from lightfield.measurement.sampling import DENOISED, TRACED, standard_error
 from lightfield.measurement.trials import Trial, Trials
 
@@ -126,16 +126,7 @@ class Probes:
     ) -> None:
         self.maker, self.name = maker, name
         self.windows, areas = strata.choose(maker, size, windows)
-        # Before all others: Cycles is set up for the parts of light.
-        pilot = maker.pilot()
-        kinds = [strata.classes(pilot, window)[0] for window in self.windows]
-        progress = Progress(len(self.windows), f"{name}: references")
-        made = []
-        for window in self.windows:
-            each = reference_samples // REFERENCE_SEEDS
-            made.append(maker.reference(window, REFERENCE_SEEDS, each))
-            progress.done()
-        self.parts = parted(metrics.exposed_alike(made), kinds, areas)
+        _, self.parts = referenced(maker, self.windows, areas, reference_samples, name)
         self.areas = {stratum: areas[stratum] for stratum in self.parts}
         self._renders: dict[str, list[list[Trial]]] = {}
 

@@ -113,16 +113,7 @@ def measure(
     near = nearest_view(maker.lightfield.views, chosen[0].view)
     if near:
         chosen.insert(1, replace(chosen[0], view=near))
-    # Before all others: Cycles is set up for the parts of light.
-    pilot = maker.pilot()
-    kinds = [strata.classes(pilot, window)[0] for window in chosen]
-    progress = Progress(len(chosen), f"{name}: references")
-    made = []
-    for window in chosen:
-        made.append(maker.reference(window, REFERENCE_SEEDS, reference_samples // REFERENCE_SEEDS))
-        progress.done()
-    references = metrics.exposed_alike(made)
-    parts = parted(references, kinds, areas)
+    references, parts = referenced(maker, chosen, areas, reference_samples, name)
     own = weighted({s: own_error(list(places.values())) for s, places in parts.items()}, areas)
 
     on_cpu = maker.render(chosen[0], 1, {"samples": 1}).device == "CPU"
@@ -221,6 +212,22 @@ def compared(
         resolved=mean["relative_mse"] > own_error(references),
         depth_error=fmean(depths) if depths else None,
     )
+
+
+def referenced(
+    maker: Trials, windows: Sequence[Window], areas: Mapping[str, float], samples: int, name: str
+) -> tuple[list[metrics.Reference], dict[str, dict[int, metrics.Reference]]]:
+    """Return the windows' references, of so many ``samples``, and by stratum as `parted` does."""
+    # Before all others: Cycles is set up for the parts of light.
+    pilot = maker.pilot()
+    kinds = [strata.classes(pilot, window)[0] for window in windows]
+    progress = Progress(len(windows), f"{name}: references")
+    made = []
+    for window in windows:
+        made.append(maker.reference(window, REFERENCE_SEEDS, samples // REFERENCE_SEEDS))
+        progress.done()
+    references = metrics.exposed_alike(made)
+    return references, parted(references, kinds, areas)
 
 
 def parted(
