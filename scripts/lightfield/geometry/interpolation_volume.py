@@ -58,25 +58,30 @@ def interpolation_volume(rig: Rig, lens: Lens) -> InterpolationVolume | None:
     positions = matrices[:, :3, 3]
     if not is_closed(mesh, positions):
         return InterpolationVolume(0.0, 0.0)
-    enclosed = float(ConvexHull(positions).volume)
+    hull = ConvexHull(positions)
+    enclosed = float(hull.volume)
     if rig.cube_map or sees_all_round(lens):
         return InterpolationVolume(enclosed, enclosed)
-    planes = immersive_planes(mesh, matrices, lens, rig.face_inside)
+    planes = immersive_planes(mesh, hull, matrices, lens, rig.face_inside)
     return InterpolationVolume(0.0 if planes is None else _polyhedron_volume(planes), enclosed)
 
 
 def immersive_planes(
-    mesh: list[tuple[int, ...]], matrices: Floats, lens: Lens, face_inside: bool
+    mesh: list[tuple[int, ...]],
+    hull: ConvexHull,
+    matrices: Floats,
+    lens: Lens,
+    face_inside: bool,
 ) -> Floats | None:
     """Return the planes (n, 4) around the immersive volume: n · p + c ≤ 0 within.
 
-    ``mesh`` are the cells of a closed surface between cameras (m, 4, 4). None if the lens does not
-    see its own axis: nothing is within.
+    ``mesh`` are the cells of a closed surface between cameras (m, 4, 4), and ``hull`` is that of
+    their positions. None if the lens does not see its own axis: nothing is within.
     """
     positions = matrices[:, :3, 3]
-    hull: Floats = ConvexHull(positions).equations
+    outside: Floats = hull.equations
     if sees_all_round(lens):
-        return hull
+        return outside
     sides = cone_sides(lens)
     if sides is None:
         return None
@@ -87,7 +92,7 @@ def immersive_planes(
     for camera, corner in neighbours(mesh):
         bounds[camera] = np.minimum(bounds[camera], normals[camera] @ positions[corner])
     planes = np.concatenate([normals, -bounds[..., None]], axis=-1).reshape(-1, 4)
-    return np.concatenate([_tightest(planes), hull])
+    return np.concatenate([_tightest(planes), outside])
 
 
 def parts_to_edge(matrices: Floats, lens: Lens, places: Floats) -> Floats:
@@ -101,11 +106,12 @@ def parts_to_edge(matrices: Floats, lens: Lens, places: Floats) -> Floats:
     middle = positions.mean(axis=0)
     nowhere = np.full(len(places), np.inf)
     try:
-        mesh = [tuple(map(int, cell)) for cell in ConvexHull(positions).simplices]
+        hull = ConvexHull(positions)
     except QhullError:
         return nowhere
     outward = ((positions - middle) * -matrices[:, :3, 2]).sum() >= 0
-    planes = immersive_planes(mesh, matrices, lens, not outward)
+    mesh = [tuple(map(int, cell)) for cell in hull.simplices]
+    planes = immersive_planes(mesh, hull, matrices, lens, not outward)
     if planes is None or (planes[:, :3] @ middle + planes[:, 3] >= 0).any():
         return nowhere
     room = -(planes[:, :3] @ middle + planes[:, 3])
