@@ -222,22 +222,27 @@ def _entry(x, y, z, resolution, entries):  # type: ignore[no-untyped-def]
     return (x ^ (y * 2654435761) ^ (z * 805459861)) & (entries - 1)
 
 
+@part
+def _corner(point, corner, resolution, entries):  # type: ignore[no-untyped-def]
+    """Return the entry of one of the 8 corners of the cell around a point, and its weight."""
+    x, y, z = point[0] * resolution, point[1] * resolution, point[2] * resolution
+    left, low, front = int(x), int(y), int(z)
+    x, y, z = x - left, y - low, z - front
+    i, j, k = corner & 1, (corner >> 1) & 1, corner >> 2
+    weight = (x if i else 1 - x) * (y if j else 1 - y) * (z if k else 1 - z)
+    return _entry(left + i, low + j, front + k, resolution, entries), weight
+
+
 @kernel
 def _encode(points, resolution, table, out):  # type: ignore[no-untyped-def]
     """Write what a level of the grid holds at points (n, 3) of the unit cube into out (n, k)."""
     for number in range(points.shape[0]):
-        x, y, z = points[number, 0], points[number, 1], points[number, 2]
-        x, y, z = x * resolution, y * resolution, z * resolution
-        left, low, front = int(x), int(y), int(z)
-        x, y, z = x - left, y - low, z - front
         one = np.float32(0)
         two = np.float32(0)
         for corner in range(8):
-            i, j, k = corner & 1, (corner >> 1) & 1, corner >> 2
-            share = (x if i else 1 - x) * (y if j else 1 - y) * (z if k else 1 - z)
-            entry = _entry(left + i, low + j, front + k, resolution, table.shape[0])
-            one += share * table[entry, 0]
-            two += share * table[entry, 1]
+            entry, weight = _corner(points[number], corner, resolution, table.shape[0])
+            one += weight * table[entry, 0]
+            two += weight * table[entry, 1]
         out[number, 0] = one
         out[number, 1] = two
 
@@ -246,13 +251,7 @@ def _encode(points, resolution, table, out):  # type: ignore[no-untyped-def]
 def _scatter(points, resolution, gradient, out):  # type: ignore[no-untyped-def]
     """Add the gradient (n, k) of what `_encode` wrote to that of the table."""
     for number in range(points.shape[0]):
-        x, y, z = points[number, 0], points[number, 1], points[number, 2]
-        x, y, z = x * resolution, y * resolution, z * resolution
-        left, low, front = int(x), int(y), int(z)
-        x, y, z = x - left, y - low, z - front
         for corner in range(8):
-            i, j, k = corner & 1, (corner >> 1) & 1, corner >> 2
-            share = (x if i else 1 - x) * (y if j else 1 - y) * (z if k else 1 - z)
-            entry = _entry(left + i, low + j, front + k, resolution, out.shape[0])
-            out[entry, 0] += share * gradient[number, 0]
-            out[entry, 1] += share * gradient[number, 1]
+            entry, weight = _corner(points[number], corner, resolution, out.shape[0])
+            out[entry, 0] += weight * gradient[number, 0]
+            out[entry, 1] += weight * gradient[number, 1]
