@@ -30,7 +30,13 @@ from lightfield.core.gpus import visible
 from lightfield.core.memory import available
 from lightfield.dataset import journal, ledger, memory, shard_counts
 from lightfield.dataset.config import accept_blend, load_config, load_scene, scene_path
-from lightfield.dataset.dataset import PICTURES, PLOTS, load_datasets, scene_datasets
+from lightfield.dataset.dataset import (
+    MOST_SHARDS,
+    PICTURES,
+    PLOTS,
+    load_datasets,
+    scene_datasets,
+)
 from lightfield.dataset.exports import MANIFEST, VIEWS
 from lightfield.dataset.splits import SPLITS
 from lightfield.dataset.view_store import VARIABLE, ViewStore
@@ -61,7 +67,7 @@ if (workflow.resource_settings.cores, workflow.resource_settings.nodes) == (None
 # On a cluster at least one for each job that runs at once, and none waits long for the last.
 if workflow.resource_settings.nodes:
     config.setdefault(
-        "most_shards", max(64, min(workflow.resource_settings.nodes, 10_000))
+        "most_shards", max(64, min(workflow.resource_settings.nodes, MOST_SHARDS))
     )
     config.setdefault("shard_minutes", 20 * (workflow.resource_settings.cores or 1))
 
@@ -73,6 +79,7 @@ try:
 except UserError as error:
     sys.exit(f"error: {error}")
 
+CHOSEN_SCENES = list(dict.fromkeys(dataset.scene_name for dataset in CHOSEN))
 RESULTS = SETTINGS.results
 WORK = SETTINGS.work
 # Those that are not chosen may test what is trained on the chosen ones.

@@ -4,10 +4,7 @@
 # Without output: it is asked for to be read.
 rule rig_tables:
     input:
-        [
-            os.path.relpath(scene_path(name))
-            for name in dict.fromkeys(d.scene_name for d in CHOSEN)
-        ],
+        [os.path.relpath(scene_path(name)) for name in CHOSEN_SCENES],
     log:
         log_of("rig_tables"),
     localrule: True
