@@ -137,7 +137,7 @@ rule try_changes:
         f"python {SCRIPTS}/try_changes.py"
         " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} {params.calibration} --device {params.device} --threads 1"
-        " --cache {params.cache} --output {output} > {log} 2>&1"
+        " --cores {threads} --cache {params.cache} --output {output} > {log} 2>&1"
 
 
 # Without output: it is asked for to be read.

@@ -6,7 +6,7 @@ from pathlib import Path
 from lightfield.core.cli import run
 from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField
-from lightfield.measurement import advice, trials
+from lightfield.measurement import advice, threads, trials
 
 
 def main() -> None:
@@ -19,6 +19,9 @@ def main() -> None:
     parser.add_argument(
         "--reference", type=int, default=512, help="samples of a reference (default: %(default)s)"
     )
+    parser.add_argument(
+        "--cores", type=int, default=1, help="for threads a process to be tried on (default: 1)"
+    )
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 
@@ -26,8 +29,12 @@ def main() -> None:
     lightfield = lightfield.changed(render=trials.own_settings(arguments, lightfield))
     maker = trials.Trials.of(arguments, lightfield)
     name = arguments.output.stem
+    # First, because a process that has started Blender can start no others that do.
+    scene = (arguments.blend, arguments.inventory)
+    by_threads = threads.tried(lightfield, *scene, arguments.device, arguments.cores, name)
     probes = advice.Probes(maker, arguments.size, arguments.probes, arguments.reference, name)
-    write_json(arguments.output, advice.tried(maker, lightfield.render, maker.inventory, probes))
+    found = advice.tried(maker, lightfield.render, maker.inventory, probes)
+    write_json(arguments.output, {**found, "threads": by_threads})
 
 
 if __name__ == "__main__":

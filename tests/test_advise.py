@@ -15,6 +15,7 @@ from lightfield.measurement.metrics import make_reference
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
 RIG = {"type": "plane", "cameras": [4, 1], "size": 0.3, "center": [0, 0, 1.5]}
 RENDER = {"samples": 256, "adaptive_threshold": 0, "denoise": False, "seed": 0}
+RENDER |= {"depth_precision": "float"}
 SAMPLING = {"max_bounces": 8, "clamp_indirect": 10, "light_tree": True, "guiding": False}
 INVENTORY = {name: [] for name in ("lights", *advice.COSTLY)} | {"sampling": SAMPLING}
 INVENTORY |= {"lights": ["sun"], "volumes": ["Fog"]}
@@ -133,7 +134,8 @@ def test_a_scene_is_advised_by_the_programs(run_program, room, tmp_path):
     run_program("inventory.py", "--blend", room, "--output", inventory)
     words = ("--blend", room, "--inventory", inventory, "--device", "cpu", "--size", "24")
     words += ("--lightfield", tmp_path / "lightfield.json", "--cache", tmp_path / "cache")
-    run_program("try_changes.py", *words, "--reference", "1024", "--output", output)
+    words += ("--reference", "1024", "--cores", "2", "--output", output)
+    run_program("try_changes.py", *words)
     found = json.loads(output.read_text())
     assert "diffuse" in found["strata"]
     tried = {json.dumps(one["change"]): one["savings"] for one in found["tried"]}
@@ -146,6 +148,12 @@ def test_a_scene_is_advised_by_the_programs(run_program, room, tmp_path):
     # Each change reaches Cycles: no two make the same pixels.
     wholes = [saved["whole views"] for change, saved in tried.items() if "clamp" not in change]
     assert len({(whole["bias"], whole["light"]) for whole in wholes}) == len(wholes)
+    # Two processes of one thread have the scene twice, and one of two has it once.
+    single, double = found["threads"]
+    assert (single["threads"], single["processes"]) == (1, 2)
+    assert (double["threads"], double["processes"]) == (2, 1)
+    assert single["memory_bytes"] > 1.5 * double["memory_bytes"]
+    assert min(single["view_core_seconds"], double["view_core_seconds"]) > 0
     said = run_program("advise.py", output).stdout
     assert said == output.with_suffix(".md").read_text() + "\n"
     assert "| `denoise_prefilter: fast` | denoised |" in said
