@@ -84,6 +84,14 @@ def test_another_picture_is_not_the_same(trials, change):
     assert not gpu_check.compare(one, [change(trial) for trial in other], mask).same
 
 
+def test_a_picture_without_noise_is_the_same_or_not(trials):
+    one, _, mask = trials
+    still = [replace(trial, colour=np.full_like(trial.colour, 0.5)) for trial in one]
+    assert gpu_check.compare(still, still, mask).same
+    brighter = [replace(trial, colour=trial.colour * 2) for trial in still]
+    assert not gpu_check.compare(still, brighter, mask).same
+
+
 def test_hours_are_those_of_the_views_pixels_and_samples():
     full = {"big": {"views": 10, "resolution": [2000, 1000]}}
     maker = Simulated(lenses.from_camera(CAMERA))

@@ -181,6 +181,8 @@ def test_a_power_law_is_found_and_its_slopes_error_is_that_of_linear_regression(
     assert (line.slope, line.factor) == (pytest.approx(-1), pytest.approx(3))
     assert line.at(32) == pytest.approx(3 / 32)
     assert line.inverse(3 / 32) == pytest.approx(32)
+    # A denoiser's error may hardly fall, and then no number of samples is enough.
+    assert metrics.Line(-1e-9, 0, 1.0).inverse(0.1) == 1e300
     y = [2.9, 1.6, 0.7, 0.4, 0.18]
     wanted = linregress(np.log(x), np.log(y))
     line = metrics.fit(x, y)

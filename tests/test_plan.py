@@ -137,6 +137,12 @@ def test_denoised_and_calibrated_hours_stand_beside_the_plain_ones():
     denoised, calibrated = plan.cheaper_parts(256, advice)
     assert denoised == pytest.approx((128 + 3) / 256)
     assert calibrated == pytest.approx((50 + 3) / 256)
+    # A denoiser's error that hardly falls is never as small as that of plain path tracing.
+    biased = [
+        {**point, "error": 0.1 * point["samples"] ** -0.001} for point in unchanged["denoised"]
+    ]
+    biased_advice = advice | {"unchanged": unchanged | {"denoised": biased}}
+    assert plan.cheaper_parts(256, biased_advice) == (None, pytest.approx(100 / 256))
     assert plan.cheaper_parts(6, advice) == plan.cheaper_parts(256, None) == (None, None)
     probe = {"resolution": [64, 64], "samples": 256, "device": "CPU", "views": 100}
     probe |= {"view_seconds": [3600.0], "view_bytes": [1e9]}

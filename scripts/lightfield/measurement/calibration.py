@@ -336,7 +336,8 @@ def effort_for(target: float, points: Sequence[tuple[float, float]]) -> float:
     if below == 0:
         return points[0][0]
     (x0, e0), (x1, e1) = points[below - 1 : below + 1]
-    part = math.log(e0 / target) / math.log(e0 / e1)
+    # By chance an error far below the reference's own is measured as nothing, or less.
+    part = math.log(e0 / target) / math.log(e0 / max(e1, 1e-6 * target))
     return float(x0 * (x1 / x0) ** part)
 
 

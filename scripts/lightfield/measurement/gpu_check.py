@@ -69,14 +69,19 @@ def compare(
         [trial.colour[mask].mean(dtype=np.float64) for trial in made] for made in (one, other)
     ]
     error = math.hypot(*(standard_error(total) for total in totals))
-    light = (fmean(totals[1]) - fmean(totals[0])) / error
+    light = _over(fmean(totals[1]) - fmean(totals[0]), error)
     depths = one[0].depth, other[0].depth
     differ = np.zeros(mask.shape, dtype=bool)
     if depths[0] is not None and depths[1] is not None:
         with np.errstate(invalid="ignore"):
             near = np.abs(depths[1] / depths[0] - 1) <= SAME_DEPTH
         differ = ~near & ~(np.isinf(depths[0]) & np.isinf(depths[1]))
-    return Comparison(float(apart / noise), float(light), float(differ[mask].mean()))
+    return Comparison(_over(apart, noise), light, float(differ[mask].mean()))
+
+
+def _over(difference: float, noise: float) -> float:
+    """Return a difference over noise, of which a picture of nothing but sky has none."""
+    return 0.0 if difference == 0 else float(difference / noise) if noise else math.inf
 
 
 def _blocks(pixels: NDArray[Any], block: int) -> Any:

@@ -276,8 +276,10 @@ class Line:
         return float(self.factor * x**self.slope)
 
     def inverse(self, y: float) -> float:
-        """Return x at y."""
-        return float((y / self.factor) ** (1 / self.slope))
+        """Return x at y; 1e300 where a line that hardly falls or rises does not get there."""
+        with np.errstate(divide="ignore"):
+            exponent = np.log10(y / self.factor) / np.float64(self.slope)
+        return float(10 ** min(exponent, 300.0))
 
 
 def fit(x: Sequence[float], y: Sequence[float]) -> Line | None:

@@ -28,6 +28,8 @@ HEAD = "| dataset | views | resolution | samples | s a view | hours | denoised |
 
 # The target error that the calibrated hours are for.
 TARGET_ERROR = 0.01
+# Times as long as plain path tracing.
+OUT_OF_REACH = 1e4
 
 
 def table(datasets: list[tuple[str, int, dict[str, Any]]], advice: Mapping[str, Any]) -> str:
@@ -70,7 +72,8 @@ def table(datasets: list[tuple[str, int, dict[str, Any]]], advice: Mapping[str, 
     lines += [
         "Measured on small views, with all their samples; ± is the standard error over these.",
         "Denoised: to the same error by fewer samples and the denoiser. Calibrated: to the error "
-        f"{TARGET_ERROR:g}, by the cheaper of both. By `snakemake advise`; — where it has not run.",
+        f"{TARGET_ERROR:g}, by the cheaper of both. By `snakemake advise`; — where it has not run, "
+        "or no number of samples is enough.",
         "",
     ]
     return "\n".join(lines)
@@ -82,7 +85,8 @@ def cheaper_parts(
     """Return the parts of the time of plain path tracing that denoised and calibrated views take.
 
     ``samples`` are those of a pixel. Errors and seconds follow ``advice``: power laws of samples,
-    and fewer than one sample there are not.
+    and fewer than one sample there are not. None where it is not known, or no number of samples
+    would be enough, as where a denoiser's error is nothing but bias.
     """
     if not advice or advice["own"] != {"samples": samples, "denoise": False}:
         return None, None
@@ -100,9 +104,11 @@ def cheaper_parts(
 
     errors, seconds = ways[TRACED]
     plain = float(seconds.intercept + seconds.slope * samples)
+    denoised = seconds_to(errors.at(samples), DENOISED) / plain
+    calibrated = min(seconds_to(TARGET_ERROR, way) for way in ways) / plain
     return (
-        seconds_to(errors.at(samples), DENOISED) / plain,
-        min(seconds_to(TARGET_ERROR, way) for way in ways) / plain,
+        denoised if denoised < OUT_OF_REACH else None,
+        calibrated if calibrated < OUT_OF_REACH else None,
     )
 
 
