@@ -8,8 +8,10 @@ from lightfield.measurement.plan import Work, calibration_seconds, forecast
 
 # Of more datasets than this the page of all is named instead of each one's own.
 MOST_PAGES = 12
-# What the rules of a file are called, where that is not the file's name.
+# What the rules of a file are called, where that is not the file's name, and some by their own.
 PHASES = {
+    "measure_error": "measurement",
+    "try_changes": "measurement",
     "rig": "cameras",
     "render": "views",
     "error": "calibration",
@@ -43,7 +45,7 @@ def task_of(job):
     return Task(
         job.rule.name,
         str(Path(job.log[0]).relative_to(stored(f"{WORK}/logs")).with_suffix("")),
-        PHASES.get(stem, stem),
+        PHASES.get(job.rule.name, PHASES.get(stem, stem)),
         Path(job.log[0]),
         views=views,
         seconds=seconds,

@@ -79,6 +79,18 @@ def test_one_line_says_how_far_the_whole_run_is(run):
     assert run.shown(50, finished=["panorama"]) == ["report: 1 job in 50 s"]
 
 
+@pytest.mark.parametrize("run", [Terminal], indirect=True)
+def test_a_measurement_takes_as_long_as_its_log_says(run):
+    run.tasks = {"error": run.task("error", "measurement")}
+    run.display.begin(run.tasks, cores=2)
+    run.shown(running=["error"])
+    run.log("error", "garden: trials: 50 renders to do")
+    run.log("error", "garden: trials: 10 of 50 renders, 3 s each, …")
+    assert run.shown(30) == ["0 of 1 job · 2 min 00 s left · measurement 10 of 50"]
+    run.log("error", "garden: trials: 50 of 50 renders, 3 s each, done in 150 s")
+    assert run.shown(120, finished=["error"])[-1] == "measurement: 1 job in 2 min 30 s"
+
+
 def test_warnings_are_shown_once_and_other_lines_not(run):
     run.log("a", "warning: coarse", "a detail", "note: so and so")
     run.log("b", "warning: coarse")

@@ -66,6 +66,13 @@ class Task:
         """Those of ``views_done`` that were not there before."""
         return max(0, self.views_done - self.kept)
 
+    @property
+    def at_work(self) -> str:
+        """What it works on; if that is no views, how much of it is done."""
+        if self.views or not self.total:
+            return self.phase
+        return f"{self.phase} {self.kept + self.done} of {self.total}"
+
     def lines(self, since: float) -> list[str]:
         """Return the whole lines that its log has got; one from before ``since`` is another run's.
 
@@ -208,14 +215,15 @@ class RunDisplay:
             if made and now > since and any(task.views for task in self._open.values()):
                 parts[-1] += f", {60 * made / (now - since):.3g} a minute"
         parts.append(f"{duration(self.seconds_left(now))} left")
-        at_work = [task.phase for task in self._open.values() if task.began is not None]
+        at_work = [task.at_work for task in self._open.values() if task.began is not None]
         return " · ".join([*parts, *dict.fromkeys(at_work)])
 
     def seconds_left(self, now: float) -> float:
         """Return an estimate of how long the whole run will still take.
 
         Renders are expected to differ from their estimates as those of this run did so far. What is
-        left goes on at the rate at which work was done until now.
+        left goes on at the rate at which work was done until now. Of what nothing is expected, a
+        measurement's, what its log says is counted from when it says so.
         """
         tasks = self._tasks.values()
         spent = expected = 0.0
@@ -236,7 +244,12 @@ class RunDisplay:
         elapsed = now - self._began
         # Before anything is done, as fast as the cores can.
         rate = done / elapsed if done > JOB_SECONDS else float(self._cores)
-        return left / rate
+        by_logs = [
+            (task.total - task.kept - task.done) * task.each
+            for task in self._open.values()
+            if not task.seconds and task.each is not None
+        ]
+        return max([left / rate, *by_logs])
 
     def _say(self, text: str) -> None:
         self.clear()
