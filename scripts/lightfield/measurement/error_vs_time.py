@@ -315,7 +315,8 @@ def evaluated(points: Sequence[Point], own: float) -> dict[str, Any]:
             for method, found in lines.items()
             if found
         },
-        "methods": by_method(seen),
+        "methods": by_method(seen, 0.5),
+        "methods_at_most_samples": by_method(seen, 1),
         "pareto_front": [asdict(seen[index]) for index in front],
         "against_plain_at_equal_error": saved,
         "settings": [asdict(point) for point in points if point.method == OWN],
@@ -323,36 +324,37 @@ def evaluated(points: Sequence[Point], own: float) -> dict[str, Any]:
     }
 
 
-def by_method(points: Sequence[Point]) -> list[dict[str, Any]]:
+def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
     """Return each method's error at equal time, and its time at equal error.
 
-    Equal to those of plain path tracing in the middle of its points. Interpolated between a
-    method's own points, and None where these do not reach so far; where its cheapest point has less
-    error already, it is that one's time.
+    Equal to those of plain path tracing at one of its points: with 0.5 as ``part`` that in the
+    middle, with 1 that of most samples. Interpolated between a method's own points, and None where
+    these do not reach so far; where its cheapest point has less error already, it is that one's
+    time.
     """
     plain = sorted((p for p in points if p.method == PLAIN), key=lambda p: p.seconds)
     if not plain:
         return []
-    middle = plain[len(plain) // 2]
+    equal = plain[int(part * (len(plain) - 1) + 0.5)]
     found = []
     for method in dict.fromkeys(p.method for p in points if p.method != OWN):
         own = sorted((p for p in points if p.method == method), key=lambda p: p.seconds)
         seconds = metrics.interpolated(
-            middle.relative_mse, [(p.relative_mse, p.seconds) for p in own]
+            equal.relative_mse, [(p.relative_mse, p.seconds) for p in own]
         )
-        if seconds is None and own[0].relative_mse <= middle.relative_mse:
+        if seconds is None and own[0].relative_mse <= equal.relative_mse:
             seconds = own[0].seconds
         found.append(
             {
                 "method": method,
-                "seconds": middle.seconds,
+                "seconds": equal.seconds,
                 "error": metrics.interpolated(
-                    middle.seconds, [(p.seconds, p.relative_mse) for p in own]
+                    equal.seconds, [(p.seconds, p.relative_mse) for p in own]
                 ),
-                "equal_error": middle.relative_mse,
+                "equal_error": equal.relative_mse,
                 "seconds_at_equal_error": seconds,
-                "times_faster": seconds and middle.seconds / seconds,
-                "nearest": asdict(min(own, key=lambda p: abs(p.seconds - middle.seconds))),
+                "times_faster": seconds and equal.seconds / seconds,
+                "nearest": asdict(min(own, key=lambda p: abs(p.seconds - equal.seconds))),
             }
         )
     return found
@@ -456,38 +458,38 @@ def tables(name: str, content: Mapping[str, Any]) -> str:
     columns, rows = strata_table(content)
     lines += [
         "",
-        "By stratum, what pixels show: its part of the views; the slope of plain path tracing over",
-        "time; the error of the scene's own settings; that of plain path tracing in the middle of",
-        "its points; how many times faster each method has that; and its error in that time.",
+        "By stratum, what pixels show, which is a part of the views: the slope of a method's error",
+        "over time, its error in the time of plain path tracing in the middle of its points, its",
+        "seconds to the error of that, and how many times faster it is there, and at the error of",
+        "plain path tracing with most samples.",
         "",
         f"| {' | '.join(columns)} |",
-        "| --- " + "| ---: " * (len(columns) - 1) + "|",
+        "| --- | ---: | --- " + "| ---: " * (len(columns) - 3) + "|",
         *(_row(*row) for row in rows),
     ]
     return "\n".join([*lines, ""])
 
 
 def strata_table(content: Mapping[str, Any]) -> tuple[list[str], list[list[Any]]]:
-    """Return the columns and rows of what was measured in each stratum."""
-    methods = [entry["method"] for entry in content["methods"]]
-    columns = ["stratum", "part", "slope", "own settings", "equal error"]
-    columns += [f"{method}: times faster" for method in methods if method != PLAIN]
-    columns += [f"{method}: error at equal time" for method in methods if method != PLAIN]
+    """Return the columns and rows of what was measured of each stratum and method."""
+    columns = ["stratum", "part", "method", "slope", "s", "error in these", "error", "s to it"]
+    columns += ["times faster", "at most samples"]
     rows = []
-    for stratum, found in content["strata"].items():
-        slope = found["slopes"].get(PLAIN, {}).get("over_time", {}).get("slope")
-        by_name = {entry["method"]: entry for entry in found["methods"]}
-        row = [stratum, found["area"], slope, found["settings"][0]["relative_mse"]]
-        row.append(by_name.get(PLAIN, {}).get("equal_error"))
-        for figure in ("times_faster", "error"):
-            row += [by_name.get(m, {}).get(figure) for m in methods if m != PLAIN]
-        rows.append(row)
+    for stratum, found in {"whole views": {"area": 1.0, **content}, **content["strata"]}.items():
+        for middle, most in zip(found["methods"], found["methods_at_most_samples"], strict=True):
+            slope = found["slopes"].get(middle["method"], {}).get("over_time", {}).get("slope")
+            names = ("seconds", "error", "equal_error", "seconds_at_equal_error", "times_faster")
+            figures = [middle[name] for name in names]
+            row = [stratum, found["area"], middle["method"], slope, *figures]
+            rows.append([*row, most["times_faster"]])
     return columns, rows
 
 
-def _row(method: str, *figures: float | None) -> str:
-    cells = ["—" if figure is None else f"{figure:.3g}" for figure in figures]
-    return f"| {method} | {' | '.join(cells)} |"
+def _row(*cells: str | float | None) -> str:
+    texts = [
+        "—" if cell is None else cell if isinstance(cell, str) else f"{cell:.3g}" for cell in cells
+    ]
+    return f"| {' | '.join(texts)} |"
 
 
 def _draw(stem: Path, content: Mapping[str, Any]) -> None:

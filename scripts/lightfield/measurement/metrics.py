@@ -222,7 +222,7 @@ def bias_correlation(
     """Return how far two views' biases agree at pixels ``seen``, as `disagreement` has them.
 
     1 where both are wrong alike, as texture is, and 0 where they have nothing in common; None where
-    no bias is known.
+    the square of a bias is not above 0 by two standard errors over the pixels.
     """
     means, squares = [], []
     for colours, reference, where in zip(renders, references, seen, strict=True):
@@ -232,9 +232,10 @@ def bias_correlation(
         squares.append(means[-1] ** 2 - noise - reference.variance.reshape(-1, 3)[where])
     gain = 4.0 ** references[0].exposure
     weights = gain / (gain * references[0].colour.reshape(-1, 3)[seen[0]] ** 2 + EPSILON)
-    first, second = (float((square * weights).mean()) for square in squares)
-    if min(first, second) <= 0:
+    known = [(square * weights).mean(axis=-1) for square in squares]
+    if any(one.mean() <= 2 * one.std() / math.sqrt(one.size) for one in known):
         return None
+    first, second = (float(one.mean()) for one in known)
     return float((means[0] * means[1] * weights).mean()) / math.sqrt(first * second)
 
 
