@@ -81,7 +81,7 @@ def test_what_saves_is_advised_with_its_yaml(simulated):
     assert abs(whole["light"]) < 1e-6 and whole["same_picture"] and one["advised"]
     assert one["savings"]["diffuse"] == whole
     assert found["yaml"] == {"light_tree": False}
-    text = advice.table("room", found)
+    text = advice.table("room", {**found, "threads": []})
     assert "render:\n  light_tree: false\n" in text
     assert "- lights: 1, sun" in text and "- volumes: 1, Fog" in text
     assert "| `light_tree: false` | path tracing | yes | 2.0" in text
