@@ -244,8 +244,11 @@ def test_rays_of_any_length_and_of_none(name: str, dtype: type) -> None:
     assert np.isfinite(expected).all()
     for length in (tiny, huge):
         np.testing.assert_allclose(lens.pixels(ray * dtype(length)), expected, rtol=1e-5)
-    for bad in ([0, 0, 0], [np.nan, 0, -1], [0, np.inf, -1], [-np.inf, np.inf, np.nan]):
+    no_rays = ([0, 0, 0], [np.nan, 0, -1], [0, np.inf, -1], [-np.inf, np.inf, np.nan])
+    for bad in no_rays:
         assert np.isnan(lens.pixels(np.array(bad, dtype))).all()
+    among = lens.pixels(np.array([ray, *no_rays], dtype))
+    np.testing.assert_array_equal(np.isnan(among), [[i > 0] * 2 for i in range(5)])
     for x, y in ((np.nan, 5), (5, np.inf)):
         assert np.isnan(lens.rays(np.array(x, dtype), np.array(y, dtype))).all()
 
@@ -269,6 +272,68 @@ def test_z_depth_is_for_lenses_within_180_degrees(name: str) -> None:
     # A lens that says no may still have a frame that stops earlier.
     elif "kannala" not in name and "polynomial" not in name:
         assert np.nanmin(cos) < 0
+
+
+def fisheyes(fov: float) -> list[Lens]:
+    """Return one of every fisheye of at least 180 degrees, all of which is in the frame."""
+    size = {"width": 64, "height": 48, "fov": fov}
+    known: dict[str, Any] = {"focal_length": 4, "coefficients": (0.0,) * 4}
+    return [
+        Equidistant(**size),
+        Equisolid(**size, focal_length=4),
+        Stereographic(**size),
+        Polynomial(**size, coefficients=(0, -0.25, 0, 0, 0)),
+        KannalaBrandt(**size, **known),
+    ]
+
+
+def test_depth_is_along_the_axis_up_to_exactly_180_degrees_and_beyond_along_the_ray() -> None:
+    half, beyond = math.pi / 2, math.radians(90.01)
+    for lens in (*fisheyes(math.pi), Orthographic(width=64, height=48, fov=math.pi)):
+        assert lens.usual_depth == "z"
+        # The ray at 90 degrees is on the rim, and seen.
+        for ray in ([1.0, 0, 0], [0, -1.0, 0]):
+            np.testing.assert_allclose(lens.rays(*lens.pixels(np.array(ray))), ray, atol=1e-7)
+    for lens in fisheyes(2 * beyond):
+        assert lens.usual_depth == "distance"
+    for longitude, meaning in (
+        ((-half, half), "z"),
+        ((-half, beyond), "distance"),
+        ((-beyond, half), "distance"),
+    ):
+        assert Equirectangular(**SIZE, longitude=longitude).usual_depth == meaning
+    assert EXAMPLES["rectilinear 179.9°"].usual_depth == "z"
+    assert EXAMPLES["cube map"].usual_depth == "distance"
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_what_a_lens_says_of_its_mirrors_holds_and_nothing_else_does(name: str) -> None:
+    lens = EXAMPLES[name]
+    x, y = grid(lens, np.float64, 30)
+    rays = lens.rays(x, y)
+    for mirrors, mirrored, axis in (
+        (lens.mirrors[0], lens.rays(x, lens.height - y), [1, -1, 1]),
+        (lens.mirrors[1], lens.rays(lens.width - x, y), [-1, 1, 1]),
+    ):
+        assert np.allclose(mirrored * axis, rays, atol=1e-9, equal_nan=True) == mirrors
+
+
+def test_a_frame_without_an_image_circle_is_seen_to_its_edges_and_a_sphere_ends_there() -> None:
+    for name, lens in EXAMPLES.items():
+        if isinstance(lens, CubeMap | Equirectangular | Rectilinear):
+            assert np.isfinite(lens.rays(*grid(lens, np.float64))).all(), name
+    cube, panorama = EXAMPLES["cube map"], EXAMPLES["equirectangular"]
+    for x, y in ((-0.01, 5), (cube.width + 0.01, 5), (5, -0.01), (5, cube.height + 0.01)):
+        assert np.isnan(cube.rays(x, y)).all()
+    for y in (-0.01, panorama.height + 0.01):
+        assert np.isnan(panorama.rays(5, y)).all()
+
+
+def test_a_turn_of_a_panorama_is_360_degrees() -> None:
+    assert EXAMPLES["equirectangular"].turn == 2048
+    assert Equirectangular(**SIZE, longitude=(-0.5, 1)).turn == pytest.approx(
+        2048 * 2 * math.pi / 1.5
+    )
 
 
 def test_exact_centre_looks_along_the_axis() -> None:
@@ -357,14 +422,50 @@ def test_kannala_brandt_ends_at_its_turning_point() -> None:
 
 
 def test_hole_of_a_polynomial_lens() -> None:
-    # θ = 0.01 + 0.1 r leaves a hole; a hole within a pixel belongs to the centre.
+    # θ = 0.01 + 0.1 r leaves a hole; one across which lies less than a pixel belongs to the centre.
     axis = np.array([0.0, 0, -1])
-    for width, closed in ((100, True), (2000, False)):
+    for width, height, closed in (
+        (100, 100, True),
+        (340, 340, True),
+        (400, 400, False),
+        (2000, 100, True),
+    ):
         lens = Polynomial(
-            width=width, height=width, coefficients=(-0.01, -0.1, 0, 0, 0), fov=math.pi
+            width=width,
+            height=height,
+            sensor_size=(36, 36),
+            coefficients=(-0.01, -0.1, 0, 0, 0),
+            fov=math.pi,
         )
         pixel = lens.pixels(axis)
-        assert (pixel == width / 2).all() if closed else np.isnan(pixel).all()
+        assert (pixel == lens.center).all() if closed else np.isnan(pixel).all()
+        # The centre itself looks up, as in Cycles.
+        up = [0, math.sin(0.01), -math.cos(0.01)]
+        np.testing.assert_allclose(lens.rays(*lens.center), up, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "radius"),
+    [
+        # θ = 0.5 where −k0 + 0.1 r is 0.5.
+        ((0.01, -0.1, 0, 0, 0), 5.1),
+        ((-0.01, -0.1, 0, 0, 0), 4.9),
+        # Turned by 180 degrees.
+        ((-0.01, 0.1, 0, 0, 0), -5.1),
+        # All that it sees is within 0.4 mm: 0.1 r + 10 r² is 0.5.
+        ((0, -0.1, -10, 0, 0), (math.sqrt(0.01 + 20) - 0.1) / 20),
+        ((0, 0, -2, 0, 0), 0.5),
+        ((0, 0, 0, -4, 0), 0.5),
+    ],
+)
+def test_a_polynomial_has_a_ray_where_its_equation_says(
+    coefficients: tuple[float, ...], radius: float
+) -> None:
+    lens = Polynomial(width=360, height=360, coefficients=coefficients, fov=math.pi)
+    ray = np.array([math.sin(0.5), 0, -math.cos(0.5)])
+    np.testing.assert_allclose(lens.pixels(ray), [180 + 10 * radius, 180], rtol=1e-12)
+    rim = lens.pixels(np.array([1.0, 0, 0]))
+    np.testing.assert_allclose(lens.rays(*rim), [1, 0, 0], atol=1e-9)
 
 
 def test_near_the_rim_of_wide_lenses_nothing_cancels() -> None:
@@ -383,11 +484,13 @@ def test_near_the_rim_of_wide_lenses_nothing_cancels() -> None:
 
 @both
 def test_backward_axis_is_on_the_rim_of_a_lens_of_360_degrees(dtype: type) -> None:
-    size = {"width": 200, "height": 100}
+    # Blender's angles are a little too large.
+    size = {"width": 200, "height": 100, "fov": 2 * math.pi + 5e-7}
     for lens, radius in (
-        (Equidistant(**size, fov=2 * math.pi), 50),
-        (Equisolid(**size, focal_length=4.5, fov=2 * math.pi), 50),
+        (Equidistant(**size), 50),
+        (Equisolid(**size, focal_length=4.5), 50),
         (KannalaBrandt(**size, focal_length=4, coefficients=(0, 0, 0, 0)), 4 * math.pi / 36 * 200),
+        (Polynomial(**size, coefficients=(0, -0.25, 0, 0, 0)), 4 * math.pi / 36 * 200),
     ):
         pixel = lens.pixels(np.array([0, 0, 1], dtype))
         # Any azimuth is right, the lens's centre is not.
@@ -579,7 +682,10 @@ def test_a_scene_yaml_can_have_every_lens(name: str) -> None:
 
 def test_angles_in_a_scene_yaml_are_as_round_as_they_are_meant() -> None:
     camera = {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT"}
-    for fov, degrees in ((np.float32(math.pi), 180), (1, math.degrees(1))):
+    for fov, degrees in (
+        *((np.float32(math.radians(round_one)), round_one) for round_one in (180, 170.125)),
+        (1, math.degrees(1)),
+    ):
         image = {"resolution": [64, 64], "camera": camera | {"fisheye_fov": float(fov)}}
         assert from_lightfield(image).settings()["fov"] == degrees
 
@@ -594,6 +700,8 @@ def test_cycles_has_lenses_of_blenders_cameras() -> None:
     ("change", "message"),
     [
         ({"width": 0, "height": 0}, "is not an image"),
+        ({"width": 0}, "is not an image"),
+        ({"height": 0}, "is not an image"),
         ({"sensor_size": (36, 0)}, "must be positive millimetres"),
         ({"sensor_size": (math.inf, 1)}, "must be positive millimetres"),
         ({"principal_point": (math.nan, 1)}, "must be finite pixels"),
@@ -604,6 +712,21 @@ def test_every_lens_refuses_an_image_that_is_none(
 ) -> None:
     with pytest.raises(UserError, match=message):
         replace(EXAMPLES[name], **change)
+
+
+@pytest.mark.parametrize("bad", [0, -1, math.inf, math.nan])
+@pytest.mark.parametrize("name", ["rectilinear", "equisolid 180°", "kannala_brandt"])
+def test_a_focal_length_is_positive_and_finite(name: str, bad: float) -> None:
+    with pytest.raises(UserError, match=r"focal_length: .* must be positive millimetres"):
+        replace(EXAMPLES[name], focal_length=bad)
+
+
+@pytest.mark.parametrize("name", ["polynomial", "kannala_brandt"])
+def test_coefficients_are_all_there_and_finite(name: str) -> None:
+    right = EXAMPLES[name].coefficients
+    for wrong in (right[1:], (*right, 0.0), (*right[1:], math.nan), (*right[1:], math.inf)):
+        with pytest.raises(UserError, match=f"coefficients: .* must be {len(right)} numbers"):
+            replace(EXAMPLES[name], coefficients=wrong)
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -643,6 +766,65 @@ def test_the_smallest_image(name: str) -> None:
 def test_a_lens_that_cannot_be_is_refused(camera: dict[str, object], message: str) -> None:
     with pytest.raises(UserError, match=message):
         from_camera({"resolution": [96, 64], **camera})
+
+
+OF_POLYNOMIAL = {"lens": "polynomial", "coefficients": [0, -0.1, 0, 0, 0]}
+OF_OPENCV = {"lens": "kannala_brandt", "focal_length": 9, "coefficients": [0, 0, 0, 0]}
+EQUISOLID, PINHOLE = {"lens": "equisolid", "focal_length": 9}, {"lens": "rectilinear"}
+
+
+@pytest.mark.parametrize(
+    ("camera", "key", "allowed", "refused"),
+    [
+        ({"lens": "equidistant", "fov": 9}, "resolution", [[1, 65536], [65536, 1]], []),
+        ({"lens": "equidistant", "fov": 9}, "resolution", [], [[0, 9], [9, 65537], [65537, 9]]),
+        (PINHOLE | {"fov": 9}, "principal_point", [[-1e6, 1e6]], [[-1e6 - 1, 0], [0, 1e6 + 1]]),
+        (PINHOLE | {"fov": 9}, "sensor_size", [0.5, 1e6, [0.5, 1e6]], [0, 1e6 + 1, [9, 1e6 + 1]]),
+        (PINHOLE, "focal_length", [0.5, 1e6], [0, -1, 1e6 + 1]),
+        (PINHOLE, "fov", [0.5, 179.5], [0, -0.5, 180]),
+        ({"lens": "equidistant"}, "fov", [0.5, 360], [0, -0.5, 360.5]),
+        ({"lens": "orthographic"}, "fov", [0.5, 180], [0, 180.5]),
+        ({"lens": "stereographic"}, "fov", [0.5, 359.9999], [0, 359.99995]),
+        (EQUISOLID, "fov", [0.5, 360], [0, 360.5]),
+        (OF_POLYNOMIAL, "fov", [0.5, 360], [0, 360.5]),
+        (OF_OPENCV, "fov", [0.5, 360], [0, 360.5]),
+        ({"lens": "equirectangular"}, "longitude", [[-180, 180]], [[-180.5, 0], [0, 180.5]]),
+        ({"lens": "equirectangular"}, "latitude", [[-90, 90]], [[-90.5, 0], [0, 90.5]]),
+    ],
+)
+def test_the_limits_of_what_a_scene_yaml_may_say(
+    camera: dict[str, Any], key: str, allowed: list[Any], refused: list[Any]
+) -> None:
+    for value in allowed:
+        assert from_camera({"resolution": [96, 64], **camera, key: value})
+    for value in refused:
+        with pytest.raises(UserError, match=rf"{key}(\.\[\d\])?: is .*; must be"):
+            from_camera({"resolution": [96, 64], **camera, key: value})
+
+
+def test_what_a_scene_yaml_leaves_out() -> None:
+    size = {"resolution": [96, 64]}
+    assert from_camera(OF_OPENCV | size) == KannalaBrandt(
+        **LANDSCAPE, focal_length=9, coefficients=(0, 0, 0, 0), fov=2 * math.pi
+    )
+    # Until the .blend's own camera is read.
+    assert from_camera({"lens": "file", **size}) == Rectilinear(**LANDSCAPE, focal_length=50)
+
+
+@pytest.mark.parametrize("name", ["rectilinear", "rectilinear shifted"])
+def test_a_projection_matrix_puts_points_where_the_lens_does(name: str) -> None:
+    lens = EXAMPLES[name]
+    matrix = np.array(lens.to_lightfield()["camera"]["projection_matrix"])
+    x, y = grid(lens, np.float64, 9)
+    rays = lens.rays(x, y)
+    # From −1 to 1 over the frame, up and to the right, and from the nearest to the farthest depth.
+    for z, expected in ((0.1, -1), (1000, 1)):
+        points = np.concatenate([rays * z / -rays[..., 2:], np.ones((9, 9, 1))], axis=-1)
+        clip = points @ matrix.T
+        found = clip[..., :3] / clip[..., 3:]
+        np.testing.assert_allclose(found[..., 0], 2 * x / lens.width - 1, atol=1e-9)
+        np.testing.assert_allclose(found[..., 1], 1 - 2 * y / lens.height, atol=1e-9)
+        np.testing.assert_allclose(found[..., 2], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", sorted(LENSES.keys() - {"cube_map"}))
@@ -687,13 +869,23 @@ def test_a_field_of_view_has_one_limit_wherever_it_is_read(
             "11,24,-.01,.03,-.02,.003,3",
             KannalaBrandt(**SENSOR, focal_length=11, coefficients=OPENCV, fov=3),
         ),
+        ("180deg", Equidistant(**LANDSCAPE, fov=math.pi)),
+        ("9,24,90deg", Equisolid(**SENSOR, focal_length=9, fov=math.pi / 2)),
+        (
+            "-180deg,90deg,-90deg,45deg",
+            Equirectangular(
+                **LANDSCAPE,
+                longitude=(-math.pi, math.pi / 2),
+                latitude=(-math.pi / 2, math.pi / 4),
+            ),
+        ),
         ("full", Equirectangular(**LANDSCAPE)),
         ("-1,2,-.5,1", Equirectangular(**LANDSCAPE, longitude=(-1, 2), latitude=(-0.5, 1))),
     ],
 )
 def test_flags(text: str, lens: Lens) -> None:
     assert type(lens).from_flag(text, 96, 64) == lens
-    for wrong in ("", "wide", "1,2,3,4,5,6,7,8", text.replace("full", "") + ",nan"):
+    for wrong in ("", "wide", "1,2,3,4,5,6,7,8", text.replace("full", "") + ",nan", "20deg,24"):
         with pytest.raises(UserError, match="must have the form"):
             type(lens).from_flag(wrong, 96, 64)
 
@@ -739,6 +931,8 @@ def test_rays_of_all_pixel_centres(dtype: type) -> None:
     rays = lens.pixel_rays(dtype)
     assert rays.dtype == dtype
     np.testing.assert_array_equal(rays, lens.rays(x, y))
+    # Of two types the wider one is kept.
+    assert lens.rays(x, y.astype(np.float64)).dtype == lens.rays(1, y).dtype == np.float64
 
 
 USE_IT = """

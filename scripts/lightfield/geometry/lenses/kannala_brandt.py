@@ -68,7 +68,7 @@ class KannalaBrandt(Fisheye):
     @cached_property
     def _increasing(self) -> IncreasingPolynomial:
         odd = [c for k in (1.0, *self.coefficients) for c in (0.0, k)]
-        return IncreasingPolynomial(odd, last=min(self.fov / 2, math.pi))
+        return IncreasingPolynomial(odd, last=self.fov / 2)
 
     @property
     def _unit(self) -> Pair:

@@ -72,7 +72,7 @@ class Polynomial(Fisheye):
     def _increasing(self) -> IncreasingPolynomial:
         # θ = _sign · (a polynomial that increases with r)
         return IncreasingPolynomial(
-            [-self._sign * k for k in self.coefficients], last_value=min(self.fov / 2, math.pi)
+            [-self._sign * k for k in self.coefficients], last_value=self.fov / 2
         )
 
     @property
