@@ -147,6 +147,8 @@ def _patches(
             & (spread < SMOOTH_SPREAD * footprint + precision)
             & (np.abs(cosine) > GRAZING_COSINE)
         )
+    # Where pixels have no points there is no plane, and what they say has no extent of its own.
+    footprint[~finite] = error[~finite] = 0.0
     return Patches(centres, normals, spread, footprint, error), smooth
 
 
