@@ -15,6 +15,7 @@ from lightfield.dataset import config
 from lightfield.dataset.dataset import scene_datasets
 from lightfield.geometry import colmap
 from lightfield.geometry.rigs import from_settings
+from lightfield.geometry.rigs import poses as rig_of_poses
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
 CORNER = [[0, 0, 0], [1, 0, 0], [1, 2, 0.5], [-3, 2, 0.5]]
@@ -102,6 +103,10 @@ def test_random_places_are_seeded_and_a_thinned_rig_has_the_first_of_them():
     assert np.ptp(places(rig), axis=0).min() > 2
     up = matrices(rig)[:, :3, 1]
     np.testing.assert_allclose(up, [[0, 0, 1]] * 40, atol=1e-9)
+    # They are what they were, in every version: datasets are made again from them.
+    one = from_settings({"type": "random", "count": 2, "seed": 5}).poses()[1]
+    np.testing.assert_allclose(one.position, [-0.029277, 0.195880, 0.316538], atol=1e-6)
+    assert one.rotation == pytest.approx((np.pi / 2, 0, 4.864468), abs=1e-6)
 
 
 BUILD = """
@@ -296,3 +301,75 @@ def test_what_no_format_has_is_refused(name, content, expected, tmp_path):
     (tmp_path / name).write_text(content)
     with pytest.raises(UserError, match=expected):
         from_settings({"type": "poses", "file": str(tmp_path / name)}).poses()
+
+
+@pytest.mark.parametrize(
+    ("change", "within", "beyond", "expected"),
+    [
+        (
+            lambda pose, by: pose["world_matrix"][0].__setitem__(0, 1 + by),
+            4e-5,
+            6e-5,
+            "without scale",
+        ),
+        (lambda pose, by: pose["world_matrix"][3].__setitem__(1, by), 9e-5, 1.1e-4, "its last row"),
+        (lambda pose, by: pose["rotation"].__setitem__(2, by), 9e-5, 1.1e-4, "the same rotation"),
+        (lambda pose, by: pose["position"].__setitem__(0, by), 9e-5, 1.1e-4, "the same place"),
+        # Far away, in proportion.
+        (
+            lambda pose, by: pose.update(
+                world_matrix=[[1, 0, 0, 100], *np.eye(4)[1:].tolist()], position=[100 + by, 0, 0]
+            ),
+            9e-3,
+            1.1e-2,
+            "the same place",
+        ),
+        (
+            lambda pose, by: pose.update(
+                world_matrix=[[1, 0, 0, 1e7 + by], *np.eye(4)[1:].tolist()], position=[1e7, 0, 0]
+            ),
+            0,
+            1,
+            "position: must be within 1e.07 metres",
+        ),
+    ],
+)
+def test_poses_may_be_as_far_from_a_rotation_and_from_each_other_as_files_round(
+    change, within, beyond, expected, tmp_path
+):
+    for by, refused in ((within, False), (beyond, True)):
+        pose = {"name": "a", "position": [0, 0, 0], "rotation": [0, 0, 0]}
+        pose["world_matrix"] = np.eye(4).tolist()
+        change(pose, by)
+        file = tmp_path / f"{refused}.json"
+        file.write_text(json.dumps({"frames": [pose]}))
+        rig = from_settings({"type": "poses", "file": str(file)})
+        if refused:
+            with pytest.raises(UserError, match=rf"frames\[0\]: .*{expected}"):
+                rig.poses()
+        else:
+            assert len(rig.poses()) == 1
+
+
+def test_a_quaternion_may_be_as_long_as_files_round(tmp_path):
+    for length, refused in ((1 + 9e-5, False), (1 - 9e-5, False), (1 + 1.1e-4, True)):
+        file = tmp_path / f"{length}.csv"
+        file.write_text(f"name,x,y,z,qw,qx,qy,qz\na,1,2,3,0,0,0,{length}\n")
+        rig = from_settings({"type": "poses", "file": str(file)})
+        if refused:
+            with pytest.raises(UserError, match=r"quaternion: has the length 1\.00011; must be 1"):
+                rig.poses()
+        else:
+            np.testing.assert_allclose(matrices(rig)[0, :3, :3], np.diag([-1, -1, 1]), atol=1e-12)
+
+
+def test_a_file_that_is_too_large_for_poses_is_not_read(tmp_path, monkeypatch):
+    file = tmp_path / "poses.csv"
+    file.write_text("name,x,y,z,rx,ry,rz\na,0,0,0,0,0,0")
+    size = file.stat().st_size
+    monkeypatch.setattr(rig_of_poses, "LARGEST_FILE", size)
+    rig = from_settings({"type": "poses", "file": str(file)})
+    assert rig.view_count == 1
+    monkeypatch.setattr(rig_of_poses, "LARGEST_FILE", size - 1)
+    with pytest.raises(UserError, match=f"is {size} bytes; must be at most {size - 1}"):
+        rig.poses()

@@ -274,13 +274,67 @@ def test_cube_map_faces_look_along_six_axes_of_the_camera() -> None:
         ("plane", [7, 5], [(x, 0, 0) for x in np.linspace(-1, 1, 7)]),
         ("cuboid", [5, 2, 5], [(x, 1, 0) for x in np.linspace(-1, 1, 5)]),
         ("cuboid", [2, 5, 5], [(-1, y, 0) for y in np.linspace(-1, 1, 5)]),
+        ("cuboid", [3, 3, 2], [(x, 1, -1) for x in (-1, 0, 1)]),
         ("cylinder", [4, 3], [(0, 1, 0), (1, 0, 0), (0, -1, 0), (-1, 0, 0)]),
+        ("lattice", [3, 5, 7], [(x, 0, 0) for x in (-1, 0, 1)]),
     ],
 )
 def test_the_row_in_the_middle(kind: str, cameras: list[int], expected: Any) -> None:
     rig = from_settings({"type": kind, "cameras": cameras, "size": 2})
     places = np.array([pose.position for pose in rig.poses()])
     np.testing.assert_allclose(places[rig.middle_row(places)], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("subdivisions", "count", "height"), [(1, 5, -0.447), (2, 10, 0), (3, 20, 0)]
+)
+def test_the_row_of_a_sphere_is_its_ring_nearest_the_equator(
+    subdivisions: int, count: int, height: float
+) -> None:
+    rig = from_settings({"type": "sphere", "subdivisions": subdivisions, "size": 2})
+    places = np.array([pose.position for pose in rig.poses()])
+    row = rig.middle_row(places)
+    assert row == sorted(set(row)) and len(row) == count
+    np.testing.assert_allclose(places[row, 2], height, atol=1e-3)
+    # Two rings of one camera are none.
+    assert rig.middle_row(places[[0, 11]]) == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "own", "area"),
+    [
+        ("plane", {"cameras": [4, 3]}, 2 * 6),
+        ("cuboid", {"cameras": [4, 3, 2]}, 2 * (2 * 4 + 4 * 6 + 6 * 2)),
+        ("lattice", {"cameras": [4, 3, 2]}, 2 * (2 * 4 + 4 * 6 + 6 * 2)),
+        # A prism on a square that lies in the ellipse of the box.
+        ("cylinder", {"cameras": [4, 3]}, 4 * math.hypot(1, 2) * 6),
+    ],
+)
+def test_cells_cover_the_surface_on_which_the_cameras_stand(
+    kind: str, own: Any, area: float
+) -> None:
+    rig = from_settings({"type": kind, "size": [2, 4, 6], **own})
+    places = np.array([pose.position for pose in rig.poses()])
+    cells = rig.cells()
+    assert cells is not None
+    corners = places[np.array(cells)]
+    # Of a parallelogram whose corners are in order, either diagonal halves it.
+    halves = [
+        np.cross(corners[:, i] - corners[:, 0], corners[:, 2] - corners[:, 0]) for i in (1, 3)
+    ]
+    one, other = (np.linalg.norm(half, axis=1) / 2 for half in halves)
+    np.testing.assert_allclose(one, other)
+    assert (one + other).sum() == pytest.approx(area)
+
+
+def test_the_cells_of_a_sphere_are_triangles_that_close_it() -> None:
+    rig = from_settings({"type": "sphere", "subdivisions": 3})
+    cells = rig.cells()
+    assert cells is not None and rig.cells() == cells
+    edges = {frozenset(pair) for a, b, c in cells for pair in ((a, b), (b, c), (c, a))}
+    # Euler's formula.
+    assert 162 - len(edges) + len(cells) == 2
+    assert from_settings({"type": "ring", "count": 5}).cells() is None
 
 
 @pytest.mark.parametrize(
@@ -291,18 +345,30 @@ def test_the_row_in_the_middle(kind: str, cameras: list[int], expected: Any) -> 
         ("lattice", {"cameras": [3, 3, 3]}),
         ("cylinder", {"cameras": [4, 3]}),
         ("sphere", {"subdivisions": 4}),
+        ("hemisphere", {"count": 400, "elevation": [-90, 90]}),
+        ("ring", {"count": 4, "elevation": 0}),
+        ("random", {"count": 2000}),
+        (
+            "path",
+            {"count": 401, "keys": [{"position": at} for at in ((0, 0, 0), (1, 3, 0), (2, 0, 1))]},
+        ),
     ],
 )
 def test_an_outline_reaches_as_far_as_the_rig(kind: str, own: Any) -> None:
-    size = 2 if kind == "sphere" else [2, 4, 6]
+    round_ones = ("sphere", "hemisphere", "ring")
+    size = 2 if kind in round_ones else [2, 4, 6]
     rig = from_settings({"type": kind, "size": size, "center": [1, 1, 1], **own})
     corners = np.concatenate(rig.outline())
     places = np.array([pose.position for pose in rig.poses()])
-    assert rig.is_round == (kind in ("cylinder", "sphere"))
-    # A sphere's cameras need not be at its outermost points.
-    tolerance = 0.03 if kind == "sphere" else 1e-9
-    np.testing.assert_allclose(corners.min(0), places.min(0), atol=tolerance)
-    np.testing.assert_allclose(corners.max(0), places.max(0), atol=tolerance)
+    assert rig.is_round == (kind in ("cylinder", *round_ones))
+    # A sphere's cameras need not be at its outermost points, nor those at random places.
+    tolerance = {"sphere": 0.03, "hemisphere": 0.06, "random": 0.02, "path": 0.02}.get(kind, 1e-9)
+    axes = [0, 1] if kind == "ring" else [0, 1, 2]
+    np.testing.assert_allclose(corners.min(0)[axes], places.min(0)[axes], atol=tolerance)
+    np.testing.assert_allclose(corners.max(0)[axes], places.max(0)[axes], atol=tolerance)
+    if kind in round_ones:
+        np.testing.assert_allclose(np.linalg.norm(corners - 1, axis=1), 1)
+        np.testing.assert_allclose([corners.min(0), corners.max(0)], [[0] * 3, [2] * 3], atol=1e-9)
 
 
 def test_more_than_9999_views_keep_one_name_each() -> None:
@@ -410,6 +476,28 @@ def test_thin_takes_an_even_subset_of_a_pose_file(tmp_path: Path) -> None:
     thinner = from_settings({"type": "poses", "file": str(path)}).thinned(5)
     assert thinner.view_count == 5
     assert [view.name for view in thinner.poses()] == ["v0", "v25", "v50", "v75", "v100"]
+
+
+def test_a_rig_of_pairs_or_of_cubes_cannot_have_fewer_views_than_one_of_them() -> None:
+    ring = {"type": "ring", "count": 3}
+    for more, views in (({"stereo": {"distance": 0.1}}, 2), ({"cube_map": True}, 6)):
+        rig = from_settings(ring | more)
+        assert rig.thinned(2 * views + 1).view_count == 2 * views
+        with pytest.raises(UserError, match=f"a rig of type ring .* as few as {views - 1} views"):
+            rig.thinned(views - 1)
+
+
+def test_the_path_of_a_blends_camera_is_thinned_from_end_to_end() -> None:
+    frames = {"first": 10, "last": 30, "step": 5}
+    rig = from_settings({"type": "blend_camera", "frames": frames})
+    assert isinstance(rig, rigs.BlendCamera)
+    assert rig.path == [10, 15, 20, 25, 30] and rig.view_count == 5 and rig.sequence is None
+    for views, path in ((4, [10, 15, 25, 30]), (3, [10, 20, 30]), (2, [10, 30]), (1, [10])):
+        thinner = rig.thinned(views)
+        assert thinner.path == path and thinner.view_count == views
+    assert from_settings({"type": "blend_camera"}).placed("inventory.json", 7).path == [7]
+    with pytest.raises(UserError, match="where it is, is known once"):
+        rig.poses()
 
 
 @pytest.mark.parametrize("label", ["garden sphere", "garden cuboid"])

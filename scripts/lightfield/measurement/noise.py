@@ -30,7 +30,7 @@ def relative_noise(luminance: Array, block: int = SMALLEST_BLOCK) -> Array:
         deviation = np.median(_blocks(residual, block), axis=(-2, -1)) / MEDIAN_OF_NORMAL
         mean = np.mean(_blocks(light[1:-1, 1:-1], block), axis=(-2, -1))
         ratio = deviation / mean
-    return np.where((mean > 0) & np.isfinite(mean) & np.isfinite(ratio), ratio, np.nan)
+    return np.where((mean > 0) & np.isfinite(mean), ratio, np.nan)
 
 
 def _blocks(values: Array, block: int) -> Array:
