@@ -72,15 +72,46 @@ def test_a_lens_maps_onto_itself():
         assert made.summary[name] == pytest.approx(1, abs=1e-3)
 
 
-@pytest.mark.parametrize(("size", "expected"), [(200, 2.0), (50, 0.5)])
+@pytest.mark.parametrize(
+    ("size", "expected"),
+    [
+        (200, "upsampling: up to 2 target pixels to one of the source (median 2)"),
+        (160, "upsampling: up to 1.6 "),
+        (140, None),
+        (75, None),
+        (60, "aliasing: one target pixel spans up to 1.67 of the source's"),
+        (30, "--samples 4 helps"),
+    ],
+)
 def test_magnification_of_a_plain_change_of_size(size, expected):
     made = lens_map.compute(rectilinear(100), rectilinear(size), IDENTITY, "bicubic")
     assert made.summary == pytest.approx(
-        {"min": expected, "median": expected, "max": expected, "covered": 1.0}, rel=1e-5
+        {"min": size / 100, "median": size / 100, "max": size / 100, "covered": 1.0}, rel=1e-5
     )
-    told = " ".join(lens_map.warnings(made))
-    assert ("upsampling" in told) == (size == 200)
-    assert ("aliasing" in told) == (size == 50)
+    warnings = lens_map.warnings(made)
+    assert len(warnings) == (expected is not None)
+    assert expected is None or expected in warnings[0]
+
+
+def test_several_targets_are_reported_as_one(capsys):
+    targets = [rectilinear(160), rectilinear(120), rectilinear(100)]
+    away = lens_map.rotation_matrix(180, 0, 0)
+    rotations = [IDENTITY, IDENTITY, away]
+    maps = [
+        lens_map.compute(rectilinear(100), target, rotation, "bicubic")
+        for target, rotation in zip(targets, rotations, strict=True)
+    ]
+    lens_map.report(maps)
+    said = capsys.readouterr().err.splitlines()
+    assert said[0] == (
+        "magnification: 1.2 to 1.6, median 1.4 target pixels to one of the source; "
+        "66.7% of the image has a source"
+    )
+    assert [line.split(":")[1] for line in said[1:]] == [" upsampling"]
+    lens_map.report(maps[2:])
+    said = capsys.readouterr().err.splitlines()
+    assert said[0].startswith("magnification: 0 to 0, median 0 ")
+    assert said[1:] == ["warning: the source sees nothing of the target image"]
 
 
 def test_a_filter_that_covers_the_pixel_is_not_warned_of_aliasing():
@@ -160,6 +191,10 @@ def test_a_map_that_mirrors_itself_is_as_one_computed_whole(monkeypatch, source,
     rotation = lens_map.rotation_matrix(*angles)
     assert any(Fold.of_map(source, target, rotation).mirrors)
     folded = lens_map.compute(source, target, rotation)
+    top, bottom, left, right = folded.window
+    cosines = -source.pixel_rays()[top:bottom, left:right, 2]
+    np.testing.assert_allclose(folded.source_cos, cosines, atol=1e-6)
+    np.testing.assert_allclose(folded.target_cos, -target.pixel_rays()[..., 2], atol=1e-6)
     monkeypatch.setattr(Fold, "of_map", lambda *_: Fold((target.height, target.width)))
     whole = lens_map.compute(source, target, rotation)
     assert folded.window == whole.window and folded.summary == pytest.approx(whole.summary)
@@ -167,6 +202,31 @@ def test_a_map_that_mirrors_itself_is_as_one_computed_whole(monkeypatch, source,
         if isinstance(array, np.ndarray):
             found = getattr(folded, name)
             assert np.allclose(found, array, rtol=0, atol=1e-6, equal_nan=True), name
+
+
+@pytest.mark.parametrize("source", [FISHEYE, CubeMap(width=6 * 64, height=64)])
+def test_samples_are_the_pixels_of_a_finer_target(source):
+    rotation = lens_map.rotation_matrix(20, 30, 0)
+    made = lens_map.compute(source, rectilinear(20), rotation, "bicubic", 3)
+    finer = lens_map.compute(source, rectilinear(60), rotation, "bicubic")
+    assert made.coordinates.shape == (60, 60, 2) and made.centers.shape == (20, 20, 2)
+    np.testing.assert_allclose(made.centers, made.coordinates[1::3, 1::3], atol=1e-4)
+    corners = [np.array([one.window[2], one.window[0]]) for one in (made, finer)]
+    np.testing.assert_allclose(
+        made.coordinates + corners[0], finer.coordinates + corners[1], atol=1e-4
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "reach"), [("nearest", 0), ("bilinear", 1), ("bicubic", 2), ("lanczos", 3)]
+)
+def test_a_window_reaches_as_far_as_its_filter(name, reach):
+    # Half of the tangents, so pixels from 25.25 to 74.75 of 100.
+    made = lens_map.compute(rectilinear(100), rectilinear(100, 36), IDENTITY, name)
+    top, bottom, left, right = made.window
+    assert (top, bottom) == (left, right) == (100 - bottom, 100 - top)
+    assert 25 - reach - 2 <= top <= 25 - reach
+    assert np.isfinite(made.source_cos).all() and made.source_cos.shape == (bottom - top,) * 2
 
 
 def test_what_does_not_mirror_itself_is_computed_whole():
