@@ -1,5 +1,7 @@
 """Verify: faults of every kind in files of every kind, all found, named and mended."""
 
+import hashlib
+import json
 import os
 import random
 import shutil
@@ -9,6 +11,10 @@ import pytest
 import simulated
 from checkouts import checkout
 
+from lightfield.core.files import sha256
+from lightfield.dataset import ledger
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
 from lightfield.validation.integrity import Integrity
 from soak import KINDS, replace, spoil
 
@@ -142,6 +148,199 @@ def test_what_is_mended_is_planned_and_nothing_else(copy, run_program):
     assert two.inventory not in planned and two.blend not in planned
     assert f"{two.folder}/lightfield.json" not in planned
     assert Path("work/removed", one.folder, "notes.txt").read_text() == "a stray"
+
+
+# ---- a dataset of one view, alone and as a frame of a sequence ------------------------------
+
+
+def put(path, content):
+    """Write a text, or JSON of what is none."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(content if isinstance(content, str) else json.dumps(content))
+
+
+def published(folder):
+    """Write a dataset of one view and its file of sums."""
+    lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [4, 4]})
+    rig = {"type": "plane", "cameras": [1, 1]}
+    LightField.from_rig(rig, lens).write(folder / "lightfield.json")
+    put(folder / "validation.json", {"valid": True})
+    files = ["exr/view_0000f.exr", "transforms.json", "depth.png"]
+    files += ["exports/colmap/export.json", "exports/colmap/sparse/points.txt"]
+    for name in files:
+        put(folder / name, f'{{"name": "{folder}/{name}"}}')
+    resum(folder, [*files, "lightfield.json", "validation.json"])
+    put(folder / "report/page.html", "a page")
+
+
+def resum(folder, names):
+    lines = [f"{sha256(folder / name)}  {name}\n" for name in sorted(names)]
+    put(folder / "sha256sums.txt", "".join(lines))
+
+
+def worked(name):
+    """Write a dataset's files of work; return them."""
+    folder = Path("work", name)
+    view = f"results/{name}/exr/view_0000f.exr"
+    record = {"files": {"exr/view_0000f.exr": {"sha256": sha256(view)}}}
+    sums = Path(f"results/{name}/sha256sums.txt").read_text()
+    contents = {
+        folder / "render/0-1.json": json.dumps(record),
+        folder / "render/0-1.sums.jsonl": "{}",
+        folder / "places.json": "{}",
+        folder / "checksums.txt": sums,
+        Path("work/benchmarks", name, "r.tsv"): "seconds",
+    }
+    for path, text in contents.items():
+        put(path, text)
+    return list(contents)
+
+
+OF_SCENE = [
+    "work/scene_near/inventory.json",
+    "work/scene/scene.json",
+    "results/scene_near/splits.json",
+]
+OF_OTHERS = [
+    "work/scene_far/x.json",
+    "work/scene_near_too/x.json",
+    "work/scen/x.json",
+    "work/x.json",
+]
+
+
+@pytest.fixture(params=["scene_near/rig", "scene_near/rig/f00001"])
+def small(request, tmp_path, monkeypatch):
+    """Small datasets beside one another, and the name of one of them."""
+    monkeypatch.chdir(tmp_path)
+    name = request.param
+    noted = []
+    for one in (name, f"{name[:-1]}2", "scene_near/other"):
+        published(Path("results", one))
+        noted += worked(one)
+        listed = ("exr/view_0000f.exr", "exports/colmap/sparse/points.txt", "depth.png")
+        present = [path for path in Path("results", one).rglob("*") if path.is_file()]
+        noted += [
+            path for path in present if path.relative_to(f"results/{one}").as_posix() not in listed
+        ]
+    for path in map(Path, OF_SCENE + OF_OTHERS):
+        put(path, {"of": str(path)})
+        noted.append(path)
+    ledger.note(Path("work/sums.json"), sorted({str(path) for path in noted}), (), lambda _: False)
+    return name
+
+
+def found_in(name, work="work"):
+    integrity = Integrity(Path("results", name), Path(work) if work else None)
+    return {str(fault.path): fault.problem for fault in integrity.faults()}
+
+
+def test_each_file_of_a_dataset_and_of_its_scene_is_its_own_and_no_other(small):
+    assert found_in(small) == found_in(small, None) == {}
+    own = {path for path in Path("results", small).rglob("*") if path.is_file()}
+    published_ones = {path for path in own if "report" not in path.parts}
+    own |= {path for path in Path("work", small).rglob("*") if path.is_file()}
+    own |= {Path("work/benchmarks", small, "r.tsv"), *map(Path, OF_SCENE)}
+    everything = [p for top in ("results", "work") for p in Path(top).rglob("*") if p.is_file()]
+    assert len(own) == 17 and own < set(everything)
+    for path in everything:
+        if path == Path("work/sums.json"):
+            continue
+        content = path.read_bytes()
+        path.write_bytes(content + b"\n")
+        assert found_in(small).keys() == ({str(path)} if path in own else set()), path
+        if path in published_ones and path.name != "sha256sums.txt":
+            assert found_in(small, None).keys() == {str(path)}
+        path.write_bytes(content)
+    stray = Path("results", small, "stray.txt")
+    stray.touch()
+    assert found_in(small) == {str(stray): "is no file of this dataset, or has no checksum"}
+
+
+def test_what_says_that_a_file_is_wrong_is_named(small):
+    folder = Path("results", small)
+    for name, source in (
+        ("lightfield.json", "work/sums.json"),
+        ("exr/view_0000f.exr", "its record"),
+        ("depth.png", "sha256sums.txt"),
+    ):
+        content = (folder / name).read_bytes()
+        (folder / name).write_bytes(content + b" ")
+        digest, right = hashlib.sha256(content + b" "), hashlib.sha256(content)
+        problem = f"its sha256 is {digest.hexdigest()}, but {source} says {right.hexdigest()}"
+        assert found_in(small) == {f"results/{small}/{name}": problem}
+        (folder / name).write_bytes(content)
+
+
+def test_what_a_copy_says_of_itself_must_agree(small):
+    folder = Path("results", small)
+    sums = f"{folder}/sha256sums.txt"
+    listed = [line.split("  ")[1] for line in Path(sums).read_text().splitlines()]
+    for missing in ("validation.json", "lightfield.json", "exr/view_0000f.exr"):
+        resum(folder, [name for name in listed if name != missing])
+        assert found_in(small, None) == {
+            f"{folder}/{missing}": "is no file of this dataset, or has no checksum",
+            sums: f"has no checksum of {missing}",
+        }
+    resum(folder, listed)
+    for name in ("README.md", "card.json"):
+        (folder / name).write_text("of a package")
+    assert found_in(small, None) == {}
+    put(folder / "validation.json", {"valid": False})
+    resum(folder, listed)
+    problem = "says that the dataset is not valid"
+    assert found_in(small, None) == {f"{folder}/validation.json": problem}
+    for text, problem in (("no sums\n", "has no checksum"), ("", "is empty"), (None, "is missing")):
+        Path(sums).unlink()
+        if text is not None:
+            Path(sums).write_text(text)
+        assert found_in(small, None) == {sums: problem}
+
+
+def test_without_its_ledger_only_what_is_published_has_a_checksum(small):
+    Path("work/sums.json").unlink()
+    stray = Path("results", small, "depth.png")
+    stray.write_bytes(b"spoilt")
+    found = found_in(small)
+    assert found.pop("work/sums.json").startswith("is missing: what is not published")
+    assert found.keys() == {str(stray)}
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "follower"),
+    [
+        ("results/{}/exports/colmap/sparse/points.txt", "results/{}/exports/colmap/export.json"),
+        ("results/{}/depth.png", "results/{}/transforms.json"),
+        ("work/{}/render/0-1.sums.jsonl", "work/{}/render/0-1.json"),
+        ("work/{}/places.json", None),
+        ("results/{}/exr/view_0000f.exr", None),
+        ("results/{}/lightfield.json", None),
+    ],
+)
+def test_with_a_file_goes_what_its_job_is_known_by(spoilt, follower, small):
+    path = spoilt.format(small)
+    expected = {path, follower.format(small)} if follower else {path}
+    Path(path).write_bytes(b"spoilt")
+    integrity = Integrity(Path("results", small), Path("work"))
+    (fault,) = integrity.faults()
+    integrity.mend(fault)
+    aside = {
+        str(p.relative_to("work/removed")) for p in Path("work/removed").rglob("*") if p.is_file()
+    }
+    assert aside == expected
+    assert not any(Path(name).exists() for name in expected)
+    # What is to be made again is known to be missing.
+    assert expected <= found_in(small).keys()
+
+
+def test_what_only_tells_of_the_work_is_not_missed_once_it_is_aside(small):
+    path = Path("work/benchmarks", small, "r.tsv")
+    path.write_bytes(b"spoilt")
+    integrity = Integrity(Path("results", small), Path("work"))
+    (fault,) = integrity.faults()
+    integrity.mend(fault)
+    assert found_in(small) == {}
+    assert not path.exists() and Path("work/removed", path).read_bytes() == b"spoilt"
 
 
 @pytest.mark.slow
