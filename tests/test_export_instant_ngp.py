@@ -259,6 +259,32 @@ def test_pixels_without_a_source_are_hidden(dataset: Dataset) -> None:
     np.testing.assert_array_equal(mask == 255, pixels[:, :, 3] == 0)
 
 
+def test_where_transparent_views_see_nothing_is_not_hidden(dataset: Dataset) -> None:
+    content = dataset.write(PERSPECTIVE, render={"transparent": True})
+    clear = np.zeros((48, 64, 4), np.uint8)
+    half = np.full((48, 64), 0.5, np.float16)
+    for frame in content["frames"]:
+        images.write_png(dataset.folder / f"{frame['name']}.png", clear)
+        images.write_exr(dataset.folder / f"{frame['name']}.exr", dict.fromkeys("RGBA", half))
+    dataset.export()
+    assert not list(dataset.folder.glob("dynamic_mask_*"))
+    transforms = dataset.export("--image-suffix", ".exr")
+    copied = images.read_image(dataset.folder / transforms["frames"][0]["file_path"]).channels
+    assert copied.keys() == set("RGBA")
+    np.testing.assert_array_equal(copied["A"], half)
+
+
+def test_images_that_are_not_there_yet_are_a_warning(
+    dataset: Dataset, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dataset.write(PERSPECTIVE)
+    images.write_png(dataset.folder / "view_0000f.png", np.ones((48, 64, 3), np.uint8))
+    assert len(dataset.export()["frames"]) == 6
+    first = dataset.folder / "view_0001f.png"
+    expected = f"warning: 5 images are not there, the first is {first}\n"
+    assert capsys.readouterr().err.endswith(expected)
+
+
 @pytest.mark.parametrize("meaning", ["z", "distance"])
 @pytest.mark.parametrize("camera", [PERSPECTIVE, FISHEYE])
 def test_the_loaders_depth_is_the_true_distance(
@@ -473,15 +499,39 @@ def test_other_fisheyes_are_followed_to_a_quarter_of_a_pixel(
         assert abs(angle_between(direction, axes[:, 2]) - angle) < 0.25 * pixel
 
 
+@pytest.mark.parametrize("turned", [1, -1])
+def test_what_is_a_polynomial_goes_as_it_is(turned: int, dataset: Dataset) -> None:
+    terms = [0.01, -0.1, 2e-3, -3e-4, 1e-5]  # radians per mm^i, of which a pixel has 36 / 64
+    coefficients = [turned * term for term in terms]
+    lens = {"lens": "polynomial", "coefficients": coefficients, "resolution": [64, 64]}
+    dataset.write(lens | {"fov": 140})
+    transforms = dataset.export()
+    for power, term in enumerate(coefficients):
+        expected = -term * (36 / 64) ** power
+        assert transforms[f"ftheta_p{power}"] == pytest.approx(expected, abs=1e-9)
+    assert transforms["fl_x"] == transforms["fl_y"] == pytest.approx(64 / 36 / 0.1)
+    dataset.write(FISHEYE)
+    transforms = dataset.export()
+    linear = [transforms[f"ftheta_p{power}"] for power in range(5)]
+    assert linear == [0, pytest.approx(math.pi / 64, rel=1e-9), 0, 0, 0]
+    assert transforms["fl_x"] == pytest.approx(64 / math.pi)
+    # It misses the loader's polynomial by less than a quarter of a pixel, as that has few.
+    dataset.write(ORTHOGRAPHIC | {"resolution": [32, 32]})
+    assert dataset.export()["w"] == 32
+
+
 @pytest.mark.parametrize(
     ("camera", "arguments", "message"),
     [
         (ORTHOGRAPHIC, [], r"lightfield.json: camera: instant-ngp cannot .* by 3.3 pixels"),
         (ORTHOGRAPHIC | {"resolution": [64, 64]}, [], "misses it by 0.41 pixels"),
+        (ORTHOGRAPHIC | {"resolution": [40, 40]}, [], "misses it by 0.26 pixels"),
         (PANORAMA | {"latitude": [-45, 45]}, [], "instant-ngp cannot follow"),
         (PANORAMA | {"longitude": [-180, 170]}, [], "instant-ngp cannot follow"),
         (FISHEYE, ["--offset", 0, 0, 0], "--offset: goes with --scale"),
         (FISHEYE, ["--scale", 0], "--scale: is 0"),
+        (FISHEYE, ["--scale", -1], "--scale: is -1"),
+        (FISHEYE, ["--scale", "nan"], "--scale: is nan"),
         (FISHEYE, ["--image-suffix", ".exr"], "view_0000f.exr: no such file"),
         (FISHEYE, ["--depth-bounds"], "view_0000f.exr: no such file"),
     ],

@@ -209,10 +209,9 @@ class _Writer:
     def seen_points(self) -> Iterator[Floats]:
         """Yield world points (n, 3) seen by views spread over the rig."""
         views = self.lightfield.views
-        count = min(_BOUNDS_VIEWS, len(views))
         step = max(1, max(self.lens.width, self.lens.height) // _BOUNDS_PIXELS)
         part = np.s_[step // 2 :: step, step // 2 :: step]
-        for index in np.unique(np.linspace(0, len(views) - 1, count).round().astype(int)):
+        for index in np.unique(np.linspace(0, len(views) - 1, _BOUNDS_VIEWS).round().astype(int)):
             depth, meaning = self.depth(views[index])
             yield world_points(depth[part], meaning, self.rays[part], views[index])
 
@@ -472,7 +471,8 @@ def _ftheta(lens: Lens) -> list[float]:
     # Chebyshev's nodes keep the largest error of a polynomial fit near its minimum.
     nodes = seen[-1] * (0.5 - 0.5 * np.cos(np.linspace(0, math.pi, 1001)))
     across, down = _angles(lens, nodes)
-    known = np.isfinite(across)
+    # The centre of a lens whose angle there is not 0 looks up, which no pixel beside it does.
+    known = np.isfinite(across) & ((nodes > 0) | (down == 0))
     nodes, across, down = nodes[known], across[known], down[known]
     for degree in (1, 4):
         fit = Polynomial.fit(  # type: ignore[no-untyped-call, unused-ignore]
