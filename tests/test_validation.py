@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.ndimage import binary_erosion
+from scipy.ndimage import binary_dilation, binary_erosion
 
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.dataset.lightfield import NAME, LightField, View
@@ -547,6 +547,70 @@ def test_broken_view_is_named(case: str, small_dataset: Path) -> None:
     assert str(small_dataset) not in json.dumps(result.to_json())
 
 
+def grey(but: int) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
+    """Give a view one colour, but for as many pixels."""
+
+    def change(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        colour = (channels["R"] > 0) * np.float16(0.3)
+        colour[30, 20 : 20 + but] = 0.4
+        return {**channels, **dict.fromkeys("RGB", colour)}
+
+    return change
+
+
+def light_outside(
+    value: float, part: float = 1, within: int = 64
+) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
+    """Light a part of the pixels outside the image circle, up to so many pixels from its rim."""
+
+    def change(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        seen = np.isfinite(channels["Z"])
+        lit = ~seen & binary_dilation(seen, np.ones((3, 3)), within)
+        lit &= np.arange(64 * 64).reshape(64, 64) % 100 < 100 * part
+        return {
+            **channels,
+            **{name: np.where(lit, np.float16(value), channels[name]) for name in "RGB"},
+        }
+
+    return change
+
+
+def depth_outside(within: int) -> Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]:
+    """Give pixels up to so many beyond the image circle a depth."""
+
+    def change(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        seen = np.isfinite(channels["Z"])
+        near = ~seen & binary_dilation(seen, np.ones((3, 3)), within)
+        return {**channels, "Z": np.where(near, np.float32(2), channels["Z"])}
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "check_name", "passed"),
+    [
+        # A five-hundredth of what the lens sees is 5 pixels here.
+        (grey(4), "colour", False),
+        (grey(8), "colour", True),
+        (light_outside(0.0009), "colour", True),
+        (light_outside(0.0011), "colour", False),
+        (light_outside(1, part=0.04), "colour", True),
+        (light_outside(1, part=0.06), "colour", False),
+        # Two pixels at the rim may hold light from both sides of it.
+        (light_outside(1, within=2), "colour", True),
+        (light_outside(1, within=3), "colour", False),
+        (depth_outside(2), "depth", True),
+        (depth_outside(3), "depth", False),
+    ],
+)
+def test_how_little_is_none(
+    change: Callable[[Any], Any], check_name: str, passed: bool, small_dataset: Path
+) -> None:
+    painted(change, ONE)(small_dataset)
+    result = validate(small_dataset)
+    assert failed(result) == ([] if passed else [check_name])
+
+
 def test_the_first_view_is_looked_at_too(small_dataset: Path) -> None:
     first = names(small_dataset)[0]
     repaint(small_dataset, first, lambda c: {**c, **{n: c[n] * 0 for n in "RGB"}})
@@ -697,6 +761,10 @@ def test_of_a_scene_with_volumes_the_misses_are_counted(
     missed = np.mean([np.isposinf(depth[seen]).mean() for depth in views])
     assert missed > 0.01
     assert float(part) / 100 == pytest.approx(missed, abs=0.0005)
+    for count, end in ((8, "V6, V7"), (9, "V6, V7 …")):
+        write_json(tmp_path / "inventory.json", {"volumes": [f"V{i}" for i in range(count)]})
+        many = validate(small_dataset, inventory=tmp_path / "inventory.json")
+        assert check(many, "depth").warnings[0].endswith(end)
     write_json(tmp_path / "inventory.json", {"volumes": []})
     clear = validate(small_dataset, inventory=tmp_path / "inventory.json")
     assert check(clear, "depth").warnings == []
@@ -827,8 +895,8 @@ BROKEN_PASSES: dict[str, tuple[Spoil, str]] = {
         "has the channels Y:float32; must have Y:uint32",
     ),
     "not finite": (in_pass("emission", R=np.nan, G=np.inf), "2 values are not finite"),
-    "long normal": (in_pass("normal", B=1.00015), "1 normals are no unit vectors"),
-    "short normal": (in_pass("normal", B=0.99985), "1 normals are no unit vectors"),
+    "long normal": (in_pass("normal", B=1.00012), "1 normals are no unit vectors"),
+    "short normal": (in_pass("normal", B=0.99988), "1 normals are no unit vectors"),
     "unknown object": (in_pass("object", Y=7), "has [7], which object/names.json does not have"),
     "unknown matte": (
         in_pass("cryptomatte", CryptoObject00_R=3),
@@ -846,6 +914,7 @@ def test_a_broken_pass_is_named(case: str, small_dataset: Path) -> None:
     spoil(small_dataset)
     result = validate(small_dataset)
     assert failed(result) == ["passes"]
+    assert check(result, "passes").detail == "23 of 24 are there and hold what they must"
     (problem,) = check(result, "passes").problems
     path, said = problem.split(": ", 1)
     assert Path(path).name == f"{names(small_dataset)[BAD]}.exr"
@@ -856,7 +925,7 @@ def test_right_passes_are_valid_and_what_cycles_had_no_number_for_is_a_warning(
     small_dataset: Path,
 ) -> None:
     add_passes(small_dataset)
-    in_pass("normal", B=1.00005)(small_dataset)
+    in_pass("normal", B=1.00009)(small_dataset)
     for_floats = np.array([0x00800001, 0xFF000001], np.uint32).view(np.float32)
     own = dict(zip(("CryptoObject00_R", "CryptoObject00_B"), for_floats, strict=True))
     in_pass("cryptomatte", **own)(small_dataset)
@@ -960,6 +1029,48 @@ def test_wrong_reprojection_fails(case: str, small_dataset: Path) -> None:
     result = validate(small_dataset, ["panorama"])
     assert f"panorama/{name}" in failed(result)
     assert all(check.startswith("panorama/") for check in failed(result))
+
+
+def marked_from(columns: float) -> Callable[[dict[str, np.ndarray]], Any]:
+    """Mark what is so many columns and more from the middle; the source sees up to 24."""
+    away = np.abs(np.arange(96) + 0.5 - 48)
+    return lambda c: {
+        **c,
+        "Z": np.where(away > columns, np.float32(np.nan), np.nan_to_num(c["Z"], nan=3)),
+    }
+
+
+@pytest.mark.parametrize(("columns", "passed"), [(22, True), (21, False), (26, True), (27, False)])
+def test_marks_may_be_two_pixels_off(columns: float, passed: bool, small_dataset: Path) -> None:
+    add_panoramas(small_dataset, marked_from(columns))
+    assert check(validate(small_dataset, ["panorama"]), "panorama/marks").passed is passed
+
+
+@pytest.mark.parametrize(("by", "compared"), [(5e-6, True), (2e-5, None)])
+def test_marks_are_compared_with_the_view_from_the_same_place(
+    by: float, compared: bool | None, small_dataset: Path
+) -> None:
+    add_panoramas(small_dataset)
+    for view in range(6):
+        relist(small_dataset / "panorama", move(view, (0, by, 0)))
+    assert check(validate(small_dataset, ["panorama"]), "panorama/marks").passed is compared
+
+
+def test_of_transparent_views_a_pixel_may_be_clear_where_the_source_sees(
+    small_dataset: Path,
+) -> None:
+    rewrite(small_dataset, lambda held: held.update(render={"transparent": True}))
+    painted(alpha(1))(small_dataset)
+    add_panoramas(small_dataset, lambda c: {**c, "A": (~np.isnan(c["Z"])).astype(np.float16)})
+    for view in names(small_dataset):
+        path = small_dataset / "panorama" / f"{view}.png"
+        channels = images.read_image(path).channels
+        pixels = np.dstack([channels[name] for name in "RGBA"])
+        pixels[10:30, 40:60] = 0
+        images.write_png(path, pixels)
+    result = validate(small_dataset, ["panorama"])
+    assert check(result, "panorama/marks").passed
+    assert check(result, "panorama/images").passed
 
 
 def test_missing_picture_of_a_reprojection_is_named(small_dataset: Path) -> None:
