@@ -53,7 +53,8 @@ def test_misses_stay_misses_and_nan_stays_nan(convert) -> None:
 def test_no_distance_where_a_z_depth_says_nothing() -> None:
     beside, behind, ahead = np.array([1.0, 0, 0]), np.array([0, 0, 1.0]), np.array([0, 0, -1.0])
     assert np.isnan(distance_from_z(np.array(0.0), beside))
-    assert np.isnan(distance_from_z(np.array(2.0), beside))
+    for level in (0.0, -0.0):
+        assert np.isnan(distance_from_z(np.array(2.0), np.array([1.0, 0, level])))
     assert np.isnan(distance_from_z(np.array(2.0), behind))
     # However little the point lies on the other side; in the camera itself it is no distance away.
     for z, ray in ((-2.0, ahead), (-0.5, ahead), (-1e-9, ahead), (0.5, behind), (1e-9, behind)):

@@ -61,7 +61,7 @@ def test_only_whole_blocks_within_the_border_count():
     # The border of one pixel has no answer, so 8 × 8 blocks need 10 × 10 pixels.
     assert noise.relative_noise(np.ones((10, 17))).shape == (1, 1)
     assert noise.relative_noise(np.ones((26, 18))).shape == (3, 2)
-    assert np.isnan(noise.relative_noise(-np.ones((10, 10)))).all()
+    assert np.isnan(noise.relative_noise(np.full((10, 10), -0.5))).all()
     # Neither has a block whose light is none in the mean.
     assert np.isnan(noise.relative_noise(np.zeros((10, 10)))).all()
     assert np.isnan(noise.relative_noise(np.indices((10, 10)).sum(axis=0) % 2 * 2 - 1)).all()

@@ -27,8 +27,8 @@ def relative_noise(luminance: Array, block: int = SMALLEST_BLOCK) -> Array:
     light = luminance.astype(np.float64)
     with np.errstate(invalid="ignore", divide="ignore"):
         residual = np.abs(np.diff(np.diff(light, 2, axis=0), 2, axis=1)) / MASK_NORM
-        deviation = np.median(_blocks(residual, block), axis=(-2, -1)) / MEDIAN_OF_NORMAL
-        mean = np.mean(_blocks(light[1:-1, 1:-1], block), axis=(-2, -1))
+        deviation = np.median(_blocks(residual, block), axis=(2, 3)) / MEDIAN_OF_NORMAL
+        mean = np.mean(_blocks(light[1:-1, 1:-1], block), axis=(2, 3))
         ratio = deviation / mean
     return np.where((mean > 0) & np.isfinite(mean), ratio, np.nan)
 
