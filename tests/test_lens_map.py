@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from lightfield.core.errors import UserError
-from lightfield.geometry.lenses.cube_map import CubeMap
+from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -202,6 +202,38 @@ def test_a_map_that_mirrors_itself_is_as_one_computed_whole(monkeypatch, source,
         if isinstance(array, np.ndarray):
             found = getattr(folded, name)
             assert np.allclose(found, array, rtol=0, atol=1e-6, equal_nan=True), name
+
+
+@pytest.mark.parametrize("name", ["nearest", "bicubic"])
+def test_a_cube_maps_faces_go_on_beyond_their_borders(name):
+    cube = CubeMap(width=6 * 16, height=16)
+    made = lens_map.compute(cube, rectilinear(20), lens_map.rotation_matrix(40, 30, 0), name)
+    side = made.strip.shape[0]
+    border = (side - 16) // 2
+    assert border >= 2 and made.strip.shape == (side, 6 * side, 2)
+    assert made.source_cos.shape == made.strip.shape[:2]
+    places = np.arange(side) + 0.5 - border
+    ahead = cube.face.rays(places[None, :], places[:, None])
+    edge = -ahead[..., 2][np.ix_(*[np.arange(side).clip(border, side - border - 1)] * 2)]
+    for index, turn in enumerate(CUBE_FACES.values()):
+        columns = slice(index * side, (index + 1) * side)
+        # Where the strip without borders has the ray of a pixel of the plane of this face.
+        found = cube.rays(*np.moveaxis(made.strip[:, columns].astype(float), -1, 0))
+        np.testing.assert_allclose(found, ahead @ turn.T, atol=1e-5)
+        np.testing.assert_allclose(made.source_cos[:, columns], edge, atol=1e-6)
+    # A map's coordinates are of the strip with borders.
+    rays = rectilinear(20).pixel_rays() @ lens_map.rotation_matrix(40, 30, 0).T
+    face = made.centers[..., 0] // side
+    plain = made.centers - np.stack([(2 * face + 1) * border, border + 0 * face], axis=-1)
+    np.testing.assert_allclose(cube.rays(*np.moveaxis(plain.astype(float), -1, 0)), rays, atol=1e-5)
+
+
+def test_the_magnification_of_a_cube_map_is_that_of_its_faces_across_their_borders():
+    # (cos θ of the source / cos θ of the target)^1.5, of which the least is at the seam ahead.
+    cube = CubeMap(width=6 * 64, height=64)
+    made = lens_map.compute(cube, rectilinear(64), lens_map.rotation_matrix(45, 0, 0), "bicubic")
+    assert made.summary["min"] == pytest.approx(2**-0.75, rel=0.03)
+    assert made.summary["max"] == pytest.approx(2**0.75, rel=0.03)
 
 
 @pytest.mark.parametrize("source", [FISHEYE, CubeMap(width=6 * 64, height=64)])

@@ -363,7 +363,12 @@ def _strip_with_borders(source: CubeMap, border: int) -> Array:
     places = np.arange(-border, source.height + border) + 0.5
     rays = source.face.rays(places[None, :], places[:, None])
     faces = [source.pixels(rays @ rotation.T) for rotation in CUBE_FACES.values()]
-    return np.concatenate(faces, axis=1).astype(np.float32)
+    exact = np.concatenate(faces, axis=1)
+    strip = exact.astype(np.float32)
+    # Rounding must not carry a pixel to the next face of the strip, which is no neighbour in space.
+    end = ((np.floor(exact[..., 0] / source.height) + 1) * source.height).astype(np.float32)
+    strip[..., 0] = np.minimum(strip[..., 0], np.nextafter(end, np.float32(0)))
+    return strip
 
 
 def _face_cosines(source: CubeMap, border: int) -> Array:
