@@ -52,6 +52,14 @@ def test_cameras_are_evenly_along_a_path_through_its_keys(closed, size):
     assert np.allclose(few[0], many[0])
 
 
+@pytest.mark.parametrize("size", [1, [1, 3, 0.5]])
+def test_a_path_is_the_same_from_either_end(size):
+    forth, back = (places(path(keys, 41, size=size)) for keys in (CORNER, CORNER[::-1]))
+    np.testing.assert_allclose(forth, back[::-1], atol=1e-5)
+    assert np.allclose(forth[0], np.array(CORNER[0]) * size)
+    assert np.allclose(forth[-1], np.array(CORNER[-1]) * size)
+
+
 def test_without_rotations_cameras_look_along_the_path_upright():
     turns = matrices(path([[0, 0, 0], [3, 4, 0]], 4))[:, :3, :3]
     np.testing.assert_allclose(turns[:, :, 2], [[-0.6, -0.8, 0]] * 4, atol=1e-9)

@@ -371,6 +371,21 @@ def test_an_outline_reaches_as_far_as_the_rig(kind: str, own: Any) -> None:
         np.testing.assert_allclose([corners.min(0), corners.max(0)], [[0] * 3, [2] * 3], atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("kind", "own", "volume"),
+    [
+        ("cuboid", {"cameras": [2, 2, 2]}, 1),
+        ("lattice", {"cameras": [2, 2, 2]}, 1),
+        ("random", {"count": 9}, 1),
+        ("sphere", {"subdivisions": 2}, math.pi / 6),
+        ("plane", {"cameras": [2, 2]}, None),
+        ("ring", {"count": 3}, None),
+    ],
+)
+def test_what_a_rig_encloses_of_its_box(kind: str, own: Any, volume: float | None) -> None:
+    assert from_settings({"type": kind, **own}).unit_volume == volume
+
+
 def test_more_than_9999_views_keep_one_name_each() -> None:
     rig = from_settings({"type": "plane", "cameras": [101, 101]})
     names = [view.name for view in rig.poses()]
@@ -533,6 +548,18 @@ def test_orbits_look_at_the_middle_from_where_they_are_said_to_be(name):
     assert len(thinner.poses()) == thinner.view_count == 7
 
 
+def test_orbits_begin_before_the_object_and_go_round_it_as_a_cylinder_does():
+    ring = rigs.from_settings({"type": "ring", "count": 4, "size": 2}).poses()
+    expected = [(0, 1, 0), (1, 0, 0), (0, -1, 0), (-1, 0, 0)]
+    np.testing.assert_allclose([pose.position for pose in ring], expected, atol=1e-9)
+    golden = math.pi * (3 - math.sqrt(5))
+    for name, turn in (("hemisphere", golden), ("spiral", 2 * math.pi * 3 / 49), ("rings", None)):
+        places = np.array([p.position for p in rigs.from_settings(ORBITS[name]).poses()])
+        azimuth = np.arctan2(places[:2, 0], places[:2, 1])
+        assert azimuth[0] == pytest.approx(0, abs=1e-9)
+        assert azimuth[1] == pytest.approx(turn or azimuth[1].clip(0.1, 1), abs=1e-9)
+
+
 def test_a_hemisphere_is_evenly_covered():
     for name in ("hemisphere", "rings"):
         places = np.array([p.position for p in rigs.from_settings(ORBITS[name]).poses()]) * 2
@@ -572,5 +599,7 @@ def test_every_rig_can_look_at_a_point():
 
 
 def test_elevations_must_grow():
+    flat = rigs.from_settings({"type": "spiral", "count": 5, "elevation": [30, 30], "size": 2})
+    np.testing.assert_allclose([pose.position[2] for pose in flat.poses()], 0.5)
     with pytest.raises(UserError, match="must have the smaller value first"):
         rigs.from_settings({"type": "spiral", "count": 5, "elevation": [50, 10]})

@@ -1056,11 +1056,13 @@ def test_marks_are_compared_with_the_view_from_the_same_place(
     assert check(validate(small_dataset, ["panorama"]), "panorama/marks").passed is compared
 
 
+@pytest.mark.parametrize("transparent", [True, False])
 def test_of_transparent_views_a_pixel_may_be_clear_where_the_source_sees(
-    small_dataset: Path,
+    transparent: bool, small_dataset: Path
 ) -> None:
-    rewrite(small_dataset, lambda held: held.update(render={"transparent": True}))
-    painted(alpha(1))(small_dataset)
+    rewrite(small_dataset, lambda held: held.update(render={"transparent": transparent}))
+    if transparent:
+        painted(alpha(1))(small_dataset)
     add_panoramas(small_dataset, lambda c: {**c, "A": (~np.isnan(c["Z"])).astype(np.float16)})
     for view in names(small_dataset):
         path = small_dataset / "panorama" / f"{view}.png"
@@ -1069,8 +1071,33 @@ def test_of_transparent_views_a_pixel_may_be_clear_where_the_source_sees(
         pixels[10:30, 40:60] = 0
         images.write_png(path, pixels)
     result = validate(small_dataset, ["panorama"])
-    assert check(result, "panorama/marks").passed
+    assert check(result, "panorama/marks").passed is transparent
     assert check(result, "panorama/images").passed
+
+
+def test_the_faces_of_a_cube_map_are_compared_with_their_view(small_dataset: Path) -> None:
+    lens = lenses.from_camera({"lens": "rectilinear", "fov": 90, "resolution": [32, 32]})
+    own = LightField.read(small_dataset / NAME)
+    for face, side in (("l", 1), ("r", -1)):
+        turned = np.eye(4)
+        turned[:3, :3] = degrees(1, 90 * side)
+        views = [View.placed(f"{view.name}_{face}", view.matrix @ turned) for view in own.views]
+        lightfield = own.changed(lens=lens, views=views, depth="distance")
+        # Ahead of the fisheyes is the right half of what is to the left, and the other way round.
+        unseen = (np.arange(32) < 16) == (side > 0)
+        for view in views:
+            channels = render(lens, view.matrix, "distance", np.random.default_rng(3))
+            channels = {name: np.where(unseen, 0, pixels) for name, pixels in channels.items()}
+            channels["Z"] = np.where(unseen, np.float32(np.nan), channels["Z"])
+            images.write_exr(small_dataset / face / f"{view.name}.exr", channels)
+        lightfield.write(small_dataset / face / NAME)
+    result = validate(small_dataset, ["l", "r"])
+    assert failed(result) == []
+    assert check(result, "l/marks").passed and check(result, "r/marks").passed
+    path = small_dataset / "r" / f"{views[2].name}.exr"
+    channels = images.read_image(path).channels
+    images.write_exr(path, {**channels, "Z": np.nan_to_num(channels["Z"], nan=2)})
+    assert "r/marks" in failed(validate(small_dataset, ["l", "r"]))
 
 
 def test_missing_picture_of_a_reprojection_is_named(small_dataset: Path) -> None:
