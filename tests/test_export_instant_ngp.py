@@ -215,9 +215,11 @@ def test_a_camera_worked_by_hand(dataset: Dataset) -> None:
 
 
 def test_frames_keep_the_views_order_which_natural_sorting_leaves_alone(dataset: Dataset) -> None:
-    rig = {"type": "plane", "cameras": [1001, 10]}
+    rig = {"type": "plane", "cameras": [12, 2]}
     content = dataset.write({**FISHEYE, "resolution": [1, 1]}, rig)
-    content["frames"] = [*content["frames"][:12], *content["frames"][9990:]]
+    # As a rig of more than 10,000 views names them.
+    for number, frame in enumerate(content["frames"][12:], 9990):
+        frame["name"] = f"view_{number:04d}f"
     (dataset.folder / "lightfield.json").write_text(json.dumps(content))
     transforms = dataset.export()
     paths = [frame["file_path"] for frame in transforms["frames"]]
