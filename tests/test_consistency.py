@@ -96,6 +96,16 @@ def test_of_each_cell_a_smooth_place_is_taken(smooth):
     assert len(consistency.sample(at(), np.full((64, 64), np.inf), 16)) == 0
 
 
+def test_smooth_is_what_is_so_for_the_size_of_its_pixels():
+    # Chequered by a fifth of a pixel at 1 m, and by a tenth of one at 8 m.
+    away, amount = np.array([[1.0], [8.0]]), np.array([[0.2], [0.1]])
+    halves = away + np.where(np.arange(8) % 2, 1, -1) * amount * away / FOCAL
+    rows = np.stack([halves.ravel(), 2 * np.repeat(away, 8) - halves.ravel()])
+    found = consistency.sample(at(), np.tile(rows, (32, 4)), 16)
+    assert len(found) == 16
+    np.testing.assert_allclose(found.points[:, 2], -8, rtol=1e-2)
+
+
 def test_spread_is_the_deviation_of_depth_from_a_plane():
     noisy = np.random.default_rng(2).normal(AWAY, 0.1 * STEP, (64, 64))
     found = consistency.sample(at(), noisy, 10**6)
@@ -161,13 +171,13 @@ def test_a_point_agrees_within_the_tolerance_of_both_surfaces(asked, depth, tole
 
 
 def test_a_residual_counts_in_footprints_and_comes_with_the_deviation_that_is_expected():
-    asked = on_wall(ROW, away=AWAY - 0.2 * STEP, spread=0.3 * STEP, error=0.12 * STEP)
+    asked = on_wall(ROW, away=AWAY - 0.2 * STEP, spread=0.3 * STEP, error=1.2 * STEP)
     found = consistency.compare(asked, at(), wall())
     assert found.fine.all()
     np.testing.assert_allclose(found.footprint, STEP, rtol=0.02)
     np.testing.assert_allclose(found.residual, 0.2, rtol=0.02)
     # Of an error evenly within its bound the deviation is a √12th.
-    expected = np.sqrt(0.1**2 + (0.05 / 4) ** 2 + 0.12**2 / 12)
+    expected = np.sqrt(0.1**2 + (0.05 / 4) ** 2 + 1.2**2 / 12)
     np.testing.assert_allclose(found.expected, expected, rtol=0.02)
     coarse = replace(asked, error=0 * asked.error)
     found = consistency.compare(coarse, at(grain=0.1), wall())
@@ -317,7 +327,16 @@ def test_scales_are_what_angles_and_depths_lack(angle, depth):
         answers += Answer(moments=moments, measured=int(known.sum()))
     found, deviation = consistency.scales(answers)
     np.testing.assert_allclose(found, [-angle, -depth], atol=2e-5)
-    assert (deviation < 1e-4).all()
+    assert (deviation < 1e-6).all()
+
+
+def test_of_large_residuals_less_counts():
+    points, normals, footprint = surfaces(33, 7)
+    residual = np.where(np.arange(33) < 30, 1.0, 3.0) * np.where(np.arange(33) % 2, 1, -1)
+    measured = compared(points, points, normals, footprint, residual)
+    moments = consistency.scale_moments(measured, at(1, 0, 0), at())
+    # Beyond 1.5 medians the weight falls as the residual grows.
+    assert moments[2, 2] == pytest.approx(30 + 3 * 1.5 / 3 * 3**2)
 
 
 def test_the_deviation_of_scales_is_that_of_their_noise():
