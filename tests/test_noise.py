@@ -65,3 +65,12 @@ def test_only_whole_blocks_within_the_border_count():
     # Neither has a block whose light is none in the mean.
     assert np.isnan(noise.relative_noise(np.zeros((10, 10)))).all()
     assert np.isnan(noise.relative_noise(np.indices((10, 10)).sum(axis=0) % 2 * 2 - 1)).all()
+
+
+def test_the_light_of_a_block_is_that_of_its_own_pixels():
+    y, x = np.mgrid[:18, :26]
+    plane = 1.0 + 10 * y + 3 * x
+    measured = noise.relative_noise(plane + 0.1 * (-1) ** (x + y))
+    # The border has no answer, so the first block begins at the second row and column.
+    light = plane[1:17, 1:25].reshape(2, 8, 3, 8).mean(axis=(1, 3))
+    np.testing.assert_allclose(measured, 0.1 * 16 / 6 / 0.6745 / light)
