@@ -53,8 +53,9 @@ SUBMIT = """#!/bin/sh
 # Run a job in a folder of its own, and print its number.
 set -e
 job=$(mktemp -d {jobs}/XXXXXX)
+cd {root}
+cp -R --parents program configs config.yaml {settings} "$job"
 cd "$job"
-cp -R {root}/program {root}/configs {root}/config.yaml .
 setsid sh -c 'sh "$1" > terminal.log 2>&1; echo $? > status' sh "$1" > /dev/null 2>&1 &
 echo $! > pid
 basename "$job"
@@ -80,9 +81,12 @@ class Disk(Build):
 
 
 class Cloud(Disk):
-    """A build whose jobs see nothing of each other but what lies in ``store``, a URL or folder."""
+    """A build whose jobs see nothing of each other but what lies in ``store``, a URL or folder.
 
-    def __init__(self, root: Path, views: int, store: str) -> None:
+    Each has the scene YAMLs, and ``settings``, paths of what else these name, without blanks.
+    """
+
+    def __init__(self, root: Path, views: int, store: str, settings: tuple[str, ...] = ()) -> None:
         super().__init__(root, views)
         self.store = store
         self.jobs = root.with_name("jobs")
@@ -93,7 +97,8 @@ class Cloud(Disk):
             subprocess.run(["cp", "-R", ROOT / name, program], check=True)
         for name, text in (("submit", SUBMIT), ("status", STATUS)):
             script = root / f"{name}.sh"
-            write_text(script, text.format(jobs=self.jobs, root=root))
+            named = " ".join(settings)
+            write_text(script, text.format(jobs=self.jobs, root=root, settings=named))
             script.chmod(0o755)
 
     def start(self, *words: str, limit: int | None = None) -> subprocess.Popen[str]:

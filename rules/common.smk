@@ -34,6 +34,7 @@ from lightfield.dataset.dataset import (
     MOST_SHARDS,
     PICTURES,
     PLOTS,
+    check_presence,
     load_datasets,
     scene_datasets,
 )
@@ -74,6 +75,9 @@ if workflow.resource_settings.nodes:
 try:
     SETTINGS = load_config(config)
     CHOSEN = load_datasets(SETTINGS)
+    if workflow.is_main_process:
+        for dataset in CHOSEN:
+            check_presence(dataset)
     WHOLE = load_datasets(SETTINGS.model_copy(update={"rigs": "all"}))
     SMOKE = scene_datasets("smoke", settings=SETTINGS)
 except UserError as error:
@@ -305,7 +309,7 @@ def checked_blend(wildcards):
     dataset = SCENES[wildcards.name]
     if dataset.blend_changed:
         made_anew(dataset.blend_check)
-    return dataset.blend
+    return local(dataset.blend)
 
 
 def listed_blend(wildcards):
@@ -313,7 +317,7 @@ def listed_blend(wildcards):
     dataset = SCENES[wildcards.name]
     if dataset.external_changed:
         made_anew(dataset.inventory)
-    return dataset.blend
+    return local(dataset.blend) if dataset.source.blend else dataset.blend
 
 
 def inventory_settings(wildcards):

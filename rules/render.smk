@@ -15,6 +15,8 @@ rule import_views:
         log_of("{scene}/{rig}/render/{first}-{end}"),
     wildcard_constraints:
         scene=IMPORTED,
+    # With a store the views lie where Snakemake runs.
+    localrule: bool(STORE)
     conda:
         ENVIRONMENT
     params:

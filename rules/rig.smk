@@ -6,6 +6,7 @@ rule free_places:
     input:
         check=of_dataset("blend_check"),
         blend=of_dataset("blend"),
+        inventory=of_dataset("blend_inventory"),
     output:
         f"{MADE}/places.json",
     log:
@@ -23,12 +24,13 @@ rule free_places:
         ),
         name=of_dataset("scene_name"),
         frame=lambda wildcards: dataset_of(wildcards).source.frame,
+        inventory=inventory_words,
     message:
         "Looking for free places for the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/free_places.py"
         " --blend {input.blend:q} --scene {params.name}"
-        " --rig {params.rig:q} --frame {params.frame}"
+        " --rig {params.rig:q} --frame {params.frame} {params.inventory}"
         " --output {output} > {log} 2>&1"
 
 
@@ -69,6 +71,7 @@ rule check_cameras:
     input:
         check=of_dataset("blend_check"),
         blend=of_dataset("blend"),
+        inventory=of_dataset("blend_inventory"),
         lightfield=f"{DATASET}/lightfield.json",
     output:
         f"{MADE}/cameras.json",
@@ -81,11 +84,13 @@ rule check_cameras:
     resources:
         mem_mb=8000,
         runtime=60,
+    params:
+        inventory=inventory_words,
     message:
         "Looking for cameras of {wildcards.scene}/{wildcards.rig} inside geometry"
     shell:
         f"python {SCRIPTS}/check_cameras.py"
-        " --blend {input.blend:q} --lightfield {input.lightfield}"
+        " --blend {input.blend:q} --lightfield {input.lightfield} {params.inventory}"
         " --output {output} > {log} 2>&1"
 
 

@@ -61,6 +61,8 @@ rule inventory:
         log_of("{name}/inventory"),
     benchmark:
         times_of("{name}/inventory")
+    # With a store a user's files lie where Snakemake runs.
+    localrule: bool(STORE) and any(d.source.blend for d in SCENES.values())
     conda:
         ENVIRONMENT
     resources:
@@ -85,7 +87,7 @@ for name, dataset in SCENES.items():
         name:
             f"fetch_{name}"
         output:
-            dataset.blend,
+            local(dataset.blend),
         log:
             log_of(f"{name}/fetch_blend"),
         # Where Snakemake runs: a cluster's nodes may not reach the Internet.
@@ -100,3 +102,28 @@ for name, dataset in SCENES.items():
             f"python {SCRIPTS}/fetch_blend.py"
             " --scene {params.name} --output {output:q}"
             " > {log} 2>&1"
+
+
+# Only where jobs see no common folder: Snakemake brings them the copy in its storage.
+for name, dataset in SCENES.items() if STORE else ():
+    if not dataset.source.blend:
+        continue
+
+    rule:
+        name:
+            f"store_{name}"
+        input:
+            # Another file may be older than the copy of the one before.
+            check=dataset.blend_check,
+            blend=local(dataset.blend),
+        output:
+            dataset.blend,
+        log:
+            log_of(f"{name}/store_blend"),
+        localrule: True
+        conda:
+            ENVIRONMENT
+        message:
+            "Storing {input.blend}"
+        shell:
+            "cp {input.blend:q} {output:q} > {log} 2>&1"

@@ -35,16 +35,14 @@ def check_storage():
         raise UserError(
             f"default-storage-prefix: {STORE}: must be a URL, or a path from /"
         )
-    for key in ("results", "work"):
-        if Path(config[key]).is_absolute() or ".." in Path(config[key]).parts:
-            raise UserError(
-                f"{key}: {config[key]}: must lie here, for the storage has its copy"
-            )
+    places = {"results": RESULTS, "work": WORK}
     for dataset in CHOSEN:
-        if not dataset.source.builder:
+        if dataset.source.blend:
+            places[f"{dataset.scene_name}: scene.blend"] = dataset.source.blend
+    for key, path in places.items():
+        if Path(path).is_absolute() or ".." in Path(path).parts:
             raise UserError(
-                f"{dataset.scene_name}: is made of files that are in no storage; only built "
-                "scenes can be rendered so: let all nodes see one folder, and take no storage"
+                f"{key}: {path}: must lie here, for the storage has its copy"
             )
 
 
@@ -66,8 +64,8 @@ def use_copies(folder):
 def bring_settings():
     """Bring here what says from what the stored files were made: each run may begin with none."""
     for dataset in CHOSEN:
-        perhaps = (dataset.inventory, dataset.calibration, dataset.places)
-        for path in (*perhaps, *dataset.published):
+        perhaps = (dataset.blend_check, dataset.inventory, dataset.calibration)
+        for path in (*perhaps, dataset.places, *dataset.published):
             if isinstance(path, str):
                 ViewStore(STORE).bring(path)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import write_json
+from lightfield.core.files import read_json, write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.rendering import blend_file
 from lightfield.rendering.clearance import REACH, TOUCHING, clearances, enclosing_objects
@@ -20,13 +20,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--blend", required=True, type=Path, help="the scene")
     parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
+    parser.add_argument("--inventory", type=Path, help="JSON of what the scene's .blend reads")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 
     lightfield = LightField.read(arguments.lightfield)
     names = [view.name for view in lightfield.views]
     positions = np.array([view.position for view in lightfield.views])
-    blend_file.open_scene(arguments.blend, lightfield.content.get("scene", {}))
+    inventory = read_json(arguments.inventory) if arguments.inventory else None
+    blend_file.open_scene(arguments.blend, lightfield.content.get("scene", {}), inventory)
     bpy.context.scene.frame_set(lightfield.frame)
     distances = clearances(positions)
     inside = enclosing_objects(positions)

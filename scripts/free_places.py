@@ -8,7 +8,7 @@ import bpy
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import write_json
+from lightfield.core.files import read_json, write_json
 from lightfield.dataset import config
 from lightfield.geometry import rigs
 from lightfield.rendering import blend_file
@@ -21,6 +21,7 @@ def main() -> None:
     parser.add_argument("--rig", required=True, type=json.loads, help="the rig's settings, as JSON")
     parser.add_argument("--scene", help="name of a file in configs/scenes/, for what it chooses")
     parser.add_argument("--frame", default="1", help="a number, or file: the .blend's own")
+    parser.add_argument("--inventory", type=Path, help="JSON of what the scene's .blend reads")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 
@@ -28,7 +29,8 @@ def main() -> None:
     if not isinstance(rig, rigs.Random):
         raise UserError(f"--rig: type: is {rig.type}; must be random")
     chosen = config.load_scene(arguments.scene).scene.model_dump() if arguments.scene else {}
-    blend_file.open_scene(arguments.blend, chosen)
+    inventory = read_json(arguments.inventory) if arguments.inventory else None
+    blend_file.open_scene(arguments.blend, chosen, inventory)
     if arguments.frame != config.FILE:
         bpy.context.scene.frame_set(int(arguments.frame))
     places = free_places(rig)

@@ -16,8 +16,9 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import blend, config
 from lightfield.dataset.dataset import scene_datasets
+from lightfield.dataset.view_store import ViewStore
 from lightfield.geometry.rigs import BlendCamera
-from lightfield.rendering import blend_facts, blend_file, pruning, scene_memory
+from lightfield.rendering import blend_facts, blend_file, external_files, pruning, scene_memory
 from lightfield.rendering.inventory import FEATURES, inventory
 
 
@@ -41,6 +42,8 @@ def main() -> None:
     found |= inventory()
     if found["missing"] and not chosen.get("allow_missing"):
         raise UserError(refusal(arguments.blend, found["missing"]))
+    if store := ViewStore.configured():
+        external_files.put(arguments.blend, found["external_files"], store)
     leave_out = pruning.left_out(found)
     found["left_out"] = leave_out
     # Of what is open here nothing is left, for it to be rendered in the same memory.

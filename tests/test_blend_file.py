@@ -13,7 +13,7 @@ from checkouts import checkout, planned, snakemake
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.dataset import config, download
-from lightfield.dataset.dataset import load_datasets, scene_datasets
+from lightfield.dataset.dataset import check_presence, load_datasets, scene_datasets
 
 CONTENT = bytes(range(256)) * 12345
 SUM = hashlib.sha256(CONTENT).hexdigest()
@@ -208,12 +208,12 @@ def test_a_missing_file_gives_the_page_and_the_place(scene):
     content = {"scenes": ["own"], "preset": "full", "presets": {"full": {}}}
     settings = config.load_config(content)
     with pytest.raises(UserError) as caught:
-        load_datasets(settings)
+        check_presence(load_datasets(settings)[0])
     assert "there is no file blends/mine.blend" in str(caught.value)
     assert "get it from https://example.org/scenes and put it there" in str(caught.value)
     # What can be downloaded may be missing.
     scene(more=", url: 'https://example.org/mine.blend'", blend="blends/mine.blend")
-    assert len(load_datasets(settings)) == 1
+    check_presence(load_datasets(settings)[0])
 
 
 # What an original has of its own.

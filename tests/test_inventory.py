@@ -9,6 +9,7 @@ import pytest
 from checkouts import checkout, planned
 
 from lightfield.core.files import sha256
+from lightfield.dataset.view_store import VARIABLE
 from lightfield.rendering import pruning
 
 NOTHING = {"hidden": [], "animated": [], "moving": [], "motion_blur": False}
@@ -124,7 +125,7 @@ bpy.ops.wm.save_as_mainfile(filepath=folder + "/linked.blend", relative_remap=Fa
 """
 
 
-def test_what_is_missing_or_cannot_be_read_is_an_error(run_program, tmp_path):
+def test_what_is_missing_or_cannot_be_read_is_an_error(run_program, tmp_path, monkeypatch):
     (tmp_path / "make.py").write_text(MISSING)
     scripts = Path(pruning.__file__).parents[2]
     run_program(tmp_path / "make.py", tmp_path, scripts)
@@ -141,6 +142,13 @@ def test_what_is_missing_or_cannot_be_read_is_an_error(run_program, tmp_path):
     assert found[0]["sha256"] == sha256(tmp_path / "bark.png")
     assert found[2]["sha256"] is None
     output.unlink()
+
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "store"))
+    code, told = listed("textured")
+    assert code == 1
+    assert told.startswith(f"error: {tmp_path}/textured.blend: reads {tmp_path}/")
+    assert "; with a storage, what a .blend reads must lie in this folder" in told
+    monkeypatch.delenv(VARIABLE)
 
     bark, font = tmp_path / "bark.png", tmp_path / "font.woff2"
     texture = f"the texture bark at {bark}"

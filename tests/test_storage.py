@@ -1,11 +1,13 @@
-"""A build whose jobs see no common folder, by a storage in a folder."""
+"""Builds whose jobs see no common folder, by a storage in a folder."""
 
 from collections import Counter
 
 import pytest
-from checkouts import wait_until
+from checkouts import ROOT, wait_until
+from sphere import write_views
 
 from cloud import Cloud, kill_group
+from lightfield.core.files import sha256
 from lightfield.dataset import records
 from lightfield.dataset.view_store import ViewStore
 
@@ -42,3 +44,89 @@ def test_a_build_in_isolated_folders_loses_no_view_when_its_jobs_are_killed(smok
             assert (tmp_path / name).read_bytes() == (
                 smoke / "results" / PANORAMAS / name
             ).read_bytes()
+
+
+# A room with a texture of its walls, and a box with another one from a linked library.
+BLEND = """
+import sys
+import bpy
+folder, scripts = sys.argv[1:]
+sys.path.insert(0, scripts)
+from scenes import room
+
+def paint(name, colour):
+    image = bpy.data.images.new(name, 4, 4)
+    image.pixels = [*colour, 1] * 16
+    image.filepath_raw, image.file_format = f"{folder}/textures/{name}.png", "PNG"
+    image.save()
+    image.source = "FILE"
+    tree = bpy.data.materials[name].node_tree
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = image
+    tree.links.new(texture.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
+
+bpy.ops.wm.read_factory_settings(use_empty=True)
+room.build({})
+paint("box", (0.9, 0.1, 0.1))
+bpy.ops.wm.save_as_mainfile(filepath=f"{folder}/blends/parts/box.blend")
+bpy.ops.file.make_paths_relative()
+bpy.ops.wm.save_mainfile()
+
+bpy.ops.wm.read_factory_settings(use_empty=True)
+room.build({})
+paint("walls", (0.1, 0.9, 0.1))
+bpy.data.objects.remove(bpy.data.objects["box"])
+bpy.ops.wm.save_as_mainfile(filepath=f"{folder}/blends/mine.blend")
+with bpy.data.libraries.load(f"{folder}/blends/parts/box.blend", link=True) as (_, wanted):
+    wanted.objects = ["box"]
+bpy.context.scene.collection.objects.link(wanted.objects[0])
+bpy.ops.file.make_paths_relative()
+bpy.ops.wm.save_mainfile()
+"""
+CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
+PLANE = {"type": "plane", "cameras": [2, 1], "size": [0.5, 0, 0], "center": [0, 0, 1.5]}
+BROUGHT = f"""
+scene: {{blend: blends/mine.blend}}
+render: {{samples: 1}}
+report: {{panorama: false}}
+rigs: {{LFPlane: {PLANE | {"camera": CAMERA}}}}
+"""
+BROUGHT_WORDS = (
+    *("--config", "scenes=[brought,theirs]", "rigs=all", "preset=full", "--"),
+    *(f"results/{name}/LFPlane/validation.json" for name in ("brought", "theirs")),
+)
+
+
+@pytest.mark.slow
+def test_what_a_user_brings_reaches_jobs_in_isolated_folders(run_program, tmp_path):
+    folder, root, given = (tmp_path / name for name in ("store", "cloud", "dataset"))
+    build = Cloud(root, 2, str(folder), ("published/LFPlane/lightfield.json",))
+    for name in ("blends/parts", "textures", "published"):
+        (root / name).mkdir(parents=True)
+    (tmp_path / "make.py").write_text(BLEND)
+    run_program(tmp_path / "make.py", root, ROOT / "scripts")
+    write_views(given, CAMERA, {**PLANE, "center": [0, 0, 0]})
+    given.rename(root / "published/LFPlane")
+    scenes = {"brought": BROUGHT, "theirs": "scene: {dataset: published}"}
+    for name, text in scenes.items():
+        (root / f"configs/scenes/{name}.yaml").write_text(text)
+    said, _ = (run := build.start(*BROUGHT_WORDS)).communicate()
+    assert run.returncode == 0, said
+
+    work, store = folder / "work", ViewStore(str(folder))
+    words = ("--blend", root / "blends/mine.blend", "--inventory", work / "brought/inventory.json")
+    words += ("--lightfield", folder / "results/brought/LFPlane/lightfield.json")
+    words += ("--output", tmp_path / "exr", "--record", tmp_path / "here.json")
+    run_program("render_shard.py", *words)
+    found = records.checksums(work / "brought/LFPlane/render/0-2.json")
+    assert found == records.checksums(tmp_path / "here.json")
+
+    found = records.checksums(work / "theirs/LFPlane/render/0-2.json")
+    for name, digest in found.items():
+        assert digest == sha256(root / "published/LFPlane" / name)
+        assert store.take(digest, tmp_path / "theirs" / name)
+
+    (root / "textures/box.png").write_bytes((root / "textures/walls.png").read_bytes())
+    said, _ = build.start("--dry-run", "--quiet", "rules", *BROUGHT_WORDS).communicate()
+    assert {"inventory", "lightfield", "render"} <= set(said.split()), said
+    assert not {"check_blend", "store_brought", "import_views"} & set(said.split())

@@ -709,7 +709,6 @@ def load_datasets(settings: Configuration) -> list[Dataset]:
     for scene in settings.scenes:
         limits = settings.presets[settings.preset]
         found += scene_datasets(scene, settings.preset, limits, settings)
-        _check_presence(found[-1])
     if settings.rigs == "all":
         return found
     known = {dataset.rig_name for dataset in found}
@@ -805,8 +804,11 @@ def scene_datasets(
     ]
 
 
-def _check_presence(dataset: Dataset) -> None:
-    """Check that the user's .blend is where the scene YAML says, or can be downloaded."""
+def check_presence(dataset: Dataset) -> None:
+    """Check that the user's .blend is where the scene YAML says, or can be downloaded.
+
+    Raises `UserError`. Where machines see no common folder, only that of the user has the file.
+    """
     source = dataset.source
     if source.blend and not source.url and not Path(source.blend).is_file():
         page = f"get it from {source.page} and " if source.page else ""

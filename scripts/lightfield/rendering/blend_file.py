@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 
 from lightfield.core.errors import UserError
+from lightfield.dataset.view_store import ViewStore
 from lightfield.rendering.quiet import quiet
 
 
@@ -45,14 +46,20 @@ def _check_blend(path: Path) -> None:
         raise OSError("the file is cut short")
 
 
-def open_scene(path: Path, chosen: Mapping[str, Any] = MappingProxyType({})) -> list[str]:
+def open_scene(
+    path: Path,
+    chosen: Mapping[str, Any] = MappingProxyType({}),
+    inventory: Mapping[str, Any] | None = None,
+) -> list[str]:
     """Open a .blend with its scripts disabled, and return the names of the view layers rendered.
 
     These and the scene are those of ``scene_name`` and ``view_layers`` in ``chosen``, a scene
-    YAML's ``scene`` block. Raises `UserError` if Blender cannot read the file, or would lose what
-    it does not know: where a newer version saved it, or a library that it links; and where what is
-    chosen is not there.
+    YAML's ``scene`` block. With a view store the files that it reads, by its ``inventory``, are
+    taken from there. Raises `UserError` if Blender cannot read the file, or would lose what it does
+    not know: where a newer version saved it, or a library that it links; and where what is chosen
+    is not there.
     """
+    _take_files(path, inventory or {})
     here = bpy.app.version_string
     try:
         with quiet():
@@ -72,6 +79,19 @@ def open_scene(path: Path, chosen: Mapping[str, Any] = MappingProxyType({})) -> 
         return _choose(chosen.get("scene_name"), chosen.get("view_layers"))
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
+
+
+def _take_files(path: Path, inventory: Mapping[str, Any]) -> None:
+    """Take from the view store, if there is one, the files that the .blend at ``path`` reads."""
+    store = ViewStore.configured()
+    if store is None:
+        return
+    for file in inventory.get("external_files", ()):
+        if file["bytes"] and not store.take(file["sha256"], path.parent / file["path"]):
+            raise UserError(
+                f"{path}: reads {file['path']}, which is not in the view store {store.url}; "
+                "snakemake --forcerun inventory puts it there"
+            )
 
 
 def _choose(scene_name: str | None, view_layers: str | Sequence[str] | None) -> list[str]:

@@ -43,7 +43,7 @@ def set_up(
     out. Raises `UserError` if the scene cannot be opened or the ``device`` is not there.
     """
     left_out = inventory["left_out"] if inventory else []
-    blend_file.open_scene(blend, lightfield.content.get("scene", {}))
+    blend_file.open_scene(blend, lightfield.content.get("scene", {}), inventory)
     passes = lightfield.passes
     numbered = [found.name for found in passes if found.kind == "id"]
     if inventory and "hidden_objects" in left_out:

@@ -3,13 +3,15 @@
 import glob
 import os
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import bpy
 
+from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
+from lightfield.dataset.view_store import ViewStore
 from lightfield.imaging.images import is_whole
 from lightfield.rendering.blend_file import path_of
 from lightfield.rendering.quiet import quiet
@@ -72,15 +74,46 @@ def problems(images: Collection[Any]) -> list[dict[str, str]]:
     return sorted(found, key=lambda entry: (entry["kind"], entry["path"], entry["name"]))
 
 
-def _read() -> Iterator[tuple[Any, str]]:
-    """Yield each data-block that reads a file, and the path as Blender has it, absolute."""
+def put(blend: Path, files: Iterable[Mapping[str, Any]], store: ViewStore) -> None:
+    """Put the ``files`` of `external_files` into a view store, for who opens a copy of ``blend``.
+
+    Raises `UserError` where a copy, which lies in another folder at the same path, would not find
+    them: the open .blend names one from the root of the disk, or one is outside this folder.
+    """
+    there = [file for file in files if file["bytes"]]
+    far = [path for block, path in _named() if _is_far(block, path)]
+    paths = (os.path.normpath(blend.parent / file["path"]) for file in there)
+    far += [path for path in paths if path.startswith("..")]
+    if far:
+        raise UserError(
+            f"{blend}: reads {far[0]}{f' and {len(far) - 1} more' if far[1:] else ''}; with a "
+            "storage, what a .blend reads must lie in this folder and be named from the .blend (in "
+            "Blender: File, External Data, Make Paths Relative), or be packed into it"
+        )
+    for file in there:
+        store.put(blend.parent / file["path"], file["sha256"])
+
+
+def _is_far(block: Any, path: str) -> bool:
+    """Whether a file that is there is named from the root of the disk."""
+    return not path.startswith("//") and any(file.is_file() for file in _files(block, path))
+
+
+def _named() -> Iterator[tuple[Any, str]]:
+    """Yield each data-block that reads a file, and the path as it stands in the .blend."""
     for library in bpy.data.libraries:
         if not library.packed_file:
-            yield library, str(path_of(library))
+            yield library, library.filepath
     for block, paths in bpy.data.file_path_map().items():
         if type(block).__name__ in KINDS and not _is_packed(block):
             for path in sorted(paths):
-                yield block, bpy.path.abspath(path, library=block.library)
+                yield block, path
+
+
+def _read() -> Iterator[tuple[Any, str]]:
+    """Yield each data-block that reads a file, and the path as Blender has it, absolute."""
+    for block, path in _named():
+        yield block, bpy.path.abspath(path, library=block.library)
     folder = Path(bpy.data.filepath).parent / f"blendcache_{Path(bpy.data.filepath).stem}"
     for thing in bpy.data.objects:
         caches = [getattr(modifier, "point_cache", None) for modifier in thing.modifiers]

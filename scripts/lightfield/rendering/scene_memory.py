@@ -35,7 +35,8 @@ def measure(blend: Path, inventory: Mapping[str, Any], chosen: Mapping[str, Any]
             "render": {**RENDER, "depth_precision": "float"},
         }
         LightField(content, [View.placed("view", np.eye(4))]).write(folder / "lightfield.json")
-        write_json(folder / "inventory.json", inventory)
+        # What the .blend reads is where it is: nothing is taken from a view store.
+        write_json(folder / "inventory.json", {**inventory, "external_files": []})
         words: list[Any] = [
             "--blend",
             blend,
