@@ -5,6 +5,7 @@
 installs what is missing (as root, by apt), starts the daemons with all that they write in FOLDER,
 runs the command against them, and stops them. Everything listens on the loopback address. The one
 file outside FOLDER is /etc/slurm/slurm.conf, where a job's steps find the cluster; it goes again.
+Where file systems may be mounted, the node's temporary files lie on a small disk of its own.
 """
 
 import argparse
@@ -14,6 +15,7 @@ import shutil
 import socket
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 from checkouts import wait_until
@@ -28,6 +30,8 @@ PACKAGES = {
 CONFIGURED = Path("/etc/slurm/slurm.conf")
 # Debian puts daemons where not every user looks.
 PATH = f"{os.environ['PATH']}:/usr/sbin:/sbin"
+# Mounted for the node's daemon and its jobs alone.
+DISK = 'mount -t tmpfs -o size=64m node "$0" && mount --bind "$0" /dev/shm && exec "$@"'
 
 CONFIGURATION = """ClusterName=plenoforge
 SlurmctldHost={host}(127.0.0.1)
@@ -76,12 +80,15 @@ def install() -> None:
 
 
 class Node:
-    """One node and its controller; ``environment`` is what a command needs to use them."""
+    """One node and its controller; ``environment`` is what a command needs to use them.
+
+    ``own_disk`` is the command that gives another one the node's disk; empty where there is none.
+    """
 
     def __init__(self, folder: Path, memory: int = 16000) -> None:
         """``memory`` is how many MB the node says it has."""
         self.folder = folder
-        for name in ("state", "spool"):
+        for name in ("state", "spool", "disk"):
             (folder / name).mkdir(parents=True, exist_ok=True)
         (folder / "munge.key").write_bytes(secrets.token_bytes(1024))
         (folder / "munge.key").chmod(0o400)
@@ -97,7 +104,10 @@ class Node:
         if CONFIGURED.exists():
             sys.exit(f"error: {CONFIGURED} is there: this machine belongs to a cluster already")
         CONFIGURED.write_text(content)
-        self.environment = os.environ | {"PATH": PATH}
+        self.environment = os.environ | {"PATH": PATH, "TMPDIR": f"{folder}/disk"}
+        self.own_disk = ["unshare", "--mount", "sh", "-c", DISK, f"{folder}/disk"]
+        if subprocess.run([*self.own_disk, "true"], capture_output=True, check=False).returncode:
+            self.own_disk = []
         self.daemons: dict[str, subprocess.Popen[bytes]] = {}
 
     def __enter__(self) -> "Node":
@@ -119,6 +129,7 @@ class Node:
     def start(self, daemon: str, *arguments: str) -> None:
         """Start a daemon in the foreground, as a child of this process."""
         words = [daemon, *arguments, *(["--foreground"] if daemon == "munged" else [])]
+        words = [*(self.own_disk if daemon == "slurmd" else []), *words]
         with (self.folder / f"{daemon}.out").open("ab") as output:
             self.daemons[daemon] = subprocess.Popen(
                 words, env=self.environment, stdout=output, stderr=output
@@ -129,6 +140,14 @@ class Node:
         self.start("slurmd", "-D")
         up = ("idle", "mixed", "allocated")
         wait_until(lambda: self.state() in up, self.daemons["slurmd"], 60)
+
+    def fill_disk(self) -> Path:
+        """Leave no byte on the node's own disk; return the file that takes them all."""
+        filler = Path(f"/proc/{self.daemons['slurmd'].pid}/root{self.folder}/disk/filler")
+        with filler.open("wb", buffering=0) as file, suppress(OSError):
+            while True:
+                file.write(bytes(4096))
+        return filler
 
     def kill_node(self) -> None:
         """Kill the node's daemon and its jobs, as a power cut does."""

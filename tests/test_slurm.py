@@ -4,8 +4,10 @@ import json
 import os
 import resource
 import signal
+from contextlib import contextmanager
 from pathlib import Path
 
+import psutil
 import pytest
 from checkouts import assert_same_bytes, checkout, rendered, start_snakemake, wait_until
 from slurm_node import Node, install
@@ -40,11 +42,13 @@ def test_no_view_is_lost_or_made_twice_whatever_happens_on_the_cluster(smoke, tm
         began |= stop_next(folder, began, run)
         for job in node.run("squeue", "--states=RUNNING", "--noheader", "--format=%i").split():
             node.run("scontrol", "update", f"JobId={job}", "EndTime=now")
-        # What is submitted in place of that finds a disk that takes no byte more.
+        # What is submitted in place of that finds no room, until it has failed.
         full = stop_next(folder, began, run)
-        for process in full:
-            resource.prlimit(process, resource.RLIMIT_FSIZE, (1, 1))
-            os.kill(process, signal.SIGCONT)
+        with no_room(node, full):
+            for process in full:
+                os.kill(process, signal.SIGCONT)
+            wait_until(lambda: not any(map(psutil.pid_exists, full)), run, log=log)
+            logs = [path.read_text() for path in folder.glob(f"work/logs/{CUBOID}/render/*.log")]
         wait_until(lambda: processes(folder) - began - full, run, log=log)
         wait_for_views(folder, 4, run)
         node.kill_node()
@@ -53,6 +57,7 @@ def test_no_view_is_lost_or_made_twice_whatever_happens_on_the_cluster(smoke, tm
         assert run.wait(1800) == 0, log.read_text()
         states = node.run("squeue", "--states=all", "--noheader", "--format=%T").split()
     assert {"COMPLETED", "CANCELLED", "TIMEOUT", "FAILED"} <= set(states)
+    assert not node.own_disk or any("; 0 bytes are free there: make room" in log for log in logs)
     assert "exceeded memory limit" in (tmp_path / "node/slurmd.log").read_text()
     assert set(rendered(folder).values()) == {1}
     assert_same_bytes(smoke, folder, CUBOID)
@@ -74,6 +79,19 @@ def stop_next(folder: Path, began: set[int], run) -> set[int]:
     for process in (found := processes(folder) - began):
         os.kill(process, signal.SIGSTOP)
     return found
+
+
+@contextmanager
+def no_room(node: Node, found: set[int]):
+    """Fill the node's disk; where it has none of its own, let these processes write no file."""
+    if node.own_disk:
+        filler = node.fill_disk()
+        yield
+        filler.unlink()
+        return
+    for process in found:
+        resource.prlimit(process, resource.RLIMIT_FSIZE, (1, 1))
+    yield
 
 
 def wait_for_views(folder: Path, count: int, run) -> None:
