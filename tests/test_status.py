@@ -185,8 +185,11 @@ def test_a_record_says_which_views_are_finished_until_a_file_is_lost(dataset):
     dataset.render("a", settings=dataset.content)
     dataset.render("b", "c", settings=dataset.content.changed(resolution=[4, 1]))
     record = dataset.made / "render/1-3.json"
+    # The names of what a pass numbers are no view.
+    files.write_json(dataset.folder / "object/names.json", {"cube": 1})
     sizes = {
-        f"exr/{name}.exr": (dataset.folder / f"exr/{name}.exr").stat().st_size for name in "bc"
+        name: (dataset.folder / name).stat().st_size
+        for name in ("exr/b.exr", "exr/c.exr", "object/names.json")
     }
     files.write_json(record, {"files": {name: {"bytes": size} for name, size in sizes.items()}})
     assert dataset()[1].startswith("  rendered: 3 of 4")

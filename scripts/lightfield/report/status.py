@@ -15,6 +15,7 @@ from lightfield.core.progress import duration
 from lightfield.dataset import journal, keys, shard_files
 from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.imaging import images
+from lightfield.validation.files import IMAGES
 
 # The rate is that of so many seconds.
 WINDOW = 600.0
@@ -66,7 +67,10 @@ def _recorded(folder: Path, work: Path) -> set[str]:
     records = (work / "render").glob("*-*.json")
     current = (path for path in records if path.stat().st_mtime_ns >= written)
     files = (shard_files.recorded(path, str(folder)) for path in current)
-    return {Path(name).stem for sizes in files for name in sizes or ()}
+    # Beside the views a record has their passes, and the names of what these number.
+    return {
+        Path(name).stem for sizes in files for name in sizes or () if name.startswith(f"{IMAGES}/")
+    }
 
 
 def _keyed(folder: Path, lightfield: LightField, recorded: set[str]) -> set[str]:
@@ -166,4 +170,4 @@ def _bounds(path: Path) -> tuple[int, int]:
 
 
 def _file(folder: Path, name: str) -> Path:
-    return folder / "exr" / f"{name}.exr"
+    return folder / IMAGES / f"{name}.exr"
