@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -45,6 +46,19 @@ def run_program():
         return result
 
     return run
+
+
+@pytest.fixture
+def nobody():
+    """A folder of its own for a test that has not the rights of root."""
+    with tempfile.TemporaryDirectory() as name:
+        if os.geteuid():
+            yield Path(name)
+            return
+        os.chown(name, 65534, 65534)
+        os.seteuid(65534)
+        yield Path(name)
+        os.seteuid(0)
 
 
 @pytest.fixture(scope="session")

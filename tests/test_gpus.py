@@ -57,6 +57,13 @@ def test_no_two_processes_take_the_same_gpu(tmp_path):
         lock.close()
 
 
+def test_a_gpu_is_free_whoever_had_it_before(nobody):
+    (nobody / "plenoforge-CUDA_VISIBLE_DEVICES_GPU_a.lock").touch(0o444)
+    gpu, lock = gpus.take(FAKE[:1], nobody)
+    lock.close()
+    assert gpu == FAKE[0]
+
+
 @pytest.mark.parametrize(
     ("environment", "expected"),
     [

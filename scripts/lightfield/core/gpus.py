@@ -63,7 +63,7 @@ def take(gpus: Sequence[Gpu], folder: Path | None = None) -> tuple[Gpu, BinaryIO
         for gpu in gpus:
             name = re.sub(r"\W", "_", f"{gpu.variable}-{gpu.id}")
             path = folder / f"plenoforge-{name}.lock"
-            lock = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b")
+            lock = os.fdopen(_opened(path), "rb")
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 return gpu, lock
@@ -73,6 +73,22 @@ def take(gpus: Sequence[Gpu], folder: Path | None = None) -> tuple[Gpu, BinaryIO
             print(f"waiting for one of {len(gpus)} GPUs to be free", file=sys.stderr, flush=True)
         waited = True
         time.sleep(0.5)
+
+
+def _opened(path: Path) -> int:
+    """Open a lock file, which may be another user's and not to be written, or create it.
+
+    In a folder of all users Linux refuses to open another's file with O_CREAT. For writing if it
+    can be, for NFS locks no others.
+    """
+    try:
+        return os.open(path, os.O_RDWR)
+    except PermissionError:
+        return os.open(path, os.O_RDONLY)
+    except FileNotFoundError:
+        file = os.open(path, os.O_RDWR | os.O_CREAT)
+        os.fchmod(file, 0o666)
+        return file
 
 
 _taken: list[BinaryIO] = []
