@@ -10,7 +10,7 @@ from pydantic import TypeAdapter
 from sphere import write_views
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import sha256
+from lightfield.core.files import second_name, sha256
 from lightfield.core.settings import checked
 from lightfield.dataset.config import Scene
 from lightfield.geometry import lenses
@@ -135,3 +135,11 @@ def test_an_angle_that_blender_rounded_is_whole_again():
     camera["fisheye_fov"] = float(np.float32(2 * math.pi))
     lens = lenses.from_lightfield({"camera": camera, "resolution": [8, 8]})
     assert lens.settings()["fov"] == 360
+
+
+def test_a_view_that_nobody_may_write_is_taken_over(nobody):
+    view, taken = nobody / "published.exr", nobody / "exr" / "taken.exr"
+    view.write_bytes(b"a view")
+    view.chmod(0o444)
+    second_name(view, taken)
+    assert taken.samefile(view)

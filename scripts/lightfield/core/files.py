@@ -42,7 +42,8 @@ def atomic_path(target: Path | str) -> Iterator[Path]:
         target.parent.mkdir(parents=True, exist_ok=True)
         try:
             yield temporary
-            with temporary.open("rb+") as file:
+            # For reading: it may be a second name of a file that nobody may write.
+            with temporary.open("rb") as file:
                 if not file.seek(0, os.SEEK_END):
                     raise OSError("the file is empty")
                 os.fsync(file.fileno())
