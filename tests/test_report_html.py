@@ -18,7 +18,15 @@ from lightfield.geometry import lenses, overview, rigs
 from lightfield.geometry.depth import z_from_distance
 from lightfield.imaging import images, pictures
 from lightfield.imaging.tonemap import decode_srgb
-from lightfield.report import dataset_page, epipolar, faults, figures, packing, pass_pictures
+from lightfield.report import (
+    contact_sheet,
+    dataset_page,
+    epipolar,
+    faults,
+    figures,
+    packing,
+    pass_pictures,
+)
 
 SPHERE = {
     "type": "sphere",
@@ -433,6 +441,17 @@ def test_pictures_of_a_fault_mark_every_wrong_pixel(tmp_path):
     assert np.argwhere((colour == faults.WRONG).all(axis=-1)).tolist() == [[33, 67]]
     assert np.argwhere((depth == faults.WRONG).all(axis=-1)).tolist() == [[50, 0]]
     assert (decoded(second.colour) == 90).all()
+
+
+def test_a_picture_of_16_bits_is_shown_as_one_of_8(tmp_path):
+    pixels = np.arange(8 * 8 * 3, dtype=np.uint8).reshape(8, 8, 3)
+    images.write_png(tmp_path / "a.png", pixels)
+    images.write_png(tmp_path / "b.png", pixels * np.uint16(257))
+    for fault in faults.collect(tmp_path, ["a", "b"]):
+        assert (decoded(fault.colour) == pixels).all()
+    one, other = (contact_sheet.small_view(tmp_path / f"{name}.png", 8, 8) for name in "ab")
+    assert np.allclose(one, pixels, atol=1e-3)
+    assert (one == other).all()
 
 
 def decoded(uri):

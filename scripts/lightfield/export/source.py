@@ -87,8 +87,7 @@ class Source:
         """Return a view's sRGB pixels, (height, width, 3)."""
         image = images.read_image(self.path(view))
         if self.suffix == ".png":
-            pixels = np.stack([image.channels[name] for name in "RGB"], axis=-1)
-            return np.asarray(np.rint(pixels / (257 if self._has_16_bits else 1)), np.uint8)
+            return image.srgb
         colour = image.colour
         if self.lightfield.transparent:
             alpha = image.channels["A"][..., None].astype(np.float32)

@@ -59,6 +59,12 @@ class Image:
         """The channels R, G and B as (height, width, 3) float32."""
         return np.stack([self.channels[name] for name in "RGB"], axis=-1, dtype=np.float32)
 
+    @property
+    def srgb(self) -> np.ndarray[Any, Any]:
+        """R, G and B of an 8-bit or 16-bit picture as (height, width, 3) uint8."""
+        pixels = np.stack([self.channels[name] for name in "RGB"], axis=-1)
+        return np.asarray(np.rint(pixels / (np.iinfo(pixels.dtype).max // 255)), np.uint8)
+
 
 @dataclass(frozen=True)
 class Header:

@@ -65,8 +65,9 @@ def small_view(path: Path, width: int, height: int) -> Array:
     Pixels that hold no number are black too.
     """
     try:
-        colour = images.read_image(path, "RGB").colour
+        image = images.read_image(path, "RGB")
     except UserError as error:
         print(f"warning: {error}", file=sys.stderr)
         return np.zeros((height, width, 3), dtype=np.float32)
+    colour = image.srgb if path.suffix == ".png" else image.colour
     return pictures.shrunk(np.where(np.isfinite(colour), colour, 0), width, height)

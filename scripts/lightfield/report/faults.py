@@ -43,11 +43,10 @@ def _fault(folder: Path, view: str) -> Fault | None:
     path = exr if exr.is_file() or not png.is_file() else png
     try:
         image = images.read_image(path)
-        colour = image.colour
+        shown = image.srgb if path == png else _colour(image.colour)
     except (UserError, LookupError):
         return None
     depth = webp(_depth(image.channels["Z"])) if "Z" in image.channels else None
-    shown = colour.astype(np.uint8) if path == png else _colour(colour)
     return Fault(path.name, webp(shown), depth)
 
 
