@@ -176,6 +176,12 @@ def test_points_come_from_the_views_to_train_on_alone(scene, tmp_path):
     np.testing.assert_allclose(distance, RADIUS, atol=1e-5)
 
 
+def test_points_of_a_rig_that_only_tests_come_from_all_its_views(scene, tmp_path):
+    settings = settings_of("point_cloud")(sources=["small"], voxel=0.1)
+    export.run("point_cloud", Source(scene / "along", "small", ".exr"), settings, tmp_path)
+    assert len(ply(tmp_path / "points.ply")[0])
+
+
 def test_a_split_without_a_part_is_an_error():
     lens = rigs.from_settings(PLANE | {"camera": PERSPECTIVE}).camera.make()
     for split, missing in (("train", "test"), ("test", "train")):

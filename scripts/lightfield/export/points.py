@@ -38,10 +38,11 @@ class Observations:
 def lift(source: Source, count: int | None = None, voxel: float | None = None) -> Points:
     """Lift points from depth: about ``count``, or one in each ``voxel`` metres.
 
-    They come from all views, but with a split from those to train on alone. Each has the colour
-    that the view it was lifted from shows there.
+    They come from all views, but with a split from those to train on alone, if there are any. Each
+    has the colour that the view it was lifted from shows there.
     """
-    views = [view for view in source.lightfield.views if view.split in (None, "train")]
+    every = source.lightfield.views
+    views = [view for view in every if view.split in (None, "train")] or every
     size = source.rendered.lens.width * source.rendered.lens.height
     wanted = _CANDIDATES * count / len(views) if count else size
     step = max(1, int((size / wanted) ** 0.5))
