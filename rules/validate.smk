@@ -25,13 +25,14 @@ rule validate:
     params:
         dataset=DATASET,
         reprojections=reprojection_words,
+        exports=of_dataset("export_lists"),
         optional=optional_words,
         removed=REMOVED,
     message:
         "Validating {wildcards.scene}/{wildcards.rig}"
     shell:
         f"{taking('input')}python {SCRIPTS}/validate.py"
-        " {params.dataset} {params.reprojections}"
+        " {params.dataset} {params.reprojections} --exports {params.exports}"
         " --records {input.records} {params.optional} --processes {threads}"
         " --removed {params.removed}"
         " --output {output.validation} --sums {output.sums} > {log} 2>&1"

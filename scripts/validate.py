@@ -35,6 +35,8 @@ def main() -> None:
     add("--splits", type=Path, help="splits.json of the scene")
     folders = "folders of the dataset that hold a reprojection (default without --output: all)"
     add("--reprojection", action="extend", nargs="+", default=[], metavar="NAME", help=folders)
+    lists = "export.json or transforms.json of each export that it shall have (default: any)"
+    add("--exports", type=Path, nargs="*", help=lists)
     add("--removed", type=Path, help="folder to which files go that are not the dataset's")
     add("--processes", type=int, default=1, help="worker processes (default: 1)")
     arguments = parser.parse_args()
@@ -48,9 +50,10 @@ def main() -> None:
     elif not arguments.reprojection:
         found = sorted(arguments.dataset.glob(f"*/{NAME}"))
         arguments.reprojection = [path.parent.name for path in found]
+    wanted = arguments.exports and [path.resolve() for path in arguments.exports]
     if arguments.removed:
         count = remove_strays(
-            arguments.dataset, arguments.reprojection, MANIFESTS, arguments.removed
+            arguments.dataset, arguments.reprojection, MANIFESTS, arguments.removed, wanted
         )
         if count:
             print(
@@ -66,6 +69,7 @@ def main() -> None:
         arguments.processes,
         MANIFESTS,
         arguments.splits,
+        wanted,
     )
     print(result.summary())
     for line in result.failures():

@@ -259,6 +259,9 @@ def test_pixels_without_a_source_are_hidden(dataset: Dataset) -> None:
     ]
     mask = images.read_image(dataset.folder / "dynamic_mask_view_0000f.png").channels["Y"]
     np.testing.assert_array_equal(mask == 255, pixels[:, :, 3] == 0)
+    images.write_png(dataset.folder / "view_0000f.png", pixels[:, :, :3])
+    dataset.export()
+    assert not list(dataset.folder.glob("dynamic_mask_*"))
 
 
 def test_where_transparent_views_see_nothing_is_not_hidden(dataset: Dataset) -> None:

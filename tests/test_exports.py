@@ -17,8 +17,9 @@ from sphere import LENSES, RADIUS, colour_of, write_views
 
 from lightfield import export
 from lightfield.core.errors import UserError
-from lightfield.core.files import sha256
+from lightfield.core.files import sha256, write_json
 from lightfield.dataset.config import Scene
+from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField
 from lightfield.export import disparity
@@ -626,3 +627,20 @@ def test_a_rig_that_a_consumer_cannot_take_is_refused_when_the_yaml_is_read():
     content["exports"] = {"hci": {"sources": ["views"]}}
     with pytest.raises(ValidationError, match="views is of the rig Ball, which is no plane"):
         TypeAdapter(Scene).validate_python(content)
+
+
+@pytest.mark.parametrize("name", ["exports/miv/export.json", "transforms.json"])
+def test_an_export_that_is_no_longer_asked_for_lets_a_dataset_be_validated_again(
+    name, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    dataset = next(d for d in scene_datasets("smoke") if d.rig.split)
+    assert [Path(path).name for path in dataset.export_lists] == [
+        *("transforms.json", "transforms_train.json"),
+        *("transforms_validation.json", "transforms_test.json"),
+    ]
+    for path in dataset.export_lists:
+        write_json(path, {"options": dataset.exports.instant_ngp.recorded})
+    assert list(dataset.outdated(dataset.render)) == []
+    write_json(f"{dataset.folder}/{name}", {})
+    assert list(dataset.outdated(dataset.render)) == [f"{dataset.folder}/validation.json"]

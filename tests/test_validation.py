@@ -1193,6 +1193,28 @@ def test_strays_are_moved_before_they_make_a_dataset_invalid(
     assert files.remove_strays(folder, [], MANIFESTS, Path("removed")) == 0
 
 
+def test_an_export_that_is_no_longer_wanted_is_moved_away(
+    small_dataset: Path, tmp_path: Path
+) -> None:
+    picture = np.full((64, 64, 3), 128, np.uint8)
+    images.write_png(small_dataset / "exr" / "dynamic_mask_view_0001f.png", picture[..., 0])
+    images.write_png(small_dataset / "pictures" / "one.png", picture)
+    frames = {"frames": [{"file_path": "pictures/one.png"}]}
+    for name in ("transforms.json", "transforms_train.json"):
+        write_json(small_dataset / name, frames)
+    manifest = small_dataset / "exports" / "poses_csv" / "export.json"
+    manifest.parent.mkdir(parents=True)
+    (manifest.parent / "poses.csv").write_text("name\n")
+    write_json(manifest, {"files": {"poses.csv": sha256(manifest.parent / "poses.csv")}})
+    # Every one that is there, those that are wanted, and none.
+    for wanted, moved in ((None, 0), ([small_dataset / "transforms.json", manifest], 1), ([], 5)):
+        assert check(validate(small_dataset, wanted=wanted), "files").passed == (not moved)
+        removed = tmp_path / "removed"
+        assert files.remove_strays(small_dataset, [], MANIFESTS, removed, wanted) == moved
+        assert check(validate(small_dataset, wanted=wanted), "files").passed
+    assert len(list((tmp_path / "removed").rglob("poses.csv"))) == 1
+
+
 @pytest.mark.parametrize("broken", [NAME, "transforms.json", f"panorama/{NAME}", None])
 def test_nothing_is_moved_of_a_dataset_that_is_not_understood(
     broken: str | None, small_dataset: Path, tmp_path: Path

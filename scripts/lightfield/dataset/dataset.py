@@ -40,6 +40,7 @@ from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.overview import sees_all_round
 from lightfield.geometry.rigs import BlendCamera, Pose, Poses, Random, Rig
+from lightfield.geometry.rigs.split import PARTS
 
 # For planning only, measured on one core of a 2-core x86-64 machine: path tracing of one sample of
 # one pixel, and start-up (bpy, the scene, and Cycles' acceleration structures).
@@ -214,11 +215,13 @@ class Dataset:
             expected = reprojection.lens(self.rig.camera).to_lightfield()
             if _differs(path, expected | {"reprojection": reprojection.recorded}):
                 yield from (path, *self.lens_maps(name), *self.records(name))
-        if any(
-            path.parent.name not in self.reprojections
-            for path in Path(self.folder).glob(f"*/{NAME}")
-        ):
-            # A reprojection that there was makes the dataset invalid until validation removes it.
+        folder = Path(self.folder)
+        known = {folder / name / NAME for name in self.reprojections}
+        known |= {Path(path) for path in self.export_lists}
+        lists = ("transforms*.json", f"exports/*/{MANIFEST}")
+        there = {path for name in lists for part in ("", "*/") for path in folder.glob(part + name)}
+        if not known.issuperset(there.union(folder.glob(f"*/{NAME}"))):
+            # What there was makes the dataset invalid until validation removes it.
             yield f"{self.folder}/validation.json"
         for path in self.exported:
             name = Path(path).parent.name if path.endswith(MANIFEST) else "instant_ngp"
@@ -363,6 +366,14 @@ class Dataset:
             for name, export in self.exports.wanted.items()
             for source in export.sources
         ]
+
+    @property
+    def export_lists(self) -> list[str]:
+        """All files by which exports list what is theirs: of a split each part has one, too."""
+        own = [path for path in self.exported if not path.endswith(MANIFEST)]
+        parts = PARTS if self.rig.split else ()
+        more = [f"{path.removesuffix('.json')}_{part}.json" for path in own for part in parts]
+        return [*self.exported, *more]
 
     @property
     def splits(self) -> str | list[str]:

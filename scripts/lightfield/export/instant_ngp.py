@@ -298,10 +298,13 @@ class _Writer:
             self.check_size(image, next(iter(channels.values())))
             if "A" in channels and not self.lightfield.transparent:
                 hidden = hidden | (channels["A"] == 0)
+        path = image.with_name(MASK.format(view=view.name))
         if hidden.any():
-            mask = np.where(hidden, 255, 0).astype(np.uint8)
-            self.pictures.append(image.with_name(MASK.format(view=view.name)))
-            images.write_png(self.pictures[-1], mask)
+            self.pictures.append(path)
+            images.write_png(path, np.where(hidden, 255, 0).astype(np.uint8))
+        else:
+            # Of another lens, that the views had before.
+            path.unlink(missing_ok=True)
 
 
 def transform_matrix(view: View) -> Floats:

@@ -5,7 +5,7 @@ its own lightfield.json and images.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -219,17 +219,27 @@ def names(sets: Sequence[ImageSet]) -> list[str]:
 
 
 def of_exports(
-    dataset: Path, sets: Sequence[ImageSet], views: Iterable[File], manifests: Sequence[Manifest]
+    dataset: Path,
+    sets: Sequence[ImageSet],
+    views: Iterable[File],
+    manifests: Sequence[Manifest],
+    wanted: Collection[Path] | None = None,
 ) -> tuple[list[File], list[str], Check]:
-    """Return the pictures beside the views, the exports' other files, and a check of these."""
+    """Return the pictures beside the views, the exports' other files, and a check of these.
+
+    Of lists only those ``wanted`` count; without it every one that is there.
+    """
     found: dict[str, File] = {}
     lists: list[str] = []
     others: list[str] = []
     problems: list[str] = []
     for number, image_set in enumerate(sets):
-        folders = {image_set.folder}
+        folders, patterns = {image_set.folder}, [BESIDE]
         for manifest in manifests:
-            for path in sorted((dataset / image_set.name).glob(manifest.lists)):
+            there = sorted((dataset / image_set.name).glob(manifest.lists))
+            taken = [path for path in there if wanted is None or path.resolve() in wanted]
+            patterns += manifest.beside if taken or wanted is None else ()
+            for path in taken:
                 lists.append(path.relative_to(dataset).as_posix())
                 try:
                     named = manifest.pictures(path)
@@ -253,7 +263,6 @@ def of_exports(
                         problems.append(f"{target.relative_to(dataset)}: is not as it was exported")
                     else:
                         others.append(target.relative_to(dataset).as_posix())
-        patterns = [BESIDE, *(name for manifest in manifests for name in manifest.beside)]
         for folder in sorted(folders):
             present = {path.name for path in (dataset / folder).glob("*")}
             for view in image_set.views:
@@ -289,20 +298,24 @@ def _sorted_out(
 
 
 def remove_strays(
-    dataset: Path, reprojections: Sequence[str], manifests: Sequence[Manifest], folder: Path
+    dataset: Path,
+    reprojections: Sequence[str],
+    manifests: Sequence[Manifest],
+    folder: Path,
+    wanted: Collection[Path] | None = None,
 ) -> int:
     """Move the files that are not the dataset's own into ``folder``; return how many they were.
 
-    Such are the views of a rig that had more cameras, reprojections that there were, and what an
-    older program drew for the report. Nothing is moved of a dataset with a lightfield.json or an
-    export that cannot be understood.
+    Such are the views of a rig that had more cameras, reprojections and exports that there were,
+    and what an older program drew for the report. Nothing is moved of a dataset with a
+    lightfield.json or an export that cannot be understood. ``wanted`` is that of `of_exports`.
     """
     sets, _ = read_sets(dataset, reprojections)
     if len(sets) <= len(reprojections):
         return 0
     views, _ = of_views(dataset, sets)
     views += of_passes(dataset, sets)[0]
-    extras, lists, exports = of_exports(dataset.resolve(), sets, views, manifests)
+    extras, lists, exports = of_exports(dataset.resolve(), sets, views, manifests, wanted)
     if exports.passed is False:
         return 0
     known = {*lists, *names(sets), *(file.path for file in [*views, *extras])}

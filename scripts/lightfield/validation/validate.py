@@ -8,7 +8,7 @@ The result is a list of checks, each passed, failed, or not applicable and why: 
 checked is said, never counted as right.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context
@@ -36,6 +36,7 @@ def validate(
     processes: int = 1,
     manifests: Sequence[Manifest] = (),
     splits: Path | None = None,
+    wanted: Collection[Path] | None = None,
 ) -> Result:
     """Check a dataset's files, and what its pixels must satisfy.
 
@@ -43,7 +44,8 @@ def validate(
     (``files``: relative path: ``bytes``, ``sha256``); ``clearance`` a JSON file of what surrounds
     each camera (``views``: name: ``distance`` in metres, ``inside``); ``inventory`` one of what the
     scene contains; ``manifests`` those of the exports that it may hold; ``splits`` the scene's
-    splits.json, if it has one. Raises `UserError` where one of these cannot be read; whatever is
+    splits.json, if it has one; ``wanted`` those of the exports' lists that it is to have, if it is
+    not every one that is there. Raises `UserError` where one of these cannot be read; whatever is
     wrong with the dataset is in the result.
     """
     dataset = dataset.resolve()
@@ -51,7 +53,7 @@ def validate(
     sets, checks = files.read_sets(dataset, reprojections)
     views, presence = files.of_views(dataset, sets)
     passes, missing = files.of_passes(dataset, sets)
-    extras, lists, exports = files.of_exports(dataset, sets, views, manifests)
+    extras, lists, exports = files.of_exports(dataset, sets, views, manifests, wanted)
     facts: dict[File, Facts] = {}
     with _workers(Examiner(dataset, sets), processes) as mapped:
         images = views + passes + extras
