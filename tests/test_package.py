@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import tarfile
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 from sphere import write_views
 
+from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
 from lightfield.dataset.config import load_scene
 from lightfield.dataset.exports import Exports
@@ -67,9 +69,11 @@ def test_the_same_files_give_the_same_bytes_whoever_packs_them_and_when(folder, 
 def test_parts_of_a_size_unfold_to_a_whole_dataset(folder, tmp_path):
     target = tmp_path / f"{NAME}.tar"
     (target.with_name(f"{NAME}.9.tar")).write_text("of an earlier package")
+    other = target.with_name(f"{NAME}.b.tar")
+    other.write_text("of the rig LFPlane.b")
     parts = packed(folder, target, 30_000)
     assert [path.name for path in parts[:2]] == [f"{NAME}.tar", f"{NAME}.2.tar"]
-    assert sorted(tmp_path.glob("*.tar")) == sorted(parts)
+    assert sorted(tmp_path.glob("*.tar")) == sorted([*parts, other])
     assert len(parts) > 2
     for path in parts:
         with tarfile.open(path) as archive:
@@ -100,11 +104,22 @@ def test_the_card_says_what_it_is_and_how_it_is_loaded_and_cited(folder, tmp_pat
         "Reconstruction('perspective/exports/colmap/sparse/0')"
     )
     assert card["loaders"]["."].endswith("'./exr/view_0000f.exr').channels()")
+    assert card["loaders"]["perspective/transforms.json"].startswith("./instant-ngp perspective/")
     assert all(text in readme for text in (*card["cite"], *card["loaders"].values()))
     assert "licence of the scene | not stated" in readme
     credited = load_scene("lone_monk_original")
     again = package.card(folder, NAME, credited)
     assert again["cite"][1] == credited.credit == "Lone Monk, by Carlo Bergonzini (Monorender)"
+
+
+def test_a_folder_may_be_called_as_the_exports_are_and_must_hold_a_dataset(folder, tmp_path):
+    elsewhere = tmp_path / "exports" / "smoke"
+    shutil.copytree(folder, elsewhere)
+    cards = [package.card(path, NAME, load_scene("smoke")) for path in (folder, elsewhere)]
+    assert cards[0] == cards[1]
+    with pytest.raises(UserError, match=r"smoke: has no lightfield\.json"):
+        shutil.rmtree(elsewhere)
+        package.card(elsewhere, NAME, load_scene("smoke"))
 
 
 def test_every_export_has_a_loader():

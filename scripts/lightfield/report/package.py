@@ -5,6 +5,7 @@ are. Names, order, times, owners and modes follow from the files alone.
 """
 
 import json
+import re
 import tarfile
 from collections.abc import Iterator, Sequence
 from io import BytesIO
@@ -13,6 +14,7 @@ from typing import Any
 
 import jinja2
 
+from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, sha256
 from lightfield.core.progress import Progress
 from lightfield.dataset.config import Scene
@@ -47,7 +49,10 @@ LOADERS = {
 
 def card(folder: Path, name: str, scene: Scene) -> dict[str, Any]:
     """Return what there is to say of a rig's folder, in which a sequence has one of each frame."""
-    first = min(folder.glob(f"**/{NAME}"), key=lambda path: (len(path.parts), path)).parent
+    own = sorted(folder.glob(f"**/{NAME}"), key=lambda path: (len(path.parts), path))
+    if not own:
+        raise UserError(f"{folder}: has no {NAME}")
+    first = own[0].parent
     lightfield = LightField.read(first / NAME)
     view = lightfield.views[0].name
     bpy = images.attribute(first / IMAGES / f"{view}.exr", images.BPY_ATTRIBUTE)
@@ -76,8 +81,9 @@ def _loaders(folder: Path, view: str) -> Iterator[tuple[str, str]]:
     """Yield how the views and each export are loaded, by their folders."""
     yield ".", LOADERS["exr"].replace("{view}", view).replace("{}", ".")
     for path in sorted(folder.rglob("transforms.json")):
-        if "exports" not in path.parts:
-            place = path.parent.relative_to(folder).as_posix()
+        place = path.parent.relative_to(folder).as_posix()
+        # nerfstudio's has the same name.
+        if not (path.parent / MANIFEST).is_file():
             yield f"{place}/transforms.json", LOADERS["instant_ngp"].replace("{}", place)
     for path in sorted(folder.rglob(MANIFEST)):
         place = path.parent.relative_to(folder).as_posix()
@@ -100,7 +106,9 @@ def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None
         if path.is_file() and REPORT not in path.relative_to(folder).parts[:2]
     )
     for old in target.parent.glob(f"{target.stem}.*.tar"):
-        old.unlink()
+        # Another rig's name may begin as this one's does.
+        if re.fullmatch(r"\.\d+", old.name[len(target.stem) : -len(".tar")]):
+            old.unlink()
     written = []
     card_size = sum(_size(len(text.encode())) for text in texts.values())
     for number, part in enumerate(_parts(paths, most, card_size), 1):
