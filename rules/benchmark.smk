@@ -16,7 +16,7 @@ rule reprojection_benchmark:
     conda:
         ENVIRONMENT
     # Alone on the machine, so that nothing else is in the figures.
-    threads: lambda wildcards: workflow.cores
+    threads: lambda wildcards: workflow.cores or 1
     params:
         folder=lambda wildcards, output: str(Path(output[0]).parent),
     message:
@@ -67,7 +67,7 @@ rule render_overhead:
         log_of("render_overhead"),
     conda:
         ENVIRONMENT
-    threads: lambda wildcards: workflow.cores
+    threads: lambda wildcards: workflow.cores or 1
     message:
         "Measuring what the workflow adds to Cycles' own render time"
     shell:
