@@ -78,9 +78,10 @@ rule inventory:
         " --scene {wildcards.name} --blend {input.blend:q} --output {output} > {log} 2>&1"
 
 
-# Only where a scene YAML says from where, and the user has not brought the file.
+# Only where a scene YAML says from where, and the user has not brought the file: Snakemake removes
+# what a rule makes before it makes it again, as with --forceall, and it may be a work of weeks.
 for name, dataset in SCENES.items():
-    if not dataset.source.url:
+    if not dataset.source.url or Path(dataset.blend).exists():
         continue
 
     rule:

@@ -349,3 +349,7 @@ def test_a_blend_needs_no_builder_and_a_builder_no_blend(server, tmp_path):
     result = snakemake(folder, "blends/fetched.blend", *chosen)
     assert result.returncode == 0, result.stdout + result.stderr
     assert (folder / "blends" / "fetched.blend").read_bytes() == CONTENT
+    # What is there is never removed, to be fetched again.
+    jobs = planned(folder, "--forceall", *chosen)
+    assert jobs["check_blend"] == 2
+    assert not any(name.startswith("fetch_") for name in jobs)

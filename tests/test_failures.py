@@ -122,6 +122,9 @@ class Failing:
         jobs = [self.jobs[rule] for rule in rules]
         targets = [job["output"][0] if job["output"] else job["rule"] for job in jobs]
         work = [file for job in jobs for file in job["output"]]
+        for file in work:
+            # A .blend that is there is not fetched.
+            (self.folder / file).unlink()
         run = self.run(
             *("--rerun-triggers", "mtime", *options, *CHOSEN, *config, "--force", *targets),
             work=work,
