@@ -32,11 +32,13 @@ def main() -> None:
         help="a rig whose views test what is trained on these, and its dataset's folder",
     )
     parser.add_argument("--suffix", choices=[".png", ".exr"], default=".exr", help="of the views")
-    parser.add_argument("--options", default="{}", help="JSON of the export's options")
+    parser.add_argument(
+        "--options", type=json.loads, default={}, help="JSON of the export's options"
+    )
     parser.add_argument("--output", type=Path, required=True, help="folder to write")
     arguments = parser.parse_args()
 
-    options = {"sources": [arguments.source]} | json.loads(arguments.options)
+    options = {"sources": [arguments.source], **arguments.options}
     settings = checked(TypeAdapter(settings_of(arguments.format)), options, "--options")
     name = "" if arguments.source == VIEWS else arguments.source
     development = {

@@ -644,3 +644,11 @@ def test_an_export_that_is_no_longer_asked_for_lets_a_dataset_be_validated_again
     assert list(dataset.outdated(dataset.render)) == []
     write_json(f"{dataset.folder}/{name}", {})
     assert list(dataset.outdated(dataset.render)) == [f"{dataset.folder}/validation.json"]
+
+
+def test_nothing_but_an_earlier_export_is_replaced(dataset, tmp_path):
+    folder = exported(dataset, "poses_csv", "perspective", tmp_path)
+    (folder / "export.json").unlink()
+    with pytest.raises(UserError, match="perspective: is no export, and not empty"):
+        exported(dataset, "poses_csv", "perspective", tmp_path)
+    assert (folder / "poses.csv").is_file()

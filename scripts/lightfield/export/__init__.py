@@ -18,12 +18,19 @@ from lightfield.export import instant_ngp
 from lightfield.export.source import Source
 from lightfield.validation.files import Manifest
 
+# In a dataset, where exports are.
+FOLDER = "exports"
+
 
 def run(name: str, source: Source, settings: Export, folder: Path) -> dict[str, str]:
     """Write an export into ``folder``, in place of an earlier one; return its files' SHA-256.
 
-    Nothing is left of an export that fails.
+    Nothing is left of an export that fails. Raises `UserError` where anything else is there.
     """
+    # In a dataset a killed run may have left an export without its list.
+    replaced = (folder / MANIFEST).is_file() or folder.parent.name == FOLDER
+    if folder.exists() and not replaced and any(folder.iterdir()):
+        raise UserError(f"{folder}: is no export, and not empty; give another folder")
     shutil.rmtree(folder, ignore_errors=True)
     try:
         importlib.import_module(f"lightfield.export.{name}").export(source, settings, folder)
@@ -32,8 +39,7 @@ def run(name: str, source: Source, settings: Export, folder: Path) -> dict[str, 
         raise
     paths = sorted(path for path in folder.rglob("*") if path.is_file())
     files = {path.relative_to(folder).as_posix(): sha256(path) for path in paths}
-    options = settings.model_dump(mode="json", exclude={"sources"})
-    write_json(folder / MANIFEST, {"format": name, "options": options, "files": files})
+    write_json(folder / MANIFEST, {"format": name, "options": settings.recorded, "files": files})
     if store := ViewStore.configured():
         store.put_list(folder / MANIFEST, paths)
     return files
@@ -54,5 +60,5 @@ def _pictures(path: Path) -> list[str]:
 
 MANIFESTS = [
     instant_ngp.MANIFEST,
-    Manifest(f"exports/*/{MANIFEST}", _pictures, files=_files),
+    Manifest(f"{FOLDER}/*/{MANIFEST}", _pictures, files=_files),
 ]
