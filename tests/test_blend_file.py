@@ -11,7 +11,7 @@ import pytest
 from checkouts import checkout, planned, snakemake
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import sha256
+from lightfield.core.files import sha256, write_json
 from lightfield.dataset import config, download
 from lightfield.dataset.dataset import check_presence, load_datasets, scene_datasets
 
@@ -131,6 +131,24 @@ def test_a_file_that_changed_meanwhile_is_fetched_anew(server, tmp_path):
     with pytest.raises(UserError):
         download.fetch(server.url, target, None, "the test")
     server.content = CONTENT[::-1]
+    download.fetch(server.url, target, None, "the test")
+    assert target.read_bytes() == CONTENT[::-1]
+
+
+def test_versions_are_not_mixed_by_a_kill(server, tmp_path, monkeypatch):
+    target = tmp_path / "scene.blend"
+    server.cut_after = [1_000_000, 0]
+    with pytest.raises(UserError):
+        download.fetch(server.url, target, None, "the test")
+    server.content = CONTENT[::-1]
+
+    def killed(path, content):
+        write_json(path, content)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+        patched.setattr(download, "write_json", killed)
+        download.fetch(server.url, target, None, "the test")
     download.fetch(server.url, target, None, "the test")
     assert target.read_bytes() == CONTENT[::-1]
 

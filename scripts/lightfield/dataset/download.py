@@ -75,10 +75,11 @@ def _receive(answer: Any, part: Path, have: int) -> str | None:
     """Write an answer's body behind the first ``have`` bytes of ``part``."""
     length = answer.headers.get("Content-Length")
     total = None if length is None else have + int(length)
-    write_json(_mark(part), {"version": _version(answer)})
     progress = Progress(-(-(total or _CHUNK) // _CHUNK), f"download {part.stem}", "MiB")
     progress.count = have // _CHUNK
     with part.open("r+b" if have else "wb") as file:
+        # Only now that nothing is left of another version.
+        write_json(_mark(part), {"version": _version(answer)})
         file.seek(have)
         while chunk := answer.read(_CHUNK):
             file.write(chunk)
