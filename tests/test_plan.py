@@ -11,9 +11,11 @@ from checkouts import checkout, planned
 from lightfield.core.files import write_json
 from lightfield.dataset import shard_counts
 from lightfield.dataset.dataset import scene_datasets
+from lightfield.dataset.journal import Journal
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.measurement import plan
+from lightfield.rendering import probe as probing
 
 SILVR = ("garden", "lone_monk", "barbershop")
 
@@ -175,3 +177,23 @@ def test_a_probe_foretells_the_size_of_the_views(run_program, room, tmp_path):
     run_program("probe.py", *shared, "--size", "64", "--output", tmp_path / "probe.json")
     smaller = json.loads((tmp_path / "probe.json").read_text())
     assert sum(smaller["view_bytes"]) / 3 < 0.9 * foretold
+
+
+def test_a_rig_of_one_view_is_probed_by_that(tmp_path, monkeypatch):
+    def render(probes, views, folder, journal, **_):
+        folder.mkdir()
+        log = Journal(journal)
+        log.append({"start_up_seconds": 1.0, "device": "CPU", "threads": 1})
+        for view in probes.views:
+            (folder / f"{view.name}.exr").write_bytes(b"1000")
+            seconds = dict.fromkeys(("wall_seconds", "cpu_seconds", "render_seconds"), 2.0)
+            log.append({"view": view.name, "finished": 3.0, **seconds})
+
+    monkeypatch.setattr(probing.shard, "render", render)
+    lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [128, 128]})
+    lightfield = LightField.from_rig(
+        {"type": "plane", "cameras": [1, 1]}, lens, render={"samples": 4}
+    )
+    found = probing.measure(lightfield, 3, 64, tmp_path, tmp_path, "cpu")
+    assert (found["view_seconds"], found["view_bytes"]) == ([8.0], [16.0])
+    assert "| a/b | 1 | 128 × 128 | 4 | 8 ± 0 |" in plan.table([("a/b", 1, found)], {})

@@ -26,7 +26,8 @@ def measure(
     views, lens = lightfield.views, lightfield.lens
     scale = min(1.0, size / max(lens.width, lens.height))
     small = [max(1, round(side * scale)) for side in (lens.width, lens.height)]
-    # The first view's time holds some of the start-up, so it is rendered and not counted.
+    # The first view's time holds some of the start-up, so it is rendered and, beside others, not
+    # counted.
     step = max(1, len(views) // (count + 1))
     probes = lightfield.changed(lens=lens.resized(*small), views=views[::step][: count + 1])
     with temporary_folder() as temporary:
@@ -42,7 +43,7 @@ def measure(
             journal=log,
         )
         (run,) = journal.read(log)
-        rendered = run.views[1:]
+        rendered = run.views[1:] or run.views
         sizes = [
             sum(file.stat().st_size for file in temporary.rglob(f"{view['view']}.exr"))
             for view in rendered
