@@ -8,6 +8,7 @@ import json
 import math
 import re
 import shutil
+import signal
 import subprocess
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -19,6 +20,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_dilation, binary_erosion
 
+from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.dataset.passes import NAMES, PASSES, matte_header
@@ -27,6 +29,7 @@ from lightfield.geometry import lenses, rotations
 from lightfield.imaging import images
 from lightfield.validation import files, geometry
 from lightfield.validation import validate as validation
+from lightfield.validation.pixels import Examiner
 from lightfield.validation.result import Check, Result
 
 validate = partial(validation.validate, manifests=MANIFESTS)
@@ -1169,6 +1172,14 @@ def test_program_writes_the_same_bytes_each_time_and_sums_that_hold(
     assert listed_paths == sorted(listed_paths)
     assert len(listed_paths) == 12 + 2
     subprocess.run(["sha256sum", "-c", "--strict", "sha256sums.txt"], cwd=dataset, check=True)
+
+
+def test_a_killed_worker_is_an_error_of_one_line(tmp_path: Path) -> None:
+    with (
+        pytest.raises(UserError, match="room: a process that reads it was killed; most likely"),
+        validation._workers(Examiner(tmp_path / "room", []), 2) as mapped,
+    ):
+        list(mapped(signal.raise_signal, [signal.SIGKILL]))
 
 
 def test_strays_are_moved_before_they_make_a_dataset_invalid(

@@ -10,6 +10,7 @@ checked is said, never counted as right.
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
@@ -17,6 +18,8 @@ from typing import Any
 
 import OpenImageIO as oiio
 
+from lightfield.core.errors import UserError
+from lightfield.core.failures import LESS_MEMORY
 from lightfield.core.files import read_json, sha256
 from lightfield.core.progress import Progress
 from lightfield.validation import files, geometry, pixels
@@ -98,11 +101,17 @@ def _workers(examiner: Examiner, processes: int) -> Iterator[Mapped]:
         _start_worker(examiner)
         yield map
         return
-    # Spawned, because OpenImageIO has threads, which do not survive a fork.
-    with ProcessPoolExecutor(
-        processes, get_context("spawn"), initializer=_start_worker, initargs=(examiner,)
-    ) as pool:
-        yield pool.map
+    try:
+        # Spawned, because OpenImageIO has threads, which do not survive a fork.
+        with ProcessPoolExecutor(
+            processes, get_context("spawn"), initializer=_start_worker, initargs=(examiner,)
+        ) as pool:
+            yield pool.map
+    except BrokenProcessPool:
+        raise UserError(
+            f"{examiner.dataset}: a process that reads it was killed; most likely memory ran out: "
+            f"{LESS_MEMORY}"
+        ) from None
 
 
 _examiner: Examiner
