@@ -27,7 +27,7 @@ from lightfield.dataset.passes import NAMES, PASSES, matte_header
 from lightfield.export import MANIFESTS
 from lightfield.geometry import lenses, rotations
 from lightfield.imaging import images
-from lightfield.validation import files, geometry
+from lightfield.validation import consistency, files, geometry
 from lightfield.validation import validate as validation
 from lightfield.validation.pixels import Examiner
 from lightfield.validation.result import Check, Result
@@ -1172,6 +1172,14 @@ def test_program_writes_the_same_bytes_each_time_and_sums_that_hold(
     assert listed_paths == sorted(listed_paths)
     assert len(listed_paths) == 12 + 2
     subprocess.run(["sha256sum", "-c", "--strict", "sha256sums.txt"], cwd=dataset, check=True)
+
+
+@pytest.mark.parametrize("size", [(1, 40), (40, 1), (40, 2)])
+def test_an_image_without_inner_pixels_has_no_surfaces(size: tuple[int, int]) -> None:
+    lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": size})
+    camera = consistency.Camera(lens, np.eye(4), "z")
+    depth = np.full((lens.height, lens.width), 2, np.float32)
+    assert len(consistency.sample(camera, depth, 400)) == 0
 
 
 def test_a_killed_worker_is_an_error_of_one_line(tmp_path: Path) -> None:

@@ -156,9 +156,12 @@ def sample(camera: Camera, depth: NDArray[Any], rays: int) -> Patches:
     """Return up to ``rays`` smooth patches of a view, spread evenly over it.
 
     The image is divided into square cells; of four fixed places in each the smoothest is taken.
-    ``depth``: (height, width) of a float type, misses +inf.
+    ``depth``: (height, width) of a float type, misses +inf; below 3 × 3 there is no patch.
     """
     height, width = depth.shape
+    if min(height, width) < 3:
+        none = np.zeros(0, np.int64)
+        return _patches(camera, depth, none, none)[0]
     cell = max((height * width / rays) ** 0.5, 2.0)
     down, across = int(height / cell), int(width / cell)
     # The four places of a cell: the corners of a square turned so that none share a row or column.
