@@ -22,8 +22,11 @@ def check(path: Path, dataset: Path, sets: Sequence[ImageSet]) -> Check:
     """Check a scene's splits.json, beside the folders of its rigs, and the sets of one of these.
 
     No view may be in two lists, nor have the pose of one that is in another: it would be the same
-    picture. Raises `UserError` where splits.json cannot be read.
+    picture. Raises `UserError` where splits.json cannot be read, or is of another folder.
     """
+    home = path.resolve().parent
+    if not dataset.is_relative_to(home):
+        raise UserError(f"{path}: is of the rigs in {home}, and {dataset} is not in it")
     content = read_json(path)
     try:
         parts = {part: [str(name) for name in content[part]] for part in PARTS}
@@ -41,7 +44,7 @@ def check(path: Path, dataset: Path, sets: Sequence[ImageSet]) -> Check:
         for part in PARTS
         if sorted(parts[part]) != sorted(expected[part])
     ]
-    own = lightfields.get(dataset.relative_to(path.resolve().parent).as_posix())
+    own = lightfields.get(dataset.relative_to(home).as_posix())
     split = {view.name: view.split for view in own.views} if own else {}
     for image_set in sets:
         for view in image_set.lightfield.views:
