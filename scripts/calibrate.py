@@ -9,7 +9,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from lightfield.core.cli import run
+from lightfield.core.cli import positive, run
 from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import calibration, sampling, trials
@@ -20,7 +20,7 @@ def main() -> None:
     trials.add_arguments(parser, "lightfield.json with render.target_error")
     parser.add_argument(
         "--probes",
-        type=int,
+        type=positive,
         default=sampling.PROBES,
         help="windows of views, as many held out (default: %(default)s)",
     )

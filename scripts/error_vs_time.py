@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from lightfield.core.cli import run
+from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import error_vs_time, trials
@@ -15,15 +15,15 @@ def main() -> None:
     trials.add_calibration(parser)
     parser.add_argument(
         "--probes",
-        type=int,
+        type=positive,
         default=1,
         help="windows of each stratum, beside that of the first one's neighbour (default: 1)",
     )
     parser.add_argument(
-        "--octaves", type=int, default=8, help="of sample counts, beginning at 1 (default: 8)"
+        "--octaves", type=positive, default=8, help="of sample counts, beginning at 1 (default: 8)"
     )
     parser.add_argument(
-        "--reference", type=int, default=2048, help="samples of a reference (default: 2048)"
+        "--reference", type=positive, default=2048, help="samples of a reference (default: 2048)"
     )
     parser.add_argument(
         "--seeds",

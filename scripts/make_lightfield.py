@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import TypeAdapter
 
-from lightfield.core.cli import run
+from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.core.settings import checked
@@ -35,7 +35,7 @@ def main() -> None:
     )
     parser.add_argument(
         "--panorama",
-        type=int,
+        type=positive,
         metavar="WIDTH",
         help="instead of the rig, one equirectangular view from its centre, WIDTH pixels wide",
     )

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from lightfield.core.cli import run
+from lightfield.core.cli import positive, run
 from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.rendering import probe
@@ -14,8 +14,10 @@ def main() -> None:
     parser.add_argument("--blend", required=True, type=Path, help="the scene")
     parser.add_argument("--inventory", required=True, type=Path, help="what the scene contains")
     parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
-    parser.add_argument("--views", type=int, default=3, help="views to render (default: 3)")
-    parser.add_argument("--size", type=int, default=48, help="of their longer side (default: 48)")
+    parser.add_argument("--views", type=positive, default=3, help="views to render (default: 3)")
+    parser.add_argument(
+        "--size", type=positive, default=48, help="of their longer side (default: 48)"
+    )
     parser.add_argument("--device", default="auto", help="what Cycles renders on (default: auto)")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()

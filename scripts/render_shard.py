@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from lightfield.core.cli import run
+from lightfield.core.cli import positive, run
 from lightfield.dataset.lightfield import LightField
 from lightfield.rendering import shard
 
@@ -32,7 +32,7 @@ def main() -> None:
         choices=["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"],
         help="what Cycles renders on (default: auto)",
     )
-    parser.add_argument("--threads", type=int, help="CPU threads (default: all cores)")
+    parser.add_argument("--threads", type=positive, help="CPU threads (default: all cores)")
     parser.add_argument(
         "--stall", type=int, default=0, metavar="S", help="seconds for a view, or it is killed"
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightfield.core.cli import run
+from lightfield.core.cli import positive, run
 from lightfield.core.files import write_csv
 from lightfield.core.progress import Progress
 from lightfield.export.source import Source
@@ -25,7 +25,7 @@ def main() -> None:
     add = parser.add_argument
     add("dataset", type=Path, help="folder of a dataset with depth")
     add("--truth", type=Path, nargs="+", help="folders of the datasets that were held out")
-    add("--views", type=int, default=12, help="of each that are compared (default: 12)")
+    add("--views", type=positive, default=12, help="of each that are compared (default: 12)")
     add("--output", type=Path, required=True, metavar="STEM")
     arguments = parser.parse_args()
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightfield.core.cli import run
+from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
 from lightfield.core.progress import Progress
 from lightfield.dataset.config import read_yaml
@@ -45,14 +45,12 @@ def main() -> None:
         "dataset's split has to test with, from the others)",
     )
     help_text = f"views a picture is made of (default: {BEST})"
-    add("--best", type=int, default=BEST, metavar="K", help=help_text)
+    add("--best", type=positive, default=BEST, metavar="K", help=help_text)
     add("--exposure", type=float, help="of the PNGs, in stops (default: by the first picture)")
     add("--video", action="store_true", help="write walk.mp4, too, with ffmpeg")
-    add("--rate", type=int, default=25, help="pictures a second of the video (default: 25)")
+    add("--rate", type=positive, default=25, help="pictures a second of the video (default: 25)")
     add("--output", type=Path, required=True, metavar="FOLDER")
     arguments = parser.parse_args()
-    if arguments.best < 1:
-        raise UserError(f"--best: is {arguments.best}; must be 1 or more")
 
     source = Source(arguments.dataset, arguments.reprojection, ".exr")
     views, targets = source.lightfield.views, poses(arguments.poses)

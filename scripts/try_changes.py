@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from lightfield.core.cli import run
+from lightfield.core.cli import positive, run
 from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import advice, threads, trials
@@ -14,13 +14,19 @@ def main() -> None:
     trials.add_arguments(parser, "lightfield.json")
     trials.add_calibration(parser)
     parser.add_argument(
-        "--probes", type=int, default=1, help="windows of each stratum (default: %(default)s)"
+        "--probes", type=positive, default=1, help="windows of each stratum (default: %(default)s)"
     )
     parser.add_argument(
-        "--reference", type=int, default=512, help="samples of a reference (default: %(default)s)"
+        "--reference",
+        type=positive,
+        default=512,
+        help="samples of a reference (default: %(default)s)",
     )
     parser.add_argument(
-        "--cores", type=int, default=1, help="for threads a process to be tried on (default: 1)"
+        "--cores",
+        type=positive,
+        default=1,
+        help="for threads a process to be tried on (default: 1)",
     )
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()

@@ -13,7 +13,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from lightfield.core.cli import run
+from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import NAME
@@ -38,7 +38,7 @@ def main() -> None:
     lists = "export.json or transforms.json of each export that it shall have (default: any)"
     add("--exports", type=Path, nargs="*", help=lists)
     add("--removed", type=Path, help="folder to which files go that are not the dataset's")
-    add("--processes", type=int, default=1, help="worker processes (default: 1)")
+    add("--processes", type=positive, default=1, help="worker processes (default: 1)")
     arguments = parser.parse_args()
     if (arguments.output is None) != (arguments.sums is None):
         raise UserError("--output, --sums: go together")

@@ -1,5 +1,6 @@
 """Failing programs: each fails its job, and why is the last thing that the terminal says."""
 
+import argparse
 import json
 import os
 import re
@@ -12,7 +13,7 @@ import pytest
 from checkouts import checkout
 from sphere import write_views
 
-from lightfield.core.cli import run
+from lightfield.core.cli import positive, run
 from lightfield.core.failures import cause, failure_report
 
 ROOT = Path(__file__).parents[1]
@@ -297,6 +298,17 @@ def test_what_the_system_refuses_is_one_line(problem, said):
     with pytest.raises(SystemExit) as caught:
         run(main)
     assert str(caught.value).startswith(said)
+
+
+@pytest.mark.parametrize("count", ["0", "-1", "1.5", "many"])
+def test_a_count_is_one_or_more(count, capsys):
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--views", type=positive)
+    assert parser.parse_args(["--views", "7"]).views == 7
+    with pytest.raises(SystemExit):
+        parser.parse_args([f"--views={count}"])
+    said = f"error: argument --views: is {count}; must be 1 or more\n"
+    assert capsys.readouterr().err.endswith(said)
 
 
 def test_the_same_cause_of_many_jobs_is_said_once(tmp_path):

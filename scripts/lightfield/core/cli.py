@@ -1,5 +1,6 @@
-"""What programs in scripts/ have in common: how they end, and which views they are to take."""
+"""What programs in scripts/ have in common: how they end, counts, and which views they take."""
 
+import argparse
 import os
 import sys
 from collections.abc import Callable
@@ -28,6 +29,13 @@ def run(main: Callable[[], None]) -> None:
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         sys.exit(f"error: {where}{error.strerror or error}")
+
+
+def positive(text: str) -> int:
+    """Return a whole number from 1 on: an ``add_argument``'s ``type``."""
+    if text.isdecimal() and int(text) > 0:
+        return int(text)
+    raise argparse.ArgumentTypeError(f"is {text}; must be 1 or more")
 
 
 def view_slice(text: str, count: int) -> slice:
