@@ -35,16 +35,19 @@ def run(job: Job) -> None:
     label = f"reproject to {arguments.output_dir} {arguments.views or ''}".rstrip()
     progress = Progress(len(views), label)
     paths: list[Path] = []
-    failed = 0
+    failed: list[str] = []
     for view, result in _results(job, views):
         if isinstance(result, UserError | OSError):
-            failed += 1
-            print(f"error: {_named(view, result)}", file=sys.stderr, flush=True)
+            failed.append(_named(view, result))
+            print(f"error: {failed[-1]}", file=sys.stderr, flush=True)
         else:
             paths += result
         progress.done()
     if failed:
-        raise UserError(f"{failed} of {len(views)} views could not be reprojected")
+        # The last line of a log is what is said of its job.
+        raise UserError(
+            f"{len(failed)} of {len(views)} views could not be reprojected, as {min(failed)}"
+        )
     job.record.write(sorted(paths), counts={"views": len(views), "files": len(paths)})
 
 
