@@ -477,6 +477,8 @@ def test_the_yaml_asks_for_all_that_the_program_can_do(dataset: Dataset) -> None
     assert images.read_image(depth).channels["Y"].max() == 4000
     with pytest.raises(ValidationError, match="bounds: goes without scale"):
         TypeAdapter(InstantNgp).validate_python(settings | {"scale": 0.1})
+    with pytest.raises(ValidationError, match="offset: goes with scale"):
+        TypeAdapter(InstantNgp).validate_python(settings | {"offset": [0, 0, 0]})
 
 
 @pytest.mark.parametrize(

@@ -128,6 +128,7 @@ VALUES = [
 SETTINGS = [
     *({"results": value} for value in ("a b", "a;b", "a\n", "$(id)", "a'b", 'a"b', "{a}", "-a")),
     *({"results": value} for value in ("", "a|b", "a>b", "a&b", "a`b", "~", "*", LONG * 10, 7)),
+    *({"results": value} for value in ("work", "./work/", "..")),
     *({"work": value} for value in ("a b", ".", "/", "\0", None, ["a"], {"a": "b"})),
     *(
         {"scenes": [value]}
@@ -225,7 +226,8 @@ def test_a_hostile_value_is_refused(number, tmp_path):
 
 
 @pytest.mark.parametrize("number", range(len(SETTINGS)))
-def test_a_hostile_setting_is_refused(number):
+def test_a_hostile_setting_is_refused(number, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     content = {"scenes": ["room"], "preset": "full", "presets": {"full": {}}, **SETTINGS[number]}
     assert assert_refused(lambda: config.load_config(content)).startswith("config.yaml: ")
 

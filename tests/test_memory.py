@@ -45,7 +45,7 @@ def test_this_machines_memory_is_within_every_limit(tmp_path, monkeypatch):
 
 
 def test_a_job_asks_for_what_the_scene_was_measured_to_take(tmp_path):
-    content = read_config(ROOT / "config.yaml") | {"work": str(tmp_path), "results": str(tmp_path)}
+    content = read_config(ROOT / "config.yaml") | {"work": str(tmp_path)}
     dataset = scene_datasets("garden", settings=load_config(content))[0]
     pixels = 2048 * 2048 * memory.PIXEL_BYTES
     assert dataset.view_memory_bytes == memory.UNKNOWN_SCENE + pixels

@@ -158,10 +158,12 @@ class Configuration(Settings):
             if "." in name or name in SCENE_NEIGHBOURS:
                 taken = ", ".join(sorted(SCENE_NEIGHBOURS))
                 raise ValueError(f"scenes: {name} is no name for a scene; no dots, and not {taken}")
+        others = [Path.cwd(), *Path.cwd().parents, ROOT, *ROOT.parents]
         for key in ("results", "work"):
             folder = getattr(self, key)
-            if Path(folder).resolve() in (Path.cwd(), ROOT, *ROOT.parents):
+            if Path(folder).resolve() in others:
                 raise ValueError(f"{key}: is {folder!r}; must be a folder of its own")
+            others.append(Path(folder).resolve())
         return self
 
 

@@ -93,6 +93,8 @@ class InstantNgp(Export):
     def _one_placement(self) -> Self:
         if self.scale is not None and self.bounds == "depth":
             raise ValueError("bounds: goes without scale, which it would find")
+        if self.scale is None and "offset" in self.model_fields_set:
+            raise ValueError("offset: goes with scale; without it both are fitted")
         return self
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
