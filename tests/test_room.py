@@ -1,5 +1,6 @@
 """Room before a run, and what killed runs left: refused and removed before anything is made."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -11,7 +12,7 @@ import pytest
 from checkouts import checkout, snakemake
 from conftest import SCRIPTS
 
-from lightfield.core import leftovers, room
+from lightfield.core import files, leftovers, room
 from lightfield.core.errors import UserError
 
 Usage = namedtuple("Usage", "free")
@@ -74,8 +75,8 @@ def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path, monkey
     keepers[1].kill()
     keepers[1].wait()
     (tmp_path / "results").mkdir()
-    files = [".view.77.tmp.exr", ".view.78.tmp", ".view.79.tmp.exr", "view.exr", ".tmp.exr"]
-    paths = [tmp_path / "results" / name for name in files]
+    names = [".view.77.tmp.exr", ".view.78.tmp", ".view.79.tmp.exr", "view.exr", ".tmp.exr"]
+    paths = [tmp_path / "results" / name for name in names]
     for path in paths:
         path.write_bytes(b"half")
     empty, full, young = (tmp_path / f"blender_{name}" for name in ("empty", "full", "young"))
@@ -94,3 +95,26 @@ def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path, monkey
     assert all(path.exists() for path in (live / "view.exr", *paths[2:], full, young, own))
     keepers[0].kill()
     keepers[0].wait()
+
+
+def test_a_temporary_folder_needs_no_locks(tmp_path, monkeypatch):
+    def flock(*_):
+        raise OSError(errno.EBADF, "Bad file descriptor")
+
+    monkeypatch.setattr(leftovers.fcntl, "flock", flock)
+    monkeypatch.setattr(leftovers, "FOLDER_AGE", -1)
+    with leftovers.temporary_folder(tmp_path) as folder:
+        monkeypatch.setattr(leftovers.tempfile, "gettempdir", lambda: str(tmp_path))
+        leftovers.remove()
+        assert folder.is_dir()
+    assert not folder.exists()
+
+
+def test_two_processes_of_one_number_write_to_one_file_each_its_own(tmp_path, monkeypatch):
+    monkeypatch.setattr(files.os, "getpid", lambda: 7)
+    target = tmp_path / "names.json"
+    with files.atomic_path(target) as one, files.atomic_path(target) as other:
+        one.write_text("one")
+        other.write_text("other")
+    assert target.read_text() == "one"
+    assert list(tmp_path.iterdir()) == [target]

@@ -31,13 +31,15 @@ def writing(path: Path) -> Iterator[None]:
 def atomic_path(target: Path | str) -> Iterator[Path]:
     """Yield a temporary path beside ``target``; on success it is flushed to disk and renamed.
 
-    The temporary name keeps the target's suffix, because image writers choose the format by it.
+    The temporary name keeps the target's suffix, because image writers choose the format by it. It
+    holds a random number: in containers several processes may have one number.
     On any error the temporary file is removed and the target is left as it was; an OSError, and an
     empty file, become a `UserError`. Python reports every byte that it cannot write. A library
     that may not must be checked by whoever calls it: it raises an OSError for a file cut short.
     """
     target = Path(target)
-    temporary = target.with_name(f".{target.stem}.{os.getpid()}.tmp{target.suffix}")
+    number = int.from_bytes(os.urandom(4))
+    temporary = target.with_name(f".{target.stem}.{number}.tmp{target.suffix}")
     with writing(target):
         target.parent.mkdir(parents=True, exist_ok=True)
         try:

@@ -34,7 +34,9 @@ def temporary_folder(parent: Path | str | None = None) -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix=PREFIX, dir=parent) as name:
         lock = os.open(name, os.O_RDONLY)
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+            # Without locks of folders, as on some networks' file systems, `remove` leaves it.
+            with suppress(OSError):
+                fcntl.flock(lock, fcntl.LOCK_EX)
             yield Path(name)
         finally:
             os.close(lock)
