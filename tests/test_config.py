@@ -101,6 +101,16 @@ BROKEN = {
         {"lens": "file", "resolution": [8, 8]},
         "rigs.LFSphere.camera.lens: file goes with a rig of type blend_camera",
     ),
+    "oblong pixels": (
+        "rigs.LFSphere.camera",
+        {
+            "lens": "rectilinear",
+            "focal_length": 50,
+            "sensor_size": [36, 24],
+            "resolution": [1920, 1080],
+        },
+        "rigs.LFSphere.camera.sensor_size: is [36.0, 24.0], but the pixels of Cycles' persp",
+    ),
     "bad sum": (
         "scene",
         {"blend": "a.blend", "sha256": "123"},

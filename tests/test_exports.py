@@ -583,7 +583,7 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
         ),
         ("nerfstudio", "views", VIEWS, {"splatfacto": True}, "taken for a pinhole by splatfacto"),
         ("nerf_synthetic", "views", VIEWS, {}, "is no pinhole camera"),
-        ("nerf_synthetic", "views", LENSES["shifted"], {}, "off centre"),
+        ("nerf_synthetic", "views", LENSES["shifted"] | {"sensor_size": 36}, {}, "off centre"),
         ("opendibr", "views", VIEWS | {"principal_point": [40, 48]}, {}, "axis off centre"),
         ("opendibr", "again", VIEWS, {}, "holds no depth; give it format: exr"),
         ("miv", "views", VIEWS, {}, "a fisheye of 180 degrees with longitude: .-90, 90."),

@@ -30,6 +30,7 @@ from lightfield.dataset.exports import VIEWS, Export, Exports
 from lightfield.dataset.passes import FLOW, PASSES, in_order
 from lightfield.geometry.lenses import LENSES, CameraSettings, Lens
 from lightfield.geometry.lenses.cube_map import CubeMap
+from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
 from lightfield.geometry.rigs.rig import Frame
 from lightfield.geometry.rigs.split import PARTS, Chosen
@@ -624,6 +625,11 @@ class Scene(Settings):
             raise ValueError(
                 f"{key}.camera.lens: is {camera.lens!r}, which Cycles does not have; "
                 f"must be one of {known} (reproject for the others)"
+            )
+        if self.render and isinstance(lens, Rectilinear) and not lens.has_square_pixels:
+            raise ValueError(
+                f"{key}.camera.sensor_size: is {list(lens.sensor)}, but the pixels of Cycles' "
+                f"perspective views are square; must be its width alone, {lens.sensor[0]:g}"
             )
         if self.render and self.render.depth == "z" and not lens.has_z_depth:
             raise ValueError(

@@ -273,8 +273,7 @@ def _centred_pinhole(lens: Lens) -> str | None:
     """Say why a lens is no pinhole with a centred axis and square pixels; None if it is."""
     if not isinstance(lens, Rectilinear):
         return f"is no pinhole camera, which this layout knows alone; {TO_RECTILINEAR}"
-    square = math.isclose(lens.sensor[0] / lens.width, lens.sensor[1] / lens.height, rel_tol=1e-6)
-    if lens.center != (lens.width / 2, lens.height / 2) or not square:
+    if lens.center != (lens.width / 2, lens.height / 2) or not lens.has_square_pixels:
         return "has its axis off centre or oblong pixels, which this layout cannot say"
     return None
 

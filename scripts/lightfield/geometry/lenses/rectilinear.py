@@ -78,6 +78,12 @@ class Rectilinear(RadialLens):
         return f"{self.title}, {self.focal_length:.4g} mm"
 
     @property
+    def has_square_pixels(self) -> bool:
+        """Whether a pixel is as wide on the sensor as it is high."""
+        across, down = self._pixel_size()
+        return math.isclose(across, down, rel_tol=1e-6)
+
+    @property
     def _unit(self) -> Pair:
         # r is counted in focal lengths.
         return self._pixel_size(self.focal_length)
