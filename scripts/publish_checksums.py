@@ -11,7 +11,7 @@ from typing import Any
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, read_json
+from lightfield.core.files import read_json, write_bytes
 
 # So many failed checks are named, each by the first thing that is wrong.
 CAUSES = 3
@@ -31,8 +31,7 @@ def main() -> None:
         raise UserError(
             f"{validation['dataset']} is not valid: {causes(validation)}: see {arguments.page}"
         )
-    with atomic_path(arguments.output) as temporary:
-        temporary.write_bytes(arguments.sums.read_bytes())
+    write_bytes(arguments.output, arguments.sums.read_bytes())
 
 
 def causes(validation: Mapping[str, Any]) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, write_text
+from lightfield.core.files import write_bytes, write_text
 from lightfield.core.progress import Progress
 from lightfield.dataset.exports import Hci
 from lightfield.dataset.lightfield import LightField, View
@@ -119,6 +119,5 @@ def parameters(
 def write_pfm(path: Path, values: Floats | NDArray[np.float32]) -> None:
     """Write a (height, width) map as a portable float map: float32, the lowest row first."""
     height, width = values.shape
-    with atomic_path(path) as temporary:
-        head = f"Pf\n{width} {height}\n-1.0\n".encode()
-        temporary.write_bytes(head + np.flipud(values).astype("<f4").tobytes())
+    head = f"Pf\n{width} {height}\n-1.0\n".encode()
+    write_bytes(path, head + np.flipud(values).astype("<f4").tobytes())

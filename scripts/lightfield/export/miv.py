@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.files import write_json
+from lightfield.core.files import write_bytes, write_json
 from lightfield.core.progress import Progress
 from lightfield.dataset.exports import Miv
 from lightfield.export import yuv
@@ -39,9 +39,9 @@ def export(source: Source, settings: Miv, folder: Path) -> None:
         depth = source.depth(view, meaning)
         limits = depth_range(depth)
         texture = yuv.of_colour(source.encoded(view), COLOUR_BITS)
-        yuv.write(folder / f"{view.name}_texture_{size}_yuv420p{COLOUR_BITS}le.yuv", texture)
+        write_bytes(folder / f"{view.name}_texture_{size}_yuv420p{COLOUR_BITS}le.yuv", texture)
         geometry = yuv.of_levels(levels(depth, limits, DEPTH_BITS, 1), DEPTH_BITS)
-        yuv.write(folder / f"{view.name}_depth_{size}_yuv420p{DEPTH_BITS}le.yuv", geometry)
+        write_bytes(folder / f"{view.name}_depth_{size}_yuv420p{DEPTH_BITS}le.yuv", geometry)
         found.append(
             {
                 "Name": view.name,

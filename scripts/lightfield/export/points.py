@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.core.files import atomic_path
+from lightfield.core.files import write_bytes
 from lightfield.core.progress import Progress
 from lightfield.export.source import Floats, Source, pixel_indices
 
@@ -91,8 +91,7 @@ def write_ply(path: Path, points: Points) -> None:
         f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n"
         f"{properties}end_header\n"
     )
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(header.encode() + vertices.tobytes())
+    write_bytes(path, header.encode() + vertices.tobytes())
 
 
 def _joined(parts: Sequence[Points]) -> Points:

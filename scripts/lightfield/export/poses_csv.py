@@ -1,9 +1,8 @@
 """Poses as a table, which a rig of type ``poses`` reads: metres, and XYZ Euler radians."""
 
-import csv
 from pathlib import Path
 
-from lightfield.core.files import atomic_path
+from lightfield.core.files import write_csv
 from lightfield.dataset.exports import PosesCsv
 from lightfield.export.source import Source
 from lightfield.geometry.rigs.poses import CSV_HEADER
@@ -11,11 +10,8 @@ from lightfield.geometry.rigs.poses import CSV_HEADER
 
 def export(source: Source, settings: PosesCsv, folder: Path) -> None:
     """Write ``poses.csv`` into ``folder``."""
-    with (
-        atomic_path(folder / "poses.csv") as temporary,
-        temporary.open("w", encoding="utf-8", newline="") as file,
-    ):
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(CSV_HEADER)
-        for view in source.lightfield.views:
-            writer.writerow([view.name, *view.position.tolist(), *view.rotation.tolist()])
+    rows = [
+        (view.name, *view.position.tolist(), *view.rotation.tolist())
+        for view in source.lightfield.views
+    ]
+    write_csv(folder / "poses.csv", [dict(zip(CSV_HEADER, row, strict=True)) for row in rows])

@@ -33,12 +33,6 @@ def of_levels(levels: NDArray[np.uint16], bits: int) -> bytes:
     return levels.astype("<u2").tobytes() + grey.tobytes()
 
 
-def write(path: Path, frame: bytes) -> None:
-    """Write a file of one frame."""
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(frame)
-
-
 def write_hevc(path: Path, frame: bytes, size: tuple[int, int], bits: int) -> None:
     """Write one frame as lossless H.265 with ffmpeg; raises `UserError` where it cannot."""
     pixels = ["-pix_fmt", f"yuv420p{bits}le"]

@@ -1,19 +1,19 @@
 """Pages that are one file each: templates filled in, with styles, programs and pictures inside."""
 
-import io
 import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import jinja2
+import numpy as np
 from markupsafe import Markup
 from PIL import Image
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_text
 from lightfield.core.progress import duration
-from lightfield.report.packing import data_uri
+from lightfield.report.packing import data_uri, webp
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 
@@ -51,9 +51,7 @@ def photo(path: Path, widest: int) -> str | None:
     if picture.width > widest:
         height = max(1, round(picture.height * widest / picture.width))
         picture = picture.resize((widest, height), Image.Resampling.LANCZOS)
-    file = io.BytesIO()
-    picture.save(file, "WEBP", quality=PHOTO_QUALITY, method=4)
-    return data_uri(file.getvalue(), "image/webp")
+    return webp(np.asarray(picture), PHOTO_QUALITY)
 
 
 def plot(stem: Path) -> str | None:

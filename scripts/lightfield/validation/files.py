@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, read_json, set_aside, sha256
+from lightfield.core.files import read_json, set_aside, sha256, write_text
 from lightfield.dataset.dataset import REPORT_FILES
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, NAMES, Pass
@@ -408,6 +408,4 @@ def write_sums(path: Path, checksums: Mapping[str, str], dataset: Path, result: 
     sums = dict(checksums)
     if result.resolve().is_relative_to(dataset.resolve()):
         sums[result.resolve().relative_to(dataset.resolve()).as_posix()] = sha256(result)
-    with atomic_path(path) as temporary:
-        text = "".join(f"{digest}  {name}\n" for name, digest in sorted(sums.items()))
-        temporary.write_text(text, encoding="utf-8")
+    write_text(path, "".join(f"{digest}  {name}\n" for name, digest in sorted(sums.items())))
