@@ -62,10 +62,9 @@ def _listed(store: ViewStore, path: Path, results: Path, work: Path) -> Iterable
     """Yield each file that a list names, and its SHA-256."""
     if re.fullmatch(r"\d+-\d+\.json", path.name):
         stage = path.resolve().parent.relative_to(work.resolve())
-        folder, files = results / stage.parent, records.checksums(path).items()
-    else:
-        folder, files = path.parent, store.listed(sha256(path))
-    return [(folder / name, digest) for name, digest in files]
+        files = records.read(path).items()
+        return [(results / stage.parent / name, digest) for name, (_, digest) in files]
+    return [(path.parent / name, digest) for name, digest in store.listed(sha256(path))]
 
 
 if __name__ == "__main__":

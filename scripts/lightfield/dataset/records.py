@@ -97,11 +97,11 @@ class ShardRecord:
         return _entries(self._path.parent.glob(f"*{_LOG_SUFFIX}"))
 
 
-def checksums(record: Path) -> dict[str, str]:
-    """Return each file's SHA-256 by its path in the dataset; a `UserError` names the record."""
+def read(record: Path) -> dict[str, tuple[int, str]]:
+    """Return each file's bytes and SHA-256 by its path in the dataset; errors name the record."""
     content = read_json(record)
     try:
-        return {name: entry["sha256"] for name, entry in content["files"].items()}
+        return {path: (entry["bytes"], entry["sha256"]) for path, entry in content["files"].items()}
     except (LookupError, TypeError, AttributeError):
         raise UserError(f"{record}: files: must map paths to bytes and sha256") from None
 

@@ -127,7 +127,9 @@ class Job:
     def source_sums(self) -> Mapping[str, str]:
         """The SHA-256 of each image of --source-record, by its path in the dataset."""
         record = self.arguments.source_record
-        return records.checksums(record) if record else {}
+        return (
+            {path: digest for path, (_, digest) in records.read(record).items()} if record else {}
+        )
 
     @cached_property
     def copies(self) -> bool:

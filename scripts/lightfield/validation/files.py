@@ -17,6 +17,7 @@ from lightfield.core.files import read_json, set_aside, sha256, write_text
 from lightfield.dataset.dataset import REPORT_FILES
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, NAMES, Pass
+from lightfield.dataset.records import read as read_record
 from lightfield.geometry import rotations
 from lightfield.geometry.lenses import Lens
 from lightfield.validation.consistency import Camera
@@ -340,13 +341,7 @@ def checksums(
         return Check("checksums", None, "no record was given")
     recorded: dict[str, tuple[int, str]] = {}
     for record in records:
-        content = read_json(record)
-        try:
-            recorded |= {
-                path: (entry["bytes"], entry["sha256"]) for path, entry in content["files"].items()
-            }
-        except (LookupError, TypeError, AttributeError):
-            raise UserError(f"{record}: files: must map paths to bytes and sha256") from None
+        recorded |= read_record(record)
     faults = {}
     for path, (size, digest) in sorted(recorded.items()):
         if path not in found:

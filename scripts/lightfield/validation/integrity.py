@@ -14,7 +14,7 @@ from pathlib import Path
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import broken, read_json, set_aside, sha256
-from lightfield.dataset import ledger
+from lightfield.dataset import ledger, records
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.splits import SPLITS
@@ -117,10 +117,10 @@ class Integrity:
             if self._is_own(path) and re.fullmatch(r"\d+-\d+\.json", path.name):
                 if not self._is_sound(path):
                     continue
-                for file, entry in read_json(path)["files"].items():
+                for file, (_, digest) in records.read(path).items():
                     # A record of shards with other bounds may have views that there were.
                     if not self._published or self.dataset / file in self._published:
-                        found[self.dataset / file] = entry["sha256"]
+                        found[self.dataset / file] = digest
         return found
 
     @cached_property
