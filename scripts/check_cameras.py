@@ -51,8 +51,8 @@ def main() -> None:
     for warning in warnings(positions, distances):
         print(f"warning: {warning}", file=sys.stderr)
     nearest = min(distances)
-    told = f"{nearest:.3f} m" if nearest < REACH else f"more than {REACH} m"
-    print(f"{len(names)} cameras, none inside geometry; the nearest surface is {told} away")
+    away = f"{nearest:.3f} m" if nearest < REACH else f"more than {REACH} m"
+    print(f"{len(names)} cameras, none inside geometry; the nearest surface is {away} away")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Journals: what a shard's processes did and how fast, one JSON line each, kept through kills.
 
-Every process that works on a shard appends to the shard's journal, so that it tells all the time
+Every process that works on a shard appends to the shard's journal, so that it holds all the time
 that was really spent. Times of day are seconds since 1970. A process's lines are in this order:
 
 - ``started``, ``host``, ``pid``: when and where it began;
@@ -126,7 +126,7 @@ class Run:
 
 
 def read(path: Path) -> list[Run]:
-    """Return the runs that a journal tells of, in their order.
+    """Return the runs in a journal, in their order.
 
     A line that a kill cut short is left out, and so is one that was damaged since, and what stands
     before the first start.

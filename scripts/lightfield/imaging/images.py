@@ -137,12 +137,12 @@ def attribute(path: Path, name: str) -> Attribute | None:
 
 
 def has_key(path: Path, key: str) -> bool:
-    """Tell by its header alone whether a file is there and made by the settings of ``key``."""
+    """Return, by its header alone, whether a file is there and made by the settings of ``key``."""
     return attribute(path, KEY_ATTRIBUTE) == key
 
 
 def is_finished(path: Path, key: str) -> bool:
-    """Tell whether a file is there, whole, and made by the settings that ``key`` stands for."""
+    """Return whether a file is there, whole, and made by the settings that ``key`` stands for."""
     try:
         return path.exists() and read_image(path).attributes.get(KEY_ATTRIBUTE) == key
     except UserError:

@@ -166,7 +166,7 @@ def moving(objects: list[Any]) -> list[str]:
 
 
 def keeps_time(modifier: Any) -> bool:
-    """Tell whether a geometry nodes modifier asks for the time or simulates."""
+    """Return whether a geometry nodes modifier asks for the time or simulates."""
     timed = ("GeometryNodeInputSceneTime", "GeometryNodeSimulationOutput")
     return modifier.node_group is not None and any(
         node.bl_idname in timed

@@ -130,7 +130,7 @@ def _collect_shown(layer_collection: Any, shown: set[Any]) -> None:
 
 
 def _meets_rays(thing: Any) -> bool:
-    """Tell whether an object has any kind of ray turned on; empties stand for others."""
+    """Return whether an object has any kind of ray turned on; empties stand for others."""
     return thing.type == "EMPTY" or any(
         getattr(thing, f"visible_{kind}")
         for kind in ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")

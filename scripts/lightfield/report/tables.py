@@ -21,7 +21,7 @@ CHECK_KEYS = ("passed", "detail", "views", "problems", "warnings", "figures")
 ERROR_TABLES = {
     "slopes": "Slope of the error, both axes logarithmic; plain path tracing's is −1 in theory",
     "settings": "This scene's settings",
-    "pareto front": "On the Pareto front: no other way is both faster and better",
+    "pareto front": "On the Pareto front: no other method is both faster and better",
 }
 
 

@@ -3,7 +3,7 @@
 A view's depth is lifted into the world as small surface patches: 3 × 3 pixels and the plane that
 fits them best. Depth may have been sampled somewhere under the pixel filter (SILVR's is), so one
 value is only good to the slope of the surface times that jitter; the plane averages it, and how far
-the nine points lie from it (`Patches.spread`) tells how far one can trust it. Patches that no plane
+the nine points lie from it (`Patches.spread`) says how far it can be trusted. Patches that no plane
 fits (edges, thin structures) are not used to ask, and give a range instead of an answer.
 
 A patch's centre is then projected into another view, and the plane of the 3 × 3 pixels recorded
