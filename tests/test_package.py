@@ -15,6 +15,7 @@ from lightfield.core.files import sha256, write_json
 from lightfield.dataset.config import load_scene
 from lightfield.dataset.exports import Exports
 from lightfield.dataset.lightfield import LightField
+from lightfield.export import transforms
 from lightfield.report import package
 from lightfield.validation.integrity import Integrity
 
@@ -33,6 +34,7 @@ def folder(tmp_path_factory):
     for name in ("perspective/lightfield.json", "perspective/transforms.json"):
         write_json(dataset / name, {"frames": []})
     write_json(dataset / "perspective/exports/colmap/export.json", {"format": "colmap"})
+    write_json(dataset / "perspective/exports/nerfstudio/transforms.json", {"frames": []})
     write_json(dataset / "normal/names.json", {})
     write_json(dataset / "report/costs.json", {"not": "packed"})
     write_json(dataset / "validation.json", {"valid": True})
@@ -104,7 +106,10 @@ def test_the_card_says_what_it_is_and_how_it_is_loaded_and_cited(folder, tmp_pat
         "Reconstruction('perspective/exports/colmap/sparse/0')"
     )
     assert card["loaders"]["."].endswith("'./exr/view_0000f.exr').channels()")
-    assert card["loaders"]["perspective/transforms.json"].startswith("./instant-ngp perspective/")
+    # nerfstudio's file is not for it.
+    found = {path for path, how in card["loaders"].items() if how.startswith("./instant-ngp")}
+    assert found == {"perspective/transforms.json"}
+    assert transforms(folder) == [folder / path for path in found]
     assert all(text in readme for text in (*card["cite"], *card["loaders"].values()))
     assert "licence of the scene | not stated" in readme
     credited = load_scene("lone_monk_original")

@@ -45,6 +45,11 @@ def run(name: str, source: Source, settings: Export, folder: Path) -> dict[str, 
     return files
 
 
+def transforms(folder: Path) -> list[Path]:
+    """Return instant-ngp's files of the dataset in a folder; nerfstudio's have the same name."""
+    return sorted([*folder.glob("transforms.json"), *folder.glob("*/transforms.json")])
+
+
 def _files(path: Path) -> dict[str, str]:
     """Return the files that an export.json lists, with their SHA-256."""
     try:

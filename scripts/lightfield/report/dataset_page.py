@@ -12,6 +12,7 @@ from lightfield.dataset import blend
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW
 from lightfield.dataset.splits import SPLITS
+from lightfield.export import transforms
 from lightfield.geometry import rigs
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
@@ -86,9 +87,7 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
         measured={title: one for title, one in measured.items() if one},
         costs=tables.costs(report / "costs.json"),
         files=files(folder, lightfield, valid=not validation or validation["valid"]),
-        transforms=sorted(
-            path.relative_to(folder).as_posix() for path in folder.glob("**/transforms.json")
-        ),
+        transforms=[path.relative_to(folder).as_posix() for path in transforms(folder)],
         yaml=origin.yaml,
         command=origin.command,
     )

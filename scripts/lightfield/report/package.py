@@ -21,6 +21,7 @@ from lightfield.dataset.config import Scene
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import PASSES
+from lightfield.export import transforms
 from lightfield.imaging import images
 from lightfield.report.page import TEMPLATES
 from lightfield.validation.files import CARD, IMAGES, README, REPORT
@@ -80,11 +81,9 @@ def card(folder: Path, name: str, scene: Scene) -> dict[str, Any]:
 def _loaders(folder: Path, view: str) -> Iterator[tuple[str, str]]:
     """Yield how the views and each export are loaded, by their folders."""
     yield ".", LOADERS["exr"].replace("{view}", view).replace("{}", ".")
-    for path in sorted(folder.rglob("transforms.json")):
+    for path in transforms(folder):
         place = path.parent.relative_to(folder).as_posix()
-        # nerfstudio's has the same name.
-        if not (path.parent / MANIFEST).is_file():
-            yield f"{place}/transforms.json", LOADERS["instant_ngp"].replace("{}", place)
+        yield f"{place}/transforms.json", LOADERS["instant_ngp"].replace("{}", place)
     for path in sorted(folder.rglob(MANIFEST)):
         place = path.parent.relative_to(folder).as_posix()
         yield place, LOADERS[path.parent.name].replace("{}", place)
