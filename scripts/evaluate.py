@@ -9,6 +9,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
@@ -53,7 +54,7 @@ def main() -> None:
         true = evaluation.truth(source, view, paths[view.name])
         counted = np.ones(shown.colour.shape[:2], bool)
         if arguments.masks:
-            counted = images.read_image(arguments.masks / f"{view.name}.png").channels["Y"] > 0
+            counted = mask(arguments.masks / f"{view.name}.png", counted.shape)
         parts = evaluation.regions(source, view, counted, true.depth)
         if not parts:
             raise UserError(f"{paths[view.name]}: its mask leaves no pixel that the lens sees")
@@ -95,6 +96,15 @@ def find(folder: Path, view: View) -> Path:
         if path.is_file():
             return path
     raise UserError(f"{folder}: has no {view.name}.png or .exr, which is a view to test with")
+
+
+def mask(path: Path, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Return where a grey picture is not 0; raises `UserError` for one of another size or kind."""
+    pixels = images.read_image(path, ["Y"]).channels["Y"]
+    if pixels.shape != shape:
+        sizes = (f"{width} × {height}" for height, width in (pixels.shape, shape))
+        raise UserError(f"{path}: is {', but its view is '.join(sizes)}")
+    return np.asarray(pixels > 0)
 
 
 if __name__ == "__main__":

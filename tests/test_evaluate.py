@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from sphere import write_views
 
+import evaluate
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField
 from lightfield.export.source import Source
@@ -125,3 +126,13 @@ def test_what_is_missing_or_of_another_size_is_named(dataset, tmp_path, run_prog
     images.write_png(tmp_path / "small.png", np.zeros((4, 6, 3), np.uint8))
     with pytest.raises(UserError, match="is 6 × 4, but the dataset's views are 64 × 48"):
         evaluation.rendered(tmp_path / "small.png", Source(dataset, "perspective", ".exr"))
+    mask = tmp_path / "view_0001f.png"
+    for pixels, problem in (
+        (np.ones((48, 64, 3), np.uint8), "has no channel Y; it has R, G, B"),
+        (np.ones((4, 6), np.uint8), "is 6 × 4, but its view is 64 × 48"),
+    ):
+        images.write_png(mask, pixels)
+        with pytest.raises(UserError, match=problem):
+            evaluate.mask(mask, (48, 64))
+    images.write_png(mask, np.eye(48, 64, dtype=np.uint8))
+    assert evaluate.mask(mask, (48, 64)).sum() == 48
