@@ -57,8 +57,8 @@ def main() -> None:
         )
         if count:
             print(
-                f"{arguments.dataset}: {count} files that are no longer the dataset's are now in "
-                f"{arguments.removed / arguments.dataset}"
+                f"{arguments.dataset}: {count} files that are no longer the dataset's are now below "
+                f"{arguments.removed}, under their own paths"
             )
     result = validate(
         arguments.dataset,
