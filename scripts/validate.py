@@ -57,7 +57,7 @@ def main() -> None:
         )
         if count:
             print(
-                f"{arguments.dataset}: {count} files that are no longer the dataset's are now below "
+                f"{arguments.dataset}: {count} files that are no longer its own are now below "
                 f"{arguments.removed}, under their own paths"
             )
     result = validate(
