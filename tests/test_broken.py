@@ -53,6 +53,16 @@ def test_nothing_that_was_set_aside_is_lost(tmp_path, monkeypatch):
     assert not Path("results/a.json").exists()
 
 
+def test_what_lies_elsewhere_is_set_aside_where_all_else_is(tmp_path, monkeypatch):
+    (tmp_path / "own").mkdir()
+    monkeypatch.chdir(tmp_path / "own")
+    inside = Path("work/removed") / (tmp_path / "a.json").relative_to("/")
+    for path, name in ((tmp_path / "a.json", inside.name), (Path("../a.json"), "a.json.2")):
+        (tmp_path / "a.json").touch()
+        assert set_aside(path, Path("work/removed")) == inside.with_name(name)
+        assert inside.with_name(name).is_file()
+
+
 def run(folder, *arguments):
     result = snakemake(folder, *arguments)
     told = result.stdout + result.stderr

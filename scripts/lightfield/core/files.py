@@ -152,9 +152,13 @@ def broken(path: Path) -> str | None:
 def set_aside(path: Path, folder: Path) -> Path:
     """Move a file or folder into ``folder``, under its own path; return where it is now.
 
-    What lies there already keeps its name, and the new one gets a number behind its own.
+    That is from the present folder, or from / of what is not in it. What lies there already keeps
+    its name, and the new one gets a number behind its own.
     """
-    inside = path.relative_to(path.anchor) if path.is_absolute() else path
+    inside = Path(os.path.normpath(path))
+    if inside.is_absolute() or ".." in inside.parts:
+        whole = Path(os.path.normpath(path.absolute()))
+        inside = whole.relative_to(whole.anchor)
     target = folder / inside
     number = 1
     while os.path.lexists(target):
