@@ -7,6 +7,7 @@ describes them. An earlier export in the same folder is replaced.
 import argparse
 import json
 from pathlib import Path
+from typing import Any
 
 from pydantic import TypeAdapter
 
@@ -38,7 +39,8 @@ def main() -> None:
     parser.add_argument("--output", type=Path, required=True, help="folder to write")
     arguments = parser.parse_args()
 
-    options = {"sources": [arguments.source], **arguments.options}
+    options = checked(TypeAdapter(dict[str, Any]), arguments.options, "--options")
+    options = {"sources": [arguments.source], **options}
     settings = checked(TypeAdapter(settings_of(arguments.format)), options, "--options")
     name = "" if arguments.source == VIEWS else arguments.source
     development = {

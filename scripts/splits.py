@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from lightfield.core.cli import run
+from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.splits import listed
@@ -17,6 +18,9 @@ def main() -> None:
 
     scene = arguments.output.parent
     found = [LightField.read(path) for path in arguments.lightfields]
+    for lightfield in found:
+        if not lightfield.folder.is_relative_to(scene):
+            raise UserError(f"{lightfield.path}: must be in {scene}, where --output is")
     content = listed({lf.folder.relative_to(scene).as_posix(): lf for lf in found})
     write_json(arguments.output, content)
     print(", ".join(f"{len(views)} views for {part}" for part, views in content.items()))

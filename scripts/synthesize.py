@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightfield.core.cli import positive, run
+from lightfield.core.cli import positive, run, stops
 from lightfield.core.errors import UserError
 from lightfield.core.progress import Progress
 from lightfield.dataset.config import read_yaml
@@ -46,7 +46,7 @@ def main() -> None:
     )
     help_text = f"views a picture is made of (default: {BEST})"
     add("--best", type=positive, default=BEST, metavar="K", help=help_text)
-    add("--exposure", type=float, help="of the PNGs, in stops (default: by the first picture)")
+    add("--exposure", type=stops, help="of the PNGs, in stops (default: by the first picture)")
     add("--video", action="store_true", help="write walk.mp4, too, with ffmpeg")
     add("--rate", type=positive, default=25, help="pictures a second of the video (default: 25)")
     add("--output", type=Path, required=True, metavar="FOLDER")

@@ -539,6 +539,8 @@ def test_what_is_a_polynomial_goes_as_it_is(turned: int, dataset: Dataset) -> No
         (FISHEYE, ["--scale", 0], "--scale: is 0"),
         (FISHEYE, ["--scale", -1], "--scale: is -1"),
         (FISHEYE, ["--scale", "nan"], "--scale: is nan"),
+        (FISHEYE, ["--scale", "inf"], "--scale: is inf"),
+        (FISHEYE, ["--placed-as", __file__], r"\.py: is not JSON"),
         (FISHEYE, ["--image-suffix", ".exr"], "view_0000f.exr: no such file"),
         (FISHEYE, ["--depth-bounds"], "view_0000f.exr: no such file"),
     ],
@@ -558,6 +560,7 @@ def test_what_cannot_be_exported_is_an_error(
         ([], "required: --input-cfg, --output"),
         (["--image-suffix", ".jpg"], "--image-suffix: invalid choice: '.jpg'"),
         (["--aabb-scale", "3"], "--aabb-scale: invalid choice: 3"),
+        (["--offset", "0", "nan", "0"], "--offset: is nan; must be a finite number"),
     ],
 )
 def test_what_the_command_line_cannot_say(

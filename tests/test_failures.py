@@ -13,7 +13,7 @@ import pytest
 from checkouts import checkout
 from sphere import write_views
 
-from lightfield.core.cli import positive, run
+from lightfield.core.cli import finite, positive, run, stops
 from lightfield.core.failures import cause, failure_report
 
 ROOT = Path(__file__).parents[1]
@@ -309,6 +309,20 @@ def test_a_count_is_one_or_more(count, capsys):
         parser.parse_args([f"--views={count}"])
     said = f"error: argument --views: is {count}; must be 1 or more\n"
     assert capsys.readouterr().err.endswith(said)
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "problem"),
+    [
+        (finite, "inf", "is inf; must be a finite number"),
+        (stops, "nan", "is nan; must be from -100 to 100 stops"),
+        (stops, "101", "is 101; must be from -100 to 100 stops"),
+    ],
+)
+def test_a_number_is_one_and_no_exposure_is_beyond_all_bounds(kind, text, problem):
+    assert kind("-1.5") == -1.5
+    with pytest.raises(argparse.ArgumentTypeError, match=problem):
+        kind(text)
 
 
 def test_the_same_cause_of_many_jobs_is_said_once(tmp_path):

@@ -774,6 +774,9 @@ def test_of_a_scene_with_volumes_the_misses_are_counted(
         write_json(tmp_path / "inventory.json", {"volumes": [f"V{i}" for i in range(count)]})
         many = validate(small_dataset, inventory=tmp_path / "inventory.json")
         assert check(many, "depth").warnings[0].endswith(end)
+    write_json(tmp_path / "inventory.json", [])
+    with pytest.raises(UserError, match=r"inventory\.json: volumes: must be a list of names"):
+        validate(small_dataset, inventory=tmp_path / "inventory.json")
     write_json(tmp_path / "inventory.json", {"volumes": []})
     clear = validate(small_dataset, inventory=tmp_path / "inventory.json")
     assert check(clear, "depth").warnings == []

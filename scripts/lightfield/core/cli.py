@@ -1,6 +1,7 @@
 """What programs in scripts/ have in common: how they end, counts, and which views they take."""
 
 import argparse
+import math
 import os
 import sys
 from collections.abc import Callable
@@ -31,11 +32,28 @@ def run(main: Callable[[], None]) -> None:
         sys.exit(f"error: {where}{error.strerror or error}")
 
 
+# What follows may be the ``type`` of an argument.
+
+
 def positive(text: str) -> int:
-    """Return a whole number from 1 on: an ``add_argument``'s ``type``."""
+    """Return a whole number from 1 on."""
     if text.isdecimal() and int(text) > 0:
         return int(text)
     raise argparse.ArgumentTypeError(f"is {text}; must be 1 or more")
+
+
+def finite(text: str) -> float:
+    """Return a number that is neither infinite nor NaN."""
+    if math.isfinite(float(text)):
+        return float(text)
+    raise argparse.ArgumentTypeError(f"is {text}; must be a finite number")
+
+
+def stops(text: str) -> float:
+    """Return an exposure."""
+    if abs(float(text)) <= 100:
+        return float(text)
+    raise argparse.ArgumentTypeError(f"is {text}; must be from -100 to 100 stops")
 
 
 def view_slice(text: str, count: int) -> slice:

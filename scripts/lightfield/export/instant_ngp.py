@@ -29,6 +29,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
+from lightfield.core.cli import finite
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
 from lightfield.core.progress import Progress
@@ -95,7 +96,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--scale", type=float, help="metres to unit cubes (default: fitted to the scene)")
     add(
         "--offset",
-        type=float,
+        type=finite,
         nargs=3,
         metavar=("X", "Y", "Z"),
         help="where the mean camera lies in the unit cube, with --scale (default: 0.5 0.5 0.5)",
@@ -114,7 +115,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--render-aabb",
-        type=float,
+        type=finite,
         nargs=6,
         metavar=("X0", "Y0", "Z0", "X1", "Y1", "Z1"),
         help="the part of the unit cube that instant-ngp shows",
@@ -131,8 +132,8 @@ def export(arguments: argparse.Namespace) -> None:
     """Write a dataset's transforms.json and what it names, as the command line says."""
     if arguments.scale is None and arguments.offset is not None:
         raise UserError("--offset: goes with --scale; without it both are fitted")
-    if arguments.scale is not None and not arguments.scale > 0:
-        raise UserError(f"--scale: is {arguments.scale}; must be above 0")
+    if arguments.scale is not None and not 0 < arguments.scale < math.inf:
+        raise UserError(f"--scale: is {arguments.scale}; must be a number above 0")
     lightfield = LightField.read(arguments.input_cfg)
     lightfield.require_centre()
     parts = {arguments.output: [view.name for view in lightfield.views]}
@@ -194,7 +195,10 @@ class _Writer:
         """Return scale and offset: as given, or fitted to what the views see, or to the rig."""
         if self.arguments.placed_as:
             trained = read_json(self.arguments.placed_as)
-            return trained["scale"], trained["offset"]
+            try:
+                return trained["scale"], trained["offset"]
+            except (LookupError, TypeError):
+                raise UserError(f"{self.arguments.placed_as}: has no scale and offset") from None
         cameras = np.array([view.position for view in self.lightfield.views])
         if self.arguments.scale is not None:
             offset = self.arguments.offset or (0.5, 0.5, 0.5)

@@ -4,6 +4,7 @@ import argparse
 import hashlib
 import itertools
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.cli import view_slice
+from lightfield.core.cli import stops, view_slice
 from lightfield.core.errors import UserError
 from lightfield.dataset import lightfield, records
 from lightfield.dataset.lightfield import LightField
@@ -75,7 +76,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     add_geometry_flags(parser)
     parser.add_argument("--lens-map", type=Path, metavar="FILE", help="computed by lens_map.py")
     colour = parser.add_argument_group("Colour")
-    colour.add_argument("--exposure", type=float, default=0.0, help="stops, default 0")
+    colour.add_argument("--exposure", type=stops, default=0.0, help="stops, default 0")
     colour.add_argument(
         "--reinhard", type=float, default=1.0, help="value that becomes white, default 1: off"
     )
@@ -104,9 +105,9 @@ class Job:
         self.targets = self.geometry.targets
         if not (arguments.exr or arguments.png):
             raise UserError("--exr, --png: give one of them, or both")
-        if arguments.reinhard <= 0:
+        if not 0 < arguments.reinhard < math.inf:
             raise UserError(f"--reinhard {arguments.reinhard:g}: must be positive")
-        if arguments.depth_png is not None and arguments.depth_png <= 0:
+        if arguments.depth_png is not None and not 0 < arguments.depth_png < math.inf:
             raise UserError(f"--depth-png {arguments.depth_png:g}: must be positive")
         if arguments.no_configs and arguments.output_cfg:
             raise UserError("--output-cfg: needs --input-cfg, which --no-configs excludes")

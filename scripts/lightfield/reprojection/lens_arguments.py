@@ -24,6 +24,9 @@ from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.filters import DEFAULT_FILTER, FILTERS
 
+# Of an image's side: of a cube map's strip of faces, too.
+MOST_PIXELS = 2**19
+
 
 def joined(arguments: Sequence[str]) -> list[str]:
     """Return the command line with ``--flag -1,2`` as ``--flag=-1,2``, which argparse needs."""
@@ -177,6 +180,8 @@ def _targets(arguments: argparse.Namespace, source: Lens) -> list[Target]:
         width, height = int(source.width * arguments.scale), int(source.height * arguments.scale)
         if min(width, height) < 1:
             raise UserError(f"--scale {arguments.scale:g}: leaves no pixel")
+        if max(width, height) > MOST_PIXELS:
+            raise UserError(f"--scale {arguments.scale:g}: makes a side of over {MOST_PIXELS}")
     rotation = lens_map.rotation_matrix(
         *_numbers(arguments.rotation, "--rotation", "PAN,PITCH,ROLL")
     )
@@ -233,6 +238,6 @@ def _numbers(text: str, flag: str, form: str) -> list[float]:
 
 def _size(text: str, flag: str) -> tuple[int, int]:
     width, height = _numbers(text, flag, "WIDTH,HEIGHT")
-    if width != int(width) or height != int(height) or width < 1 or height < 1:
-        raise UserError(f"{flag} {text}: must be two positive whole numbers of pixels")
+    if not all(side.is_integer() and 1 <= side <= MOST_PIXELS for side in (width, height)):
+        raise UserError(f"{flag} {text}: must be two whole numbers from 1 to {MOST_PIXELS}")
     return int(width), int(height)

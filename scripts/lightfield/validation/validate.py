@@ -52,7 +52,7 @@ def validate(
     wrong with the dataset is in the result.
     """
     dataset = dataset.resolve()
-    volumes = read_json(inventory)["volumes"] if inventory else []
+    volumes = _volumes(inventory) if inventory else []
     sets, checks = files.read_sets(dataset, reprojections)
     views, presence = files.of_views(dataset, sets)
     passes, missing = files.of_passes(dataset, sets)
@@ -89,6 +89,13 @@ def validate(
         checks,
         {path: found[path][1] if path in found else sha256(dataset / path) for path in published},
     )
+
+
+def _volumes(inventory: Path) -> list[str]:
+    try:
+        return [str(name) for name in read_json(inventory)["volumes"]]
+    except (LookupError, TypeError):
+        raise UserError(f"{inventory}: volumes: must be a list of names") from None
 
 
 Mapped = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
