@@ -5,8 +5,11 @@ import importlib
 import json
 from pathlib import Path
 
+from pydantic import TypeAdapter
+
 from lightfield.core.cli import run
 from lightfield.core.files import atomic_path
+from lightfield.core.settings import checked
 from lightfield.dataset import config
 from lightfield.rendering import blend_file
 
@@ -17,15 +20,16 @@ def main() -> None:
     parser.add_argument(
         "--parameters",
         type=json.loads,
-        default='{"seed": 0, "detail": 1.0}',
-        help="JSON: seed, detail (1 is full) and the builder's own (default: %(default)s)",
+        default={},
+        help="JSON: seed (default: 0), detail (default: 1, full) and the builder's own",
     )
     parser.add_argument("--output", required=True, type=Path, help=".blend to write")
     arguments = parser.parse_args()
 
+    parameters = checked(TypeAdapter(config.Parameters), arguments.parameters, "--parameters")
     builder = importlib.import_module(f"scenes.{arguments.builder}")
     blend_file.new_scene()
-    builder.build(arguments.parameters)
+    builder.build(parameters.model_dump())
     with atomic_path(arguments.output) as temporary:
         blend_file.save_scene(temporary)
 

@@ -22,13 +22,14 @@ def main() -> None:
     parser.add_argument("--blend", required=True, type=Path, help="file to check")
     parser.add_argument("--output", required=True, type=Path, help="JSON, written if it is right")
     arguments = parser.parse_args()
+    source = config.load_scene(arguments.scene).scene
+    if source.blend is None:
+        raise UserError(f"--scene {arguments.scene}: is made of no .blend")
     status = arguments.blend.stat()
     found = sha256(arguments.blend)
-    expected, origin = config.blend_sha256(
-        arguments.scene, config.load_scene(arguments.scene).scene
-    )
+    expected, origin = config.blend_sha256(arguments.scene, source)
     if expected is None:
-        config.accept_blend(arguments.scene)
+        config.record_blend(arguments.blend, found, origin)
     elif found != expected:
         remedy = (
             "write the new one there"

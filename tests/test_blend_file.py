@@ -179,12 +179,12 @@ def scene(tmp_path, monkeypatch):
     return write
 
 
-def check(monkeypatch, blend):
+def check(monkeypatch, blend, scene="own"):
     import check_blend
 
     output = blend.with_suffix(".json")
     output.unlink(missing_ok=True)
-    arguments = ["check_blend.py", "--scene", "own", "--blend", blend, "--output", output]
+    arguments = ["check_blend.py", "--scene", scene, "--blend", blend, "--output", output]
     monkeypatch.setattr(sys, "argv", list(map(str, arguments)))
     check_blend.main()
     return json.loads(output.read_text())
@@ -207,6 +207,15 @@ def test_the_first_file_used_is_recorded_and_every_later_one_checked(scene, monk
     assert json.loads(lock.read_text())["sha256"] == SUM
     config.accept_blend("own")
     assert check(monkeypatch, blend)["sha256"] == sha256(blend)
+    lock.write_text("{}")
+    with pytest.raises(UserError, match=r"own\.lock\.json: sha256: is missing"):
+        check(monkeypatch, blend)
+
+
+def test_a_built_scene_has_no_file_to_check(monkeypatch, tmp_path):
+    (tmp_path / "any.blend").write_bytes(CONTENT)
+    with pytest.raises(UserError, match="--scene smoke: is made of no"):
+        check(monkeypatch, tmp_path / "any.blend", "smoke")
 
 
 def test_the_sum_of_the_yaml_is_checked_and_needs_no_lock(scene, monkeypatch):

@@ -733,7 +733,12 @@ def blend_sha256(scene: str, source: Source) -> tuple[str | None, Path]:
     if source.sha256:
         return source.sha256, scene_path(scene)
     lock = scene_path(scene).with_suffix(".lock.json")
-    return (str(read_json(lock)["sha256"]) if lock.exists() else None), lock
+    try:
+        return (str(read_json(lock)["sha256"]) if lock.exists() else None), lock
+    except (LookupError, TypeError):
+        raise UserError(
+            f"{lock}: sha256: is missing; without the file it is recorded anew"
+        ) from None
 
 
 def accept_blend(scene: str) -> None:
@@ -752,8 +757,13 @@ def accept_blend(scene: str) -> None:
             "writes no scene YAML: write it there"
         )
     if found != expected:
-        write_json(origin, {"blend": Path(source.blend).name, "sha256": found})
-        print(f"note: {source.blend}: its sha256 {found} is now recorded in {origin}")
+        record_blend(Path(source.blend), found, origin)
+
+
+def record_blend(blend: Path, digest: str, lock: Path) -> None:
+    """Record the SHA-256 of the .blend that is meant."""
+    write_json(lock, {"blend": blend.name, "sha256": digest})
+    print(f"note: {blend}: its sha256 {digest} is now recorded in {lock}")
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):
