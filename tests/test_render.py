@@ -282,3 +282,41 @@ def test_a_device_that_is_not_there_is_an_error(shard):
         "use device=cpu, or device=auto to take what there is"
     ]
     assert not shard.views.exists()
+
+
+WORLDS = """
+import bpy, sys
+for name, colour in (("ACEScg", (0.4, 0.2, 0.1)), ("Linear Rec.709", sys.argv[2:])):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.set_working_color_space(working_space=name, convert_colors=False)
+    bpy.context.scene.world = world = bpy.data.worlds.new("world")
+    (background,) = [n for n in world.node_tree.nodes if n.bl_idname == "ShaderNodeBackground"]
+    background.inputs["Color"].default_value = (*map(float, colour), 1)
+    bpy.ops.wm.save_as_mainfile(filepath=f"{sys.argv[1]}/{name}.blend")
+"""
+# From AP1 with the white of ACES, adapted by Bradford's matrix.
+ACES_TO_REC_709 = [
+    [1.70505, -0.62179, -0.08326],
+    [-0.13026, 1.14080, -0.01055],
+    [-0.02400, -0.12897, 1.15297],
+]
+
+
+def test_colours_are_those_of_rec_709_whatever_space_a_blend_works_in(run_program, tmp_path):
+    (tmp_path / "make.py").write_text(WORLDS)
+    expected = np.array(ACES_TO_REC_709) @ (0.4, 0.2, 0.1)
+    run_program(tmp_path / "make.py", tmp_path, *expected)
+    camera = {"lens": "rectilinear", "fov": 60, "resolution": [16, 16]}
+    content = lightfield(camera, RENDER | {"passes": ["environment"]})
+    content.write(tmp_path / "lightfield.json")
+    found = []
+    for name in ("ACEScg", "Linear Rec.709"):
+        words = ("--blend", tmp_path / f"{name}.blend", "--output", tmp_path / name / "exr")
+        run_program("render_shard.py", *words, "--lightfield", tmp_path / "lightfield.json")
+        for folder in ("exr", "environment"):
+            (path,) = (tmp_path / name / folder).iterdir()
+            found.append(images.read_image(path, "RGB").colour)
+    for colour in found:
+        parts = colour / colour.sum(axis=-1, keepdims=True)
+        assert np.abs(parts - expected / expected.sum()).max() < 1e-3
+        np.testing.assert_allclose(colour, found[-1], rtol=2e-3)

@@ -18,6 +18,9 @@ ENGINES = {
     "BLENDER_WORKBENCH": "Workbench",
 }
 
+# Blender's name of the colours in which all datasets are.
+REC_709 = "Linear Rec.709"
+
 
 def camera_of(blend: Settings) -> Settings:
     """Return the .blend's camera; raises `UserError` where its scene has none."""
@@ -127,6 +130,9 @@ def taken(
             words.append(f"{title} ignored")
     if blend["simplify"]:
         words.append("simplify ON")
+    # An inventory from before this was looked at has none.
+    if blend.get("working_space", REC_709) != REC_709:
+        words.append(f"working space {blend['working_space']} converted to Rec. 709")
     if blend["unit_scale"] != 1:
         words.append(f"unit scale {blend['unit_scale']:g} ignored")
     if blend["scripts"]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import bpy
+import mathutils
 import numpy as np
 
 from lightfield.dataset.passes import Pass
@@ -19,7 +20,7 @@ _COUNTS = "Debug Sample Count"
 
 @dataclass(frozen=True)
 class Colour:
-    """The colour of a view, (height, width, 3 or 4) float32, scene-linear, alpha associated.
+    """The colour of a view, (height, width, 3 or 4) float32, linear Rec. 709, alpha associated.
 
     ``passes`` are those that were asked for, by name, each as the colour itself; ``manifest`` has
     the hashes of the objects in a matte.
@@ -56,15 +57,31 @@ def render_colour(
     if watched:
         # The pass holds each pixel's part of all samples.
         samples = np.rint(found.passes[_COUNTS][..., 0] * max(count for _, count in _reports))
+    made = {each.name: _composed(each, found.passes) for each in wanted}
+    to_rec_709 = _to_rec_709()
+    if to_rec_709 is not None:
+        lights = [made[each.name] for each in wanted if each.kind == "light"]
+        for pixels in (found.passes["Combined"], *lights):
+            pixels[..., :3] = pixels[..., :3] @ to_rec_709.T
     return Colour(
         pixels=found.passes["Combined"],
-        passes={each.name: _composed(each, found.passes) for each in wanted},
+        passes=made,
         manifest=_manifest(found.attributes),
         samples=samples,
         worked_seconds=_reports[-1][0] - _reports[0][0] if _reports else None,
         render_seconds=found.render_seconds,
         synchronization_seconds=found.synchronization_seconds,
     )
+
+
+def _to_rec_709() -> Array | None:
+    """Return what takes colours (3,) of the .blend's working space to linear Rec. 709; (3, 3).
+
+    None where it is that.
+    """
+    units = [mathutils.Color(unit) for unit in np.eye(3)]
+    matrix = np.array([unit.from_scene_linear_to_rec709_linear() for unit in units], np.float32).T
+    return None if np.allclose(matrix, np.eye(3), atol=1e-6) else matrix
 
 
 def _composed(wanted: Pass, passes: Mapping[str, Array]) -> Array:
