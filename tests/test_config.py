@@ -72,6 +72,11 @@ BROKEN = {
         0,
         "render.samples: is 0; must be a whole number at least 1",
     ),
+    "too many samples": (
+        "render.samples",
+        2**31,
+        "render.samples: is 2147483648; must be a whole number at most 2147483647",
+    ),
     "misspelt key": ("render.sample", 4, "render.sample: unknown key; did you mean samples?"),
     "unknown key": ("render.xyzzy", 4, "render.xyzzy: unknown key; allowed here: samples, "),
     "unknown builder": ("scene.builder", "nowhere", "'nowhere'; must be one of"),

@@ -158,7 +158,8 @@ def _allowed(error: ErrorDetails) -> str:
     for name, words in _BOUNDS.items():
         if name in error.get("ctx", {}):
             bound = error["ctx"][name]
-            kind = "a whole number" if isinstance(bound, int) else "a number"
-            return f"be {kind} {words} {bound:g}"
+            if isinstance(bound, int):
+                return f"be a whole number {words} {bound}"
+            return f"be a number {words} {bound:g}"
     text = re.sub(r"^\w+ should ", "", error["msg"])
     return re.sub(r" after validation, not .*", "", text)
