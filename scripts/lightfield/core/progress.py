@@ -5,6 +5,9 @@ import sys
 import time
 from dataclasses import dataclass
 
+# Seconds between two lines.
+INTERVAL = 5.0
+
 _BEGIN = re.compile(r".*: (\d+) \w+ to do(?:, (\d+) already done)?")
 _NOW = re.compile(r".*: (\d+) of (\d+) \w+, ([\d.e+-]+) s each")
 
@@ -45,22 +48,14 @@ class Progress:
     """Counts finished pieces of work and prints a line from time to time, the first at once.
 
     Whole lines, never carriage returns, so that several shards can share one log. The lines come
-    every ``interval`` seconds, and more rarely, down to one a minute, the longer the work takes.
+    every `INTERVAL`, and more rarely, down to one a minute, the longer the work takes.
     ``already`` pieces were finished before; ``total`` are to do.
     """
 
-    def __init__(
-        self,
-        total: int,
-        label: str,
-        unit: str = "views",
-        interval: float = 5.0,
-        already: int = 0,
-    ) -> None:
+    def __init__(self, total: int, label: str, unit: str = "views", already: int = 0) -> None:
         self.total = total
         self.label = label
         self.unit = unit
-        self.interval = interval
         self.count = 0
         self._print(f"{total} {unit} to do" + (f", {already} already done" if already else ""))
         self.begin()
@@ -77,8 +72,7 @@ class Progress:
         elapsed = now - self.started
         if self.first is None:
             self.first = (self.count, elapsed)
-        interval = max(self.interval, min(elapsed / 20, 60))
-        if now - self.printed < interval and self.count < self.total:
+        if now - self.printed < max(INTERVAL, min(elapsed / 20, 60)) and self.count < self.total:
             return
         self.printed = now
         # The first piece often pays for preparations that the others need not make.

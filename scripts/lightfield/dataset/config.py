@@ -683,9 +683,9 @@ _CONFIGURATION = TypeAdapter(Configuration)
 _SCENE = TypeAdapter(Scene)
 
 
-def load_config(content: Any, file: str = "config.yaml") -> Configuration:
+def load_config(content: Any) -> Configuration:
     """Return the top-level configuration; raises `UserError`."""
-    return checked(_CONFIGURATION, content, file)
+    return checked(_CONFIGURATION, content, "config.yaml")
 
 
 def read_config(path: Path) -> dict[str, Any]:
