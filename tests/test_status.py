@@ -181,6 +181,20 @@ def test_progress_begins_at_once_and_reads_in_a_log(capsys, monkeypatch):
     assert capsys.readouterr().err.endswith("done in 2 min 41 s\n")
 
 
+def test_progress_bears_that_nothing_is_done_yet(capsys, monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    told = progress.Progress(10, "places", "cameras")
+    now[0] += 60
+    told.done(0)
+    now[0] += 60
+    told.done(4)
+    assert capsys.readouterr().err.splitlines() == [
+        "places: 10 cameras to do",
+        "places: 4 of 10 cameras, 30 s each, 3 min 00 s left",
+    ]
+
+
 def test_a_record_says_which_views_are_finished_until_a_file_is_lost(dataset):
     dataset.render("a", settings=dataset.content)
     dataset.render("b", "c", settings=dataset.content.changed(resolution=[4, 1]))

@@ -68,6 +68,8 @@ class Progress:
     def done(self, count: int = 1) -> None:
         """Count ``count`` more pieces as finished."""
         self.count += count
+        if not self.count:
+            return
         now = time.monotonic()
         elapsed = now - self.started
         if self.first is None:
