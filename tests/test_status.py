@@ -142,6 +142,13 @@ def test_a_validation_counts_if_it_is_of_these_views(dataset):
     assert any(line.startswith("  validated: yes, and it is not valid") for line in dataset())
 
 
+def test_a_clock_that_is_ahead_gives_no_rate(dataset):
+    dataset.render("a")
+    there = started(-5, pid=1) | {"host": "another-node"}
+    dataset.journal("0-4", there, finished("a", -7))
+    assert dataset()[1] == "  rendered: 1 of 4, no rate yet"
+
+
 def test_all_chosen_datasets_are_added_up(dataset):
     dataset.render("a")
     assert dataset(("--dataset", "scene/other", 6, ""))[-1] == (

@@ -132,7 +132,8 @@ def outlook(left: int, recent: int, seconds: float) -> str:
     """Say the rate of ``recent`` views in so many ``seconds``, and how long the others take."""
     if not left:
         return ""
-    if not recent:
+    # A node's clock may be ahead.
+    if not recent or seconds <= 0:
         return ", no rate yet"
     return (
         f", {recent / seconds * 60:.3g} a minute, {duration(left / recent * seconds)} left"
