@@ -263,6 +263,18 @@ def test_defaults_and_limits_are_applied(tmp_path, monkeypatch):
     assert small[0].render["denoise"] is True
 
 
+def test_a_preset_leaves_the_pixels_of_a_perspective_view_square(tmp_path, monkeypatch):
+    camera = {"lens": "rectilinear", "fov": 60, "sensor_size": [36, 24], "resolution": [3000, 2000]}
+    content = changed("rigs.LFSphere.camera", camera)
+    (tmp_path / "right.yaml").write_text(yaml.safe_dump(content))
+    monkeypatch.setattr(config, "SCENES", tmp_path)
+    for limits, size in ((Preset(), (36, 24)), (Preset(resolution=64), 36)):
+        datasets = scene_datasets("right", limits=limits)
+        (rig,) = [dataset.rig for dataset in datasets if dataset.rig_name == "LFSphere"]
+        assert rig.camera.sensor_size == size
+        assert rig.camera.make().has_square_pixels
+
+
 def test_a_cube_map_has_a_lens_map_and_a_view_a_face(tmp_path, monkeypatch):
     faces = {"camera": {"lens": "rectilinear", "fov": 90, "resolution": [64, 64]}}
     content = changed("reprojections.faces", faces | {"cube_map": True})

@@ -38,6 +38,7 @@ from lightfield.dataset.lightfield import NAME, OMNIDIRECTIONAL
 from lightfield.dataset.splits import SPLITS
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
+from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.overview import sees_all_round
 from lightfield.geometry.rigs import BlendCamera, Pose, Poses, Random, Rig
 from lightfield.geometry.rigs.split import PARTS
@@ -889,4 +890,8 @@ def _limited(camera: CameraSettings, limits: Preset) -> CameraSettings:
     if camera.principal_point:
         x, y = camera.principal_point
         update["principal_point"] = (x * scale, y * scale)
+    lens, size = camera.make(), camera.sensor_size
+    if scale < 1 and isinstance(lens, Rectilinear) and lens.has_square_pixels:
+        # Pixels stay square where a side is rounded.
+        update["sensor_size"] = size[0] if isinstance(size, tuple) else size
     return camera.model_copy(update=update)
