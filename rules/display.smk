@@ -4,7 +4,7 @@ import logging
 from lightfield.core.progress import duration
 from lightfield.core.run_display import RunDisplay, Task
 from lightfield.dataset.dataset import START_UP_SECONDS
-from lightfield.measurement.plan import Work, calibration_seconds, forecast
+from lightfield.measurement.forecast import Work, calibration_seconds, forecast
 
 # Of more datasets than this the page of all is named instead of each one's own.
 MOST_PAGES = 12

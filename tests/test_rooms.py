@@ -2,6 +2,8 @@
 
 import ast
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -51,3 +53,14 @@ def test_no_files_import_each_other_in_a_circle():
         for name in free:
             del arrows[name]
     assert not arrows
+
+
+def test_what_each_run_and_job_reads_the_rules_with_imports_nothing_heavy():
+    lines = "\n".join(file.read_text() for file in (ROOT / "rules").glob("*.smk"))
+    imports = re.findall(r"^from lightfield\S* import (?:\([^)]*\)|.*)", lines, re.M)
+    program = "\n".join([*imports, "import sys", "print(*sys.modules)"])
+    found = subprocess.run(
+        [sys.executable, "-c", program], cwd=LIBRARY.parent, capture_output=True, text=True
+    ).stdout.split()
+    assert "lightfield.dataset.dataset" in found
+    assert not {"numba", "skimage", "scipy", "OpenImageIO", "matplotlib", "bpy"} & set(found)

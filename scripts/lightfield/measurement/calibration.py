@@ -14,21 +14,19 @@ from typing import Any
 from lightfield.measurement import metrics, strata
 from lightfield.measurement.sampling import (
     DENOISING_SAMPLES,
+    FEWEST_SEEDS,
+    MOST_SEEDS,
     PLAIN,
+    PLAIN_SAMPLES,
+    REFERENCE_PART,
+    REFERENCE_SAMPLES,
     cost_in_samples,
     standard_error,
 )
 from lightfield.measurement.trials import Trials, Window, nearest_view
 
-# A reference takes renders of so many samples until its own error is this part of the target.
-REFERENCE_SAMPLES = 16
-REFERENCE_PART = 0.2
-FEWEST_SEEDS, MOST_SEEDS = 4, 256
-
 PROBE_SEED, HELD_OUT_SEED = 1, 2
 
-# Plain path tracing is measured at these; beyond, its error is inversely proportional to samples.
-PLAIN_SAMPLES = (1, 4, 16, 64)
 # What adaptive sampling may take; of it, the threshold is chosen.
 MOST_ADAPTIVE_SAMPLES = 4096
 FIRST_THRESHOLD, LEAST_THRESHOLD = 0.4, 1e-4

@@ -2,27 +2,15 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from statistics import fmean
 from typing import Any
 
 from scipy.stats import linregress
 
 from lightfield.core import processors
-from lightfield.dataset.dataset import SECONDS_PER_SAMPLE, START_UP_SECONDS
 from lightfield.measurement import metrics
-from lightfield.measurement.calibration import (
-    FEWEST_SEEDS,
-    MOST_SEEDS,
-    PLAIN_SAMPLES,
-    REFERENCE_PART,
-    REFERENCE_SAMPLES,
-)
-from lightfield.measurement.sampling import DENOISED, PROBES, TRACED, WINDOW_SIZE, standard_error
-
-# Measured in the courtyard: how many renders a calibration's search makes of each window, how many
-# of the samples that the target needs, and what a render of a window takes beside its samples.
-SEARCH_RENDERS, SEARCH_PART, WINDOW_SECONDS = 9, 2.5, 0.07
+from lightfield.measurement.forecast import figure
+from lightfield.measurement.sampling import DENOISED, TRACED, standard_error
 
 HEAD = "| dataset | views | resolution | samples | s a view | hours | denoised | calibrated | GB |"
 
@@ -113,53 +101,4 @@ def cheaper_parts(
 
 
 def _hours(values: Sequence[float | None]) -> str:
-    return " | ".join("—" if value is None else _figure(value) for value in values)
-
-
-@dataclass(frozen=True)
-class Work:
-    """What a run will do of one rig, or to calibrate: views, seconds of one core, and bytes."""
-
-    name: str
-    views: int
-    seconds: float
-    size: float = 0.0
-
-
-def forecast(works: Sequence[Work]) -> str:
-    """Return the table that a dry run ends with, sums below."""
-    total = Work(
-        "all",
-        sum(work.views for work in works),
-        sum(work.seconds for work in works),
-        sum(work.size for work in works),
-    )
-    rows = [
-        f"{work.name:<40} {work.views or '':>8} {_figure(work.seconds / 3600):>10} "
-        f"{_figure(work.size / 1e9) if work.size else '':>8}"
-        for work in [*works, *([total] if len(works) > 1 else [])]
-    ]
-    head = f"{'to render':<40} {'views':>8} {'CPU hours':>10} {'GB':>8}"
-    return "\n".join([head, *rows, "Expected from pixels and samples, or from probes: see `plan`."])
-
-
-def calibration_seconds(target: float, size: int, most: int | None = None) -> float:
-    """Estimate how long one core calibrates for a ``target`` error with views of ``size``².
-
-    Path tracing of N samples a pixel has an error of about 1 / N (0.4 / N in the courtyard, 1.4 / N
-    in the barbershop, 2.6 / N in the garden), and a preset may allow no more than ``most`` samples.
-    """
-    needed, seeds = 1 / target, FEWEST_SEEDS
-    while seeds < MOST_SEEDS and seeds * REFERENCE_SAMPLES * REFERENCE_PART < needed:
-        seeds *= 2
-    # References for the windows and for those held out, plain path tracing, and what else is tried.
-    tried = sum(PLAIN_SAMPLES) + SEARCH_PART * min(needed, most or needed)
-    samples = 2 * seeds * REFERENCE_SAMPLES + tried
-    renders = 2 * seeds + SEARCH_RENDERS
-    pixels = min(size, WINDOW_SIZE) ** 2
-    window = renders * WINDOW_SECONDS + pixels * samples * SECONDS_PER_SAMPLE
-    return START_UP_SECONDS + PROBES * window
-
-
-def _figure(value: float) -> str:
-    return f"{value:.2g}" if value < 10 else f"{value:,.0f}"
+    return " | ".join("—" if value is None else figure(value) for value in values)

@@ -14,6 +14,14 @@ UNCALIBRATED = ("target_error", "most_samples", "denoise")
 PROBES = 16
 WINDOW_SIZE = 64
 
+# A reference takes renders of so many samples until its own error is this part of the target.
+REFERENCE_SAMPLES = 16
+REFERENCE_PART = 0.2
+FEWEST_SEEDS, MOST_SEEDS = 4, 256
+
+# Plain path tracing is measured at these; beyond, its error is inversely proportional to samples.
+PLAIN_SAMPLES = (1, 4, 16, 64)
+
 # What changes of settings are compared with.
 TRACED, DENOISED = "path tracing", "denoised"
 
