@@ -273,6 +273,9 @@ def test_a_preset_leaves_the_pixels_of_a_perspective_view_square(tmp_path, monke
         (rig,) = [dataset.rig for dataset in datasets if dataset.rig_name == "LFSphere"]
         assert rig.camera.sensor_size == size
         assert rig.camera.make().has_square_pixels
+    # What is not written stays so.
+    cuboid, sphere = scene_datasets("right", limits=Preset(resolution=64))
+    assert "sensor_size" not in cuboid.rig_json + sphere.reprojections["perspective"].optics
 
 
 def test_a_cube_map_has_a_lens_map_and_a_view_a_face(tmp_path, monkeypatch):

@@ -891,7 +891,8 @@ def _limited(camera: CameraSettings, limits: Preset) -> CameraSettings:
         x, y = camera.principal_point
         update["principal_point"] = (x * scale, y * scale)
     lens, size = camera.make(), camera.sensor_size
-    if scale < 1 and isinstance(lens, Rectilinear) and lens.has_square_pixels:
+    square = isinstance(lens, Rectilinear) and lens.has_square_pixels
+    if scale < 1 and square and isinstance(size, tuple):
         # Pixels stay square where a side is rounded.
-        update["sensor_size"] = size[0] if isinstance(size, tuple) else size
+        update["sensor_size"] = size[0]
     return camera.model_copy(update=update)
