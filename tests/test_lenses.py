@@ -721,6 +721,13 @@ def test_a_focal_length_is_positive_and_finite(name: str, bad: float) -> None:
         replace(EXAMPLES[name], focal_length=bad)
 
 
+@pytest.mark.parametrize("name", ["equisolid 180°", "polynomial", "kannala_brandt"])
+def test_no_fisheye_sees_more_than_everything(name: str) -> None:
+    assert replace(EXAMPLES[name], fov=2 * math.pi)
+    with pytest.raises(UserError, match=r"fov: 360\.001 degrees is not within"):
+        replace(EXAMPLES[name], fov=math.radians(360.001))
+
+
 @pytest.mark.parametrize("name", ["polynomial", "kannala_brandt"])
 def test_coefficients_are_all_there_and_finite(name: str) -> None:
     right = EXAMPLES[name].coefficients
