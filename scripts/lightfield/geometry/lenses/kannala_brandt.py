@@ -81,7 +81,7 @@ class KannalaBrandt(Fisheye):
 
     def _sin_cos(self, r: Array) -> tuple[Array, Array]:
         theta = self._increasing.inverse(r)
-        return np.maximum(np.sin(theta), 0), np.cos(theta)
+        return np.sin(theta), np.cos(theta)
 
     def _radius(self, sin: Array, cos: Array) -> Array:
         theta = np.arctan2(sin, cos)
