@@ -408,6 +408,8 @@ def test_a_polynomial_that_falls_and_rises_again_ends_where_it_first_turns() -> 
     values = rising.value(np.array([0, 1.5, 3 - 1e-3]))
     np.testing.assert_allclose(rising.inverse(values), [0, 1.5, 3 - 1e-3], atol=1e-9)
     assert np.isnan(rising.inverse(np.array([14.0]))).all()
+    # A parabola has one turning point.
+    assert math.isclose(IncreasingPolynomial((0, 0.1, -0.01)).end, 5)
 
 
 def test_kannala_brandt_ends_at_its_turning_point() -> None:
