@@ -468,6 +468,7 @@ def test_a_polynomial_has_a_ray_where_its_equation_says(
     np.testing.assert_allclose(lens.pixels(ray), [180 + 10 * radius, 180], rtol=1e-12)
     rim = lens.pixels(np.array([1.0, 0, 0]))
     np.testing.assert_allclose(lens.rays(*rim), [1, 0, 0], atol=1e-9)
+    assert np.isnan(lens.pixels(np.array([1.0, 0, 0.01]))).all()
 
 
 def test_near_the_rim_of_wide_lenses_nothing_cancels() -> None:
