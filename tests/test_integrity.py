@@ -232,7 +232,9 @@ def small(request, tmp_path, monkeypatch):
 
 def found_in(name, work="work"):
     integrity = Integrity(Path("results", name), Path(work) if work else None)
-    return {str(fault.path): fault.problem for fault in integrity.faults()}
+    found = list(integrity.faults())
+    assert len({fault.path for fault in found}) == len(found)
+    return {str(fault.path): fault.problem for fault in found}
 
 
 def test_each_file_of_a_dataset_and_of_its_scene_is_its_own_and_no_other(small):
@@ -274,6 +276,10 @@ def test_what_says_that_a_file_is_wrong_is_named(small):
 
 def test_what_a_copy_says_of_itself_must_agree(small):
     folder = Path("results", small)
+    right = (folder / "validation.json").read_text()
+    put(folder / "validation.json", {"valid": False})
+    assert found_in(small, None)[f"{folder}/validation.json"].startswith("its sha256 is")
+    put(folder / "validation.json", right)
     sums = f"{folder}/sha256sums.txt"
     listed = [line.split("  ")[1] for line in Path(sums).read_text().splitlines()]
     for missing in ("validation.json", "lightfield.json", "exr/view_0000f.exr"):
