@@ -220,11 +220,23 @@ def test_at_an_edge_anything_between_the_two_surfaces_agrees(right, away, verdic
 
 def test_a_surface_before_the_sky_contradicts():
     assert verdicts(on_wall(ROW), wall(np.inf)) == {CONTRADICT}
+    # And where there is no source nothing is said at all.
+    unknown = consistency.ask(on_wall(ROW), at(), at(), wall(np.nan))
+    assert (unknown.agree, unknown.occluded, unknown.contradict) == (0, 0, 0)
 
 
 @pytest.mark.parametrize(
     ("column", "row", "seen"),
-    [(1.01, 32, 1), (0.99, 32, 0), (62.99, 32, 1), (63.01, 32, 0), (32, 1.01, 1), (32, 63.01, 0)],
+    [
+        (63, 32, 0),
+        (32, 63, 0),
+        (1.01, 32, 1),
+        (0.99, 32, 0),
+        (62.99, 32, 1),
+        (63.01, 32, 0),
+        (32, 1.01, 1),
+        (32, 63.01, 0),
+    ],
 )
 def test_only_what_lies_in_a_view_with_its_neighbours_is_asked(column, row, seen):
     found = consistency.compare(on_wall([column], [row]), at(), wall())
