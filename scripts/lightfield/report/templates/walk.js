@@ -492,7 +492,7 @@ function drawRoom([right, up, back], [spreadX, spreadY]) {
   }
   const metresLeft = room(walk.at);
   element("walk-readout").textContent =
-    `${walk.at.map((value) => value.toFixed(2)).join(", ")} m   ${metresLeft.toFixed(2)} m to the edge   ${walk.chosen.length} of ${walk.order.length} views`;
+    `${walk.at.map((value) => (Math.round(100 * value) / 100 + 0).toFixed(2)).join(", ")} m · ${metresLeft.toFixed(2)} m to the edge · ${walk.chosen.length} of ${walk.order.length} views`;
 }
 
 const drawWalkSoon = onceAFrame(() => {
