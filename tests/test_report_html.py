@@ -443,6 +443,13 @@ def test_pictures_of_a_fault_mark_every_wrong_pixel(tmp_path):
     assert (decoded(second.colour) == 90).all()
 
 
+@pytest.mark.parametrize("size", [(1, 1), (5, 64), (64, 5)])
+def test_the_noise_of_few_pixels_is_not_known(size, tmp_path):
+    colour, depth = np.full((*size, 3), 0.5, np.float32), np.ones(size, np.float32)
+    figures.draw_noise(tmp_path / "noise", figures.Overview(colour, depth, False, "distance"))
+    assert {path.suffix for path in tmp_path.iterdir()} == {".svg", ".png"}
+
+
 def test_a_picture_of_16_bits_is_shown_as_one_of_8(tmp_path):
     pixels = np.arange(8 * 8 * 3, dtype=np.uint8).reshape(8, 8, 3)
     images.write_png(tmp_path / "a.png", pixels)

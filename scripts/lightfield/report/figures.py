@@ -166,6 +166,9 @@ def draw_noise(stem: Path, overview: Overview) -> None:
     """Draw the relative noise in percent."""
     block = max(noise.SMALLEST_BLOCK, overview.colour.shape[1] // NOISE_BLOCKS)
     percent = 100 * noise.relative_noise(pictures.luminance(overview.colour), block)
+    if not percent.size:
+        # The picture is smaller than a block.
+        percent = np.full((1, 1), np.nan)
     known = percent[np.isfinite(percent) & (percent > 0)]
     low, high = np.percentile(known, [2, 99]) if known.size else (1.0, 2.0)
     limits = (max(low, high / 1e3), max(high, 1.01 * low))
