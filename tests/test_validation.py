@@ -1083,6 +1083,13 @@ def test_of_transparent_views_a_pixel_may_be_clear_where_the_source_sees(
     result = validate(one_view, ["panorama"])
     assert check(result, "panorama/marks").passed is transparent
     assert check(result, "panorama/images").passed
+    # With depth the two differ: a clear pixel is a miss, and NaN has no source.
+    path = path.with_suffix(".exr")
+    channels = images.read_image(path).channels
+    depth = channels["Z"].copy()
+    depth[10:30, 40:60] = np.nan
+    images.write_exr(path, {**channels, "Z": depth})
+    assert check(validate(one_view, ["panorama"]), "panorama/marks").passed is False
 
 
 def test_the_faces_of_a_cube_map_are_compared_with_their_view(one_view: Path) -> None:
