@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
+from scipy.spatial.transform import Rotation
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField
@@ -193,6 +195,15 @@ def test_icosphere_is_blenders(subdivisions: int, blender: dict[str, Any]) -> No
     assert rig.view_count == len(theirs)
 
 
+@pytest.mark.parametrize("subdivisions", [2, 3, 4])
+def test_a_sphere_is_the_same_turned_by_a_fifth_and_has_each_place_once(subdivisions: int) -> None:
+    places = icosphere(subdivisions)
+    turned = places @ Rotation.from_euler("z", 72, degrees=True).as_matrix().T
+    tree = KDTree(places)
+    assert tree.query(turned)[0].max() < 1e-4
+    assert tree.query(places, 2)[0][:, 1].min() > 0.5 / 2 ** (subdivisions - 1)
+
+
 def test_spheres_hold_the_coarser_ones() -> None:
     found = nested(642)
     assert [len(numbers) for numbers in found] == [162, 42, 12]
@@ -366,6 +377,9 @@ def test_an_outline_reaches_as_far_as_the_rig(kind: str, own: Any) -> None:
     axes = [0, 1] if kind == "ring" else [0, 1, 2]
     np.testing.assert_allclose(corners.min(0)[axes], places.min(0)[axes], atol=tolerance)
     np.testing.assert_allclose(corners.max(0)[axes], places.max(0)[axes], atol=tolerance)
+    if kind != "path":
+        once = np.unique(corners.round(9), axis=0)
+        np.testing.assert_allclose(once.mean(0), 1, atol=1e-6)
     if kind in round_ones:
         np.testing.assert_allclose(np.linalg.norm(corners - 1, axis=1), 1)
         np.testing.assert_allclose([corners.min(0), corners.max(0)], [[0] * 3, [2] * 3], atol=1e-9)
