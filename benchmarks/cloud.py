@@ -229,13 +229,11 @@ def main() -> None:
         finally:
             server.terminate()
             server.wait()
-        made = build.made()
+        made, jobs = build.made(), len(list(build.jobs.iterdir()))
     for what, times in sorted(killed.items()):
         print(f"killed {what}: {times} times")
     again = made.total() - len(made)
-    print(
-        f"{len(made)} views, {again} of them made twice, in {len(list(build.jobs.iterdir()))} jobs"
-    )
+    print(f"{len(made)} views, {again} of them made twice, in {jobs} jobs")
     if again or not same or len(made) != arguments.views:
         sys.exit("error: not all bytes are those of a build on one disk, or something was lost")
     print("all published bytes are those of a build on one disk")
