@@ -236,7 +236,17 @@ def test_the_magnification_of_a_cube_map_is_that_of_its_faces_across_their_borde
     assert made.summary["max"] == pytest.approx(2**0.75, rel=0.03)
 
 
-@pytest.mark.parametrize("source", [FISHEYE, CubeMap(width=6 * 64, height=64)])
+@pytest.mark.parametrize(("size", "most"), [(100, None), (60, 2), (20, 4)])
+def test_the_adaptive_filter_has_footprints_wherever_it_takes_more_than_one_sample(size, most):
+    made = lens_map.compute(rectilinear(100), rectilinear(size), IDENTITY, "adaptive")
+    if most is None:
+        assert made.counts is None and made.footprints is None
+    else:
+        assert (made.counts == most).all()
+        assert made.footprints.shape == (size, size, 2, 2)
+
+
+@pytest.mark.parametrize("source", [FISHEYE, CubeMap(width=6 * 64, height=64), rectilinear(64, 36)])
 def test_samples_are_the_pixels_of_a_finer_target(source):
     rotation = lens_map.rotation_matrix(20, 30, 0)
     made = lens_map.compute(source, rectilinear(20), rotation, "bicubic", 3)
