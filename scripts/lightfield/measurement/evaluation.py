@@ -49,9 +49,14 @@ def truth(source: Source, view: View, like: Path) -> Pictures:
 
 
 def rendered(path: Path, source: Source) -> Pictures:
-    """Return somebody's view; raises `UserError` where it is of another size than the dataset's."""
+    """Return somebody's view.
+
+    Raises `UserError` where it has no colour, or another size than the dataset's.
+    """
     image = images.read_image(path)
     if path.suffix == ".png":
+        if not {*"RGB"} <= image.channels.keys():
+            raise UserError(f"{path}: has the channels {', '.join(image.channels)}; must have RGB")
         pixels = np.stack([image.channels[name] for name in "RGB"], axis=-1)
         colour = pixels / np.iinfo(pixels.dtype).max
     else:
