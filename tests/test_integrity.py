@@ -181,8 +181,9 @@ def resum(folder, names):
 def worked(name):
     """Write a dataset's files of work; return them."""
     folder = Path("work", name)
-    view = f"results/{name}/exr/view_0000f.exr"
-    record = {"files": {"exr/view_0000f.exr": {"sha256": sha256(view)}}}
+    view = Path(f"results/{name}/exr/view_0000f.exr")
+    entry = {"bytes": view.stat().st_size, "sha256": sha256(view)}
+    record = {"files": {"exr/view_0000f.exr": entry}}
     sums = Path(f"results/{name}/sha256sums.txt").read_text()
     contents = {
         folder / "render/0-1.json": json.dumps(record),

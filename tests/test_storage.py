@@ -37,9 +37,9 @@ def test_a_build_in_isolated_folders_loses_no_view_when_its_jobs_are_killed(smok
 
     for stage in ("render", "perspective"):
         record = f"work/{PANORAMAS}/{stage}/0-2.json"
-        found = records.checksums(folder / record)
-        assert found == records.checksums(smoke / record)
-        for name, digest in found.items():
+        found = records.read(folder / record)
+        assert found == records.read(smoke / record)
+        for name, (_, digest) in found.items():
             assert store.take(digest, tmp_path / name)
             assert (tmp_path / name).read_bytes() == (
                 smoke / "results" / PANORAMAS / name
@@ -118,11 +118,11 @@ def test_what_a_user_brings_reaches_jobs_in_isolated_folders(run_program, tmp_pa
     words += ("--lightfield", folder / "results/brought/LFPlane/lightfield.json")
     words += ("--output", tmp_path / "exr", "--record", tmp_path / "here.json")
     run_program("render_shard.py", *words)
-    found = records.checksums(work / "brought/LFPlane/render/0-2.json")
-    assert found == records.checksums(tmp_path / "here.json")
+    found = records.read(work / "brought/LFPlane/render/0-2.json")
+    assert found == records.read(tmp_path / "here.json")
 
-    found = records.checksums(work / "theirs/LFPlane/render/0-2.json")
-    for name, digest in found.items():
+    found = records.read(work / "theirs/LFPlane/render/0-2.json")
+    for name, (_, digest) in found.items():
         assert digest == sha256(root / "published/LFPlane" / name)
         assert store.take(digest, tmp_path / "theirs" / name)
 
