@@ -68,8 +68,8 @@ class Task:
 
     @property
     def at_work(self) -> str:
-        """What it works on; if that is no views, how much of it is done."""
-        if self.views or not self.total:
+        """What it works on; if that is no views but several pieces, how many are done."""
+        if self.views or self.total < 2:
             return self.phase
         return f"{self.phase} {self.kept + self.done} of {self.total}"
 

@@ -92,7 +92,8 @@ def immersive_planes(
     for camera, corner in neighbours(mesh):
         bounds[camera] = np.minimum(bounds[camera], normals[camera] @ positions[corner])
     planes = np.concatenate([normals, -bounds[..., None]], axis=-1).reshape(-1, 4)
-    return np.concatenate([_tightest(planes), outside])
+    bounded: Floats = np.concatenate([_tightest(planes), outside])
+    return bounded
 
 
 def parts_to_edge(matrices: Floats, lens: Lens, places: Floats) -> Floats:
