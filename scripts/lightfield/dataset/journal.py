@@ -83,6 +83,11 @@ class Run:
     end: dict[str, Any] | None = None
 
     @property
+    def later_views(self) -> list[dict[str, Any]]:
+        """All but the first, whose time holds some of the start-up; that one, if it is alone."""
+        return self.views[1:] or self.views
+
+    @property
     def last_heard(self) -> float:
         """When it last wrote, in seconds since 1970."""
         if self.end:

@@ -37,7 +37,7 @@ def with_precision(depth: Array, precision: str) -> Array:
     if precision == "half":
         with np.errstate(over="ignore"):
             return depth.astype(np.float16)
-    depth = depth.astype(np.float32)
+    depth = depth.astype(np.float32, copy=False)
     if precision == "float":
         return depth
     bits = depth.view(np.uint32)

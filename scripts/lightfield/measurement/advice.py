@@ -369,12 +369,12 @@ def table(name: str, found: Mapping[str, Any]) -> str:
             "",
             "| threads a process | processes | s a small view | s to the first view | GB of all |",
             "| ---: | ---: | ---: | ---: | ---: |",
+            *(
+                f"| {one['threads']} | {one['processes']} | {one['view_core_seconds']:.3g} "
+                f"| {one['start_up_core_seconds']:.3g} | {one['memory_bytes'] / 1e9:.2g} |"
+                for one in found["threads"]
+            ),
         ]
-    lines += [
-        f"| {one['threads']} | {one['processes']} | {one['view_core_seconds']:.3g} "
-        f"| {one['start_up_core_seconds']:.3g} | {one['memory_bytes'] / 1e9:.2g} |"
-        for one in found["threads"]
-    ]
     lines += ["", "What may cost time in the scene:", ""]
     for kind, names in found["costly"].items():
         more = " …" if len(names) > MOST_NAMES else ""

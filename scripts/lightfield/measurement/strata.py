@@ -60,9 +60,7 @@ def choose(maker: Trials, size: int, count: int) -> tuple[list[Window], dict[str
     Of a stratum's pixels in the pilot, its windows are around ones that are as noisy as the rest
     of it: at even steps of their rank, and away from its borders if it is large enough.
     """
-    lens = maker.lens
-    scale = min(1.0, SIZE / max(lens.width, lens.height))
-    small = lens.resized(*(max(1, round(side * scale)) for side in (lens.width, lens.height)))
+    small = maker.lens.fitted(SIZE)
     pilot = maker.pilot(small)
     views = maker.lightfield.views
     views = [views[(2 * n + 1) * len(views) // (2 * VIEWS)] for n in range(min(VIEWS, len(views)))]

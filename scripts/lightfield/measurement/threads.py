@@ -10,13 +10,13 @@ from lightfield.core.files import read_json
 from lightfield.core.leftovers import temporary_folder
 from lightfield.core.memory import available
 from lightfield.core.progress import Progress
-from lightfield.dataset import journal, memory
+from lightfield.dataset import memory
 from lightfield.dataset.lightfield import LightField
-from lightfield.rendering import shard
+from lightfield.rendering import probe
 
 # Of the longer side in pixels, and of a pixel: some seconds a view, of which little is overhead.
 SIZE, SAMPLES = 256, 16
-# The first one of a process is not counted: it builds what the others use.
+# Of each process; the first one is not counted beside others.
 VIEWS = 3
 
 
@@ -30,9 +30,7 @@ def tried(
     (``start_up_core_seconds``), idle threads counted, and their ``memory_bytes`` together. Nothing
     on a GPU, which one process has, and on one core; what does not fit into memory is left out.
     """
-    lens = lightfield.lens
-    scale = min(1.0, SIZE / max(lens.width, lens.height))
-    small = lens.resized(*(max(1, round(side * scale)) for side in (lens.width, lens.height)))
+    small = lightfield.lens.fitted(SIZE)
     render = {**lightfield.render, "samples": SAMPLES, "adaptive_threshold": 0}
     views = lightfield.views[:: max(1, len(lightfield.views) // VIEWS)][:VIEWS]
     probes = lightfield.changed(lens=small, views=views, render=render)
@@ -49,15 +47,15 @@ def tried(
             temporary_folder() as temporary,
             ProcessPoolExecutor(cores // threads, get_context("spawn")) as pool,
         ):
-            scene_and_device = (blend, inventory, device, threads)
+            words = (probes, blend, inventory, device, threads)
             started = [
-                pool.submit(_rendered, probes, *scene_and_device, temporary / str(number))
+                pool.submit(probe.rendered, *words, temporary / str(number))
                 for number in range(cores // threads)
             ]
             runs = [run.result() for run in started]
         if runs[0].start["device"] != "CPU":
             return []
-        seconds = [view["wall_seconds"] for run in runs for view in run.views[1:]]
+        seconds = [view["wall_seconds"] for run in runs for view in run.later_views]
         starts = [run.start["start_up_seconds"] + run.views[0]["wall_seconds"] for run in runs]
         found.append(
             {
@@ -70,21 +68,3 @@ def tried(
         )
         progress.done()
     return found
-
-
-def _rendered(
-    probes: LightField, blend: Path, inventory: Path, device: str, threads: int, folder: Path
-) -> journal.Run:
-    log = folder / "journal.jsonl"
-    shard.render(
-        probes,
-        ":",
-        folder / "exr",
-        blend=blend,
-        inventory=inventory,
-        device=device,
-        threads=threads,
-        journal=log,
-    )
-    (run,) = journal.read(log)
-    return run

@@ -5,7 +5,6 @@ number of pixels. So does the size of its file, as an upper estimate: smaller vi
 detail a pixel, and compress worse.
 """
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -24,38 +23,43 @@ def measure(
     for each probe what its view would take: ``view_seconds`` and ``view_bytes``.
     """
     views, lens = lightfield.views, lightfield.lens
-    scale = min(1.0, size / max(lens.width, lens.height))
-    small = [max(1, round(side * scale)) for side in (lens.width, lens.height)]
-    # The first view's time holds some of the start-up, so it is rendered and, beside others, not
-    # counted.
+    small = lens.fitted(size)
+    # One more than are counted.
     step = max(1, len(views) // (count + 1))
-    probes = lightfield.changed(lens=lens.resized(*small), views=views[::step][: count + 1])
+    probes = lightfield.changed(lens=small, views=views[::step][: count + 1])
     with temporary_folder() as temporary:
-        folder, log = temporary / "exr", temporary / "journal.jsonl"
-        shard.render(
-            probes,
-            ":",
-            folder,
-            blend=blend,
-            inventory=inventory,
-            device=device,
-            threads=1,
-            journal=log,
-        )
-        (run,) = journal.read(log)
-        rendered = run.views[1:] or run.views
+        run = rendered(probes, blend, inventory, device, 1, temporary)
         sizes = [
             sum(file.stat().st_size for file in temporary.rglob(f"{view['view']}.exr"))
-            for view in rendered
+            for view in run.later_views
         ]
     # On a processor the time that it worked, whatever else it did meanwhile.
     busy = "cpu_seconds" if run.start["device"] == "CPU" else "render_seconds"
-    factor = lens.width * lens.height / math.prod(small)
+    factor = lens.width * lens.height / (small.width * small.height)
     return {
         "views": len(views),
         "resolution": [lens.width, lens.height],
         "samples": lightfield.render["samples"],
         "device": run.start["device"],
-        "view_seconds": [view[busy] * factor for view in rendered],
+        "view_seconds": [view[busy] * factor for view in run.later_views],
         "view_bytes": [size * factor for size in sizes],
     }
+
+
+def rendered(
+    lightfield: LightField, blend: Path, inventory: Path, device: str, threads: int, folder: Path
+) -> journal.Run:
+    """Render a dataset into a ``folder`` that is new; return what its journal says."""
+    log = folder / "journal.jsonl"
+    shard.render(
+        lightfield,
+        ":",
+        folder / "exr",
+        blend=blend,
+        inventory=inventory,
+        device=device,
+        threads=threads,
+        journal=log,
+    )
+    (run,) = journal.read(log)
+    return run

@@ -83,7 +83,7 @@ def collect(
     matrices, lens, meaning = lightfield.matrices, lightfield.lens, lightfield.depth
     shown = list(range(len(names)))[:: math.ceil(len(names) / pictures.MOST_VIEWS)]
     side = SIDE if len(shown) <= MANY_VIEWS else SMALLER_SIDE
-    small = _fitted(lens, side)
+    small = lens.fitted(side)
 
     def load(view: int, lens: Lens) -> View:
         if names[view] in unreadable:
@@ -189,12 +189,6 @@ def _middle(length: int) -> slice:
     return slice(start, start + NOISE_SIDE)
 
 
-def _fitted(lens: Lens, side: int) -> Lens:
-    """Return the lens at a resolution whose longer side is at most ``side``."""
-    part = min(1.0, side / max(lens.width, lens.height))
-    return lens.resized(max(1, round(lens.width * part)), max(1, round(lens.height * part)))
-
-
 def _points(
     distances: Array, rays: Array, matrices: Array, colours: Array
 ) -> dict[str, Any] | None:
@@ -260,7 +254,7 @@ def _epipolar_images(
     limits: tuple[float, float],
 ) -> dict[str, Any]:
     """Return a row's epipolar-plane images, all tilts beneath each other in one picture."""
-    fitted = _fitted(lens, EPIPOLAR_SIDE)
+    fitted = lens.fitted(EPIPOLAR_SIDE)
     columns = epipolar.COLUMNS[row.kind]
     count = len(kept)
     light = np.zeros((len(epipolar.TILTS), count, columns, 3), np.float32)

@@ -211,6 +211,11 @@ class Lens(ABC):
             self, width=width, height=height, sensor_size=self.sensor, principal_point=center
         )
 
+    def fitted(self, side: int) -> Self:
+        """Return the lens at a resolution whose longer side is at most ``side``."""
+        part = min(1.0, side / max(self.width, self.height))
+        return self.resized(max(1, round(self.width * part)), max(1, round(self.height * part)))
+
     def to_lightfield(self) -> dict[str, Any]:
         """Return ``camera``, ``resolution`` and ``sensor_size`` as lightfield.json has them."""
         kind = self.camera_types[0]
