@@ -129,6 +129,9 @@ def test_what_is_missing_or_of_another_size_is_named(dataset, tmp_path, run_prog
     images.write_png(tmp_path / "grey.png", np.zeros((48, 64), np.uint8))
     with pytest.raises(UserError, match="has the channels Y; must have RGB"):
         evaluation.rendered(tmp_path / "grey.png", Source(dataset, "perspective", ".exr"))
+    images.write_exr(tmp_path / "grey.exr", {"Z": np.ones((48, 64), np.float32)})
+    with pytest.raises(UserError, match="has the channels Z; must have RGB"):
+        evaluation.rendered(tmp_path / "grey.exr", Source(dataset, "perspective", ".exr"))
     mask = tmp_path / "view_0001f.png"
     for pixels, problem in (
         (np.ones((48, 64, 3), np.uint8), "has no channel Y; it has R, G, B"),

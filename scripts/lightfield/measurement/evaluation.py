@@ -54,9 +54,9 @@ def rendered(path: Path, source: Source) -> Pictures:
     Raises `UserError` where it has no colour, or another size than the dataset's.
     """
     image = images.read_image(path)
+    if not {*"RGB"} <= image.channels.keys():
+        raise UserError(f"{path}: has the channels {', '.join(image.channels)}; must have RGB")
     if path.suffix == ".png":
-        if not {*"RGB"} <= image.channels.keys():
-            raise UserError(f"{path}: has the channels {', '.join(image.channels)}; must have RGB")
         pixels = np.stack([image.channels[name] for name in "RGB"], axis=-1)
         colour = pixels / np.iinfo(pixels.dtype).max
     else:
