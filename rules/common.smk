@@ -131,7 +131,8 @@ wildcard_constraints:
     scene="[A-Za-z0-9_-]+",
     # A sequence's datasets lie a folder deeper, one for each frame.
     rig=r"[A-Za-z0-9_.-]+(/f\d{5,7})?",
-    reprojection=r"(?!f\d{5,7}/|flow/)[A-Za-z0-9_.-]+",
+    # The records of the views lie beside those of the reprojections.
+    reprojection=r"(?!f\d{5,7}/|flow/|render/)[A-Za-z0-9_.-]+",
     # Of an export: nothing for the views, or a reprojection's name and a slash.
     source=r"((?!f\d{5,7}/)[A-Za-z0-9_.-]+/)?",
     format="[a-z_]+",

@@ -67,8 +67,7 @@ def remove(folders: Iterable[Path] = ()) -> list[Path]:
 def _files(folder: Path) -> Iterator[Path]:
     for parent, _, names in os.walk(folder):
         for name in names:
-            path = Path(parent, name)
-            if _ON_THE_WAY.fullmatch(name) and _is_old(path, FILE_AGE):
+            if _ON_THE_WAY.fullmatch(name) and _is_old(path := Path(parent, name), FILE_AGE):
                 yield path
 
 

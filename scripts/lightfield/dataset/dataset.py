@@ -207,10 +207,10 @@ class Dataset:
                 yield from filter(os.path.exists, [places])
                 return
         own = f"{self.folder}/{NAME}"
-        expected = self.origin(render) | self.rig.camera.make().to_lightfield()
-        poses = self.placed_rig.poses()
-        if Path(own).exists() and _differs(own, expected, poses, bool(self.flow)):
-            yield own
+        if Path(own).exists():
+            expected = self.origin(render) | self.rig.camera.make().to_lightfield()
+            if _differs(own, expected, self.placed_rig.poses(), bool(self.flow)):
+                yield own
         for name, reprojection in self.reprojections.items():
             path = f"{self.folder}/{name}/{NAME}"
             expected = reprojection.lens(self.rig.camera).to_lightfield()

@@ -1,6 +1,7 @@
 """Whether a shard's files are on disk as its record has them, by their sizes alone."""
 
 import json
+import os
 from pathlib import Path
 from stat import S_ISREG
 
@@ -20,7 +21,8 @@ def recorded(record: Path, folder: str) -> dict[str, int] | None:
         return None
     try:
         for name, size in sizes.items():
-            status = Path(folder, name).stat()
+            # A `Path` of each of a hundred thousand would take longer than all else.
+            status = os.stat(f"{folder}/{name}")  # noqa: PTH116
             if status.st_size != size or not S_ISREG(status.st_mode):
                 return None
     except OSError:

@@ -4,6 +4,7 @@ A rendered view counts if its shard's record has it, or if its file carries the 
 that lightfield.json gives; a reprojected one if it is no older than the view it was made from.
 """
 
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -68,9 +69,7 @@ def _recorded(folder: Path, work: Path) -> set[str]:
     current = (path for path in records if path.stat().st_mtime_ns >= written)
     files = (shard_files.recorded(path, str(folder)) for path in current)
     # Beside the views a record has their passes, and the names of what these number.
-    return {
-        Path(name).stem for sizes in files for name in sizes or () if name.startswith(f"{IMAGES}/")
-    }
+    return {_stem(name) for sizes in files for name in sizes or () if name.startswith(f"{IMAGES}/")}
 
 
 def _keyed(folder: Path, lightfield: LightField, recorded: set[str]) -> set[str]:
@@ -156,7 +155,11 @@ def _validated(folder: Path, count: int, finished: set[str]) -> str:
     path = folder / "validation.json"
     if len(finished) < count or not path.exists():
         return "no"
-    newest = max((_file(folder, name).stat().st_mtime for name in finished), default=0)
+    images_folder = folder / IMAGES
+    views = os.scandir(images_folder) if images_folder.exists() else ()
+    newest = max(
+        (view.stat().st_mtime for view in views if _stem(view.name) in finished), default=0
+    )
     if path.stat().st_mtime < newest:
         return "not since its views were made"
     if problem := broken(path):
@@ -168,6 +171,11 @@ def _bounds(path: Path) -> tuple[int, int]:
     """Return the first view and the end of the shard that a journal is of."""
     first, end = path.name.partition(".")[0].split("-")
     return int(first), int(end)
+
+
+def _stem(path: str) -> str:
+    """Return a file's name without its ending: quicker than a `Path` where there are many."""
+    return path.rpartition("/")[2].rpartition(".")[0]
 
 
 def _file(folder: Path, name: str) -> Path:
