@@ -62,11 +62,18 @@ soak: .venv/complete
 	@$(PIP) install --require-hashes -r envs/requirements-test-$(VERSION).txt
 	@touch $@
 
+# Where machines see no common folder.
+.venv/complete-with-storage: .venv/complete envs/requirements-storage-3.13.txt envs/requirements-storage-3.11.txt
+	@$(PIP) install --require-hashes -r envs/requirements-storage-$(VERSION).txt
+	@touch $@
+
 # Resolve anew what the locks do not hold yet; delete a lock to renew all that is in it. Needs uv.
 locks:
 	for version in 3.13 3.11; do \
 		$(LOCK) --python-version $$version envs/requirements-test.in -o envs/requirements-test-$$version.txt && \
-		$(LOCK) --python-version $$version envs/requirements.in \
-			--constraints envs/requirements-test-$$version.txt -o envs/requirements-$$version.txt || exit; \
+		for lock in requirements requirements-storage; do \
+			$(LOCK) --python-version $$version envs/$$lock.in \
+				--constraints envs/requirements-test-$$version.txt -o envs/$$lock-$$version.txt || exit; \
+		done; \
 	done
 	echo uv | $(LOCK) --universal - -o envs/requirements-uv.txt

@@ -5,7 +5,7 @@ from the storage, and whatever is to stay of it goes there. A build that nothing
 disk, says what bytes are right. Prints how often jobs and the whole run were killed, and what was
 lost or made twice. Needs, beside the environment:
 
-    pip install -r envs/requirements-storage.in 'moto[server]'
+    make .venv/complete-with-storage && pip install 'moto[server]'
 """
 
 import argparse

@@ -129,7 +129,7 @@ def test_an_unusable_store_is_one_line(tmp_path):
 
 def test_a_package_that_is_missing_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "upath", None)
-    with pytest.raises(UserError, match="pip install -r envs/requirements-storage"):
+    with pytest.raises(UserError, match=r"make \.venv/complete-with-storage"):
         ViewStore("s3://bucket").check()
 
 

@@ -149,7 +149,7 @@ class ViewStore:
             raise
         except ImportError as error:
             raise UserError(
-                f"{self.url}: needs {error.name}: pip install -r envs/requirements-storage.in"
+                f"{self.url}: needs {error.name}: make .venv/complete-with-storage"
             ) from None
         except Exception as error:
             raise UserError(f"{self.url}: the view store cannot be used: {error}") from None
