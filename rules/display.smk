@@ -140,9 +140,13 @@ def end_display():
 def print_pages():
     """Print where the pages are of the datasets that are valid: all that this run was for."""
     made = {str(file) for job in workflow.dag.jobs for file in job.output}
-    pages = [d.page for d in DATASETS.values() if f"{d.folder}/sha256sums.txt" in made]
+    valid = [
+        d for d in DATASETS.values() if stored(f"{d.folder}/sha256sums.txt") in made
+    ]
+    where = f"{STORE}/" if STORE else ""
+    pages = [f"{where}{dataset.page}" for dataset in valid]
     if len(pages) > MOST_PAGES:
-        pages = [f"{len(pages)} datasets: {RESULTS}/index.html"]
+        pages = [f"{len(pages)} datasets: {where}{RESULTS}/index.html"]
     for page in pages:
         print(f"valid: {page}", file=sys.stderr)
 

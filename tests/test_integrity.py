@@ -304,6 +304,13 @@ def test_what_a_copy_says_of_itself_must_agree(small):
         assert found_in(small, None) == {sums: problem}
 
 
+def test_a_copy_is_checked_from_within(small, monkeypatch):
+    monkeypatch.chdir(Path("results", small))
+    assert list(Integrity(Path()).faults()) == []
+    Path("depth.png").write_bytes(b"spoilt")
+    assert [str(fault.path) for fault in Integrity(Path()).faults()] == ["depth.png"]
+
+
 def test_without_its_ledger_only_what_is_published_has_a_checksum(small):
     Path("work/sums.json").unlink()
     stray = Path("results", small, "depth.png")

@@ -1,5 +1,6 @@
 """The view store, in a folder: nothing is taken for a file but its own bytes."""
 
+import hashlib
 import os
 import shutil
 import sys
@@ -144,3 +145,39 @@ def test_what_is_stored_under_a_path_is_brought_with_its_time(tmp_path, monkeypa
     found = tmp_path / "results/lightfield.json"
     assert (found.read_text(), found.stat().st_mtime) == ("{}", 1000)
     assert not (tmp_path / "results/missing.json").exists()
+
+
+def test_a_finished_dataset_is_taken_as_its_checksums_say(
+    tmp_path, monkeypatch, store, run_program
+):
+    monkeypatch.chdir(tmp_path)
+    dataset, stored = Path("results/s/rig"), tmp_path / "store/results/s/rig"
+    words = ("--store", store.url, str(dataset))
+    missing = run_program("take_dataset.py", *words, check=False)
+    assert "sha256sums.txt: is not in" in missing.stderr
+
+    store.put(write(tmp_path / "view", b"view"), digest(b"view"))
+    write(stored / "report/index.html", b"page")
+    sums = f"{digest(b'view')}  exr/a.exr\n{digest(b'page')}  report/index.html\n"
+    write(stored / "sha256sums.txt", sums.encode())
+    taken = run_program("take_dataset.py", *words, check=False)
+    assert taken.returncode == 0, taken.stderr
+    assert (dataset / "exr/a.exr").read_bytes() == b"view"
+    assert (dataset / "report/index.html").read_bytes() == b"page"
+
+    write(stored / "report/index.html", b"egap")
+    shutil.rmtree(dataset)
+    wrong = run_program("take_dataset.py", *words, check=False)
+    assert wrong.returncode == 1
+    assert f"1 files are not in {store.url}" in wrong.stderr
+    assert str(dataset / "report/index.html") in wrong.stderr
+
+
+def write(path, content):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
+    return path
+
+
+def digest(content):
+    return hashlib.sha256(content).hexdigest()

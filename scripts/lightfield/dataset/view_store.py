@@ -56,22 +56,23 @@ class ViewStore:
         """Raise `UserError` where the store cannot be read."""
         self.listed("")
 
-    def bring(self, path: str) -> None:
+    def bring(self, path: str) -> bool:
         """Bring here what Snakemake has stored under a path, as old as it is.
 
-        Nothing is brought if there is nothing, or if it is empty, as a log may be.
+        Return False where there is nothing, or it is empty, as a log may be: then nothing changes.
         """
         with self._answering():
             stored = self._place(path)
             try:
                 time, content = stored.stat().st_mtime, stored.read_bytes()
             except FileNotFoundError:
-                return
+                return False
             if not content:
-                return
+                return False
             with atomic_path(path) as temporary:
                 temporary.write_bytes(content)
             os.utime(path, (time, time))
+        return True
 
     def send(self, path: str) -> None:
         """Store a file under its path, as Snakemake does."""

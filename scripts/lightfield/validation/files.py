@@ -398,6 +398,16 @@ def remove_leftovers(dataset: Path) -> None:
             leftover.unlink()
 
 
+def read_sums(path: Path) -> dict[str, str]:
+    """Return the SHA-256 of each file that a sha256sums.txt names, and that is below its folder."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return {
+        name: digest
+        for digest, _, name in (line.partition("  ") for line in lines)
+        if name and ".." not in name.split("/") and not name.startswith("/")
+    }
+
+
 def write_sums(path: Path, checksums: Mapping[str, str], dataset: Path, result: Path) -> None:
     """Write as sha256sum does: ``checksums`` by path, and ``result``'s if the dataset holds it."""
     sums = dict(checksums)

@@ -18,7 +18,7 @@ from lightfield.dataset import ledger, records
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.splits import SPLITS
-from lightfield.validation.files import CARD, IMAGES, README, REPORT, SUMS
+from lightfield.validation.files import CARD, IMAGES, README, REPORT, SUMS, read_sums
 
 # Made as the work went on, and of it alone: nothing can make them again, and no dataset needs them.
 _HISTORY = (".journal.jsonl", ".tsv")
@@ -44,11 +44,12 @@ class Integrity:
         self.dataset = Path(os.path.relpath(dataset))
         self.work = Path(os.path.relpath(work)) if work else None
         # A sequence's datasets lie a folder deeper, one for each frame.
-        depth = 3 if re.fullmatch(r"f\d{5,7}", dataset.name) else 2
-        self._name = "/".join(dataset.absolute().parts[-depth:])
-        self._scene = dataset.absolute().parts[-depth]
+        folder = dataset.absolute()
+        depth = 3 if re.fullmatch(r"f\d{5,7}", folder.name) else 2
+        self._name = "/".join(folder.parts[-depth:])
+        self._scene = folder.parts[-depth]
         # Beside the folders of the scene's rigs.
-        self._splits = self.dataset.parents[depth - 2] / SPLITS
+        self._splits = Path(os.path.relpath(folder.parents[depth - 2] / SPLITS))
 
     def faults(self) -> Iterator[Fault]:
         """Yield every fault, one for each file."""
@@ -134,14 +135,10 @@ class Integrity:
             candidates.append(self.work / self._name / "checksums.txt")
         sound = (path for path in candidates if self._is_sound(path))
         try:
-            lines = next(sound).read_text(encoding="utf-8").splitlines()
+            sums = read_sums(next(sound))
         except (StopIteration, OSError, UnicodeDecodeError):
             return {}
-        return {
-            self.dataset / name: digest
-            for digest, _, name in (line.partition("  ") for line in lines)
-            if name and ".." not in name.split("/") and not name.startswith("/")
-        }
+        return {self.dataset / name: digest for name, digest in sums.items()}
 
     @cached_property
     def _expected(self) -> dict[Path, tuple[str, str]]:
