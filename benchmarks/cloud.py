@@ -28,6 +28,7 @@ import psutil
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
 from lightfield.core.files import sha256
+from lightfield.core.progress import Progress
 from lightfield.dataset.view_store import ViewStore
 from soak import DATASET, ROOT, SCENE, Build, write_text
 
@@ -179,8 +180,10 @@ def kill(build: Cloud, count: int, seconds: float, rng: random.Random) -> Counte
     A run fails where one of its jobs was killed more often than it is submitted, and goes on.
     """
     killed: Counter[str] = Counter()
+    progress = Progress(count, "cloud", "kills")
     process = build.start()
     while killed.total() < count:
+        progress.done(killed.total() - progress.count)
         time.sleep(rng.uniform(0.1, 1.0) * seconds)
         if process.poll() == 0:
             break

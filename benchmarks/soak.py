@@ -29,6 +29,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
 from lightfield.core.files import write_json, write_text
+from lightfield.core.progress import Progress
 from lightfield.dataset.config import ROOT
 from lightfield.imaging import images
 
@@ -218,6 +219,7 @@ class Row:
 
 def limit_files(build: Build, count: int) -> Iterator[Row]:
     """Build with ever larger limits of a file's size: each is named, and leaves nothing half."""
+    progress = Progress(count, "soak", "limits of files")
     for limit in LIMITS[:count]:
         before = build.finished()
         succeeded, said = build.run(limit=limit)
@@ -228,6 +230,7 @@ def limit_files(build: Build, count: int) -> Iterator[Row]:
         yield Row(f"no file beyond {limit} B", 1, int(found), int(whole), lost(before))
         if not (found and whole):
             print(said, file=sys.stderr)
+        progress.done()
 
 
 def kill(
@@ -239,6 +242,7 @@ def kill(
     before it is killed another begins from nothing.
     """
     row, killed = Row("killed at a random moment"), 0
+    progress = Progress(count, "soak", "kills")
     while True:
         before = build.finished()
         process = build.start()
@@ -254,6 +258,7 @@ def kill(
             killed += 1
             row.injected += 1
             row.found += 1
+            progress.done()
             build.run("--unlock")
         elif process.returncode == 0:
             row.mended += killed if build.published() == expected else 0
@@ -269,6 +274,7 @@ def kill(
 def damage(build: Build, faults: int, rng: random.Random) -> Iterator[Row]:
     """Spoil files of every kind, find, mend, and build on; yield a row for each kind of fault."""
     rows = {kind: Row(f"{kind.__name__}: a file") for kind in KINDS}
+    progress = Progress(faults, "soak", "faults")
     verify = [sys.executable, str(ROOT / "scripts/verify.py"), str(DATASET), "--work", "work"]
     while faults:
         files = build.files()
@@ -295,6 +301,7 @@ def damage(build: Build, faults: int, rng: random.Random) -> Iterator[Row]:
         again = [view for view in build.made() - rendered if view not in spoiled]
         rows[KINDS[0]].made_twice += len(again)
         rows[KINDS[0]].bytes_lost += lost(sound)
+        progress.done(len(chosen))
     yield from rows.values()
 
 
