@@ -82,6 +82,17 @@ def replace(path: Path, rng: random.Random) -> None:
         path.write_bytes(path.read_bytes()[::-1] + b"\n")
 
 
+def swap(path: Path, rng: random.Random) -> None:
+    """Put the bytes of another file of its folder there, which is as good but not this one."""
+    content = path.read_bytes()
+    beside = sorted(other for other in path.parent.glob(f"*{path.suffix}") if other.is_file())
+    others = [other for other in map(Path.read_bytes, beside) if other != content]
+    if others:
+        path.write_bytes(rng.choice(others))
+    else:
+        replace(path, rng)
+
+
 def folder(path: Path, rng: random.Random) -> None:
     path.unlink()
     (path / "inside").mkdir(parents=True)
@@ -94,7 +105,7 @@ def unreadable(path: Path, rng: random.Random) -> None:
 
 
 KINDS: list[Callable[[Path, random.Random], None]] = [
-    *(flip, truncate, empty, delete, replace, folder, unreadable)
+    *(flip, truncate, empty, delete, replace, swap, folder, unreadable)
 ]
 
 
