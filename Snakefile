@@ -97,23 +97,19 @@ rule all:
     input:
         [[*dataset.files, *dataset.intermediates] for dataset in CHOSEN],
         f"{RESULTS}/index.html",
-        whole(CHOSEN),
 
 
 rule report_html:
     input:
         [dataset.page for dataset in CHOSEN],
         f"{RESULTS}/index.html",
-        whole(CHOSEN),
 
 
 rule smoke:
     input:
         [[*dataset.files, *dataset.intermediates] for dataset in SMOKE],
-        whole(SMOKE),
 
 
 rule package:
     input:
         [dataset.package for dataset in CHOSEN],
-        whole(CHOSEN),

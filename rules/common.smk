@@ -257,30 +257,27 @@ def noted_sums():
         return {}
 
 
-def whole(datasets):
-    """Return the input function of a target: no input, but what is broken is made anew.
+def whole(wildcards):
+    """Return no input, but let what is broken or out of date of a dataset be made anew.
 
-    So is what views are made from where it has other bytes than those that a job wrote.
+    So is what views are made from where it has other bytes than those that a job wrote. The page
+    asks, which every target of a finished dataset leads to.
 
     That it is broken is said here; it is set aside when the run starts.
     """
-
-    def input_function(wildcards):
-        for dataset in datasets:
-            damaged = ledger.damaged(noted_sums(), dataset.view_sources)
-            for path, problem in (*dataset.broken(), *damaged):
-                if path not in BROKEN:
-                    print(f"{path}: {problem}; it is made anew", file=sys.stderr)
-                    BROKEN[path] = problem
-                made_anew(path)
-            for path in outdated(dataset):
-                made_anew(path)
-            # A run without a job would note no checksums.
-            if not (STORE or Path(SUMS).exists()):
-                made_anew(dataset.page)
-        return []
-
-    return input_function
+    dataset = dataset_of(wildcards)
+    damaged = ledger.damaged(noted_sums(), dataset.view_sources)
+    for path, problem in (*dataset.broken(), *damaged):
+        if path not in BROKEN:
+            print(f"{path}: {problem}; it is made anew", file=sys.stderr)
+            BROKEN[path] = problem
+        made_anew(path)
+    for path in outdated(dataset):
+        made_anew(path)
+    # A run without a job would note no checksums.
+    if not (STORE or Path(SUMS).exists()):
+        made_anew(dataset.page)
+    return []
 
 
 @cache

@@ -104,6 +104,7 @@ rule page:
         validation=f"{DATASET}/validation.json",
         costs=f"{DATASET}/report/costs.json",
         inventory=of_dataset("blend_inventory"),
+        whole=whole,
     output:
         f"{DATASET}/report/index.html",
     log:

@@ -130,6 +130,20 @@ def test_what_is_broken_is_planned_again_and_set_aside(tmp_path):
 
 
 @pytest.mark.slow
+def test_a_dataset_named_alone_notices_a_changed_yaml_and_what_is_broken(tmp_path):
+    folder = checkout(tmp_path)
+    one, two, _ = simulated.build(folder)
+    targets = [f"{one.folder}/sha256sums.txt", two.package]
+    assert not simulated.planned(folder, targets[0])
+    path = folder / "configs/scenes/smoke.yaml"
+    path.write_text(re.sub(r"samples: \d+", "samples: 3", path.read_text(), count=1))
+    (folder / two.costs).write_text("{")
+    os.utime(folder / two.costs, (simulated.WHEN, simulated.WHEN))
+    expected = {f"{d.folder}/lightfield.json" for d in (one, two)} | {two.costs}
+    assert expected <= simulated.planned(folder, *targets)
+
+
+@pytest.mark.slow
 def test_a_reprojection_that_does_not_say_how_it_was_made_is_made_anew_alone(tmp_path):
     folder = checkout(tmp_path)
     one, *_ = simulated.build(folder)
