@@ -13,6 +13,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import second_name, sha256
 from lightfield.core.settings import checked
 from lightfield.dataset.config import Scene
+from lightfield.dataset.published import lightfields
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 
@@ -88,6 +89,16 @@ def test_nothing_is_rendered_of_it(published, tmp_path):
     assert jobs.keys() >= {"import_views", "reproject", "validate", "page"}
     rendering = {"render", "render_panorama", "build_scene", "inventory", "check_cameras"}
     assert not rendering & jobs.keys()
+
+
+def test_linked_folders_are_rigs_by_the_names_of_their_links(published, tmp_path, monkeypatch):
+    for name in ("near", "far"):
+        folder = tmp_path / "linked" / name
+        folder.parent.mkdir(exist_ok=True)
+        folder.symlink_to(published)
+    assert list(lightfields(str(tmp_path / "linked"))) == ["far", "near"]
+    monkeypatch.chdir(published)
+    assert list(lightfields(".")) == list(lightfields("../LFPlane/exr/..")) == ["LFPlane"]
 
 
 @pytest.mark.parametrize(

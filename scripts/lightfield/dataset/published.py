@@ -18,10 +18,13 @@ def lightfields(dataset: str) -> dict[str, Path]:
     Raises `UserError` where there is none.
     """
     folder = Path(dataset)
-    found = [folder / NAME] if (folder / NAME).is_file() else sorted(folder.glob(f"*/{NAME}"))
+    if (folder / NAME).is_file():
+        return {folder.resolve().name: folder / NAME}
+    # A link has the name that was given to it: two may lead to folders of one name.
+    found = {path.parent.name: path for path in sorted(folder.glob(f"*/{NAME}"))}
     if not found:
         raise UserError(f"there is no {NAME} in {dataset}, nor in a folder in it")
-    return {path.resolve().parent.name: path for path in found}
+    return found
 
 
 def rigs(dataset: str) -> dict[str, Poses]:
