@@ -1,5 +1,6 @@
 """Verify: faults of every kind in files of every kind, all found, named and mended."""
 
+import errno
 import hashlib
 import json
 import os
@@ -15,6 +16,7 @@ from lightfield.core.files import sha256
 from lightfield.dataset import ledger
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
+from lightfield.validation import integrity
 from lightfield.validation.integrity import Integrity
 from soak import KINDS, replace, spoil
 
@@ -295,13 +297,31 @@ def test_what_a_copy_says_of_itself_must_agree(small):
     assert found_in(small, None) == {}
     put(folder / "validation.json", {"valid": False})
     resum(folder, listed)
-    problem = "says that the dataset is not valid"
-    assert found_in(small, None) == {f"{folder}/validation.json": problem}
+    invalid = {f"{folder}/validation.json": "says that the dataset is not valid"}
+    assert found_in(small, None) == invalid
+    written = [f"{folder}/validation.json", sums, f"work/{small}/checksums.txt"]
+    Path(written[-1]).write_text(Path(sums).read_text())
+    ledger.note(Path("work/sums.json"), written, (), lambda _: False)
+    # A run that adds a package notes its files.
+    added = {f"{folder}/{name}" for name in ("README.md", "card.json")}
+    found = found_in(small)
+    assert {path: problem for path, problem in found.items() if path not in added} == invalid
     for text, problem in (("no sums\n", "has no checksum"), ("", "is empty"), (None, "is missing")):
         Path(sums).unlink()
         if text is not None:
             Path(sums).write_text(text)
         assert found_in(small, None) == {sums: problem}
+
+
+def test_a_file_that_the_disk_does_not_yield_is_a_fault(small, monkeypatch):
+    def failing(path):
+        if path.name == "depth.png":
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        return sha256(path)
+
+    monkeypatch.setattr(integrity, "sha256", failing)
+    image = f"results/{small}/depth.png"
+    assert found_in(small) == {image: "cannot be read: Input/output error"}
 
 
 def test_a_copy_is_checked_from_within(small, monkeypatch):
