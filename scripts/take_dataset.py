@@ -1,7 +1,7 @@
 """Take finished datasets from the storage in which their jobs have put them.
 
 Each file is compared with the dataset's sha256sums.txt. What is there already, with the same bytes,
-is left as it is.
+is left as it is. The dataset's page is taken, too.
 """
 
 import argparse
@@ -12,7 +12,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.progress import Progress
 from lightfield.dataset.view_store import ViewStore
-from lightfield.validation.files import SUMS, read_sums
+from lightfield.validation.files import REPORT, SUMS, read_sums
 
 
 def main() -> None:
@@ -27,6 +27,8 @@ def main() -> None:
 
 def take(store: ViewStore, dataset: Path) -> None:
     """Take all files of a dataset; raises `UserError` where one is not in the storage."""
+    for name in store.names(f"{dataset}/{REPORT}"):
+        store.bring(f"{dataset}/{REPORT}/{name}")
     sums = dataset / SUMS
     if not store.bring(str(sums)):
         raise UserError(f"{sums}: is not in {store.url}: no run has finished this dataset there")

@@ -157,20 +157,22 @@ def test_a_finished_dataset_is_taken_as_its_checksums_say(
     assert "sha256sums.txt: is not in" in missing.stderr
 
     store.put(write(tmp_path / "view", b"view"), digest(b"view"))
+    write(stored / "perspective/lightfield.json", b"lens")
     write(stored / "report/index.html", b"page")
-    sums = f"{digest(b'view')}  exr/a.exr\n{digest(b'page')}  report/index.html\n"
+    sums = f"{digest(b'view')}  exr/a.exr\n{digest(b'lens')}  perspective/lightfield.json\n"
     write(stored / "sha256sums.txt", sums.encode())
     taken = run_program("take_dataset.py", *words, check=False)
     assert taken.returncode == 0, taken.stderr
     assert (dataset / "exr/a.exr").read_bytes() == b"view"
+    assert (dataset / "perspective/lightfield.json").read_bytes() == b"lens"
     assert (dataset / "report/index.html").read_bytes() == b"page"
 
-    write(stored / "report/index.html", b"egap")
+    write(stored / "perspective/lightfield.json", b"snel")
     shutil.rmtree(dataset)
     wrong = run_program("take_dataset.py", *words, check=False)
     assert wrong.returncode == 1
     assert f"1 files are not in {store.url}" in wrong.stderr
-    assert str(dataset / "report/index.html") in wrong.stderr
+    assert str(dataset / "perspective/lightfield.json") in wrong.stderr
 
 
 def write(path, content):

@@ -74,6 +74,14 @@ class ViewStore:
             os.utime(path, (time, time))
         return True
 
+    def names(self, folder: str) -> list[str]:
+        """Return the names of what Snakemake has stored in a folder."""
+        with self._answering():
+            try:
+                return sorted(entry.name for entry in self._place(folder).iterdir())
+            except (FileNotFoundError, NotADirectoryError):
+                return []
+
     def send(self, path: str) -> None:
         """Store a file under its path, as Snakemake does."""
         with self._answering():
@@ -111,16 +119,8 @@ class ViewStore:
 
     def listed(self, key: str) -> list[tuple[str, str]]:
         """Return name and SHA-256 of each file that the settings of ``key`` have made."""
-        with self._answering():
-            try:
-                notes = sorted(entry.name for entry in (self._root / "keys" / key).iterdir())
-            except (FileNotFoundError, NotADirectoryError):
-                return []
-        return [
-            (name.replace("@", "/"), digest)
-            for name, separator, digest in (note.rpartition("@") for note in notes)
-            if separator
-        ]
+        notes = (note.rpartition("@") for note in self.names(f"views/keys/{key}"))
+        return [(name.replace("@", "/"), digest) for name, separator, digest in notes if separator]
 
     def take(self, digest: str, target: Path) -> bool:
         """Make ``target`` the file of a SHA-256, unless it is; return False where there is none."""
