@@ -244,7 +244,10 @@ def outdated(dataset):
         record = Path(dataset.calibration)
         if not record.exists() or record in map(Path, BROKEN):
             return []
-        render = calibrated(render, read_json(record))
+        try:
+            render = calibrated(render, record)
+        except UserError:
+            return [str(record)]
     return list(dataset.outdated(render))
 
 

@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 
 from lightfield.core.cli import run
-from lightfield.core.files import read_json, write_text
+from lightfield.core.files import read_keys, write_text
 from lightfield.measurement import advice
 
 
@@ -15,7 +15,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("measured", nargs="+", type=Path, help="JSON of a scene, named after it")
     for path in parser.parse_args().measured:
-        text = advice.table(path.stem, read_json(path))
+        text = advice.table(path.stem, read_keys(path, "try_changes.py", *advice.SHOWN))
         write_text(path.with_suffix(".md"), text)
         print(text)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, write_json
+from lightfield.core.files import read_keys, write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.rendering import blend_file
 from lightfield.rendering.clearance import REACH, TOUCHING, clearances, enclosing_objects
@@ -27,7 +27,11 @@ def main() -> None:
     lightfield = LightField.read(arguments.lightfield)
     names = [view.name for view in lightfield.views]
     positions = np.array([view.position for view in lightfield.views])
-    inventory = read_json(arguments.inventory) if arguments.inventory else None
+    inventory = (
+        read_keys(arguments.inventory, "inventory.py", "external_files")
+        if arguments.inventory
+        else None
+    )
     blend_file.open_scene(arguments.blend, lightfield.content.get("scene", {}), inventory)
     bpy.context.scene.frame_set(lightfield.frame)
     distances = clearances(positions)

@@ -4,9 +4,13 @@ import argparse
 import json
 from pathlib import Path
 
+from pydantic import TypeAdapter
+
 from lightfield.core.cli import run
-from lightfield.core.files import read_json, write_json
-from lightfield.dataset.config import FILE
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_keys, write_json
+from lightfield.core.settings import checked
+from lightfield.dataset.config import FILE, Energy
 from lightfield.measurement import costs
 
 
@@ -43,16 +47,21 @@ def main() -> None:
     parser.add_argument("--inventory", type=Path, help="JSON of what the scene's .blend says")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
-    if arguments.full["samples"] == FILE:
-        arguments.full["samples"] = read_json(arguments.inventory)["blend"]["samples"]
+    tariff = checked(TypeAdapter(Energy), arguments.energy, "--energy")
+    full = checked(TypeAdapter(costs.FullSize), arguments.full, "--full").model_dump()
+    if full["samples"] == FILE:
+        if arguments.inventory is None:
+            raise UserError("--inventory: is missing; it has the samples of the .blend")
+        said = read_keys(arguments.inventory, "inventory.py", "blend")["blend"]
+        full["samples"] = said["samples"]
     found = costs.costs(
         arguments.dataset,
         arguments.blend,
         arguments.journals,
         arguments.benchmarks,
         arguments.scene_benchmarks,
-        costs.Tariff.read(arguments.energy),
-        arguments.full,
+        costs.Tariff.read(tariff.model_dump()),
+        full,
         arguments.reprojection,
     )
     write_json(arguments.output, found)

@@ -8,7 +8,7 @@ import bpy
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, write_json
+from lightfield.core.files import read_keys, write_json
 from lightfield.dataset import config
 from lightfield.geometry import rigs
 from lightfield.rendering import blend_file
@@ -29,7 +29,11 @@ def main() -> None:
     if not isinstance(rig, rigs.Random):
         raise UserError(f"--rig: type: is {rig.type}; must be random")
     chosen = config.load_scene(arguments.scene).scene.model_dump() if arguments.scene else {}
-    inventory = read_json(arguments.inventory) if arguments.inventory else None
+    inventory = (
+        read_keys(arguments.inventory, "inventory.py", "external_files")
+        if arguments.inventory
+        else None
+    )
     blend_file.open_scene(arguments.blend, chosen, inventory)
     if arguments.frame != config.FILE:
         bpy.context.scene.frame_set(int(arguments.frame))

@@ -4,12 +4,16 @@ import argparse
 import json
 from pathlib import Path
 
+from pydantic import TypeAdapter
+
 from lightfield.core import processors
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
+from lightfield.core.settings import checked
 from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import gpu_check, trials
+from lightfield.measurement.costs import FullSize
 
 
 def main() -> None:
@@ -25,6 +29,8 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="stem of the .json and .md")
     arguments = parser.parse_args()
 
+    full = checked(TypeAdapter(dict[str, FullSize]), arguments.full, "--full")
+    sizes = {name: size.model_dump() for name, size in full.items()}
     # Where there is none, nothing is rendered.
     with processors.only(arguments.threads):
         from lightfield.rendering import cycles
@@ -35,7 +41,7 @@ def main() -> None:
     lightfield = LightField.read(arguments.lightfield)
     render = trials.own_settings(arguments, lightfield)
     maker = trials.Trials.of(arguments, lightfield)
-    found = gpu_check.check(maker, device, render, arguments.full)
+    found = gpu_check.check(maker, device, render, sizes)
     name = arguments.output.name
     text = gpu_check.table(name, found)
     print(text)

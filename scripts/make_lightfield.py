@@ -9,7 +9,6 @@ from pydantic import TypeAdapter
 
 from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json
 from lightfield.core.settings import checked
 from lightfield.dataset import passes
 from lightfield.dataset.config import Preset
@@ -70,7 +69,7 @@ def main() -> None:
             raise UserError("--places: is missing; scripts/free_places.py finds them")
         dataset = replace(dataset, rig=dataset.rig.placed(arguments.places))
     if arguments.calibration:
-        render = calibrated(render, read_json(arguments.calibration))
+        render = calibrated(render, arguments.calibration)
     made = LightField.from_rig(dataset.rig, dataset.rig.camera.make(), **dataset.origin(render))
     if dataset.flow and not arguments.panorama:
         made = made.with_flow()

@@ -7,8 +7,8 @@ card where that renders; gigabytes are those of the rendered views.
 import argparse
 from pathlib import Path
 
-from lightfield.core.cli import run
-from lightfield.core.files import read_json, write_text
+from lightfield.core.cli import counted, run
+from lightfield.core.files import read_keys, write_text
 from lightfield.measurement import plan
 
 
@@ -33,8 +33,14 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="Markdown to write")
     arguments = parser.parse_args()
     text = plan.table(
-        [(name, int(frames), read_json(probe)) for name, frames, probe in arguments.dataset],
-        {name: read_json(path) for name, path in arguments.advice},
+        [
+            (name, counted("--dataset", frames), read_keys(probe, "probe.py", *plan.PROBED))
+            for name, frames, probe in arguments.dataset
+        ],
+        {
+            name: read_keys(path, "try_changes.py", "own", "unchanged")
+            for name, path in arguments.advice
+        },
     )
     write_text(arguments.output, text)
     print(text, end="")

@@ -11,7 +11,7 @@ from typing import Any
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, write_bytes
+from lightfield.core.files import read_keys, write_bytes
 
 # So many failed checks are named, each by the first thing that is wrong.
 CAUSES = 3
@@ -25,7 +25,7 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="sha256sums.txt to write")
     arguments = parser.parse_args()
 
-    validation = read_json(arguments.validation)
+    validation = read_keys(arguments.validation, "validate.py", "valid", "dataset", "checks")
     if not validation["valid"]:
         arguments.sums.unlink()
         raise UserError(

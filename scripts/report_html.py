@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 
 from lightfield.core.cli import run
-from lightfield.core.files import read_json
+from lightfield.core.files import read_keys
 from lightfield.geometry import rigs
 from lightfield.report import dataset_page
 
@@ -42,7 +42,9 @@ def main() -> None:
         command=arguments.command,
         has_panorama=bool(arguments.panorama),
         measurements=arguments.measurements,
-        inventory=read_json(arguments.inventory) if arguments.inventory else None,
+        inventory=read_keys(arguments.inventory, "inventory.py", "blend", "missing")
+        if arguments.inventory
+        else None,
     )
     dataset_page.write(arguments.output, arguments.dataset, arguments.name, origin)
 

@@ -8,7 +8,7 @@ import argparse
 import time
 from pathlib import Path
 
-from lightfield.core.cli import run
+from lightfield.core.cli import counted, run
 from lightfield.report import status
 
 
@@ -27,12 +27,13 @@ def main() -> None:
     arguments = parser.parse_args()
     now = time.time()
     renderings = []
-    for name, views, reprojections in arguments.dataset:
-        folder = arguments.results / name
-        renderings.append(status.look(folder, arguments.work / name, int(views), now))
+    total = 0
+    for name, text, reprojections in arguments.dataset:
+        folder, views = arguments.results / name, counted("--dataset", text)
+        renderings.append(status.look(folder, arguments.work / name, views, now))
         others = list(filter(None, reprojections.split(",")))
-        print("\n".join(status.lines(name, folder, int(views), others, renderings[-1])))
-    total = sum(int(views) for _, views, _ in arguments.dataset)
+        print("\n".join(status.lines(name, folder, views, others, renderings[-1])))
+        total += views
     done = sum(len(rendering.finished) for rendering in renderings)
     recent = sum(rendering.recent for rendering in renderings)
     seconds = max(rendering.seconds for rendering in renderings)

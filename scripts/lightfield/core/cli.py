@@ -42,6 +42,14 @@ def positive(text: str) -> int:
     raise argparse.ArgumentTypeError(f"is {text}; must be 1 or more")
 
 
+def counted(flag: str, text: str) -> int:
+    """Return a whole number from 1 on of a flag with several values; raises `UserError`."""
+    try:
+        return positive(text)
+    except argparse.ArgumentTypeError as error:
+        raise UserError(f"{flag}: {error}") from None
+
+
 def finite(text: str) -> float:
     """Return a number that is neither infinite nor NaN."""
     if math.isfinite(float(text)):

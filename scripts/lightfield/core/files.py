@@ -170,6 +170,19 @@ def set_aside(path: Path, folder: Path) -> Path:
     return target
 
 
+def read_keys(path: Path | str, program: str, *keys: str) -> dict[str, Any]:
+    """Read the JSON mapping that a program of scripts/ writes.
+
+    Raises `UserError` as `read_json` does, and for one that lacks one of the ``keys``.
+    """
+    content = read_json(path)
+    for key in keys:
+        if not isinstance(content, dict) or key not in content:
+            raise UserError(f"{path}: {key}: is missing; scripts/{program} writes it")
+    found: dict[str, Any] = content
+    return found
+
+
 def read_json(path: Path | str) -> Any:
     """Read a JSON file; a missing or malformed one is a `UserError` that names it."""
     try:

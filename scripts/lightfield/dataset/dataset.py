@@ -13,7 +13,7 @@ from statistics import fmean
 from typing import Any, Literal, Self
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import broken, read_json
+from lightfield.core.files import broken, read_keys
 from lightfield.dataset import (
     blend,
     config,
@@ -106,11 +106,13 @@ class Dataset:
     external_files: Sequence[tuple[str, str | None]] = ()
 
     def resolved(self, inventory: Path) -> Self:
-        """Return the dataset with what its .blend says, by its ``inventory``, filled in.
+        """Return the dataset with what a user's .blend says, by its ``inventory``, filled in.
 
         Raises `UserError` where the .blend has not what the scene YAML asks of it.
         """
-        found = read_json(inventory)
+        if not self.source.blend:
+            return self
+        found = read_keys(inventory, "inventory.py", "blend", "external_files")
         said = found["blend"]
         frame = int(said["frame"] if self.source.frame == FILE else self.source.frame)
         render, rig = dict(self.render), self.rig

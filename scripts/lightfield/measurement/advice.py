@@ -317,6 +317,10 @@ def is_advised(one: Try, saving: Saving | None) -> bool:
     )
 
 
+# What `table` reads.
+SHOWN = ("device", "seeds", "strata", "tried", "unchanged", "threads", "costly", "yaml")
+
+
 def table(name: str, found: Mapping[str, Any]) -> str:
     """Return what `tried` has found, in Markdown."""
     columns = [WHOLE, *found["strata"]]

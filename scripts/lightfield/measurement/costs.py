@@ -46,9 +46,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import mean
-from typing import Any
+from typing import Any, Literal
 
+from pydantic import Field
+
+from lightfield.core.settings import Settings
 from lightfield.dataset import journal
+from lightfield.dataset.config import AtLeastOne
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, PASSES
 from lightfield.measurement.sampling import DENOISING_SAMPLES, cost_in_samples, standard_error
@@ -74,6 +78,15 @@ class Stage:
     wall_seconds: float = 0.0
     cpu_seconds: float = 0.0
     peak_memory_bytes: int = 0
+
+
+class FullSize(Settings):
+    """What a dataset has at full size; null are the samples and denoising of the one at hand."""
+
+    views: AtLeastOne
+    resolution: list[AtLeastOne] = Field(min_length=2, max_length=2)
+    samples: AtLeastOne | Literal["file"] | None = None
+    denoise: bool | None = None
 
 
 @dataclass(frozen=True)

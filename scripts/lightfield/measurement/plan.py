@@ -14,6 +14,9 @@ from lightfield.measurement.sampling import DENOISED, TRACED, standard_error
 
 HEAD = "| dataset | views | resolution | samples | s a view | hours | denoised | calibrated | GB |"
 
+# What `table` reads of a probe.
+PROBED = ("views", "resolution", "samples", "device", "view_seconds", "view_bytes")
+
 # The target error that the calibrated hours are for.
 TARGET_ERROR = 0.01
 # Times as long as plain path tracing.

@@ -3,7 +3,10 @@
 import math
 import statistics
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
+
+from lightfield.core.files import read_keys
 
 # What a `render` block with a target error says of its calibration, and not of rendering: the
 # target, and a preset's limits.
@@ -37,8 +40,12 @@ def cost_in_samples(samples: float, denoise: bool) -> float:
     return samples + DENOISING_SAMPLES * denoise
 
 
-def calibrated(render: Mapping[str, Any], record: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a ``render`` block with what was chosen for its ``target_error`` in it."""
+def calibrated(render: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    """Return a ``render`` block with what scripts/calibrate.py chose for its ``target_error``.
+
+    Raises `UserError` where the file at ``path`` is no such choice.
+    """
+    record = read_keys(path, "calibrate.py", "target_error", "choice")
     return {**without_target(render), "target_error": record["target_error"], **record["choice"]}
 
 

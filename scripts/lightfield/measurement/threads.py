@@ -6,7 +6,7 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any
 
-from lightfield.core.files import read_json
+from lightfield.core.files import read_keys
 from lightfield.core.leftovers import temporary_folder
 from lightfield.core.memory import available
 from lightfield.core.progress import Progress
@@ -34,7 +34,7 @@ def tried(
     render = {**lightfield.render, "samples": SAMPLES, "adaptive_threshold": 0}
     views = lightfield.views[:: max(1, len(lightfield.views) // VIEWS)][:VIEWS]
     probes = lightfield.changed(lens=small, views=views, render=render)
-    scene = read_json(inventory)["memory_bytes"]
+    scene = read_keys(inventory, "inventory.py", "memory_bytes")["memory_bytes"]
     need = memory.needed(scene, small.width * small.height, render["denoise"])
     fewest = memory.threads(cores, cores, need, available())
     counts = [n for n in range(fewest, cores + 1) if cores % n == 0]

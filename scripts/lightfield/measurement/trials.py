@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from lightfield.core import processors
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json
+from lightfield.core.files import read_keys
 from lightfield.dataset import keys, passes
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.geometry.lenses import Lens
@@ -138,7 +138,7 @@ class Trials:
     @cached_property
     def inventory(self) -> Any:
         """What the scene contains, and how its .blend traces paths."""
-        return read_json(self._inventory)
+        return read_keys(self._inventory, "inventory.py", "left_out", "sampling", "volumes")
 
     @property
     def has_volumes(self) -> bool:
@@ -302,7 +302,7 @@ def own_settings(arguments: argparse.Namespace, lightfield: LightField) -> Mappi
     Raises `UserError` where it has one, and nothing says what was.
     """
     if arguments.calibration:
-        return calibrated(lightfield.render, read_json(arguments.calibration))
+        return calibrated(lightfield.render, arguments.calibration)
     if "samples" not in lightfield.render:
         raise UserError(
             f"{arguments.lightfield}: render has a target error and no samples; "

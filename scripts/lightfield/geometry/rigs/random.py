@@ -7,7 +7,8 @@ import numpy as np
 from pydantic import Field, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
-from lightfield.core.files import read_json
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_keys
 from lightfield.geometry.rigs.grid import box_outline
 from lightfield.geometry.rigs.rig import CountedRig, UnitPoses, stack
 from lightfield.geometry.rotations import Floats
@@ -52,10 +53,20 @@ class Random(CountedRig):
         if self.file is None:
             places = np.stack([self.candidate(view, 0) for view in range(self.count)])
         else:
-            places = np.array(read_json(Path(self.file))["places"], float)
+            places = self._found()
         directions = [self._numbers(view)[0] for view in range(self.count)]
         azimuth = 2 * np.pi * np.array(directions)
         return UnitPoses.of_sides(("", places, stack(np.pi / 2, 0.0, azimuth)))
+
+    def _found(self) -> Floats:
+        places = read_keys(str(self.file), "free_places.py", "box", "places")["places"]
+        try:
+            found = np.array(places, float)
+        except (TypeError, ValueError):
+            found = np.empty(0)
+        if found.shape != (self.count, 3):
+            raise UserError(f"{self.file}: places: must be {self.count} of 3 numbers each")
+        return found
 
     def unit_outline(self) -> list[Floats]:
         return box_outline()
