@@ -21,7 +21,7 @@ def main() -> None:
         "--parameters",
         type=json.loads,
         default={},
-        help="JSON: seed (default: 0), detail (default: 1, full) and the builder's own",
+        help="JSON: seed (default: 0) and detail (default: 1, full)",
     )
     parser.add_argument("--output", required=True, type=Path, help=".blend to write")
     arguments = parser.parse_args()

@@ -62,6 +62,31 @@ def changed(path, value):
 BROKEN = {
     # key path: (value, what the message must hold beside the key path)
     "no samples": ("render.samples", REMOVE, "render: is missing the key samples"),
+    "no value": (
+        "exports.nerfstudio",
+        None,
+        "exports.nerfstudio: is null; must have a value, or be left out",
+    ),
+    "no rig": (
+        "rigs.LFSphere",
+        None,
+        "rigs.LFSphere: is null; must be a mapping of keys to values",
+    ),
+    "text for length": (
+        "rigs.LFSphere.size",
+        "1m",
+        'size: is "1m"; must be a number or a list of 3',
+    ),
+    "mistyped parameter": (
+        "scene.parameters",
+        {"sede": 7},
+        "scene.parameters.sede: unknown key; did you mean seed?",
+    ),
+    "parameters of a .blend": (
+        "scene",
+        {"blend": "a.blend", "parameters": {"seed": 1}},
+        "scene.parameters: goes with builder, not with blend",
+    ),
     "text for number": ("render.samples", "many", 'render.samples: is "many"; must be a whole'),
     "true for number": ("render.samples", True, "render.samples: is true; must be a whole number"),
     "text of a number": ("render.clamp_indirect", "10", 'clamp_indirect: is "10"; must be a'),

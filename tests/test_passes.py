@@ -461,7 +461,8 @@ def test_what_needs_a_centre_goes_without_an_omnidirectional_pair(lens, more, pr
 
 def scene(**render):
     rig = {"type": "lattice", "cameras": [1, 1, 1], "camera": LENSES["fisheye"]}
-    reprojection = {"camera": LENSES["perspective"], "passes": render.pop("again", None)}
+    again = {"passes": render.pop("again")} if "again" in render else {}
+    reprojection = {"camera": LENSES["perspective"], **again}
     return {
         "scene": {"builder": "room"},
         "render": {"samples": 1, **render},

@@ -27,6 +27,8 @@ Model = TypeVar("Model")
 class Settings(BaseModel):
     """A mapping of known keys: nothing is converted (4.0 is no whole number), nothing ignored.
 
+    Null, which YAML makes of a key without a value, is none: a default would pass for a choice.
+
     A model's validator raises ``ValueError("key: what is wrong")``; the key may be dotted.
     """
 
@@ -38,11 +40,12 @@ class Settings(BaseModel):
     @classmethod
     def _known_keys(cls, content: Any) -> Any:
         known = cls.model_fields
-        if isinstance(content, Mapping) and cls.model_config["extra"] == "forbid":
-            for key in content:
-                if key not in known:
-                    hint = suggestion(key, known) or f"; allowed here: {', '.join(known)}"
-                    raise ValueError(f"{key}: unknown key{hint}")
+        for key, value in content.items() if isinstance(content, Mapping) else ():
+            if key not in known:
+                hint = suggestion(key, known) or f"; allowed here: {', '.join(known)}"
+                raise ValueError(f"{key}: unknown key{hint}")
+            if value is None:
+                raise ValueError(f"{key}: is null; must have a value, or be left out")
         return content
 
 
@@ -141,10 +144,12 @@ def _allowed(error: ErrorDetails) -> str:
     match error["type"]:
         case "value_error":
             return str(error["ctx"]["error"]).removeprefix("must ")
-        case "model_type" | "dict_type":
+        case "model_type" | "model_attributes_type" | "dict_type":
             return "be a mapping of keys to values"
         case "int_type" | "int_from_float":
             return "be a whole number"
+        case "float_type" | "float_parsing":
+            return "be a number"
         case "string_type":
             return "be a text"
         case "bool_type":

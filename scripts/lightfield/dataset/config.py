@@ -4,7 +4,6 @@ From these models scripts/schema.py makes the JSON schemas in configs/schema/, b
 complete and check the files. Nothing else in the project reads a scene YAML.
 """
 
-import json
 import math
 import re
 import shlex
@@ -16,7 +15,6 @@ import yaml
 from pydantic import (
     AfterValidator,
     BeforeValidator,
-    ConfigDict,
     Field,
     TypeAdapter,
     model_validator,
@@ -169,24 +167,10 @@ class Configuration(Settings):
 
 
 class Parameters(Settings):
-    """What a builder is given: seed, detail and its own."""
-
-    model_config = ConfigDict(extra="allow")
+    """What a builder is given."""
 
     seed: int = Field(0, ge=0, le=2**63 - 1)
     detail: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] = Field(1.0, description="1 is full.")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _is_json(cls, content: Any) -> Any:
-        for key, value in content.items() if isinstance(content, dict) else ():
-            try:
-                json.dumps(value, allow_nan=False)
-            except (TypeError, ValueError):
-                raise ValueError(
-                    f"{key}: must be finite numbers, text, lists or mappings"
-                ) from None
-        return content
 
 
 # What a value of the .blend's own is called, wherever the scene YAML may ask for it.
@@ -262,6 +246,8 @@ class Source(Settings):
         elif self.dataset is not None and len(self.model_fields_set) > 1:
             (name, *_) = self.model_fields_set - {"dataset"}
             raise ValueError(f"{name}: goes without dataset")
+        elif self.blend is not None and "parameters" in self.model_fields_set:
+            raise ValueError("parameters: goes with builder, not with blend")
         return self
 
 

@@ -261,7 +261,7 @@ class Dataset:
     @property
     def rig_json(self) -> str:
         """The rig, as the programs take it that make a report."""
-        return self.placed_rig.model_dump_json(exclude_unset=True)
+        return self.placed_rig.model_dump_json(exclude_unset=True, exclude_none=True)
 
     @property
     def panorama_width(self) -> int:
