@@ -6,6 +6,7 @@ import json
 import math
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -67,7 +68,8 @@ class Colmap:
 
     def __init__(self, folder):
         def lines(name):
-            return [line.split() for line in (folder / name).read_text().splitlines()]
+            text = (folder / name).read_text().splitlines()
+            return [line.split() for line in text if not line.startswith("#")]
 
         ((_, self.model, *self.size_and_parameters),) = lines("cameras.txt")
         self.parameters = list(map(float, self.size_and_parameters[2:]))
@@ -392,7 +394,7 @@ def test_opendibr_takes_lossless_h265_where_there_is_ffmpeg(dataset, tmp_path, m
         on_sphere(opengl_points(camera, of_disparity(levels, camera, 12)), 0.01)
     monkeypatch.setenv("PATH", "")
     assert "ffmpeg must be installed" in settings.refusal(lens, True)
-    with pytest.raises(UserError, match="needs ffmpeg, which is not installed"):
+    with pytest.raises(UserError, match=r"lightfield.json: .* ffmpeg must be installed"):
         exported(dataset, "opendibr", "perspective", tmp_path, format="h265")
 
 
@@ -562,9 +564,14 @@ def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(da
 
 
 def test_a_failed_export_leaves_nothing(dataset, tmp_path):
-    with pytest.raises(UserError, match="has no depth; reproject with format: exr"):
-        exported(dataset, "colmap", "png", tmp_path, depth=True, points=50)
-    assert not (tmp_path / "colmap" / "png").exists()
+    source = Source(dataset, "perspective", ".exr")
+    views = source.lightfield.views
+    gone = [*views[:-1], replace(views[-1], name="gone")]
+    vars(source)["lightfield"] = source.lightfield.changed(views=gone)
+    settings = settings_of("nerf_synthetic")(sources=["perspective"])
+    with pytest.raises(UserError, match=r"gone.exr: no such file"):
+        export.run("nerf_synthetic", source, settings, tmp_path / "made")
+    assert not (tmp_path / "made").exists()
 
 
 @pytest.mark.parametrize(
@@ -649,6 +656,50 @@ def test_an_export_that_is_no_longer_asked_for_lets_a_dataset_be_validated_again
 def test_nothing_but_an_earlier_export_is_replaced(dataset, tmp_path):
     folder = exported(dataset, "poses_csv", "perspective", tmp_path)
     (folder / "export.json").unlink()
-    with pytest.raises(UserError, match="perspective: is no export, and not empty"):
+    with pytest.raises(UserError, match=r"perspective: holds poses.csv, which is of no export"):
         exported(dataset, "poses_csv", "perspective", tmp_path)
     assert (folder / "poses.csv").is_file()
+
+
+def test_what_lies_among_the_files_of_an_earlier_export_is_kept(dataset, tmp_path):
+    folder = exported(dataset, "poses_csv", "perspective", tmp_path / "exports")
+    (folder / "thesis.txt").write_text("years of work")
+    with pytest.raises(UserError, match=r"perspective: holds thesis.txt, which is of no export"):
+        exported(dataset, "poses_csv", "perspective", tmp_path / "exports")
+    assert (folder / "thesis.txt").is_file()
+    (folder / "thesis.txt").unlink()
+    link = tmp_path / "link"
+    link.symlink_to(folder)
+    source = Source(dataset, "perspective", ".png")
+    assert export.run("poses_csv", source, settings_of("poses_csv")(sources=["perspective"]), link)
+    assert link.is_symlink()
+    assert (folder / "poses.csv").is_file()
+
+
+@pytest.mark.parametrize(
+    ("name", "source", "why"),
+    [
+        ("nerf_synthetic", "fisheye", "is no pinhole camera"),
+        ("miv", "fisheye", "has a lens that MIV lacks"),
+        ("scannetpp", "perspective", "is no equidistant fisheye"),
+        ("colmap", "views", "sees 180 degrees, where COLMAP's fisheye ends"),
+    ],
+)
+def test_what_a_consumer_cannot_take_is_refused_by_hand_too(dataset, tmp_path, name, source, why):
+    with pytest.raises(UserError, match=rf"lightfield.json: {why}"):
+        exported(dataset, name, source, tmp_path)
+    assert not [*tmp_path.iterdir()]
+
+
+def test_a_model_as_text_may_be_without_points(dataset, tmp_path):
+    source = Source(dataset, "perspective", ".exr")
+    # A point has two views at least.
+    lone = source.lightfield.views[:1]
+    vars(source)["lightfield"] = source.lightfield.changed(views=lone)
+    settings = settings_of("colmap")(sources=["perspective"], format="text")
+    export.run("colmap", source, settings, tmp_path / "colmap")
+    model = Colmap(tmp_path / "colmap/sparse/0")
+    assert len(model.images) == 1
+    assert not model.positions
+    images_txt = tmp_path / "colmap/sparse/0/images.txt"
+    assert images_txt.read_text().endswith(".png\n\n")

@@ -256,6 +256,14 @@ def _colmap_text(folder):
     return "images.txt"
 
 
+def _colmap_text_without_points(folder):
+    """Some programs that write poses alone leave the line of an image's points out."""
+    text = (folder / _colmap_text(folder)).read_text()
+    lines = [line for line in text.splitlines() if line and not line.startswith("1.5")]
+    (folder / "images.txt").write_text("\n".join(lines))
+    return "images.txt"
+
+
 def _colmap_binary(folder):
     content = struct.pack("<Q", 3)
     for number, quaternion, translation, name in _images():
@@ -266,7 +274,10 @@ def _colmap_binary(folder):
     return "images.bin"
 
 
-@pytest.mark.parametrize("write", [_csv, _transforms, _applied, _colmap_text, _colmap_binary])
+@pytest.mark.parametrize(
+    "write",
+    [_csv, _transforms, _applied, _colmap_text, _colmap_text_without_points, _colmap_binary],
+)
 def test_poses_are_read_as_each_format_has_them(write, tmp_path):
     rig = from_settings({"type": "poses", "file": str(tmp_path / write(tmp_path))})
     assert [pose.name for pose in rig.poses()] == ["v0", "v1", "v2"]

@@ -25,12 +25,16 @@ FOLDER = "exports"
 def run(name: str, source: Source, settings: Export, folder: Path) -> dict[str, str]:
     """Write an export into ``folder``, in place of an earlier one; return its files' SHA-256.
 
-    Nothing is left of an export that fails. Raises `UserError` where anything else is there.
+    Nothing is left of an export that fails. Raises `UserError` where anything else is there, and
+    for views that its consumer cannot take.
     """
-    # In a dataset a killed run may have left an export without its list.
-    replaced = (folder / MANIFEST).is_file() or folder.parent.name == FOLDER
-    if folder.exists() and not replaced and any(folder.iterdir()):
-        raise UserError(f"{folder}: is no export, and not empty; give another folder")
+    if wrong := settings.refusal(source.lens, source.has_depth):
+        raise UserError(f"{source.lightfield.path}: {wrong}")
+    # A link stays one.
+    folder = folder.resolve()
+    # There a killed run may have left an export without its list.
+    if folder != (source.dataset / source.name / FOLDER / name).resolve():
+        _check_replaceable(folder)
     shutil.rmtree(folder, ignore_errors=True)
     try:
         importlib.import_module(f"lightfield.export.{name}").export(source, settings, folder)
@@ -43,6 +47,16 @@ def run(name: str, source: Source, settings: Export, folder: Path) -> dict[str, 
     if store := ViewStore.configured():
         store.put_list(folder / MANIFEST, paths)
     return files
+
+
+def _check_replaceable(folder: Path) -> None:
+    """Raise `UserError` where a folder holds what no earlier export has put there."""
+    listing = folder / MANIFEST
+    own = {MANIFEST, *(_files(listing) if listing.is_file() else ())}
+    for path in folder.rglob("*"):
+        name = path.relative_to(folder).as_posix()
+        if name not in own and not path.is_dir():
+            raise UserError(f"{folder}: holds {name}, which is of no export; give another folder")
 
 
 def transforms(folder: Path) -> list[Path]:

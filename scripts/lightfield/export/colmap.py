@@ -143,14 +143,14 @@ class Model:
         size = f"{self.lens.width} {self.lens.height}"
         _write(folder / "cameras.txt", [f"1 {model} {size} {_words(parameters)}\n".encode()])
         _write(folder / "images.txt", self._text_images())
-        _write(
-            folder / "points3D.txt",
-            (
-                f"{number} {_words(position)} {_words(colour)} 0 "
-                f"{_words(part for pair in track for part in pair)}\n".encode()
-                for number, position, colour, track in self.rows()
-            ),
-        )
+        _write(folder / "points3D.txt", self._text_points())
+
+    def _text_points(self) -> Iterator[bytes]:
+        # Without a point the file would be empty.
+        yield b"# number, x, y, z, red, green, blue, error, image and place of each view\n"
+        for number, position, colour, track in self.rows():
+            places = _words(part for pair in track for part in pair)
+            yield f"{number} {_words(position)} {_words(colour)} 0 {places}\n".encode()
 
     def _text_images(self) -> Iterator[bytes]:
         for number, (view, seen) in enumerate(zip(self.views, self.seen, strict=True), 1):

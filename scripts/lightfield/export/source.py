@@ -66,6 +66,11 @@ class Source:
     def lens(self) -> Lens:
         return self.lightfield.lens
 
+    @property
+    def has_depth(self) -> bool:
+        """Whether the views themselves hold depth."""
+        return self.suffix == ".exr" and self.lightfield.depth is not None
+
     def path(self, view: View) -> Path:
         return self._path(view, self.name or "exr", self.suffix)
 
@@ -127,7 +132,7 @@ class Source:
 
         Raises `UserError` where the views have no depth.
         """
-        if self.suffix != ".exr" or self.lightfield.depth is None:
+        if not self.has_depth:
             raise UserError(f"{self.path(view)}: has no depth; reproject with format: exr")
         return _depth_of(self.path(view), self.lightfield, self._rays, meaning)
 

@@ -41,10 +41,7 @@ def write_hevc(path: Path, frame: bytes, size: tuple[int, int], bits: int) -> No
     exact = ["-fflags", "+bitexact", "-flags:v", "+bitexact", *pixels]
     with atomic_path(path) as temporary:
         command = ["ffmpeg", "-v", "error", "-y", *given, *coded, *exact, str(temporary)]
-        try:
-            result = subprocess.run(command, input=frame, capture_output=True, check=False)
-        except FileNotFoundError:
-            raise UserError(f"{path}: H.265 needs ffmpeg, which is not installed") from None
+        result = subprocess.run(command, input=frame, capture_output=True, check=False)
         if result.returncode:
             problem = " ".join(result.stderr.decode(errors="replace").split())
             raise UserError(f"{path}: ffmpeg cannot write H.265 of {bits} bits: {problem}")

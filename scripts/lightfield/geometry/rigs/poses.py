@@ -280,13 +280,18 @@ def _colmap_rows(path: Path) -> Iterator[Any]:
 
 
 def _colmap_text(path: Path) -> Iterator[tuple[str, Sequence[Any], str]]:
-    """Yield where, seven numbers and the name of each image: every other line, but comments."""
+    """Yield where, seven numbers and the name of each image: all lines but comments and points.
+
+    The line of its points is empty where an image has none, and some programs leave it out.
+    """
     try:
-        lines = iter(path.read_text(encoding="utf-8").splitlines())
+        lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise UserError(f"{path}: cannot be read as text: {error}") from None
+    may_be_points = False
     for line in lines:
-        if not line.strip() or line.startswith("#"):
+        if not line.strip() or line.startswith("#") or (may_be_points and _are_points(line)):
+            may_be_points = False
             continue
         number, *words = line.split(maxsplit=9)
         where = f"image {number}"
@@ -295,8 +300,15 @@ def _colmap_text(path: Path) -> Iterator[tuple[str, Sequence[Any], str]]:
                 f"{path}: {where}: must be IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME"
             )
         yield where, words[:7], words[8]
-        # The image's points, of which there may be none.
-        next(lines, None)
+        may_be_points = True
+
+
+def _are_points(line: str) -> bool:
+    """Whether a line is of an image's points, x, y and number each, and not of another image."""
+    try:
+        return len([float(word) for word in line.split()]) % 3 == 0
+    except ValueError:
+        return False
 
 
 def _colmap_binary(path: Path) -> Iterator[tuple[str, Sequence[Any], str]]:
