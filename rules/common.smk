@@ -409,15 +409,15 @@ def full_datasets(name):
 def full_size(wildcards):
     """Return what the scene YAML says of a dataset's size, whatever the preset, as JSON.
 
-    Samples and denoise are null where the YAML has a target error instead.
+    Without samples and denoise where the YAML has a target error instead, or there is no render.
     """
     full = full_datasets(dataset_of(wildcards).scene_name)[wildcards.rig]
+    settings = {key: full.render.get(key) for key in ("samples", "denoise")}
     return json.dumps(
         {
             "views": full.view_count,
             "resolution": full.rig.camera.resolution,
-            "samples": full.render.get("samples"),
-            "denoise": full.render.get("denoise"),
+            **{key: value for key, value in settings.items() if value is not None},
         }
     )
 

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from checkouts import ROOT, planned
+from checkouts import ROOT, planned, snakemake
 from pydantic import TypeAdapter
 from sphere import write_views
 
@@ -83,12 +83,14 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
 
 @pytest.mark.slow
 def test_nothing_is_rendered_of_it(published, tmp_path):
-    jobs = planned(
-        tmp_path, "--snakefile", ROOT / "Snakefile", "--config", "scenes=theirs", "preset=full"
-    )
+    words = ("--snakefile", ROOT / "Snakefile", "--config", "scenes=theirs", "preset=full")
+    jobs = planned(tmp_path, *words)
     assert jobs.keys() >= {"import_views", "reproject", "validate", "page"}
     rendering = {"render", "render_panorama", "build_scene", "inventory", "check_cameras"}
     assert not rendering & jobs.keys()
+    built = snakemake(tmp_path, *words)
+    assert built.returncode == 0, built.stdout + built.stderr
+    assert "\nvalid: results/theirs/LFPlane/report/index.html\n" in built.stdout + built.stderr
 
 
 def test_linked_folders_are_rigs_by_the_names_of_their_links(published, tmp_path, monkeypatch):

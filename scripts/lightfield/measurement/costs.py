@@ -81,7 +81,7 @@ class Stage:
 
 
 class FullSize(Settings):
-    """What a dataset has at full size; null are the samples and denoising of the one at hand."""
+    """What a dataset has at full size: samples and denoise, unless given, of the one at hand."""
 
     views: AtLeastOne
     resolution: list[AtLeastOne] = Field(min_length=2, max_length=2)
