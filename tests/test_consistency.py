@@ -94,6 +94,7 @@ def test_of_each_cell_a_smooth_place_is_taken(smooth):
     assert len(found) == 16
     assert found.spread.max() < 1e-6 * STEP
     assert len(consistency.sample(at(), np.full((64, 64), np.inf), 16)) == 0
+    assert len(consistency.sample(at(), wall()[:2], 16)) == 0
 
 
 def test_smooth_is_what_is_so_for_the_size_of_its_pixels():

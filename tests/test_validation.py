@@ -1058,6 +1058,16 @@ def test_marks_may_be_two_pixels_off(columns: float, passed: bool, one_view: Pat
     assert check(validate(one_view, ["panorama"]), "panorama/marks").passed is passed
 
 
+def test_one_coloured_pixel_without_a_source_is_named(one_view: Path) -> None:
+    def coloured(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        channels["G"][20, 5] = 0.5
+        return channels
+
+    add_panoramas(one_view, coloured)
+    (problem,) = check(validate(one_view, ["panorama"]), "panorama/marks").problems[:1]
+    assert problem.endswith(": has colour in pixels without a source")
+
+
 @pytest.mark.parametrize(("by", "compared"), [(5e-6, True), (2e-5, None)])
 def test_marks_are_compared_with_the_view_from_the_same_place(
     by: float, compared: bool | None, one_view: Path
