@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.core.cli import run, stops
+from lightfield.core.cli import run, stops, white
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_csv
 from lightfield.core.progress import Progress
@@ -36,7 +36,7 @@ def main() -> None:
     add("--source", default=VIEWS, help=f"a reprojection's name (default: {VIEWS}, as rendered)")
     add("--suffix", choices=[".png", ".exr"], default=".exr", help="of the dataset's views")
     add("--exposure", type=stops, default=0.0, help="of EXR views, in stops, as in the export")
-    add("--reinhard", type=float, default=1.0, help="of EXR views: what becomes white; 1 is none")
+    add("--reinhard", type=white, default=1.0, help="of EXR views: what becomes white; 1 is none")
     add("--masks", type=Path, help="folder of <view>.png: where they are 0, nothing is compared")
     add("--output", type=Path, required=True, help="folder to write")
     arguments = parser.parse_args()

@@ -5,12 +5,11 @@ face, FILE's name with _f, _b, _l, _r, _u or _d before the suffix.
 """
 
 import argparse
-import sys
 from pathlib import Path
 
 from lightfield.core import cli
 from lightfield.reprojection import lens_map
-from lightfield.reprojection.lens_arguments import add_geometry_flags, geometry, joined
+from lightfield.reprojection.lens_arguments import add_geometry_flags, geometry
 
 
 def main() -> None:
@@ -20,7 +19,7 @@ def main() -> None:
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="lens map to write, .npy")
     add_geometry_flags(parser)
-    arguments = parser.parse_args(joined(sys.argv[1:]))
+    arguments = parser.parse_args()
     work = geometry(arguments)
     path: Path = arguments.file
     maps = [work.compute(target) for target in work.targets]

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from lightfield.core.cli import run
+from lightfield.core.cli import above_zero, run
 from lightfield.core.files import write_json
 from lightfield.dataset.config import load_scene
 from lightfield.report import package
@@ -13,7 +13,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scene", required=True, help="name of a file in configs/scenes/")
     parser.add_argument("--folder", type=Path, required=True, help="of the rig's dataset, or more")
-    parser.add_argument("--gigabytes", type=float, help="size of a part, at most (default: one)")
+    parser.add_argument(
+        "--gigabytes", type=above_zero, help="size of a part, at most (default: one)"
+    )
     parser.add_argument("--output", type=Path, required=True, help="<scene>_<rig>.tar, and .json")
     arguments = parser.parse_args()
     card = package.card(arguments.folder, arguments.output.stem, load_scene(arguments.scene))

@@ -19,11 +19,9 @@ Examples, of the views in garden/exr with garden/lightfield.json beside:
 """
 
 import argparse
-import sys
 
 from lightfield.core import cli
 from lightfield.reprojection import job, pipeline
-from lightfield.reprojection.lens_arguments import joined
 
 
 def main() -> None:
@@ -32,7 +30,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     job.add_flags(parser)
-    pipeline.run(job.Job(parser.parse_args(joined(sys.argv[1:]))))
+    pipeline.run(job.Job(parser.parse_args()))
 
 
 if __name__ == "__main__":

@@ -144,7 +144,7 @@ def test_rotation_is_in_the_frames_euler_angles_too(dataset, run):
         json.loads((dataset / "lightfield.json").read_text())["frames"][0]["rotation"]
     )
     assert not mathutils_order.any()
-    run(*PERSPECTIVE, "--png", "--rotation", "-30,0,0", "--dry-run")
+    run(*PERSPECTIVE, "--png", "--rotation=-30,0,0", "--dry-run")
     frame = json.loads((dataset / "out" / "lightfield.json").read_text())["frames"][0]
     # A camera that looks along -Z and turns right by 30 degrees turns about Y by -30.
     assert np.allclose(frame["rotation"], [0, -math.radians(30), 0])
@@ -462,7 +462,7 @@ def test_a_warning_is_printed_once(dataset, run, capsys):
         ("--stereographic", "4"),
         ("--orthographic", "3"),
         ("--equirectangular", "full"),
-        ("--equirectangular", "-1,1,-0.5,0.5"),
+        ("--equirectangular=-1,1,-0.5,0.5",),
         ("--polynomial", "0,-0.07,0,0,0,36,3"),
         ("--kannala-brandt", "9,36,0.01,0,0,0"),
     ],
@@ -501,9 +501,6 @@ def test_every_lens_is_a_target_and_a_source(dataset, run, flags):
         ((*PERSPECTIVE, "--png", "--rotation", "5"), "--rotation 5: must have the form PAN"),
         ((*PERSPECTIVE, "--png", "--samples", "0"), "--samples 0"),
         (("--rectilinear", "18,36", "--png", "--scale", "0.001"), "leaves no pixel"),
-        ((*PERSPECTIVE, "--png", "--reinhard", "0"), "--reinhard 0"),
-        ((*PERSPECTIVE, "--png", "--reinhard", "nan"), "--reinhard nan"),
-        ((*PERSPECTIVE, "--exr", "--depth-png", "nan"), "--depth-png nan"),
         (("--rectilinear", "18,36", "--png", "--scale", "1e9"), "makes a side of over"),
         ((*PERSPECTIVE, "--png", "--output-resolution", "1e9,4"), "must be two whole numbers"),
         ((*PERSPECTIVE, "--png", "--no-reproject"), "--no-reproject: excludes"),

@@ -3,6 +3,7 @@
 import argparse
 import math
 import os
+import re
 import sys
 from collections.abc import Callable
 
@@ -15,6 +16,7 @@ def run(main: Callable[[], None]) -> None:
 
     So does what the system refuses: memory, and files and folders that nobody expected it to.
     """
+    sys.argv[1:] = map(_as_value, sys.argv[1:])
     try:
         main()
     except UserError as error:
@@ -30,6 +32,14 @@ def run(main: Callable[[], None]) -> None:
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         sys.exit(f"error: {where}{error.strerror or error}")
+
+
+def _as_value(word: str) -> str:
+    """Return a word of the command line so that argparse takes -1e-05, -1,2 and -90deg for values.
+
+    It knows -1 and -0.5 by itself, and takes no word that begins with a blank for a flag.
+    """
+    return f" {word}" if re.fullmatch(r"-[\d.]+[,de][\d.,deg+-]*", word) else word
 
 
 # What follows may be the ``type`` of an argument.
@@ -55,6 +65,20 @@ def finite(text: str) -> float:
     if math.isfinite(float(text)):
         return float(text)
     raise argparse.ArgumentTypeError(f"is {text}; must be a finite number")
+
+
+def above_zero(text: str) -> float:
+    """Return a finite number above 0."""
+    if 0 < float(text) < math.inf:
+        return float(text)
+    raise argparse.ArgumentTypeError(f"is {text}; must be a finite number above 0")
+
+
+def white(text: str) -> float:
+    """Return the value of light that becomes white."""
+    if 0 < float(text) <= 1e9:
+        return float(text)
+    raise argparse.ArgumentTypeError(f"is {text}; must be above 0 and at most 1e9")
 
 
 def stops(text: str) -> float:

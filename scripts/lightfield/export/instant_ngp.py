@@ -29,7 +29,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from lightfield.core.cli import finite
+from lightfield.core.cli import above_zero, finite
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
 from lightfield.core.progress import Progress
@@ -93,7 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         help="write 16-bit depth PNGs there, in millimetres, from channel Z of the .exr views",
     )
-    add("--scale", type=float, help="metres to unit cubes (default: fitted to the scene)")
+    add("--scale", type=above_zero, help="metres to unit cubes (default: fitted to the scene)")
     add(
         "--offset",
         type=finite,
@@ -132,8 +132,6 @@ def export(arguments: argparse.Namespace) -> None:
     """Write a dataset's transforms.json and what it names, as the command line says."""
     if arguments.scale is None and arguments.offset is not None:
         raise UserError("--offset: goes with --scale; without it both are fitted")
-    if arguments.scale is not None and not 0 < arguments.scale < math.inf:
-        raise UserError(f"--scale: is {arguments.scale}; must be a number above 0")
     lightfield = LightField.read(arguments.input_cfg)
     lightfield.require_centre()
     parts = {arguments.output: [view.name for view in lightfield.views]}

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core import processors
+from lightfield.core.cli import positive
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys
 from lightfield.dataset import keys, passes
@@ -282,10 +283,13 @@ def add_arguments(parser: argparse.ArgumentParser, lightfield: str) -> None:
     parser.add_argument("--inventory", required=True, type=Path, help="what the scene contains")
     parser.add_argument("--lightfield", required=True, type=Path, help=lightfield)
     parser.add_argument(
-        "--size", type=int, default=WINDOW_SIZE, help="of a window's sides (default: %(default)s)"
+        "--size",
+        type=positive,
+        default=WINDOW_SIZE,
+        help="of a window's sides (default: %(default)s)",
     )
     parser.add_argument("--device", default="auto", help="what Cycles renders on (default: auto)")
-    parser.add_argument("--threads", type=int, default=1, help="CPU threads (default: 1)")
+    parser.add_argument("--threads", type=positive, default=1, help="CPU threads (default: 1)")
     parser.add_argument("--cache", required=True, type=Path, help="folder of what was rendered")
 
 

@@ -4,7 +4,6 @@ import argparse
 import hashlib
 import itertools
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.cli import stops, view_slice
+from lightfield.core.cli import above_zero, positive, stops, view_slice, white
 from lightfield.core.errors import UserError
 from lightfield.dataset import lightfield, records
 from lightfield.dataset.lightfield import LightField
@@ -43,7 +42,7 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     files.add_argument("--bits", type=int, choices=[8, 16], default=8, help="of a PNG, default 8")
     files.add_argument(
         "--depth-png",
-        type=float,
+        type=above_zero,
         metavar="SCALE",
         help="write <name>_depth.png: 16-bit, depth in metres × SCALE, 0 for none",
     )
@@ -78,11 +77,11 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
     colour = parser.add_argument_group("Colour")
     colour.add_argument("--exposure", type=stops, default=0.0, help="stops, default 0")
     colour.add_argument(
-        "--reinhard", type=float, default=1.0, help="value that becomes white, default 1: off"
+        "--reinhard", type=white, default=1.0, help="value that becomes white, default 1: off"
     )
     runtime = parser.add_argument_group("Runtime")
     runtime.add_argument("--skip-if-exists", action="store_true", help="keep any existing output")
-    runtime.add_argument("-j", "--parallel", type=int, default=1, help="images at a time")
+    runtime.add_argument("-j", "--parallel", type=positive, default=1, help="images at a time")
     runtime.add_argument("--dry-run", action="store_true", help="write only --output-cfg")
 
 
@@ -105,10 +104,6 @@ class Job:
         self.targets = self.geometry.targets
         if not (arguments.exr or arguments.png):
             raise UserError("--exr, --png: give one of them, or both")
-        if not 0 < arguments.reinhard < math.inf:
-            raise UserError(f"--reinhard {arguments.reinhard:g}: must be positive")
-        if arguments.depth_png is not None and not 0 < arguments.depth_png < math.inf:
-            raise UserError(f"--depth-png {arguments.depth_png:g}: must be positive")
         if arguments.no_configs and arguments.output_cfg:
             raise UserError("--output-cfg: needs --input-cfg, which --no-configs excludes")
         if not self.copies:

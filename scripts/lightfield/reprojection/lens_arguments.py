@@ -6,15 +6,13 @@ degrees.
 
 import argparse
 import json
-import math
-import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from lightfield.core.cli import above_zero
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.dataset.lightfield import LightField
@@ -26,17 +24,6 @@ from lightfield.reprojection.filters import DEFAULT_FILTER, FILTERS
 
 # Of an image's side: of a cube map's strip of faces, too.
 MOST_PIXELS = 2**19
-
-
-def joined(arguments: Sequence[str]) -> list[str]:
-    """Return the command line with ``--flag -1,2`` as ``--flag=-1,2``, which argparse needs."""
-    out: list[str] = []
-    for argument in arguments:
-        if re.match(r"-[\d.]", argument) and out and re.fullmatch(r"--[a-z-]+", out[-1]):
-            out[-1] += f"={argument}"
-        else:
-            out.append(argument)
-    return out
 
 
 def add_geometry_flags(parser: argparse.ArgumentParser) -> None:
@@ -56,7 +43,9 @@ def add_geometry_flags(parser: argparse.ArgumentParser) -> None:
         metavar="PAN,PITCH,ROLL",
         help="turn the camera left, down and clockwise, degrees",
     )
-    optics.add_argument("--scale", type=float, default=1.0, help="size over the input's, default 1")
+    optics.add_argument(
+        "--scale", type=above_zero, default=1.0, help="size over the input's, default 1"
+    )
     optics.add_argument(
         "--output-resolution", metavar="WIDTH,HEIGHT", help="size, instead of --scale"
     )
@@ -175,8 +164,6 @@ def _targets(arguments: argparse.Namespace, source: Lens) -> list[Target]:
     if arguments.output_resolution:
         width, height = _size(arguments.output_resolution, "--output-resolution")
     else:
-        if not 0 < arguments.scale < math.inf:
-            raise UserError(f"--scale {arguments.scale:g}: must be positive")
         width, height = int(source.width * arguments.scale), int(source.height * arguments.scale)
         if min(width, height) < 1:
             raise UserError(f"--scale {arguments.scale:g}: leaves no pixel")
