@@ -88,9 +88,18 @@ def test_nothing_is_rendered_of_it(published, tmp_path):
     assert jobs.keys() >= {"import_views", "reproject", "validate", "page"}
     rendering = {"render", "render_panorama", "build_scene", "inventory", "check_cameras"}
     assert not rendering & jobs.keys()
-    built = snakemake(tmp_path, *words)
-    assert built.returncode == 0, built.stdout + built.stderr
-    assert "\nvalid: results/theirs/LFPlane/report/index.html\n" in built.stdout + built.stderr
+    dataset, (view, *_) = tmp_path / "results/theirs/LFPlane", (published / "exr").iterdir()
+    again = []
+    for part in (1, 0.5):
+        # A view that its owner makes anew is taken over anew.
+        channels = images.read_image(view).channels
+        images.write_exr(view, channels | {name: part * channels[name] for name in "RGB"})
+        built = snakemake(tmp_path, *words)
+        assert built.returncode == 0, built.stdout + built.stderr
+        assert "\nvalid: results/theirs/LFPlane/report/index.html\n" in built.stdout + built.stderr
+        assert sha256(dataset / "exr" / view.name) == sha256(view)
+        again.append(images.read_image(dataset / "perspective" / view.name).channels["R"])
+    assert again[1].sum() == pytest.approx(again[0].sum() / 2, rel=0.01)
 
 
 def test_linked_folders_are_rigs_by_the_names_of_their_links(published, tmp_path, monkeypatch):

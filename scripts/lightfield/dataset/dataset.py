@@ -477,11 +477,25 @@ class Dataset:
 
         A view that was deleted or cut short shows in its size. Its shard then runs again, makes
         what is missing, and by the log of checksums finds every other file that is not as it was.
+        So it does where views that somebody else has rendered are no longer those it took over.
         """
         try:
-            return shard_files.recorded(Path(record), self.folder) is None
+            sizes = shard_files.recorded(Path(record), self.folder)
+            return sizes is None or self._is_older_than_its_source(Path(record), sizes)
         except FileNotFoundError:
             return False
+
+    def _is_older_than_its_source(self, record: Path, sizes: dict[str, int]) -> bool:
+        """Whether a view was written anew, or has another size, where it was taken over from."""
+        if not self.imported or record.parent.name != "render":
+            return False
+        taken = record.stat().st_mtime_ns
+        for name, size in sizes.items():
+            # What is no longer there is not needed any more.
+            found, changed = _size_and_time(Path(self.imported, name))
+            if changed and (found != size or changed > taken):
+                return True
+        return False
 
     def broken(self) -> Iterator[tuple[str, str]]:
         """Yield each file that cannot be what a program wrote there, and what is wrong with it.
