@@ -20,6 +20,7 @@ import numpy as np
 
 from lightfield.core.cli import positive, run, stops
 from lightfield.core.errors import UserError
+from lightfield.core.files import keep_apart
 from lightfield.core.progress import Progress
 from lightfield.dataset.config import read_yaml
 from lightfield.dataset.lightfield import NAME, LightField
@@ -52,6 +53,7 @@ def main() -> None:
     add("--output", type=Path, required=True, metavar="FOLDER")
     arguments = parser.parse_args()
 
+    keep_apart("--output", arguments.output / NAME, arguments.dataset / NAME, arguments.poses)
     source = Source(arguments.dataset, arguments.reprojection, ".exr")
     views, targets = source.lightfield.views, poses(arguments.poses)
     if targets is None:
@@ -93,7 +95,7 @@ def poses(path: Path | None) -> LightField | None:
         return None
     if path.suffix == ".json":
         return LightField.read(path)
-    rig = rigs.from_settings(read_yaml(path, str(path)))
+    rig = rigs.from_settings(read_yaml(path, str(path)), str(path))
     if rig.camera is None:
         raise UserError(f"{path}: camera: is missing; it is what the views are seen through")
     return LightField.from_rig(rig, rig.camera.make())

@@ -139,3 +139,65 @@ def test_a_number_that_would_spoil_all_is_refused(refused, program, flag, values
         said = refused(program, flag, value)
         assert said.startswith(f"argument {flag}: is ")
         assert "; must be " in said
+
+
+def test_what_is_read_is_never_written_over(refused, lightfield, tmp_path):
+    images = tmp_path / "exr"
+    write_text(images / "view_0000f.exr", "rendered in an hour")
+    write_text(images / "view_0000f.png", "rendered in an hour")
+    folder = ["--input-cfg", lightfield]
+    (tmp_path / "link").symlink_to(images)
+    lens = ["--rectilinear", "18,36"]
+    exr = [
+        *folder,
+        "--image-dir",
+        images,
+        "--image-suffix",
+        ".exr",
+        "--output",
+        tmp_path / "t.json",
+    ]
+    png = [*folder, "--image-dir", images, "--output", tmp_path / "t.json"]
+    for said in (
+        refused("synthesize.py", tmp_path, "--output", images / ".."),
+        refused("synthesize.py", images, "--poses", lightfield, "--output", tmp_path),
+        refused("reproject.py", "-i", images, *folder, *lens, "-o", tmp_path / "link", "--exr"),
+        refused(
+            "reproject.py",
+            "--single",
+            images / "view_0000f.png",
+            *folder,
+            *lens,
+            "-o",
+            tmp_path / "link",
+            "--png",
+        ),
+        refused(
+            "reproject.py",
+            "-i",
+            images,
+            *folder,
+            *lens,
+            "-o",
+            tmp_path / "made",
+            "--png",
+            "--filter-suffix",
+            "png",
+            "--output-cfg",
+            lightfield,
+        ),
+        refused("export_instant_ngp.py", *exr, "--exr-dir", tmp_path / "link"),
+        refused("export_instant_ngp.py", *png, "--depth-dir", tmp_path / "link"),
+        refused("export_instant_ngp.py", *folder, "--output", lightfield),
+    ):
+        assert "read" in said, said
+    assert {path.read_text() for path in images.iterdir()} == {"rendered in an hour"}
+    assert LightField.read(lightfield).views
+    assert not (tmp_path / "made").exists()
+
+
+def test_a_rig_that_is_none_is_named_by_its_file(refused, lightfield, tmp_path):
+    write_text(tmp_path / "rig.yaml", "scenes: [garden]")
+    words = ["--poses", tmp_path / "rig.yaml", "--output", tmp_path / "made"]
+    said = refused("synthesize.py", lightfield.parent, *words)
+    assert said == f"{tmp_path}/rig.yaml: is missing the key type"

@@ -149,6 +149,12 @@ def broken(path: Path) -> str | None:
         return str(error).removeprefix(f"{path}: ")
 
 
+def keep_apart(flag: str, written: Path, *read: Path | None) -> None:
+    """Raise `UserError` where what the ``flag`` has written is a file or folder that is read."""
+    if any(path is not None and path.resolve() == written.resolve() for path in read):
+        raise UserError(f"{flag} {written}: is what is read, and would be lost; give another")
+
+
 def set_aside(path: Path, folder: Path) -> Path:
     """Move a file or folder into ``folder``, under its own path; return where it is now.
 

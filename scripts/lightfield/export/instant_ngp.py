@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from lightfield.core.cli import above_zero, finite
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, write_json
+from lightfield.core.files import keep_apart, read_json, write_json
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.view_store import ViewStore
@@ -188,6 +188,11 @@ class _Writer:
         # Those that have been written.
         self.pictures: list[Path] = []
         self.exr_dir: Path = arguments.exr_dir or arguments.output.parent / "instant_ngp"
+        keep_apart("--output", arguments.output, arguments.input_cfg, arguments.placed_as)
+        if arguments.image_suffix == ".exr":
+            keep_apart("--exr-dir", self.exr_dir, self.image_dir)
+        elif arguments.depth_dir:
+            keep_apart("--depth-dir", arguments.depth_dir, self.image_dir)
 
     def placement(self) -> tuple[float, list[float]]:
         """Return scale and offset: as given, or fitted to what the views see, or to the rig."""

@@ -214,6 +214,10 @@ class Job:
         folder: Path = self.arguments.output_dir
         return {found: found.path(folder, view.name + target.suffix) for found in self.passes}
 
+    def files(self, view: SourceView, target: Target) -> list[Path]:
+        """Return all files to make of a view."""
+        return [*self.outputs(view, target).values(), *self.pass_outputs(view, target).values()]
+
     def sources(self, view: SourceView) -> list[Path]:
         """Return the files that a view is made of: its own, and those of its passes."""
         folder = self.lightfield.folder

@@ -4,11 +4,12 @@ import os
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import sha256
+from lightfield.core.files import keep_apart, sha256
 from lightfield.core.progress import Progress
 from lightfield.imaging.images import KEY_ATTRIBUTE, read_header
 from lightfield.reprojection import lens_map
@@ -22,6 +23,7 @@ def run(job: Job) -> None:
     """Do all that the command line asks for; a `UserError` says how many views failed."""
     arguments = job.arguments
     views = [] if arguments.dry_run else job.views()
+    _check_apart(job, views)
     if arguments.output_cfg:
         job.output_lightfield().write(arguments.output_cfg)
     if arguments.dry_run:
@@ -51,6 +53,21 @@ def run(job: Job) -> None:
     job.record.write(sorted(paths), counts={"views": len(views), "files": len(paths)})
 
 
+def _check_apart(job: Job, views: list[SourceView]) -> None:
+    """Raise `UserError` where a file would be written that is read, by whatever path."""
+    if job.arguments.output_cfg and job.arguments.input_cfg:
+        keep_apart("--output-cfg", job.arguments.output_cfg, job.arguments.input_cfg)
+    folder = cache(Path.resolve)
+    for view in views:
+        read = {(folder(path.parent), path.name) for path in job.sources(view)}
+        for path in (path for target in job.targets for path in job.files(view, target)):
+            if (folder(path.parent), path.name) in read:
+                raise UserError(
+                    f"--output-dir {job.arguments.output_dir}: would replace {path}, which is "
+                    "read; give another folder"
+                )
+
+
 def _results(job: Job, views: list[SourceView]) -> Iterator[tuple[SourceView, Any]]:
     """Yield each view with its files, or with the error that it ended in."""
     with ThreadPoolExecutor(max(1, job.arguments.parallel)) as pool:
@@ -69,7 +86,7 @@ def reproject_view(job: Job, view: SourceView) -> list[Path]:
     todo: list[tuple[int, Target, str]] = []
     identity = ""
     for index, target in enumerate(job.targets):
-        paths = [*job.outputs(view, target).values(), *job.pass_outputs(view, target).values()]
+        paths = job.files(view, target)
         made += paths
         if arguments.skip_if_exists and all(path.exists() for path in paths):
             continue

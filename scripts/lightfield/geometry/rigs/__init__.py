@@ -57,9 +57,9 @@ AnyRig = Annotated[
 _SETTINGS: TypeAdapter[Rig] = TypeAdapter(AnyRig, config=ConfigDict(defer_build=True))
 
 
-def from_settings(settings: Mapping[str, Any] | Rig) -> Rig:
+def from_settings(settings: Mapping[str, Any] | Rig, file: str = "rig") -> Rig:
     """Return the rig that a scene YAML's mapping means; raises `UserError` for a wrong key.
 
-    A rig is returned as it is.
+    A rig is returned as it is. The error names the ``file``.
     """
-    return checked(_SETTINGS, settings, "rig")
+    return checked(_SETTINGS, settings, file)
