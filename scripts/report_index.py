@@ -1,14 +1,17 @@
 """Make the page that leads to the pages of all datasets in a results folder.
 
-Like them it is one file, thumbnails and all. It holds every dataset whose page is there.
+Like them it is one file, thumbnails and all. It holds every dataset whose page is there,
+and warns of those whose files cannot be read.
 """
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 from lightfield.core.cli import run
+from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.report import page
 from lightfield.report import tables as report_tables
@@ -23,7 +26,13 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="HTML file to write in it")
     arguments = parser.parse_args()
     pages = sorted(arguments.results.glob(f"*/**/{REPORT}/index.html"))
-    datasets = [entry(arguments.results, path) for path in pages]
+    datasets = []
+    for path in pages:
+        try:
+            datasets.append(entry(arguments.results, path))
+        except UserError as error:
+            # Of one dataset; the others' pages are as they were.
+            print(f"warning: left out: {error}", file=sys.stderr)
     page.write(arguments.output, "index.html.j2", datasets=datasets)
 
 

@@ -1,6 +1,7 @@
 """List what the views of a scene's rigs are for: to train on, for validation, or to test with."""
 
 import argparse
+import os.path
 from pathlib import Path
 
 from lightfield.core.cli import run
@@ -16,14 +17,19 @@ def main() -> None:
     parser.add_argument("--output", type=Path, required=True, help="splits.json to write")
     arguments = parser.parse_args()
 
-    scene = arguments.output.parent
-    found = [LightField.read(path) for path in arguments.lightfields]
-    for lightfield in found:
-        if not lightfield.folder.is_relative_to(scene):
+    scene = whole(arguments.output).parent
+    found = {whole(path).parent: LightField.read(path) for path in arguments.lightfields}
+    for folder, lightfield in found.items():
+        if not folder.is_relative_to(scene):
             raise UserError(f"{lightfield.path}: must be in {scene}, where --output is")
-    content = listed({lf.folder.relative_to(scene).as_posix(): lf for lf in found})
+    content = listed({folder.relative_to(scene).as_posix(): lf for folder, lf in found.items()})
     write_json(arguments.output, content)
     print(", ".join(f"{len(views)} views for {part}" for part, views in content.items()))
+
+
+def whole(path: Path) -> Path:
+    """Return a path from / on, without ``..``; a rig's folder may be a link to another disk."""
+    return Path(os.path.normpath(path.absolute()))
 
 
 if __name__ == "__main__":

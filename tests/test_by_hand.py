@@ -201,3 +201,43 @@ def test_a_rig_that_is_none_is_named_by_its_file(refused, lightfield, tmp_path):
     words = ["--poses", tmp_path / "rig.yaml", "--output", tmp_path / "made"]
     said = refused("synthesize.py", lightfield.parent, *words)
     assert said == f"{tmp_path}/rig.yaml: is missing the key type"
+
+
+def test_splits_are_listed_by_whatever_path_they_are_named(
+    run_in_process, refused, lightfield, tmp_path, monkeypatch
+):
+    rig = tmp_path / "Rig"
+    rig.mkdir()
+    lightfield.rename(rig / "lightfield.json")
+    content = read_json(rig / "lightfield.json")
+    content["frames"][0]["split"] = "test"
+    write_json(rig / "lightfield.json", content)
+    output, read = tmp_path / "splits.json", rig / "lightfield.json"
+    for folder, words in (
+        (rig, ["lightfield.json", "--output", "../splits.json"]),
+        (rig, ["../Rig/./lightfield.json", "--output", output]),
+        (tmp_path, [read, "--output", "splits.json"]),
+        (tmp_path, ["Rig/lightfield.json", "--output", "./splits.json"]),
+    ):
+        monkeypatch.chdir(folder)
+        run_in_process("splits.py", *words)
+        assert read_json(output)["test"] == ["Rig/view_0000f"]
+        output.unlink()
+    said = refused("splits.py", read, "--output", rig / "x/splits.json")
+    assert said == f"{read}: must be in {rig}/x, where --output is"
+
+
+def test_the_index_leaves_out_a_dataset_that_cannot_be_read(
+    run_in_process, lightfield, tmp_path, capsys
+):
+    kept, lost = tmp_path / "results/a/Kept", tmp_path / "results/b/Lost"
+    for folder in (kept, lost):
+        write_text(folder / "report/index.html", "<p>")
+    lightfield.rename(kept / "lightfield.json")
+    words = ["--results", tmp_path / "results", "--output", tmp_path / "results/index.html"]
+    run_in_process("report_index.py", *words)
+    text = (tmp_path / "results/index.html").read_text()
+    assert "a/Kept/report/index.html" in text
+    assert "Lost" not in text
+    said = capsys.readouterr().err
+    assert said.startswith(f"warning: left out: {lost}/lightfield.json: cannot be read")

@@ -129,3 +129,14 @@ def test_a_folder_may_be_called_as_the_exports_are_and_must_hold_a_dataset(folde
 
 def test_every_export_has_a_loader():
     assert package.LOADERS.keys() == {"exr", *Exports.model_fields}
+
+
+def test_an_export_in_a_folder_of_another_name_is_known_by_its_list(folder, tmp_path):
+    dataset = shutil.copytree(folder, tmp_path / "dataset")
+    write_json(dataset / "perspective/exports/mine/export.json", {"format": "miv"})
+    card = package.card(dataset, NAME, load_scene("smoke"))
+    assert card["loaders"]["perspective/exports/mine"].startswith("Encoder -c perspective/exports")
+    for content, why in (({"format": "x"}, "format: is 'x'; must be one of"), ({}, "is missing")):
+        write_json(dataset / "perspective/exports/mine/export.json", content)
+        with pytest.raises(UserError, match=rf"mine/export.json: .*{why}"):
+            package.card(dataset, NAME, load_scene("smoke"))

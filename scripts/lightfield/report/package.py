@@ -15,7 +15,7 @@ from typing import Any
 import jinja2
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, sha256
+from lightfield.core.files import atomic_path, read_keys, sha256
 from lightfield.core.progress import Progress
 from lightfield.dataset.config import Scene
 from lightfield.dataset.exports import MANIFEST
@@ -86,7 +86,10 @@ def _loaders(folder: Path, view: str) -> Iterator[tuple[str, str]]:
         yield f"{place}/transforms.json", LOADERS["instant_ngp"].replace("{}", place)
     for path in sorted(folder.rglob(MANIFEST)):
         place = path.parent.relative_to(folder).as_posix()
-        yield place, LOADERS[path.parent.name].replace("{}", place)
+        name = read_keys(path, "export.py", "format")["format"]
+        if name not in LOADERS:
+            raise UserError(f"{path}: format: is {name!r}; must be one of {', '.join(LOADERS)}")
+        yield place, LOADERS[name].replace("{}", place)
 
 
 def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None) -> list[Path]:
