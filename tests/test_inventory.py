@@ -122,6 +122,12 @@ with bpy.data.libraries.load(folder + "/library.blend", link=True) as (_, wanted
     wanted.objects = ["cone"]
 bpy.context.scene.collection.objects.link(wanted.objects[0])
 bpy.ops.wm.save_as_mainfile(filepath=folder + "/linked.blend", relative_remap=False)
+
+tree = bpy.data.node_groups.new("tree", "GeometryNodeTree")
+tree.nodes.new("GeometryNodeImportSTL").inputs[0].default_value = folder + "/leaf.stl"
+room.build({})
+bpy.data.objects["cone"].modifiers.new("tree", "NODES").node_group = tree
+bpy.ops.wm.save_as_mainfile(filepath=folder + "/imports.blend", relative_remap=False)
 """
 
 
@@ -176,6 +182,9 @@ def test_what_is_missing_or_cannot_be_read_is_an_error(run_program, tmp_path, mo
     assert told.startswith(
         f"{start.format('linked', 1)} read: the library library.blend at {tmp_path}/library.blend "
     )
+    code, told = listed("imports")
+    assert code == 1
+    assert f" read: the geometry tree at {tmp_path}/leaf.stl (missing); " in told
     assert not output.exists()
 
 

@@ -25,6 +25,8 @@ KINDS = {
     "Library": "library",
     "CacheFile": "cache",
     "Object": "simulation cache",
+    # What its nodes import, such as an STL.
+    "GeometryNodeTree": "geometry",
     # Light profiles (IES).
     "PointLight": "light profile",
     "SpotLight": "light profile",
