@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from lightfield.core.cli import positive, run
-from lightfield.core.files import write_json
+from lightfield.core.files import whole, write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import calibration, sampling, trials
 
@@ -39,7 +39,7 @@ def main() -> None:
     reached = (f"{name} {found['error']:.2g}" for name, found in record["strata"].items())
     target, error, found = (record[k] for k in ("target_error", "probe_error", "held_out_error"))
     print(
-        f"note: {arguments.lightfield.parent.name}: {record['way']}, {record['choice']}: "
+        f"note: {whole(arguments.lightfield).parent.name}: {record['way']}, {record['choice']}: "
         f"error {error:.3g} on the probe views and "
         f"{found:.3g} ± {record['held_out_standard_error']:.1g} on others, "
         f"wanted {target:g}; {record['times_fewer_samples']:.1f} times cheaper than plain path "

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lightfield.core.cli import run, stops, white
 from lightfield.core.errors import UserError
-from lightfield.core.files import write_csv
+from lightfield.core.files import whole, write_csv
 from lightfield.core.progress import Progress
 from lightfield.dataset.exports import VIEWS
 from lightfield.dataset.lightfield import View
@@ -72,8 +72,8 @@ def main() -> None:
     page.write(
         arguments.output / "index.html",
         "evaluation.html.j2",
-        name=f"{arguments.dataset.parent.name}/{arguments.dataset.name}",
-        renders=arguments.renders.name,
+        name="/".join(whole(arguments.dataset).parts[-2:]),
+        renders=whole(arguments.renders).name,
         means=means,
         rows=rows,
         pictures={

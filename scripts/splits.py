@@ -1,12 +1,11 @@
 """List what the views of a scene's rigs are for: to train on, for validation, or to test with."""
 
 import argparse
-import os.path
 from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import write_json
+from lightfield.core.files import whole, write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.splits import listed
 
@@ -25,11 +24,6 @@ def main() -> None:
     content = listed({folder.relative_to(scene).as_posix(): lf for folder, lf in found.items()})
     write_json(arguments.output, content)
     print(", ".join(f"{len(views)} views for {part}" for part, views in content.items()))
-
-
-def whole(path: Path) -> Path:
-    """Return a path from / on, without ``..``; a rig's folder may be a link to another disk."""
-    return Path(os.path.normpath(path.absolute()))
 
 
 if __name__ == "__main__":

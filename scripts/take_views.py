@@ -54,13 +54,17 @@ def main() -> None:
 
 def _stored(path: Path, results: Path, work: Path) -> str:
     """Return under which path Snakemake has stored a list, of which ``path`` is its copy here."""
-    (folder,) = (root for root in (results, work) if path.resolve().is_relative_to(root.resolve()))
-    return str(folder / path.resolve().relative_to(folder.resolve()))
+    for folder in (results, work):
+        if path.resolve().is_relative_to(folder.resolve()):
+            return str(folder / path.resolve().relative_to(folder.resolve()))
+    raise UserError(f"{path}: must be in {results} or {work}")
 
 
 def _listed(store: ViewStore, path: Path, results: Path, work: Path) -> Iterable[tuple[Path, str]]:
     """Yield each file that a list names, and its SHA-256."""
     if re.fullmatch(r"\d+-\d+\.json", path.name):
+        if not path.resolve().is_relative_to(work.resolve()):
+            raise UserError(f"{path}: must be in {work}")
         stage = path.resolve().parent.relative_to(work.resolve())
         files = records.read(path).items()
         return [(results / stage.parent / name, digest) for name, (_, digest) in files]

@@ -2,13 +2,17 @@
 
 import runpy
 import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
 from conftest import ROOT, SCRIPTS
 
-from lightfield.core.files import read_json, write_json, write_text
+from lightfield.core.files import read_json, whole, write_json, write_text
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
+from lightfield.imaging import images
+from lightfield.validation.integrity import Integrity
 
 
 @pytest.fixture
@@ -142,30 +146,30 @@ def test_a_number_that_would_spoil_all_is_refused(refused, program, flag, values
 
 
 def test_what_is_read_is_never_written_over(refused, lightfield, tmp_path):
-    images = tmp_path / "exr"
-    write_text(images / "view_0000f.exr", "rendered in an hour")
-    write_text(images / "view_0000f.png", "rendered in an hour")
+    views = tmp_path / "exr"
+    write_text(views / "view_0000f.exr", "rendered in an hour")
+    write_text(views / "view_0000f.png", "rendered in an hour")
     folder = ["--input-cfg", lightfield]
-    (tmp_path / "link").symlink_to(images)
+    (tmp_path / "link").symlink_to(views)
     lens = ["--rectilinear", "18,36"]
     exr = [
         *folder,
         "--image-dir",
-        images,
+        views,
         "--image-suffix",
         ".exr",
         "--output",
         tmp_path / "t.json",
     ]
-    png = [*folder, "--image-dir", images, "--output", tmp_path / "t.json"]
+    png = [*folder, "--image-dir", views, "--output", tmp_path / "t.json"]
     for said in (
-        refused("synthesize.py", tmp_path, "--output", images / ".."),
-        refused("synthesize.py", images, "--poses", lightfield, "--output", tmp_path),
-        refused("reproject.py", "-i", images, *folder, *lens, "-o", tmp_path / "link", "--exr"),
+        refused("synthesize.py", tmp_path, "--output", views / ".."),
+        refused("synthesize.py", views, "--poses", lightfield, "--output", tmp_path),
+        refused("reproject.py", "-i", views, *folder, *lens, "-o", tmp_path / "link", "--exr"),
         refused(
             "reproject.py",
             "--single",
-            images / "view_0000f.png",
+            views / "view_0000f.png",
             *folder,
             *lens,
             "-o",
@@ -175,7 +179,7 @@ def test_what_is_read_is_never_written_over(refused, lightfield, tmp_path):
         refused(
             "reproject.py",
             "-i",
-            images,
+            views,
             *folder,
             *lens,
             "-o",
@@ -191,7 +195,7 @@ def test_what_is_read_is_never_written_over(refused, lightfield, tmp_path):
         refused("export_instant_ngp.py", *folder, "--output", lightfield),
     ):
         assert "read" in said, said
-    assert {path.read_text() for path in images.iterdir()} == {"rendered in an hour"}
+    assert {path.read_text() for path in views.iterdir()} == {"rendered in an hour"}
     assert LightField.read(lightfield).views
     assert not (tmp_path / "made").exists()
 
@@ -241,3 +245,33 @@ def test_the_index_leaves_out_a_dataset_that_cannot_be_read(
     assert "Lost" not in text
     said = capsys.readouterr().err
     assert said.startswith(f"warning: left out: {lost}/lightfield.json: cannot be read")
+
+
+@pytest.mark.parametrize("within", [True, False])
+def test_views_are_compared_with_their_record_by_whatever_path(
+    refused, lightfield, tmp_path, within
+):
+    view = tmp_path / "dataset/exr/view_0000f.exr"
+    images.write_exr(view, dict.fromkeys("RGB", np.ones((8, 8), np.float16)))
+    sums = {"bytes": view.stat().st_size, "sha256": "0" * 64}
+    write_json(tmp_path / "record.json", {"files": {"exr/view_0000f.exr": sums}})
+    words = ["--input-cfg", lightfield, "--source-record", tmp_path / "record.json", "--exr"]
+    words += ["--rectilinear", "18,36", "-o", tmp_path / "made"]
+    place = "." if within else view.parent
+    said = refused("reproject.py", "-i", place, *words, folder=view.parent)
+    assert "view_0000f.exr: is not as it was written" in said
+
+
+def test_a_list_elsewhere_is_refused(refused, tmp_path):
+    write_json(tmp_path / "0-6.json", {"files": {}})
+    words = ["--store", tmp_path, "--results", tmp_path / "results", "--work", tmp_path / "work"]
+    said = refused("take_views.py", tmp_path / "0-6.json", *words)
+    assert said == f"{tmp_path}/0-6.json: must be in {tmp_path}/work"
+
+
+def test_a_folder_has_its_name_from_within(tmp_path, monkeypatch):
+    (tmp_path / "scene/rig/exr").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "scene/rig/exr")
+    for path in (Path(".."), Path("../../rig/"), Path("../exr/.."), tmp_path / "scene/rig"):
+        assert whole(path).parts[-2:] == ("scene", "rig")
+        assert Integrity(path, tmp_path)._name == "scene/rig"

@@ -149,6 +149,14 @@ def broken(path: Path) -> str | None:
         return str(error).removeprefix(f"{path}: ")
 
 
+def whole(path: Path) -> Path:
+    """Return a path from / on, without ``.`` and ``..``: it and all folders above it have names.
+
+    Links stay what they are, for what is on another disk may have another name there.
+    """
+    return Path(os.path.normpath(path.absolute()))
+
+
 def keep_apart(flag: str, written: Path, *read: Path | None) -> None:
     """Raise `UserError` where what the ``flag`` has written is a file or folder that is read."""
     if any(path is not None and path.resolve() == written.resolve() for path in read):
@@ -163,8 +171,7 @@ def set_aside(path: Path, folder: Path) -> Path:
     """
     inside = Path(os.path.normpath(path))
     if inside.is_absolute() or ".." in inside.parts:
-        whole = Path(os.path.normpath(path.absolute()))
-        inside = whole.relative_to(whole.anchor)
+        inside = whole(path).relative_to(path.absolute().anchor)
     target = folder / inside
     number = 1
     while os.path.lexists(target):

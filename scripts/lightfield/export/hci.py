@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import write_bytes, write_text
+from lightfield.core.files import whole, write_bytes, write_text
 from lightfield.core.progress import Progress
 from lightfield.dataset.exports import Hci
 from lightfield.dataset.lightfield import LightField, View
@@ -80,7 +80,9 @@ def parameters(
     """Return the text of parameters.cfg; ``baseline`` is in metres."""
     lens = source.lens
     assert isinstance(lens, Rectilinear)
-    scene = source.lightfield.content.get("scene", {}).get("name", source.dataset.parent.name)
+    scene = source.lightfield.content.get("scene", {}).get(
+        "name", whole(source.dataset).parent.name
+    )
     center = zip(
         ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"),
         [*middle.position.tolist(), *middle.rotation.tolist()],

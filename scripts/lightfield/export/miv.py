@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.files import write_bytes, write_json
+from lightfield.core.files import whole, write_bytes, write_json
 from lightfield.core.progress import Progress
 from lightfield.dataset.exports import Miv
 from lightfield.export import yuv
@@ -60,7 +60,7 @@ def export(source: Source, settings: Miv, folder: Path) -> None:
         progress.done()
     content: dict[str, Any] = {
         "Version": "3.0",
-        "Content_name": source.dataset.name,
+        "Content_name": whole(source.dataset).name,
         "BoundingBox_center": source.lightfield.matrices[:, :3, 3].mean(axis=0).tolist(),
         "Fps": 30,
         "Frames_number": 1,

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.core.files import whole
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
 from lightfield.export.source import Source
@@ -140,7 +141,7 @@ def compare(
             yield {
                 "variant": variant.name,
                 "value": variant.value,
-                "truth": truth.dataset.name,
+                "truth": whole(truth.dataset).name,
                 "view": view.name,
                 "to_edge": to_edge,
                 "place": next(name for name, most in PLACES.items() if to_edge <= most),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.core.files import whole
 from lightfield.dataset import blend
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW
@@ -54,11 +55,11 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
     looks = views.collect(folder / IMAGES, lightfield, rig, _unreadable(validation))
     middle = lightfield.views[middle_view(rig)]
     report = folder / REPORT
-    found = origin.measurements
+    found, own = origin.measurements, whole(folder)
     measured = {
         "error_vs_time": tables.error_vs_time(found, str(lightfield.scene["name"])),
-        "synthesis": tables.synthesis(found, f"{folder.parent.name}/{folder.name}"),
-        "learning": tables.learning(found, f"{folder.parent.name}/{folder.name}"),
+        "synthesis": tables.synthesis(found, f"{own.parent.name}/{own.name}"),
+        "learning": tables.learning(found, f"{own.parent.name}/{own.name}"),
         "reprojection": tables.reprojection(found),
         "stability": tables.stability(found),
     }
@@ -75,7 +76,7 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
         taken=_taken(origin, lightfield),
         looks=looks,
         frames=list(rig.sequence.folders) if rig.sequence else [],
-        frame=folder.name,
+        frame=own.name,
         passes=list(pass_pictures.collect(folder, lightfield, middle, looks.data["exposure"])),
         reprojected=list(_reprojected(folder)),
         render=lightfield.render,

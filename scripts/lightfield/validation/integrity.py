@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import broken, read_json, set_aside, sha256
+from lightfield.core.files import broken, read_json, set_aside, sha256, whole
 from lightfield.dataset import ledger, records
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
@@ -44,7 +44,7 @@ class Integrity:
         self.dataset = Path(os.path.relpath(dataset))
         self.work = Path(os.path.relpath(work)) if work else None
         # A sequence's datasets lie a folder deeper, one for each frame.
-        folder = dataset.absolute()
+        folder = whole(dataset)
         depth = 3 if re.fullmatch(r"f\d{5,7}", folder.name) else 2
         self._name = "/".join(folder.parts[-depth:])
         self._scene = folder.parts[-depth]
