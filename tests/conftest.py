@@ -16,8 +16,8 @@ ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = ROOT / "scripts"
 
 
-# Fixtures that start programs, a browser, Blender or Snakemake.
-SLOW = {"run_program", "smoke", "blender", "browser", "cycles", "planned", "renders"}
+# Fixtures that start programs, a browser, Blender or Snakemake, or compute for long.
+SLOW = {"run_program", "smoke", "blender", "browser", "cycles", "planned", "renders", "simulated"}
 
 
 def pytest_collection_modifyitems(items):

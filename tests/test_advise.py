@@ -113,6 +113,7 @@ def test_a_clamp_is_reported_and_never_advised():
     assert not any("guiding" in t.change for t in advice.tries(SAMPLING, on_cpu=False))
 
 
+@pytest.mark.slow
 def test_of_one_key_the_value_that_saves_most_is_advised(monkeypatch):
     """Guiding has fireflies, and of a denoiser's prefilters the one without is the fastest."""
     maker = Simulated()

@@ -126,6 +126,7 @@ class SimulatedPilot:
         return trials.Trial(colour.astype(np.float32), None, 4, 1.0, "CPU", parts)
 
 
+@pytest.mark.slow
 def test_a_small_fire_gets_windows_of_its_own():
     maker = SimulatedPilot(lenses.from_camera(CAMERA))
     windows, areas = strata.choose(maker, 16, 2)

@@ -94,6 +94,7 @@ def test_intervals_hold_the_surface_and_follow_each_other():
         assert abs(along[ray][taught[ray]] / surface - 1).max() < 0.03
 
 
+@pytest.mark.slow
 def test_a_field_is_learned_from_true_poses_and_not_from_shuffled_ones(views, monkeypatch):
     monkeypatch.setattr(learn, "LOOKS", 1)
     monkeypatch.setattr(learn, "LOOKED_AT", 500)

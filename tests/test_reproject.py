@@ -250,7 +250,7 @@ def test_a_source_that_is_not_as_it_was_written_is_not_used(dataset, run, capsys
 @pytest.mark.parametrize("views", ["3:4", "1:1", "x", "-1:2", "1"])
 def test_views_that_there_are_not(run, views):
     with pytest.raises(UserError, match="--views"):
-        run(*PERSPECTIVE, "--png", "--views", views)
+        run(*PERSPECTIVE, "--png", f"--views={views}")
 
 
 def test_only_what_is_missing_or_out_of_date_is_made_again(dataset, run):

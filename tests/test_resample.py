@@ -268,6 +268,7 @@ def test_openimageio_agrees_about_a_rotated_view():
     assert np.abs(difference).max() < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(1, 1), (2, 3), (9, 7)])
 def test_no_pair_of_lenses_and_no_value_gives_what_is_no_answer(size):
     width, height = size

@@ -46,6 +46,7 @@ def errors(made, see, lens, matrix=EYE):
     return difference, made.distance[seen] / distance[seen] - 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EYES)
 def test_a_view_from_between_the_cameras_is_what_is_there(name):
     lens = lenses.from_camera(EYES[name])

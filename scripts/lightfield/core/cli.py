@@ -35,11 +35,11 @@ def run(main: Callable[[], None]) -> None:
 
 
 def _as_value(word: str) -> str:
-    """Return a word of the command line so that argparse takes -1e-05, -1,2 and -90deg for values.
+    """Return a word so that argparse takes -1e-05, -1,2, -1:2 and -90deg for values.
 
     It knows -1 and -0.5 by itself, and takes no word that begins with a blank for a flag.
     """
-    return f" {word}" if re.fullmatch(r"-[\d.]+[,de][\d.,deg+-]*", word) else word
+    return f" {word}" if re.fullmatch(r"-[\d.]+[,:de][\d.,:deg+-]*", word) else word
 
 
 # What follows may be the ``type`` of an argument.
