@@ -22,9 +22,9 @@ from lightfield.core.files import sha256, write_json
 from lightfield.dataset.config import Scene
 from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.exports import settings_of
-from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.lightfield import LightField, View
 from lightfield.export import disparity
-from lightfield.export.source import Source
+from lightfield.export.source import Source, Surface
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
 from lightfield.validation import files as validation_files
@@ -703,3 +703,15 @@ def test_a_model_as_text_may_be_without_points(dataset, tmp_path):
     assert not model.positions
     images_txt = tmp_path / "colmap/sparse/0/images.txt"
     assert images_txt.read_text().endswith(".png\n\n")
+
+
+def test_points_are_lifted_from_views_that_see_the_sky_too():
+    lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [8, 8]})
+    rays = lens.pixel_rays()
+    distance = np.full(rays.shape[:2], np.inf)
+    distance[2:6, 2:6] = 3
+    surface = Surface(lens, View.placed("one", np.eye(4)), rays, distance)
+    with np.errstate(invalid="raise"):
+        points, normals = surface.points(1)
+    assert points.shape == normals.shape == (16, 3)
+    np.testing.assert_allclose(np.linalg.norm(points, axis=1), 3)

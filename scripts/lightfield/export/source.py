@@ -189,9 +189,9 @@ class Surface:
         """
         first = step // 2
         part = np.s_[first::step, first::step]
-        world = self.rays * self.distance[..., None] @ self.view.matrix[:3, :3].T
-        right, below = np.full_like(world, np.nan), np.full_like(world, np.nan)
         with np.errstate(invalid="ignore"):
+            world = self.rays * self.distance[..., None] @ self.view.matrix[:3, :3].T
+            right, below = np.full_like(world, np.nan), np.full_like(world, np.nan)
             right[:, :-1] = world[:, 1:] - world[:, :-1]
             below[:-1] = world[1:] - world[:-1]
             normal = np.cross(below, right)
