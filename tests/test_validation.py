@@ -706,6 +706,12 @@ def test_stray_files_fail(small_dataset: Path) -> None:
     ]
 
 
+def test_an_unpacked_dataset_is_valid_with_what_its_package_adds(small_dataset: Path) -> None:
+    for name in ("README.md", "card.json"):
+        (small_dataset / name).write_text("{}")
+    assert not failed(validate(small_dataset))
+
+
 # ---- records, clearance, exports ------------------------------------------------------------
 
 

@@ -294,7 +294,8 @@ def _sorted_out(
     own = {*known, *(f"{image_set.prefix}{NAME}" for image_set in sets)}
     paths = [path.relative_to(dataset) for path in dataset.rglob("*") if path.is_file()]
     present = sorted(path.as_posix() for path in paths if path.parts[0] != REPORT)
-    strays = [path for path in present if path not in own and path not in OUTPUTS]
+    beside = (*OUTPUTS, README, CARD)
+    strays = [path for path in present if path not in own and path not in beside]
     return [path for path in present if path in own], strays
 
 
