@@ -5,12 +5,15 @@ import json
 from pathlib import Path
 
 import bpy
+from pydantic import TypeAdapter
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, write_json
+from lightfield.core.settings import checked
 from lightfield.dataset import config
 from lightfield.geometry import rigs
+from lightfield.geometry.rigs.rig import Frame
 from lightfield.rendering import blend_file
 from lightfield.rendering.clearance import free_places
 
@@ -36,7 +39,7 @@ def main() -> None:
     )
     blend_file.open_scene(arguments.blend, chosen, inventory)
     if arguments.frame != config.FILE:
-        bpy.context.scene.frame_set(int(arguments.frame))
+        bpy.context.scene.frame_set(checked(TypeAdapter(Frame), arguments.frame, "--frame"))
     places = free_places(rig)
     write_json(arguments.output, {"box": rig.box, "places": places.tolist()})
     print(f"{len(places)} cameras, each with {rig.clearance:g} m around it")

@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 
 from lightfield.core.cli import run
-from lightfield.core.files import read_keys
+from lightfield.core.files import read_keys, read_text
 from lightfield.geometry import rigs
 from lightfield.report import dataset_page
 
@@ -38,7 +38,7 @@ def main() -> None:
     arguments = parser.parse_args()
     origin = dataset_page.Origin(
         rig=rigs.from_settings(arguments.rig),
-        yaml=arguments.yaml.read_text(encoding="utf-8"),
+        yaml=read_text(arguments.yaml),
         command=arguments.command,
         has_panorama=bool(arguments.panorama),
         measurements=arguments.measurements,

@@ -43,6 +43,8 @@ def run_in_process(monkeypatch):
     return run
 
 
+RIG = '{"type": "plane", "cameras": [1, 1], "camera": {"lens": "equidistant", "fov": 180, '
+RIG += '"resolution": [8, 8]}, "size": 1}'
 ENERGY = '{"watts": 65, "price_per_kwh": 0.3, "currency": "EUR", "cores": 2}'
 FULL = '{"views": 6, "resolution": [64, 64], "samples": "file"}'
 COSTS = ["--dataset", ".", "--journals", ".", "--benchmarks", ".", "--scene-benchmarks", "."]
@@ -275,3 +277,13 @@ def test_a_folder_has_its_name_from_within(tmp_path, monkeypatch):
     for path in (Path(".."), Path("../../rig/"), Path("../exr/.."), tmp_path / "scene/rig"):
         assert whole(path).parts[-2:] == ("scene", "rig")
         assert Integrity(path, tmp_path)._name == "scene/rig"
+
+
+def test_an_image_is_no_text(refused, tmp_path):
+    other = tmp_path / "view.exr"
+    other.write_bytes(bytes([0x76, 0x2F, 0x31, 0x01, 0x80]))
+    words = ["--dataset", tmp_path, "--name", "a/b", "--command", "c", "--rig", RIG]
+    said = refused("report_html.py", *words, "--yaml", other, "--output", tmp_path / "page.html")
+    assert said == f"{other}: is no text in UTF-8"
+    said = refused("splits.py", other, "--output", tmp_path / "splits.json")
+    assert said == f"{other}: is no text in UTF-8"

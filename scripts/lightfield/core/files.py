@@ -183,6 +183,16 @@ def set_aside(path: Path, folder: Path) -> Path:
     return target
 
 
+def read_text(path: Path | str) -> str:
+    """Read a text in UTF-8; one that is missing, or something else, is a `UserError`."""
+    try:
+        return Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise UserError(f"{path}: is no text in UTF-8") from None
+
+
 def read_keys(path: Path | str, program: str, *keys: str) -> dict[str, Any]:
     """Read the JSON mapping that a program of scripts/ writes.
 
@@ -199,8 +209,6 @@ def read_keys(path: Path | str, program: str, *keys: str) -> dict[str, Any]:
 def read_json(path: Path | str) -> Any:
     """Read a JSON file; a missing or malformed one is a `UserError` that names it."""
     try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+        return json.loads(read_text(path))
     except (ValueError, RecursionError) as error:
         raise UserError(f"{path}: is not JSON: {error}") from None

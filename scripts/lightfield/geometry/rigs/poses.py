@@ -19,7 +19,7 @@ from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json
+from lightfield.core.files import read_json, read_text
 from lightfield.core.settings import FARTHEST
 from lightfield.geometry import colmap
 from lightfield.geometry.rigs.rig import Rig, UnitPoses
@@ -284,12 +284,8 @@ def _colmap_text(path: Path) -> Iterator[tuple[str, Sequence[Any], str]]:
 
     The line of its points is empty where an image has none, and some programs leave it out.
     """
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: cannot be read as text: {error}") from None
     may_be_points = False
-    for line in lines:
+    for line in read_text(path).splitlines():
         if not line.strip() or line.startswith("#") or (may_be_points and _are_points(line)):
             may_be_points = False
             continue
