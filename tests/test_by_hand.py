@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from conftest import ROOT, SCRIPTS
 
+from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, whole, write_json, write_text
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
+from lightfield.report import tables
 from lightfield.validation.integrity import Integrity
 
 
@@ -287,3 +289,27 @@ def test_an_image_is_no_text(refused, tmp_path):
     assert said == f"{other}: is no text in UTF-8"
     said = refused("splits.py", other, "--output", tmp_path / "splits.json")
     assert said == f"{other}: is no text in UTF-8"
+
+
+@pytest.mark.parametrize(
+    ("name", "read", "column"),
+    [
+        ("reprojection.csv", tables.reprojection, "scenario"),
+        ("stability.csv", tables.stability, "group"),
+        ("synthesis/a/b.csv", lambda files: tables.synthesis(files, "a/b"), "truth"),
+        ("learn/a/b.csv", lambda files: tables.learning(files, "a/b"), "learned"),
+    ],
+)
+def test_a_table_of_another_kind_is_named(tmp_path, name, read, column):
+    path = tmp_path / name
+    for text, why in (("", "has no row"), ("x,y\n1,2\n", f"{column}: is missing")):
+        write_text(path, text or "\n")
+        with pytest.raises(UserError, match=rf"{path}: {why}"):
+            read([path])
+
+
+def test_slopes_that_are_no_numbers_are_named(tmp_path):
+    path = tmp_path / "error_vs_time/scene.json"
+    write_json(path, {"slopes": {"plain": {"over_time": {"slope": "steep"}}}})
+    with pytest.raises(UserError, match=r"scene.json: slopes: is not what"):
+        tables.error_vs_time([path], "scene")

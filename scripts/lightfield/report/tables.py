@@ -64,8 +64,8 @@ def reprojection(files: Sequence[Path]) -> Measurement | None:
     path = _named(files, "reprojection.csv")
     if path is None:
         return None
-    rows = _read_csv(path)
-    columns = list(rows[0]) if rows else []
+    rows = _read_csv(path, "scenario", "method", "on_front")
+    columns = list(rows[0])
     front = [row for row in rows if row.get("on_front") == "True"]
     best = Table(
         ["case", "method", "samples", "RMS error", "largest error", "CPU time a view"],
@@ -93,7 +93,7 @@ def stability(files: Sequence[Path]) -> Measurement | None:
     path = _named(files, "stability.csv")
     if path is None:
         return None
-    rows = _read_csv(path)
+    rows = _read_csv(path, "group", "verdict")
     counts: dict[tuple[str, str], dict[str, int]] = {}
     for row in rows:
         verdicts = counts.setdefault((row.get("group", ""), row.get("dtype", "")), {})
@@ -110,7 +110,7 @@ def stability(files: Sequence[Path]) -> Measurement | None:
     worst = sorted(rows, key=_bound_used, reverse=True)[:WORST_CASES]
     names = ["case", "dtype", "condition", "error", "error_bound", "unit", "verdict"]
     shown = [[*(row.get(name) for name in names), f"{_bound_used(row):.0%}"] for row in worst]
-    columns = list(rows[0]) if rows else []
+    columns = list(rows[0])
     failed = sum(not row.get("verdict", "").startswith("ok") for row in rows)
     return Measurement(
         page.plot(path.with_suffix("")),
@@ -131,9 +131,9 @@ def synthesis(files: Sequence[Path], folder: str) -> Measurement | None:
     path = _named(files, f"synthesis/{folder}.csv")
     if path is None:
         return None
-    rows = _read_csv(path)
     names = synthesis_quality.MEANS
     columns = [*synthesis_quality.COLUMNS, *names]
+    rows = _read_csv(path, *columns, "place", "region")
     means = [[row[name] for name in columns] for row in synthesis_quality.means(rows)]
     plain = [row for row in rows if row["variant"] == "all"]
     by_place = [
@@ -163,7 +163,7 @@ def learning(files: Sequence[Path], folder: str) -> Measurement | None:
     path = _named(files, f"learn/{folder}.csv")
     if path is None:
         return None
-    rows = _read_csv(path)
+    rows = _read_csv(path, "learned", "held_out", "reading", "step", "psnr")
     last = {
         (row["learned"], row["held_out"], row["reading"]): float(row["psnr"])
         for row in sorted(rows, key=lambda row: int(row["step"]))
@@ -193,7 +193,12 @@ def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
     whole = {name: table for name, table in tables.items() if name not in known}
     whole.pop("measured on", None)
     if "slopes" in known:
-        known["slopes"] = _slopes(content["slopes"])
+        try:
+            known["slopes"] = _slopes(content["slopes"])
+        except (TypeError, ValueError):
+            raise UserError(
+                f"{path}: slopes: is not what scripts/error_vs_time.py writes"
+            ) from None
     measured_on = content.get("measured_on")
     shown = {ERROR_TABLES[name]: known[name] for name in ERROR_TABLES if name in known}
     if content.get("strata"):
@@ -306,15 +311,22 @@ def _named(files: Sequence[Path], ending: str) -> Path | None:
     return next((file for file in files if f"/{file.as_posix()}".endswith(f"/{ending}")), None)
 
 
-def _read_csv(path: Path) -> list[dict[str, str]]:
+def _read_csv(path: Path, *columns: str) -> list[dict[str, str]]:
+    """Return the rows of a CSV; one without a row, or one of the ``columns``, is a `UserError`."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
-            return [
+            rows = [
                 {str(key): value or "" for key, value in row.items() if key}
                 for row in csv.DictReader(file)
             ]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise UserError(f"{path}: cannot be read as CSV: {error}") from None
+    if not rows:
+        raise UserError(f"{path}: has no row")
+    for column in columns:
+        if column not in rows[0]:
+            raise UserError(f"{path}: {column}: is missing; it is a column of the measurement's")
+    return rows
 
 
 def _bound_used(row: Mapping[str, str]) -> float:
