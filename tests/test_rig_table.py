@@ -182,6 +182,7 @@ rigs:
   LFSphere_e100cm_d170cm: {type: sphere, subdivisions: 4, size: 1.7, camera: *eye}
   LFCuboid_1mx3mx1m: {type: cuboid, cameras: [10, 30, 10], size: [1, 3, 1], camera: *eye}
   LFPlane: {type: plane, cameras: [3, 1], camera: *eye}
+  path: {type: path, count: 3, keys: [{position: [0, 1, 0]}, {position: [0, 4, 0]}], camera: *eye}
 """.replace("CAMERA", "lens: equidistant, fov: 180, resolution: [64, 64]")
 
 
@@ -206,6 +207,7 @@ def test_the_table_sets_computed_figures_beside_the_printed_ones(
     assert 0.95 * ball < inside < float(sphere["enclosed_m3"]) < ball
     assert float(sphere["box_or_ball_m3"]) == pytest.approx(ball)
     assert rows["LFPlane"]["printed_m"] == ""
+    assert rows["path"]["size"] == "0 × 3 × 0 m"
 
     text = table.read_text(encoding="utf-8")
     assert (

@@ -102,7 +102,8 @@ def _setup(scene: str, name: str, rig: rigs.Rig) -> Setup:
     if isinstance(rig, rigs.Sphere) and np.ptp(rig.sides) == 0:
         extent = f"⌀ {rig.sides[0]:g} m"
     else:
-        extent = " × ".join(f"{side:g}" for side in rig.sides) + " m"
+        sides = np.ptp(positions, axis=0) if rig.is_loose else rig.sides
+        extent = " × ".join(f"{side:g}" for side in sides) + " m"
     return Setup(
         scene=scene,
         rig=name,

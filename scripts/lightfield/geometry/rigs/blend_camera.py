@@ -21,6 +21,7 @@ class BlendCamera(Rig):
     """
 
     shape = "PLANE"
+    is_loose = True
 
     type: Literal["blend_camera"]
     frames: Frames | None = Field(

@@ -37,6 +37,7 @@ class Path(CountedRig):
     """Keys without rotations let the cameras look along the path, upright."""
 
     shape = "PLANE"
+    is_loose = True
 
     type: Literal["path"]
     keys: list[Key] = Field(

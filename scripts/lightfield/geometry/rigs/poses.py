@@ -52,6 +52,7 @@ class Poses(Rig):
     """``max_views`` is for no scene YAML: a preset has thinned the rig to an even subset."""
 
     shape = "PLANE"
+    is_loose = True
 
     type: Literal["poses"]
     file: str = Field(

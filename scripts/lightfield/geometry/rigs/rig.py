@@ -125,6 +125,8 @@ class Rig(Settings):
     shape: ClassVar[Literal["PLANE", "CUBOID", "CYLINDER", "SPHERE"]]
     # Whether the cameras of a row stand round z.
     is_round: ClassVar[bool] = False
+    # Whether the rig is as large as the box around its cameras, whatever its ``size``.
+    is_loose: ClassVar[bool] = False
     # Of what the cameras stand on, in the unit box; None where it is open.
     unit_volume: ClassVar[float | None] = None
 
