@@ -15,7 +15,7 @@ import schema
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
 from lightfield.dataset.config import Preset
-from lightfield.dataset.dataset import scene_datasets
+from lightfield.dataset.dataset import load_datasets, scene_datasets
 
 RIGHT = {
     "scene": {"builder": "room"},
@@ -416,3 +416,19 @@ def test_snakemake_ends_with_one_line_and_no_job(arguments, expected, tmp_path):
     assert expected in told[0]
     assert "Traceback" not in result.stderr
     assert "rule " not in result.stdout + result.stderr
+
+
+def test_no_two_scenes_have_one_folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(config, "SCENES", tmp_path)
+    for name in ("room", "room_tiny"):
+        (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump(RIGHT))
+
+    def chosen(scene, preset):
+        presets = {"tiny": {}, "full": {}}
+        content = {"scenes": [scene], "preset": preset, "presets": presets}
+        return load_datasets(config.load_config(content))
+
+    assert chosen("room", "full") and chosen("room_tiny", "tiny")
+    for scene, preset in (("room", "tiny"), ("room_tiny", "full")):
+        with pytest.raises(UserError, match="room_tiny would be the folder of both room with"):
+            chosen(scene, preset)

@@ -731,10 +731,20 @@ def _entries(folder: str, name: str) -> list[os.DirEntry[str]]:
 def load_datasets(settings: Configuration) -> list[Dataset]:
     """Read the scene YAMLs that a configuration chooses and resolve their datasets.
 
-    Raises `UserError` for a scene that is not there, not right, or without the rigs asked for.
+    Raises `UserError` for a scene that is not there, not right, or without the rigs asked for, and
+    for one whose folder another scene has under another preset.
     """
     found: list[Dataset] = []
     for scene in settings.scenes:
+        full = settings.preset == "full"
+        folder = scene if full else f"{scene}_{settings.preset}"
+        base, _, preset = folder.rpartition("_")
+        other = base if full else folder
+        if preset in settings.presets.keys() - {"full"} and config.scene_path(other).is_file():
+            raise UserError(
+                f"config.yaml: scenes: {folder} would be the folder of both {base} with "
+                f"preset={preset} and {folder}; give one of these scene YAMLs another name"
+            )
         limits = settings.presets[settings.preset]
         found += scene_datasets(scene, settings.preset, limits, settings)
     if settings.rigs == "all":
