@@ -25,6 +25,8 @@ def main() -> None:
     parser.add_argument("--results", required=True, type=Path, help="folder of the datasets")
     parser.add_argument("--output", required=True, type=Path, help="HTML file to write in it")
     arguments = parser.parse_args()
+    if not arguments.results.is_dir():
+        raise UserError(f"{arguments.results}: no such folder")
     pages = sorted(arguments.results.glob(f"*/**/{REPORT}/index.html"))
     datasets = []
     for path in pages:

@@ -266,6 +266,14 @@ def test_views_are_compared_with_their_record_by_whatever_path(
     assert "view_0000f.exr: is not as it was written" in said
 
 
+def test_a_record_of_another_kind_is_named_once(refused, lightfield, tmp_path, capsys):
+    write_json(tmp_path / "record.json", [])
+    words = ["-i", tmp_path, "--input-cfg", lightfield, "--source-record", tmp_path / "record.json"]
+    said = refused("reproject.py", *words, "--no-reproject", "--exr", "-o", tmp_path / "made")
+    assert said == f"{tmp_path}/record.json: files: must map paths to bytes and sha256"
+    assert not capsys.readouterr().err
+
+
 def test_a_list_elsewhere_is_refused(refused, tmp_path):
     write_json(tmp_path / "0-6.json", {"files": {}})
     words = ["--store", tmp_path, "--results", tmp_path / "results", "--work", tmp_path / "work"]
@@ -313,3 +321,16 @@ def test_slopes_that_are_no_numbers_are_named(tmp_path):
     write_json(path, {"slopes": {"plain": {"over_time": {"slope": "steep"}}}})
     with pytest.raises(UserError, match=r"scene.json: slopes: is not what"):
         tables.error_vs_time([path], "scene")
+
+
+@pytest.mark.parametrize("content", [[], {"extrapolation": 5}])
+def test_costs_of_another_kind_are_named(tmp_path, content):
+    write_json(tmp_path / "costs.json", content)
+    with pytest.raises(UserError, match=r"costs.json: is not what scripts/costs.py writes"):
+        tables.costs(tmp_path / "costs.json")
+
+
+def test_an_index_of_no_folder_is_refused(refused, tmp_path):
+    words = ["--results", tmp_path / "none", "--output", tmp_path / "index.html"]
+    assert refused("report_index.py", *words) == f"{tmp_path}/none: no such folder"
+    assert not [*tmp_path.iterdir()]

@@ -390,7 +390,7 @@ def test_an_index_leads_to_every_page(sphere, run_program, show):
         ("lightfield.json", "[", "lightfield.json: is not JSON"),
         ("lightfield.json", '{"frames": []}', "lightfield.json: camera: is missing"),
         ("validation.json", "{}", "validation.json: is not what"),
-        ("report/costs.json", "[]", "costs.json: must be a mapping"),
+        ("report/costs.json", "[]", "costs.json: is not what scripts/costs.py writes"),
         ("report/overview.png", "no", "overview.png: is no picture"),
         ("exr/view_0001f.exr", "no", "view_0001f.exr: is no image"),
     ],

@@ -247,12 +247,13 @@ def costs(path: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     content = read_json(path)
-    if not isinstance(content, Mapping):
-        raise UserError(f"{path}: must be a mapping")
+    full = content.get("extrapolation") if isinstance(content, Mapping) else None
+    if not isinstance(content, Mapping) or not isinstance(full, Mapping | None):
+        raise UserError(f"{path}: is not what scripts/costs.py writes")
     tables, facts = _tables(
         {key: value for key, value in content.items() if key != "extrapolation"}
     )
-    full = content.get("extrapolation") or {}
+    full = full or {}
     currency = str(content.get("currency") or "")
     return {
         "tables": tables,

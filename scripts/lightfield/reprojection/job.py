@@ -4,7 +4,6 @@ import argparse
 import hashlib
 import itertools
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -110,6 +109,9 @@ class Job:
             self.lightfield.require_centre()
         self.passes = self._passes_wanted(arguments.passes)
         self.record = ShardRecord(arguments.record, arguments.output_dir)
+        given = records.read(arguments.source_record) if arguments.source_record else {}
+        # The SHA-256 of each image, by its path in the dataset.
+        self.source_sums = {path: digest for path, (_, digest) in given.items()}
 
     def _passes_wanted(self, names: list[str]) -> list[Pass]:
         there = [found.name for found in self.lightfield.passes if found.kind != "motion"]
@@ -118,14 +120,6 @@ class Job:
                 known = ", ".join(there) or "no passes to reproject"
                 raise UserError(f"--passes: is {name}; --input-cfg has {known}")
         return [PASSES[name] for name in names]
-
-    @cached_property
-    def source_sums(self) -> Mapping[str, str]:
-        """The SHA-256 of each image of --source-record, by its path in the dataset."""
-        record = self.arguments.source_record
-        return (
-            {path: digest for path, (_, digest) in records.read(record).items()} if record else {}
-        )
 
     @cached_property
     def copies(self) -> bool:
