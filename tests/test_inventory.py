@@ -127,6 +127,11 @@ tree = bpy.data.node_groups.new("tree", "GeometryNodeTree")
 tree.nodes.new("GeometryNodeImportSTL").inputs[0].default_value = folder + "/leaf.stl"
 room.build({})
 bpy.data.objects["cone"].modifiers.new("tree", "NODES").node_group = tree
+bpy.ops.mesh.primitive_cube_add()
+bpy.context.object.modifiers.new("fine", "MULTIRES")
+bpy.ops.object.multires_subdivide(modifier="fine")
+bpy.ops.wm.save_as_mainfile(filepath=folder + "/imports.blend", relative_remap=False)
+bpy.ops.object.multires_external_save(modifier="fine", filepath=folder + "/fine.btx")
 bpy.ops.wm.save_as_mainfile(filepath=folder + "/imports.blend", relative_remap=False)
 """
 
@@ -182,9 +187,11 @@ def test_what_is_missing_or_cannot_be_read_is_an_error(run_program, tmp_path, mo
     assert told.startswith(
         f"{start.format('linked', 1)} read: the library library.blend at {tmp_path}/library.blend "
     )
+    (tmp_path / "fine.btx").unlink()
     code, told = listed("imports")
     assert code == 1
     assert f" read: the geometry tree at {tmp_path}/leaf.stl (missing); " in told
+    assert f"; the sculpted detail Cube at {tmp_path}/fine.btx (missing); " in told
     assert not output.exists()
 
 

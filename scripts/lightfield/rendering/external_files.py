@@ -27,6 +27,8 @@ KINDS = {
     "Object": "simulation cache",
     # What its nodes import, such as an STL.
     "GeometryNodeTree": "geometry",
+    # Of a multiresolution modifier.
+    "Mesh": "sculpted detail",
     # Light profiles (IES).
     "PointLight": "light profile",
     "SpotLight": "light profile",
