@@ -115,8 +115,10 @@ def _first(errors: list[ErrorDetails], content: Any) -> str:
             known = context["expected_tags"].replace("'", "")
             return f'{kind}: is "{context["tag"]}"; must be one of {known}'
     if error["loc"][-1:] == ("[key]",):
+        # Not of the path: rigs that are somebody else's folders are not in the content.
+        *above, name, _ = error["loc"]
         return (
-            f"{'.'.join(map(str, path[:-1]))}: {path[-1]!r} is no name; "
+            f"{'.'.join(map(str, above))}: {name!r} is no name; "
             "use letters, digits and . _ - , with a letter or digit first"
         )
     text = json.dumps(value, default=str)
