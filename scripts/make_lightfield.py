@@ -60,6 +60,8 @@ def main() -> None:
         raise UserError(f"--rig: is {arguments.rig!r}; must be one of {known}")
     if arguments.inventory:
         dataset = dataset.resolved(arguments.inventory)
+    elif dataset.source.blend:
+        raise UserError("--inventory: is missing; scripts/inventory.py says what the .blend has")
     render = dataset.render
     if arguments.panorama:
         dataset = replace(dataset, rig=panorama_rig(dataset.rig, arguments.panorama))

@@ -26,7 +26,7 @@ from lightfield.dataset.config import read_yaml
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.export.source import Source
 from lightfield.export.splits import splits
-from lightfield.geometry import rigs
+from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images, pictures
 from lightfield.imaging.video import video
 from lightfield.synthesis.view import BEST, Sources, reader
@@ -98,7 +98,7 @@ def poses(path: Path | None) -> LightField | None:
     rig = rigs.from_settings(read_yaml(path, str(path)), str(path))
     if rig.camera is None:
         raise UserError(f"{path}: camera: is missing; it is what the views are seen through")
-    return LightField.from_rig(rig, rig.camera.make())
+    return LightField.from_rig(rig, lenses.from_camera(rig.camera))
 
 
 if __name__ == "__main__":

@@ -82,8 +82,10 @@ def test_a_blend_whose_inventory_is_another_file_is_refused(tmp_path, refused):
     scene["rigs"] = {"Rig": {"type": "plane", "cameras": [1, 1], "size": 1, "camera": camera}}
     write_json(tmp_path / "configs/scenes/mine.yaml", scene)
     write_text(tmp_path / "other.json", "[]")
-    words = ["--scene", "mine", "--inventory", "other.json", "--output", "made"]
+    words = ["--scene", "mine", "--output", "made"]
     said = refused("make_lightfield.py", *words, folder=tmp_path)
+    assert said == "--inventory: is missing; scripts/inventory.py says what the .blend has"
+    said = refused("make_lightfield.py", *words, "--inventory", "other.json", folder=tmp_path)
     assert said == "other.json: blend: is missing; scripts/inventory.py writes it"
 
 
@@ -334,3 +336,25 @@ def test_an_index_of_no_folder_is_refused(refused, tmp_path):
     words = ["--results", tmp_path / "none", "--output", tmp_path / "index.html"]
     assert refused("report_index.py", *words) == f"{tmp_path}/none: no such folder"
     assert not [*tmp_path.iterdir()]
+
+
+def test_the_lens_of_no_blend_is_not_made_up(refused, lightfield, tmp_path):
+    camera = '{"lens": "file", "resolution": [8, 8]}'
+    words = ["-i", tmp_path, "--input-cfg", lightfield, "--exr", "-o", tmp_path / "made"]
+    said = refused("reproject.py", *words, "--camera", camera)
+    assert said.endswith("lens: is file, which goes with a rig of type blend_camera alone")
+    rig = '{"type": "plane", "cameras": [1, 1], "size": 1, "camera": ' + camera + "}"
+    write_text(tmp_path / "rig.yaml", rig)
+    words = [tmp_path, "--poses", tmp_path / "rig.yaml", "--output", tmp_path / "made"]
+    assert "lens: is file" in refused("synthesize.py", *words)
+
+
+def test_a_report_of_another_rig_is_refused(refused, lightfield, tmp_path):
+    rig = RIG.replace("[1, 1]", "[5, 5]")
+    write_text(tmp_path / "scene.yaml", "scene: {}")
+    words = ["--dataset", tmp_path, "--rig", rig, "--output", tmp_path / "made"]
+    page = ["--name", "a/b", "--command", "c", "--yaml", tmp_path / "scene.yaml"]
+    why = f"{lightfield}: frames: are 1, but its rig has 25"
+    assert refused("report_figures.py", *words) == why
+    assert refused("report_html.py", *words, *page) == why
+    assert not (tmp_path / "made").exists()

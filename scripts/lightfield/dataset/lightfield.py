@@ -245,6 +245,13 @@ class LightField:
         """Whether the views' channel A is how much of a pixel the scene covers."""
         return bool(self.content.get("render", {}).get("transparent"))
 
+    def require_rig(self, rig: "rigs.Rig") -> None:
+        """Raise `UserError` where these are not as many views as a rig has."""
+        if rig.view_count != len(self.views):
+            raise UserError(
+                f"{self.path}: frames: are {len(self.views)}, but its rig has {rig.view_count}"
+            )
+
     def require_centre(self) -> None:
         """Raise `UserError` where the rays of a view do not start from one point."""
         if OMNIDIRECTIONAL in self.content:

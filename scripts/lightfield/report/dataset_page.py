@@ -51,6 +51,7 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
     What is not there (validation, measurements, depth, costs) has no section.
     """
     lightfield, rig = LightField.read(folder / NAME), origin.rig
+    lightfield.require_rig(rig)
     validation = tables.validation(folder / "validation.json")
     looks = views.collect(folder / IMAGES, lightfield, rig, _unreadable(validation))
     middle = lightfield.views[middle_view(rig)]

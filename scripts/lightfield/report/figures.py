@@ -49,6 +49,7 @@ class Overview:
 def draw(dataset: Path, rig: Rig, panorama: Path | None, output: Path) -> None:
     """Write all pictures of the dataset in the folder ``dataset`` to ``output``."""
     lightfield = LightField.read(dataset / NAME)
+    lightfield.require_rig(rig)
     views = [dataset / IMAGES / f"{view.name}.exr" for view in lightfield.views]
     lens = lightfield.lens
     thinned = views[:: math.ceil(len(views) / pictures.MOST_VIEWS)]

@@ -37,9 +37,13 @@ def from_camera(camera: Mapping[str, Any] | LensSettings) -> Lens:
     """Return the lens of a scene YAML's ``camera`` mapping.
 
     ``fov`` is in degrees: across the image's width for a rectilinear lens, that of the image
-    circle for a fisheye. ``sensor_size`` is its width, or both sides, in mm. Raises `UserError`.
+    circle for a fisheye. ``sensor_size`` is its width, or both sides, in mm. Raises `UserError`,
+    also for the lens of a .blend's camera, which its inventory has.
     """
-    return checked(_SETTINGS, camera, "camera").make()
+    settings = checked(_SETTINGS, camera, "camera")
+    if isinstance(settings, FileSettings):
+        raise UserError("camera: lens: is file, which goes with a rig of type blend_camera alone")
+    return settings.make()
 
 
 def from_lightfield(content: Mapping[str, Any]) -> Lens:
