@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from lightfield.core.cli import above_zero, run
+from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset.config import load_scene
 from lightfield.report import package
@@ -18,6 +19,10 @@ def main() -> None:
     )
     parser.add_argument("--output", type=Path, required=True, help="<scene>_<rig>.tar, and .json")
     arguments = parser.parse_args()
+    if arguments.output.suffix != ".tar":
+        raise UserError(f"--output {arguments.output}: must end in .tar; .json lies beside it")
+    if arguments.output.resolve().is_relative_to(arguments.folder.resolve()):
+        raise UserError(f"--output {arguments.output}: must not be in what it packs")
     card = package.card(arguments.folder, arguments.output.stem, load_scene(arguments.scene))
     most = arguments.gigabytes and arguments.gigabytes * 1e9
     parts = package.listed(package.pack(arguments.folder, card, arguments.output, most))

@@ -358,3 +358,16 @@ def test_a_report_of_another_rig_is_refused(refused, lightfield, tmp_path):
     assert refused("report_figures.py", *words) == why
     assert refused("report_html.py", *words, *page) == why
     assert not (tmp_path / "made").exists()
+
+
+@pytest.mark.parametrize(
+    ("output", "why"),
+    [("../rig.json", "must end in .tar; .json lies beside it"), ("./rig.tar", "must not be in")],
+)
+def test_a_package_is_no_list_and_not_in_itself(refused, lightfield, tmp_path, output, why):
+    rig = tmp_path / "rig"
+    rig.mkdir()
+    lightfield.rename(rig / "lightfield.json")
+    words = ["--scene", "smoke", "--folder", rig, "--output", rig / output]
+    assert why in refused("package.py", *words)
+    assert [path.name for path in tmp_path.rglob("*.*")] == ["lightfield.json"]
