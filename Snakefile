@@ -11,6 +11,8 @@ from lightfield.dataset.config import read_config
 
 # What the command line says, or the workflow whose module this is; config.yaml fills in the rest.
 GIVEN = set(config)
+# What a user's own folder says.
+OWN = {}
 
 
 # The defaults, and what a user's own folder says instead.
@@ -21,7 +23,7 @@ if Path("config.yaml").exists() and Path.cwd() != FOLDER:
 
     # Snakemake loads it without a limit.
     try:
-        read_config(Path("config.yaml"))
+        OWN = read_config(Path("config.yaml"))
     except UserError as error:
         sys.exit(f"error: {error}")
 

@@ -56,8 +56,9 @@ shell.prefix(
     ' echo "error: killed by SIG$(kill -l $status)" >&2; fi; return $status; }}; }}; '
 )
 
-# The rigs that config.yaml names are those of the scene that it names.
-if "scenes" in GIVEN and "rigs" not in GIVEN:
+# The rigs that a config.yaml names are those of the scene that it names.
+NAMING = GIVEN if "scenes" in GIVEN else OWN
+if "scenes" in NAMING and "rigs" not in {*GIVEN, *NAMING}:
     config["rigs"] = "all"
 
 # Locally, without --cores and --jobs, all that this process may use.
