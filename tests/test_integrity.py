@@ -313,6 +313,24 @@ def test_what_a_copy_says_of_itself_must_agree(small):
         assert found_in(small, None) == {sums: problem}
 
 
+def test_a_view_is_known_by_whatever_list_is_left(small):
+    """Of those that have its checksum: both of published files, the shard's record and its log."""
+    view = Path("results", small, "exr/view_0000f.exr")
+    log = Path("work", small, "render/0-1.sums.jsonl")
+    log.write_text(json.dumps({"file": "exr/view_0000f.exr", "sha256": sha256(view)}))
+    ledger.note(Path("work/sums.json"), [str(log)], (), lambda _: False)
+    view.write_bytes(b"spoilt")
+    lists = [view.parents[1] / "sha256sums.txt", Path("work", small, "checksums.txt")]
+    lists += [log.with_name("0-1.json"), log]
+    for number, path in enumerate(lists):
+        assert found_in(small)[str(view)].startswith("its sha256 is "), number
+        path.write_bytes(b"spoilt")
+    assert found_in(small)[str(view)] == "is no file of this dataset, or has no checksum"
+    view.unlink()
+    view.mkdir()
+    assert str(view) in found_in(small)
+
+
 def test_a_file_that_the_disk_does_not_yield_is_a_fault(small, monkeypatch):
     def failing(path):
         if path.name == "depth.png":

@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import broken, read_json, set_aside, sha256, whole
+from lightfield.core.files import broken, read_json, read_json_lines, set_aside, sha256, whole
 from lightfield.dataset import ledger, records
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
@@ -66,9 +66,13 @@ class Integrity:
         for path, problem in found.items():
             if problem:
                 yield Fault(path, problem)
-        for path in self._present() if self._published else ():
-            if path not in expected:
-                yield Fault(path, "is no file of this dataset, or has no checksum")
+        # Also where all lists that had a file's checksum are damaged.
+        was_finished = self._published or self._is_noted(self.dataset / SUMS)
+        present = set(self._present()) if was_finished else set()
+        for path in sorted(present - expected.keys()):
+            yield Fault(path, "is no file of this dataset, or has no checksum")
+        for path in sorted(self._views_like(present) - expected.keys() - present):
+            yield Fault(path, "is missing")
         wrong = {path for path, problem in found.items() if problem}
         yield from (fault for fault in self._contents(expected) if fault.path not in wrong)
 
@@ -87,7 +91,8 @@ class Integrity:
         """Yield the file by which the job is known that has made a file, where that is another."""
         if path.name.endswith(_LOG):
             yield path.with_name(path.name.replace(_LOG, ".json"))
-        if path in self._published and path not in self._recorded and not self._is_noted(path):
+        is_listed = path in self._published or not self._published
+        if is_listed and path not in self._recorded and not self._is_noted(path):
             # An export's file.
             for folder in path.relative_to(self.dataset).parents:
                 for name in (MANIFEST, "transforms.json"):
@@ -112,16 +117,26 @@ class Integrity:
 
     @cached_property
     def _recorded(self) -> dict[Path, str]:
-        """The SHA-256 of each view by its path, from the records that are as they were written."""
+        """The SHA-256 of each view by its path, from what is as it was written of its shard.
+
+        That is the record, or else the log, in which a file's last line counts.
+        """
         found: dict[Path, str] = {}
         for path in map(Path, self._ledger):
-            if self._is_own(path) and re.fullmatch(r"\d+-\d+\.json", path.name):
-                if not self._is_sound(path):
-                    continue
-                for file, (_, digest) in records.read(path).items():
-                    # A record of shards with other bounds may have views that there were.
-                    if not self._published or self.dataset / file in self._published:
-                        found[self.dataset / file] = digest
+            if not (self._is_own(path) and re.fullmatch(r"\d+-\d+\.json", path.name)):
+                continue
+            log = path.with_name(f"{path.stem}{_LOG}")
+            if self._is_sound(path):
+                sums = {file: digest for file, (_, digest) in records.read(path).items()}
+            elif self._is_sound(log):
+                lines = (line for line in read_json_lines(log) if "file" in line)
+                sums = {line["file"]: line["sha256"] for line in lines}
+            else:
+                continue
+            for file, digest in sums.items():
+                # A record of shards with other bounds may have views that there were.
+                if not self._published or self.dataset / file in self._published:
+                    found[self.dataset / file] = digest
         return found
 
     @cached_property
@@ -178,8 +193,22 @@ class Integrity:
         for path in sorted(self.dataset.rglob("*")):
             parts = path.relative_to(self.dataset).parts
             added = parts in ((SUMS,), (CARD,), (README,))
-            if not path.is_dir() and not added and (self._ledger or parts[0] != REPORT):
+            # A folder may have taken a picture's place.
+            is_file = not path.is_dir() or path.suffix in (".exr", ".png")
+            if is_file and not added and (self._ledger or parts[0] != REPORT):
                 yield path
+
+    def _views_like(self, present: set[Path]) -> set[Path]:
+        """Return the views by the names that lightfield.json has, of the kinds that are there."""
+        views = set()
+        for path in {self.dataset / NAME, *self.dataset.glob(f"*/{NAME}")}:
+            if self._is_noted(path) and self._is_sound(path):
+                folder = self.dataset / IMAGES if path.parent == self.dataset else path.parent
+                names = {view.name for view in LightField.read(path).views}
+                there = {file for file in present if file.parent == folder and file.stem in names}
+                kinds = {file.suffix for file in there}
+                views |= {folder / f"{name}{kind}" for name in names for kind in kinds}
+        return views
 
     def _contents(self, expected: Mapping[Path, tuple[str, str]]) -> Iterator[Fault]:
         """Check that the files of sums, validation and views agree on what there is."""
