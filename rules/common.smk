@@ -1,5 +1,6 @@
 # The configuration, and where everything lies. Every path of the workflow comes from here.
 import atexit
+import difflib
 import json
 import math
 import os
@@ -170,8 +171,15 @@ def times_of(job):
 
 
 def dataset_of(wildcards):
-    """Return the dataset that a job's wildcards mean."""
-    return DATASETS[wildcards.scene, wildcards.rig]
+    """Return the dataset that a job's wildcards mean; ends the run where there is none."""
+    key = (wildcards.scene, wildcards.rig)
+    if key not in DATASETS:
+        name = f"{wildcards.scene}/{wildcards.rig}"
+        names = [f"{scene}/{rig}" for scene, rig in DATASETS]
+        near = " or ".join(difflib.get_close_matches(name, names))
+        hint = f"; is {near} meant?" if near else ""
+        sys.exit(f"error: {RESULTS}/{name}: no dataset of the chosen scenes{hint}")
+    return DATASETS[key]
 
 
 def of_dataset(attribute):

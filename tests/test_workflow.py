@@ -237,3 +237,10 @@ def test_the_default_scene_plans_its_stages(preset, smoke):
     plan = succeeding(smoke, "-n", "--cores", "1", "--config", f"preset={preset}")
     assert "build_scene" in plan
     assert "check_blend" not in plan
+
+
+def test_a_dataset_that_there_is_not_is_named_beside_one_that_there_is(other):
+    said = failing(other, "--dry-run", "results/smoke/LFCuboid_1x1/sha256sums.txt")
+    last = said.splitlines()[-1]
+    assert last.startswith("error: results/smoke/LFCuboid_1x1: no dataset of the chosen scenes; is")
+    assert "smoke/LFCuboid_1x1x1" in last and "Traceback" not in said
