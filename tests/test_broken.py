@@ -26,7 +26,7 @@ FAULTS = [
     (folder_of, "is a folder"),
     (text(b'{"half": ['), "is not JSON: "),
     (text(b"[1, 2]"), "is a list, not a mapping"),
-    (text(b'{"\xff": 1}'), "is not JSON: "),
+    (text(b'{"\xff": 1}'), "is no text in UTF-8"),
     (text(b""), "is empty"),
     (text(b"null"), "is a NoneType, not a mapping"),
 ]

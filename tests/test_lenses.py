@@ -817,8 +817,8 @@ def test_what_a_scene_yaml_leaves_out() -> None:
     assert from_camera(OF_OPENCV | size) == KannalaBrandt(
         **LANDSCAPE, focal_length=9, coefficients=(0, 0, 0, 0), fov=2 * math.pi
     )
-    # Until the .blend's own camera is read.
-    assert from_camera({"lens": "file", **size}) == Rectilinear(**LANDSCAPE, focal_length=50)
+    with pytest.raises(UserError, match="goes with a rig of type blend_camera"):
+        from_camera({"lens": "file", **size})
 
 
 @pytest.mark.parametrize("name", ["rectilinear", "rectilinear shifted"])
