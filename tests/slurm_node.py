@@ -5,6 +5,7 @@
 installs what is missing (as root, by apt), starts the daemons with all that they write in FOLDER,
 runs the command against them, and stops them. Everything listens on the loopback address. The one
 file outside FOLDER is /etc/slurm/slurm.conf, where a job's steps find the cluster; it goes again.
+If this program is killed, its daemons go with it, and the next one takes the file's place.
 Where file systems may be mounted, the node's temporary files lie on a small disk of its own.
 """
 
@@ -18,6 +19,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
+import psutil
 from checkouts import wait_until
 
 PACKAGES = {
@@ -33,8 +35,8 @@ PATH = f"{os.environ['PATH']}:/usr/sbin:/sbin"
 # Mounted for the node's daemon and its jobs alone.
 DISK = 'mount -t tmpfs -o size=64m node "$0" && mount --bind "$0" /dev/shm && exec "$@"'
 
-CONFIGURATION = """ClusterName=plenoforge
-SlurmctldHost={host}(127.0.0.1)
+CLUSTER = "ClusterName=plenoforge\n"
+CONFIGURATION = """SlurmctldHost={host}(127.0.0.1)
 SlurmctldPort={controller_port}
 SlurmdPort={node_port}
 SlurmUser=root
@@ -93,7 +95,7 @@ class Node:
         (folder / "munge.key").write_bytes(secrets.token_bytes(1024))
         (folder / "munge.key").chmod(0o400)
         self.host = socket.gethostname().split(".")[0]
-        content = CONFIGURATION.format(
+        content = CLUSTER + CONFIGURATION.format(
             host=self.host,
             folder=folder,
             memory=memory,
@@ -101,7 +103,7 @@ class Node:
             controller_port=_free_port(),
             node_port=_free_port(),
         )
-        if CONFIGURED.exists():
+        if CONFIGURED.exists() and not _is_left_behind(CONFIGURED.read_text()):
             sys.exit(f"error: {CONFIGURED} is there: this machine belongs to a cluster already")
         CONFIGURED.write_text(content)
         self.environment = os.environ | {"PATH": PATH, "TMPDIR": f"{folder}/disk"}
@@ -129,6 +131,8 @@ class Node:
     def start(self, daemon: str, *arguments: str) -> None:
         """Start a daemon in the foreground, as a child of this process."""
         words = [daemon, *arguments, *(["--foreground"] if daemon == "munged" else [])]
+        # A killed process ends no child: this lets the kernel do it.
+        words = ["setpriv", "--pdeathsig", "KILL", *words]
         words = [*(self.own_disk if daemon == "slurmd" else []), *words]
         with (self.folder / f"{daemon}.out").open("ab") as output:
             self.daemons[daemon] = subprocess.Popen(
@@ -164,6 +168,15 @@ class Node:
 
     def state(self) -> str:
         return self.run("sinfo", "--noheader", "--format=%T").rstrip("*")
+
+
+def _is_left_behind(configuration: str) -> bool:
+    """Return whether a killed program of these has written it: its daemons are gone."""
+    running = any(
+        process.info["name"] == "slurmctld" and process.info["status"] != psutil.STATUS_ZOMBIE
+        for process in psutil.process_iter(["name", "status"])
+    )
+    return configuration.startswith(CLUSTER) and not running
 
 
 def _free_port() -> int:

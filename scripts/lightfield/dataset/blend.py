@@ -51,17 +51,17 @@ def lens_of(blend: Settings, resolution: tuple[int, int]) -> RectilinearSettings
     across = fit == "HORIZONTAL" or (fit == "AUTO" and width >= height)
     side = width if across else height
     millimetres = lens["sensor_height" if fit == "VERTICAL" else "sensor_width"] / side
-    point = None
-    if lens["shift_x"] or lens["shift_y"]:
-        # Blender shifts by parts of the side that the sensor is fitted to, and up.
-        point = (width / 2 - lens["shift_x"] * side, height / 2 + lens["shift_y"] * side)
-    return RectilinearSettings(
+    settings = RectilinearSettings(
         lens="rectilinear",
         focal_length=lens["lens"],
         sensor_size=(width * millimetres, height * millimetres),
         resolution=(width, height),
-        principal_point=point,
     )
+    if not lens["shift_x"] and not lens["shift_y"]:
+        return settings
+    # Blender shifts by parts of the side that the sensor is fitted to, and up.
+    point = (width / 2 - lens["shift_x"] * side, height / 2 + lens["shift_y"] * side)
+    return settings.model_copy(update={"principal_point": point})
 
 
 def taken(
