@@ -59,6 +59,7 @@ def test_nothing_is_wrong_with_a_build_and_with_a_copy_of_it(copy):
     assert faults(copy, work=None) == {}
 
 
+@pytest.mark.slow
 def test_every_fault_is_found_and_no_other(copy):
     rng = random.Random(1)
     whole = {path: path.read_bytes() for path in own_files("results", "work")}

@@ -540,6 +540,7 @@ def test_a_rig_in_words_has_no_size_that_nobody_gave():
     assert dataset_page.rig_text(rigs.from_settings(LINE), places) == "plane 5 × 3, 2 × 1 × 1 m"
 
 
+@pytest.mark.slow
 def test_without_a_panorama_the_overview_is_the_view_in_the_middle(tmp_path):
     write_dataset(tmp_path, LINE)
     draw(tmp_path, LINE, tmp_path / "report")

@@ -241,7 +241,7 @@ def test_a_panorama_has_no_seam(name):
 
 
 @pytest.mark.parametrize("pitch", [-90, 90])
-@pytest.mark.parametrize("size", [24, 256])
+@pytest.mark.parametrize("size", [24, pytest.param(256, marks=pytest.mark.slow)])
 def test_a_panorama_is_whole_at_its_poles(pitch, size):
     function = Waves(25)
     source = as_source(function.pixels(PANORAMA, nodes=3))
