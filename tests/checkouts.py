@@ -15,12 +15,16 @@ PARTS = ("Snakefile", "config.yaml", "configs", "envs", "profiles", "captions", 
 
 
 def checkout(folder, **scenes):
-    """Copy what Snakemake needs to ``folder``, with ``scenes``' YAML texts in configs/scenes/."""
+    """Copy what Snakemake needs to ``folder``, with ``scenes``' YAML texts in configs/scenes/.
+
+    What is compiled goes with it, but not what another process is about to write.
+    """
     folder.mkdir(parents=True, exist_ok=True)
+    on_the_way = shutil.ignore_patterns("*.pyc.*", "*.tmp.*")
     for name in PARTS:
         source = ROOT / name
         if source.is_dir():
-            shutil.copytree(source, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(source, folder / name, ignore=on_the_way)
         else:
             shutil.copy(source, folder / name)
     for name, text in scenes.items():
