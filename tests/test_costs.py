@@ -93,6 +93,8 @@ def dataset(tmp_path, run_program):
     def count(*lines, full=None):
         journals = work / "journals"
         journals.mkdir(exist_ok=True)
+        # A user's copy is of no shard.
+        (journals / "kept.journal.jsonl").write_text("{}\n")
         (journals / "0-3.journal.jsonl").write_text("\n".join(map(json.dumps, lines)) + "\n")
         run_program(
             "costs.py",

@@ -49,6 +49,8 @@ def dataset(tmp_path, monkeypatch, capsys):
         (made / "render").mkdir(parents=True, exist_ok=True)
         text = "".join(json.dumps(line) + "\n" for line in lines)
         (made / f"render/{name}.journal.jsonl").write_text(text)
+        # A user's copy is of no shard.
+        (made / "render/kept.journal.jsonl").write_text(text)
 
     lines.folder, lines.made, lines.content = folder, made, content
     lines.render, lines.journal = render, journal

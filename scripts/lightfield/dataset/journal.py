@@ -27,6 +27,9 @@ import psutil
 from lightfield.core import memory
 from lightfield.core.files import append_json_line, read_json_lines
 
+# Of all shards in a folder: 0-6.journal.jsonl is of the views from 0 to 5.
+JOURNALS = "[0-9]*-[0-9]*.journal.jsonl"
+
 # A machine that has failed so often, one time after the other, is avoided.
 MOST_FAILURES = 3
 # A view is suspect that was rendered in so small a part of the time of so many others at least.

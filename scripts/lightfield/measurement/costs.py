@@ -246,7 +246,7 @@ def costs(
     """
     by_shard = {
         path.name.removesuffix(".journal.jsonl"): journal.read(path)
-        for path in sorted(journals.glob("*.journal.jsonl"))
+        for path in sorted(journals.glob(journal.JOURNALS))
     }
     runs = [run for part in by_shard.values() for run in part]
     shards = [shard_costs(name, part) for name, part in by_shard.items()]

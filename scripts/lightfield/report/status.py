@@ -51,7 +51,7 @@ def look(folder: Path, work: Path, count: int, now: float) -> Rendering:
                 found.finished |= _keyed(folder, lightfield, found.finished)
     except UserError as error:
         print(f"{error}; it is made anew", file=sys.stderr)
-    journals = filter(Path.is_file, (work / "render").glob("*.journal.jsonl"))
+    journals = filter(Path.is_file, (work / "render").glob(journal.JOURNALS))
     for bounds, path in sorted((_bounds(path), path) for path in journals):
         if runs := journal.read(path):
             first, end = bounds
