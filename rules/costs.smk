@@ -4,7 +4,7 @@
 rule costs:
     input:
         validation=f"{DATASET}/validation.json",
-        records=of_dataset("all_records"),
+        records=stored_records,
         published=of_dataset("published"),
         pictures=of_dataset("pictures"),
         blend=of_dataset("blend"),

@@ -98,7 +98,7 @@ rule figures:
 
 rule page:
     input:
-        records=of_dataset("all_records"),
+        records=stored_records,
         published=of_dataset("published"),
         pictures=of_dataset("pictures"),
         validation=f"{DATASET}/validation.json",

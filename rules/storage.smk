@@ -23,6 +23,14 @@ def taking(lists):
     return f"python {SCRIPTS}/take_views.py {words} > {{log}} 2>&1; " if STORE else ""
 
 
+def stored_records(wildcards):
+    """Return a dataset's records where the job takes its views from the store.
+
+    Else its validation stands for them, and a plan of thousands of shards is shorter.
+    """
+    return dataset_of(wildcards).all_records if STORE else []
+
+
 def stored_lists(wildcards):
     """Return what lists the files in the view store, of all chosen datasets; nothing without one."""
     datasets = CHOSEN if STORE else []
