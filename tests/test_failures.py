@@ -268,8 +268,10 @@ def test_why_slurm_takes_no_job_is_said_at_the_end(
             *("--slurm-init-seconds-before-status-checks", "1"),
         ],
     )
-    assert terminal.splitlines()[-2].startswith("render failed: "), terminal
-    assert terminal.splitlines()[-2].endswith(said), terminal
+    # The account is judged before there is a job; older plugins break the line.
+    lines = terminal.splitlines()
+    assert " ".join(lines[:-1]).endswith(said) or " ".join(lines).endswith(said), terminal
+    assert account != "mine" or lines[-2].startswith("render failed: "), terminal
 
 
 def test_the_cause_is_the_last_error_or_else_the_last_line(tmp_path):
