@@ -788,6 +788,15 @@ def test_of_a_scene_with_volumes_the_misses_are_counted(
     assert check(clear, "depth").warnings == []
 
 
+@pytest.mark.parametrize("name", ["records", "clearance", "splits"])
+def test_a_wrong_list_is_named_before_images_are_read(small_dataset, capsys, name) -> None:
+    path = small_dataset.parent / "list.json"
+    write_json(path, [])
+    with pytest.raises(UserError, match=r"list\.json: "):
+        validate(small_dataset, **{name: [path] if name == "records" else path})
+    assert not capsys.readouterr().err
+
+
 def test_exports_own_what_they_list(small_dataset: Path) -> None:
     picture = np.zeros((64, 64, 3), np.uint8)
     images.write_png(small_dataset / "exr" / "dynamic_mask_view_0001f.png", picture[..., 0])

@@ -17,7 +17,6 @@ from lightfield.core.files import read_json, set_aside, sha256, write_text
 from lightfield.dataset.dataset import REPORT_FILES
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, NAMES, Pass
-from lightfield.dataset.records import read as read_record
 from lightfield.geometry import rotations
 from lightfield.geometry.lenses import Lens
 from lightfield.validation.consistency import Camera
@@ -335,14 +334,13 @@ def remove_strays(
 
 
 def checksums(
-    records: Sequence[Path], found: Mapping[str, tuple[int, str]], sets: Sequence[ImageSet]
+    recorded: Mapping[str, tuple[int, str]] | None,
+    found: Mapping[str, tuple[int, str]],
+    sets: Sequence[ImageSet],
 ) -> Check:
-    """Compare the images' sizes and SHA-256, by path, with the records of those who wrote them."""
-    if not records:
+    """Compare the images' sizes and SHA-256, by path, with those that their writers recorded."""
+    if recorded is None:
         return Check("checksums", None, "no record was given")
-    recorded: dict[str, tuple[int, str]] = {}
-    for record in records:
-        recorded |= read_record(record)
     faults = {}
     for path, (size, digest) in sorted(recorded.items()):
         if path not in found:

@@ -22,6 +22,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_MEMORY
 from lightfield.core.files import read_json, sha256
 from lightfield.core.progress import Progress
+from lightfield.dataset.records import read as read_record
 from lightfield.validation import files, geometry, pixels
 from lightfield.validation import splits as validation_splits
 from lightfield.validation.consistency import Answer
@@ -57,6 +58,10 @@ def validate(
     views, presence = files.of_views(dataset, sets)
     passes, missing = files.of_passes(dataset, sets)
     extras, lists, exports = files.of_exports(dataset, sets, views, manifests, wanted)
+    # What does not follow from the images comes first: a wrong file of it costs no hours.
+    written = [sums for record in records for sums in read_record(record).items()]
+    cameras = files.clearance(clearance, sets)
+    split = [validation_splits.check(splits, dataset, sets)] if splits else []
     facts: dict[File, Facts] = {}
     with _workers(Examiner(dataset, sets), processes) as mapped:
         images = views + passes + extras
@@ -79,9 +84,8 @@ def validate(
     published, listing = files.listing(dataset, sets, {*lists, *found})
     if len(sets) <= len(reprojections):
         listing = Check("files", None, "a lightfield.json that cannot be understood lists no files")
-    checks += [listing, files.checksums(records, found, sets), files.clearance(clearance, sets)]
-    if splits:
-        checks.append(validation_splits.check(splits, dataset, sets))
+    sums = files.checksums(dict(written) if records else None, found, sets)
+    checks += [listing, sums, cameras, *split]
     rendered = files.rendered(sets)
     return Result(
         f"{dataset.parent.name}/{dataset.name}",
