@@ -27,11 +27,8 @@ def main() -> None:
     lightfield = LightField.read(arguments.lightfield)
     names = [view.name for view in lightfield.views]
     positions = np.array([view.position for view in lightfield.views])
-    inventory = (
-        read_keys(arguments.inventory, "inventory.py", "external_files")
-        if arguments.inventory
-        else None
-    )
+    path = arguments.inventory
+    inventory = path and read_keys(path, "inventory.py", "external_files")
     blend_file.open_scene(arguments.blend, lightfield.content.get("scene", {}), inventory)
     bpy.context.scene.frame_set(lightfield.frame)
     distances = clearances(positions)

@@ -32,11 +32,8 @@ def main() -> None:
     if not isinstance(rig, rigs.Random):
         raise UserError(f"--rig: type: is {rig.type}; must be random")
     chosen = config.load_scene(arguments.scene).scene.model_dump() if arguments.scene else {}
-    inventory = (
-        read_keys(arguments.inventory, "inventory.py", "external_files")
-        if arguments.inventory
-        else None
-    )
+    path = arguments.inventory
+    inventory = path and read_keys(path, "inventory.py", "external_files")
     blend_file.open_scene(arguments.blend, chosen, inventory)
     if arguments.frame != config.FILE:
         bpy.context.scene.frame_set(checked(TypeAdapter(Frame), arguments.frame, "--frame"))
