@@ -73,7 +73,8 @@ def test_one_line_says_how_far_the_whole_run_is(run):
     assert line.endswith(" left · views")
     run.log("a", "render scene a: 8 of 8 views, 20 s each, done in 180 s")
     run.log("b", "render scene b: 10 of 10 views, 20 s each, done in 200 s")
-    run.shown(160, finished=["a", "b"], running=["panorama"])
+    shown = run.shown(160, finished=["a", "b"], running=["panorama"])
+    assert shown[0] == "views: 18 views in 3 min 20 s"
     # Views took 20 s instead of 10 s: 50 s become 100 s, of which 1.8 are done in a second.
     assert run.display.line(run.now) == "3 of 4 jobs · 20 of 20 views · 56 s left · report"
     assert run.shown(50, finished=["panorama"]) == ["report: 1 job in 50 s"]

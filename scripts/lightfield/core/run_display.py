@@ -188,8 +188,9 @@ class RunDisplay:
         for phase in [phase for phase in self._phases if phase not in waiting]:
             del self._phases[phase]
             tasks = [task for task in self._tasks.values() if task.phase == phase]
-            views = sum(task.views for task in tasks)
-            count = f"{views} views" if views else _count(len(tasks), "job")
+            made = sum(task.views_made for task in tasks)
+            has_views = any(task.views for task in tasks)
+            count = _count(made, "view") if has_views else _count(len(tasks), "job")
             began = min(task.began or self._began for task in tasks)
             ended = max(task.ended or began for task in tasks)
             self._say(f"{phase}: {count} in {duration(ended - began)}")
