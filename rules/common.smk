@@ -336,7 +336,7 @@ def checked_blend(wildcards):
 def listed_blend(wildcards):
     """Return a scene's .blend, which is listed again if a file that it reads is another one."""
     dataset = SCENES[wildcards.name]
-    if dataset.external_changed:
+    if dataset.external_changed(ViewStore(STORE) if STORE else None):
         made_anew(dataset.inventory)
     return local(dataset.blend) if dataset.source.blend else dataset.blend
 

@@ -126,7 +126,11 @@ def test_what_a_user_brings_reaches_jobs_in_isolated_folders(run_program, tmp_pa
         assert digest == sha256(root / "published/LFPlane" / name)
         assert store.take(digest, tmp_path / "theirs" / name)
 
+    dry_run = ("--dry-run", "--quiet", "rules", *BROUGHT_WORDS)
+    (folder / "views/sums" / sha256(root / "textures/walls.png")).unlink()
+    said, _ = build.start(*dry_run).communicate()
+    assert "inventory" in said.split(), said
     (root / "textures/box.png").write_bytes((root / "textures/walls.png").read_bytes())
-    said, _ = build.start("--dry-run", "--quiet", "rules", *BROUGHT_WORDS).communicate()
+    said, _ = build.start(*dry_run).communicate()
     assert {"inventory", "lightfield", "render"} <= set(said.split()), said
     assert not {"check_blend", "store_brought", "import_views"} & set(said.split())

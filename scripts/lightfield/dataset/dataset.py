@@ -36,6 +36,7 @@ from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
 from lightfield.dataset.keys import scene_fingerprint
 from lightfield.dataset.lightfield import NAME, OMNIDIRECTIONAL
 from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.view_store import ViewStore
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -530,15 +531,18 @@ class Dataset:
         except (OSError, ValueError, LookupError, TypeError):
             return True
 
-    @property
-    def external_changed(self) -> bool:
-        """Whether a file that the user's .blend reads is no longer the one in its inventory."""
+    def external_changed(self, store: ViewStore | None) -> bool:
+        """Whether a file that the user's .blend reads is no longer the one in its inventory.
+
+        So is one that the view store has lost, if there is one.
+        """
         if not self.source.blend:
             return False
         home = Path(self.source.blend).parent
         try:
             return any(
                 _size_and_time(home / file["path"]) != (file["bytes"], file["mtime_ns"])
+                or (store and file["bytes"] and not store.has(file["sha256"]))
                 for file in json.loads(Path(str(self.inventory)).read_bytes())["external_files"]
             )
         except FileNotFoundError:

@@ -122,6 +122,11 @@ class ViewStore:
         notes = (note.rpartition("@") for note in self.names(f"views/keys/{key}"))
         return [(name.replace("@", "/"), digest) for name, separator, digest in notes if separator]
 
+    def has(self, digest: str) -> bool:
+        """Return whether there is a file of a SHA-256, by its name alone."""
+        with self._answering():
+            return bool((self._root / "sums" / digest).is_file())
+
     def take(self, digest: str, target: Path) -> bool:
         """Make ``target`` the file of a SHA-256, unless it is; return False where there is none."""
         if target.is_file() and sha256(target) == digest:

@@ -90,7 +90,7 @@ def _take_files(path: Path, inventory: Mapping[str, Any]) -> None:
         if file["bytes"] and not store.take(file["sha256"], path.parent / file["path"]):
             raise UserError(
                 f"{path}: reads {file['path']}, which is not in the view store {store.url}; "
-                "snakemake --forcerun inventory puts it there"
+                "the next run puts it there"
             )
 
 
