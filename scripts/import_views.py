@@ -5,11 +5,10 @@ from pathlib import Path
 
 from lightfield.core.cli import run, view_slice
 from lightfield.core.errors import UserError
-from lightfield.core.files import second_name, sha256
+from lightfield.core.files import second_name
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.records import ShardRecord
-from lightfield.dataset.view_store import ViewStore
 
 
 def main() -> None:
@@ -23,17 +22,21 @@ def main() -> None:
 
     views = LightField.read(arguments.lightfield).views
     names = [f"{view.name}.exr" for view in views[view_slice(arguments.views, len(views))]]
-    progress, store = Progress(len(names), "import", "views"), ViewStore.configured()
+    record = ShardRecord(arguments.record, arguments.output)
+    progress = Progress(len(names), "import", "views")
     for name in names:
         path = arguments.dataset / "exr" / name
         if not path.is_file():
             raise UserError(f"{path}: no such file, but its lightfield.json has the view")
-        second_name(path, arguments.output / name)
-        if store:
-            store.put(path, sha256(path))
+        taken = arguments.output / name
+        second_name(path, taken)
+        # An owner who makes a view anew makes another file: what changes in this one is damage.
+        key = f"inode-{path.stat().st_ino}"
+        if taken.samefile(path):
+            record.refuse_changed(taken, key)
+        record.add(taken, key)
         progress.done()
-    files = [arguments.output / name for name in names]
-    ShardRecord(arguments.record, arguments.output).write(files)
+    record.write(arguments.output / name for name in names)
 
 
 if __name__ == "__main__":

@@ -51,8 +51,8 @@ def published(tmp_path):
 
 
 def test_published_views_are_reprojected_exported_and_validated(published, tmp_path, run_program):
-    def run(name, *words):
-        return run_program(name, *words, cwd=tmp_path)
+    def run(name, *words, **options):
+        return run_program(name, *words, cwd=tmp_path, **options)
 
     dataset = tmp_path / "results" / "theirs" / "LFPlane"
     own = dataset / "lightfield.json"
@@ -68,6 +68,14 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
     assert files.keys() == {f"exr/{path.name}" for path in (published / "exr").iterdir()}
     for name, entry in files.items():
         assert sha256(published / name) == sha256(dataset / name) == entry["sha256"]
+    # One file by two names: what damages the one damages the other.
+    view = next((published / "exr").iterdir())
+    content = view.read_bytes()
+    view.write_bytes(content[:-1] + b"?")
+    refused = run("import_views.py", *words, check=False)
+    assert f"{view.name}: has other bytes than when it was taken over" in refused.stderr
+    view.write_bytes(content)
+    run("import_views.py", *words)
     again = dataset / "perspective"
     camera = '{"lens": "rectilinear", "fov": 90, "resolution": [24, 24]}'
     words = ["--exr", "--camera", camera, "--input-cfg", own, "--input-dir", views]
@@ -170,5 +178,10 @@ def test_a_view_that_nobody_may_write_is_taken_over(nobody):
     view, taken = nobody / "published.exr", nobody / "exr" / "taken.exr"
     view.write_bytes(b"a view")
     view.chmod(0o444)
-    second_name(view, taken)
-    assert taken.samefile(view)
+    (nobody / "deep").mkdir()
+    link = nobody / "deep" / "link.exr"
+    link.symlink_to("../published.exr")
+    for name in (view, link):
+        second_name(name, taken)
+        assert taken.samefile(view)
+        assert not taken.is_symlink()

@@ -58,7 +58,8 @@ def second_name(file: Path, target: Path) -> None:
     """Make ``target`` a hard link to a file, or a copy where the file system has no links."""
     with atomic_path(target) as temporary:
         try:
-            os.link(file, temporary)
+            # Not of a link, as git-annex has them: Linux would take over the link itself.
+            os.link(file.resolve(), temporary)
         except OSError:
             shutil.copyfile(file, temporary)
 

@@ -51,6 +51,17 @@ class ShardRecord:
         self._finished[name] = sums
         return True
 
+    def refuse_changed(self, file: Path, key: str) -> None:
+        """Raise `UserError` for a file that was last logged for ``key``, but with other bytes."""
+        if self._path is None:
+            return
+        last = self._last_logged.get(self._name(file), {})
+        if last.get("key") == key and last.get("sha256") != sha256(file):
+            raise UserError(
+                f"{file}: has other bytes than when it was taken over, in the same file; put back "
+                f"the right one, or remove {_log(self._path)} to take them as they are now"
+            )
+
     def add(self, file: Path, key: str) -> None:
         """Log a file that has just been finished; a kill before that makes it once more."""
         if self._path is None:
@@ -84,6 +95,13 @@ class ShardRecord:
     def _name(self, file: Path) -> str:
         # A view's passes lie beside the folder of the views.
         return os.path.normpath(Path(self._dataset_folder, os.path.relpath(file, self._folder)))
+
+    @cached_property
+    def _last_logged(self) -> dict[Any, dict[str, Any]]:
+        """The last line of the log on each file."""
+        assert self._path
+        log = _log(self._path)
+        return {line.get("file"): line for line in read_json_lines(log)} if log.exists() else {}
 
     @cached_property
     def _logged_here(self) -> set[tuple[Any, Any, Any]]:
