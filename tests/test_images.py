@@ -152,6 +152,19 @@ def test_exr_files_of_other_kinds(tmp_path, channels, storage):
     assert np.array_equal(some, channels["Z"][3:9], equal_nan=True)
 
 
+def test_a_header_with_damaged_text_is_read_or_named(tmp_path, channels):
+    path = tmp_path / "a.exr"
+    write_exr(path, channels, ATTRIBUTES)
+    whole = path.read_bytes()
+    # OpenEXR itself ends with an error of Python's, or of the system's, for both.
+    path.write_bytes(whole.replace(b"plenoforge:nan", b"\xf0lenoforge:nan"))
+    assert read_header(path).attributes["plenoforge:scale"] == 0.5
+    assert same(np.ascontiguousarray(read_image(path).channels["Z"]), channels["Z"])
+    path.write_bytes(whole.replace(b"\0Z\0", b"\0\xda\0"))
+    with pytest.raises(UserError, match=r"a\.exr: is no image that can be read: .*utf-8"):
+        read_header(path)
+
+
 @pytest.mark.parametrize("part", [0, 3, 100, 0.5, 0.99])
 def test_a_file_cut_short_is_named(tmp_path, channels, part):
     path = tmp_path / "cut.exr"

@@ -5,6 +5,7 @@ package reads twice as fast and writes in two thirds of the time, and with codec
 So OpenImageIO, which takes 33 MB of memory, is imported where a file needs it.
 """
 
+import functools
 import re
 import struct
 import zlib
@@ -100,12 +101,12 @@ def is_whole(path: Path | str) -> bool:
 
 def read_header(path: Path | str) -> Header:
     """Read the header alone; raises `UserError` for a file that is no image."""
-    if _is_plain_exr(path):
-        return _exr_header(_open_exr(path).header())
+    if header := _plain_exr_header(path):
+        return header
     file = _open(path)
     spec = file.spec()
     file.close()
-    return Header(spec.width, spec.height, list(spec.channelnames), _attributes(spec))
+    return Header(spec.width, spec.height, _channel_names(path, spec), _attributes(spec))
 
 
 def read_image(
@@ -120,7 +121,8 @@ def read_image(
     arrays may be read-only. Raises `UserError` for a file that is missing, no image, cut short,
     or without one of the ``channels``.
     """
-    read = _read_plain_exr if _is_plain_exr(path) else _read_other
+    header = _plain_exr_header(path)
+    read = functools.partial(_read_plain_exr, header) if header else _read_other
     image, names = read(path, channels, rows)
     missing = [name for name in channels or () if name not in image.channels]
     if missing:
@@ -256,34 +258,25 @@ def _open(path: Path | str) -> Any:
     return file
 
 
-def _is_plain_exr(path: Path | str) -> bool:
-    """Whether a file is an EXR of one part, without tiles or deep pixels."""
+def _plain_exr_header(path: Path | str) -> Header | None:
+    """Return the header of an EXR of one part, without tiles or deep pixels; None of other files.
+
+    None, too, where it has text that is not UTF-8, at which OpenEXR's InputFile may crash.
+    """
     try:
         with Path(path).open("rb") as file:
             magic, version = struct.unpack("<II", file.read(8))
-    except (OSError, struct.error):
-        return False
-    return magic == _EXR_MAGIC and not version & _EXR_OTHER_KINDS
-
-
-def _open_exr(path: Path | str) -> Any:
-    try:
-        # OpenEXR.File, which is to replace InputFile, reads whole files only.
-        return OpenEXR.InputFile(str(path))
-    except OSError as error:
+        if magic != _EXR_MAGIC or version & _EXR_OTHER_KINDS:
+            return None
+        header = OpenEXR.File(str(path), header_only=True).header()
+        names = [channel.name for channel in header["channels"]]
+    except (OSError, struct.error, UnicodeDecodeError):
+        return None
+    except (RuntimeError, ValueError) as error:
         raise UserError(f"{path}: is no image that can be read: {error}") from None
-
-
-def _exr_header(header: dict[str, Any]) -> Header:
-    window = header["dataWindow"]
-    width, height = window.max.x - window.min.x + 1, window.max.y - window.min.y + 1
-    # Text that is not UTF-8 is damaged: none of ours, which is ASCII.
-    values = {
-        name: value.decode(errors="replace") if isinstance(value, bytes) else value
-        for name, value in header.items()
-    }
-    attributes = {k: v for k, v in values.items() if isinstance(v, str | int | float)}
-    return Header(width, height, _colour_first(header["channels"]), attributes)
+    (left, top), (right, bottom) = (corner.tolist() for corner in header["dataWindow"])
+    attributes = {k: v for k, v in header.items() if isinstance(v, str | int | float)}
+    return Header(right - left + 1, bottom - top + 1, _colour_first(names), attributes)
 
 
 def _colour_first(names: Iterable[str]) -> list[str]:
@@ -292,17 +285,20 @@ def _colour_first(names: Iterable[str]) -> list[str]:
 
 
 def _read_plain_exr(
-    path: Path | str, channels: Sequence[str] | None, rows: tuple[int, int] | None
+    header: Header,
+    path: Path | str,
+    channels: Sequence[str] | None,
+    rows: tuple[int, int] | None,
 ) -> tuple[Image, list[str]]:
     """Return an EXR's channels, those asked for, and the names of all."""
-    file = _open_exr(path)
-    raw = file.header()
-    header = _exr_header(raw)
     names = [name for name in header.channels if channels is None or name in channels]
-    kinds = [np.dtype(_EXR_TYPES[str(raw["channels"][name].type)]) for name in names]
-    top = raw["dataWindow"].min.y
     first, end = rows or (0, header.height)
     try:
+        # OpenEXR.File, which is to replace InputFile, reads whole files only.
+        file = OpenEXR.InputFile(str(path))
+        raw = file.header()
+        kinds = [np.dtype(_EXR_TYPES[str(raw["channels"][name].type)]) for name in names]
+        top = raw["dataWindow"].min.y
         read = file.channels(names, scanLine1=top + first, scanLine2=top + end - 1)
     except OSError as error:
         raise UserError(f"{path}: cannot be read whole: {error}") from None
@@ -325,33 +321,26 @@ def _read_other(
     while file.seek_subimage(subimage, 0):
         spec = file.spec()
         attributes = _attributes(spec) | attributes
-        names += spec.channelnames
-        wanted = [
-            index
-            for index, name in enumerate(spec.channelnames)
-            if channels is None or name in channels
-        ]
-        pixels = _pixels(path, file, subimage, wanted)
-        found |= {name: array[slice(*(rows or (None,)))] for name, array in pixels.items()}
+        own = _channel_names(path, spec)
+        wanted = [index for index, name in enumerate(own) if channels is None or name in channels]
+        for first, end, kind in _runs(spec, wanted):
+            pixels = file.read_image(subimage, 0, first, end, kind)
+            if pixels is None:
+                raise UserError(f"{path}: cannot be read whole: {file.geterror()}")
+            pixels = np.asarray(pixels).reshape(spec.height, spec.width, end - first)
+            planes = np.moveaxis(pixels[slice(*(rows or (None,)))], -1, 0)
+            found |= dict(zip(own[first:end], planes, strict=True))
+        names += own
         subimage += 1
     file.close()
     return Image(found, attributes), names
 
 
-def _pixels(
-    path: Path | str, file: Any, subimage: int, wanted: Sequence[int]
-) -> dict[str, np.ndarray[Any, Any]]:
-    """Return channels of any file, all rows."""
-    spec = file.spec()
-    found: dict[str, np.ndarray[Any, Any]] = {}
-    for first, end, kind in _runs(spec, wanted):
-        pixels = file.read_image(subimage, 0, first, end, kind)
-        if pixels is None:
-            raise UserError(f"{path}: cannot be read whole: {file.geterror()}")
-        pixels = np.asarray(pixels).reshape(spec.height, spec.width, end - first)
-        for index in range(first, end):
-            found[spec.channelnames[index]] = pixels[:, :, index - first]
-    return found
+def _channel_names(path: Path | str, spec: Any) -> list[str]:
+    try:
+        return list(spec.channelnames)
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path}: is no image that can be read: {error}") from None
 
 
 def _runs(spec: Any, wanted: Sequence[int]) -> list[tuple[int, int, str]]:
@@ -370,9 +359,9 @@ def _attributes(spec: Any) -> dict[str, Attribute]:
     found: dict[str, Attribute] = {}
     for parameter in spec.extra_attribs:
         try:
-            value = parameter.value
+            name, value = parameter.name, parameter.value
         except UnicodeDecodeError:
             continue  # damaged: none of ours, which are ASCII
         if isinstance(value, str | int | float):
-            found[parameter.name] = value
+            found[name] = value
     return found
