@@ -135,7 +135,7 @@ def test_numbers_are_read_however_they_are_written(run_in_process, lightfield, t
 @pytest.mark.parametrize(
     ("program", "flag", "values"),
     [
-        ("evaluate.py", "--reinhard", ["0", "-1", "-1e-05", "nan", "inf", "1e400"]),
+        ("evaluate.py", "--reinhard", ["0", "-1", "-1e-05", "1e-30", "nan", "inf", "1e400"]),
         ("evaluate.py", "--exposure", ["101", "-1e+03", "nan", "inf", "-1e400"]),
         ("reproject.py", "--reinhard", ["0", "nan", "1e400"]),
         ("reproject.py", "--scale", ["0", "-1e-05", "nan", "inf"]),

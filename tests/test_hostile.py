@@ -101,6 +101,7 @@ VALUES = [
     ("reprojections.perspective.samples", HUGE),
     ("reprojections.perspective.exposure", 1e31),
     ("reprojections.perspective.reinhard", 1e31),
+    ("reprojections.perspective.reinhard", 1e-30),
     ("reprojections.perspective.rotation", [0, 0, 1e31]),
     ("reprojections.perspective.camera.focal_length", 1e31),
     ("reprojections.perspective.rigs", ["x\ny"]),

@@ -27,6 +27,12 @@ def test_no_negative_value_passes_the_pole_of_the_curve():
     assert out[:3].tolist() == [0, 0, 0] and np.isnan(out[3])
 
 
+@pytest.mark.parametrize("white", [1e-9, 1, 5, 1e9])
+def test_all_light_too_strong_for_a_float_is_white_and_none_is_black(white):
+    values = np.array([0, 3e38, np.inf], np.float32)
+    assert to_8_bit(tone_map(values, 1, white)).tolist() == [0, 255, 255]
+
+
 def reference_srgb(linear):
     """Encode grey with scikit-image, from the XYZ of the same grey."""
     white = np.array([0.412453 + 0.357580 + 0.180423, 1.0, 0.019334 + 0.119193 + 0.950227])

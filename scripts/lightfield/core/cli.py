@@ -76,9 +76,9 @@ def above_zero(text: str) -> float:
 
 def white(text: str) -> float:
     """Return the value of light that becomes white."""
-    if 0 < float(text) <= 1e9:
+    if 1e-9 <= float(text) <= 1e9:
         return float(text)
-    raise argparse.ArgumentTypeError(f"is {text}; must be above 0 and at most 1e9")
+    raise argparse.ArgumentTypeError(f"is {text}; must be from 1e-9 to 1e9")
 
 
 def stops(text: str) -> float:

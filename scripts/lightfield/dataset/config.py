@@ -370,7 +370,7 @@ class Reprojection(Settings):
     exposure: Stops | Annotated[list[Stops], Field(min_length=1, max_length=32)] = Field(
         0, description="In stops; of a list each makes a folder, as in png_ev-2 and png_ev0."
     )
-    reinhard: Annotated[float, Field(gt=0, le=1e9)] | None = Field(
+    reinhard: Annotated[float, Field(ge=1e-9, le=1e9)] | None = Field(
         None, description="Reinhard tone mapping with this maximum."
     )
     passes: PassNames | None = Field(

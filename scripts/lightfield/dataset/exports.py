@@ -60,7 +60,7 @@ class Developed(Export):
 
     exposure: float = Field(0.0, ge=-100, le=100, description="Of EXR sources, in stops.")
     reinhard: float = Field(
-        1.0, gt=0, le=1e9, description="Of EXR sources: the value that becomes white; 1 is none."
+        1.0, ge=1e-9, le=1e9, description="Of EXR sources: the value that becomes white; 1 is none."
     )
 
 

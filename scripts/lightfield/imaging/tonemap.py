@@ -12,9 +12,9 @@ from lightfield.geometry.lenses import Array
 def tone_map(color: Array, exposure: float, reinhard: float) -> Array:
     """Return linear ``color`` brightened by ``exposure`` stops, then compressed by Reinhard.
 
-    v ↦ v (1 + v / m²) / (1 + v) with m = ``reinhard``, the value that becomes 1; m = 1 leaves v
-    as it is. Source: Reinhard et al. 2002, equation 4, a channel at a time as SILVR's tool does.
-    NaN stays NaN.
+    v ↦ v (1 + v / m²) / (1 + v) with m = ``reinhard``, the value that becomes 1, from 1e-9 to 1e9;
+    m = 1 leaves v as it is. Source: Reinhard et al. 2002, equation 4, a channel at a time as
+    SILVR's tool does. NaN stays NaN.
     """
     if exposure == 0 and reinhard == 1:
         return color
@@ -27,11 +27,14 @@ def tone_map(color: Array, exposure: float, reinhard: float) -> Array:
 
 @kernel
 def _tone_map(values: Array, gain: np.float32, inverse_square: np.float32, out: Array) -> None:
-    one = np.float32(1)
+    one, huge = np.float32(1), np.float32(1e18)
     for i in range(values.size):
         # Below −1 the curve has a pole and then grows; no light is negative.
         v = max(values[i] * gain, np.float32(0)) if values[i] == values[i] else values[i]
-        out[i] = v * (one + v * inverse_square) / (one + v)
+        if v > huge:
+            out[i] = one + v * inverse_square  # in which v / (1 + v) is 1 and v² may be infinite
+        else:
+            out[i] = v * (one + v * inverse_square) / (one + v)
 
 
 def encode_srgb(linear: npt.ArrayLike) -> Array:
