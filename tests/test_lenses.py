@@ -734,7 +734,8 @@ def test_no_fisheye_sees_more_than_everything(name: str) -> None:
 @pytest.mark.parametrize("name", ["polynomial", "kannala_brandt"])
 def test_coefficients_are_all_there_and_finite(name: str) -> None:
     right = EXAMPLES[name].coefficients
-    for wrong in (right[1:], (*right, 0.0), (*right[1:], math.nan), (*right[1:], math.inf)):
+    ends = (math.nan, math.inf, 1e150, 1e-310)
+    for wrong in (right[1:], (*right, 0.0), *((*right[1:], end) for end in ends)):
         with pytest.raises(UserError, match=f"coefficients: .* must be {len(right)} numbers"):
             replace(EXAMPLES[name], coefficients=wrong)
 
@@ -972,6 +973,9 @@ def test_a_new_lens_is_one_file(tmp_path: Path) -> None:
     subprocess.run([sys.executable, "-c", USE_IT], cwd=tmp_path, check=True)
 
 
+OF_EQUIDISTANT = {"camera": {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT"}}
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -979,10 +983,13 @@ def test_a_new_lens_is_one_file(tmp_path: Path) -> None:
         ({"camera": {"type": "ORTHO"}}, "ORTHO"),
         ({"camera": {"type": "PANO"}}, "panorama_type"),
         ({"camera": {"type": "PANO", "panorama_type": "MIRRORBALL"}}, "MIRRORBALL"),
-        ({"camera": {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT"}}, "fisheye_fov"),
+        (OF_EQUIDISTANT, "fisheye_fov"),
         ({"camera": {"type": "PERSP", "lens_unit": "FOV"}}, "angle"),
         ({"camera": {"type": "PERSP", "lens_unit": "INCH"}}, "INCH"),
         ({"camera": {"type": "PERSP", "lens_unit": "MILLIMETERS"}}, "focal_length"),
+        ({"camera": {"type": "PERSP", "lens_unit": "FOV", "angle": 0}}, "camera, resolution or"),
+        ({"camera": {"type": "PERSP", "projection_matrix": [[1]]}}, "camera, resolution or"),
+        (OF_EQUIDISTANT | {"resolution": [math.inf, 9]}, "camera, resolution or"),
     ],
 )
 def test_a_bad_lightfield_json_names_its_key(change: dict[str, object], message: str) -> None:

@@ -62,7 +62,7 @@ def from_lightfield(content: Mapping[str, Any]) -> Lens:
         return _lens_of(camera).read(camera, image)
     except KeyError as error:
         raise UserError(f"{error.args[0]}: is missing, so the lens is not known") from None
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, IndexError, ArithmeticError) as error:
         raise UserError(f"camera, resolution or sensor_size: {error}") from None
 
 

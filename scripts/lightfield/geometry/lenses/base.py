@@ -413,8 +413,11 @@ def checked_focal_length(focal_length: float) -> None:
 
 
 def checked_coefficients(coefficients: Sequence[float], count: int, names: str) -> None:
-    if len(coefficients) != count or not all(map(math.isfinite, coefficients)):
-        raise UserError(f"coefficients: {list(coefficients)} must be {count} numbers, {names}")
+    if len(coefficients) != count or not all(k == 0 or 1e-99 < abs(k) < 1e99 for k in coefficients):
+        raise UserError(
+            f"coefficients: {list(coefficients)} must be {count} numbers, {names}, "
+            "each 0 or of a size from 1e-99 to 1e99"
+        )
 
 
 def slack(dtype: np.dtype[Any]) -> float:
