@@ -85,7 +85,9 @@ def test_rotations_turn_evenly_from_key_to_key():
         ([CORNER[0]], "keys: is .* at least 2"),
         ([CORNER[0], CORNER[0]], "keys: two in a row are at one place"),
         ([CORNER[0], {"position": [1, 1, 1], "rotation": [0, 0, 0]}], "keys: must all have a rot"),
-        ([CORNER[0], {"position": [1, 1, 1], "quaternion_wxyz": [0, 0, 0, 0]}], "not be all 0"),
+        ([CORNER[0], {"position": [1, 1, 1], "quaternion_wxyz": [0, 0, 0, 0]}], "have a length"),
+        ([CORNER[0], {"position": [1, 1, 1], "quaternion_wxyz": [1e200, 0, 0, 0]}], "have a len"),
+        ([CORNER[0], CORNER[1], CORNER[0]], "keys: the path turns back at a camera"),
         (
             [{"position": [1, 1, 1], "quaternion_wxyz": [1, 0, 0, 0], "rotation": [0, 0, 0]}] * 2,
             "quaternion_wxyz: goes without rotation",
@@ -94,7 +96,9 @@ def test_rotations_turn_evenly_from_key_to_key():
 )
 def test_what_is_no_path_is_refused(keys, expected):
     with pytest.raises(UserError, match=expected):
-        path(keys, 3)
+        path(keys, 3).poses()
+    with pytest.raises(UserError, match="keys: two in a row are at one place"):
+        path(CORNER, 3, size=0)
 
 
 # ---- random ---------------------------------------------------------------------------------

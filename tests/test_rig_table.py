@@ -129,10 +129,14 @@ def test_panoramas_and_cube_maps_interpolate_whatever_they_surround() -> None:
     [
         {"type": "plane", "cameras": [5, 5]},
         {"type": "cylinder", "cameras": [12, 5]},
+        {"type": "cylinder", "cameras": [1, 5]},
+        {"type": "cylinder", "cameras": [2, 2]},
         {"type": "cuboid", "cameras": [1, 1, 1]},
+        {"type": "lattice", "cameras": [1, 2, 2]},
+        {"type": "sphere", "subdivisions": 2, "size": [1, 1, 0]},
     ],
 )
-def test_an_open_surface_has_no_immersive_volume(rig: Any) -> None:
+def test_a_surface_that_is_open_or_flat_has_no_immersive_volume(rig: Any) -> None:
     assert volume(rig, FISHEYE) == 0
 
 
@@ -171,6 +175,7 @@ def test_spacing_leaves_out_cameras_at_the_same_place() -> None:
     assert spacing(square) == pytest.approx((3 + 3 + 3 + 4) / 4)
     assert math.isnan(spacing(square[:2]))
     assert neighbour_spacing([(0, 2, 3)], square) == pytest.approx((3 + 4 + 5) / 3)
+    assert neighbour_spacing([(2, 2, 3, 3)], square) == pytest.approx(4)
 
 
 SCENE = """

@@ -58,7 +58,10 @@ def interpolation_volume(rig: Rig, lens: Lens) -> InterpolationVolume | None:
     positions = matrices[:, :3, 3]
     if not is_closed(mesh, positions):
         return InterpolationVolume(0.0, 0.0)
-    hull = ConvexHull(positions)
+    try:
+        hull = ConvexHull(positions)
+    except QhullError:  # of cameras in a plane
+        return InterpolationVolume(0.0, 0.0)
     enclosed = float(hull.volume)
     if rig.cube_map or sees_all_round(lens):
         return InterpolationVolume(enclosed, enclosed)
@@ -135,7 +138,7 @@ def spacing(positions: Floats) -> float:
 
 def neighbour_spacing(mesh: list[tuple[int, ...]], positions: Floats) -> float:
     """Return the mean length in metres of the cells' edges, each counted once; NaN for no cell."""
-    edges = {frozenset(edge) for cell in mesh for edge in _edges(cell)}
+    edges = {frozenset((a, b)) for cell in mesh for a, b in _edges(cell) if a != b}
     if not edges:
         return math.nan
     ends = positions[[sorted(edge) for edge in edges]]

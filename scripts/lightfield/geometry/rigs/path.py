@@ -1,10 +1,12 @@
 """A path: cameras evenly along a smooth curve through key poses."""
 
+import math
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from lightfield.core.errors import UserError
 from lightfield.core.settings import Settings, Vector, as_list
 from lightfield.geometry.rigs.rig import CountedRig, UnitPoses
 from lightfield.geometry.rotations import Floats, looking_at, matrix_to_euler
@@ -24,8 +26,8 @@ class Key(Settings):
     def _one_rotation(self) -> Self:
         if self.rotation is not None and self.quaternion_wxyz is not None:
             raise ValueError("quaternion_wxyz: goes without rotation")
-        if self.quaternion_wxyz is not None and not any(self.quaternion_wxyz):
-            raise ValueError("quaternion_wxyz: must not be all 0")
+        if self.quaternion_wxyz and not 1e-9 < math.hypot(*self.quaternion_wxyz) < 1e9:
+            raise ValueError("quaternion_wxyz: must have a length from 1e-9 to 1e9")
         return self
 
     @property
@@ -49,7 +51,8 @@ class Path(CountedRig):
     def _is_a_path(self) -> Self:
         if len({key.is_turned for key in self.keys}) > 1:
             raise ValueError("keys: must all have a rotation, or none of them")
-        if (np.linalg.norm(np.diff(self._places(), axis=0), axis=-1) < 1e-9).any():
+        steps = np.diff(self._places(), axis=0) * self.sides
+        if (np.linalg.norm(steps, axis=-1) < 1e-9).any():
             raise ValueError("keys: two in a row are at one place")
         return self
 
@@ -65,7 +68,11 @@ class Path(CountedRig):
             turns = Slerp(length[::_PIECES], Rotation.from_quat(self._quaternions()))(along)
             matrices = turns.as_matrix()
         else:
-            matrices = looking_at(-spline(where, 1) * self.sides, np.zeros(3))
+            ahead = spline(where, 1) * self.sides
+            speed = np.linalg.norm(ahead, axis=-1)
+            if speed.min() <= 1e-9 * speed.max():
+                raise UserError("keys: the path turns back at a camera; give each key a rotation")
+            matrices = looking_at(-ahead, np.zeros(3))
         return UnitPoses.of_sides(("", spline(where), matrix_to_euler(matrices)))
 
     def unit_outline(self) -> list[Floats]:
