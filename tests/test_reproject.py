@@ -169,6 +169,14 @@ def test_pixels_without_a_source_are_marked(dataset, run):
     assert np.abs(integers[~missing] - z * 1000).max() <= 0.5
 
 
+def test_a_depth_below_zero_is_none_in_a_png(dataset, run):
+    ones = np.ones((SIZE, SIZE), np.float32)
+    write_exr(dataset / "behind.exr", dict.fromkeys("RGB", ones) | {"Z": -ones})
+    words = ["--no-reproject", "--png", "--depth-png", "1000", "--single"]
+    run(*words, str(dataset / "behind.exr"), source=False)
+    assert not read_image(dataset / "out/behind_depth.png").channels["Y"].any()
+
+
 @pytest.mark.parametrize("suffix", [".png", ".jpg"])
 def test_8_bit_images_are_read_as_srgb(dataset, run, suffix):
     code = np.full((SIZE, SIZE, 3), 128, np.uint8)

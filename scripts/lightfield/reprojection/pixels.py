@@ -166,9 +166,9 @@ def write(
             case "depth":
                 if depth is None:
                     raise UserError("--depth-png: the image has no channel Z")
-                with np.errstate(invalid="ignore"):
-                    scaled = np.rint(depth.astype(np.float64) * arguments.depth_png)
-                    known = np.isfinite(scaled) & (scaled <= 65535)
+                scaled = np.rint(depth.astype(np.float64) * arguments.depth_png)
+                # Comparisons with NaN are false.
+                known = (scaled > 0) & (scaled <= 65535)
                 write_png(path, np.where(known, scaled, 0).astype(np.uint16), {KEY_ATTRIBUTE: key})
             case "mask":
                 write_png(path, np.where(empty, 255, 0).astype(np.uint8), {KEY_ATTRIBUTE: key})
