@@ -415,7 +415,9 @@ def test_poses_from_csv_and_lightfield_json_agree(tmp_path: Path) -> None:
     rows = [[f["name"], *f["position"], *f["rotation"]] for f in content["frames"]]
     lines = ["name,x,y,z,rx,ry,rz", *(",".join(map(str, row)) for row in rows)]
     (tmp_path / "poses.csv").write_text("\n".join(lines) + "\n")
-    for file, lf_type in (("lightfield.json", "SPHERE"), ("poses.csv", "PLANE")):
+    (tmp_path / "spreadsheet.csv").write_text("\n".join(lines), encoding="utf-8-sig")
+    files = {"lightfield.json": "SPHERE", "poses.csv": "PLANE", "spreadsheet.csv": "PLANE"}
+    for file, lf_type in files.items():
         again = {"type": "poses", "file": str(tmp_path / file)}
         assert from_settings(again).view_count == 12
         assert from_settings(again).poses() == from_settings(rig).poses()

@@ -183,7 +183,8 @@ def _csv_rows(path: Path) -> Iterator[Any]:
     """Yield what `_json_rows` yields, of rows of angles or quaternions."""
     yield Poses.shape, "quaternion"
     try:
-        with path.open(encoding="utf-8", newline="") as file:
+        # Spreadsheets begin a file with a byte order mark.
+        with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.reader(file)
             keys = next(reader, [])
             if keys not in (CSV_HEADER, QUATERNION_HEADER):
