@@ -10,6 +10,7 @@ same colour rendered without any geometry before it.
 import json
 import sys
 from pathlib import Path
+from types import MappingProxyType
 
 import bpy
 import numpy as np
@@ -61,16 +62,21 @@ def known():
     add("plane", 1, material("floor"), size=20)
     add("plane", 2, material("wall"), size=20, location=(0, 3, 0), rotation=(np.pi / 2, 0, 0))
     points = add("plane", 3, material("sphere"))
-    group = bpy.data.node_groups.new("sphere", "GeometryNodeTree")
+    inputs = {"Position": (-1, 1.5, 1.25), "Radius": 1}
+    by_nodes(points, points.data.materials[0], "GeometryNodePoints", inputs)
+
+
+def by_nodes(thing, surface, kind, inputs=MappingProxyType({})):
+    """Let geometry nodes replace what an object is by what a node of a ``kind`` makes."""
+    group = bpy.data.node_groups.new("made", "GeometryNodeTree")
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    point = group.nodes.new("GeometryNodePoints")
-    point.inputs["Position"].default_value = (-1, 1.5, 1.25)
-    point.inputs["Radius"].default_value = 1
-    painted = group.nodes.new("GeometryNodeSetMaterial")
-    painted.inputs["Material"].default_value = points.data.materials[0]
-    group.links.new(point.outputs[0], painted.inputs["Geometry"])
+    made, painted = group.nodes.new(kind), group.nodes.new("GeometryNodeSetMaterial")
+    for name, value in inputs.items():
+        made.inputs[name].default_value = value
+    painted.inputs["Material"].default_value = surface
+    group.links.new(made.outputs[0], painted.inputs["Geometry"])
     group.links.new(painted.outputs[0], group.nodes.new("NodeGroupOutput").inputs[0])
-    points.modifiers.new("sphere", "NODES").node_group = group
+    thing.modifiers.new("made", "NODES").node_group = group
 
 
 def curtains():
@@ -108,6 +114,15 @@ def volume_object():
     # Its colour need not be right, but be there soon.
     bpy.context.scene.cycles.volume_biased = True
     bpy.context.scene.cycles.volume_step_rate = 20
+
+
+def nodes_fog():
+    """What geometry nodes make of a cube that no viewport shows: a mesh of fog, and a grid."""
+    known()
+    for kind in ("GeometryNodeMeshCube", "GeometryNodeVolumeCube"):
+        host = add("cube", 9, material("replaced"))
+        host.hide_viewport = True
+        by_nodes(host, volume("cloud", shader="ShaderNodeVolumePrincipled"), kind)
 
 
 def world_fog():

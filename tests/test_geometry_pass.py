@@ -15,7 +15,7 @@ LENSES = {
     "fisheye_220": {"lens": "equidistant", "fov": 220, "resolution": [64, 64]},
     "panorama": {"lens": "equirectangular", "resolution": [64, 32]},
 }
-FOGS = ["mesh_fog", "clear_surface_fog", "volume_object", "world_fog"]
+FOGS = ["mesh_fog", "clear_surface_fog", "volume_object", "nodes_fog", "world_fog"]
 # Of `known` in geometry_views.py: floor, wall and sphere.
 SPHERE, RADIUS = np.array([-1, 1.5, 1.25]), 1.0
 RENDER = {"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0, "max_bounces": 2}

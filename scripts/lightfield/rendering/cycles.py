@@ -11,7 +11,7 @@ from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.dataset.passes import Pass
 from lightfield.geometry.rigs.rig import EYES
-from lightfield.rendering import blend_file, ids, instances, pruning
+from lightfield.rendering import blend_file, ids, instances, pruning, volumes
 
 # In the order in which `auto` tries them.
 GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
@@ -61,6 +61,8 @@ def set_up(
     _use_device(scene, device)
     # At this frame a marker may choose the artist's camera, and later none may.
     scene.frame_set(lightfield.frame)
+    volumes.alone.cache_clear()
+    volumes.alone()
     if "instance" in numbered:
         instances.set_up(view_layer(scene))
         instances.shown()

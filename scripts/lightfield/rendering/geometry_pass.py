@@ -13,7 +13,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from lightfield.rendering import instances
+from lightfield.rendering import instances, volumes
 from lightfield.rendering.cycles import GEOMETRY_PASSES, pass_property, view_layer
 from lightfield.rendering.view import Array, render_view
 
@@ -104,10 +104,10 @@ def _geometry_settings(wanted: Iterable[str]) -> Iterator[None]:
         stack.enter_context(_changed(layer, "pass_alpha_threshold", OPACITY))
         stack.enter_context(_changed(layer.cycles, "pass_debug_sample_count", False))
         for thing in bpy.data.objects:
-            if thing.visible_camera and _is_volume_alone(thing):
+            if thing.visible_camera and thing.name_full in volumes.alone():
                 stack.enter_context(_changed(thing, "visible_camera", False))
         for shader in (*bpy.data.materials, scene.world):
-            if shader and has_volume(shader) and has_surface(shader):
+            if shader and volumes.has_volume(shader) and volumes.has_surface(shader):
                 stack.enter_context(_without_volume(shader.node_tree))
         yield
 
@@ -134,26 +134,3 @@ def _without_volume(tree: Any) -> Iterator[None]:
         yield
     finally:
         tree.links.new(source, socket)
-
-
-def _is_volume_alone(thing: Any) -> bool:
-    """Whether an object is a volume without any surface."""
-    if thing.type == "VOLUME":
-        return True
-    materials = [slot.material for slot in thing.material_slots if slot.material]
-    return bool(materials) and all(has_volume(m) and not has_surface(m) for m in materials)
-
-
-def has_volume(shader: Any) -> bool:
-    """Whether a material or world has a volume."""
-    return _is_linked(shader, "Volume")
-
-
-def has_surface(shader: Any) -> bool:
-    """Whether a material has a surface; a world is taken to have one."""
-    return _is_linked(shader, "Surface") or isinstance(shader, bpy.types.World)
-
-
-def _is_linked(shader: Any, name: str) -> bool:
-    output = shader.node_tree.get_output_node("CYCLES") if shader.node_tree else None
-    return output is not None and output.inputs[name].is_linked

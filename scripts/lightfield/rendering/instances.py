@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.rendering.ids import has_no_surface
+from lightfield.rendering.pruning import unhidden
 
 Array = NDArray[Any]
 
@@ -83,25 +84,21 @@ def _node_group() -> Any:
 @cache
 def shown() -> Instances:
     """Return what the opened scene shows at its frame."""
-    hidden = [thing for thing in bpy.data.objects if thing.hide_viewport and not thing.hide_render]
-    for thing in hidden:
-        thing.hide_viewport = False
     entries: dict[str, tuple[int, int]] = {}
     own = np.zeros(max((thing.pass_index for thing in bpy.data.objects), default=0) + 1, np.uint32)
-    for entry in bpy.context.evaluated_depsgraph_get().object_instances:
-        thing = entry.object.original
-        if has_no_surface(thing):
-            continue
-        name, number = str(thing.name_full), int(thing.pass_index)
-        if entry.is_instance:
-            places = [str(place) for place in entry.persistent_id if place != _NO_INDEX]
-            name = f"{entry.parent.name_full} > {name} {' '.join(places)}"
-            number = min(int(np.float32(entry.random_id & 0xFFFFFFFF)), _LARGEST)
-        else:
-            own[number] = number
-        entries[name] = (number, thing.pass_index)
-    for thing in hidden:
-        thing.hide_viewport = True
+    with unhidden(bpy.data.objects):
+        for entry in bpy.context.evaluated_depsgraph_get().object_instances:
+            thing = entry.object.original
+            if has_no_surface(thing):
+                continue
+            name, number = str(thing.name_full), int(thing.pass_index)
+            if entry.is_instance:
+                places = [str(place) for place in entry.persistent_id if place != _NO_INDEX]
+                name = f"{entry.parent.name_full} > {name} {' '.join(places)}"
+                number = min(int(np.float32(entry.random_id & 0xFFFFFFFF)), _LARGEST)
+            else:
+                own[number] = number
+            entries[name] = (number, thing.pass_index)
     names = {name: number for name, (number, _) in sorted(entries.items())}
     numbers, objects = np.array(sorted(entries.values()), np.int64).reshape(-1, 2).T
     return Instances(names, numbers, objects, own)

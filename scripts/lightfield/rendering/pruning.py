@@ -5,7 +5,8 @@ what saves measurably: benchmarks/pruning.py measures each of these, and what wa
 here (bounces of volumes, of transmission and of transparency where there are none: nothing saved).
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import bpy
@@ -95,6 +96,17 @@ def leave_out(names: Collection[str]) -> None:
         for thing in scene.objects:
             thing.hide_viewport = True
         bpy.context.view_layer.update()
+
+
+@contextmanager
+def unhidden(things: Iterable[Any]) -> Iterator[None]:
+    """Show those of the ``things`` in the viewport for a while that only a render shows."""
+    hidden = [thing for thing in things if thing.hide_viewport and not thing.hide_render]
+    for thing in hidden:
+        thing.hide_viewport = False
+    yield
+    for thing in hidden:
+        thing.hide_viewport = True
 
 
 def animated() -> Iterator[tuple[Any, bool]]:

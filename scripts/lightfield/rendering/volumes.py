@@ -1,0 +1,59 @@
+"""Fog, smoke and every other volume: what of a scene is a volume without any surface."""
+
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+import bpy
+
+from lightfield.rendering.pruning import unhidden
+
+
+@cache
+def alone() -> frozenset[str]:
+    """Return the full names of the opened scene's objects that are volumes alone, at its frame."""
+    by_nodes = [t for t in bpy.data.objects if any(m.type == "NODES" for m in t.modifiers)]
+    with unhidden(by_nodes):
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        found = {
+            thing: all(map(_is_volume, _parts(thing.evaluated_get(depsgraph).evaluated_geometry())))
+            for thing in by_nodes
+            if thing.evaluated_get(depsgraph).is_evaluated
+        }
+    found = {thing: _is_volume(thing) for thing in bpy.data.objects} | found
+    return frozenset(str(thing.name_full) for thing in found if found[thing])
+
+
+def _parts(geometry: Any) -> Iterator[Any]:
+    """Yield the meshes, volumes and others that nodes have made, and objects that they place."""
+    # Of a mesh that is replaced an empty one stays.
+    if geometry.mesh and geometry.mesh.polygons:
+        yield geometry.mesh
+    others = (geometry.curves, geometry.pointcloud, geometry.grease_pencil, geometry.volume)
+    yield from filter(None, others)
+    for placed in geometry.instance_references():
+        yield from _parts(placed) if isinstance(placed, bpy.types.GeometrySet) else (placed,)
+
+
+def _is_volume(part: Any) -> bool:
+    if isinstance(part, bpy.types.Volume) or getattr(part, "type", None) == "VOLUME":
+        return True
+    slots = getattr(part, "material_slots", ())
+    materials = [slot.material for slot in slots] or getattr(part, "materials", ())
+    used = [material for material in materials if material]
+    return bool(used) and all(has_volume(m) and not has_surface(m) for m in used)
+
+
+def has_volume(shader: Any) -> bool:
+    """Whether a material or world has a volume."""
+    return _is_linked(shader, "Volume")
+
+
+def has_surface(shader: Any) -> bool:
+    """Whether a material has a surface; a world is taken to have one."""
+    return _is_linked(shader, "Surface") or isinstance(shader, bpy.types.World)
+
+
+def _is_linked(shader: Any, name: str) -> bool:
+    output = shader.node_tree.get_output_node("CYCLES") if shader.node_tree else None
+    return output is not None and output.inputs[name].is_linked
