@@ -11,8 +11,8 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, write_json
 from lightfield.dataset.lightfield import LightField
-from lightfield.rendering import blend_file
-from lightfield.rendering.clearance import REACH, TOUCHING, clearances, enclosing_objects
+from lightfield.rendering import blend_file, clearance
+from lightfield.rendering.clearance import REACH, TOUCHING
 from lightfield.rendering.limits import warnings
 
 
@@ -31,8 +31,9 @@ def main() -> None:
     inventory = path and read_keys(path, "inventory.py", "external_files")
     blend_file.open_scene(arguments.blend, lightfield.content.get("scene", {}), inventory)
     bpy.context.scene.frame_set(lightfield.frame)
-    distances = clearances(positions)
-    inside = enclosing_objects(positions)
+    clearance.show_what_is_rendered()
+    distances = clearance.clearances(positions)
+    inside = clearance.enclosing_objects(positions)
     views = {
         name: {
             "distance": None if np.isinf(distance) else round(float(distance), 6),

@@ -14,8 +14,7 @@ from lightfield.core.settings import checked
 from lightfield.dataset import config
 from lightfield.geometry import rigs
 from lightfield.geometry.rigs.rig import Frame
-from lightfield.rendering import blend_file
-from lightfield.rendering.clearance import free_places
+from lightfield.rendering import blend_file, clearance
 
 
 def main() -> None:
@@ -37,7 +36,8 @@ def main() -> None:
     blend_file.open_scene(arguments.blend, chosen, inventory)
     if arguments.frame != config.FILE:
         bpy.context.scene.frame_set(checked(TypeAdapter(Frame), arguments.frame, "--frame"))
-    places = free_places(rig)
+    clearance.show_what_is_rendered()
+    places = clearance.free_places(rig)
     write_json(arguments.output, {"box": rig.box, "places": places.tolist()})
     print(f"{len(places)} cameras, each with {rig.clearance:g} m around it")
 

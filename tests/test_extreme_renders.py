@@ -21,6 +21,37 @@ blend_file.new_scene()
 case.build()
 blend_file.save_scene(Path(sys.argv[3]))
 """
+# At 0 what no render shows, fog, and a transparent text; at 5 and 10 m what no viewport shows.
+HIDDEN = """
+import sys
+from pathlib import Path
+import bpy
+from lightfield.rendering import blend_file
+blend_file.new_scene()
+clear, fog = (bpy.data.materials.new(name) for name in ("clear", "fog"))
+clear.node_tree.nodes["Principled BSDF"].inputs["Alpha"].default_value = 0.5
+nodes = fog.node_tree.nodes
+nodes.remove(nodes["Principled BSDF"])
+link = fog.node_tree.links.new
+link(nodes.new("ShaderNodeVolumeScatter").outputs[0], nodes["Material Output"].inputs["Volume"])
+for name, x in (("cutter", 0), ("off", 0), ("mist", 0), ("statue", 5), ("bust", 10)):
+    bpy.ops.mesh.primitive_cube_add(location=(x, 0, 0))
+    bpy.context.object.name = name
+things = bpy.data.objects
+things["cutter"].hide_render = True
+things["mist"].data.materials.append(fog)
+things["statue"].hide_viewport = True
+things["bust"].hide_set(True)
+collection = bpy.data.collections.new("off")
+bpy.context.scene.collection.children.link(collection)
+bpy.context.scene.collection.objects.unlink(things["off"])
+collection.objects.link(things["off"])
+collection.hide_render = True
+bpy.ops.object.text_add(location=(0, 0.6, 0))
+bpy.context.object.data.extrude = 1
+bpy.context.object.data.materials.append(clear)
+blend_file.save_scene(Path(sys.argv[1]))
+"""
 # Measures one case whose truth is another one.
 UNTRUE = """
 import dataclasses, sys
@@ -67,6 +98,19 @@ def test_a_wrong_case_fails_the_run(tmp_path, run_program):
     assert "error: 1 of 2 cases are wrong without a word: light of 65000" in result.stderr
 
 
+def checked(folder, run_program, blend, **rig):
+    """Run the check of the cameras of a lattice."""
+    lens = lenses.from_camera({"lens": "equirectangular", "resolution": [32, 16]})
+    content = LightField.from_rig({"type": "lattice", **rig}, lens, depth="distance", frame=1)
+    content.write(folder / "lightfield.json")
+    return run_program(
+        "check_cameras.py",
+        *("--blend", blend, "--lightfield", folder / "lightfield.json"),
+        *("--output", folder / "cameras.json"),
+        check=False,
+    )
+
+
 @pytest.mark.parametrize(
     ("case", "place", "said"),
     [
@@ -80,15 +124,17 @@ def test_the_check_of_cameras_warns(tmp_path, run_program, case, place, said):
     program, blend = tmp_path / "build.py", tmp_path / "scene.blend"
     program.write_text(BUILD)
     run_program(program, ROOT / "benchmarks", case, blend)
-    lens = lenses.from_camera({"lens": "equirectangular", "resolution": [32, 16]})
-    rig = {"type": "lattice", "cameras": [1, 1, 1], "center": place}
-    content = LightField.from_rig(rig, lens, depth="distance", frame=1)
-    content.write(tmp_path / "lightfield.json")
-    result = run_program(
-        "check_cameras.py",
-        *("--blend", blend, "--lightfield", tmp_path / "lightfield.json"),
-        *("--output", tmp_path / "cameras.json"),
-    )
+    result = checked(tmp_path, run_program, blend, cameras=[1, 1, 1], center=place)
     warnings = [line for line in result.stderr.splitlines() if line.startswith("warning: ")]
     assert len(warnings) == (said is not None)
     assert said is None or said in warnings[0]
+
+
+def test_the_check_of_cameras_sees_what_a_render_shows_and_that_alone(tmp_path, run_program):
+    program, blend = tmp_path / "build.py", tmp_path / "scene.blend"
+    program.write_text(HIDDEN)
+    run_program(program, blend)
+    result = checked(tmp_path, run_program, blend, cameras=[3, 1, 1], size=10, center=[5, 0, 0])
+    assert "2 of 3 cameras are inside bust, statue: view_0001f, view_0002f;" in result.stderr
+    result = checked(tmp_path, run_program, blend, cameras=[1, 1, 1])
+    assert (result.returncode, result.stderr) == (0, "")

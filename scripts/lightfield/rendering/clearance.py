@@ -14,6 +14,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.progress import Progress
 from lightfield.geometry.rigs.random import Random
 from lightfield.geometry.rigs.sphere import icosphere
+from lightfield.rendering.volumes import alone
 
 Floats = NDArray[np.float64]
 
@@ -24,6 +25,22 @@ TOUCHING = 0.001
 # How many places each camera of a random rig tries, and how many say what the box is inside of.
 _TRIES = 100
 _SAMPLES = 64
+
+
+def show_what_is_rendered() -> None:
+    """Let the viewport, in which what follows looks, have what a render shows, less its volumes."""
+    volumes = alone()
+    layer = bpy.context.view_layer
+    for thing in bpy.data.objects:
+        thing.hide_viewport = thing.hide_render or thing.name_full in volumes
+    for thing in layer.objects:
+        thing.hide_set(False)
+    for collection in bpy.data.collections:
+        collection.hide_viewport = collection.hide_render
+    parts = [layer.layer_collection]
+    for part in parts:
+        part.hide_viewport = False
+        parts += part.children
 
 
 def clearances(positions: Floats, reach: float = REACH) -> Floats:

@@ -63,17 +63,27 @@ def _meets_more(limit: int, position: Floats, clear: Set[str]) -> bool:
         place, direction = Vector(position), Vector(vertex).normalized()
         for _ in range(limit + 1):
             hit, place, _, index, thing, _ = bpy.context.scene.ray_cast(depsgraph, place, direction)
-            mesh = thing.evaluated_get(depsgraph).data if hit else None
-            if not mesh or not mesh.materials:
-                break
-            material = mesh.materials[mesh.polygons[index].material_index]
-            if not material or material.name_full not in clear:
+            if not hit or _material(thing.evaluated_get(depsgraph), index) not in clear:
                 break
             # On from just behind it.
             place = place + direction * 1e-5 * (1 + place.length)
         else:
             return True
     return False
+
+
+def _material(thing: Any, index: int) -> str | None:
+    """Return the full name of the material of an object's face.
+
+    None where it has none, and where the face is none of its mesh: of a text, or an instance.
+    """
+    mesh = thing.data
+    if not isinstance(mesh, bpy.types.Mesh) or index >= len(mesh.polygons) or not mesh.materials:
+        return None
+    # As Cycles takes it.
+    last = len(mesh.materials) - 1
+    material = mesh.materials[min(mesh.polygons[index].material_index, last)]
+    return str(material.name_full) if material else None
 
 
 def _is_transparent(material: Any) -> bool:
