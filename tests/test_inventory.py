@@ -112,6 +112,11 @@ text.font = bpy.data.fonts.load(folder + "/font.woff2")
 bpy.context.scene.collection.objects.link(bpy.data.objects.new("sign", text))
 unused = image.copy()
 unused.name, unused.filepath_raw, unused.use_fake_user = "unused", folder + "/never.png", True
+tree = bpy.data.node_groups.new("baked", "GeometryNodeTree")
+tree.nodes.new("GeometryNodeBake")
+bpy.data.objects["cone"].modifiers.new("baked", "NODES").node_group = tree
+Path(folder, "blendcache_textured").mkdir()
+Path(folder, "blendcache_textured/leaves.json").write_text("{}")
 bpy.ops.wm.save_as_mainfile(filepath=folder + "/textured.blend", relative_remap=False)
 
 bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -127,6 +132,22 @@ tree = bpy.data.node_groups.new("tree", "GeometryNodeTree")
 tree.nodes.new("GeometryNodeImportSTL").inputs[0].default_value = folder + "/leaf.stl"
 room.build({})
 bpy.data.objects["cone"].modifiers.new("tree", "NODES").node_group = tree
+tree = bpy.data.node_groups.new("any tree", "GeometryNodeTree")
+socket = tree.interface.new_socket("Path", in_out="INPUT", socket_type="NodeSocketString")
+socket.subtype = "FILE_PATH"
+given = bpy.data.objects["sphere"].modifiers.new("given", "NODES")
+given.node_group = tree
+if bpy.app.version < (5, 2):
+    given[socket.identifier] = folder + "/bough.stl"
+else:
+    getattr(given.properties.inputs, socket.identifier).value = folder + "/bough.stl"
+tiles = bpy.data.images.new("tiles", 4, 4, tiled=True)
+tiles.filepath, tiles.source = folder + "/tile.<UVTILE>.png", "TILED"
+tiles.tiles.new(1012)
+texture = bpy.data.materials["cone"].node_tree.nodes.new("ShaderNodeTexImage")
+texture.image = tiles
+shader = bpy.data.materials["cone"].node_tree.nodes["Principled BSDF"]
+bpy.data.materials["cone"].node_tree.links.new(texture.outputs[0], shader.inputs["Base Color"])
 bpy.ops.mesh.primitive_cube_add()
 bpy.context.object.modifiers.new("fine", "MULTIRES")
 bpy.ops.object.multires_subdivide(modifier="fine")
@@ -149,9 +170,10 @@ def test_what_is_missing_or_cannot_be_read_is_an_error(run_program, tmp_path, mo
 
     assert listed("textured")[0] == 0
     found = json.loads(output.read_text())["external_files"]
-    assert [Path(file["path"]).name for file in found] == ["bark.png", "font.woff2", "never.png"]
+    names = ["bark.png", "leaves.json", "font.woff2", "never.png"]
+    assert [Path(file["path"]).name for file in found] == names
     assert found[0]["sha256"] == sha256(tmp_path / "bark.png")
-    assert found[2]["sha256"] is None
+    assert found[3]["sha256"] is None
     output.unlink()
 
     monkeypatch.setenv(VARIABLE, str(tmp_path / "store"))
@@ -191,6 +213,8 @@ def test_what_is_missing_or_cannot_be_read_is_an_error(run_program, tmp_path, mo
     code, told = listed("imports")
     assert code == 1
     assert f" read: the geometry tree at {tmp_path}/leaf.stl (missing); " in told
+    assert f"; the modifier's file sphere at {tmp_path}/bough.stl (missing); " in told
+    assert f"; the texture tiles at {tmp_path}/tile.u2_v2.png (missing)" in told
     assert f"; the sculpted detail Cube at {tmp_path}/fine.btx (missing); " in told
     assert not output.exists()
 

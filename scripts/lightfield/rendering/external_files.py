@@ -24,7 +24,7 @@ KINDS = {
     "VectorFont": "font",
     "Library": "library",
     "CacheFile": "cache",
-    "Object": "simulation cache",
+    "Object": "modifier's file",
     # What its nodes import, such as an STL.
     "GeometryNodeTree": "geometry",
     # Of a multiresolution modifier.
@@ -112,6 +112,25 @@ def _named() -> Iterator[tuple[Any, str]]:
         if type(block).__name__ in KINDS and not _is_packed(block):
             for path in sorted(paths):
                 yield block, path
+    # Blender lists the names that stand in a node, and not those that a modifier gives to it.
+    for thing in bpy.data.objects:
+        for modifier in _nodes(thing):
+            tree = modifier.node_group
+            for item in tree.interface.items_tree if tree else ():
+                is_path = getattr(item, "subtype", None) == "FILE_PATH"
+                if is_path and (path := _given(modifier, item.identifier)):
+                    yield thing, path
+
+
+def _nodes(thing: Any) -> list[Any]:
+    return [modifier for modifier in thing.modifiers if modifier.type == "NODES"]
+
+
+def _given(modifier: Any, identifier: str) -> str:
+    """Return the text that a geometry nodes modifier has for an input."""
+    # Blender 5.2 has its inputs in a place of their own.
+    inputs = getattr(modifier, "properties", None)
+    return str(getattr(inputs.inputs, identifier).value if inputs else modifier[identifier])
 
 
 def _read() -> Iterator[tuple[Any, str]]:
@@ -124,6 +143,13 @@ def _read() -> Iterator[tuple[Any, str]]:
         caches += [system.point_cache for system in thing.particle_systems]
         if any(cache and cache.use_disk_cache and not cache.use_external for cache in caches):
             yield thing, str(folder)
+        for modifier in _nodes(thing):
+            baked = {modifier.bake_directory, *(bake.directory for bake in modifier.bakes)} - {""}
+            baked |= {str(folder)} if modifier.bakes else set()
+            for path in (bpy.path.abspath(path, library=thing.library) for path in sorted(baked)):
+                # A bake may be in the .blend itself.
+                if Path(path).is_dir():
+                    yield thing, path
 
 
 def _is_packed(block: Any) -> bool:
@@ -145,12 +171,19 @@ def _files(block: Any, path: str) -> list[Path]:
     if folder.is_dir():
         return sorted(file for file in folder.rglob("*") if file.is_file()) or [folder]
     if isinstance(block, bpy.types.Image) and block.source == "TILED":
-        return [Path(path.replace("<UDIM>", str(tile.number))) for tile in block.tiles]
+        return [_tile(path, tile.number) for tile in block.tiles]
     sequence = getattr(block, "source", "") == "SEQUENCE" or getattr(block, "is_sequence", False)
     if sequence:
         stem = glob.escape(re.sub(r"\d+$", "", folder.stem))
         return sorted(folder.parent.glob(f"{stem}*{folder.suffix}")) or [folder]
     return [folder]
+
+
+def _tile(path: str, number: int) -> Path:
+    """Return the file of one tile, of which there are ten in a row from 1001 on."""
+    row, column = divmod(number - 1001, 10)
+    name = path.replace("<UDIM>", str(number))
+    return Path(name.replace("<UVTILE>", f"u{column + 1}_v{row + 1}"))
 
 
 def _problem(block: Any, path: Path) -> str | None:

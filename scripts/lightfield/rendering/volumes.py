@@ -38,8 +38,8 @@ def _parts(geometry: Any) -> Iterator[Any]:
 def _is_volume(part: Any) -> bool:
     if isinstance(part, bpy.types.Volume) or getattr(part, "type", None) == "VOLUME":
         return True
-    slots = getattr(part, "material_slots", ())
-    materials = [slot.material for slot in slots] or getattr(part, "materials", ())
+    slots = getattr(part, "material_slots", [])
+    materials = [slot.material for slot in slots] or getattr(part, "materials", [])
     used = [material for material in materials if material]
     return bool(used) and all(has_volume(m) and not has_surface(m) for m in used)
 
