@@ -130,15 +130,15 @@ def test_what_calibration_will_cost_is_said_beforehand(tmp_path):
 class SimulatedBench:
     """Plain path tracing of error 1/N, 8/N of all pixels, and others of half that error.
 
-    They leave ``whole_error`` in all pixels, however much effort they take.
+    They leave ``whole_error`` in all pixels, and ``bias`` in most, however much effort they take.
     """
 
-    def __init__(self, whole_error):
-        self.whole_error = whole_error
+    def __init__(self, whole_error, bias=0.0):
+        self.whole_error, self.bias = whole_error, bias
 
     def measure(self, way, settings):
         samples = min(settings["samples"], 1 / (settings.get("adaptive_threshold") or 1e-4))
-        error = 1 / samples if way == "plain" else 0.5 / samples
+        error = 1 / samples if way == "plain" else self.bias + 0.5 / samples
         whole = 8 / samples if way == "plain" else self.whole_error
         return Candidate(way, {**PLAIN, **settings}, samples, samples, error, whole, 1.0), [error]
 
@@ -150,6 +150,13 @@ def test_what_hides_fireflies_is_not_chosen(whole_error, way):
     assert search.most_whole_error == pytest.approx(2 * 8 / 50)
     choice = search.choose()
     assert choice.way == way and search.reaches(choice)
+
+
+@pytest.mark.parametrize("bias", [2 * TARGET, 1e6])
+def test_a_way_whose_bias_is_above_the_target_is_given_up(bias):
+    search = Search(SimulatedBench(0.0, bias), TARGET, denoise=True)
+    assert search.choose().error > TARGET
+    assert max(entry.settings["samples"] for entry in search.measured) <= 4096
 
 
 def test_effort_follows_from_what_lies_on_both_sides_of_the_target():

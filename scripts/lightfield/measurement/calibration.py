@@ -27,6 +27,8 @@ from lightfield.measurement.trials import Trials, Window, nearest_view
 
 PROBE_SEED, HELD_OUT_SEED = 1, 2
 
+# Cycles takes no more.
+MOST_SAMPLES = 2**24
 # What adaptive sampling may take; of it, the threshold is chosen.
 MOST_ADAPTIVE_SAMPLES = 4096
 FIRST_THRESHOLD, LEAST_THRESHOLD = 0.4, 1e-4
@@ -174,11 +176,14 @@ class Search:
         ]
 
     def _affordable(self) -> float:
-        """Return the least cost that is known to reach the target."""
+        """Return the least cost that is known to reach the target; without any, that of the limit.
+
+        A preset's limit is tried out, whether it is known to suffice or not.
+        """
         costs = [entry.cost for entry in self._eligible() if self.reaches(entry)]
         if not self.denoise and self._needed <= self.limit:
             costs.append(self._needed)
-        return min(costs, default=math.inf)
+        return min(costs, default=MOST_SAMPLES if self.limit == math.inf else math.inf)
 
     def choose(self) -> Candidate:
         """Return the cheapest that reaches the target; if none does, that of the least error."""
@@ -213,9 +218,12 @@ class Search:
             if len(points) > 1 and now.samples == points[-2][1].samples:
                 break
             if len(points) > 2:
-                slope = math.log(now.error / points[-2][1].error) / math.log(2)
-                more = (self.target / now.error) ** (1 / slope) if slope < 0 else math.inf
-                if now.samples * more > 2 * affordable:
+                before, doublings = points[-2][1].error, 0.0
+                if before <= now.error:
+                    doublings = math.inf
+                elif now.error > self.target:
+                    doublings = math.log(now.error / self.target) / math.log(before / now.error)
+                if doublings > math.log2(2 * affordable / now.samples):
                     break
             effort = min(2 * effort, last)
         measured = [entry for _, entry in points]
@@ -250,7 +258,8 @@ def calibrate(
     known = Bench(maker, windows, PROBE_SEED, target)
     search = Search(known, target, render.get("most_samples"), render.get("denoise"))
     choice = search.choose()
-    equal = search.plain_samples(choice.error)
+    # By chance, what is far below the references' own error is measured as nothing, or less.
+    equal = search.plain_samples(max(choice.error, known.own_error))
     _, known_errors = known.measure(choice.way, choice.settings)
     held_out = Bench(maker, others, HELD_OUT_SEED, target, known.references[0].exposure)
     _, errors = held_out.measure(choice.way, choice.settings)
