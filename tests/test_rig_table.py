@@ -179,7 +179,7 @@ def test_spacing_leaves_out_cameras_at_the_same_place() -> None:
 
 
 SCENE = """
-scene: {builder: garden}
+scene: {blend: FILE}
 render: {samples: 1}
 rigs:
   LFCuboid_2x2x1:
@@ -188,6 +188,7 @@ rigs:
   LFCuboid_1mx3mx1m: {type: cuboid, cameras: [10, 30, 10], size: [1, 3, 1], camera: *eye}
   LFPlane: {type: plane, cameras: [3, 1], camera: *eye}
   path: {type: path, count: 3, keys: [{position: [0, 1, 0]}, {position: [0, 4, 0]}], camera: *eye}
+  own: {type: blend_camera, frames: {first: 1, last: 4}, camera: *eye}
 """.replace("CAMERA", "lens: equidistant, fov: 180, resolution: [64, 64]")
 
 
@@ -195,7 +196,9 @@ def test_the_table_sets_computed_figures_beside_the_printed_ones(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene, table, figures = (tmp_path / name for name in ("silvr.yaml", "rigs.md", "rigs.csv"))
-    scene.write_text(SCENE)
+    own = tmp_path / "own.blend"
+    own.touch()
+    scene.write_text(SCENE.replace("FILE", str(own)))
     arguments = ["rig_table.py", scene, "--markdown", table, "--csv", figures]
     monkeypatch.setattr(sys, "argv", list(map(str, arguments)))
     rig_table.main()
@@ -213,6 +216,7 @@ def test_the_table_sets_computed_figures_beside_the_printed_ones(
     assert float(sphere["box_or_ball_m3"]) == pytest.approx(ball)
     assert rows["LFPlane"]["printed_m"] == ""
     assert rows["path"]["size"] == "0 × 3 × 0 m"
+    assert (rows["own"]["views"], rows["own"]["nearest_m"]) == ("4", "nan")
 
     text = table.read_text(encoding="utf-8")
     assert (

@@ -87,16 +87,20 @@ class Setup:
 
 
 def read_setups(scenes: Sequence[Path]) -> list[Setup]:
-    """Compute the line of every rig of the scene YAMLs but those that a .blend's camera is."""
+    """Compute the line of every rig of the scene YAMLs."""
     return [
         _setup(path.stem, name, rig)
         for path in scenes
         for name, rig in config.read_scene(path).rigs.items()
-        if not isinstance(rig, rigs.BlendCamera)
     ]
 
 
 def _setup(scene: str, name: str, rig: rigs.Rig) -> Setup:
+    if isinstance(rig, rigs.BlendCamera):
+        # Where it is, only the .blend says.
+        places = {"along": "–", "size": "–", "nearest": math.nan, "neighbours": math.nan}
+        volumes = dict.fromkeys(("immersive", "enclosed", "formula"))
+        return Setup(scene=scene, rig=name, views=rig.view_count, **places, **volumes)
     positions = np.array([view.position for view in rig.poses()[:: rig.views_a_position]])
     volume = interpolation_volume(rig, rig.camera.make())
     if isinstance(rig, rigs.Sphere) and np.ptp(rig.sides) == 0:
