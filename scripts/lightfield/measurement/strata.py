@@ -78,7 +78,7 @@ def choose(maker: Trials, size: int, count: int) -> tuple[list[Window], dict[str
         around = _around(
             maker, views, inner if np.any(inner) else members, [noise for _, noise in found], size
         )
-        for step in range(count if around else 0):
+        for step in range(count):
             window = around[int((step + 0.5) / count * len(around))]
             if window not in windows:
                 windows.append(window)
@@ -94,7 +94,7 @@ def _around(
 ) -> list[Window]:
     """Return a window around each member pixel of the pilot's views, those of little noise first.
 
-    Those that reach too far out of the image circle are left out.
+    Those that reach too far out of the image circle are left out, unless all do.
     """
     lens = maker.lens
     side = min(size, lens.width, lens.height)
@@ -110,5 +110,5 @@ def _around(
             )
             found.append((float(noisy[row, column]), Window(view, x, y, side, side)))
     found.sort(key=lambda entry: entry[0])
-    whole = size >= min(lens.width, lens.height)
-    return [w for _, w in found if whole or maker.mask(w).mean() >= FULL_ENOUGH]
+    windows = [window for _, window in found]
+    return [w for w in windows if maker.mask(w).mean() >= FULL_ENOUGH] or windows

@@ -34,8 +34,8 @@ from lightfield.validation.consistency import Camera
 REFERENCE_SEED = 1000
 
 R2 = (0.7548776662466927, 0.5698402909980532)
-# A window has at least this part of its pixels in the image circle.
-FULL_ENOUGH = 0.75
+# A window has at least this part of its pixels in the image circle, if one of so many places has.
+FULL_ENOUGH, MOST_PLACES = 0.75, 64
 
 # What a pilot says of the surface that a pixel sees: whether its material has one of these features
 # of the scene's inventory.
@@ -203,16 +203,21 @@ class Trials:
         size = min(size, self.lens.width, self.lens.height)
         found: list[Window] = []
         point = 0
-        while len(found) < count:
-            view = views[int((len(found) + 0.5) * len(views) / count)]
-            # Roberts' R2 sequence, which fills a square evenly.
-            point += 1
-            across, down = (point * step % 1 for step in R2)
-            x, y = round(across * (self.lens.width - size)), round(down * (self.lens.height - size))
-            window = Window(view, x, y, size, size)
+        for number in range(count):
+            view = views[int((number + 0.5) * len(views) / count)]
             # In the corners of a fisheye view there is nothing.
-            if self.mask(window).mean() >= FULL_ENOUGH:
-                found.append(window)
+            tried: list[tuple[float, Window]] = []
+            while not tried or (tried[-1][0] < FULL_ENOUGH and len(tried) < MOST_PLACES):
+                # Roberts' R2 sequence, which fills a square evenly.
+                point += 1
+                across, down = (point * step % 1 for step in R2)
+                x, y = (
+                    round(across * (self.lens.width - size)),
+                    round(down * (self.lens.height - size)),
+                )
+                window = Window(view, x, y, size, size)
+                tried.append((float(self.mask(window).mean()), window))
+            found.append(max(tried, key=lambda one: one[0])[1])
         return found
 
     def _render(self, window: Window, settings: Mapping[str, Any], path: Path, key: str) -> None:
