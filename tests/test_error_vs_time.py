@@ -2,18 +2,21 @@
 
 import csv
 import json
+from dataclasses import replace
 from itertools import pairwise
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
+from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.passes import PARTS_OF_LIGHT
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.measurement import strata, trials
-from lightfield.measurement.metrics import Reference
+from lightfield.measurement.error_vs_time import compared, evaluated, together
+from lightfield.measurement.metrics import Reference, disagreement, make_reference
 from lightfield.measurement.strata import STRATA
 from lightfield.measurement.trials import SURFACES, Window
 from lightfield.report import tables
@@ -222,6 +225,20 @@ def test_a_datasets_page_has_the_strata_in_a_table(measured, content):
         assert name != "methods" or row["error in these"] == denoised["error"]
 
 
+def test_a_stratum_without_noise_has_no_error_and_no_psnr(tmp_path):
+    sky, depth = np.full((16, 16, 3), 0.5, np.float32), np.full((16, 16), 2, np.float32)
+    reference = make_reference([sky] * 2, [depth] * 2, np.ones((16, 16), bool))
+    trial = trials.Trial(sky, depth, 1, 1.0, "CPU")
+    points = [compared("plain", {"samples": 1}, [[trial, trial]], [reference])]
+    points.append(together({"environment": points[0]}, {"environment": 1.0}, 0.0))
+    found = evaluated(points, 0.0)
+    assert [(p["relative_mse"], p["psnr"]) for p in found["points"]] == [(0, None)] * 2
+    write_json(tmp_path / "points.json", found)
+    seen = np.arange(9), np.arange(9)
+    same = disagreement((sky, sky), (reference, reference), seen)
+    assert (same.total, same.added, same.share) == (0, 0, 0)
+
+
 def test_files_can_be_read_by_others(measured, content):
     rows = list(csv.DictReader((measured.folder / "room.csv").open()))
     strata = content["strata"].values()
@@ -270,6 +287,10 @@ def test_windows_lie_in_the_image_circle_and_in_different_views():
     (whole,) = maker.windows(100, 1)
     assert (whole.x, whole.y, whole.width, whole.height) == (0, 0, 64, 64)
     assert maker.mask(whole).mean() == pytest.approx(np.pi / 4, abs=0.01)
+    # A circle that fills less of every window.
+    maker.lens = replace(maker.lens, principal_point=(60.0, 60.0))
+    (corner,) = maker.windows(64, 1)
+    assert 0 < maker.mask(corner).mean() < 0.75
 
 
 def test_the_same_wall_is_found_in_both_views():

@@ -145,6 +145,10 @@ def test_denoised_and_calibrated_hours_stand_beside_the_plain_ones():
     ]
     biased_advice = advice | {"unchanged": unchanged | {"denoised": biased}}
     assert plan.cheaper_parts(256, biased_advice) == (None, pytest.approx(100 / 256))
+    # Without noise, or without a time, nothing can be said.
+    for figures in ({"error": 0.0}, {"seconds": 0.0}):
+        still = {way: [point | figures for point in points] for way, points in unchanged.items()}
+        assert plan.cheaper_parts(256, advice | {"unchanged": still}) == (None, None)
     assert plan.cheaper_parts(6, advice) == plan.cheaper_parts(256, None) == (None, None)
     probe = {"resolution": [64, 64], "samples": 256, "device": "CPU", "views": 100}
     probe |= {"view_seconds": [3600.0], "view_bytes": [1e9]}

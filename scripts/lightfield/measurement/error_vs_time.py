@@ -91,6 +91,10 @@ class Point:
     flip: float
     depth_error: float | None
 
+    def figures(self) -> dict[str, Any]:
+        """Return all figures as JSON can have them: no psnr of what is equal to its reference."""
+        return {**asdict(self), "psnr": self.psnr if math.isfinite(self.psnr) else None}
+
 
 def measure(
     maker: Trials,
@@ -317,10 +321,10 @@ def evaluated(points: Sequence[Point], own: float) -> dict[str, Any]:
         },
         "methods": by_method(seen, 0.5),
         "methods_at_most_samples": by_method(seen, 1),
-        "pareto_front": [asdict(seen[index]) for index in front],
+        "pareto_front": [seen[index].figures() for index in front],
         "against_plain_at_equal_error": saved,
-        "settings": [asdict(point) for point in points if point.method == OWN],
-        "points": [asdict(point) for point in points],
+        "settings": [point.figures() for point in points if point.method == OWN],
+        "points": [point.figures() for point in points],
     }
 
 
@@ -354,7 +358,7 @@ def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
                 "equal_error": equal.relative_mse,
                 "seconds_at_equal_error": seconds,
                 "times_faster": seconds and equal.seconds / seconds,
-                "nearest": asdict(min(own, key=lambda p: abs(p.seconds - equal.seconds))),
+                "nearest": min(own, key=lambda p: abs(p.seconds - equal.seconds)).figures(),
             }
         )
     return found

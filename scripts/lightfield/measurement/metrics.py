@@ -257,10 +257,10 @@ def developed(colour: NDArray[Any], reference: Reference) -> Array:
 
 
 def depth_error(depth: NDArray[Any], truth: NDArray[Any]) -> float:
-    """Return the mean relative error of depths, as `Errors` has it; inf is a miss."""
+    """Return the mean relative error of depths, as `Errors` has it; inf is a miss, NaN unknown."""
     missed, gone = np.isinf(depth), np.isinf(truth)
     with np.errstate(invalid="ignore"):
-        error = np.minimum(np.abs(depth / truth - 1), 1.0)
+        error = np.fmin(np.abs(depth / truth - 1), 1.0)
     return float(np.where(missed | gone, missed != gone, error).mean())
 
 
@@ -278,14 +278,17 @@ class Line:
 
     def inverse(self, y: float) -> float:
         """Return x at y; 1e300 where a line that hardly falls or rises does not get there."""
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
             exponent = np.log10(y / self.factor) / np.float64(self.slope)
-        return float(10 ** min(exponent, 300.0))
+        return float(10 ** np.fmin(exponent, 300.0))
 
 
 def fit(x: Sequence[float], y: Sequence[float]) -> Line | None:
-    """Fit a power law by least squares of the logarithms; None for fewer than three different x."""
-    if len(set(x)) < 3:
+    """Fit a power law by least squares of the logarithms.
+
+    None for fewer than three different x, and where a y is not above 0.
+    """
+    if len(set(x)) < 3 or min(y) <= 0:
         return None
     found = linregress(np.log(x), np.log(y))
     return Line(float(found.slope), float(found.stderr), float(np.exp(found.intercept)))
@@ -324,7 +327,7 @@ class Disagreement:
     references, so what reflections, texture and the look-up of nearest pixels make; added: root of
     the mean relative squared difference of the images' errors, so what rendering makes; share:
     added² as a part of both images' squared errors: 1 where errors are independent of each other,
-    as noise is, less where both views are wrong alike.
+    as noise is, less where both views are wrong alike, and 0 where nothing is wrong.
     """
 
     total: float
@@ -371,5 +374,5 @@ def disagreement(
         total=math.sqrt(total),
         floor=math.sqrt(max(floor, 0.0)),
         added=math.sqrt(max(added, 0.0)),
-        share=added / sum_,
+        share=added / sum_ if sum_ else 0.0,
     )

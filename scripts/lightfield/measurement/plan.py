@@ -75,9 +75,10 @@ def cheaper_parts(
 ) -> tuple[float | None, float | None]:
     """Return the parts of the time of plain path tracing that denoised and calibrated views take.
 
-    ``samples`` are those of a pixel. Errors and seconds follow ``advice``: power laws of samples,
-    and fewer than one sample there are not. None where it is not known, or no number of samples
-    would be enough, as where a denoiser's error is nothing but bias.
+    ``samples`` are those of a pixel. Errors and seconds follow ``advice``: a power law and a line
+    over samples, and fewer than one sample there are not. None where it is not known, as of a scene
+    without noise, or no number of samples would be enough, as where a denoiser's error is nothing
+    but bias.
     """
     if not advice or advice["own"] != {"samples": samples, "denoise": False}:
         return None, None
@@ -85,16 +86,17 @@ def cheaper_parts(
     for way, points in advice["unchanged"].items():
         counts = [point["samples"] for point in points]
         errors = metrics.fit(counts, [point["error"] for point in points])
-        assert errors is not None
         seconds = linregress(counts, [point["seconds"] for point in points])
-        ways[way] = errors, seconds
+        if errors is None or seconds.slope <= 0:
+            return None, None
+        ways[way] = errors, max(0.0, float(seconds.intercept)), float(seconds.slope)
 
     def seconds_to(error: float, way: str) -> float:
-        errors, seconds = ways[way]
-        return float(seconds.intercept + seconds.slope * max(1.0, math.ceil(errors.inverse(error))))
+        errors, overhead, each = ways[way]
+        return overhead + each * max(1.0, math.ceil(errors.inverse(error)))
 
-    errors, seconds = ways[TRACED]
-    plain = float(seconds.intercept + seconds.slope * samples)
+    errors, overhead, each = ways[TRACED]
+    plain = overhead + each * samples
     denoised = seconds_to(errors.at(samples), DENOISED) / plain
     calibrated = min(seconds_to(TARGET_ERROR, way) for way in ways) / plain
     return (
