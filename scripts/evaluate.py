@@ -5,27 +5,14 @@ RENDERS holds <view>.png or <view>.exr for each view that the dataset's split ha
 """
 
 import argparse
-import math
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lightfield.core.cli import run, stops, white
-from lightfield.core.errors import UserError
-from lightfield.core.files import whole, write_csv
-from lightfield.core.progress import Progress
+from lightfield.core.leftovers import temporary_folder
 from lightfield.dataset.exports import VIEWS
-from lightfield.dataset.lightfield import View
 from lightfield.export.source import Source
 from lightfield.export.splits import splits
-from lightfield.imaging import images
-from lightfield.measurement import evaluation, metrics
-from lightfield.report import page
-
-# More views than this are in the table alone.
-SHOWN_VIEWS = 24
-WIDEST = 1500
+from lightfield.report import evaluation_page
 
 
 def main() -> None:
@@ -46,65 +33,18 @@ def main() -> None:
     source = Source(arguments.dataset, name, arguments.suffix, **development)
     views = source.lightfield.views
     tests = [view for view in views if view.split == "test"] or splits(source.lightfield).test
-    paths = {view.name: find(arguments.renders, view) for view in tests}
-    rows = []
-    progress = Progress(len(tests), "evaluate", "views")
-    for view in tests:
-        shown = evaluation.rendered(paths[view.name], source)
-        true = evaluation.truth(source, view, paths[view.name])
-        counted = np.ones(shown.colour.shape[:2], bool)
-        if arguments.masks:
-            counted = mask(arguments.masks / f"{view.name}.png", counted.shape)
-        parts = evaluation.regions(source, view, counted, true.depth)
-        if not parts:
-            raise UserError(f"{paths[view.name]}: its mask leaves no pixel that the lens sees")
-        for region, errors in evaluation.errors(shown, true, parts):
-            rows.append({"view": view.name, "region": region, **errors})
-        flip = metrics.flip_map(true.colour, shown.colour)[..., np.newaxis].repeat(3, axis=-1)
-        strip = np.concatenate([true.colour, shown.colour, flip], axis=1).clip(0, 1)
-        images.write_png(
-            arguments.output / "pictures" / f"{view.name}.png",
-            np.round(strip * 255).astype(np.uint8),
-        )
-        progress.done()
-    means = evaluation.means(rows)
-    write_csv(arguments.output / "evaluation.csv", [*rows, *means])
-    page.write(
-        arguments.output / "index.html",
-        "evaluation.html.j2",
-        name="/".join(whole(arguments.dataset).parts[-2:]),
-        renders=whole(arguments.renders).name,
-        means=means,
-        rows=rows,
-        pictures={
-            view.name: page.photo(arguments.output / "pictures" / f"{view.name}.png", WIDEST)
-            for view in tests[:SHOWN_VIEWS]
-        },
-    )
-    overall = means[0]
-    psnr = "inf" if math.isinf(overall["psnr"]) else f"{overall['psnr']:.2f}"
+    arguments.output.parent.mkdir(parents=True, exist_ok=True)
+    # An evaluation that fails leaves nothing, or the one before it.
+    with temporary_folder(arguments.output.parent) as made:
+        overall = evaluation_page.write(made, source, tests, arguments.renders, arguments.masks)
+        for path in filter(Path.is_file, [*made.rglob("*")]):
+            target = arguments.output / path.relative_to(made)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            path.replace(target)
     print(
-        f"{len(tests)} views: PSNR {psnr} dB, SSIM {overall['ssim']:.4f}, FLIP "
+        f"{len(tests)} views: PSNR {overall['psnr']:.2f} dB, SSIM {overall['ssim']:.4f}, FLIP "
         f"{overall['flip']:.4f}; LPIPS is left out: no installed package has its weights"
     )
-
-
-def find(folder: Path, view: View) -> Path:
-    """Return the render of a view; raises `UserError` where there is none."""
-    for suffix in (".exr", ".png"):
-        path = folder / f"{view.name}{suffix}"
-        if path.is_file():
-            return path
-    raise UserError(f"{folder}: has no {view.name}.png or .exr, which is a view to test with")
-
-
-def mask(path: Path, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Return where a grey picture is not 0; raises `UserError` for one of another size or kind."""
-    pixels = images.read_image(path, ["Y"]).channels["Y"]
-    if pixels.shape != shape:
-        sizes = (f"{width} × {height}" for height, width in (pixels.shape, shape))
-        raise UserError(f"{path}: is {', but its view is '.join(sizes)}")
-    return np.asarray(pixels > 0)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from sphere import write_views
 
-import evaluate
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField
 from lightfield.export.source import Source
@@ -95,13 +94,15 @@ def test_errors_are_those_that_were_made(dataset, tmp_path):
     assert both["flip"] > 0
     assert both["pixels"] == 48 * 64
     deeper = image.channels | {"Z": image.channels["Z"] * np.float32(1.25)}
+    # Unknown depth is as wrong as can be.
+    deeper["Z"][:, 16:32] = np.nan
     images.write_exr(tmp_path / "view_0001f.exr", deeper)
     turned = {"R": np.full((48, 64), 1, np.float32), "B": np.full((48, 64), 1, np.float32)}
     turned["G"] = np.zeros((48, 64), np.float32)
     images.write_exr(tmp_path / "normal" / "view_0001f.exr", turned)
     found = rows_of(dataset, "perspective", tmp_path / "view_0001f.exr")["all"]
     assert found["psnr"] == math.inf
-    assert found["depth"] == pytest.approx(0.25, abs=1e-6)
+    assert found["depth"] == pytest.approx(0.75 * 0.25 + 0.25, abs=1e-6)
     assert found["normal"] == pytest.approx(45)
 
 
@@ -123,6 +124,15 @@ def test_what_is_missing_or_of_another_size_is_named(dataset, tmp_path, run_prog
     result = run_program("evaluate.py", tmp_path, *words, check=False)
     assert result.returncode == 1
     assert "has no view_0001f.png or .exr, which is a view to test with" in result.stderr
+    renders = tmp_path / "renders"
+    for number, view in enumerate(TESTS):
+        light = {name: np.full((48, 64), 0.5, np.float32) for name in "RGB"}
+        light["G"][3, 3] = np.nan if number else 0.5
+        images.write_exr(renders / f"{view}.exr", light)
+    result = run_program("evaluate.py", renders, *words, check=False)
+    problem = f"{TESTS[1]}.exr: has colour that is no number where it is compared"
+    assert (result.returncode, result.stderr.splitlines()[-1].endswith(problem)) == (1, True)
+    assert [path.name for path in tmp_path.iterdir()] == ["renders"]
     images.write_png(tmp_path / "small.png", np.zeros((4, 6, 3), np.uint8))
     with pytest.raises(UserError, match="is 6 × 4, but the dataset's views are 64 × 48"):
         evaluation.rendered(tmp_path / "small.png", Source(dataset, "perspective", ".exr"))
@@ -139,6 +149,6 @@ def test_what_is_missing_or_of_another_size_is_named(dataset, tmp_path, run_prog
     ):
         images.write_png(mask, pixels)
         with pytest.raises(UserError, match=problem):
-            evaluate.mask(mask, (48, 64))
+            evaluation.mask(mask, (48, 64))
     images.write_png(mask, np.eye(48, 64, dtype=np.uint8))
-    assert evaluate.mask(mask, (48, 64)).sum() == 48
+    assert evaluation.mask(mask, (48, 64)).sum() == 48

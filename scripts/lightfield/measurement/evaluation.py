@@ -37,6 +37,24 @@ class Pictures:
     normals: Floats | None
 
 
+def find(folder: Path, view: View) -> Path:
+    """Return the render of a view; raises `UserError` where there is none."""
+    for suffix in (".exr", ".png"):
+        path = folder / f"{view.name}{suffix}"
+        if path.is_file():
+            return path
+    raise UserError(f"{folder}: has no {view.name}.png or .exr, which is a view to test with")
+
+
+def mask(path: Path, shape: tuple[int, ...]) -> Bools:
+    """Return where a grey picture is not 0; raises `UserError` for one of another size or kind."""
+    pixels = images.read_image(path, ["Y"]).channels["Y"]
+    if pixels.shape != shape:
+        sizes = (f"{width} × {height}" for height, width in (pixels.shape, shape))
+        raise UserError(f"{path}: is {', but its view is '.join(sizes)}")
+    return np.asarray(pixels > 0)
+
+
 def truth(source: Source, view: View, like: Path) -> Pictures:
     """Return a dataset's own view; as coarse as a PNG if what it is compared with is ``like``."""
     coarse = like.suffix == ".png"

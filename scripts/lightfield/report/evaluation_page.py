@@ -1,0 +1,68 @@
+"""The errors of somebody's views as a table and as a page, which shows them beside the truth."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightfield.core.errors import UserError
+from lightfield.core.files import whole, write_csv
+from lightfield.core.progress import Progress
+from lightfield.dataset.lightfield import View
+from lightfield.export.source import Source
+from lightfield.imaging import images
+from lightfield.measurement import evaluation, metrics
+from lightfield.report import page
+
+# More views than this are in the table alone.
+SHOWN_VIEWS = 24
+WIDEST = 1500
+
+
+def write(
+    output: Path, source: Source, tests: Sequence[View], renders: Path, masks: Path | None
+) -> dict[str, Any]:
+    """Write the table, the page and the pictures of the views to test with; return all's means.
+
+    Raises `UserError` for one that the folder ``renders`` lacks, or that cannot be compared.
+    """
+    paths = {view.name: evaluation.find(renders, view) for view in tests}
+    rows = []
+    progress = Progress(len(tests), "evaluate", "views")
+    for view in tests:
+        path = paths[view.name]
+        shown = evaluation.rendered(path, source)
+        true = evaluation.truth(source, view, path)
+        counted = np.ones(shown.colour.shape[:2], bool)
+        if masks:
+            counted = evaluation.mask(masks / f"{view.name}.png", counted.shape)
+        parts = evaluation.regions(source, view, counted, true.depth)
+        if not parts:
+            raise UserError(f"{path}: its mask leaves no pixel that the lens sees")
+        if not np.isfinite(shown.colour[parts["all"]]).all():
+            raise UserError(f"{path}: has colour that is no number where it is compared")
+        for region, errors in evaluation.errors(shown, true, parts):
+            rows.append({"view": view.name, "region": region, **errors})
+        pictures = [np.nan_to_num(one.colour) for one in (true, shown)]
+        flip = metrics.flip_map(*pictures)[..., np.newaxis].repeat(3, axis=-1)
+        strip = np.concatenate([*pictures, flip], axis=1).clip(0, 1)
+        images.write_png(
+            output / "pictures" / f"{view.name}.png", np.round(strip * 255).astype(np.uint8)
+        )
+        progress.done()
+    means = evaluation.means(rows)
+    write_csv(output / "evaluation.csv", [*rows, *means])
+    page.write(
+        output / "index.html",
+        "evaluation.html.j2",
+        name="/".join(whole(source.dataset).parts[-2:]),
+        renders=whole(renders).name,
+        means=means,
+        rows=rows,
+        pictures={
+            view.name: page.photo(output / "pictures" / f"{view.name}.png", WIDEST)
+            for view in tests[:SHOWN_VIEWS]
+        },
+    )
+    return means[0]
