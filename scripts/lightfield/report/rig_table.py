@@ -98,9 +98,7 @@ def read_setups(scenes: Sequence[Path]) -> list[Setup]:
 def _setup(scene: str, name: str, rig: rigs.Rig) -> Setup:
     if isinstance(rig, rigs.BlendCamera):
         # Where it is, only the .blend says.
-        places = {"along": "–", "size": "–", "nearest": math.nan, "neighbours": math.nan}
-        volumes = dict.fromkeys(("immersive", "enclosed", "formula"))
-        return Setup(scene=scene, rig=name, views=rig.view_count, **places, **volumes)
+        return Setup(scene, name, rig.view_count, "–", "–", math.nan, math.nan, None, None, None)
     positions = np.array([view.position for view in rig.poses()[:: rig.views_a_position]])
     volume = interpolation_volume(rig, rig.camera.make())
     if isinstance(rig, rigs.Sphere) and np.ptp(rig.sides) == 0:
