@@ -13,9 +13,9 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-# From the folder that Snakemake works in, which may be a user's own.
-SCRIPTS = os.path.relpath(FOLDER / "scripts")
-BENCHMARKS = os.path.relpath(FOLDER / "benchmarks")
+# From the folder that Snakemake works in, which may be a user's own; as commands have them.
+SCRIPTS = shlex.quote(os.path.relpath(FOLDER / "scripts"))
+BENCHMARKS = shlex.quote(os.path.relpath(FOLDER / "benchmarks"))
 
 from snakemake_interface_executor_plugins.executors.base import SubmittedJobInfo
 
@@ -737,7 +737,7 @@ def check_device():
         device = "gpu"
     renders = device == "gpu" or any(job.resources.get("gpu") for job in jobs)
     if renders and workflow.local_exec:
-        words = [sys.executable, f"{SCRIPTS}/check_device.py", device]
+        words = [sys.executable, FOLDER / "scripts/check_device.py", device]
         checked = subprocess.run(words, capture_output=True, text=True)
         if checked.returncode:
             *_, problem = checked.stderr.strip().splitlines() or ["it said nothing"]

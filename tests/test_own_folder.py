@@ -63,7 +63,8 @@ def snakemake(*words, cwd="/"):
 @pytest.mark.slow
 def test_scenes_poses_results_and_work_are_in_the_users_folder(folder):
     before = set(ROOT.rglob("*.json"))
-    own = ("--snakefile", ROOT / "Snakefile", "--directory", folder)
+    (folder / "our tools").symlink_to(ROOT)
+    own = ("--snakefile", folder / "our tools/Snakefile", "--directory", folder)
     chosen = ("--config", "scenes=mine", "preset=full")
     code, said = snakemake(*own, "--cores", "1", "results/mine/LFOwn/lightfield.json", *chosen)
     assert code == 0, said
