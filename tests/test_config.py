@@ -286,6 +286,8 @@ def test_defaults_and_limits_are_applied(tmp_path, monkeypatch):
     assert small[0].reprojections["perspective"].camera.resolution == (100, 100)
     assert small[0].render["samples"] == 8
     assert small[0].render["denoise"] is True
+    with pytest.raises(UserError, match=r"right\.yaml: rigs\.LFSphere: a rig of type sphere can"):
+        scene_datasets("right", limits=Preset(views=1))
 
 
 def test_a_preset_leaves_the_pixels_of_a_perspective_view_square(tmp_path, monkeypatch):

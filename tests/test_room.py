@@ -118,3 +118,10 @@ def test_two_processes_of_one_number_write_to_one_file_each_its_own(tmp_path, mo
         other.write_text("other")
     assert target.read_text() == "one"
     assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_name_that_is_no_files_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match="cannot be written"):
+        files.write_text("", "text")
+    assert not list(tmp_path.iterdir())

@@ -19,7 +19,7 @@ def writing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        folder = next(parent for parent in path.absolute().parents if parent.exists())
+        folder = next(part for part in (path, *path.absolute().parents) if part.exists())
         free = shutil.disk_usage(folder).free
         reason = error.strerror or error
         raise UserError(
@@ -39,7 +39,7 @@ def atomic_path(target: Path | str) -> Iterator[Path]:
     """
     target = Path(target)
     number = int.from_bytes(os.urandom(4))
-    temporary = target.with_name(f".{target.stem}.{number}.tmp{target.suffix}")
+    temporary = target.parent / f".{target.stem}.{number}.tmp{target.suffix}"
     with writing(target):
         target.parent.mkdir(parents=True, exist_ok=True)
         try:

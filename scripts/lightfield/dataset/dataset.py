@@ -787,6 +787,15 @@ def scene_datasets(
     if source.blend:
         checksum = config.blend_sha256(scene, source)[0]
         source = source.model_copy(update={"sha256": checksum})
+    folders: dict[str, Any] = {}
+    if settings:
+        folders = {
+            "results_root": settings.results,
+            "work_root": settings.work,
+            "views_per_shard": settings.views_per_shard,
+            "most_shards": settings.most_shards,
+            "shard_minutes": settings.shard_minutes or math.inf,
+        }
     testing = [name for name, rig in written.rigs.items() if rig.split in TESTED_WITH]
     training = next((name for name, rig in written.rigs.items() if rig.split == "train"), None)
     found = []
@@ -809,6 +818,12 @@ def scene_datasets(
         }
         panorama = written.report.panorama
         has_panorama = sees_all_round(rig) if panorama == "auto" else panorama
+        try:
+            limited = _limited_rig(rig, limits, written.render is not None)
+        except UserError as error:
+            file = f"{config.OWN_SCENES}/{scene}.yaml"
+            raise UserError(f"{file}: rigs.{name}: {error}; let the preset have more") from None
+        render = _limited_render(written.render, rig, limits)
         for folder, frame in _frames(name, rig, source.frame):
             below = folder.removeprefix(name)
             found.append(
@@ -818,8 +833,8 @@ def scene_datasets(
                     rig_name=name,
                     rig_folder=folder,
                     source=source.model_copy(update={"frame": frame}),
-                    render=_limited_render(written.render, rig, limits),
-                    rig=_limited_rig(rig, limits, written.render is not None),
+                    render=render,
+                    rig=limited,
                     reprojections=reprojections,
                     flow=written.flow,
                     exports=written.exports.model_copy(update=exports),
@@ -829,21 +844,10 @@ def scene_datasets(
                     if rig.split == "train"
                     else (),
                     trained_by=f"{training}{below}" if rig.split in TESTED_WITH else None,
+                    **folders,
                 )
             )
-    if settings is None:
-        return found
-    return [
-        replace(
-            dataset,
-            results_root=settings.results,
-            work_root=settings.work,
-            views_per_shard=settings.views_per_shard,
-            most_shards=settings.most_shards,
-            shard_minutes=settings.shard_minutes or math.inf,
-        )
-        for dataset in found
-    ]
+    return found
 
 
 def check_presence(dataset: Dataset) -> None:
