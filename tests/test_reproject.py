@@ -457,6 +457,15 @@ def test_angles_may_be_given_in_degrees(dataset, run):
             run(*flags, "--png", "--dry-run")
 
 
+def test_a_cube_map_of_a_narrow_lens_has_the_face_ahead_and_is_no_single_file(dataset, run):
+    lens = ["--no-configs", f"{SIZE},{SIZE}", "--i-equidistant", "1deg"]
+    run(*lens, "--cubemap", "8", "--png", "--filter-prefix", "view_0000f", configs=False)
+    assert names(dataset / "out") == ["view_0000f_f.png"]
+    cube = ["--no-configs", "48,8", "--i-cubemap", "--equirectangular", "full", "--png"]
+    with pytest.raises(UserError, match="--single: is one face of a cube map"):
+        run(*cube, "--single", str(dataset / "out/view_0000f_f.png"), configs=False, source=False)
+
+
 def test_a_warning_is_printed_once(dataset, run, capsys):
     run("--cubemap", "256", "--png")
     assert capsys.readouterr().err.count("warning: upsampling") == 1
@@ -508,6 +517,8 @@ def test_every_lens_is_a_target_and_a_source(dataset, run, flags):
         (PERSPECTIVE, "--exr, --png"),
         ((*PERSPECTIVE, "--png", "--rotation", "5"), "--rotation 5: must have the form PAN"),
         ((*PERSPECTIVE, "--png", "--samples", "0"), "--samples 0"),
+        ((*PERSPECTIVE, "--png", "--samples", "999999999"), "--samples 999999999: must be from 1"),
+        (("--cubemap", "9999999999", "--png"), "--cubemap 9999999999: must be from 1 to"),
         (("--rectilinear", "18,36", "--png", "--scale", "0.001"), "leaves no pixel"),
         (("--rectilinear", "18,36", "--png", "--scale", "1e9"), "makes a side of over"),
         ((*PERSPECTIVE, "--png", "--output-resolution", "1e9,4"), "must be two whole numbers"),

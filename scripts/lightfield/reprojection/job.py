@@ -236,6 +236,10 @@ class Job:
         """Return the views that the command line chooses, in the order of their names or frames."""
         arguments = self.arguments
         if arguments.single:
+            if isinstance(self.source, CubeMap):
+                raise UserError(
+                    "--single: is one face of a cube map; give --input-dir, for all six"
+                )
             return [SourceView(arguments.single.stem, (arguments.single,))]
         folder: Path = arguments.input_dir
         if not folder.is_dir():

@@ -24,6 +24,8 @@ from lightfield.reprojection.filters import DEFAULT_FILTER, FILTERS
 
 # Of an image's side: of a cube map's strip of faces, too.
 MOST_PIXELS = 2**19
+# Each way, of a pixel: as many as a scene YAML may have.
+MOST_SAMPLES = 64
 
 
 def add_geometry_flags(parser: argparse.ArgumentParser) -> None:
@@ -124,8 +126,8 @@ class Geometry:
 
 def geometry(arguments: argparse.Namespace) -> Geometry:
     """Read the flags of `add_geometry_flags`; a `UserError` names the one that is wrong."""
-    if arguments.samples < 1:
-        raise UserError(f"--samples {arguments.samples}: must be at least 1")
+    if not 1 <= arguments.samples <= MOST_SAMPLES:
+        raise UserError(f"--samples {arguments.samples}: must be from 1 to {MOST_SAMPLES}")
     lightfield, source = _source(arguments)
     return Geometry(
         lightfield=lightfield,
@@ -175,8 +177,10 @@ def _targets(arguments: argparse.Namespace, source: Lens) -> list[Target]:
     if arguments.cubemap is not None:
         if arguments.no_reproject:
             raise UserError("--no-reproject: excludes an output lens")
-        if arguments.cubemap < 1:
-            raise UserError(f"--cubemap {arguments.cubemap}: must be at least 1 pixel")
+        if not 1 <= arguments.cubemap <= MOST_PIXELS // 6:
+            raise UserError(
+                f"--cubemap {arguments.cubemap}: must be from 1 to {MOST_PIXELS // 6} pixels"
+            )
         face = CubeMap(width=6 * arguments.cubemap, height=arguments.cubemap).face
         faces = [Target(f"_{name}", face, rotation @ turn) for name, turn in CUBE_FACES.items()]
         return [target for target in faces if _is_seen(target, source)]
@@ -198,7 +202,11 @@ def _targets(arguments: argparse.Namespace, source: Lens) -> list[Target]:
 def _is_seen(target: Target, source: Lens) -> bool:
     """Whether the source sees anything of a target; a fisheye of 180° sees nothing behind it."""
     rays = target.lens.resized(64, 64).pixel_rays() @ target.rotation.T
-    return bool(np.isfinite(source.pixels(rays)).any())
+    if np.isfinite(source.pixels(rays)).any():
+        return True
+    # All that a narrow lens sees may lie between these rays.
+    pixels = target.lens.pixels(source.fitted(64).pixel_rays() @ target.rotation)
+    return bool(((pixels >= 0) & (pixels <= target.lens.width)).all(axis=-1).any())
 
 
 def _lens(arguments: argparse.Namespace, prefix: str, width: int, height: int) -> Lens | None:
