@@ -70,8 +70,8 @@ AS_WRITTEN = WrapValidator(_unchanged)
 
 # Metres, or degrees. Blender computes in 32 bits, which beyond that are coarser than a metre.
 FARTHEST = 1e7
-Coordinate = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
-# Named, so that the JSON schema has it once.
+Coordinate = Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)]
+# Named, so that the JSON schema has it once; a model's settings do not reach in there.
 Vector = TypeAliasType("Vector", Annotated[tuple[Coordinate, Coordinate, Coordinate], as_list(3)])
 # Of a folder that a key names.
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=100)]

@@ -25,7 +25,7 @@ from lightfield.geometry.rotations import (
     matrix_to_euler,
 )
 
-Side = Annotated[float, Field(ge=0, le=FARTHEST)]
+Side = Annotated[float, Field(strict=True, ge=0, le=FARTHEST)]
 Size = TypeAliasType("Size", Side | Annotated[tuple[Side, Side, Side], as_list(3)])
 Frame = Annotated[int, Field(ge=0, le=1048574)]
 
