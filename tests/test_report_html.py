@@ -25,6 +25,7 @@ from lightfield.report import (
     faults,
     figures,
     packing,
+    page,
     pass_pictures,
 )
 
@@ -391,7 +392,7 @@ def test_an_index_leads_to_every_page(sphere, run_program, show):
         ("lightfield.json", '{"frames": []}', "lightfield.json: camera: is missing"),
         ("validation.json", "{}", "validation.json: is not what"),
         ("report/costs.json", "[]", "costs.json: is not what scripts/costs.py writes"),
-        ("report/overview.png", "no", "overview.png: is no picture"),
+        ("report/overview.png", "no", "overview.png: is no image"),
         ("exr/view_0001f.exr", "no", "view_0001f.exr: is no image"),
     ],
 )
@@ -457,8 +458,24 @@ def test_a_picture_of_16_bits_is_shown_as_one_of_8(tmp_path):
     for fault in faults.collect(tmp_path, ["a", "b"]):
         assert (decoded(fault.colour) == pixels).all()
     one, other = (contact_sheet.small_view(tmp_path / f"{name}.png", 8, 8) for name in "ab")
-    assert np.allclose(one, pixels, atol=1e-3)
-    assert (one == other).all()
+    assert (one == pixels).all() and (other == pixels).all()
+
+
+@pytest.mark.parametrize(("views", "width", "height"), [(120, 1, 999), (1, 1, 999), (3, 999, 1)])
+def test_a_sheet_of_any_views_is_as_large_as_a_page_can_have(tmp_path, views, width, height):
+    images.write_png(tmp_path / "a.png", np.full((height, width, 3), 200, np.uint8))
+    sheet = contact_sheet.sheet([tmp_path / "a.png"] * views, width, height)
+    assert max(sheet.shape) <= 2000
+    assert (sheet == 200).all(axis=-1).any()
+
+
+def test_pictures_that_are_made_smaller_stay_white_beside_edges(tmp_path):
+    pixels = np.zeros((64, 600, 3), np.uint8)
+    pixels[:, 300:] = 255
+    images.write_png(tmp_path / "a.png", pixels)
+    small = contact_sheet.small_view(tmp_path / "a.png", 250, 24)
+    assert small.dtype == np.uint8 and small[:, 126:].min() > 240
+    assert decoded(page.photo(tmp_path / "a.png", 250))[:, 126:].min() > 230
 
 
 def decoded(uri):

@@ -30,9 +30,11 @@ def sheet(views: Sequence[Path], width: int, height: int) -> Array:
     The views are EXRs, which are developed, or PNGs, which are. Their size is ``width`` ×
     ``height``.
     """
-    columns = max(1, round(math.sqrt(len(views) * 1.6 * height / width)))
+    columns = max(1, min(len(views), round(math.sqrt(len(views) * 1.6 * height / width))))
     rows = math.ceil(len(views) / columns)
     cell_width = min(max(width, LEAST_CELL), (SHEET_WIDTH - GAP) // columns - GAP)
+    # A single tall view would make a sheet that no WebP can be of.
+    cell_width = max(1, min(cell_width, SHEET_WIDTH * width // height))
     cell_height = max(1, round(cell_width * height / width))
     cells = [small_view(path, cell_width, cell_height) for path in views]
     exposure = pictures.exposure_for(np.stack(cells))
@@ -69,5 +71,6 @@ def small_view(path: Path, width: int, height: int) -> Array:
     except UserError as error:
         print(f"warning: {error}", file=sys.stderr)
         return np.zeros((height, width, 3), dtype=np.float32)
-    colour = image.srgb if path.suffix == ".png" else image.colour
-    return pictures.shrunk(np.where(np.isfinite(colour), colour, 0), width, height)
+    if path.suffix == ".png":
+        return pictures.shrunk_8_bit(image.srgb, width, height)
+    return pictures.shrunk(np.where(np.isfinite(image.colour), image.colour, 0), width, height)

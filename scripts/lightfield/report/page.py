@@ -6,13 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
-import numpy as np
 from markupsafe import Markup
-from PIL import Image
 
-from lightfield.core.errors import UserError
 from lightfield.core.files import write_text
 from lightfield.core.progress import duration
+from lightfield.imaging import images, pictures
 from lightfield.report.packing import data_uri, webp
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
@@ -43,15 +41,11 @@ def photo(path: Path, widest: int) -> str | None:
     """Return a picture as a data URI, at most ``widest`` pixels wide; None where there is none."""
     if not path.is_file():
         return None
-    try:
-        with Image.open(path) as opened:
-            picture = opened.convert("RGB")
-    except OSError as error:
-        raise UserError(f"{path}: is no picture that can be read: {error}") from None
-    if picture.width > widest:
-        height = max(1, round(picture.height * widest / picture.width))
-        picture = picture.resize((widest, height), Image.Resampling.LANCZOS)
-    return webp(np.asarray(picture), PHOTO_QUALITY)
+    shown = images.read_image(path).srgb
+    height, width = shown.shape[:2]
+    if width > widest:
+        shown = pictures.shrunk_8_bit(shown, widest, max(1, round(height * widest / width)))
+    return webp(shown, PHOTO_QUALITY)
 
 
 def plot(stem: Path) -> str | None:
