@@ -18,6 +18,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import View
 from lightfield.export.source import Bools, Floats, Source
+from lightfield.geometry.depth import distance_from_z
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb, tone_map
 from lightfield.measurement import metrics
@@ -95,16 +96,21 @@ def regions(source: Source, view: View, counted: Bools, depth: Floats | None) ->
     """Return the parts (h, w) of a view in which errors are counted, by their names.
 
     ``counted`` is what a mask leaves. ``centre`` and ``rim`` divide the lens at half its largest
-    angle; with depth, ``edges`` are where it jumps, and ``background`` is where nothing was hit.
+    angle; with ``depth``, as the dataset has it, ``edges`` are where the distance jumps, and
+    ``background`` is where nothing was hit.
     """
-    every = counted & source.valid(view)
-    angle = np.arccos(np.clip(-source.lens.pixel_rays()[..., 2], -1, 1))
+    valid, rays = source.valid(view), source.lens.pixel_rays()
+    every = counted & valid
+    angle = np.arccos(np.clip(-rays[..., 2], -1, 1))
     inner = angle < np.nanmax(angle) / 2
     found = {"all": every, "centre": every & inner, "rim": every & ~inner}
     if depth is not None:
-        far = np.where(np.isfinite(depth), depth, 1e9)
-        near = minimum_filter(far, EDGE_PIXELS)
-        found["edges"] = every & (maximum_filter(far, EDGE_PIXELS) > (1 + EDGE) * near)
+        # Towards the rim of a wide lens Z falls on any surface.
+        distance = distance_from_z(depth, rays) if source.lightfield.depth == "z" else depth
+        known = np.where(np.isfinite(distance), distance, 1e9)
+        near = minimum_filter(np.where(valid, known, np.inf), EDGE_PIXELS)
+        far = maximum_filter(np.where(valid, known, 0), EDGE_PIXELS)
+        found["edges"] = every & (far > (1 + EDGE) * near)
         found["background"] = every & np.isposinf(depth)
     return {name: region for name, region in found.items() if region.any()}
 
