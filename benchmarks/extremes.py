@@ -13,6 +13,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -70,10 +71,10 @@ class Case:
     """
 
     name: str
-    basis: str
     build: Callable[[], None]
     truth: Truth
     bound: Mapping[str, float]
+    basis: str = "closed form"
     camera: Mapping[str, Any] = field(default_factory=lambda: PANORAMA)
     place: Vector = (0, 0, 0)
     samples: int = 4
@@ -145,13 +146,20 @@ def box(half: float, material: Any, center: Vector = (0, 0, 0)) -> Any:
     return painted(material)
 
 
-def wall(
-    y: float, material: Any, size: float = 1e3, turn: float = 90, x: float = 0, z: float = 0
-) -> Any:
-    bpy.ops.mesh.primitive_plane_add(
-        size=size, location=(x, y, z), rotation=(math.radians(turn), 0, 0)
-    )
+def wall(y: float, material: Any, size: float = 1e3, x: float = 0, z: float = 0) -> Any:
+    upright = (math.radians(90), 0, 0)
+    bpy.ops.mesh.primitive_plane_add(size=size, location=(x, y, z), rotation=upright)
     return painted(material)
+
+
+def screen(y: float, light: float = 1, **placed: float) -> Any:
+    """A wall that shines."""
+    return wall(y, emission(light), **placed)
+
+
+def room(half: float, center: Vector = (0, 0, 0)) -> None:
+    """A box whose walls shine with 1."""
+    box(half, emission(1), center)
 
 
 def painted(material: Any) -> Any:
@@ -185,8 +193,8 @@ def world(strength: float) -> None:
 
 def sliding(first: int, frame: int) -> None:
     """A square 2 m wide slides by 4 m a frame, and is ahead of the camera at ``frame``."""
-    wall(20, emission(0.25))
-    square = wall(10, emission(1), size=2)
+    screen(20, 0.25)
+    square = screen(10, size=2)
     moving(square, 0, {at: 4 * (at - frame) for at in (first, frame, frame + 1)})
     bpy.context.scene.render.use_motion_blur = True
 
@@ -303,15 +311,11 @@ def sizes() -> Iterator[Case]:
             bounces(max=8, diffuse=8)
             box(size / 2, furnace("ShaderNodeBsdfDiffuse", 0.5))
 
-        yield Case(
-            f"a room of {name}",
-            "closed form, furnace of 8 bounces",
-            build,
-            of_box(size / 2, 1 - 0.5**10, even=False),
-            {"colour": 0.01, "depth": SHARP},
-            place=(0.1 * size, -0.2 * size, 0.05 * size),
-            samples=64,
-        )
+        truth = of_box(size / 2, 1 - 0.5**10, even=False)
+        basis = "closed form, furnace of 8 bounces"
+        place = (0.1 * size, -0.2 * size, 0.05 * size)
+        bound = {"colour": 0.01, "depth": SHARP}
+        yield Case(f"a room of {name}", build, truth, bound, basis, place=place, samples=64)
 
 
 def far() -> Iterator[Case]:
@@ -319,25 +323,18 @@ def far() -> Iterator[Case]:
         # A rig's centre is at most 1e7 m away.
         away = 10.0**power - 1
         center = (away, -away, away)
-
-        def build(center: Vector = center) -> None:
-            box(2, emission(1), center)
-
-        yield Case(
-            f"a room of 4 m, 1e{power} m from the origin",
-            "closed form",
-            build,
-            of_box(2, 1, center),
-            {"colour": HALF, "depth": COARSE},
-            place=(away + 0.1, -away - 0.2, away + 0.3),
-        )
+        build = partial(room, 2, center)
+        name = f"a room of 4 m, 1e{power} m from the origin"
+        bound = {"colour": HALF, "depth": COARSE}
+        place = (away + 0.1, -away - 0.2, away + 0.3)
+        yield Case(name, build, of_box(2, 1, center), bound, place=place)
 
 
 def lights() -> Iterator[Case]:
     def sunny() -> None:
         sun(5e4 * math.pi / 0.5, 0)
         wall(10, surface("ShaderNodeBsdfDiffuse", Color=grey(0.5)))
-        shade = wall(5, emission(5e-3), size=2)
+        shade = screen(5, 5e-3, size=2)
         shade.visible_shadow = False
 
     def in_sun(seen: Seen) -> Mapping[str, float]:
@@ -348,72 +345,37 @@ def lights() -> Iterator[Case]:
             "depth": max(largest(seen.depth[inside], 5), largest(seen.depth[outside], 10)),
         }
 
-    yield Case(
-        "a sun 1e7 times the shade",
-        "closed form",
-        sunny,
-        in_sun,
-        {"colour": 2 * HALF, "depth": SHARP},
-        camera=AHEAD,
-    )
+    bound = {"colour": 2 * HALF, "depth": SHARP}
+    yield Case("a sun 1e7 times the shade", sunny, in_sun, bound, camera=AHEAD)
     for strength in (6.5e4, 1e6, 1e-6):
-
-        def bright(strength: float = strength) -> None:
-            wall(10, emission(strength))
-
-        bound = HALF if strength > 6e-5 else 2.0**-25 / strength
-        yield Case(
-            f"light of {strength:g}",
-            "closed form",
-            bright,
-            of_wall(10, strength),
-            {"colour": bound, "depth": SHARP},
-            camera=AHEAD,
-        )
+        bound = {"colour": HALF if strength > 6e-5 else 2.0**-25 / strength, "depth": SHARP}
+        build, truth = partial(screen, 10, strength), of_wall(10, strength)
+        yield Case(f"light of {strength:g}", build, truth, bound, camera=AHEAD)
 
 
 def surfaces() -> Iterator[Case]:
     for distance in (0.002, 1e-4, 5e-5):
-
-        def near(distance: float = distance) -> None:
-            wall(distance, emission(1), size=1)
-
-        yield Case(
-            f"a surface {distance:g} m ahead",
-            "closed form",
-            near,
-            of_wall(distance, 1),
-            {"colour": HALF, "depth": 2 * SHARP},
-            camera=AHEAD,
-        )
+        build, truth = partial(screen, distance, size=1), of_wall(distance, 1)
+        bound = {"colour": HALF, "depth": 2 * SHARP}
+        yield Case(f"a surface {distance:g} m ahead", build, truth, bound, camera=AHEAD)
 
     def coincident() -> None:
-        wall(2, emission(1))
-        wall(2, emission(3))
+        screen(2)
+        screen(2, 3)
 
     yield Case(
         "two surfaces in one place",
-        "each pixel shows one of them",
         coincident,
         one_of_two,
         {"colour": 3 * HALF, "depth": SHARP},
+        "each pixel shows one of them",
         camera=AHEAD,
         samples=1,
     )
-
-    def dot() -> None:
-        pixel = 2 * 10 * math.tan(math.radians(0.5)) / 16
-        wall(10, emission(1), size=pixel, x=pixel / 2, z=pixel / 2)
-
-    yield Case(
-        "a surface of one pixel",
-        "closed form",
-        dot,
-        one_pixel,
-        {"colour": 0.02, "depth": SHARP},
-        camera=NARROW,
-        samples=1024,
-    )
+    pixel = 2 * 10 * math.tan(math.radians(0.5)) / 16
+    dot = partial(screen, 10, size=pixel, x=pixel / 2, z=pixel / 2)
+    bound = {"colour": 0.02, "depth": SHARP}
+    yield Case("a surface of one pixel", dot, one_pixel, bound, camera=NARROW, samples=1024)
 
     def floor() -> None:
         bpy.ops.mesh.primitive_plane_add(size=1e5, location=(0, 0, -1))
@@ -421,10 +383,10 @@ def surfaces() -> Iterator[Case]:
 
     yield Case(
         "a floor up to 89.98° of incidence",
-        "closed form; error × cosine",
         floor,
         grazing,
         {"depth": SHARP},
+        "closed form; error × cosine",
         camera=NARROW,
     )
 
@@ -445,38 +407,28 @@ def layers() -> Iterator[Case]:
             mesh.materials.append(clear)
             thing = bpy.data.objects.new("layers", mesh)
             bpy.context.scene.collection.objects.link(thing)
-            wall(20, emission(1))
+            screen(20)
 
-        yield Case(
-            f"{count:,} transparent layers, of {limit:,} that may be",
-            "closed form",
-            build,
-            mean_light(0.9999**count),
-            {"colour": 0.05},
-            camera=NARROW,
-            samples=16,
-        )
+        name = f"{count:,} transparent layers, of {limit:,} that may be"
+        truth = mean_light(0.9999**count)
+        yield Case(name, build, truth, {"colour": 0.05}, camera=NARROW, samples=16)
 
 
 def fogs() -> Iterator[Case]:
+    # The filter takes light from beside a pixel's centre.
+    sharp = {"samples": 1, "render": {"filter_width": 0.01}}
+    ahead = {**AHEAD, "fov": 15}
     for density in (1e-4, 1.0, 12.0):
 
         def build(density: float = density) -> None:
-            wall(10, emission(1))
+            screen(10)
             bpy.ops.mesh.primitive_cube_add(size=1, location=(0, 5, 0), scale=(100, 1, 100))
             painted(fog("ShaderNodeVolumeAbsorption", density, 0))
 
-        yield Case(
-            f"fog of optical depth {density:g}",
-            "Beer–Lambert",
-            build,
-            of_wall(10, 1, density, 1),
-            # In halves light of 6e-6 has steps of 1 %.
-            {"colour": 2 * HALF if density < 10 else 0.01, "depth": SHARP},
-            camera={**AHEAD, "fov": 15},
-            samples=1,
-            render={"filter_width": 0.01},
-        )
+        name, truth = f"fog of optical depth {density:g}", of_wall(10, 1, density, 1)
+        # In halves light of 6e-6 has steps of 1 %.
+        bound = {"colour": 2 * HALF if density < 10 else 0.01, "depth": SHARP}
+        yield Case(name, build, truth, bound, "Beer–Lambert", camera=ahead, **sharp)
 
     def scattering(density: float, most: int) -> None:
         bounces(max=most, volume=most)
@@ -484,41 +436,26 @@ def fogs() -> Iterator[Case]:
         box(1, fog("ShaderNodeVolumeScatter", density, 1), (0, 5, 0))
 
     for density, most in ((0.01, 32), (5.0, 256)):
-        yield Case(
-            f"fog that scatters all light, optical depth {2 * density:g}",
-            "furnace",
-            lambda density=density, most=most: scattering(density, most),
-            mean_light(1),
-            {"colour": 0.02},
-            camera={**AHEAD, "fov": 15},
-            samples=64,
-        )
-    for name, camera in (("poles of a panorama", PANORAMA), ("rim of a 360° lens", AROUND)):
+        name = f"fog that scatters all light, optical depth {2 * density:g}"
+        build, bound = partial(scattering, density, most), {"colour": 0.02}
+        yield Case(name, build, mean_light(1), bound, "furnace", camera=ahead, samples=64)
 
-        def around() -> None:
-            box(2, emission(1))
-            fogged = bpy.data.worlds.new("world")
-            fogged.use_nodes = True
-            tree = fogged.node_tree
-            tree.nodes["Background"].inputs["Strength"].default_value = 0
-            absorbing = tree.nodes.new("ShaderNodeVolumeAbsorption")
-            absorbing.inputs["Color"].default_value = grey(0)
-            absorbing.inputs["Density"].default_value = 0.5
-            tree.links.new(absorbing.outputs[0], tree.nodes["World Output"].inputs["Volume"])
-            bpy.context.scene.world = fogged
+    def around() -> None:
+        room(2)
+        fogged = bpy.data.worlds.new("world")
+        fogged.use_nodes = True
+        tree = fogged.node_tree
+        tree.nodes["Background"].inputs["Strength"].default_value = 0
+        absorbing = tree.nodes.new("ShaderNodeVolumeAbsorption")
+        absorbing.inputs["Color"].default_value = grey(0)
+        absorbing.inputs["Density"].default_value = 0.5
+        tree.links.new(absorbing.outputs[0], tree.nodes["World Output"].inputs["Volume"])
+        bpy.context.scene.world = fogged
 
-        yield Case(
-            f"{name}, in fog",
-            "Beer–Lambert",
-            around,
-            of_box(2, 1, density=0.5),
-            # The filter takes light from beside a pixel's centre.
-            {"colour": 4 * HALF, "depth": SHARP},
-            camera=camera,
-            place=(0.1, -0.2, 0.3),
-            samples=1,
-            render={"filter_width": 0.01},
-        )
+    truth, bound = of_box(2, 1, density=0.5), {"colour": 4 * HALF, "depth": SHARP}
+    both = {"basis": "Beer–Lambert", "place": (0.1, -0.2, 0.3), **sharp}
+    yield Case("poles of a panorama, in fog", around, truth, bound, camera=PANORAMA, **both)
+    yield Case("rim of a 360° lens, in fog", around, truth, bound, camera=AROUND, **both)
 
 
 def paths() -> Iterator[Case]:
@@ -530,10 +467,10 @@ def paths() -> Iterator[Case]:
 
         yield Case(
             f"mirrors facing mirrors, {most:,} bounces",
-            f"furnace of {most:,} bounces",
             mirrors,
             of_box(1, 1 - 0.9 ** (most + 2), even=False),
             {"colour": 0.01, "depth": SHARP},
+            f"furnace of {most:,} bounces",
             place=(0.1, -0.2, 0.3),
             samples=256,
         )
@@ -544,15 +481,9 @@ def paths() -> Iterator[Case]:
         for half, index in ((1, 1.5), (0.7, 1.33), (0.4, 2.4)):
             box(half, surface("ShaderNodeBsdfGlass", IOR=index, Roughness=0.0), (0, 5, 0))
 
-    yield Case(
-        "glass in water in glass",
-        "furnace",
-        dielectrics,
-        mean_light(1),
-        {"colour": 0.01},
-        camera={**AHEAD, "fov": 15},
-        samples=64,
-    )
+    ahead = {**AHEAD, "fov": 15}
+    name, bound = "glass in water in glass", {"colour": 0.01}
+    yield Case(name, dielectrics, mean_light(1), bound, "furnace", camera=ahead, samples=64)
     # Blender's Filter Glossy, 1 in a new file, takes smooth glass for rough after a diffuse bounce.
     for degrees, blur, clamp in ((0, 0, 0), (10, 0, 0), (10, 1, 0), (10, 0, 1)):
 
@@ -568,11 +499,11 @@ def paths() -> Iterator[Case]:
         through = 2 * 1.5 / (1.5**2 + 1)
         yield Case(
             f"a sun of {degrees:g}° through glass, filter glossy {blur:g}, clamped at {clamp:g}",
-            "Fresnel's equations",
             caustic,
             mean_light(0.1 / math.pi * through),
             {"colour": 0.05},
-            camera={**AHEAD, "fov": 15},
+            "Fresnel's equations",
+            camera=ahead,
             samples=1024,
             render={"clamp_indirect": clamp},
             asked=bool(blur or clamp),
@@ -583,10 +514,10 @@ def frames() -> Iterator[Case]:
     for first, frame in ((1, 2), (1048570, 1048573)):
         yield Case(
             f"motion blur at frame {frame}",
-            "closed form, pixels' centres",
-            lambda first=first, frame=frame: sliding(first, frame),
+            partial(sliding, first, frame),
             slid,
             {"colour": 0.03, "depth": SHARP},
+            "closed form, pixels' centres",
             camera={**AHEAD, "resolution": [32, 16]},
             frame=frame,
             samples=1024,
@@ -594,17 +525,11 @@ def frames() -> Iterator[Case]:
         )
 
     def moved() -> None:
-        moving(wall(2, emission(1)), 1, {1048572: 2, 1048574: 4})
+        moving(screen(2), 1, {1048572: 2, 1048574: 4})
 
-    yield Case(
-        "frame 1048574, the last one",
-        "closed form",
-        moved,
-        of_wall(4, 1),
-        {"colour": HALF, "depth": SHARP},
-        camera=AHEAD,
-        frame=1048574,
-    )
+    bound = {"colour": HALF, "depth": SHARP}
+    last = 1048574
+    yield Case(f"frame {last}, the last one", moved, of_wall(4, 1), bound, camera=AHEAD, frame=last)
 
 
 def cases() -> Iterator[Case]:
