@@ -162,16 +162,8 @@ def neighbours(mesh: list[tuple[int, ...]]) -> list[tuple[int, int]]:
 
 def sees_all_round(lens: Lens) -> bool:
     """Whether the lens's image shows every direction."""
-    latitude, longitude = np.meshgrid(np.linspace(-1.5, 1.5, 9), np.linspace(-3.1, 3.1, 17))
-    directions = np.stack(
-        [
-            np.cos(latitude) * np.sin(longitude),
-            np.sin(latitude),
-            -np.cos(latitude) * np.cos(longitude),
-        ],
-        axis=-1,
-    )
-    return bool(_seen(lens, directions).all())
+    theta, azimuth = np.meshgrid(np.linspace(0, 3.1, 17), np.linspace(-3.1, 3.1, 17))
+    return bool(_seen(lens, _directions(theta, azimuth)).all())
 
 
 def cone_sides(lens: Lens) -> Floats | None:

@@ -127,6 +127,8 @@ def compute(
         )
     reach, covers = FILTERS[filter_name].reach, FILTERS[filter_name].cover is not None
     wraps, _, _ = _topology(source)
+    # A cube map's faces continue only so far.
+    widest = float(source.height) if isinstance(source, CubeMap) else math.inf
     fold = Fold.of_map(source, target, rotation)
     height, width = fold.part
     # In float64 until they count from the window's corner, which is not known before.
@@ -143,12 +145,16 @@ def compute(
         rays = target.rays(x[None, :], y[:, None])
         target_cos[rows] = -rays[1:-1, 1:-1, 2]
         padded = source.pixels(rays @ rotation.T)
+        left, right, above, below = _neighbours(padded, source)
         found = measure(
             padded[1:-1, 1:-1],
-            *_neighbours(padded, source),
+            left,
+            right,
+            above,
+            below,
             (source.width, source.height),
             source.width if wraps else 0.0,
-            _widest(source),
+            widest,
             points[rows],
             scale[rows],
             footprints[rows],
@@ -413,22 +419,16 @@ def _on_strip(pixels: Array, source: CubeMap, border: int) -> Array:
     return np.asarray(pixels + shift)
 
 
-def _neighbours(padded: Array, source: Lens) -> tuple[Array, Array, Array, Array]:
+def _neighbours(padded: Array, source: Lens) -> tuple[Array, ...]:
     """Return the coordinates left, right, above and below of those within a border of one pixel.
 
     Neighbours on another face of a cube map are continued onto the plane of the pixel's own.
     """
-    left, right = padded[1:-1, :-2], padded[1:-1, 2:]
-    above, below = padded[:-2, 1:-1], padded[2:, 1:-1]
-    if not isinstance(source, CubeMap):
-        return left, right, above, below
     middle = padded[1:-1, 1:-1]
-    return (
-        _on_face_of(source, left, middle),
-        _on_face_of(source, right, middle),
-        _on_face_of(source, above, middle),
-        _on_face_of(source, below, middle),
-    )
+    around = (padded[1:-1, :-2], padded[1:-1, 2:], padded[:-2, 1:-1], padded[2:, 1:-1])
+    if not isinstance(source, CubeMap):
+        return around
+    return tuple(_on_face_of(source, beside, middle) for beside in around)
 
 
 def _on_face_of(source: CubeMap, coordinates: Array, middle: Array) -> Array:
@@ -440,11 +440,6 @@ def _on_face_of(source: CubeMap, coordinates: Array, middle: Array) -> Array:
         rays = source.rays(out[other, 0], out[other, 1]) @ turn
         out[other] = source.face.pixels(rays) + np.array([index * source.height, 0])
     return out
-
-
-def _widest(source: Lens) -> float:
-    """Return the widest box that a pixel may cover: a cube map's faces continue only so far."""
-    return float(source.height) if isinstance(source, CubeMap) else math.inf
 
 
 def _window(areas: list[Any], fold: Fold, source: Lens, wraps: bool) -> tuple[int, int, int, int]:

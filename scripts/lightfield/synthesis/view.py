@@ -79,11 +79,6 @@ class Surface:
     torn: Array
     corners: Array
 
-    @property
-    def certainty(self) -> Array:
-        """How much vertices (h, w) count: little beside a tear."""
-        return np.where(self.torn, TORN_WEIGHT, 1).astype(np.float32)
-
 
 Reader = Callable[[View], tuple[Array, Array]]
 
@@ -208,7 +203,8 @@ class Sources:
         wraps = isinstance(lens, Equirectangular) and lens.is_full
         pixels, seen = self._projected(self.rays, surface.inverse, here, target, lens)
         length = np.linalg.norm(seen, axis=-1)
-        weight = surface.certainty / penalty(seen, self.rays @ _turn(here)) ** 2
+        certainty = np.where(surface.torn, TORN_WEIGHT, 1).astype(np.float32)
+        weight = certainty / penalty(seen, self.rays @ _turn(here)) ** 2
         values = np.dstack([surface.inverse / length, surface.colour, weight])
         values = values.astype(np.float32, copy=False)
         kernels.draw(pixels, values, surface.right, surface.down, wraps, inverse, drawn)

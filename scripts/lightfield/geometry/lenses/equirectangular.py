@@ -29,8 +29,8 @@ class EquirectangularSettings(LensSettings):
 
     def optics(self) -> dict[str, Any]:
         return {
-            "longitude": _radians(self.longitude),
-            "latitude": _radians(self.latitude),
+            "longitude": tuple(map(math.radians, self.longitude)),
+            "latitude": tuple(map(math.radians, self.latitude)),
         }
 
 
@@ -72,11 +72,8 @@ class Equirectangular(Lens):
     @property
     def is_full(self) -> bool:
         """Whether it sees the whole sphere, the optical axis in its middle."""
-        given, full = (
-            (*self.longitude, *self.latitude),
-            (-math.pi, math.pi, -math.pi / 2, math.pi / 2),
-        )
-        return all(abs(a - b) <= ANGLE_SLACK for a, b in zip(given, full, strict=True))
+        given, full = [self.longitude, self.latitude], math.pi * np.array([[-1, 1], [-0.5, 0.5]])
+        return bool((np.abs(given - full) <= ANGLE_SLACK).all())
 
     @property
     def turn(self) -> float:
@@ -143,7 +140,3 @@ class Equirectangular(Lens):
             "longitude": (numbers["LONG_MIN"], numbers["LONG_MAX"]),
             "latitude": (numbers["LAT_MIN"], numbers["LAT_MAX"]),
         }
-
-
-def _radians(degrees: Pair) -> Pair:
-    return math.radians(degrees[0]), math.radians(degrees[1])

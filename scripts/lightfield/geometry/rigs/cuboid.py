@@ -1,26 +1,16 @@
 """A cuboid: cameras on its six sides, each looking outward."""
 
 import math
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
-from pydantic import Field
 
-from lightfield.core.settings import as_list
-from lightfield.geometry.rigs.grid import Cell, Count, Grid, axis, box_outline, grid, quads
+from lightfield.geometry.rigs.grid import Box, Cell, axis, grid, quads
 from lightfield.geometry.rigs.rig import UnitPoses, stack
-from lightfield.geometry.rotations import Floats
 
 
-class Cuboid(Grid):
-    shape = "CUBOID"
-    fewest = (2, 2, 2)
-    unit_volume = 1.0
-
+class Cuboid(Box):
     type: Literal["cuboid"]
-    cameras: Annotated[tuple[Count, Count, Count], as_list(3)] = Field(
-        description="Cameras along x, y and z."
-    )
 
     @staticmethod
     def count(cameras: tuple[int, ...]) -> int:
@@ -55,6 +45,3 @@ class Cuboid(Grid):
             found += quads(np.arange(start, start + columns * rows).reshape(rows, columns))
             start += columns * rows
         return found
-
-    def unit_outline(self) -> list[Floats]:
-        return box_outline()

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from lightfield.core.settings import as_list
 from lightfield.geometry.rigs.rig import Rig
 from lightfield.geometry.rotations import Floats
 
@@ -67,6 +68,19 @@ class Grid(Rig):
                     counts[axis] -= 1
                     break
         return tuple(counts)
+
+
+class Box(Grid):
+    shape = "CUBOID"
+    fewest = (2, 2, 2)
+    unit_volume = 1.0
+
+    cameras: Annotated[tuple[Count, Count, Count], as_list(3)] = Field(
+        description="Cameras along x, y and z."
+    )
+
+    def unit_outline(self) -> list[Floats]:
+        return box_outline()
 
 
 def axis(count: int) -> Floats:

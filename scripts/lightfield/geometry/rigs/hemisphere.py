@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from lightfield.geometry.rigs.orbit import Elevations, Orbit, heights, on_sphere
+from lightfield.geometry.rigs.orbit import Elevations, Orbit, on_sphere
 from lightfield.geometry.rotations import Floats
 
 GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
@@ -22,8 +22,8 @@ class Hemisphere(Orbit):
     )
 
     def directions(self) -> Floats:
-        low, high = heights(self.elevation)
         if self.pattern == "fibonacci":
+            low, high = (math.sin(math.radians(angle)) for angle in self.elevation)
             # Equal steps of height are equal areas. Source: Gonzalez 2010, "Measurement of areas on
             # a sphere using Fibonacci and latitude-longitude lattices".
             number = np.arange(self.count, dtype=np.float64)

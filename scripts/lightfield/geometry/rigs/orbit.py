@@ -1,6 +1,5 @@
 """What rigs around an object have in common: cameras on a sphere that look at its middle."""
 
-import math
 from abc import abstractmethod
 from typing import Annotated, Self
 
@@ -8,7 +7,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from lightfield.core.settings import as_list
-from lightfield.geometry.rigs.rig import CountedRig, UnitPoses, circle, stack
+from lightfield.geometry.rigs.rig import CountedRig, UnitPoses, ball_outline, stack
 from lightfield.geometry.rotations import Floats, looking_at, matrix_to_euler
 
 Elevation = Annotated[float, Field(ge=-90, le=90)]
@@ -44,17 +43,10 @@ class Orbit(CountedRig):
         return UnitPoses.of_sides(("", places, matrix_to_euler(looking_at(places, np.zeros(3)))))
 
     def unit_outline(self) -> list[Floats]:
-        cosine, sine = circle()
-        return [stack(cosine, sine, 0.0), stack(cosine, 0.0, sine), stack(0.0, cosine, sine)]
+        return ball_outline()
 
 
 def on_sphere(azimuth: Floats, height: Floats) -> Floats:
     """Return points (n, 3) of the sphere of radius 1 at azimuths in radians and heights."""
     around = np.sqrt(np.maximum(1 - height**2, 0))
     return stack(around * np.sin(azimuth), around * np.cos(azimuth), height)
-
-
-def heights(limits: tuple[float, float]) -> tuple[float, float]:
-    """Return the heights, on the sphere of radius 1, of two elevations in degrees."""
-    low, high = (math.sin(math.radians(angle)) for angle in limits)
-    return low, high

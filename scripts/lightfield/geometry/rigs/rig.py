@@ -316,6 +316,12 @@ def circle() -> tuple[Floats, Floats]:
     return np.cos(angle) / 2, np.sin(angle) / 2
 
 
+def ball_outline() -> list[Floats]:
+    """Return three circles round a ball of diameter 1, across z, y and x."""
+    cosine, sine = circle()
+    return [stack(cosine, sine, 0.0), stack(cosine, 0.0, sine), stack(0.0, cosine, sine)]
+
+
 class CountedRig(Rig):
     """A rig of any number of cameras, of which fewer are such a rig again."""
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from lightfield.geometry.rigs.rig import Rig, UnitPoses, circle, stack
+from lightfield.geometry.rigs.rig import Rig, UnitPoses, ball_outline
 from lightfield.geometry.rotations import Floats, matrix_to_euler
 
 # Cameras whose heights differ by less, as a part of the sphere's own, are in one ring: its vertices
@@ -64,8 +64,7 @@ class Sphere(Rig):
         return [tuple(map(int, corners)) for corners in hull.simplices]
 
     def unit_outline(self) -> list[Floats]:
-        cosine, sine = circle()
-        return [stack(cosine, sine, 0.0), stack(cosine, 0.0, sine), stack(0.0, cosine, sine)]
+        return ball_outline()
 
 
 def vertices(subdivisions: int) -> int:
