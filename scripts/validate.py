@@ -11,6 +11,7 @@ are removed first.
 
 import argparse
 import sys
+from os.path import normpath
 from pathlib import Path
 
 from lightfield.core.cli import positive, run
@@ -34,7 +35,7 @@ def main() -> None:
     add("--inventory", type=Path, help="JSON of what the scene contains")
     add("--splits", type=Path, help="splits.json of the scene")
     folders = "folders of the dataset that hold a reprojection (default without --output: all)"
-    add("--reprojection", action="extend", nargs="+", default=[], metavar="NAME", help=folders)
+    add("--reprojection", type=normpath, action="extend", nargs="+", default=[], help=folders)
     lists = "export.json or transforms.json of each export that it shall have (default: any)"
     add("--exports", type=Path, nargs="*", help=lists)
     add("--removed", type=Path, help="folder to which files go that are not the dataset's")

@@ -1083,13 +1083,22 @@ def test_one_coloured_pixel_without_a_source_is_named(one_view: Path) -> None:
     assert problem.endswith(": has colour in pixels without a source")
 
 
-@pytest.mark.parametrize(("by", "compared"), [(5e-6, True), (2e-5, None)])
-def test_marks_are_compared_with_the_view_from_the_same_place(
-    by: float, compared: bool | None, one_view: Path
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (move(0, (0, 5e-6, 0)), None),
+        (move(0, (0, 2e-5, 0)), "is not at the place of view_0000f"),
+        (lambda held: held["frames"][0].update(name="b"), "is made of no view of the dataset's"),
+    ],
+)
+def test_a_reprojected_view_is_where_its_source_is(
+    change: Callable[[dict[str, Any]], None], fault: str | None, one_view: Path
 ) -> None:
     add_panoramas(one_view)
-    relist(one_view / "panorama", move(0, (0, by, 0)))
-    assert check(validate(one_view, ["panorama"]), "panorama/marks").passed is compared
+    relist(one_view / "panorama", change)
+    found = check(validate(one_view, ["panorama"]), "panorama/lightfield")
+    assert found.passed is (fault is None)
+    assert fault is None or fault in found.problems[0]
 
 
 @pytest.mark.parametrize("transparent", [True, False])
@@ -1172,10 +1181,12 @@ def test_program_needs_no_other_word_than_the_dataset(
     assert ": valid: " in run_program("validate.py", small_dataset).stdout
     assert before == {path: path.stat().st_mtime_ns for path in small_dataset.rglob("*")}
     (small_dataset / "panorama" / "view_0001f.png").unlink()
-    result = run_program("validate.py", small_dataset, check=False)
+    words = (small_dataset, "--reprojection", "panorama/")
+    result = run_program("validate.py", *words, check=False)
     assert result.returncode == 1
     assert result.stderr.endswith(f"error: {small_dataset}: is not valid\n")
     assert "panorama/view_0001f.png: is missing" in result.stderr
+    assert "failed: panorama/views; " in result.stdout
 
 
 def test_program_writes_the_same_bytes_each_time_and_sums_that_hold(

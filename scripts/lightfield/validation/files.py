@@ -121,7 +121,7 @@ def read_sets(dataset: Path, reprojections: Iterable[str]) -> tuple[list[ImageSe
         sets.append(
             ImageSet(name, lightfield, _central_angle(source.lightfield.lens) if source else 0.0)
         )
-        checks.append(_poses(sets[-1]))
+        checks.append(_poses(sets[-1], source))
     return sets, checks
 
 
@@ -130,12 +130,19 @@ def rendered(sets: Sequence[ImageSet]) -> ImageSet | None:
     return sets[0] if sets and not sets[0].name else None
 
 
-def _poses(image_set: ImageSet) -> Check:
-    """Check that each pose is a rigid one and the same in both forms."""
+def source_view(source: ImageSet | None, name: str) -> int | None:
+    """Return the number of the view of which a reprojected one of this name was made."""
+    views = source.views if source else []
+    # A face of a cube map is named for its view, and itself.
+    return next((views.index(n) for n in (name, name.rpartition("_")[0]) if n in views), None)
+
+
+def _poses(image_set: ImageSet, source: ImageSet | None) -> Check:
+    """Check that each pose is rigid, the same in both forms, and at its source's place."""
     views = image_set.lightfield.views
     # Blender keeps poses in float32.
     near = 1e-5 * (1 + max(np.abs(view.position).max() for view in views))
-    faults = []
+    faults = {}
     for view in views:
         difference = (
             np.abs(rotations.euler_to_matrix(view.rotation) - view.matrix[:3, :3]).max()
@@ -143,17 +150,20 @@ def _poses(image_set: ImageSet) -> Check:
             + np.abs(view.matrix[3] - (0, 0, 0, 1)).max()
         )
         if not difference < near:
-            faults.append(view.name)
-    path, fault = (
-        f"{image_set.prefix}{NAME}",
-        "world_matrix: is not that of its position and rotation",
-    )
+            faults[view.name] = "world_matrix: is not that of its position and rotation"
+        elif source:
+            number = source_view(source, view.name)
+            if number is None:
+                faults[view.name] = f"is made of no view of the dataset's {NAME}"
+            elif np.abs(view.position - source.lightfield.views[number].position).max() > near:
+                faults[view.name] = f"is not at the place of {source.views[number]}"
+    path = f"{image_set.prefix}{NAME}"
     return Check(
         f"{image_set.prefix}lightfield",
         not faults,
         f"{len(views)} views",
-        faults,
-        [f"{path}: frames: {view}: {fault}" for view in faults],
+        [*faults],
+        [f"{path}: frames: {view}: {fault}" for view, fault in faults.items()],
     )
 
 

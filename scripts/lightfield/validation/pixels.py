@@ -19,7 +19,7 @@ from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.validation import consistency
 from lightfield.validation.consistency import Answer, Patches
-from lightfield.validation.files import File, ImageSet, rendered
+from lightfield.validation.files import File, ImageSet, rendered, source_view
 from lightfield.validation.result import Check
 
 Bools = NDArray[np.bool_]
@@ -232,20 +232,15 @@ class Examiner:
     def _of_source(self, file: File) -> tuple[Bools, Bools] | None:
         """Return where a reprojected view's source sees something, and where not, less the rim.
 
-        None: the dataset has no view of the same name at the same place.
+        None: the dataset has no such view.
         """
         target, source = self.sets[file.set], rendered(self.sets)
-        views = source.views if source else []
-        name = target.views[file.view]
-        if name not in views:  # a face of a cube map is named for its view, and itself
-            name = name.rpartition("_")[0]
-        if source is None or name not in views:
+        number = source_view(source, target.views[file.view])
+        if source is None or number is None:
             return None
         lens, from_lens = target.lightfield.lens, source.lightfield.lens
         to_world = target.lightfield.matrices[file.view]
-        from_world = source.lightfield.matrices[views.index(name)]
-        if np.abs(to_world[:3, 3] - from_world[:3, 3]).max() > 1e-5:
-            return None
+        from_world = source.lightfield.matrices[number]
         # Rounded, and free of −0, so that views turned alike share one answer.
         turn = np.round(from_world[:3, :3].T @ to_world[:3, :3], 5).astype(np.float32) + 0
         key = (lens, turn.tobytes())
