@@ -4,7 +4,8 @@
   compositor, and the file's own view exposure.
 - character.blend: an animated character (armature, hair curves) and its stage in two view layers,
   filmed by two cameras that markers choose, saved at frame 24 with motion blur on.
-- product.blend: a bottle with its label, film transparent, depth of field, view exposure +1.5.
+- product.blend: a bottle with its label, film transparent, depth of field, view exposure +1.5,
+  and a camera that clips.
 """
 
 import sys
@@ -179,7 +180,7 @@ def product():
     shot = camera("Hero", root, (0, -2, 0.4), (1.5708, 0, 0), 50)
     shot.data.dof.use_dof, shot.data.dof.aperture_fstop = True, 0.2
     shot.data.dof.focus_object = bpy.data.objects["Bottle"]
-    shot.data.shift_y = 0.1
+    shot.data.shift_y, shot.data.clip_start = 0.1, 1
     scene.camera = shot
     scene.render.film_transparent = True
     scene.view_settings.exposure = 1.5

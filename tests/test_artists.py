@@ -53,8 +53,9 @@ TAKEN = {
     "1 sample a pixel (the file has 256) · camera Wide (35 mm) taken · adaptive sampling off · "
     "denoising off · motion blur off · view transform AgX ignored",
     "product": "frame 1, the file's · 4 samples a pixel, the file's · camera Hero (50 mm) taken "
-    "· adaptive sampling off · denoising off · depth of field ON · view transform AgX ignored · "
-    "view exposure +1.5 ignored · film transparent on, ignored",
+    "· clip planes at 1 and 1000 m ignored · adaptive sampling off · denoising off "
+    "· depth of field ON · view transform AgX ignored · view exposure +1.5 ignored · "
+    "film transparent on, ignored",
 }
 
 

@@ -18,6 +18,8 @@ ENGINES = {
     "BLENDER_WORKBENCH": "Workbench",
 }
 
+# Metres between which a new camera in Blender sees.
+_BLENDERS_CLIP = (0.1, 1000)
 # Blender's name of the colours in which all datasets are.
 REC_709 = "Linear Rec.709"
 
@@ -96,6 +98,10 @@ def taken(
         lens = camera["lens"]
         length = f" ({lens['lens']:g} mm)" if lens["type"] == "PERSP" else ""
         words.append(f"camera {camera['name']}{length} {'taken' if own_camera else 'ignored'}")
+        # An inventory from before this was looked at has none.
+        near, far = camera.get("clip", _BLENDERS_CLIP)
+        if own_camera and (near > _BLENDERS_CLIP[0] or far < _BLENDERS_CLIP[1]):
+            words.append(f"clip planes at {near:g} and {far:g} m ignored")
     words += [f"{name} ignored" for name in ("compositor", "sequencer") if blend[name]]
     threshold = render.get("adaptive_threshold")
     focus = bool(blend["camera"] and blend["camera"]["lens"]["depth_of_field"])
@@ -130,7 +136,6 @@ def taken(
             words.append(f"{title} ignored")
     if blend["simplify"]:
         words.append("simplify ON")
-    # An inventory from before this was looked at has none.
     if blend.get("working_space", REC_709) != REC_709:
         words.append(f"working space {blend['working_space']} converted to Rec. 709")
     if blend["unit_scale"] != 1:

@@ -65,7 +65,7 @@ def _camera(frames: list[int]) -> dict[str, Any] | None:
     None where the scene has no camera. A marker may change the camera with the frame.
     """
     scene = bpy.context.scene
-    lenses, matrices, names = [], {}, []
+    lenses, matrices, names, clips = [], {}, [], []
     for frame in sorted(set(frames)):
         scene.frame_set(frame)
         if scene.camera is None:
@@ -73,13 +73,14 @@ def _camera(frames: list[int]) -> dict[str, Any] | None:
         camera = scene.camera.evaluated_get(bpy.context.evaluated_depsgraph_get())
         names.append(scene.camera.name)
         lenses.append(_lens(camera.data))
+        clips.append([round(camera.data.clip_start, 6), round(camera.data.clip_end, 6)])
         matrices[str(frame)] = [list(row) for row in camera.matrix_world.normalized()]
         if lenses[-1] != lenses[0]:
             raise UserError(
                 f"the camera {names[-1]} has another lens at frame {frame} than at frame "
                 f"{min(frames)}, and all views of a dataset have one lens; choose frames with one"
             )
-    return {"name": names[0], "lens": lenses[0], "matrices": matrices}
+    return {"name": names[0], "lens": lenses[0], "clip": clips[0], "matrices": matrices}
 
 
 def _lens(camera: Any) -> dict[str, Any]:
