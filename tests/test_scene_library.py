@@ -8,13 +8,11 @@ import pytest
 from lightfield.dataset import config, keys
 from lightfield.dataset.config import Source
 from scenes.library.architecture import cut
-from scenes.library.model import Model
-from scenes.library.noise import noise, smoothstep
-from scenes.library.points import points, polar
-from scenes.library.scene import Scene
+from scenes.library.points import noise, points, polar, smoothstep
+from scenes.library.scene import Model, Scene
 from scenes.library.shapes import box, copies, facets, frames, icosphere, join, lathe, prism, tube
 
-SCENE = Scene(3, 1.0, {})
+SCENE = Scene(3, 1.0)
 
 
 def volume(shape):
@@ -43,6 +41,7 @@ def test_a_number_in_text_may_stand_for_several():
         ("Oak: box 1 2 3", 6.0),
         ("Oak: box 1 1 1 at ±5 0 0 turned 0 90 0 scaled 1 2 3", 12.0),
         ("Oak: ball 1", 4 * np.pi / 3),
+        ("Oak: box 1 1 1; box 1 2 3;\n box 1 1 1", 8.0),
         ("Oak: ring 1 0.25", 2 * np.pi * 8**0.5 / 16),  # a tube of 8 sides
         ("Oak: lathe 0.5 0\n 0.5 2\n at 1 1 1", np.pi / 2),
         ("Oak: tube 0.5, 0 0 0, 1 0 0, 2 0 0", np.pi / 2),
@@ -124,12 +123,12 @@ def test_noise_is_smooth_and_differs_by_seed():
 
 def test_each_element_has_a_random_stream_of_its_own():
     assert SCENE.random("maple").random() == SCENE.random("maple").random()
-    others = [SCENE.random("pines"), Scene(4, 1.0, {}).random("maple")]
+    others = [SCENE.random("pines"), Scene(4, 1.0).random("maple")]
     assert SCENE.random("maple").random() not in [other.random() for other in others]
 
 
 def test_less_detail_is_a_part_of_the_triangles():
-    half = Scene(0, 0.25, {})
+    half = Scene(0, 0.25)
     assert (half.segments(40), half.count(40)) == (20, 10)
     assert (half.segments(2, 8), half.count(2, 8)) == (8, 8)
 

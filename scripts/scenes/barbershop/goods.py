@@ -7,11 +7,9 @@ import numpy as np
 from mathutils import Matrix
 
 from scenes.barbershop.plan import INKS, TAU, drawings, put
-from scenes.library.model import Model
-from scenes.library.objects import mesh_shape
 from scenes.library.points import Array, points, polar
-from scenes.library.scene import Scene
-from scenes.library.shapes import Shape
+from scenes.library.scene import Model, Scene
+from scenes.library.shapes import Shape, mesh_shape
 
 Goods = Sequence[bpy.types.Mesh]
 
@@ -132,10 +130,10 @@ def shelf(scene: Scene, width: float, depth: float) -> bpy.types.Mesh:
     end, rail = width / 2 - 0.01, depth - 0.008
     parts = f"""Mahogany x: box {width} {depth} 0.02 0.005 at 0 {depth / 2} -0.01
         Brass: bend 0.006, 0 0.008 -0.12, 0 0.05 -0.09, 0 {depth * 0.5} -0.035
-            0 {depth * 0.85} -0.024 at ±{end - 0.07} 0 0
-        Brass: box 0.02 0.008 0.13 at ±{end - 0.07} 0.004 -0.08
-        Brass: tube 0.004, -{end} {rail} 0.035, {end} {rail} 0.035
-        Brass: tube 0.003, 0 0 0, 0 0 0.035 at -{end}..{end}*4 {rail} 0"""
+            0 {depth * 0.85} -0.024 at ±{end - 0.07} 0 0;
+            box 0.02 0.008 0.13 at ±{end - 0.07} 0.004 -0.08;
+            tube 0.004, -{end} {rail} 0.035, {end} {rail} 0.035;
+            tube 0.003, 0 0 0, 0 0 0.035 at -{end}..{end}*4 {rail} 0"""
     return Model(scene, parts).mesh("Shelf board")
 
 

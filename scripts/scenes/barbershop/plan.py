@@ -11,15 +11,14 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from scenes.library.model import Model
-from scenes.library.objects import place, transform
 from scenes.library.points import points
-from scenes.library.scene import Scene
+from scenes.library.scene import Model, Scene, place
+from scenes.library.shapes import transform
 
 TAU = 2 * np.pi
 
 ROOM = (5.0, 7.5, 3.0)  # metres in x, y, z
-HALF_X, HALF_Y, HEIGHT = ROOM[0] / 2, ROOM[1] / 2, ROOM[2]
+HALF_X, HALF_Y = ROOM[0] / 2, ROOM[1] / 2
 COUNTER_TOP = 0.86
 STATIONS = (-2.0, 0.0, 2.0)  # y of the barbers' stations
 WINDOW_MIDDLE = (-0.75, 1.725)  # x and z; it is 2.6 m wide and 1.45 m high
@@ -47,7 +46,7 @@ def wall(side: str, along: float, out: float = 0.0, z: float = 0.0) -> Matrix:
 def spots(text: str) -> list[Matrix]:
     """Frames of text, a comma after each; numbers that are 0 may be left out at its end.
 
-    "room 1 2 0 90" is at (1, 2, 0), turned by 90°. "left 2 0.1 1.5" is before the left wall: along,
+    "room 1 2 0 90" is at (1, 2, 0) turned by 90°. "left 2 0.1 1.5" is before the left wall: along,
     out and z of `wall`, and degrees. "on left 2 0.1 1.5" is for what hangs there. A number may
     stand for several (see `points`).
     """
@@ -91,5 +90,5 @@ def put(
     degrees: Sequence[float] = (0, 0, 0),
     scale: float | Sequence[float] = 1.0,
 ) -> None:
-    """An instance of a mesh in a frame, scaled, turned by XYZ Euler angles, and moved."""
+    """An instance of a mesh in a frame, scaled turned by XYZ Euler angles, and moved."""
     place(data.name, data, where @ transform(at, np.radians(degrees), scale))

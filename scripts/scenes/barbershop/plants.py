@@ -5,19 +5,17 @@ import numpy as np
 
 from scenes.barbershop.goods import Goods, stock
 from scenes.barbershop.plan import put, spot
-from scenes.library.model import Model
 from scenes.library.points import polar, xyz
-from scenes.library.scene import Scene
+from scenes.library.scene import Model, Scene
 from scenes.library.shapes import Shape, sheet
 
 POTTED = {"Fern": ("Terracotta", 44), "Snake plant": ("Navy", 16), "Rubber tree": ("Brass", 26)}
-POT = """{clay}: lathe 0.09 0, 0.10 0.01, 0.125 0.17, 0.14 0.17, 0.14 0.21, 0.125 0.21
-        0.118 0.18, 0 0.18
+POT = """{clay}: lathe 0.09 0, 0.10 0.01, 0.125 0.17, 0.14 0.17, 0.14 0.21, 0.125 0.21, 0.118 0.18
+        0 0.18
     Soil: lathe 0.117 0.18, 0.117 0.186, 0 0.19"""
 HANGER = """
 Plant cord | room -2.24 3.42 1.62 0..240*3
-    Brass: tube 0.003, 0.105 0 0.165, 0 0 0.78
-    Brass: bend 0.003, 0.105 0 0.165, 0.084 0 0, 0 0 -0.01
+    Brass: tube 0.003, 0.105 0 0.165, 0 0 0.78; bend 0.003, 0.105 0 0.165, 0.084 0 0, 0 0 -0.01
 Plant hook | room -2.24 3.42 1.62
     Brass: tube 0.003, 0 0 0.77, 0 0 1.38
 """

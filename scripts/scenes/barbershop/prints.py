@@ -4,11 +4,9 @@ import bpy
 import numpy as np
 
 from scenes.barbershop.plan import HAIR, INKS, drawings, put, spot
-from scenes.library.model import Model
-from scenes.library.objects import transform
 from scenes.library.points import circle, points
-from scenes.library.scene import Scene
-from scenes.library.shapes import Shape, prism
+from scenes.library.scene import Model, Scene
+from scenes.library.shapes import Shape, prism, transform
 
 INK = 0.0005
 """Metres between the inks, so that no two faces coincide. In what is printed z counts the inks."""
@@ -28,8 +26,7 @@ HUNG = """masters right -0.45 1.68, moustaches right 0.25 1.62, landscape right 
 PICTURES = """
 masters | Ebony 0.6 0.8
     Navy: box 0.56 0.76 0.6
-    Cream: lathe 0.165 0, 0.165 0.6 at 0 0.05 2
-    Cream: word 0.068 0.6 MASTER BARBERS at 0 -0.27 1.5
+    Cream: lathe 0.165 0, 0.165 0.6 at 0 0.05 2; word 0.068 0.6 MASTER BARBERS at 0 -0.27 1.5
     Ochre: word 0.045 0.6 since 1927 at 0 -0.335 1.5
 moustaches | Gilt 0.5 0.7
     Cream: box 0.46 0.66 0.6
@@ -37,8 +34,7 @@ moustaches | Gilt 0.5 0.7
 prices | Oak 0.7 1.0
     Black: box 0.66 0.96 0.6
     Cream: word 0.12 0.6 PRICES at 0 0.39 1.5
-    Gilt: box 0.5 0.006 0.6 at 0 0.32 1
-    Gilt: box 0.006 0.006 0.6 at 0.03..0.14*6 0.235..-0.374*8 1
+    Gilt: box 0.5 0.006 0.6 at 0 0.32 1; box 0.006 0.006 0.6 at 0.03..0.14*6 0.235..-0.374*8 1
     Red: word 0.045 0.6 no appointment needed at 0 -0.43 1.5
 haircuts | Ebony 0.7 0.5
     Teal: box 0.66 0.46 0.6
@@ -52,14 +48,13 @@ pole | Mahogany 0.4 0.7
     White: box 0.12 0.4 0.6 at 0 0 1
     Red: prism 0.6, -0.06 -0.03, 0.06 0.03, 0.06 0.055, -0.06 -0.005 at 0 -0.165..0.135*4 2
     Blue: prism 0.6, -0.06 -0.03, 0.06 0.03, 0.06 0.055, -0.06 -0.005 at 0 -0.115..0.085*3 2
-    Black: lathe 0.045 0, 0.045 0.6 at 0 ±0.235 2
-    Black: box 0.15 0.03 0.6 at 0 ±0.205 3
-    Black: word 0.042 0.6 SHAVE at -0.125 0.29 1.5
+    Black: lathe 0.045 0, 0.045 0.6 at 0 ±0.235 2; box 0.15 0.03 0.6 at 0 ±0.205 3;
+        word 0.042 0.6 SHAVE at -0.125 0.29 1.5
     Red: word 0.036 0.6 25 cents at 0.105 -0.30 1.5
 deco | Gilt 0.5 0.7
     Red: box 0.46 0.66 0.6
-    Cream: word 0.075 0.6 Brilliantine at 0 -0.22 1.5
-    Cream: word 0.026 0.6 keeps every hair in its place at 0 -0.28 1.5
+    Cream: word 0.075 0.6 Brilliantine at 0 -0.22 1.5;
+        word 0.026 0.6 keeps every hair in its place at 0 -0.28 1.5
 landscape | Gilt 0.62 0.42
     Cream: box 0.58 0.38 0.6
     Red: lathe 0.07 0, 0.07 0.6 at 0.12 0.07 1
@@ -67,9 +62,8 @@ certificate | Ebony 0.44 0.32
     Cream: box 0.40 0.28 0.6
     Gilt: box 0.38 0.26 0.6 at 0 0 1
     Cream: box 0.36 0.24 0.6 at 0 0 2
-    Black: word 0.06 0.6 Certificate at 0 0.075 3.5
-    Black: box 0.26 0.004 0.6 at 0 0.02 3, 0 -0.024 3
-    Black: box 0.21 0.004 0.6 at 0 -0.002 3, 0 -0.046 3
+    Black: word 0.06 0.6 Certificate at 0 0.075 3.5; box 0.26 0.004 0.6 at 0 0.02 3, 0 -0.024 3;
+        box 0.21 0.004 0.6 at 0 -0.002 3, 0 -0.046 3
     Red: lathe 0.028 0, 0.028 0.6 at 0.12 -0.09 3
 portrait | Gilt 0.26 0.34
     Rug sand: lathe 0.5 0, 0.5 0.6 scaled 0.24 0.32 1
@@ -84,8 +78,8 @@ MAGAZINE = """Paper: box 0.20 0.27 12 0.0012 at 0 0 -6
     {ink}: box 0.199 0.06 0.6 at 0 0.1 1
     White: word 0.06 0.6 {title} at 0 0.1 1.5
     {disc}: lathe 0.065 0, 0.065 0.6 at 0 -0.02 1
-    Black: box 0.07 0.006 0.6 at -0.05 -0.09..-0.11*2 1
-    Black: box 0.05 0.006 0.6 at -0.05 -0.10..-0.12*2 1"""
+    Black: box 0.07 0.006 0.6 at -0.05 -0.09..-0.11*2 1;
+        box 0.05 0.006 0.6 at -0.05 -0.10..-0.12*2 1"""
 TITLES = ("SHAVE", "GENT", "SPORT", "MOTOR", "JAZZ", "RADIO")
 MOUSTACHES = """0.10 0.30 0.16, 0.34 -0.18 0.26, 0.06 0.02 0.06, 0.20 -0.05 0.2, 0.02 0.42 0.12
     0.28 0.1 0.2"""  # handlebar, walrus, pencil, chevron, …: droop, curl, thickness
@@ -113,9 +107,8 @@ def masters(model: Model) -> None:
     for k in range(24):
         model.add(ray, "Ochre", (0, 0.05, 1), (0, 0, 15 * k))
     scissors = """Red: prism 0.6, -0.011 -0.013, 0.011 -0.013, 0.013 0.022, 0 0.136, -0.007 0.136
-            at 0 0 {z} turned 0 0 {turn}
-        Red: box 0.011 0.04 0.6 at {x} -0.031 {z} turned 0 0 {turn}
-        Red: pipe 0.0286 0.6, 0.0187 0.6 at {grip} -0.061 {z}"""
+        at 0 0 {z} turned 0 0 {turn}; box 0.011 0.04 0.6 at {x} -0.031 {z} turned 0 0 {turn};
+        pipe 0.0286 0.6, 0.0187 0.6 at {grip} -0.061 {z}"""
     model.draw(scissors.format(turn=-22, z=3, x=0.0124, grip=0.0247))
     model.draw(scissors.format(turn=22, z=4, x=-0.0124, grip=-0.0247))
 

@@ -4,34 +4,18 @@ The rigs stand in the middle of a raked gravel court. The fire and the pond's ri
 frame number, all else is still.
 """
 
-from collections.abc import Mapping
-from typing import Any
+from functools import partial
 
-from scenes.garden.court import flagstones, gravel, kerb, terrain
-from scenes.garden.distance import fog, mountains, sky
-from scenes.garden.fire import candles, fire
-from scenes.garden.lanterns import floor_lanterns, paper_globes, stone_lanterns
+from scenes.garden import court, distance, fire, lanterns, monuments, pond, trees, undergrowth
 from scenes.garden.materials import palette
-from scenes.garden.pond import carp, iris, water, water_lilies
-from scenes.garden.rocks import rocks
-from scenes.garden.statue import mirror, statue
-from scenes.garden.torii import torii
-from scenes.garden.trees import bamboo, maple, pines, woods
-from scenes.garden.undergrowth import fallen_leaves, grass, shrubs
-from scenes.library.scene import Scene
+from scenes.library.scene import fill
 
 ELEMENTS = (
-    *(sky, mountains, fog),
-    *(terrain, gravel, flagstones, kerb, rocks),
-    *(statue, mirror, torii),
-    *(stone_lanterns, paper_globes, floor_lanterns, fire, candles),
-    *(water, water_lilies, carp, iris),
-    *(bamboo, maple, pines, woods, shrubs, grass, fallen_leaves),
+    *(distance.sky, distance.mountains, distance.fog, court.terrain, court.gravel),
+    *(court.flagstones, court.kerb, court.rocks, monuments.statue, monuments.mirror),
+    *(monuments.torii, lanterns.stone_lanterns, lanterns.paper_globes, lanterns.floor_lanterns),
+    *(fire.fire, fire.candles, pond.water, pond.water_lilies, pond.carp, pond.iris),
+    *(trees.bamboo, trees.maple, trees.pines, trees.woods),
+    *(undergrowth.shrubs, undergrowth.grass, undergrowth.fallen_leaves),
 )
-
-
-def build(parameters: Mapping[str, Any]) -> None:
-    """Fill the empty scene. parameters: `seed` (int), `detail` (1.0 is the full garden)."""
-    scene = Scene(int(parameters["seed"]), float(parameters["detail"]), palette())
-    for element in ELEMENTS:
-        element(scene)
+build = partial(fill, palette, ELEMENTS)

@@ -1,16 +1,15 @@
-"""The ground: mossy terrain, and the court of raked gravel with its flagstones and kerb."""
+"""The ground: mossy terrain, the court of raked gravel with flagstones and kerb, and boulders."""
 
 from collections.abc import Sequence
 
+import bpy
 import numpy as np
 
 from scenes.garden import plan
-from scenes.garden.plan import COURT, TAU, court_distance, ground_height, pond_distance
-from scenes.library.noise import noise, smoothstep
-from scenes.library.objects import scatter, transform
-from scenes.library.points import Array, points, polar, xyz
-from scenes.library.scene import Scene
-from scenes.library.shapes import Shape, box, grid, sheet
+from scenes.garden.plan import COURT, TAU, court_distance, pond_distance, spread, standing
+from scenes.library.points import Array, noise, points, polar, smoothstep, xyz
+from scenes.library.scene import Scene, scatter
+from scenes.library.shapes import Shape, box, grid, icosphere, sheet, transform
 
 Flagstone = tuple[Array, float]
 """A stone's outline (n, 2) and its height."""
@@ -27,7 +26,7 @@ def terrain(scene: Scene) -> None:
     near = np.linspace(1.5, 12.0, scene.segments(120))
     radii = np.concatenate([near, np.geomspace(12.0, 420.0, scene.segments(60))[1:]])
     ground = polar(radii[::-1, None], np.linspace(0, TAU, scene.segments(420), endpoint=False))
-    ground[..., 2] = ground_height(ground[..., 0], ground[..., 1])
+    ground[..., 2] = plan.ground_height(ground[..., 0], ground[..., 1])
     scene.add("Terrain", sheet(ground, closed=True), "Moss")
 
 
@@ -82,7 +81,7 @@ def flagstones(scene: Scene) -> None:
     """Dark polished stones, still wet in places: sharp and blurred reflections side by side."""
     for i, (outline, height) in enumerate(flagstone_layout(scene)):
         middle = outline.mean(0)
-        base = 0.0 if court_distance(*middle) < 0 else float(ground_height(*middle))
+        base = 0.0 if court_distance(*middle) < 0 else float(plan.ground_height(*middle))
         stone = cushion(outline - middle, height + 0.1, 0.03, scene.segments(10, 2), i)
         spot = transform((*middle, base - 0.1))
         scene.add(f"Flagstone.{i:02d}", stone, "Wet stone", matrix=spot)
@@ -119,3 +118,34 @@ def kerb(scene: Scene) -> None:
                 turn = (0, 0, side * TAU / 4 + dx)
                 places.append(transform((x + dx, y + dy, dz - 0.03), turn))
     scatter("Kerb", blocks, places)
+
+
+def boulder(scene: Scene, number: int) -> bpy.types.Mesh:
+    """A boulder about 1 m across, weathered and mossy on top."""
+    ball = icosphere(scene.segments(5, 2))
+    v, shift = ball.vertices, np.array([17.0 * number, 5.0, 3.0])
+    ridges = 1 - 2 * np.abs(noise(v * 1.3 + shift, 62, 1))
+    swell = 1 + 0.28 * noise(v * 0.9 + shift, 61, 2) + 0.16 * ridges
+    swell += 0.05 * noise(v * 5 + shift, 63, 3)
+    stretch = scene.random(f"rock{number}").uniform((0.4, 0.34, 0.3), (0.52, 0.48, 0.46))
+    return scene.mesh(f"Rock.{number}", ball.reshaped(v * swell[:, None] * stretch), "Rock")
+
+
+def rocks(scene: Scene) -> None:
+    """Rock islands in the gravel, stones along the shore, and boulders in the moss."""
+    random = scene.random("rocks")
+    places = []
+    for x, y, radius in plan.ROCK_ISLANDS:
+        for dx, dy, size in points("0 0 1.5, 0.62 0.25 0.85, -0.35 0.55 0.6, 0.15 -0.6 0.5"):
+            spot = (x + dx * radius, y + dy * radius, 0.22 * size * radius)
+            places.append(transform(spot, (0, 0, random.uniform(0, TAU)), size * radius))
+    for angle in np.arange(0, TAU, 0.115):
+        direction = np.array([np.cos(angle), np.sin(angle) / 0.8])
+        reach = np.linspace(1.0, 4.0, 300)[:, None] * direction + plan.POND_CENTER
+        shore = reach[np.abs(pond_distance(*reach.T)).argmin()] + random.normal(0, 0.06, 2)
+        size = random.uniform(0.34, 0.62) * (1.5 if random.random() < 0.12 else 1.0)
+        turn = random.uniform((-0.2, -0.2, 0), (0.2, 0.2, TAU))
+        places.append(transform((*shore, -0.02), turn, size))
+    spots = spread(random, 26, (-13, -13, 13, 13), 1.2, court=0.7, pond=0.6, path=1.2)
+    places += standing(random, spots, (0.4, 1.5), -0.05)
+    scatter("Rock", [boulder(scene, i) for i in range(6)], places)

@@ -4,11 +4,9 @@ import numpy as np
 
 from scenes.garden.plan import SUN_AZIMUTH, TAU
 from scenes.library.lights import hdri_world, sun_light
-from scenes.library.noise import noise, smoothstep
-from scenes.library.objects import place, transform
-from scenes.library.points import points, polar, xyz
-from scenes.library.scene import Scene
-from scenes.library.shapes import facets, join, sheet
+from scenes.library.points import noise, points, polar, smoothstep, xyz
+from scenes.library.scene import Scene, place
+from scenes.library.shapes import facets, join, sheet, transform
 
 # Where the sun stands in sunrise.exr: the sky is turned so that it stands where ours does.
 SKY_SUN_AZIMUTH = np.radians(-35.5)

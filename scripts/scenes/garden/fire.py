@@ -5,11 +5,9 @@ import numpy as np
 
 from scenes.garden.plan import CANDLE_COLOR, FIRE, TAU
 from scenes.library.lights import point_light
-from scenes.library.noise import noise
-from scenes.library.objects import animate, place, transform
-from scenes.library.points import points, polar, xyz
-from scenes.library.scene import Scene
-from scenes.library.shapes import icosphere, join, tube
+from scenes.library.points import noise, points, polar, xyz
+from scenes.library.scene import Scene, animate, place
+from scenes.library.shapes import icosphere, join, transform, tube
 
 FLAME_TONGUES, FLAME_SHELLS = 6, (1.0, 0.78, 0.5)
 CANDLES = """-0.62 2.82 0, -0.48 2.9 0, -0.40 2.73 0, 0.47 2.88 0, 0.60 2.76 0, 0.70 2.9 0
@@ -24,15 +22,12 @@ def fire(scene: Scene) -> None:
     x, y = FIRE
     outside = "0.05 0.30, 0.24 0.34, 0.36 0.46, 0.40 0.60, 0.43 0.60, 0.43 0.58, 0.41 0.575"
     inside = "0 0.36, 0.22 0.38, 0.34 0.48, 0.40 0.60"
-    bowl = [scene.lathe(points(outside)[::-1], 48, capped=False)]
-    bowl.append(scene.lathe(inside, 48, capped=False))
-    bowl += [
-        scene.tube(polar([0.30, 0.36, 0.44], 0.4 + k * TAU / 3, [0.42, 0.2, -0.05]), 0.022)
-        for k in range(3)
-    ]
+    faces = points(outside)[::-1], points(inside)
+    bowl = [scene.lathe(face, 48, capped=False) for face in faces]
+    legs = [polar([0.30, 0.36, 0.44], 0.4 + k * TAU / 3, [0.42, 0.2, -0.05]) for k in range(3)]
+    bowl += [scene.tube(leg, 0.022) for leg in legs]
     scene.add("Fire bowl", join(bowl), "Iron", matrix=transform((x, y, 0)))
-    random = scene.random("fire")
-    logs = []
+    random, logs = scene.random("fire"), []
     for k in range(9):
         angle, tip = k * 2.4 + random.normal(0, 0.2), random.uniform(0.05, 0.14)
         reach, rise = 0.27 * np.array([1, -tip]), [0.44, 0.58 + 0.2 * random.random()]

@@ -4,10 +4,9 @@ import numpy as np
 
 from scenes.garden.plan import CANDLE_COLOR, STONE_LANTERNS, TAU, ground_height
 from scenes.library.lights import point_light
-from scenes.library.objects import place, transform
 from scenes.library.points import circle, points, polar, rectangle, xyz
-from scenes.library.scene import Scene
-from scenes.library.shapes import Shape, box, join, lathe, prism, sheet, tube
+from scenes.library.scene import Scene, place
+from scenes.library.shapes import Shape, box, join, lathe, prism, sheet, transform, tube
 
 FLOOR_LANTERNS = ((-0.72, -3.25), (0.85, -3.3))
 

@@ -1,60 +1,49 @@
-"""What the garden is made of."""
+"""What the garden is made of; colours are linear."""
 
-import bpy
+from scenes.library.materials import Color, MaterialGraph, foliage, plains, rows, wood
+from scenes.library.scene import animate
 
-from scenes.library import materials
-from scenes.library.materials import bark, foliage, metal, plain, thin, wood
-from scenes.library.nodes import Color, MaterialGraph
-from scenes.library.objects import animate
-
-
-def palette() -> dict[str, bpy.types.Material]:
-    """Every material of the garden; colours are linear."""
-    return materials.by_name(
-        [
-            *(moss(), gravel(), wet_stone(), mountain(), fog(), bronze(), vermilion()),
-            *(water(), koi(), bamboo_culm(), embers(), wax(), candle_flame()),
-            flame_gas("Flame gas 0", (1.0, 0.20, 0.025), 6.0),
-            flame_gas("Flame gas 1", (1.0, 0.34, 0.05), 7.0),
-            flame_gas("Flame gas 2", (1.0, 0.52, 0.14), 12.0),
-            granite("Kerb granite", (0.23, 0.22, 0.20), 0.35),
-            granite("Plinth granite", (0.30, 0.29, 0.275), 0.15),
-            granite("Lantern granite", (0.25, 0.24, 0.225), 0.55),
-            granite("Rock", (0.17, 0.165, 0.155), 0.75),
-            paper("Pane paper", (0.86, 0.80, 0.66)),
-            paper("Cream globe paper", (0.88, 0.82, 0.68)),
-            paper("Red globe paper", (0.78, 0.12, 0.06)),
-            paper("Floor lantern paper", (0.88, 0.80, 0.64)),
-            wood("Dark wood", (0.022, 0.012, 0.007), (0.14, 0.075, 0.038), 0.42),
-            plain("Rope", (0.05, 0.04, 0.03), Roughness=0.9),
-            plain("Iron", (0.03, 0.028, 0.026), Metallic=0.8, Roughness=0.55),
-            plain("Black lacquer", (0.015, 0.014, 0.013), Roughness=0.35),
-            plain("Candle cup", (0.10, 0.03, 0.02), Roughness=0.35),
-            plain("Wick", (0.01, 0.01, 0.01)),
-            plain("Shrub core", (0.012, 0.02, 0.006), Roughness=1.0),
-            metal("Polished brass", (0.75, 0.53, 0.22), 0.16),
-            metal("Mirror", (0.93, 0.94, 0.93), 0.0),
-            bark("Bark", (0.15, 0.12, 0.09)),
-            bark("Maple bark", (0.16, 0.13, 0.11)),
-            bark("Pine bark", (0.20, 0.13, 0.09)),
-            foliage("Maple leaves", (0.30, 0.018, 0.010), (0.62, 0.13, 0.02), 0.5),
-            foliage("Fallen maple leaves", (0.26, 0.02, 0.012), (0.55, 0.17, 0.04), 0.2),
-            foliage("Green leaves", (0.03, 0.075, 0.014), (0.10, 0.17, 0.03)),
-            foliage("Yellowing leaves", (0.07, 0.10, 0.015), (0.22, 0.22, 0.035)),
-            foliage("Autumn leaves", (0.22, 0.09, 0.015), (0.40, 0.22, 0.03)),
-            foliage("Pine needles", (0.012, 0.045, 0.016), (0.045, 0.095, 0.026), 0.15),
-            foliage("Bamboo leaves", (0.05, 0.11, 0.018), (0.16, 0.22, 0.04)),
-            foliage("Azalea leaves", (0.02, 0.055, 0.012), (0.07, 0.13, 0.025), 0.2),
-            foliage("Azalea flowers", (0.55, 0.06, 0.20), (0.80, 0.30, 0.45), 0.3),
-            foliage("Grass", (0.028, 0.062, 0.010), (0.125, 0.17, 0.032), 0.35),
-            foliage("Iris leaves", (0.04, 0.09, 0.02), (0.13, 0.20, 0.05), 0.3),
-            foliage("Lily pad", (0.035, 0.09, 0.02), (0.09, 0.17, 0.035), 0.1),
-            foliage("Lily petal", (0.72, 0.30, 0.42), (0.85, 0.62, 0.68), 0.3),
-        ]
-    )
+PAINTS = """Rope 0.05 0.04 0.03 0.9, Black lacquer 0.015 0.014 0.013 0.35
+    Candle cup 0.10 0.03 0.02 0.35, Wick 0.01 0.01 0.01 0.5, Shrub core 0.012 0.02 0.006 1"""
+LEAVES = """Azalea flowers 0.55 0.06 0.20 0.80 0.30 0.45 0.3
+    Maple leaves 0.30 0.018 0.010 0.62 0.13 0.02 0.5, Grass 0.028 0.062 0.010 0.125 0.17 0.032 0.35
+    Green leaves 0.03 0.075 0.014 0.10 0.17 0.03 0.4, Iris leaves 0.04 0.09 0.02 0.13 0.20 0.05 0.3
+    Autumn leaves 0.22 0.09 0.015 0.40 0.22 0.03 0.4, Lily petal 0.72 0.30 0.42 0.85 0.62 0.68 0.3
+    Azalea leaves 0.02 0.055 0.012 0.07 0.13 0.025 0.2, Lily pad 0.035 0.09 0.02 0.09 0.17 0.035 0.1
+    Bamboo leaves 0.05 0.11 0.018 0.16 0.22 0.04 0.4
+    Fallen maple leaves 0.26 0.02 0.012 0.55 0.17 0.04 0.2
+    Pine needles 0.012 0.045 0.016 0.045 0.095 0.026 0.15
+    Yellowing leaves 0.07 0.10 0.015 0.22 0.22 0.035 0.4"""
+# Colour, and how far moss has come on what faces upwards, 0 … 1.
+GRANITES = """Kerb granite 0.23 0.22 0.20 0.35, Plinth granite 0.30 0.29 0.275 0.15
+    Lantern granite 0.25 0.24 0.225 0.55, Rock 0.17 0.165 0.155 0.75"""
+PAPERS = """Pane paper 0.86 0.80 0.66, Cream globe paper 0.88 0.82 0.68
+    Red globe paper 0.78 0.12 0.06, Floor lantern paper 0.88 0.80 0.64"""
+BARKS = "Bark 0.15 0.12 0.09, Maple bark 0.16 0.13 0.11, Pine bark 0.20 0.13 0.09"
+# Glowing gas: colour, and radiance a metre.
+FLAMES = "Flame gas 0 1 0.2 0.025 6, Flame gas 1 1 0.34 0.05 7, Flame gas 2 1 0.52 0.14 12"
 
 
-def granite(name: str, tint: Color, moss: float) -> bpy.types.Material:
+def palette() -> None:
+    plains(PAINTS)
+    plains("Iron 0.03 0.028 0.026 0.55", Metallic=0.8)
+    plains("Polished brass 0.75 0.53 0.22 0.16, Mirror 0.93 0.94 0.93 0", Metallic=1.0)
+    wood("Dark wood", (0.022, 0.012, 0.007), (0.14, 0.075, 0.038), 0.42)
+    foliage(LEAVES)
+    for name, *tint, moss_part in rows(GRANITES, 4):
+        granite(name, tint, moss_part)
+    for name, *tint in rows(PAPERS, 3):
+        paper(name, tint)
+    for name, *tint in rows(BARKS, 3):
+        bark(name, tint)
+    for name, *color, glow in rows(FLAMES, 4):
+        graph = MaterialGraph(name)
+        graph.finish(volume=graph.emission(color, glow))
+    for each in NAMED:
+        each(MaterialGraph(each.__name__.capitalize().replace("_", " ")))
+
+
+def granite(name: str, tint: Color, moss: float) -> None:
     """Speckled granite; `moss` 0 … 1 is how far moss has come on what faces upwards."""
     graph = MaterialGraph(name)
     where = graph.coordinates()
@@ -63,8 +52,8 @@ def granite(name: str, tint: Color, moss: float) -> bpy.types.Material:
     dark, light = (tuple(factor * c for c in tint) for factor in (0.45, 1.5))
     stone = graph.ramp(speckle, [(0.36, *dark), (0.5, *tint), (0.66, *light)])
     stone = graph.mix(graph.span(broad, 0.0, 0.5, 0.35, 0.75), stone, (0.10, 0.095, 0.08))
-    normal = graph.add("ShaderNodeNewGeometry").outputs["Normal"]
-    upwards = graph.math("ADD", graph.xyz(normal)["Z"], graph.math("MULTIPLY", broad, 1.6))
+    upwards = graph.xyz(graph.geometry("Normal"))["Z"]
+    upwards = graph.math("ADD", upwards, graph.math("MULTIPLY", broad, 1.6))
     cover = graph.span(upwards, 0.0, 1.0, 2.05 - moss, 2.25 - moss)
     green = graph.ramp(speckle, "0.3 0.03 0.05 0.008, 0.7 0.10 0.13 0.025")
     surface = graph.principled(
@@ -72,48 +61,55 @@ def granite(name: str, tint: Color, moss: float) -> bpy.types.Material:
         Roughness=graph.span(cover, 0.62, 0.95),
         Normal=graph.bump(speckle, 0.003),
     )
-    return graph.finish(graph.plain_when_diffuse(surface, tint))
+    graph.finish(graph.plain_when_diffuse(surface, tint))
 
 
-def paper(name: str, tint: Color) -> bpy.types.Material:
+def paper(name: str, tint: Color) -> None:
     """Washi paper: half of the light that falls on it comes out at the other side."""
     graph = MaterialGraph(name)
     fibres = graph.noise(graph.coordinates(), 45.0, 4.0, 0.7, 1.0)
     thick = tuple(0.72 * c for c in tint)
     color = graph.mix(graph.span(fibres, 0.0, 0.35, 0.4, 0.7), tint, thick)
-    return graph.finish(thin(graph, color, 0.55))
+    graph.finish(graph.thin(color, 0.55))
 
 
-# --- The ground -----------------------------------------------------------------------------------
+def bark(name: str, tint: Color) -> None:
+    """Cracked bark, with some green on it."""
+    graph = MaterialGraph(name)
+    cracks = graph.noise(graph.coordinates(7.0, 7.0, 1.6), 3.0, 5.0, 0.7, 0.6)
+    dark = tuple(0.3 * c for c in tint)
+    color = graph.ramp(cracks, [(0.35, *dark), (0.6, *tint), (0.75, 0.09, 0.11, 0.06)])
+    graph.finish(graph.diffuse(color, Normal=graph.bump(cracks, 0.03)))
 
 
-def moss() -> bpy.types.Material:
-    graph = MaterialGraph("Moss")
+# Materials that are named as their functions.
+
+
+def moss(graph: MaterialGraph) -> None:
     where = graph.coordinates()
     fine = graph.noise(where, 28.0, 3.0, 0.7)
     broad = graph.math("MULTIPLY", graph.noise(where, 0.35, 3.0), 0.6)
     greens = """0.30 0.016 0.032 0.006, 0.48 0.045 0.085 0.013
         0.62 0.095 0.120 0.022, 0.75 0.110 0.085 0.036"""
     tint = graph.ramp(graph.math("MULTIPLY_ADD", fine, 0.4, broad), greens)
-    surface = graph.diffuse(tint, graph.bump(fine, 0.03))
-    return graph.finish(graph.plain_when_diffuse(surface, (0.065, 0.085, 0.018)))
+    surface = graph.diffuse(tint, Normal=graph.bump(fine, 0.03))
+    graph.finish(graph.plain_when_diffuse(surface, (0.065, 0.085, 0.018)))
 
 
-def gravel() -> bpy.types.Material:
+def gravel(graph: MaterialGraph) -> None:
     """Grains of four greys, dark between them."""
-    graph = MaterialGraph("Gravel")
     grains = graph.voronoi(graph.coordinates(), 130.0)
     greys = "0 0.20 0.185 0.165, 0.4 0.36 0.345 0.315, 0.8 0.47 0.45 0.41, 1 0.62 0.60 0.56"
-    tint = graph.ramp(graph.xyz(grains.outputs["Color"])[0], greys)
-    shade = graph.span(grains.outputs["Distance"], 1.0, 0.45, 0.25, 0.75)
-    height = graph.math("SUBTRACT", 1.0, grains.outputs["Distance"])
-    surface = graph.diffuse(graph.mix(1.0, tint, shade, "MULTIPLY"), graph.bump(height, 0.006))
-    return graph.finish(graph.plain_when_diffuse(surface, (0.36, 0.34, 0.31)))
+    tint = graph.ramp(graph.xyz(grains["Color"])[0], greys)
+    shade = graph.span(grains["Distance"], 1.0, 0.45, 0.25, 0.75)
+    height = graph.math("SUBTRACT", 1.0, grains["Distance"])
+    color = graph.mix(1.0, tint, shade, "MULTIPLY")
+    surface = graph.diffuse(color, Normal=graph.bump(height, 0.006))
+    graph.finish(graph.plain_when_diffuse(surface, (0.36, 0.34, 0.31)))
 
 
-def wet_stone() -> bpy.types.Material:
+def wet_stone(graph: MaterialGraph) -> None:
     """Dark veined stone, a mirror where it is wet."""
-    graph = MaterialGraph("Wet stone")
     where = graph.coordinates()
     grain = graph.noise(where, 60.0, 2.0, 0.7)
     veins = graph.noise(where, 3.2, 5.0, 0.65, 0.8)
@@ -125,44 +121,37 @@ def wet_stone() -> bpy.types.Material:
         IOR=1.6,
         Normal=graph.bump(grain, 0.0012),
     )
-    return graph.finish(graph.plain_when_diffuse(surface, (0.09, 0.09, 0.09)))
+    graph.finish(graph.plain_when_diffuse(surface, (0.09, 0.09, 0.09)))
 
 
-def mountain() -> bpy.types.Material:
+def mountain(graph: MaterialGraph) -> None:
     """Forest, rock where it is steep, snow on the tops."""
-    graph = MaterialGraph("Mountain")
     where = graph.coordinates()
     forest = graph.noise(where, 0.16, 6.0, 0.75)
-    normal = graph.add("ShaderNodeNewGeometry").outputs["Normal"]
-    level = graph.math("MULTIPLY_ADD", forest, 0.5, graph.xyz(normal)["Z"])
+    flat = graph.xyz(graph.geometry("Normal"))["Z"]
+    level = graph.math("MULTIPLY_ADD", forest, 0.5, flat)
     greens = "0.35 0.020 0.045 0.026, 0.52 0.045 0.075 0.030, 0.68 0.12 0.10 0.04"
     trees = graph.ramp(forest, greens)
     color = graph.mix(graph.span(level, 0.0, 1.0, 0.75, 1.0), (0.16, 0.16, 0.17), trees)
     high = graph.math("MULTIPLY_ADD", forest, 30.0, graph.xyz(where)["Z"])
     color = graph.mix(graph.span(high, 0.0, 1.0, 132.0, 146.0), color, (0.75, 0.78, 0.82))
-    return graph.finish(graph.diffuse(color))
+    graph.finish(graph.diffuse(color))
 
 
-def fog() -> bpy.types.Material:
+def fog(graph: MaterialGraph) -> None:
     """Fog that glows with the light it would scatter to the viewer: no noise, hardly any cost."""
-    graph = MaterialGraph("Fog")
     density = 0.012  # part of the light lost a metre
-    absorption = {"Color": (0.0, 0.0, 0.0), "Density": density}
-    veil = graph.add("ShaderNodeVolumeAbsorption", absorption)
+    veil = graph.add("VolumeAbsorption", {"Color": (0.0, 0.0, 0.0), "Density": density})
     glow = graph.emission((0.62, 0.60, 0.62), density)
-    return graph.finish(volume=graph.add("ShaderNodeAddShader", {0: veil, 1: glow}))
+    graph.finish(volume=graph.add("AddShader", {0: veil, 1: glow}))
 
 
-# --- Things ---------------------------------------------------------------------------------------
-
-
-def bronze() -> bpy.types.Material:
+def rough_bronze(graph: MaterialGraph) -> None:
     """Rough metal: worn bronze with patina, brushed in changing directions."""
-    graph = MaterialGraph("Rough bronze")
     where = graph.coordinates()
     broad = graph.noise(where, 2.6, 5.0, 0.6)
     fine = graph.noise(where, 26.0, 5.0, 0.7)
-    brushed = graph.noise(graph.coordinates("Object", (4.0, 4.0, 160.0)), 1.0, 2.0)
+    brushed = graph.noise(graph.coordinates(4.0, 4.0, 160.0), 1.0, 2.0)
     patina = graph.span(graph.math("MULTIPLY_ADD", fine, 0.5, broad), 0.0, 1.0, 0.72, 0.95)
     metal_tint = graph.ramp(fine, "0.3 0.36 0.20 0.09, 0.7 0.62 0.40 0.19")
     worn = graph.math("MULTIPLY_ADD", fine, 0.16, graph.span(broad, 0.16, 0.46, 0.3, 0.7))
@@ -174,91 +163,70 @@ def bronze() -> bpy.types.Material:
         Anisotropic_Rotation=graph.noise(where, 1.3, 2.0),
         Normal=graph.bump(graph.math("MULTIPLY_ADD", brushed, 0.25, fine), 0.003),
     )
-    return graph.finish(surface)
+    graph.finish(surface)
 
 
-def vermilion() -> bpy.types.Material:
+def vermilion(graph: MaterialGraph) -> None:
     """Weathered red paint."""
-    graph = MaterialGraph("Vermilion")
-    worn = graph.noise(graph.coordinates("Object", (3.0, 3.0, 0.6)), 2.0, 5.0, 0.7)
+    worn = graph.noise(graph.coordinates(3.0, 3.0, 0.6), 2.0, 5.0, 0.7)
     tint = graph.ramp(worn, "0.35 0.20 0.028 0.010, 0.6 0.46 0.060 0.018, 0.75 0.52 0.10 0.04")
     normal = graph.bump(worn, 0.004)
-    return graph.finish(graph.principled(Base_Color=tint, Roughness=0.45, Normal=normal))
+    graph.finish(graph.principled(Base_Color=tint, Roughness=0.45, Normal=normal))
 
 
-def water() -> bpy.types.Material:
+def water(graph: MaterialGraph) -> None:
     """Clear water, whose ripples run on with the frames; light passes straight into it."""
-    graph = MaterialGraph("Water")
-    where = graph.add("ShaderNodeTexCoord").outputs["Object"]
-    drift = graph.add("ShaderNodeMapping", {"Vector": where, "Scale": (1.0, 1.6, 1.0)})
-    animate(drift.inputs["Location"], "default_value", 0.012, 0)
-    ripples = graph.noise(drift, 5.0, 3.0, 0.55, 0.0, 0.0)
+    drift = graph.coordinates(1.0, 1.6, 1.0)
+    animate(drift.node.inputs["Location"], "default_value", 0.012, 0)
+    ripples = graph.noise(drift, 5.0, 3.0, 0.55, 0.0, 0.0, noise_dimensions="4D")
     animate(ripples.node.inputs["W"], "default_value", 0.04)
     normal = graph.bump(ripples, 0.045)
-    reflected = graph.add("ShaderNodeFresnel", {"IOR": 1.33, "Normal": normal})
-    clear = graph.add("ShaderNodeBsdfTransparent", {"Color": (0.62, 0.74, 0.66)})
+    reflected = graph.add("Fresnel", {"IOR": 1.33, "Normal": normal})
+    clear = graph.add("BsdfTransparent", {"Color": (0.62, 0.74, 0.66)})
     gloss = {"Color": (1.0, 1.0, 1.0), "Roughness": 0.02, "Normal": normal}
-    shine = graph.add("ShaderNodeBsdfAnisotropic", gloss)
-    return graph.finish(graph.mix_shaders(reflected, clear, shine))
+    graph.finish(graph.mix_shaders(reflected, clear, graph.add("BsdfAnisotropic", gloss)))
 
 
-def koi() -> bpy.types.Material:
+def koi(graph: MaterialGraph) -> None:
     """White, with patches of orange, red and black that differ from fish to fish."""
-    graph = MaterialGraph("Koi")
     patches = graph.noise(graph.coordinates(), 5.0, 2.0)
     patches = graph.math("MULTIPLY_ADD", graph.object_random(), 0.22, patches)
     stops = "0.50 0.85 0.80 0.72, 0.56 0.90 0.22 0.03, 0.72 0.80 0.10 0.02, 0.76 0.03 0.03 0.03"
-    tint = graph.ramp(patches, stops)
-    return graph.finish(graph.principled(Base_Color=tint, Roughness=0.3))
+    graph.finish(graph.principled(Base_Color=graph.ramp(patches, stops), Roughness=0.3))
 
 
-def bamboo_culm() -> bpy.types.Material:
+def bamboo_culm(graph: MaterialGraph) -> None:
     """Green or yellow by culm, paler in long streaks."""
-    graph = MaterialGraph("Bamboo culm")
-    along = graph.noise(graph.coordinates("Object", (6.0, 6.0, 0.8)), 1.0, 4.0)
+    along = graph.noise(graph.coordinates(6.0, 6.0, 0.8), 1.0, 4.0)
     tint = graph.mix(graph.object_random(), (0.10, 0.16, 0.035), (0.24, 0.23, 0.06))
     tint = graph.mix(graph.span(along, 0.0, 0.6, 0.4, 0.7), tint, (0.26, 0.22, 0.10))
-    return graph.finish(graph.principled(Base_Color=tint, Roughness=0.35))
+    graph.finish(graph.principled(Base_Color=tint, Roughness=0.35))
 
 
-# --- What glows -----------------------------------------------------------------------------------
-
-
-def flame_gas(name: str, color: Color, glow: float) -> bpy.types.Material:
-    """Glowing gas: radiance a metre."""
-    graph = MaterialGraph(name)
-    return graph.finish(volume=graph.emission(color, glow))
-
-
-def embers() -> bpy.types.Material:
+def embers(graph: MaterialGraph) -> None:
     """Charred wood that glows in patches."""
-    graph = MaterialGraph("Embers")
     heat = graph.span(graph.noise(graph.coordinates(), 14.0, 4.0, 0.7), 0.0, 1.0, 0.48, 0.66)
-    surface = graph.principled(
-        Base_Color=graph.mix(heat, (0.015, 0.013, 0.012), (0.10, 0.09, 0.085)),
-        Roughness=0.9,
-        Emission_Color=(1.0, 0.16, 0.02),
-        Emission_Strength=graph.math("MULTIPLY", heat, 5.0),
-    )
-    return graph.finish(surface, is_lamp=False)
+    color = graph.mix(heat, (0.015, 0.013, 0.012), (0.10, 0.09, 0.085))
+    strength = graph.math("MULTIPLY", heat, 5.0)
+    glow = {"Emission_Color": (1.0, 0.16, 0.02), "Emission_Strength": strength}
+    graph.finish(graph.principled(Base_Color=color, Roughness=0.9, **glow), is_lamp=False)
 
 
-def wax() -> bpy.types.Material:
+def wax(graph: MaterialGraph) -> None:
     """Wax that glows faintly where the flame shines into it."""
-    graph = MaterialGraph("Wax")
     warm = graph.span(graph.xyz(graph.coordinates())["Z"], 0.0, 0.9, 0.06, 0.2)
-    surface = graph.principled(
-        Base_Color=(0.82, 0.72, 0.55),
-        Roughness=0.45,
-        Emission_Color=(1.0, 0.36, 0.10),
-        Emission_Strength=graph.math("MULTIPLY", warm, warm),
-    )
-    return graph.finish(surface, is_lamp=False)
+    strength = graph.math("MULTIPLY", warm, warm)
+    glow = {"Emission_Color": (1.0, 0.36, 0.10), "Emission_Strength": strength}
+    wax = graph.principled(Base_Color=(0.82, 0.72, 0.55), Roughness=0.45, **glow)
+    graph.finish(wax, is_lamp=False)
 
 
-def candle_flame() -> bpy.types.Material:
+def candle_flame(graph: MaterialGraph) -> None:
     """A flame, blue at its foot; the lamps beside the candles give its light."""
-    graph = MaterialGraph("Candle flame")
     height = graph.span(graph.xyz(graph.coordinates())["Z"], 0.0, 1.0, 0.2, 0.252)
     tint = graph.ramp(height, "0 0.15 0.2 0.8, 0.2 1 0.45 0.12, 0.6 1 0.72 0.32, 1 1 0.4 0.08")
-    return graph.finish(graph.emission(tint, 9.0), is_lamp=False)
+    graph.finish(graph.emission(tint, 9.0), is_lamp=False)
+
+
+NAMED = (moss, gravel, wet_stone, mountain, fog, rough_bronze, vermilion, water, koi, bamboo_culm)
+NAMED += (embers, wax, candle_flame)

@@ -1,14 +1,17 @@
-"""Where things are in the garden: the court, the pond, the path, and the height of the ground.
+"""Where things are in the garden: the court, the pond, the path, the ground's height, and spots.
 
 The rigs stand in the middle of the court: no geometry comes near x, y in ±1 m, z in 0.5 … 1.5 m.
 """
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import ArrayLike
 
-from scenes.library.nodes import Color
-from scenes.library.noise import noise, smoothstep
-from scenes.library.points import Array, polar, xyz
+from scenes.library.materials import Color
+from scenes.library.points import Array, noise, polar, smoothstep, xyz
+from scenes.library.shapes import towards, transform
 
 TAU = 2 * np.pi
 
@@ -73,3 +76,50 @@ def clear_of_things(x: Array, y: Array, margin: float) -> Array:
     things = [(lx, ly) for lx, ly, _ in STONE_LANTERNS]
     things += [MAPLE, (TORII[0] - 1.5, TORII[1]), (TORII[0] + 1.5, TORII[1])]
     return np.min([np.hypot(x - tx, y - ty) for tx, ty in things], axis=0) > margin
+
+
+def spread(
+    random: np.random.Generator,
+    count: int,
+    corners: Sequence[float],
+    spacing: float,
+    allowed: Callable[[Array, Array], Array] = lambda x, y: x == x,
+    **off: float,
+) -> Array:
+    """Up to `count` points (n, 2) in a rectangle, at least `spacing` apart, where allowed.
+
+    off: how far, at least, from court, pond and path.
+    """
+    distances = {"court": court_distance, "pond": pond_distance, "path": path_distance}
+    chosen = np.empty((0, 2))
+    for _ in range(12):
+        x, y = tries = random.uniform(corners[:2], corners[2:], (count, 2)).T
+        away = [distances[name](x, y) > least for name, least in off.items()]
+        for point in tries.T[np.all([allowed(x, y), *away], axis=0)]:
+            if len(chosen) < count and (np.hypot(*(chosen - point).T) >= spacing).all():
+                chosen = np.vstack([chosen, point])
+    return chosen
+
+
+def standing(
+    random: np.random.Generator,
+    spots: Array,
+    scale: tuple[float, float],
+    sink: float = 0.0,
+    tilt: float = 0.0,
+    sloping: bool = False,
+) -> list[Matrix]:
+    """Places on the ground at spots (n, 2), each turned and scaled at random.
+
+    Upright but for a random tilt in radians, or square to the slope. sink: metres at scale 1.
+    """
+    (x, y), step = spots.T, 0.25
+    rise_x = ground_height(x + step, y) - ground_height(x - step, y)
+    rise_y = ground_height(x, y + step) - ground_height(x, y - step)
+    ups = xyz(-rise_x, -rise_y, 2 * step) if sloping else xyz(0 * x, 0, 1)
+    matrices = []
+    for at, up in zip(xyz(x, y, ground_height(x, y)), ups, strict=True):
+        size = random.uniform(*scale)
+        turn = transform(rotation=(*random.normal(0, tilt, 2), random.uniform(0, TAU)), scale=size)
+        matrices.append(towards(at - (0, 0, sink * size), up, "Z") @ turn)
+    return matrices

@@ -3,19 +3,17 @@
 import numpy as np
 from mathutils import Matrix
 
-from scenes.garden.placing import spread, standing
-from scenes.garden.plan import POND_CENTER, TAU, WATER_LEVEL, pond_distance, pond_shore
-from scenes.library.noise import noise
-from scenes.library.objects import scatter, transform
+from scenes.garden import plan
+from scenes.garden.plan import POND_CENTER, TAU, WATER_LEVEL, pond_distance, spread, standing
 from scenes.library.plants import blade, tuft
-from scenes.library.points import Array, points, polar, xyz
-from scenes.library.scene import Scene
-from scenes.library.shapes import Shape, copies, facets, join, sheet
+from scenes.library.points import Array, noise, points, polar, xyz
+from scenes.library.scene import Scene, scatter
+from scenes.library.shapes import Shape, copies, facets, join, sheet, transform
 
 
 def water(scene: Scene) -> None:
     """The pond's surface."""
-    shore = pond_shore(np.linspace(0, TAU, scene.segments(120, 16), endpoint=False))
+    shore = plan.pond_shore(np.linspace(0, TAU, scene.segments(120, 16), endpoint=False))
     inwards = np.linspace(1.0, 0.02, scene.segments(12, 3))[:, None, None]
     x, y = np.moveaxis(POND_CENTER + inwards * (shore - POND_CENTER), -1, 0)
     scene.add("Water", sheet(xyz(x, y, WATER_LEVEL), closed=True), "Water")
@@ -79,6 +77,6 @@ def iris(scene: Scene) -> None:
     leaf = blade(0.018, 6, 0.35)
     sheaves = [tuft(random, leaf, count, 0.15, (0.35, 0.8)) for _ in range(2)]
     angle = np.concatenate([random.uniform(1.2, 5.2, 20), random.uniform(-0.9, 0.9, 3)])
-    shore = POND_CENTER + (pond_shore(angle) - POND_CENTER) * 1.06
+    shore = POND_CENTER + (plan.pond_shore(angle) - POND_CENTER) * 1.06
     meshes = [scene.mesh("Iris", sheaf, "Iris leaves") for sheaf in sheaves]
     scatter("Iris", meshes, standing(random, shore, (0.8, 1.2)))

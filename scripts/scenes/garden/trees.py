@@ -2,16 +2,19 @@
 
 import numpy as np
 
-from scenes.garden.placing import spread, standing
-from scenes.garden.plan import MAPLE, SUN_AZIMUTH, TAU, ground_height, path_distance, pond_distance
-from scenes.library.noise import noise, smoothstep
-from scenes.library.objects import place, scatter, transform
+from scenes.garden.plan import MAPLE, SUN_AZIMUTH, TAU, ground_height, spread, standing
 from scenes.library.plants import Growth, branches, leaves_on, oval_leaf
-from scenes.library.points import Array, points, polar, xyz
-from scenes.library.scene import Scene
-from scenes.library.shapes import Shape, copies, facets, join, sheet, tube
+from scenes.library.points import Array, noise, points, polar, smoothstep, xyz
+from scenes.library.scene import Scene, place, scatter
+from scenes.library.shapes import Shape, copies, facets, join, sheet, transform, tube
 
 GROVES = ((-5.5, 6.4, 6.5, 9.5), (2.2, -8.5, 9.0, -5.2))  # of bamboo: rectangles x0, y0, x1, y1
+MAPLE_GROWTH = Growth(
+    (2.9, 3.5, 1.5, 0.65), (9, 6, 4), (1.0, 0.8, 0.7), (0.05, 0.055, 0.0, -0.02), 0.17, 0.13, 0.62
+)
+WOOD_GROWTH = Growth(
+    (4.2, 2.6, 1.5, 0.7), (9, 6, 4), (0.95, 0.8, 0.7), (0.03, 0.07, 0.04, 0.0), 0.2, 0.14, 0.35
+)
 
 
 def bamboo(scene: Scene) -> None:
@@ -19,13 +22,9 @@ def bamboo(scene: Scene) -> None:
     random = scene.random("bamboo")
     used = ("Bamboo culm", "Bamboo leaves")
     meshes = [scene.mesh(f"Bamboo.{i}", bamboo_culm(scene, i), *used) for i in range(5)]
-
-    def allowed(x: Array, y: Array) -> Array:
-        return (path_distance(x, y) > 1.6) & (pond_distance(x, y) > 0.5)
-
     places = []
     for corners, count in zip(GROVES, (44, 32), strict=True):
-        spots = spread(random, count, corners, 0.34, allowed)
+        spots = spread(random, count, corners, 0.34, pond=0.5, path=1.6)
         places += standing(random, spots, (0.75, 1.1), 0.05, 0.03)
     scatter("Bamboo", meshes, places)
 
@@ -78,26 +77,6 @@ def maple_leaf() -> Shape:
     rim[1::2, 2], rim[2::2, 2] = -0.10 * (np.abs(tips[:, 0]) + tips[:, 1]), 0.02
     fan = [(10, (i + 1) % 10, i) for i in range(10)]
     return facets([*rim, (0.0, 0.25, 0.03)], *fan)
-
-
-MAPLE_GROWTH = Growth(
-    lengths=(2.9, 3.5, 1.5, 0.65),
-    children=(9, 6, 4),
-    angles=(1.0, 0.8, 0.7),
-    upward=(0.05, 0.055, 0.0, -0.02),
-    radius=0.17,
-    wander=0.13,
-    bare=0.62,
-)
-WOOD_GROWTH = Growth(
-    lengths=(4.2, 2.6, 1.5, 0.7),
-    children=(9, 6, 4),
-    angles=(0.95, 0.8, 0.7),
-    upward=(0.03, 0.07, 0.04, 0.0),
-    radius=0.2,
-    wander=0.14,
-    bare=0.35,
-)
 
 
 def maple(scene: Scene) -> None:
@@ -157,7 +136,7 @@ def pine(scene: Scene, random: np.random.Generator, number: int) -> Shape:
 def woods(scene: Scene) -> None:
     """Broad-leaved trees around the garden, thinning out towards the hills."""
     random = scene.random("woods")
-    simpler = Scene(scene.seed, 0.3 * scene.detail, scene.materials)
+    simpler = Scene(scene.seed, 0.3 * scene.detail)
     meshes = []
     for colour in ("Green", "Yellowing", "Autumn"):
         wood, twigs = branches(simpler, random, WOOD_GROWTH)
@@ -170,10 +149,9 @@ def woods(scene: Scene) -> None:
         r = np.hypot(x, y)
         open_to_sun = np.cos(np.arctan2(y, x) - SUN_AZIMUTH) >= 0.93
         thicket = noise(xyz(x, y) / 16.0, 95) > -0.05 - 0.1 * (r < 25)
-        off_path = path_distance(x, y) > 3
-        return (r > 11.5) & (r < 75) & off_path & (~open_to_sun | (r > 30)) & thicket
+        return (r > 11.5) & (r < 75) & (~open_to_sun | (r > 30)) & thicket
 
-    near = spread(random, 40, (-26, -26, 26, 26), 3.4, allowed)
-    far = spread(random, 90, (-75, -75, 75, 75), 4.5, allowed)
+    near = spread(random, 40, (-26, -26, 26, 26), 3.4, allowed, path=3)
+    far = spread(random, 90, (-75, -75, 75, 75), 4.5, allowed, path=3)
     places = standing(random, np.vstack([near, far]), (0.75, 1.35), 0.1, 0.03)
     scatter("Tree", [meshes[k] for k in (0, 1, 0, 1, 0, 2, 0, 1)], places)

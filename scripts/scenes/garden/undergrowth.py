@@ -1,25 +1,13 @@
 """What grows and lies on the ground: azaleas, grass, and the maple's fallen leaves."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from scenes.garden.court import flagstone_layout, raked_height
-from scenes.garden.placing import spread, standing
-from scenes.garden.plan import (
-    COURT,
-    TAU,
-    clear_of_things,
-    court_distance,
-    path_distance,
-    pond_distance,
-)
+from scenes.garden.plan import COURT, TAU, clear_of_things, court_distance, spread, standing
 from scenes.garden.trees import maple_leaf
-from scenes.library.noise import noise
-from scenes.library.objects import scatter
 from scenes.library.plants import blade, oval_leaf, tuft
-from scenes.library.points import Array, polar, xyz
-from scenes.library.scene import Scene
+from scenes.library.points import Array, noise, polar, xyz
+from scenes.library.scene import Scene, scatter
 from scenes.library.shapes import Shape, copies, icosphere, join
 
 
@@ -31,11 +19,10 @@ def shrubs(scene: Scene) -> None:
     meshes = [scene.mesh("Shrub", shape, *used) for shape in shapes]
 
     def allowed(x: Array, y: Array) -> Array:
-        away = (court_distance(x, y) > 0.75) & (pond_distance(x, y) > 0.9)
-        near = (path_distance(x, y) > 1.3) & (np.hypot(x, y) < 14)
-        return away & near & clear_of_things(x, y, 0.6)
+        return (np.hypot(x, y) < 14) & clear_of_things(x, y, 0.6)
 
-    spots = spread(random, 56, (-14, -14, 14, 14), 1.15, allowed)
+    off = {"court": 0.75, "pond": 0.9, "path": 1.3}
+    spots = spread(random, 56, (-14, -14, 14, 14), 1.15, allowed, **off)
     scatter("Shrub", meshes, standing(random, spots, (0.8, 1.9)))
 
 
@@ -50,7 +37,7 @@ def azalea(scene: Scene, random: np.random.Generator, shift: float, flowers: flo
     leaf = oval_leaf()
     leaves = copies(leaf, spots, forward, up, random.uniform(0.035, 0.06, count))
     slots = np.where(random.random(count) < flowers, 2, 1)
-    leaves = replace(leaves, slots=np.repeat(slots, len(leaf.triangles)).astype(np.int32))
+    leaves = leaves._replace(slots=np.repeat(slots, len(leaf.triangles)).astype(np.int32))
     core = icosphere(scene.segments(3, 2))
     inner = 0.42 * (1 + 0.16 * noise(core.vertices * 1.6 + shift, 96, 2))[:, None]
     return join([core.reshaped(core.vertices * inner * (1, 1, 0.85)), leaves])
@@ -62,16 +49,15 @@ def grass(scene: Scene) -> None:
     tufts = [tuft(random, leaf, count, 0.6, (0.05, 0.15)) for _ in range(4)]
     meshes = [scene.mesh("Grass", each, "Grass") for each in tufts]
 
-    def allowed(x: Array, y: Array) -> Array:
-        patch = noise(xyz(x, y) / 2.2, 97, 2) > -0.12
-        off_path = path_distance(x, y) > 0.95
-        return patch & off_path & (court_distance(x, y) > 0.5) & (pond_distance(x, y) > 0.25)
+    def patch(x: Array, y: Array) -> Array:
+        return noise(xyz(x, y) / 2.2, 97, 2) > -0.12
 
     def farther(x: Array, y: Array) -> Array:
-        return allowed(x, y) & (np.hypot(x, y) > 9.5)
+        return patch(x, y) & (np.hypot(x, y) > 9.5)
 
-    near = spread(random, scene.count(330, 40), (-9.5, -9.5, 9.5, 9.5), 0.66, allowed)
-    far = spread(random, scene.count(190, 40), (-22, -22, 22, 22), 1.55, farther)
+    off, count = {"court": 0.5, "pond": 0.25, "path": 0.95}, scene.count(330, 40)
+    near = spread(random, count, (-9.5, -9.5, 9.5, 9.5), 0.66, patch, **off)
+    far = spread(random, scene.count(190, 40), (-22, -22, 22, 22), 1.55, farther, **off)
     places = standing(random, near, (0.8, 1.25), sloping=True)
     scatter("Grass", meshes, places + standing(random, far, (1.8, 2.8), sloping=True))
 

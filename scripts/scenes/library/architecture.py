@@ -4,9 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from scenes.library.objects import transform
 from scenes.library.points import Array, Points, points, polar, rectangle, xyz
-from scenes.library.shapes import Shape, box, join, prism, sheet
+from scenes.library.shapes import Shape, box, copies, join, prism, sheet, transform
 
 
 def blocks(centers: Any, sizes: Any, bevel: Any = 0.012) -> Shape:
@@ -15,12 +14,7 @@ def blocks(centers: Any, sizes: Any, bevel: Any = 0.012) -> Shape:
     cube = box((1, 1, 1), bevel=0.25, segments=1)
     inset = (np.abs(cube.vertices) < 0.4) * np.broadcast_to(bevel, 3)
     vertices = np.sign(cube.vertices) * (sizes[:, None] / 2 - inset) + centers[:, None]
-    offset = (np.arange(len(centers)) * len(cube.vertices))[:, None, None]
-    return Shape(
-        vertices.reshape(-1, 3),
-        (cube.quads + offset).reshape(-1, 4),
-        (cube.triangles + offset).reshape(-1, 3),
-    )
+    return copies(cube, centers).reshaped(vertices.reshape(-1, 3))
 
 
 def stones(table: Points, bevel: Any = 0.012) -> Shape:
@@ -36,26 +30,25 @@ def cut(random: np.random.Generator, start: float, stop: float, count: int) -> t
     return (edges[1:] + edges[:-1]) / 2, np.diff(edges)
 
 
-def bent(shape: Shape) -> Shape:
-    """A shape bent round the Z axis: its x becomes the angle in radians, its y the radius."""
-    angle, radius, z = shape.vertices.T
-    return shape.reshaped(polar(radius, angle, z))
-
-
 def ring_of_stones(
     count: int, radius: float, width: float, z: float, height: float, span: float = 2 * np.pi
 ) -> Shape:
     """Wedge-shaped stones side by side round the Z axis, from angle 0 to `span`."""
-    step = span / count
-    angles = (np.arange(count) + 0.5) * step
-    gap = 0.006 / radius
-    bevel = (0.012 / radius, 0.012, 0.012)
-    return bent(blocks(xyz(angles, radius, z), (step - gap, width, height), bevel))
+    step, gap = span / count, 0.006 / radius
+    places = xyz((np.arange(count) + 0.5) * step, radius, z)
+    flat = blocks(places, (step - gap, width, height), (0.012 / radius, 0.012, 0.012))
+    angle, reach, z = flat.vertices.T
+    return flat.reshaped(polar(reach, angle, z))
 
 
 def upright(shape: Shape) -> Shape:
     """A shape drawn in the XY plane put up into the XZ plane; its +Z now faces the court, −Y."""
     return shape.transformed(transform(rotation=(np.pi / 2, 0, 0)))
+
+
+def arch_stones(radius: float, depth: float, count: int) -> Shape:
+    """The voussoirs of a round arch about the origin, 0.2 m wide, its depth along y."""
+    return upright(ring_of_stones(count, radius + 0.1, 0.2, 0.0, depth, np.pi))
 
 
 def arch_outline(
@@ -78,20 +71,15 @@ def panel(width: float, bottom: float, top: float, opening: Array, thickness: fl
     middle = np.array([0.0, (opening[:, 1].min() + opening[:, 1].max()) / 2])
     corners = np.array([[1, bottom], [1, top], [-1, top], [-1, bottom]]) * [width / 2, 1] - middle
     inner = opening - middle
-    crossings = [_ray_meets(inner, corner) for corner in corners]
-    inner = np.concatenate([inner, crossings])
+    inner = np.concatenate([inner, [_ray_meets(inner, corner) for corner in corners]])
     inner = inner[np.argsort(np.arctan2(inner[:, 1], inner[:, 0]), kind="stable")]
     across = np.abs(inner[:, 0]) / (width / 2)
     along = inner[:, 1] / (np.where(inner[:, 1] > 0, top, bottom) - middle[1])
     outer = inner / np.maximum(across, along)[:, None]
-    rings = [
-        xyz((ring + middle)[:, 0], y, (ring + middle)[:, 1])
-        for y in (0, thickness)
-        for ring in (inner, outer)
-    ]
-    faces = [
-        sheet(np.stack([rings[a], rings[b]]), closed=True) for a, b in ((0, 1), (3, 2), (2, 0))
-    ]
+    outlines = (inner + middle).T, (outer + middle).T
+    front, back = ([xyz(x, y, z) for x, z in outlines] for y in (0, thickness))
+    pairs = front, back[::-1], (back[0], front[0])
+    faces = [sheet(np.stack(pair), closed=True) for pair in pairs]
     on_edge = np.isclose(np.maximum(across, along), 1)
     walled = ~(on_edge & np.roll(on_edge, -1))  # where the opening runs along the panel's edge
     return join(Shape(face.vertices, face.quads[walled]) for face in faces)
@@ -111,11 +99,6 @@ def _ray_meets(outline: Array, direction: Array) -> Array:
 def filled(outline: Array, y: float, thickness: float = 0.02) -> Shape:
     """A board or pane of an outline in x and z, its back at y."""
     return upright(prism(outline, thickness)).moved(0, y, 0)
-
-
-def arch_stones(radius: float, depth: float, count: int, width: float = 0.2) -> Shape:
-    """The voussoirs of a round arch about the origin, y from −depth / 2 to depth / 2."""
-    return upright(ring_of_stones(count, radius + width / 2, width, 0.0, depth, np.pi))
 
 
 def frame(width: float, height: float, profile: Points) -> Shape:

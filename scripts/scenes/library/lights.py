@@ -7,8 +7,9 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from scenes.library.nodes import Color, Graph
-from scenes.library.objects import place, transform
+from scenes.library.materials import Color, SkyGraph
+from scenes.library.scene import place
+from scenes.library.shapes import transform
 
 
 def point_light(
@@ -45,8 +46,8 @@ def sun_light(
 
 
 def hdri_world(
-    filename: str, strength: float = 1.0, rotation: float = 0.0, brightest: float | None = None
-) -> bpy.types.World:
+    filename: str, strength: float, rotation: float, brightest: float | None = None
+) -> None:
     """The scene's world: an environment that ships with bpy, packed into the .blend.
 
     filename: one of datafiles/studiolights/world, "sunrise.exr" for example. rotation: radians
@@ -56,18 +57,10 @@ def hdri_world(
     image = bpy.data.images.load(str(folder / filename))
     image.pack()
     image.filepath = f"//{filename}"  # the path on the building machine is nobody's business
-    world = bpy.data.worlds.new("Sky")
-    bpy.context.scene.world = world
-    graph = Graph(world.node_tree)
-    coordinates = graph.add("ShaderNodeTexCoord").outputs["Generated"]
-    turned = graph.add(
-        "ShaderNodeMapping", {"Vector": coordinates, "Rotation": (0.0, 0.0, -rotation)}
-    )
-    color = graph.add("ShaderNodeTexEnvironment", {"Vector": turned}, image=image).outputs["Color"]
+    graph = SkyGraph()
+    coordinates = graph.add("TexCoord").outputs["Generated"]
+    turned = graph.add("Mapping", {"Vector": coordinates, "Rotation": (0.0, 0.0, -rotation)})
+    color = graph.add("TexEnvironment", {"Vector": turned}, image=image).outputs["Color"]
     if brightest is not None:
-        color = graph.add(
-            "ShaderNodeVectorMath", {0: color, 1: (brightest,) * 3}, operation="MINIMUM"
-        ).outputs[0]
-    background = graph.add("ShaderNodeBackground", {"Color": color, "Strength": strength})
-    graph.add("ShaderNodeOutputWorld", {"Surface": background})
-    return world
+        color = graph.vector_math("MINIMUM", color, (brightest,) * 3)[0]
+    graph.finish(color, strength)

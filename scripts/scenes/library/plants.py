@@ -7,8 +7,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import ArrayLike
 
-from scenes.library.noise import noise
-from scenes.library.points import Array, polar, random_directions, unit, xyz
+from scenes.library.points import Array, directions, noise, polar, unit, xyz
 from scenes.library.scene import Scene
 from scenes.library.shapes import Shape, copies, facets, join, sheet, tube
 
@@ -31,14 +30,14 @@ def leaves_at(
     random: Generator, at: Array, forward: Array, length: ArrayLike, width: float
 ) -> Shape:
     """Folded leaves at places (n, 3) that point forward (n, 3), their faces turned at random."""
-    return copies(folded_leaf(width), at, forward, random_directions(random, len(at)), length)
+    return copies(folded_leaf(width), at, forward, directions(random, len(at)), length)
 
 
 def leaf_cloud(
     random: Generator, count: int, radii: ArrayLike, length: ArrayLike, width: float
 ) -> Shape:
     """Folded leaves in the outer shell of an ellipsoid about the origin, turned outwards."""
-    out = random_directions(random, count)
+    out = directions(random, count)
     depth = 1 - 0.3 * random.random((count, 1)) ** 2
     lumps = 1 + 0.10 * noise(out * 2.5, int(random.integers(10**6)))[:, None]
     forward = out + random.normal(0, 0.6, (count, 3))
@@ -76,23 +75,6 @@ class Growth:
     bare: float = 0.4  # part of a branch before its first side branch
 
 
-def crooked_path(
-    random: Generator,
-    start: Array,
-    heading: Array,
-    length: float,
-    count: int,
-    wander: float,
-    upward: float,
-) -> Array:
-    """A branch's points (count, 3), which change course at random and turn towards the light."""
-    path = [np.asarray(start, float)]
-    for _ in range(count - 1):
-        heading = unit(heading + random.normal(0, wander, 3) + (0, 0, upward))
-        path.append(path[-1] + heading * length / (count - 1))
-    return np.array(path)
-
-
 def branches(scene: Scene, random: Generator, growth: Growth) -> tuple[Shape, Array]:
     """A tree's wood, and the points of its twigs (n, k, 3)."""
     parts: list[Shape] = []
@@ -100,11 +82,12 @@ def branches(scene: Scene, random: Generator, growth: Growth) -> tuple[Shape, Ar
 
     def grow(start: Array, heading: Array, length: float, radius: float, level: int) -> None:
         count, tip = (9, 0.5) if level == 0 else (6, 0.3)
-        wander, upward = growth.wander, growth.upward[level]
-        path = crooked_path(random, start, heading, length, count, wander, upward)
-        radii = radius * np.linspace(1, tip, count)
-        sides = scene.segments((12, 7, 5, 3, 3)[level])
-        parts.append(tube(path, radii, sides, capped=False))
+        path, upward = np.tile(start, (count, 1)), growth.upward[level]
+        for k in range(1, count):  # it changes course at random, and turns towards the light
+            heading = unit(heading + random.normal(0, growth.wander, 3) + (0, 0, upward))
+            path[k] = path[k - 1] + heading * length / (count - 1)
+        sides = scene.segments((12, 7, 5, 3)[level])
+        parts.append(tube(path, radius * np.linspace(1, tip, count), sides, capped=False))
         if level == len(growth.lengths) - 1:
             twigs.append(path)
             return

@@ -1,8 +1,9 @@
-"""Points and directions as numpy arrays, read from text or made of coordinates; outlines, paths."""
+"""Points as numpy arrays, read from text or made of coordinates; outlines, paths, and noise."""
 
 from itertools import product
 from typing import Any
 
+import mathutils
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
@@ -51,7 +52,7 @@ def unit(vectors: ArrayLike) -> Array:
     return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-9)
 
 
-def random_directions(random: np.random.Generator, count: int) -> Array:
+def directions(random: np.random.Generator, count: int) -> Array:
     """Unit vectors (count, 3), evenly spread over the sphere."""
     return unit(random.normal(size=(count, 3)))
 
@@ -72,3 +73,21 @@ def smooth_path(path: Points, steps: int) -> Array:
     p = points(path)
     chord = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1))])
     return np.asarray(CubicSpline(chord, p)(np.linspace(0, chord[-1], steps + 1)))
+
+
+def smoothstep(low: float, high: float, value: ArrayLike) -> Array:
+    """0 at `low` and 1 at `high` (which may be the smaller one), level at both."""
+    t = np.clip((np.asarray(value, float) - low) / (high - low), 0.0, 1.0)
+    return t * t * (3 - 2 * t)
+
+
+def noise(places: ArrayLike, seed: int, octaves: int = 1) -> Array:
+    """Perlin's improved gradient noise at places (..., 3), about −1..1; octaves halve in size."""
+    at = np.asarray(places, float)
+    total = np.zeros(at.shape[:-1])
+    for octave in range(octaves):
+        shift = np.random.default_rng([seed, octave]).uniform(0, 256, 3)
+        spots = (at.reshape(-1, 3) * 2.0**octave + shift).tolist()
+        values = [mathutils.noise.noise(spot, noise_basis="PERLIN_NEW") for spot in spots]
+        total += np.reshape(values, total.shape) / 2.0**octave
+    return total

@@ -1,22 +1,28 @@
-"""`Scene`, the context that every element of a scene is a function of."""
+"""`Scene`, which every element of a scene is a function of; `Model`, a mesh of several shapes."""
 
+import re
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 from numpy.typing import ArrayLike
 
-from scenes.library import objects, shapes
-from scenes.library.points import Points, smooth_path
-from scenes.library.shapes import Shape
+from scenes.library import shapes
+from scenes.library.architecture import frame
+from scenes.library.points import Points, points, rectangle, smooth_path, xyz
+from scenes.library.shapes import Shape, box, join, lettering, prism, sheet, transform
+
+SHARP = np.radians(35)
+"""The usual angle between faces above which an edge stays sharp."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """The seed, the level of detail (1 is full), and the scene's materials by name.
+    """The seed and the level of detail (1 is full).
 
     An element is a function of it that puts objects into Blender's scene. Shapes that Scene makes
     have fewer segments at less detail: triangles go with `detail`, segments with its square root.
@@ -24,7 +30,6 @@ class Scene:
 
     seed: int
     detail: float
-    materials: Mapping[str, bpy.types.Material]
 
     def random(self, element: str) -> np.random.Generator:
         """Random numbers of an element's own, so that a change to it leaves the others alone."""
@@ -42,9 +47,9 @@ class Scene:
         """`shapes.lathe` with segments by detail."""
         return shapes.lathe(profile, self.segments(segments, 6), capped)
 
-    def tube(self, path: Points, radius: ArrayLike, sides: float = 8, capped: bool = True) -> Shape:
+    def tube(self, path: Points, radius: ArrayLike, sides: float = 8) -> Shape:
         """`shapes.tube` with sides by detail."""
-        return shapes.tube(path, radius, self.segments(sides, 4), capped)
+        return shapes.tube(path, radius, self.segments(sides, 4))
 
     def bend(self, path: Points, radius: float, steps: float = 24, sides: float = 8) -> Shape:
         """A tube along a smooth curve through the points."""
@@ -55,20 +60,40 @@ class Scene:
         angle = np.linspace(-np.pi / 2, np.pi / 2, self.segments(segments / 2, 4) + 1)
         return self.lathe(radius * np.column_stack([np.cos(angle), np.sin(angle)]), segments)
 
-    def ring(
-        self, radius: float, thickness: float, segments: float = 24, sides: float = 8
-    ) -> Shape:
+    def ring(self, radius: float, thick: float, segments: float = 24, sides: float = 8) -> Shape:
         """A torus about Z: the radius of its middle and of its tube."""
         angle = np.linspace(0, 2 * np.pi, self.segments(sides, 4) + 1)
-        section = np.column_stack([radius + thickness * np.cos(angle), thickness * np.sin(angle)])
+        section = np.column_stack([radius + thick * np.cos(angle), thick * np.sin(angle)])
         return self.lathe(section, segments, capped=False)
 
     def mesh(
         self, name: str, shape: Shape, *materials: str, smooth: bool | float = True
     ) -> bpy.types.Mesh:
-        """`objects.mesh` with the materials, one for each of the shape's slots, by name."""
-        made = (self.materials[each] for each in materials)
-        return objects.mesh(name, shape, *made, smooth=smooth)
+        """A mesh of a shape with its materials, one for each of the shape's slots, by name.
+
+        `smooth` may be an angle in radians, above which edges stay sharp.
+        """
+        data = bpy.data.meshes.new(name)
+        nq, nt = len(shape.quads), len(shape.triangles)
+        corners = np.concatenate([shape.quads.ravel(), shape.triangles.ravel()]).astype(np.int32)
+        starts = np.concatenate([np.arange(nq) * 4, nq * 4 + np.arange(nt) * 3]).astype(np.int32)
+        data.vertices.add(len(shape.vertices))
+        data.vertices.foreach_set("co", shape.vertices.astype(np.float32).ravel())
+        data.loops.add(len(corners))
+        data.loops.foreach_set("vertex_index", corners)
+        data.polygons.add(nq + nt)
+        data.polygons.foreach_set("loop_start", starts)
+        for material in materials:
+            data.materials.append(bpy.data.materials[material])
+        data.polygons.foreach_set("material_index", shape.face_slots().astype(np.int32))
+        data.update(calc_edges=True)
+        if smooth is False:
+            data.shade_flat()
+        else:
+            data.shade_smooth()
+            if smooth is not True:
+                data.set_sharp_from_angle(angle=float(smooth))
+        return data
 
     def add(
         self,
@@ -79,4 +104,154 @@ class Scene:
         smooth: bool | float = True,
     ) -> bpy.types.Object:
         """One object of a mesh of its own."""
-        return objects.place(name, self.mesh(name, shape, *materials, smooth=smooth), matrix)
+        return place(name, self.mesh(name, shape, *materials, smooth=smooth), matrix)
+
+
+Element = Callable[[Scene], None]
+
+
+def fill(
+    palette: Callable[[], None], elements: Iterable[Element], parameters: Mapping[str, Any]
+) -> None:
+    """Fill the empty scene: its materials, then its elements.
+
+    parameters: `seed` (int) and `detail` (1.0 is all of it).
+    """
+    palette()
+    scene = Scene(int(parameters["seed"]), float(parameters["detail"]))
+    for element in elements:
+        element(scene)
+
+
+def place(name: str, data: bpy.types.ID | None, matrix: Matrix | None = None) -> bpy.types.Object:
+    """An object of a mesh, light or curve in the scene, by default at its origin.
+
+    Objects that share one mesh are instances: Cycles keeps it in memory once.
+    """
+    thing = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(thing)
+    if matrix is not None:
+        thing.matrix_world = matrix
+    return thing
+
+
+def scatter(name: str, meshes: Sequence[bpy.types.Mesh], matrices: Iterable[Matrix]) -> None:
+    """Instances of the meshes, taken in turn, one at each matrix."""
+    for i, matrix in enumerate(matrices):
+        place(f"{name}.{i:04d}", meshes[i % len(meshes)], matrix)
+
+
+def animate(owner: bpy.types.bpy_struct, path: str, per_frame: float, index: int = -1) -> None:
+    """Let a property grow by `per_frame` each frame for ever, from its present value at frame 1.
+
+    owner is the struct that holds it (a node's input socket with path "default_value", an object
+    with "location" and an index). Keyframes, not a driver: drivers need scripts enabled.
+    """
+    start = np.array(getattr(owner, path))
+    step = per_frame if index < 0 else per_frame * np.eye(3)[index]
+    for after in (1, 0):
+        setattr(owner, path, (start + after * step).tolist())
+        owner.keyframe_insert(path, index=index, frame=1 + after)
+    action = owner.id_data.animation_data.action
+    for curve in action.layers[0].strips[0].channelbags[0].fcurves:
+        curve.extrapolation = "LINEAR"
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+
+
+class Model:
+    """Shapes, each with the name of its material, that become one mesh."""
+
+    def __init__(self, scene: Scene, parts: str = "") -> None:
+        """A model that is empty, or of the parts that a text lists (see `draw`)."""
+        self.scene = scene
+        self.parts: list[Shape] = []
+        self.materials: list[str] = []
+        self.draw(parts)
+
+    def add(
+        self,
+        shape: Shape,
+        material: str,
+        at: Points = (0, 0, 0),
+        degrees: Sequence[float] = (0, 0, 0),
+        scale: float | Sequence[float] = 1.0,
+    ) -> None:
+        """Add a shape: scaled, turned by XYZ Euler angles, and moved to a place or to each of n.
+
+        at: a place (3,) or places (n, 3).
+        """
+        if material not in self.materials:
+            self.materials.append(material)
+        painted = shape.painted(self.materials.index(material))
+        for where in np.atleast_2d(points(at)):
+            self.parts.append(painted.transformed(transform(where, np.radians(degrees), scale)))
+
+    def draw(self, parts: str) -> None:
+        """Add parts that a text lists after the name of their material, a semicolon between them.
+
+        A line without a colon continues the last one.
+
+        "Brass: ball 0.1; lathe 0.04 0, 0 0.02 at ±0.3 0 1 turned 90 0 0 scaled 1 2 1" is a ball and
+        a cone at two places, turned by degrees and scaled; what follows the shape may be left out.
+        Shapes:
+
+            box      width depth height [bevel [segments]]
+            ball     radius
+            ring     radius thickness
+            lathe    profile                    (radius and height; `pipe` is one without caps)
+            tube     radius, path               (`bend` makes the path a smooth curve)
+            prism    height, outline
+            frame    width height, profile      (see `architecture.frame`)
+            plane    width height
+            word     size depth letters
+        """
+        for line in re.sub(r"\n(?=[^:\n]*(\n|$))", ",", parts.strip()).splitlines():
+            material, listed = line.split(":")
+            for part in listed.split(";"):
+                kind, data = part.strip(" ,").split(maxsplit=1)
+                data, *rest = re.split(r",?\s+(at|turned|scaled)\s", data)
+                placed = dict(zip(rest[::2], rest[1::2], strict=True))
+                turned, scaled = placed.get("turned", "0 0 0"), placed.get("scaled", "1 1 1")
+                turn, size = points(turned)[0], points(scaled)[0]
+                shape = self._shape(kind, data)
+                self.add(shape, material.strip(), placed.get("at", "0 0 0"), turn, size)
+
+    def _shape(self, kind: str, data: str) -> Shape:
+        scene = self.scene
+        if kind == "word":
+            size, depth, letters = data.split(maxsplit=2)
+            return lettering(letters, float(depth)).scaled(float(size), float(size), 1)
+        if kind in ("lathe", "pipe"):
+            profile = points(data)
+            return scene.lathe(profile, _segments(profile[:, 0].max()), capped=kind == "lathe")
+        head, _, rest = data.partition(",")
+        numbers = points(head)[0].tolist()
+        match kind:
+            case "box":
+                width, depth, height, bevel, segments = *numbers, *(0, 1)[len(numbers) - 3 :]
+                return box((width, depth, height), bevel, int(segments))
+            case "ball":
+                return scene.ball(*numbers, _segments(numbers[0]))
+            case "ring":
+                return scene.ring(*numbers, _segments(numbers[0]))
+            case "tube":
+                return scene.tube(rest, *numbers, 4 + 60 * numbers[0] ** 0.5)
+            case "bend":
+                return scene.bend(rest, *numbers, 7 * rest.count(","), 4 + 60 * numbers[0] ** 0.5)
+            case "prism":
+                return prism(rest, *numbers)
+            case "frame":
+                return frame(*numbers, rest)
+            case "plane":
+                return sheet(xyz(*rectangle(*numbers)[[0, 1, 3, 2]].T).reshape(2, 2, 3))
+        raise ValueError(f"no such shape: {kind}")
+
+    def mesh(self, name: str, smooth: bool | float = SHARP) -> bpy.types.Mesh:
+        """The mesh of all that was added; `place` puts it into the scene."""
+        return self.scene.mesh(name, join(self.parts), *self.materials, smooth=smooth)
+
+
+def _segments(radius: float) -> float:
+    """Segments of something round at detail 1: 16 for 2 cm, 37 for 20 cm."""
+    return 6 + 70 * radius**0.5

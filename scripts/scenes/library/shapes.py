@@ -1,49 +1,63 @@
-"""Meshes as numpy arrays: primitives, sheets, sweeps, and copies of one shape."""
+"""Meshes as numpy arrays: primitives, sheets, sweeps, letters, and copies of one shape."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cache
+from typing import NamedTuple
 
 import bmesh
+import bpy
 import numpy as np
-from mathutils import Matrix, Vector
+from mathutils import Euler, Matrix, Vector
 from mathutils.geometry import tessellate_polygon
 from numpy.typing import ArrayLike
 
-from scenes.library.points import Array, Points, points, polar, unit
+from scenes.library.points import Array, Points, points, polar, unit, xyz
 
 
-def _no_faces(corners: int) -> Array:
-    return np.empty((0, corners), dtype=np.int32)
+def transform(
+    location: Sequence[float] = (0, 0, 0),
+    rotation: Sequence[float] = (0, 0, 0),
+    scale: float | Sequence[float] = 1.0,
+) -> Matrix:
+    """The matrix of a location, XYZ Euler rotation in radians, and scale."""
+    size = (scale,) * 3 if isinstance(scale, int | float) else scale
+    return Matrix.LocRotScale(Vector(location), Euler(rotation), Vector(size))
 
 
-@dataclass(frozen=True)
-class Shape:
+def towards(location: ArrayLike, direction: ArrayLike, axis: str = "-Z") -> Matrix:
+    """The matrix that moves what is at the origin to a location and turns its axis, Y upwards."""
+    turn = Vector(direction).to_track_quat(axis, "Y").to_matrix().to_4x4()
+    return Matrix.Translation(location) @ turn
+
+
+class Shape(NamedTuple):
     """A mesh as arrays: vertices (n, 3), quads (m, 4), triangles (k, 3), and the material of each.
 
     `slots` (m + k) holds each face's material slot, quads first; empty means slot 0 for all.
     """
 
     vertices: Array
-    quads: Array = field(default_factory=lambda: _no_faces(4))
-    triangles: Array = field(default_factory=lambda: _no_faces(3))
-    slots: Array = field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    quads: Array = np.empty((0, 4), np.int32)
+    triangles: Array = np.empty((0, 3), np.int32)
+    slots: Array = np.empty(0, np.int32)
 
     def face_slots(self) -> Array:
-        if len(self.slots):
-            return self.slots
-        return np.zeros(len(self.quads) + len(self.triangles), dtype=np.int32)
+        count = len(self.quads) + len(self.triangles)
+        return self.slots if len(self.slots) else np.zeros(count, np.int32)
 
     def painted(self, slot: int) -> "Shape":
         """The same shape with every face in material slot `slot`."""
-        return replace(self, slots=np.full_like(self.face_slots(), slot))
+        return self._replace(slots=np.full_like(self.face_slots(), slot))
 
     def reshaped(self, vertices: Array) -> "Shape":
         """The same faces over other vertices (n, 3)."""
-        return replace(self, vertices=vertices)
+        return self._replace(vertices=vertices)
+
+    def scaled(self, *size: float) -> "Shape":
+        return self.reshaped(self.vertices * size)
 
     def transformed(self, matrix: Matrix) -> "Shape":
-        """The shape moved by a 4 × 4 matrix (see `objects.transform`)."""
+        """The shape moved by a 4 × 4 matrix (see `transform`)."""
         m = np.array(matrix)
         return self.reshaped(self.vertices @ m[:3, :3].T + m[:3, 3])
 
@@ -54,25 +68,21 @@ class Shape:
 def join(shapes: Iterable[Shape]) -> Shape:
     """One shape of many; material slots are kept."""
     parts = list(shapes)
-    starts = np.cumsum([0] + [len(part.vertices) for part in parts])
-    pairs = list(zip(parts, starts, strict=False))
-    slots = [part.face_slots() for part in parts]
+    starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
+    slots = [np.split(part.face_slots(), [len(part.quads)]) for part in parts]
     return Shape(
         np.concatenate([part.vertices for part in parts]),
-        np.concatenate([part.quads + start for part, start in pairs]),
-        np.concatenate([part.triangles + start for part, start in pairs]),
-        np.concatenate(
-            [s[: len(p.quads)] for p, s in zip(parts, slots, strict=True)]
-            + [s[len(p.quads) :] for p, s in zip(parts, slots, strict=True)]
-        ),
+        np.concatenate([part.quads + start for part, start in zip(parts, starts, strict=True)]),
+        np.concatenate([part.triangles + start for part, start in zip(parts, starts, strict=True)]),
+        np.concatenate([*(of_quads for of_quads, _ in slots), *(rest for _, rest in slots)]),
     )
 
 
 def facets(vertices: Points, *faces: Sequence[int]) -> Shape:
     """A shape of few faces, each given by the numbers of its three or four vertices."""
-    triangles, quads = ([face for face in faces if len(face) == n] for n in (3, 4))
-    corners = (np.array(f, np.int32).reshape(-1, n) for f, n in ((quads, 4), (triangles, 3)))
-    return Shape(points(vertices), *corners)
+    quads, triangles = ([face for face in faces if len(face) == n] for n in (4, 3))
+    corners = np.reshape(quads, (-1, 4)), np.reshape(triangles, (-1, 3))
+    return Shape(points(vertices), *(each.astype(np.int32) for each in corners))
 
 
 def copies(
@@ -87,19 +97,18 @@ def copies(
     forward, up: one direction for all or (n, 3); +Y of the copy points forward, +Z as near to up
     as can be. size: a number, one for each (n), or one for each axis of each (n, 3).
     """
-    places = np.asarray(at, float)
-    count = len(places)
-    scale = np.asarray(size, float)
+    places, scale = np.asarray(at, float), np.asarray(size, float)
     scale = np.broadcast_to(scale[:, None] if scale.ndim == 1 else scale, places.shape)
     turns = frames(forward, np.broadcast_to(up, places.shape)) * scale[:, None, :]
     vertices = np.einsum("nij,vj->nvi", turns, shape.vertices) + places[:, None]
+    count = len(places)
     starts = (np.arange(count, dtype=np.int32) * len(shape.vertices))[:, None, None]
-    slots, quads = shape.face_slots(), len(shape.quads)
+    slots = np.split(shape.face_slots(), [len(shape.quads)])
     return Shape(
         vertices.reshape(-1, 3),
         (shape.quads + starts).reshape(-1, 4),
         (shape.triangles + starts).reshape(-1, 3),
-        np.concatenate([np.tile(slots[:quads], count), np.tile(slots[quads:], count)]),
+        np.concatenate([np.tile(each, count) for each in slots]),
     )
 
 
@@ -113,37 +122,22 @@ def frames(forward: ArrayLike, up: ArrayLike) -> Array:
 def _from_bmesh(bm: bmesh.types.BMesh) -> Shape:
     bm.verts.index_update()
     faces = [[v.index for v in f.verts] for f in bm.faces]
-    for f in [f for f in faces if len(f) > 4]:
-        faces.remove(f)
-        faces.extend([f[0], f[i], f[i + 1]] for i in range(1, len(f) - 1))
+    faces.sort(key=lambda f: len(f) > 4)  # these become fans of triangles
+    fans = [[f[0], *f[i : i + 2]] for f in faces if len(f) != 4 for i in range(1, len(f) - 1)]
     vertices = np.array([v.co for v in bm.verts], dtype=float)
     vertices.flags.writeable = False  # cached shapes are shared
     bm.free()
-    return Shape(
-        vertices,
-        np.array([f for f in faces if len(f) == 4], dtype=np.int32).reshape(-1, 4),
-        np.array([f for f in faces if len(f) == 3], dtype=np.int32).reshape(-1, 3),
-    )
-
-
-def box(size: Sequence[float], bevel: float = 0.0, segments: int = 2) -> Shape:
-    """A box centred at the origin, its edges rounded by `bevel` metres."""
-    return _box(tuple(map(float, size)), bevel, segments)
+    return facets(vertices, *(f for f in faces if len(f) == 4), *fans)
 
 
 @cache  # props are made of many alike
-def _box(size: tuple[float, ...], bevel: float, segments: int) -> Shape:
+def box(size: tuple[float, ...], bevel: float = 0.0, segments: int = 2) -> Shape:
+    """A box centred at the origin, its edges rounded by `bevel` metres."""
     bm = bmesh.new()
     bmesh.ops.create_cube(bm, size=1.0, matrix=Matrix.Diagonal((*size, 1.0)))
     if bevel:
-        bmesh.ops.bevel(
-            bm,
-            geom=bm.edges[:],
-            offset=min(bevel, 0.49 * min(size)),
-            segments=segments,
-            affect="EDGES",
-            profile=0.5,
-        )
+        rounded = {"offset": min(bevel, 0.49 * min(size)), "segments": segments, "profile": 0.5}
+        bmesh.ops.bevel(bm, geom=bm.edges[:], affect="EDGES", **rounded)
     return _from_bmesh(bm)
 
 
@@ -153,11 +147,35 @@ def icosphere(subdivisions: int, radius: float = 1.0) -> Shape:
     return _from_bmesh(bm)
 
 
+def mesh_shape(data: bpy.types.Mesh) -> Shape:
+    """The shape of a mesh whose faces are quads and triangles."""
+    vertices = np.empty(len(data.vertices) * 3, dtype=np.float32)
+    data.vertices.foreach_get("co", vertices)
+    corners = np.empty(len(data.loops), dtype=np.int32)
+    data.loops.foreach_get("vertex_index", corners)
+    sizes = np.empty(len(data.polygons), dtype=np.int32)
+    data.polygons.foreach_get("loop_total", sizes)
+    starts = np.cumsum(sizes) - sizes
+    quads, triangles = (corners[starts[sizes == n, None] + np.arange(n)] for n in (4, 3))
+    return Shape(vertices.reshape(-1, 3).astype(float), quads, triangles)
+
+
+@cache
+def lettering(text: str, depth: float) -> Shape:
+    """Flat letters, 1 m high and centred, in Blender's own font, `depth` metres thick."""
+    curve = bpy.data.curves.new("lettering", "FONT")
+    curve.body, curve.align_x, curve.align_y = text, "CENTER", "CENTER"
+    curve.resolution_u, curve.extrude = 3, depth / 2
+    thing = bpy.data.objects.new("lettering", curve)
+    data = bpy.data.meshes.new_from_object(thing)
+    shape = mesh_shape(data)
+    bpy.data.batch_remove([thing, curve, data])
+    return shape
+
+
 def grid(x: ArrayLike, y: ArrayLike, z: ArrayLike = 0.0) -> Shape:
     """A sheet facing +Z over the coordinates x (nx) and y (ny), with heights z (ny, nx)."""
-    gx, gy = np.meshgrid(np.asarray(x, float), np.asarray(y, float))
-    gz = np.broadcast_to(np.asarray(z, float), gx.shape)
-    return sheet(np.stack([gx, gy, gz], axis=-1))
+    return sheet(xyz(x, np.asarray(y)[:, None], z))
 
 
 def sheet(grid_of_points: ArrayLike, closed: bool = False, capped: bool = False) -> Shape:
@@ -171,24 +189,14 @@ def sheet(grid_of_points: ArrayLike, closed: bool = False, capped: bool = False)
     index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
     if closed:
         index = np.concatenate([index, index[:, :1]], axis=1)
-    corners = (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1])
-    body = Shape(places.reshape(-1, 3), np.stack(corners, axis=-1).reshape(-1, 4))
-    return _capped(body, rows, columns) if capped else body
-
-
-def _fan(ring: Array, center: int, upwards: bool) -> Array:
-    following = np.roll(ring, -1)
-    pair = (ring, following) if upwards else (following, ring)
-    return np.stack([*pair, np.full_like(ring, center)], axis=-1)
-
-
-def _capped(body: Shape, rows: int, columns: int) -> Shape:
-    """A closed sheet with its first and last row filled."""
-    first, last = np.arange(columns), np.arange((rows - 1) * columns, rows * columns)
-    centers = [body.vertices[first].mean(0), body.vertices[last].mean(0)]
-    n = len(body.vertices)
-    triangles = np.concatenate([_fan(first, n, False), _fan(last, n + 1, True)])
-    return Shape(np.concatenate([body.vertices, centers]), body.quads, triangles.astype(np.int32))
+    left, right = index[:, :-1], index[:, 1:]
+    quads = np.stack([left[:-1], right[:-1], right[1:], left[1:]], axis=-1).reshape(-1, 4)
+    if not capped:
+        return Shape(places.reshape(-1, 3), quads)
+    ends = np.concatenate([places.reshape(-1, 3), places[[0, -1]].mean(axis=1)])
+    below, above = np.full((2, columns), [[rows * columns], [rows * columns + 1]], dtype=np.int32)
+    fans = np.stack([right[0], left[0], below], -1), np.stack([left[-1], right[-1], above], -1)
+    return Shape(ends, quads, np.concatenate(fans))
 
 
 def lathe(profile: Points, segments: int, capped: bool = True) -> Shape:
@@ -216,13 +224,9 @@ def tube(path: Points, radius: ArrayLike, sides: int = 8, capped: bool = True) -
 def prism(outline: Points, height: float) -> Shape:
     """A plane outline (n, 2), counter-clockwise and not crossing itself, extruded from z = 0."""
     flat = points(outline)
-    n = len(flat)
-    bottom = np.column_stack([flat, np.zeros(n)])
-    top = bottom + np.array([0, 0, height])
-    cap = np.array(tessellate_polygon([[Vector(p) for p in bottom]]), dtype=np.int32)
-    a, b, c = (flat[cap[:, i]] for i in range(3))
-    ab, ac = b - a, c - a
+    sides = sheet(xyz(*flat.T, [[0], [height]]), closed=True)
+    cap = np.array(tessellate_polygon([sides.vertices[: len(flat)].tolist()]), dtype=np.int32)
+    ab, ac = (flat[cap[:, i]] - flat[cap[:, 0]] for i in (1, 2))
     turned = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0] < 0
     cap[turned] = cap[turned][:, ::-1]
-    sides = sheet(np.stack([bottom, top]), closed=True)
-    return Shape(sides.vertices, sides.quads, np.concatenate([cap[:, ::-1], cap + n]))
+    return sides._replace(triangles=np.concatenate([cap[:, ::-1], cap + len(flat)]))

@@ -3,31 +3,17 @@
 After the scene of that name by Carlo Bergonzini that SILVR used; every stone here is made by code.
 """
 
-from collections.abc import Mapping
-from typing import Any
+from functools import partial
 
-from scenes.library.scene import Scene
-from scenes.lone_monk.arcades import arcades, vaults
-from scenes.lone_monk.church import church, tower
-from scenes.lone_monk.court import lawns, paving
-from scenes.lone_monk.furniture import benches, broom, chair, jars, lanterns
+from scenes.library.scene import fill
+from scenes.lone_monk import arcades, church, court, furniture, monk, plants, roofs, sky, walls
 from scenes.lone_monk.materials import palette
-from scenes.lone_monk.monk import monk
-from scenes.lone_monk.plants import cypresses, fallen_leaves, geraniums, ivy, olive_tree, shrubs
-from scenes.lone_monk.roofs import lean_to_roofs
-from scenes.lone_monk.sky import sky, swallows
-from scenes.lone_monk.walls import back_walls, upper_storeys, west_wall
-from scenes.lone_monk.well import well
 
 ELEMENTS = (
-    *(sky, swallows, paving, lawns, well, arcades, vaults, back_walls, lean_to_roofs),
-    *(upper_storeys, west_wall, church, tower, benches, lanterns, jars, chair, broom),
-    *(shrubs, olive_tree, cypresses, ivy, geraniums, fallen_leaves, monk),
+    *(sky.sky, sky.swallows, court.paving, court.lawns, furniture.well, arcades.arcades),
+    *(arcades.vaults, walls.back_walls, roofs.lean_to_roofs, walls.upper_storeys),
+    *(walls.west_wall, church.church, church.tower, furniture.benches, furniture.lanterns),
+    *(furniture.jars, furniture.chair, furniture.broom, plants.shrubs, plants.olive_tree),
+    *(plants.cypresses, plants.ivy, plants.geraniums, plants.fallen_leaves, monk.monk),
 )
-
-
-def build(parameters: Mapping[str, Any]) -> None:
-    """Fill the empty scene. parameters: `seed` (int), `detail` (1.0 is the full cloister)."""
-    scene = Scene(int(parameters["seed"]), float(parameters["detail"]), palette())
-    for element in ELEMENTS:
-        element(scene)
+build = partial(fill, palette, ELEMENTS)

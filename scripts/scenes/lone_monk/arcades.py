@@ -3,9 +3,8 @@
 import numpy as np
 
 from scenes.library.architecture import arch_outline, arch_stones, blocks, cut, panel, stones
-from scenes.library.model import Model
 from scenes.library.points import Points, points, polar, xyz
-from scenes.library.scene import Scene
+from scenes.library.scene import Model, Scene
 from scenes.library.shapes import Shape, copies, grid, join, sheet
 from scenes.lone_monk import plan
 from scenes.lone_monk.plan import ARCADE, ARCADE_WALL, FRONT, SPRINGING, VAULT_RISE, WALK, on_sides
@@ -63,12 +62,12 @@ def bay(scene: Scene) -> Model:
     return model
 
 
-def pillar(section: Points, chamfer: float = 0.012) -> Shape:
+def pillar(section: Points) -> Shape:
     """Masonry of rectangular plan with chamfered corners: rows of width, depth and height."""
     width, depth, z = points(section).T[:, :, None]
     x, y = points("1 1, 1 1, -1 1, -1 1, -1 -1, -1 -1, 1 -1, 1 -1").T  # two points for each corner
-    inset = chamfer * np.array([0, 1, 1, 0, 0, 1, 1, 0])
-    ring = xyz(x * (width / 2 - inset), y * (depth / 2 - chamfer + inset), z)
+    inset = 0.012 * np.array([0, 1, 1, 0, 0, 1, 1, 0])
+    ring = xyz(x * (width / 2 - inset), y * (depth / 2 - 0.012 + inset), z)
     return sheet(ring, closed=True, capped=True)
 
 

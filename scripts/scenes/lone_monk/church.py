@@ -3,11 +3,9 @@
 import numpy as np
 
 from scenes.library.architecture import arch_outline, blocks, filled, panel, stones, upright
-from scenes.library.model import Model
-from scenes.library.objects import place, transform
 from scenes.library.points import Array, circle, polar, xyz
-from scenes.library.scene import Scene
-from scenes.library.shapes import Shape, join, lathe
+from scenes.library.scene import Model, Scene, place
+from scenes.library.shapes import Shape, box, join, lathe, transform
 from scenes.lone_monk.plan import BACK, EAST, LEAN_TO_TOP, NORTH, SIDES, on_sides, side
 from scenes.lone_monk.roofs import EXPOSED, PITCH, house, lay_tiles
 from scenes.lone_monk.walls import glaze, wall
@@ -47,7 +45,7 @@ def church(scene: Scene) -> None:
     frieze.add(stones([(-WIDTH / 14, 0.04, low - 0.05, 0.1, 0.14, 0.12)], 0.02), "Limestone")
     on_sides("Frieze", [frieze.mesh("Frieze")], in_row(7 * BAYS) / 7, BACK - 0.13, sides=[EAST])
     height = TOP - LEAN_TO_TOP - 0.1
-    strip.box((0.42, 0.16, height), "Brick", (0, BACK - 0.06, LEAN_TO_TOP + height / 2))
+    strip.add(box((0.42, 0.16, height)), "Brick", (0, BACK - 0.06, LEAN_TO_TOP + height / 2))
     on_sides("Pilaster strip", [strip.mesh("Pilaster strip")], in_row(BAYS + 1), sides=[EAST])
     house(scene, EAST, (-BACK, BACK + 3.5), TOP, 14, "Brick")
 
@@ -111,7 +109,7 @@ def tower_side(scene: Scene) -> Model:
 def core(scene: Scene) -> Model:
     """What the tower has but once: its shaft, the bell, the roof's boards, and a cross."""
     model, yoke, summit = Model(scene), (0, 0, BELFRY + 2.3), (0, 0, TOWER_TOP + ROOF_HEIGHT - 0.05)
-    model.box((2 * HALF, 2 * HALF, BELFRY), "Brick", (0, 0, BELFRY / 2))
+    model.add(box((2 * HALF, 2 * HALF, BELFRY)), "Brick", (0, 0, BELFRY / 2))
     clapper = scene.tube("0 0 -0.5, 0 0 -0.9, 0 0 -1.25", [0.02, 0.03, 0.08])
     model.add(join([scene.lathe(BELL, 28), clapper]), "Bronze", yoke)
     model.add(stones("0 0 0.02 4.2 0.22 0.26", 0.03), "Wood", yoke)

@@ -8,13 +8,10 @@ import numpy as np
 from numpy.random import Generator
 
 from scenes.library.architecture import blocks, cut, ring_of_stones, stones
-from scenes.library.model import Model
-from scenes.library.noise import noise
-from scenes.library.objects import transform
 from scenes.library.plants import blade, folded_leaf
-from scenes.library.points import polar, xyz
-from scenes.library.scene import Scene
-from scenes.library.shapes import Shape, copies, grid, join
+from scenes.library.points import noise, polar, xyz
+from scenes.library.scene import Model, Scene
+from scenes.library.shapes import Shape, copies, grid, join, transform
 from scenes.lone_monk.plan import ARCADE, BACK, CROSS_PATH, LAWN, PLAZA, WALK_FLOOR, on_sides
 
 CELLS = 16  # of grass along a lawn's edge

@@ -3,12 +3,10 @@
 import numpy as np
 
 from scenes.library.architecture import stones
-from scenes.library.model import Model
-from scenes.library.objects import place, transform
 from scenes.library.plants import leaves_at
-from scenes.library.points import Array, Points, points, polar, random_directions, xyz
-from scenes.library.scene import Scene
-from scenes.library.shapes import Shape, icosphere, join, sheet, tube
+from scenes.library.points import Array, Points, directions, points, polar, xyz
+from scenes.library.scene import Model, Scene, place
+from scenes.library.shapes import Shape, icosphere, join, sheet, transform, tube
 from scenes.lone_monk.plan import NORTH, side
 
 # From hem to neck: height, radius, and how deep the folds are, as a part of it.
@@ -83,6 +81,6 @@ def hair(scene: Scene) -> Shape:
     random, parts = scene.random("hair"), []
     for *at, count, length, x, y, z in points(HAIR):
         n = scene.count(count)
-        root = random_directions(random, n) * at[3:] + at[:3]
+        root = directions(random, n) * at[3:] + at[:3]
         parts.append(leaves_at(random, root, random.normal((x, y, z), 0.25, (n, 3)), length, 0.12))
     return join(parts)

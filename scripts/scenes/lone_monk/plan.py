@@ -13,7 +13,8 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import ArrayLike
 
-from scenes.library.objects import place, transform
+from scenes.library.scene import place
+from scenes.library.shapes import transform
 
 CENTER = (-1.2, 3.6)  # in the world, so that the rigs at the origin stand beside the well
 BAY, BAYS = 2.2, 7  # of each arcade, from column to column; the middle one is the gate

@@ -3,12 +3,18 @@
 import numpy as np
 from numpy.random import Generator
 
-from scenes.library.model import Model
-from scenes.library.noise import noise, smoothstep
-from scenes.library.objects import place
 from scenes.library.plants import Growth, branches, folded_leaf, leaf_cloud, leaves_at, leaves_on
-from scenes.library.points import Array, points, polar, random_directions, unit, xyz
-from scenes.library.scene import Scene
+from scenes.library.points import (
+    Array,
+    directions,
+    noise,
+    points,
+    polar,
+    smoothstep,
+    unit,
+    xyz,
+)
+from scenes.library.scene import Model, Scene, place
 from scenes.library.shapes import copies, icosphere
 from scenes.lone_monk import plan
 from scenes.lone_monk.plan import ARCADE, ARCADE_TOP, BAY, EAST, FRONT, LAWN, NORTH, SOUTH, WEST
@@ -101,7 +107,7 @@ def geranium(scene: Scene, random: Generator) -> Model:
     model.add(scene.lathe("0.17 0.28, 0.02 0.295"), "Soil")
     bush = leaf_cloud(random, scene.count(420), (0.25, 0.25, 0.2), 0.06, 0.95)
     model.add(bush, "Box leaf", (0, 0, 0.46))
-    for out in random_directions(random, 9):
+    for out in directions(random, 9):
         head = (*out[:2] * 0.25, 0.55 + 0.17 * abs(out[2]))
         model.add(leaf_cloud(random, scene.count(26), 0.035, 0.028, 0.9), "Petal", head)
         stalk = scene.tube([(0, 0, 0.3), np.multiply(head, (0.5, 0.5, 0.85)), head], 0.003, 4)
@@ -130,14 +136,14 @@ def shrubs(scene: Scene) -> None:
 def lavender(scene: Scene, random: Generator) -> Model:
     """A cushion of grey leaves with flower spikes on thin stalks."""
     model, count = Model(scene), scene.count(100)
-    out = random_directions(random, scene.count(350))
+    out = directions(random, scene.count(350))
     out[:, 2] = np.abs(out[:, 2]) + 0.3
     model.add(leaves_at(random, out * (0.06, 0.06, 0.02), out, 0.26, 0.07), "Olive leaf")
     lean = unit(random.normal((0, 0, 1), (0.33, 0.33, 0), (count, 3)))
     tall = random.uniform(0.33, 0.46, (count, 1))
     model.add(leaves_at(random, lean * 0.05, lean, tall[:, 0], 0.012), "Olive leaf")
     for below in np.arange(5) * 0.02 - 0.09:
-        forward = random_directions(random, count) + lean
+        forward = directions(random, count) + lean
         model.add(leaves_at(random, lean * (tall + below), forward, 0.032, 0.7), "Lavender")
     return model
 

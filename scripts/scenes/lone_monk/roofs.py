@@ -6,11 +6,9 @@ from mathutils import Matrix
 from numpy.typing import ArrayLike
 
 from scenes.library.architecture import blocks, stones, upright
-from scenes.library.model import SHARP, Model
-from scenes.library.objects import place, transform
 from scenes.library.points import Array, circle, points, polar, xyz
-from scenes.library.scene import Scene
-from scenes.library.shapes import Shape, copies, join, prism, sheet
+from scenes.library.scene import SHARP, Model, Scene, place
+from scenes.library.shapes import Shape, copies, join, prism, sheet, transform
 from scenes.lone_monk import plan
 from scenes.lone_monk.plan import BACK, EAVE, EAVE_OUT, FRONT, LEAN_TO_TOP, SLOPE, on_sides, side
 

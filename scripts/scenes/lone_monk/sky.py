@@ -1,13 +1,11 @@
 """The sky over the court: a low sun, thin clouds, and swallows."""
 
-import bpy
 import numpy as np
 
 from scenes.library.lights import sun_light
-from scenes.library.nodes import Graph
-from scenes.library.objects import scatter, transform
-from scenes.library.scene import Scene
-from scenes.library.shapes import facets, join
+from scenes.library.materials import SkyGraph
+from scenes.library.scene import Scene, scatter
+from scenes.library.shapes import facets, join, transform
 from scenes.lone_monk.plan import NORTH, side
 
 SUN_AZIMUTH, SUN_ELEVATION = np.radians(204), np.radians(30)
@@ -19,39 +17,33 @@ def sky(scene: Scene) -> None:
     The camera alone sees the clouds: they cost the lighting nothing.
     """
     sun_light("Sun", SUN_AZIMUTH, SUN_ELEVATION, 16.0, (1.0, 0.80, 0.56), np.radians(0.6))
-    world = bpy.data.worlds.new("Sky")
-    bpy.context.scene.world = world
-    graph = Graph(world.node_tree)
+    graph = SkyGraph()
     blue = graph.add(
-        "ShaderNodeTexSky",
+        "TexSky",
         sky_type="MULTIPLE_SCATTERING",
         sun_disc=False,
         sun_elevation=SUN_ELEVATION,
         sun_rotation=np.pi / 2 - SUN_AZIMUTH,  # counted from +Y, clockwise
         aerosol_density=0.6,
     )
-    direction = graph.add("ShaderNodeTexCoord").outputs["Generated"]
+    direction = graph.add("TexCoord").outputs["Generated"]
     height = graph.math("MAXIMUM", graph.xyz(direction)["Z"], 0.05)
-    plane = graph.add("ShaderNodeVectorMath", {0: direction, 1: height}, operation="DIVIDE")
-    along = {0: plane, 1: (0.5, 1.3, 1.0)}
-    drawn_out = graph.add("ShaderNodeVectorMath", along, operation="MULTIPLY")
+    plane = graph.vector_math("DIVIDE", direction, height)[0]
+    drawn_out = graph.vector_math("MULTIPLY", plane, (0.5, 1.3, 1.0))[0]
     cover = graph.span(graph.noise(drawn_out, 1.1, 6.0, 0.62, 0.35), 0.0, 0.7, 0.50, 0.78)
     clouded = graph.mix(cover, blue, (9.0, 8.6, 8.2))
-    camera = graph.add("ShaderNodeLightPath").outputs["Is Camera Ray"]
-    inputs = {"Color": graph.mix(camera, blue, clouded), "Strength": 0.34}
-    background = graph.add("ShaderNodeBackground", inputs)
-    graph.add("ShaderNodeOutputWorld", {"Surface": background})
+    camera = graph.add("LightPath").outputs["Is Camera Ray"]
+    graph.finish(graph.mix(camera, blue, clouded), 0.34)
 
 
 def swallows(scene: Scene) -> None:
     """Swallows over the court: what there is to see straight above."""
     body = scene.lathe("0 -0.09, 0.018 -0.04, 0.02 0.02, 0.012 0.07, 0 0.09", 8)
+    body = body.transformed(transform(rotation=(0, np.pi / 2, 0)))
     right = "0.05 0 0, -0.01 0 0, -0.03 -0.1 0.03, -0.11 -0.22 0.01, 0.04 -0.1 0.035"
     wing = facets(right, (0, 1, 2, 4), (4, 2, 3))
     tail = facets("-0.07 0 0, -0.19 0.05 0, -0.11 0 0, -0.19 -0.05 0", (0, 1, 2), (0, 2, 3))
-    left = wing.reshaped(wing.vertices * (1, -1, 1))
-    bird = join([body.transformed(transform(rotation=(0, np.pi / 2, 0))), wing, left, tail])
-    swallow = scene.mesh("Swallow", bird, "Iron", smooth=False)
-    random = scene.random("swallows")
+    bird = join([body, wing, wing.scaled(1, -1, 1), tail])
+    swallow, random = scene.mesh("Swallow", bird, "Iron", smooth=False), scene.random("swallows")
     places = random.uniform((-9, -9, 9, -0.7, -0.3, 0), (9, 9, 19, 0.7, 0.3, 6.0), (14, 6))
     scatter("Swallow", [swallow], (side(NORTH) @ transform(p[:3], p[3:], 1.3) for p in places))

@@ -5,11 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from scenes.library.architecture import arch_outline, blocks, filled, panel, stones, upright
-from scenes.library.model import Model
-from scenes.library.objects import transform
 from scenes.library.points import Array, xyz
-from scenes.library.scene import Scene
-from scenes.library.shapes import Shape, box, copies, join, sheet
+from scenes.library.scene import Model, Scene
+from scenes.library.shapes import Shape, box, copies, join, sheet, transform
 from scenes.lone_monk import plan
 from scenes.lone_monk.plan import ARCADE, BACK, BACK_WALL, LEAN_TO_TOP, WALK_FLOOR, on_sides
 from scenes.lone_monk.roofs import house, ridge
@@ -82,7 +80,7 @@ def back_walls(scene: Scene) -> None:
             on_sides(f"Wall.{i}", [bays[has_door]], x, BACK, sides=[number])
     ends, width, top = Model(scene), BACK - ARCADE, LEAN_TO_TOP
     for x in (-ARCADE - width / 2, ARCADE + width / 2):
-        ends.box((width, BACK_WALL, top), "Whitewash", (x, BACK + BACK_WALL / 2, top / 2))
+        ends.add(box((width, BACK_WALL, top)), "Whitewash", (x, BACK + BACK_WALL / 2, top / 2))
     ends.add(stones([(0, BACK - 0.02, WALK_FLOOR + 0.1, 2 * BACK, 0.06, 0.2)]), "Limestone")
     on_sides("Wall ends", [ends.mesh("Wall ends")])
 
@@ -115,7 +113,7 @@ def shutter() -> Shape:
 def west_wall(scene: Scene) -> None:
     """The low western wall, over which the sun comes in, under a row of ridge tiles."""
     model, y, z = Model(scene), BACK + BACK_WALL / 2, LEAN_TO_TOP + 0.2
-    model.box((2 * BACK + 1, BACK_WALL, 0.4), "Plaster", (0, y, z - 0.1))
+    model.add(box((2 * BACK + 1, BACK_WALL, 0.4)), "Plaster", (0, y, z - 0.1))
     coping = ridge(scene, (-BACK - 0.3, BACK + 0.3), 0.28)
     model.add(coping, "Roof tile", (0, y, z + 0.1), scale=(1, 1, 0.55))
     on_sides("West wall", [model.mesh("West wall")], sides=[plan.WEST])

@@ -3,10 +3,9 @@
 import bpy
 import numpy as np
 
-from scenes.library.model import Model
-from scenes.library.objects import place, transform
 from scenes.library.points import Array, points, unit
-from scenes.library.scene import Scene
+from scenes.library.scene import Model, Scene, place
+from scenes.library.shapes import transform
 
 # Middle, half axes, hairs and their length; the chick looks along −Y.
 PARTS = (
@@ -25,6 +24,7 @@ FOOT = (
     ("0.0155 -0.01 0.003, 0.021 -0.018 0.0018, 0.025 -0.025 0.0015", 0.0017),
     ("0.0155 -0.01 0.003, 0.010 -0.018 0.0018, 0.007 -0.025 0.0015", 0.0017),
 )
+EYES_AND_BEAK = "0.0128 -0.0455 0.0975, -0.0128 -0.0455 0.0975, 0 -0.049 0.089"  # without down
 STEPS = 6
 
 
@@ -38,35 +38,27 @@ def chick(scene: Scene) -> None:
         model.add(scene.ball(1.0, 32), "Skin", middle, scale=axes)
     place("Chick", model.mesh("Chick", True), matrix)
     hairs = np.concatenate([_hairs(scene, *part) for part in PARTS])
-    # None over the eyes and the beak.
-    face = np.array([(0.0128, -0.0455, 0.0975), (-0.0128, -0.0455, 0.0975), (0, -0.049, 0.089)])
-    away = np.linalg.norm(hairs[:, 0, None] - face, axis=-1) > (0.0062, 0.0062, 0.0075)
-    place("Down", _curves(hairs[away.all(axis=1)], scene.materials["Down"]), matrix)
+    away = np.linalg.norm(hairs[:, 0, None] - points(EYES_AND_BEAK), axis=-1)
+    hairs = hairs[(away > (0.0062, 0.0062, 0.0075)).all(axis=1)]
+    down = bpy.data.hair_curves.new("Down")
+    down.add_curves([STEPS] * len(hairs))
+    down.points.foreach_set("position", hairs.astype(np.float32).ravel())
+    radii = np.tile(np.linspace(0.00011, 0.00002, STEPS, dtype=np.float32), len(hairs))
+    down.points.foreach_set("radius", radii)
+    down.materials.append(bpy.data.materials["Down"])
+    place("Down", down, matrix)
 
 
 def _hairs(scene: Scene, middle: object, axes: object, count: int, length: float) -> Array:
     """Hairs (n, STEPS, 3) from an ellipsoid: outwards, backwards and down, each a little curled."""
-    random = scene.random(f"down {middle}")
-    count = scene.count(count, 60)
-    outward = unit(random.normal(size=(count, 3)))
-    roots = middle + outward * axes
+    random, size = scene.random(f"down {middle}"), (scene.count(count, 60), 3)
+    outward = unit(random.normal(size=size))
     normal = unit(outward / axes)
-    lean = unit(normal + (0, 0.55, -0.45) + 0.28 * random.normal(size=(count, 3)))
-    curl = 0.35 * random.normal(size=(count, 3)) + (0, 0.1, -0.35)
+    lean = unit(normal + (0, 0.55, -0.45) + 0.28 * random.normal(size=size))
+    curl = 0.35 * random.normal(size=size) + (0, 0.1, -0.35)
     t = np.linspace(0, 1, STEPS)[:, None]
-    reach = length * random.uniform(0.65, 1.15, count)[:, None, None]
-    hairs = roots[:, None] + reach * (t * lean[:, None] + 0.5 * t**2 * curl[:, None])
+    reach = length * random.uniform(0.65, 1.15, size[0])[:, None, None]
+    roots = (middle + outward * axes)[:, None]
+    hairs = roots + reach * (t * lean[:, None] + 0.5 * t**2 * curl[:, None])
     hairs[..., 2] = np.maximum(hairs[..., 2], 0.002)
     return hairs
-
-
-def _curves(hairs: Array, material: bpy.types.Material) -> bpy.types.ID:
-    """Blender's hair curves of points (n, steps, 3), thin and ending in points."""
-    count, steps = hairs.shape[:2]
-    curves = bpy.data.hair_curves.new("Down")
-    curves.add_curves([steps] * count)
-    curves.points.foreach_set("position", hairs.astype(np.float32).ravel())
-    radii = np.tile(np.linspace(0.00011, 0.00002, steps, dtype=np.float32), count)
-    curves.points.foreach_set("radius", radii)
-    curves.materials.append(material)
-    return curves

@@ -3,51 +3,44 @@
 import numpy as np
 
 from scenes.library.lights import point_light
-from scenes.library.model import Model
-from scenes.library.objects import place, transform
-from scenes.library.points import Array, Points, points, smooth_path
-from scenes.library.scene import Scene
-from scenes.library.shapes import Shape
+from scenes.library.points import Array, points, polar, smooth_path
+from scenes.library.scene import Model, Scene, place
+from scenes.library.shapes import transform
 
-KETTLE = """0.0 0, 0.03 0, 0.05 0.0002, 0.06 0.0016, 0.074 0.009, 0.086 0.03, 0.0885 0.055,
+KETTLE = """0.0 0, 0.03 0, 0.05 0.0002, 0.06 0.0016, 0.074 0.009, 0.086 0.03, 0.0885 0.055
     0.082 0.085, 0.064 0.108, 0.045 0.12, 0.038 0.1245"""
 KETTLE_PARTS = """Brass: ring 0.0385 0.0022 at 0 0 0.1255
     Copper: lathe 0.037 0.1265, 0.0345 0.133, 0.026 0.139, 0.013 0.1425, 0.006 0.1435
     Ebony: lathe 0.005 0.143, 0.0048 0.148, 0.009 0.153, 0.0105 0.159, 0.0085 0.165, 0.003 0.168
-    Brass: ring 0.0058 0.0014 at 0 0 0.1445
-    Brass: ring 0.006 0.0022 at ±0.057 0 0.122 turned 90 0 0
-    Brass: bend 0.0032, -0.057 0 0.124, -0.064 0 0.165, -0.052 0 0.2, -0.024 0 0.219
-    Brass: bend 0.0032, 0.057 0 0.124, 0.064 0 0.165, 0.052 0 0.2, 0.024 0 0.219
+    Brass: ring 0.0058 0.0014 at 0 0 0.1445; ring 0.006 0.0022 at ±0.057 0 0.122 turned 90 0 0
+        ; bend 0.0032, -0.057 0 0.124, -0.064 0 0.165, -0.052 0 0.2, -0.024 0 0.219
+        ; bend 0.0032, 0.057 0 0.124, 0.064 0 0.165, 0.052 0 0.2, 0.024 0 0.219
     Ebony: bend 0.0062, -0.034 0 0.2135, -0.018 0 0.2215, 0 0 0.224, 0.018 0 0.2215,
         0.034 0 0.2135"""
 SPOUT = "0.07 0 0.048, 0.094 0 0.056, 0.112 0 0.078, 0.122 0 0.106, 0.138 0 0.127, 0.15 0 0.133"
 SPOUT_RADII = (0.024, 0.0195, 0.0145, 0.0115, 0.0095, 0.009)
 
-CARAFE = """0.02 0, 0.032 0, 0.04 0.0004, 0.0465 0.0025, 0.0515 0.008, 0.0555 0.04, 0.051 0.08,
+CARAFE = """0.02 0, 0.032 0, 0.04 0.0004, 0.0465 0.0025, 0.0515 0.008, 0.0555 0.04, 0.051 0.08
     0.034 0.118, 0.0205 0.148, 0.0175 0.175, 0.0205 0.205, 0.028 0.226"""
-GLASS_FOOT = """0.004 0, 0.03 0, 0.033 0.0006, 0.0336 0.0016, 0.032 0.0024, 0.024 0.0034,
+GLASS_FOOT = """0.004 0, 0.03 0, 0.033 0.0006, 0.0336 0.0016, 0.032 0.0024, 0.024 0.0034
     0.014 0.0052, 0.008 0.0078, 0.005 0.012, 0.0038 0.018, 0.0034 0.028, 0.0034 0.05"""
-GLASS_CUP = (
-    "0.0034 0.05, 0.0075 0.064, 0.022 0.074, 0.033 0.092, 0.0365 0.115, 0.0335 0.142, 0.031 0.155"
-)
-BOWL = """0.006 0.004, 0.031 0.004, 0.033 0, 0.0355 0, 0.036 0.006, 0.052 0.013, 0.074 0.03,
+GLASS_CUP = """0.0034 0.05, 0.0075 0.064, 0.022 0.074, 0.033 0.092, 0.0365 0.115, 0.0335 0.142
+    0.031 0.155"""
+BOWL = """0.006 0.004, 0.031 0.004, 0.033 0, 0.0355 0, 0.036 0.006, 0.052 0.013, 0.074 0.03
     0.087 0.05, 0.094 0.066"""
-STICK = """Brass: lathe 0.044 0, 0.055 0.004, 0.06 0.01, 0.0585 0.0115, 0.05 0.0065, 0.02 0.006,
+STICK = """Brass: lathe 0.044 0, 0.055 0.004, 0.06 0.01, 0.0585 0.0115, 0.05 0.0065, 0.02 0.006
         0.0135 0.009, 0.0105 0.02, 0.0125 0.03, 0.0165 0.034, 0.0165 0.0365, 0.012 0.037
-    Brass: ring 0.013 0.0024 at 0.068 0 0.0158 turned 90 0 0
+        ; ring 0.013 0.0024 at 0.068 0 0.0158 turned 90 0 0
     Wax: lathe 0.0108 0.034, 0.011 0.15, 0.0112 0.162, 0.0102 0.1655, 0.0085 0.1635, 0.004 0.1615
     Wick: bend 0.0008, 0 0 0.161, 0.0004 0 0.167, 0.0018 0 0.172
-    Flame: lathe 0.0006 0.166, 0.0042 0.171, 0.0056 0.178, 0.0048 0.187, 0.0024 0.198,
+    Flame: lathe 0.0006 0.166, 0.0042 0.171, 0.0056 0.178, 0.0048 0.187, 0.0024 0.198
         0.0003 0.209"""
 # Down the candle: azimuth in degrees, from and to heights.
-DRIPS = (
-    (20, 0.165, 0.118),
-    (75, 0.164, 0.142),
-    (160, 0.165, 0.09),
-    (215, 0.164, 0.13),
-    (300, 0.165, 0.105),
-)
-BLADE = "0 -0.008, 0.1 -0.0085, 0.128 -0.005, 0.142 0.0055, 0.12 0.008, 0 0.0075"
+DRIPS = "20 0.165 0.118, 75 0.164 0.142, 160 0.165 0.09, 215 0.164 0.13, 300 0.165 0.105"
+KNIFE = """Silver: prism 0.0016, 0 -0.008, 0.1 -0.0085, 0.128 -0.005, 0.142 0.0055, 0.12 0.008
+        0 0.0075; lathe 0.0062 0, 0.007 0.003, 0.0062 0.006 at 0 0 0.0008 turned 0 -90 0
+    Ebony: lathe 0.0058 0.005, 0.0072 0.03, 0.0066 0.06, 0.0082 0.085, 0.004 0.092
+        turned 0 -90 0"""
 
 
 def kettle(scene: Scene) -> None:
@@ -62,43 +55,26 @@ def kettle(scene: Scene) -> None:
 
 
 def carafe(scene: Scene) -> None:
-    _filled(
-        scene,
-        "Carafe",
-        smooth_path(CARAFE, scene.segments(60, 12)),
-        0.0022,
-        0.083,
-        (0.135, 0.125, 0),
-    )
+    outside, matrix = smooth_path(CARAFE, scene.segments(60, 12)), transform((0.135, 0.125, 0))
+    scene.add("Carafe", scene.lathe(_wall(outside, 0.0022), 88), "Glass", matrix=matrix)
+    wine = _wine(outside, 0.0022, 0.083)
+    scene.add("Wine in the carafe", scene.lathe(wine, 72), "Wine", matrix=matrix)
 
 
 def wineglass(scene: Scene) -> None:
     """A stem of glass, and a cup with some wine."""
-    at = (0.215, 0.02, 0)
-    cup = smooth_path(GLASS_CUP, scene.segments(40, 10))
-    wall = _wall(cup[2:], 0.0011)
-    body = scene.lathe(np.concatenate([points(GLASS_FOOT), cup[1:2], wall]), 72)
-    scene.add("Wine glass", body, "Glass", matrix=transform(at))
-    scene.add(
-        "Wine in the glass", _liquid(scene, cup[2:], 0.0011, 0.1), "Wine", matrix=transform(at)
-    )
+    cup, matrix = smooth_path(GLASS_CUP, scene.segments(40, 10)), transform((0.215, 0.02, 0))
+    body = np.concatenate([points(GLASS_FOOT), cup[1:2], _wall(cup[2:], 0.0011)])
+    scene.add("Wine glass", scene.lathe(body, 72), "Glass", matrix=matrix)
+    wine = _wine(cup[2:], 0.0011, 0.1)
+    scene.add("Wine in the glass", scene.lathe(wine, 72), "Wine", matrix=matrix)
 
 
-def _filled(
-    scene: Scene, name: str, outside: Array, thickness: float, level: float, at: tuple[float, ...]
-) -> None:
-    body = scene.lathe(_wall(outside, thickness), 88)
-    scene.add(name, body, "Glass", matrix=transform(at))
-    wine = _liquid(scene, outside, thickness, level)
-    scene.add(f"Wine in the {name.lower()}", wine, "Wine", matrix=transform(at))
-
-
-def _inside(outside: Points, thickness: float) -> Array:
-    """A profile (n, 2) that is ``thickness`` within another, from its lower end up."""
-    outer = np.asarray(outside)
-    tangent = np.gradient(outer, axis=0)
+def _inside(outside: Array, thickness: float) -> Array:
+    """A profile (n, 2) that is `thickness` within another, from its lower end up."""
+    tangent = np.gradient(outside, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    inner = outer + thickness * np.column_stack([-tangent[:, 1], tangent[:, 0]])
+    inner = outside + thickness * np.column_stack([-tangent[:, 1], tangent[:, 0]])
     return inner[inner[:, 0] > 0.0005]
 
 
@@ -109,47 +85,40 @@ def _wall(outside: Array, thickness: float) -> Array:
     return np.concatenate([outside, [lip], inner[::-1]])
 
 
-def _liquid(scene: Scene, outside: Array, thickness: float, level: float) -> Shape:
-    """What fills a vessel up to a level; it reaches into the wall, so that no air is between."""
+def _wine(outside: Array, thickness: float, level: float) -> Array:
+    """The profile of what fills a vessel; it reaches into the wall, so that no air is between."""
     wet = _inside(outside, 0.6 * thickness)
     wet = wet[wet[:, 1] < level]
-    return scene.lathe(np.concatenate([wet, [[wet[-1, 0], level]]]), 72)
+    return np.concatenate([wet, [[wet[-1, 0], level]]])
 
 
 def candle(scene: Scene) -> None:
     """A burning candle on a chamberstick, with wax that ran down."""
     model = Model(scene, STICK)
-    for degrees, top, bottom in DRIPS:
-        angle = np.radians(degrees)
-        x, y = 0.0108 * np.cos(angle), 0.0108 * np.sin(angle)
-        heights = np.linspace(top, bottom, 9)
-        radii = np.interp(heights, [bottom, bottom + 0.006, top], [0.0026, 0.0021, 0.0012])
-        model.add(scene.tube(np.column_stack([np.full((9, 2), (x, y)), heights]), radii, 8), "Wax")
-        model.add(scene.ball(0.0026, 10), "Wax", (x, y, bottom))
-    at = np.array([0.005, 0.2, 0])
-    place("Candle", model.mesh("Candle", np.radians(60)), transform(at, (0, 0, 0.9)))
-    point_light("Candle light", (*at[:2], 0.186), 0.8, (1.0, 0.58, 0.24), 0.006)
+    for degrees, top, bottom in points(DRIPS):
+        drip = polar(0.0108, np.radians(degrees), np.linspace(top, bottom, 9))
+        heights = [bottom, bottom + 0.006, top]
+        radii = np.interp(drip[:, 2], heights, [0.0026, 0.0021, 0.0012])
+        model.add(scene.tube(drip, radii, 8), "Wax")
+        model.add(scene.ball(0.0026, 10), "Wax", drip[-1])
+    mesh, x, y = model.mesh("Candle", np.radians(60)), 0.005, 0.2
+    place("Candle", mesh, transform((x, y, 0), (0, 0, 0.9)))
+    point_light("Candle light", (x, y, 0.186), 0.8, (1.0, 0.58, 0.24), 0.006)
 
 
 def bowl(scene: Scene) -> None:
     """Porcelain with cobalt bands outside."""
     outside = smooth_path(BOWL, scene.segments(60, 16))
     shape = scene.lathe(_wall(outside, 0.0032), 96)
-    middle = shape.vertices[shape.quads].mean(axis=1)
-    radius, height = np.hypot(*middle[:, :2].T), middle[:, 2]
-    outer = np.interp(height, outside[:, 1], outside[:, 0]) - radius < 0.001
-    bands = ((height > 0.0565) & (height < 0.0615)) | ((height > 0.018) & (height < 0.0205))
-    shape = shape.painted(0)
-    shape.slots[: len(bands)][bands & outer] = 1
-    scene.add("Bowl", shape, "Porcelain", "Cobalt", matrix=transform((0.045, -0.035, 0.0045)))
+    x, y, z = shape.vertices[shape.quads].mean(axis=1).T
+    outer = np.interp(z, outside[:, 1], outside[:, 0]) - np.hypot(x, y) < 0.001
+    bands = ((z > 0.0565) & (z < 0.0615)) | ((z > 0.018) & (z < 0.0205))
+    slots = np.append(bands & outer, np.zeros(len(shape.triangles))).astype(np.int32)
+    matrix = transform((0.045, -0.035, 0.0045))
+    scene.add("Bowl", shape._replace(slots=slots), "Porcelain", "Cobalt", matrix=matrix)
 
 
 def knife(scene: Scene) -> None:
     """A silver fruit knife with an ebony handle."""
-    model = Model(scene)
-    model.draw(f"""Silver: prism 0.0016, {BLADE}
-        Silver: lathe 0.0062 0, 0.007 0.003, 0.0062 0.006 at 0 0 0.0008 turned 0 -90 0
-        Ebony: lathe 0.0058 0.005, 0.0072 0.03, 0.0066 0.06, 0.0082 0.085, 0.004 0.092
-            turned 0 -90 0""")
-    matrix = transform((0.015, -0.2, 0.0075), (np.radians(4), 0, np.radians(12)))
-    place("Knife", model.mesh("Knife"), matrix)
+    matrix = transform((0.015, -0.2, 0.0075), np.radians((4, 0, 12)))
+    place("Knife", Model(scene, KNIFE).mesh("Knife"), matrix)

@@ -1,16 +1,15 @@
-"""The statue, a seated bronze figure with a halo, and the mirror beside it."""
+"""The statue, a seated bronze figure with a halo; the mirror beside it; the torii over the path."""
 
 from collections.abc import Sequence
 
 import bpy
 import numpy as np
 
-from scenes.garden.plan import STATUE, TAU
-from scenes.library.noise import noise, smoothstep
-from scenes.library.objects import evaluated_shape, place, transform
-from scenes.library.points import Points, points, polar, xyz
-from scenes.library.scene import Scene
-from scenes.library.shapes import Shape, box, copies, icosphere, join, sheet, tube
+from scenes.garden.plan import STATUE, TAU, TORII, ground_height
+from scenes.library import shapes
+from scenes.library.points import Points, noise, points, polar, smoothstep, xyz
+from scenes.library.scene import Scene, place
+from scenes.library.shapes import Shape, box, copies, icosphere, join, sheet, transform
 
 MIRROR = (1.75, 3.25)
 
@@ -36,7 +35,7 @@ def halo(scene: Scene) -> Shape:
     parts = [scene.ring(0.30, 0.016, 96, 12), scene.ring(0.39, 0.008, 96)]
     for k, angle in enumerate(np.arange(48) * TAU / 48):
         reach = np.array([0.30, 0.345, 0.414]) + (k % 2) * np.array([0, 0.08, 0.07])
-        parts.append(tube(polar(reach, angle), [0.007, 0.010, 0.0023], 6))
+        parts.append(shapes.tube(polar(reach, angle), [0.007, 0.010, 0.0023], 6))
     return join(parts).transformed(transform(rotation=(np.pi / 2, 0, 0)))
 
 
@@ -51,7 +50,7 @@ def limb(path: Points, radii: Sequence[float]) -> Shape:
     middle = np.stack([np.interp(t, np.arange(len(knots)), axis) for axis in knots.T], axis=-1)
     radius = np.interp(t, np.arange(len(knots)), radii)
     ends = [ellipsoid(knots[i], (radii[i],) * 3) for i in (0, -1)]
-    return join([tube(middle, radius, 20), *ends])
+    return join([shapes.tube(middle, radius, 20), *ends])
 
 
 # The parts of the body that are ellipsoids: centre and radii.
@@ -78,10 +77,9 @@ def figure(scene: Scene) -> Shape:
     remesh.mode, remesh.voxel_size = "VOXEL", 0.011 / scene.detail**0.5
     smooth = whole.modifiers.new("Smooth", "SMOOTH")
     smooth.factor, smooth.iterations = 0.5, 4
-    skin = evaluated_shape(whole)
-    source = whole.data
-    bpy.data.objects.remove(whole)
-    bpy.data.meshes.remove(source)
+    melted = whole.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    skin = shapes.mesh_shape(melted.data)
+    bpy.data.batch_remove([whole, whole.data])
     return folded(skin)
 
 
@@ -144,3 +142,29 @@ def mirror(scene: Scene) -> None:
     scene.add("Mirror frame", join(parts), "Dark wood", matrix=spot, smooth=0.7)
     pane = sheet(xyz([-width / 2, width / 2], 0.005, [[0], [height]]))
     place("Mirror", scene.mesh("Mirror", pane, "Mirror", smooth=False), spot)
+
+
+def torii(scene: Scene) -> None:
+    """Two leaning posts with black feet, a tie beam, and two lintels that rise at their ends."""
+    red = [lintel(scene, 1.95, (3.17, 3.36), 0.12, 0.14)]
+    red.append(box((3.4, 0.12, 0.2), 0.01).moved(0, 0, 2.6))
+    red.append(box((0.22, 0.1, 0.4), 0.01).moved(0, 0, 2.9))
+    black = [lintel(scene, 2.2, (3.36, 3.46), 0.17, 0.2)]
+    for side in (-1, 1):
+        foot, head = np.array([side * 1.5, 0, -0.2]), np.array([side * 1.36, 0, 3.2])
+        red.append(scene.tube(np.linspace(foot, head, 9), np.linspace(0.15, 0.125, 9), 32))
+        black.append(scene.tube(np.linspace(foot, foot + 0.16 * (head - foot), 3), 0.18, 32))
+    spot = transform((*TORII, float(ground_height(*TORII))))
+    shape = join([*red, join(black).painted(1)])
+    scene.add("Torii", shape, "Vermilion", "Black lacquer", matrix=spot, smooth=0.6)
+
+
+def lintel(
+    scene: Scene, half: float, heights: tuple[float, float], depth: float, rise: float
+) -> Shape:
+    """A beam along x that is wider above than below and curves upwards to its ends."""
+    x = np.linspace(1, -1, scene.segments(24, 6))[:, None]
+    y, top = points("-1 0, 1 0, 1 1, -1 1").T  # around its section
+    z = rise * np.abs(x) ** 2.4 + np.where(top == 1, heights[1], heights[0])
+    rows = xyz(half * x * (1 + 0.03 * top), depth * y * (1 + 0.15 * top), z)
+    return sheet(rows, closed=True, capped=True)

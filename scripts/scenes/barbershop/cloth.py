@@ -1,0 +1,125 @@
+"""What is of cloth: coats and hats on the rack, umbrellas, towels, and their shelves."""
+
+import bpy
+import numpy as np
+
+from scenes.barbershop.plan import TAU, TOWELS, put, spot
+from scenes.library.points import Array, points, polar, smooth_path, xyz
+from scenes.library.scene import Model, Scene
+from scenes.library.shapes import prism, sheet
+
+RACK = """
+Coat rack | right 2.35
+    Mahogany: box 1.3 0.025 0.12 0.008 at 0 0.0125 1.86
+    Brass: bend 0.007, 0 0.02 1.90, 0 0.09 1.92, 0 0.11 1.97 at -0.54..0.54*5 0 0;
+        ball 0.014 at -0.54..0.54*5 0.112 1.975;
+        bend 0.006, 0 0.02 1.85, 0 0.05 1.81, 0 0.075 1.83, 0 0.08 1.86 at -0.54..0.54*5 0 0
+Umbrella stand | right 1.49 0.2
+    Brass: lathe 0.10 0.01, 0.11 0.02, 0.12 0.5, 0.13 0.52, 0.12 0.52, 0.105 0.03, 0 0.02;
+        ring 0.1174 0.006 at 0 0 0.12; ring 0.1208 0.006 at 0 0 0.4
+Fedora | right 2.62 0.14 1.94
+    Camel wool: lathe 0.175 0.006, 0.17 0, 0.10 0.012, 0.095 0.05, 0.088 0.105, 0.06 0.125
+        0 0.115 scaled 1 1.15 1 turned -62 0 0
+    Rug red: pipe 0.1005 0.014, 0.0975 0.042 scaled 1 1.15 1 turned -62 0 0
+Bowler hat | right 2.08 0.14 1.95
+    Black: lathe 0.15 0.025, 0.152 0.02, 0.105 0, 0.0996 0.011, 0.095 0.039, 0.085 0.066
+        0.071 0.088, 0.053 0.106, 0.032 0.1185, 0.01 0.1244, 0 0.125 scaled 1 1.15 1 turned -68 0 0
+"""
+BUTTONS = "Ebony: lathe 0.012 0, 0.012 0.004, 0.008 0.005 at 0.02 0.245 1.12..1.36*3 turned -90 0 0"
+SHELVES = """Oak: box 0.03 0.32 1.75 0.004 at ±0.39 0.16 0.875;
+        box 0.78 0.32 0.024 0.003 at 0 0.16 0.068..1.718*6
+    Mahogany: box 0.78 0.012 1.75 at 0 0.006 0.875"""
+
+
+def coats(scene: Scene) -> None:
+    """Three coats on the rack's hooks, between two hats."""
+    for k, (y, color) in enumerate(((1.81, "Grey"), (2.33, "Camel"), (2.89, "Green"))):
+        put(coat(scene, f"{color} wool", k), spot(f"right {y}"))
+
+
+def around(scene: Scene) -> tuple[Array, Array]:
+    """Angles round something that hangs in folds, and parts of its length as a column."""
+    sides, rows = scene.segments(72, 16), scene.segments(32, 6)
+    return np.arange(sides) * TAU / sides, np.linspace(0, 1, rows)[:, None]
+
+
+def coat(scene: Scene, wool: str, k: int) -> bpy.types.Mesh:
+    """A coat that hangs in folds from 1.85 m down; the greater its k, the shorter it is."""
+    model, (angle, t) = Model(scene, BUTTONS), around(scene)
+    width = 0.03 + 0.15 * np.minimum(t * 6, 1) ** 0.6 + 0.05 * t
+    waves = 0.10 * np.sin(7 * angle + 2 * k) + 0.06 * np.sin(11 * angle + k)
+    body = polar(width * (1 + waves * np.minimum(t * 2, 1)), angle, 1.85 - (0.95 - 0.12 * k) * t)
+    body[..., 1] *= 0.5 * (0.2 + 0.8 * t)
+    model.add(sheet(body[::-1], closed=True), wool, (0, 0.135, 0))
+    sleeve = points("0.14 0.15 1.74, 0.20 0.18 1.5, 0.19 0.20 1.22, 0.18 0.21 1.12")
+    lapel = prism("0 0, 0.06 0.02, 0.075 -0.10, 0 -0.34", 0.008)
+    for side in (-1, 1):
+        path = smooth_path(sleeve * (side, 1, 1), scene.segments(20, 5))
+        model.add(scene.tube(path, np.linspace(0.062, 0.048, len(path)), 18), wool)
+        turn = (90, 0, 180 if side > 0 else 0)
+        model.add(lapel, wool, (side * 0.005, 0.222, 1.74), turn, (1, 1, side))
+    return model.mesh(f"Coat of {wool.lower()}")
+
+
+def umbrellas(scene: Scene) -> None:
+    """Two rolled umbrellas in their stand."""
+    stick = "0 0 0.02, 0 0 0.4, 0 0 0.78, 0.03 0 0.85, 0.075 0 0.83, 0.08 0 0.79"
+    model, (angle, t) = Model(scene, f"Oak: bend 0.009, {stick}"), around(scene)
+    folds = 1 + 0.22 * np.cos(8 * angle)
+    radius = folds * np.interp(t, (0, 0.12, 0.75, 1), (0.006, 0.02, 0.045, 0.018))
+    model.add(sheet(polar(radius, angle + t, 0.06 + 0.58 * t), closed=True), "Black")
+    data = model.mesh("Umbrella")
+    put(data, spot("right 1.46 0.19 0.01"), degrees=(4, -4, 30))
+    put(data, spot("right 1.53 0.22 0.01"), degrees=(-3, 5, 160))
+
+
+def folded_towel(scene: Scene, towel: str) -> bpy.types.Mesh:
+    """A towel folded twice, with a stripe."""
+    stripe = "White towel" if towel == "Red towel" else "Red towel"
+    parts = f"""{towel}: box 0.26 0.17 0.016 0.007 3 at 0 0 0.008..0.036*3;
+            tube 0.022, -0.13 0.078 0.022, 0.13 0.078 0.022
+        {stripe}: box 0.02 0.171 0.002 at -0.09 0 0.0445"""
+    return Model(scene, parts).mesh(f"Folded {towel.lower()}")
+
+
+def rolled_towel(scene: Scene, towel: str) -> bpy.types.Mesh:
+    """A rolled towel, lying along y, its end a spiral."""
+    lids = f"{towel}: lathe 0.039 -0.0005, 0.039 0.0005 at 0 ±0.106 0.042 turned 90 0 0"
+    model, s = Model(scene, lids), np.linspace(1, 0, scene.segments(72, 12))
+    x, z, _ = polar(0.012 + 0.030 * s, TAU * 3.2 * s).T
+    shrink, y = np.array([(0.93, -0.11), (1, -0.104), (1, 0.104), (0.93, 0.11)]).T[:, :, None]
+    model.add(sheet(xyz(x * shrink, y, z * shrink + 0.042)), towel)
+    return model.mesh(f"Rolled {towel.lower()}")
+
+
+def draped_towel(scene: Scene, towel: str) -> bpy.types.Mesh:
+    """A towel over a rail along x at the origin, hanging down on both sides."""
+    x = np.linspace(-0.16, 0.16, scene.segments(28, 6))
+    s = np.linspace(0.46, -0.36, scene.segments(48, 10))[:, None]
+    bow = np.clip(s / 0.022, -np.pi / 2, np.pi / 2)
+    y = 0.022 * np.sin(bow) + 0.016 * np.sin(38 * x + 2) * np.abs(s) / 0.4
+    z = 0.022 * np.cos(bow) - np.maximum(np.abs(s) - 0.0345, 0)
+    return scene.mesh(f"Draped {towel.lower()}", sheet(xyz(x, y, z)), towel)
+
+
+def towel_shelves(scene: Scene) -> None:
+    """Open shelves of towels beside the staff door, with a basket on top."""
+    basket, random, where = Model(scene), scene.random("towel shelves"), spot("back -0.42 0.036")
+    put(Model(scene, SHELVES).mesh("Towel shelves"), where)
+    folded = [folded_towel(scene, towel) for towel in TOWELS]
+    rolled = [rolled_towel(scene, towel) for towel in TOWELS]
+    for level, z in enumerate(np.linspace(0.08, 1.73, 6)[:-1]):
+        side = 1 if level % 2 else -1
+        for k, x in enumerate((-0.235 * side, 0.05 * side)):
+            for pile in range(random.integers(2, 6)):
+                turn = (0, 0, random.uniform(-2, 2))
+                put(folded[(level + k) % 4], where, (x, 0.17, z + 0.0455 * pile), turn)
+        for k, (x, up) in enumerate(((0.25, 0), (0.335, 0), (0.2925, 0.074))):
+            put(rolled[(level + k + 1) % 4], where, (side * x, 0.17, z + up))
+    basket.draw("Bristle: lathe 0.12 0.004, 0.12 0.01")
+    for k in range(9):
+        basket.add(scene.ring(0.13 + 0.004 * k, 0.011, 40, 6), "Bristle", (0, 0, 0.011 + 0.02 * k))
+    put(basket.mesh("Basket"), where, (0, 0.16, 1.73))
+    for k in range(5):
+        x, y, z = polar(0.07, k * TAU / 5, 1.87)
+        put(rolled[k % 4], where, (x, 0.16 + y, z), (78, 0, 72 * k))
