@@ -96,7 +96,7 @@ rule check_gpu:
     params:
         device=SETTINGS.device,
         cache=of_first("trials"),
-        calibration=calibration_words,
+        calibration=optional("calibration"),
         full=full_sizes,
         stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
     message:

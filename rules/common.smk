@@ -354,11 +354,6 @@ def inventory_settings(wildcards):
     ]
 
 
-def inventory_words(wildcards, input):
-    """Return the words that name a .blend's inventory to a program, if there is one."""
-    return f"--inventory {input.inventory}" if input.inventory else ""
-
-
 @of_each_shard
 def shard_threads(wildcards):
     """Give each shard so many cores that what runs at once fits this machine's memory."""
@@ -608,40 +603,29 @@ def of_first(attribute):
     return lambda wildcards: getattr(first_dataset(wildcards.scene), attribute)
 
 
-def optional_words(wildcards, input):
-    """Return the words that name to scripts/validate.py what not every dataset has."""
-    given = {
-        "clearance": input.cameras,
-        "inventory": input.inventory,
-        "splits": input.splits,
-    }
-    return shlex.join(
-        word
-        for name, path in given.items()
-        if path
-        for word in (f"--{name}", str(path))
-    )
+def optional(*names, **flags):
+    """Return the function by which a rule names to its program inputs that there may be.
 
+    Each has a flag of its own name, or the one that is given.
+    """
 
-def blend_words(wildcards, input):
-    """Return the words that name a dataset's scene to a program, if there is one."""
-    return shlex.join(["--blend", str(input.blend)]) if input.blend else ""
+    def words(wildcards, input):
+        given = {flag: input[name] for flag, name in flags.items()}
+        return shlex.join(
+            word
+            for flag, path in given.items()
+            if path
+            for word in (f"--{flag}", str(path))
+        )
 
-
-def calibration_words(wildcards, input):
-    """Return the words that name a calibration to a program, if there is one."""
-    return f"--calibration {input.calibration}" if input.calibration else ""
+    flags |= {name: name for name in names}
+    return words
 
 
 def lens_maps_of(wildcards):
     """Return the lens maps of a reprojection; none of what is not one."""
     dataset, name = dataset_of(wildcards), wildcards.reprojection
     return dataset.lens_maps(name) if name in dataset.reprojections else []
-
-
-def place_words(wildcards, input):
-    """Return the words that name the places of a random rig to a program."""
-    return f"--places {input.places}" if input.places else ""
 
 
 def of_reprojection(attribute):

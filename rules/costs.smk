@@ -29,10 +29,10 @@ rule costs:
                 wildcards.scene: None,
             }
         ],
-        blend=blend_words,
+        blend=optional("blend"),
         energy=SETTINGS.energy.model_dump_json(),
         full=full_size,
-        inventory=inventory_words,
+        inventory=optional("inventory"),
         reprojections=reprojection_words,
     message:
         "Adding up what {wildcards.scene}/{wildcards.rig} has cost"

@@ -16,8 +16,8 @@ rule probe_cameras:
     params:
         name=of_first("scene_name"),
         limits=of_first("limits_json"),
-        places=place_words,
-        inventory=inventory_words,
+        places=optional("places"),
+        inventory=optional("inventory"),
         # Not in the command: when what the YAML says changes, so does the file.
         rig=of_first("rig_json"),
         render=of_first("render"),
@@ -92,7 +92,7 @@ rule measure_error:
     params:
         device=SETTINGS.device,
         cache=of_first("trials"),
-        calibration=calibration_words,
+        calibration=optional("calibration"),
         stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
     message:
         "Measuring error against render time in {wildcards.scene}"
@@ -130,7 +130,7 @@ rule try_changes:
     params:
         device=SETTINGS.device,
         cache=of_first("trials"),
-        calibration=calibration_words,
+        calibration=optional("calibration"),
     message:
         "Trying what could be cheaper in {wildcards.scene}"
     shell:

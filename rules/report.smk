@@ -18,8 +18,8 @@ rule panorama_lightfield:
         name=of_dataset("scene_name"),
         limits=of_dataset("limits_json"),
         width=of_dataset("panorama_width"),
-        calibration=calibration_words,
-        inventory=inventory_words,
+        calibration=optional("calibration"),
+        inventory=optional("inventory"),
         render=of_dataset("render"),
         center=lambda wildcards: dataset_of(wildcards).rig.center,
         fingerprint=of_dataset("builder_fingerprint"),
@@ -121,7 +121,7 @@ rule page:
         yaml=lambda wildcards: str(scene_path(dataset_of(wildcards).scene_name)),
         command=rebuilding,
         measurements=measurements,
-        inventory=inventory_words,
+        inventory=optional("inventory"),
         # Not in the command: when the YAML is another, so is the page.
         text=lambda wildcards: scene_path(dataset_of(wildcards).scene_name).read_text(),
         # Not in the command: when a measurement was made anew, so is the page.

@@ -24,7 +24,7 @@ rule free_places:
         ),
         name=of_dataset("scene_name"),
         frame=lambda wildcards: dataset_of(wildcards).source.frame,
-        inventory=inventory_words,
+        inventory=optional("inventory"),
     message:
         "Looking for free places for the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
@@ -51,9 +51,9 @@ rule lightfield:
     params:
         name=of_dataset("scene_name"),
         limits=of_dataset("limits_json"),
-        calibration=calibration_words,
-        places=place_words,
-        inventory=inventory_words,
+        calibration=optional("calibration"),
+        places=optional("places"),
+        inventory=optional("inventory"),
         # Not in the command: when what the YAML says of this dataset changes, so does the file.
         rig=of_dataset("rig_json"),
         render=of_dataset("render"),
@@ -85,7 +85,7 @@ rule check_cameras:
         mem_mb=8000,
         runtime=60,
     params:
-        inventory=inventory_words,
+        inventory=optional("inventory"),
     message:
         "Looking for cameras of {wildcards.scene}/{wildcards.rig} inside geometry"
     shell:

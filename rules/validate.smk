@@ -26,7 +26,7 @@ rule validate:
         dataset=DATASET,
         reprojections=reprojection_words,
         exports=of_dataset("export_lists"),
-        optional=optional_words,
+        optional=optional("inventory", "splits", clearance="cameras"),
         removed=REMOVED,
     message:
         "Validating {wildcards.scene}/{wildcards.rig}"

@@ -435,7 +435,7 @@ class Dataset:
         return [
             f"{self.folder}/validation.json",
             f"{self.folder}/sha256sums.txt",
-            *([self.splits] if isinstance(self.splits, str) else []),
+            *_paths(self.splits),
             *self.published,
             *self.pictures,
             self.costs,
@@ -447,9 +447,8 @@ class Dataset:
     def intermediates(self) -> list[str]:
         """What is made on the way to the dataset, named so that a missing one is made anew, too."""
         scene = self.blend if self.source.builder else self.blend_check
-        perhaps = (scene, self.inventory, self.calibration, self.places, self.cameras)
         return [
-            *(path for path in perhaps if isinstance(path, str)),
+            *_paths(scene, self.inventory, self.calibration, self.places, self.cameras),
             f"{self.work}/checksums.txt",
             *(
                 [f"{self.work}/panorama/lightfield.json", self.panorama]
@@ -465,8 +464,8 @@ class Dataset:
 
         A user's own .blend is checked by its proof, lens maps carry a checksum.
         """
-        wanted = [self.blend if self.source.builder else [], self.inventory, self.calibration]
-        return [path for path in wanted if isinstance(path, str)]
+        scene = self.blend if self.source.builder else []
+        return _paths(scene, self.inventory, self.calibration)
 
     @property
     def package(self) -> str:
@@ -713,6 +712,11 @@ def _differs(
         return False
     except (OSError, ValueError, LookupError, TypeError, StopIteration, RecursionError):
         return True
+
+
+def _paths(*perhaps: str | list[str]) -> list[str]:
+    """Return those of several files that there are; one that a dataset has not is an empty list."""
+    return [path for path in perhaps if isinstance(path, str)]
 
 
 def _size_and_time(path: Path) -> tuple[int, int] | tuple[None, None]:
