@@ -634,6 +634,14 @@ def test_a_rig_that_a_consumer_cannot_take_is_refused_when_the_yaml_is_read():
     content["exports"] = {"hci": {"sources": ["views"]}}
     with pytest.raises(ValidationError, match="views is of the rig Ball, which is no plane"):
         TypeAdapter(Scene).validate_python(content)
+    content["rigs"] = {"One": RIG | {"camera": camera, "cameras": [1, 1]}}
+    content["reprojections"] = {}
+    for name, why in (("instant_ngp", "cameras at one place"), ("colmap", "one view")):
+        content["exports"] = {name: {"sources": ["views"]}}
+        with pytest.raises(ValidationError, match=f"views is of the rig One, which has {why}"):
+            TypeAdapter(Scene).validate_python(content)
+    content["exports"] = {"instant_ngp": {"sources": ["views"], "bounds": "depth"}}
+    assert TypeAdapter(Scene).validate_python(content).exports.instant_ngp
 
 
 @pytest.mark.parametrize("name", ["exports/miv/export.json", "transforms.json"])

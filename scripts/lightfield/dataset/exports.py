@@ -18,6 +18,7 @@ from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import Rig
 from lightfield.geometry.rigs.plane import Plane
+from lightfield.geometry.rigs.split import PARTS
 
 # In `sources`, the rendered views themselves.
 VIEWS = "views"
@@ -52,6 +53,8 @@ class Export(Settings):
 
     def rig_refusal(self, rig: Rig) -> str | None:
         """Say why the consumer cannot take the views of a rig; None if it can."""
+        if self.is_for_training and rig.view_count == 1 and rig.split not in PARTS:
+            return "has one view, of which none is left to test with"
         return None
 
 
@@ -99,6 +102,11 @@ class InstantNgp(Export):
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         return NO_DEPTH if (self.depth or self.bounds == "depth") and not has_depth else None
+
+    def rig_refusal(self, rig: Rig) -> str | None:
+        if self.scale is None and self.bounds == "rig" and rig.positions == 1:
+            return "has cameras at one place, which says no scale; give scale, or bounds: depth"
+        return None
 
     @property
     def recorded(self) -> dict[str, Any]:
