@@ -17,7 +17,7 @@ from lightfield.core.progress import Progress
 from lightfield.export.source import Source
 from lightfield.export.splits import splits
 from lightfield.imaging import images, pictures
-from lightfield.measurement import synthesis_quality
+from lightfield.measurement import summaries, synthesis_quality
 
 
 def main() -> None:
@@ -47,7 +47,7 @@ def main() -> None:
             rows += synthesis_quality.compare(variant, views, some, truth, exposure)
         progress.done()
     write_csv(arguments.output.with_name(f"{arguments.output.name}.csv"), rows)
-    means = synthesis_quality.means(rows)
+    means = summaries.means(rows)
     synthesis_quality.draw(means, arguments.output)
     for row in means:
         print(

@@ -18,7 +18,7 @@ from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.imaging.video import video
-from lightfield.measurement import synthesis_quality
+from lightfield.measurement import summaries
 from lightfield.report import tables
 from lightfield.synthesis.view import Sources
 
@@ -188,7 +188,7 @@ def measured(tmp_path_factory, run_program):
 
 
 def test_fewer_views_and_the_controls_are_worse(measured):
-    means = synthesis_quality.means(measured[0])
+    means = summaries.means(measured[0])
     found = {(row["variant"], row["value"]): row for row in means}
     plain = found["all", "42"]
     assert plain["psnr"] > found["views", "12"]["psnr"] + 0.5
@@ -201,7 +201,7 @@ def test_regions_are_told_apart_by_the_light_that_pixels_show(measured):
     rows, _ = measured
     assert {row["region"] for row in rows} == {"all", "diffuse", "glossy"}
     (whole,), (diffuse,), (glossy,) = (
-        synthesis_quality.means([row for row in rows if row["variant"] == "all"], region)
+        summaries.means([row for row in rows if row["variant"] == "all"], region)
         for region in ("all", "diffuse", "glossy")
     )
     assert whole["part"] == 1

@@ -27,6 +27,7 @@ from lightfield.imaging import plots
 from lightfield.measurement import metrics, strata
 from lightfield.measurement.sampling import PLAIN as PLAIN_SAMPLING
 from lightfield.measurement.sampling import standard_error
+from lightfield.measurement.summaries import strata_table
 from lightfield.measurement.trials import Trial, Trials, Window, both_see, nearest_view
 
 PLAIN, ADAPTIVE, DENOISED = "plain", "adaptive", "denoised"
@@ -472,21 +473,6 @@ def tables(name: str, content: Mapping[str, Any]) -> str:
         *(_row(*row) for row in rows),
     ]
     return "\n".join([*lines, ""])
-
-
-def strata_table(content: Mapping[str, Any]) -> tuple[list[str], list[list[Any]]]:
-    """Return the columns and rows of what was measured of each stratum and method."""
-    columns = ["stratum", "part", "method", "slope", "s", "error in these", "error", "s to it"]
-    columns += ["times faster", "at most samples"]
-    rows = []
-    for stratum, found in {"whole views": {"area": 1.0, **content}, **content["strata"]}.items():
-        for middle, most in zip(found["methods"], found["methods_at_most_samples"], strict=True):
-            slope = found["slopes"].get(middle["method"], {}).get("over_time", {}).get("slope")
-            names = ("seconds", "error", "equal_error", "seconds_at_equal_error", "times_faster")
-            figures = [middle[name] for name in names]
-            row = [stratum, found["area"], middle["method"], slope, *figures]
-            rows.append([*row, most["times_faster"]])
-    return columns, rows
 
 
 def _row(*cells: str | float | None) -> str:

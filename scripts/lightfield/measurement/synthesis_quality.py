@@ -23,17 +23,8 @@ from lightfield.geometry.rigs.sphere import nested
 from lightfield.imaging import images, pictures, plots
 from lightfield.imaging.tonemap import encode_srgb, tone_map
 from lightfield.measurement import metrics
+from lightfield.measurement.summaries import PLACES, WHOLE
 from lightfield.synthesis.view import BEST, Sources, reader
-
-COLUMNS = ("truth", "variant", "value")
-MEANS = ("psnr", "ssim", "flip", "holes", "source_bytes")
-# Of all that is between the middle of the cameras and the edge of their interpolation volume, so
-# much is inside, the rest towards the edge, and what is farther out beyond.
-PLACES = {"inside": 0.5, "edge": 1.0, "beyond": np.inf}
-# The region of a picture that is all of it. The others are of the pixels that show most of a kind
-# of light: glossy is that of metal and mirrors, transmission that of glass, volume that of fog and
-# fire.
-WHOLE = "all"
 
 
 @dataclass(frozen=True)
@@ -155,33 +146,10 @@ def compare(
             }
 
 
-def means(rows: Sequence[Mapping[str, Any]], region: str = WHOLE) -> list[dict[str, Any]]:
-    """Return one row for each variant and truth: means over views, of numbers or their texts.
-
-    Each view counts as much as it has of the ``region``; ``part`` is that of all views.
-    """
-    groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
-    for row in rows:
-        groups.setdefault(tuple(row[name] for name in COLUMNS), []).append(row)
-    found = []
-    for names, group in groups.items():
-        some = [row for row in group if row["region"] == region]
-        if not some:
-            continue
-        parts = [float(row["part"]) for row in some]
-        count = sum(row["region"] == WHOLE for row in group)
-        mean: dict[str, Any] = dict(zip(COLUMNS, names, strict=True))
-        mean["part"] = sum(parts) / count
-        for name in MEANS:
-            mean[name] = float(np.average([float(row[name]) for row in some], weights=parts))
-        found.append(mean)
-    return found
-
-
 def draw(rows: Sequence[Mapping[str, Any]], stem: Path) -> None:
-    """Plot the `means`: quality against bytes and number of views, and of how many a picture is.
+    """Plot quality against bytes and number of views, and of how many a picture is.
 
-    Of several truths it is that of the first.
+    The rows are those of `summaries.means`; of several truths it is that of the first.
     """
     by_name: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:

@@ -9,8 +9,7 @@ from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
-from lightfield.measurement import synthesis_quality
-from lightfield.measurement.error_vs_time import strata_table as _strata_table
+from lightfield.measurement import summaries
 from lightfield.report import page
 
 # Of the stability table, so many of the cases that use most of their bound are shown at once.
@@ -131,20 +130,20 @@ def synthesis(files: Sequence[Path], folder: str) -> Measurement | None:
     path = _named(files, f"synthesis/{folder}.csv")
     if path is None:
         return None
-    names = synthesis_quality.MEANS
-    columns = [*synthesis_quality.COLUMNS, *names]
+    names = summaries.MEANS
+    columns = [*summaries.COLUMNS, *names]
     rows = _read_csv(path, *columns, "place", "region")
-    means = [[row[name] for name in columns] for row in synthesis_quality.means(rows)]
+    means = [[row[name] for name in columns] for row in summaries.means(rows)]
     plain = [row for row in rows if row["variant"] == "all"]
     by_place = [
         [mean["truth"], place, *(mean[name] for name in names)]
-        for place in synthesis_quality.PLACES
-        for mean in synthesis_quality.means([row for row in plain if row["place"] == place])
+        for place in summaries.PLACES
+        for mean in summaries.means([row for row in plain if row["place"] == place])
     ]
     by_region = [
         [mean["truth"], region, *(mean[name] for name in ("part", *names))]
         for region in dict.fromkeys(row["region"] for row in plain)
-        for mean in synthesis_quality.means(plain, region)
+        for mean in summaries.means(plain, region)
     ]
     found = {
         "Views that were held out, synthesised from this dataset's": Table(columns, means),
@@ -152,7 +151,7 @@ def synthesis(files: Sequence[Path], folder: str) -> Measurement | None:
             ["truth", "place", *names], by_place
         ),
     }
-    if {row["region"] for row in plain} > {synthesis_quality.WHOLE}:
+    if {row["region"] for row in plain} > {summaries.WHOLE}:
         title = "Apart for the kind of light that a pixel shows most of"
         found[title] = Table(["truth", "region", "part", *names], by_region)
     return Measurement(page.plot(path.with_suffix("")), found)
@@ -203,7 +202,7 @@ def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
     shown = {ERROR_TABLES[name]: known[name] for name in ERROR_TABLES if name in known}
     if content.get("strata"):
         try:
-            shown["By what pixels show"] = Table(*_strata_table(content))
+            shown["By what pixels show"] = Table(*summaries.strata_table(content))
         except (LookupError, TypeError, AttributeError):
             raise UserError(f"{path}: is not what scripts/error_vs_time.py writes") from None
     return Measurement(
