@@ -880,7 +880,8 @@ def add_passes(dataset: Path) -> None:
         planes = {channel: np.zeros((64, 64), one.dtype) for channel in one.channels}
         header = {}
         if one.name in ("normal", "object"):
-            planes["B" if one.name == "normal" else "Y"][8:56, 8:56] = 1
+            depth = images.read_image(dataset / "exr" / f"{view}.exr").channels["Z"]
+            planes["B" if one.name == "normal" else "Y"][np.isfinite(depth)] = 1
         if one.name == "cryptomatte":
             planes["CryptoObject00.R"][:], planes["CryptoObject00.G"][:] = 1, 0.6
             planes["CryptoObject00.B"][:], planes["CryptoObject00.A"][:] = 2, 0.4
@@ -925,6 +926,7 @@ BROKEN_PASSES: dict[str, tuple[Spoil, str]] = {
     "long normal": (in_pass("normal", B=1.00012), "1 normals are no unit vectors"),
     "short normal": (in_pass("normal", B=0.99988), "1 normals are no unit vectors"),
     "unknown object": (in_pass("object", Y=7), "has [7], which object/names.json does not have"),
+    "no object": (in_pass("object", Y=0), "1 pixels have a depth or an object, and not both"),
     "unknown matte": (
         in_pass("cryptomatte", CryptoObject00_R=3),
         "has 1 objects that its manifest does not have",

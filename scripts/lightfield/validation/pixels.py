@@ -19,7 +19,7 @@ from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.validation import consistency
 from lightfield.validation.consistency import Answer, Patches
-from lightfield.validation.files import File, ImageSet, rendered, source_view
+from lightfield.validation.files import IMAGES, File, ImageSet, rendered, source_view
 from lightfield.validation.result import Check
 
 Bools = NDArray[np.bool_]
@@ -91,7 +91,7 @@ class Examiner:
             text = f"is {width} × {height}; must be {lens.width} × {lens.height}"
             facts.fault(check, text)
         elif file.of_pass:
-            self._examine_pass(file.of_pass, lens, image, facts)
+            self._examine_pass(file, file.of_pass, image, facts)
         elif file.view >= 0:
             problem = _format_problem(file, image_set, image)
             if problem:
@@ -159,7 +159,7 @@ class Examiner:
             facts.clamped = int(image.attributes.get(images.CLAMPED_ATTRIBUTE, 0))
             facts.fault("counts", f"{facts.nan} rendered values were not a number", facts.nan)
 
-    def _examine_pass(self, wanted: Pass, lens: Lens, image: images.Image, facts: Facts) -> None:
+    def _examine_pass(self, file: File, wanted: Pass, image: images.Image, facts: Facts) -> None:
         problem = _channels_problem(image, dict.fromkeys(wanted.channels, wanted.dtype))
         if problem:
             facts.fault("passes", problem)
@@ -176,6 +176,10 @@ class Examiner:
             unknown = sorted(set(np.unique(pixels).tolist()) - self._numbers(wanted))
             path = f"{wanted.name}/{NAMES}"
             facts.fault("passes", f"has {unknown[:4]}, which {path} does not have", bool(unknown))
+        if wanted.name == "object":
+            missed = self._missed(file)
+            wrong = 0 if missed is None else int(((pixels[0] == 0) != missed).sum())
+            facts.fault("passes", f"{wrong} pixels have a depth or an object, and not both", wrong)
         if wanted.kind == "matte":
             part = pixels[1::2]
             wrong = int(((part < 0) | (np.diff(part, axis=0, append=0) > 0)).any(axis=0).sum())
@@ -187,8 +191,24 @@ class Examiner:
             visible = pixels[2] == 1
             wrong = int((~visible & (pixels[2] != 0)).sum())
             facts.fault("passes", f"{wrong} values of V are neither 0 nor 1", wrong)
+            lens = self.sets[file.set].lightfield.lens
             wrong = int((visible & ~in_frame(lens, pixels[:2])).sum())
             facts.fault("passes", f"{wrong} visible points are out of the frame", wrong)
+
+    def _missed(self, file: File) -> Bools | None:
+        """Return where the rendered view of a pass hits nothing; None if it cannot say so."""
+        image_set = self.sets[file.set]
+        lens = image_set.lightfield.lens
+        if image_set.name or not image_set.lightfield.depth:
+            return None
+        try:
+            path = self.dataset / f"{IMAGES}/{image_set.views[file.view]}.exr"
+            depth = images.read_image(path, ["Z"]).channels["Z"]
+        except UserError:
+            return None  # which has been said
+        # A half knows no depth beyond 65504 m.
+        is_sure = depth.dtype == np.float32 and depth.shape == (lens.height, lens.width)
+        return np.isposinf(depth) if is_sure else None
 
     def _numbers(self, wanted: Pass) -> set[int]:
         """Return the numbers that the names file of a pass has; none if it cannot be read."""
