@@ -35,8 +35,7 @@ from lightfield.core.files import keep_apart, read_json, write_json
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.view_store import ViewStore
-from lightfield.export.source import DEPTH_UNIT, millimetres
-from lightfield.geometry.depth import distance_from_z, z_from_distance
+from lightfield.export.source import DEPTH_UNIT, Floats, check_size, depth_of, millimetres
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -44,8 +43,6 @@ from lightfield.geometry.rigs.split import PARTS
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.imaging import images
 from lightfield.validation.files import Manifest
-
-Floats = NDArray[np.float64]
 
 TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """World to NeRF coordinates, as SILVR's generate_NERF_transforms.py turns its scenes."""
@@ -219,12 +216,16 @@ class _Writer:
         step = max(1, max(self.lens.width, self.lens.height) // _BOUNDS_PIXELS)
         part = np.s_[step // 2 :: step, step // 2 :: step]
         for index in np.unique(np.linspace(0, len(views) - 1, _BOUNDS_VIEWS).round().astype(int)):
-            depth, meaning = self.depth(views[index])
-            yield world_points(depth[part], meaning, self.rays[part], views[index])
+            view, distance = views[index], self.depth(views[index], "distance")[part]
+            points = (self.rays[part] * distance[..., None])[np.isfinite(distance)]
+            yield points @ view.matrix[:3, :3].T + view.matrix[:3, 3]
 
     def frames(self) -> dict[str, dict[str, Any]]:
         """Write every view's files and return the frames that name them, by the view's name."""
         progress = Progress(len(self.lightfield.views), "export")
+        # The loader scales a depth by its ray's length, which is 1 along the axis for perspective
+        # rays, and 1 itself for all others. A depth of 0 is none to it.
+        meaning = "z" if isinstance(self.lens, Rectilinear) else "distance"
         frames = {}
         missing = []
         for view in self.lightfield.views:
@@ -240,7 +241,7 @@ class _Writer:
             }
             if self.arguments.depth_dir:
                 path = self.arguments.depth_dir / f"{view.name}.png"
-                images.write_png(path, depth_map(*self.depth(view), self.lens, self.rays))
+                images.write_png(path, millimetres(self.depth(view, meaning)))
                 self.pictures.append(path)
                 frame["depth_path"] = self.relative(path)
             frames[view.name] = frame
@@ -257,26 +258,10 @@ class _Writer:
         start = self.arguments.output.parent.resolve()
         return Path(os.path.relpath(path.resolve(), start)).as_posix()
 
-    def depth(self, view: View) -> tuple[NDArray[Any], str]:
-        """Return a view's channel Z and whether it is "z" or "distance"."""
+    def depth(self, view: View, meaning: str) -> Floats:
+        """Return a view's depth in metres, (height, width): "z" or "distance"."""
         path = self.image_dir / f"{view.name}.exr"
-        image = images.read_image(path, ["Z"])
-        self.check_size(path, image.channels["Z"])
-        meaning = image.attributes.get(images.DEPTH_ATTRIBUTE, self.lightfield.depth)
-        if meaning not in ("z", "distance"):
-            raise UserError(
-                f"{self.lightfield.path}: depth: is {meaning!r}; must be z or distance "
-                "to say what channel Z of the views holds"
-            )
-        return image.channels["Z"], str(meaning)
-
-    def check_size(self, path: Path, pixels: NDArray[Any]) -> None:
-        height, width = pixels.shape[:2]
-        if (width, height) != (self.lens.width, self.lens.height):
-            raise UserError(
-                f"{path}: is {width} × {height}, but {self.lightfield.path} says "
-                f"{self.lens.width} × {self.lens.height}"
-            )
+        return depth_of(path, self.lightfield, self.rays, meaning)
 
     def copied_exr(self, source: Path) -> Path:
         """Copy R, G, B as half floats, with −1 in pixels that instant-ngp must not train on.
@@ -287,7 +272,7 @@ class _Writer:
         missing = [name for name in "RGB" if name not in channels]
         if missing:
             raise UserError(f"{source}: has no channel {missing[0]}")
-        self.check_size(source, channels["R"])
+        check_size(source, self.lightfield, channels["R"])
         hidden = self.blind | np.isnan(channels.get("Z", np.zeros(1)))
         target = self.exr_dir / source.name
         copied = {name: np.where(hidden, -1, channels[name]).astype(np.float16) for name in "RGB"}
@@ -302,7 +287,7 @@ class _Writer:
         hidden = self.blind
         if image.is_file():
             channels = images.read_image(image).channels
-            self.check_size(image, next(iter(channels.values())))
+            check_size(image, self.lightfield, next(iter(channels.values())))
             if "A" in channels and not self.lightfield.transparent:
                 hidden = hidden | (channels["A"] == 0)
         path = image.with_name(MASK.format(view=view.name))
@@ -372,34 +357,6 @@ def blind_pixels(lens: Lens) -> NDArray[np.bool_]:
         y, x = np.ogrid[: lens.height, : lens.width]
         blind |= (x + 0.5 == lens.center[0]) & (y + 0.5 == lens.center[1])
     return blind
-
-
-def depth_map(
-    depth: NDArray[Any], meaning: str, lens: Lens, rays: NDArray[Any]
-) -> NDArray[np.uint16]:
-    """Return a (height, width) depth map in steps of `DEPTH_UNIT`, 0 where there is none.
-
-    ``meaning`` of ``depth`` is "z" or "distance", ``rays`` are the pixels' unit rays. The loader
-    scales a depth by its ray's length, which is 1 along the axis for perspective rays (so it reads
-    Z-depth), and 1 itself for all others. A depth of 0 is no depth to it; misses, unknown and
-    farther points become that.
-    """
-    values = depth.astype(np.float64)
-    reads_z = isinstance(lens, Rectilinear)
-    if reads_z and meaning == "distance":
-        values = z_from_distance(values, rays)
-    elif not reads_z and meaning == "z":
-        values = distance_from_z(values, rays)
-    return millimetres(values)
-
-
-def world_points(depth: NDArray[Any], meaning: str, rays: NDArray[Any], view: View) -> Floats:
-    """Return the (n, 3) world points, in metres, that the pixels of one view have seen."""
-    distance = depth.astype(np.float64)
-    if meaning == "z":
-        distance = distance_from_z(distance, rays)
-    points = (rays * distance[..., None])[np.isfinite(distance)]
-    return np.asarray(points @ view.matrix[:3, :3].T + view.matrix[:3, 3])
 
 
 def scene_bounds(cameras: Floats, points: Floats) -> tuple[Floats, Floats]:

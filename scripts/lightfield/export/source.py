@@ -1,9 +1,10 @@
 """What an exporter writes from: the views of a lightfield.json, and the surfaces they see."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,9 +89,15 @@ class Source:
             for view in LightField.read(folder / name / NAME).views
         }
 
+    def _image(self, view: View, channels: Sequence[str] | None = None) -> images.Image:
+        """Read a view; raises `UserError` for one of another size than the lens has."""
+        image = images.read_image(self.path(view), channels)
+        check_size(self.path(view), self.lightfield, next(iter(image.channels.values())))
+        return image
+
     def colour(self, view: View) -> NDArray[np.uint8]:
         """Return a view's sRGB pixels, (height, width, 3)."""
-        image = images.read_image(self.path(view))
+        image = self._image(view)
         if self.suffix == ".png":
             return image.srgb
         colour = image.colour
@@ -103,7 +110,7 @@ class Source:
         """Return how much of each pixel (height, width) is covered; 0 where there is no light."""
         covered = self.valid(view).astype(np.float32)
         if self.lightfield.transparent:
-            alpha = images.read_image(self.path(view), ["A"]).channels["A"]
+            alpha = self._image(view, ["A"]).channels["A"]
             scale = np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1
             covered *= alpha.astype(np.float32) / scale
         return np.asarray(np.rint(covered * 255), np.uint8)
@@ -112,15 +119,14 @@ class Source:
         """Return a view's sRGB-encoded colour, (height, width, 3), 0 to 1, not rounded."""
         if self.suffix == ".png":
             return self.colour(view) / 255
-        image = images.read_image(self.path(view))
-        developed = tone_map(image.colour, self.exposure, self.reinhard)
+        developed = tone_map(self._image(view).colour, self.exposure, self.reinhard)
         return np.asarray(encode_srgb(developed), np.float64)
 
     def valid(self, view: View) -> Bools:
         """Return which pixels (height, width) hold light: the lens has a ray there and a source."""
         inside: Bools = np.isfinite(self._rays[..., 0])
         if self.name:
-            channels = images.read_image(self.path(view)).channels
+            channels = self._image(view).channels
             if "A" in channels and not self.lightfield.transparent:
                 inside = inside & (channels["A"] > 0)
             elif "Z" in channels:
@@ -134,7 +140,7 @@ class Source:
         """
         if not self.has_depth:
             raise UserError(f"{self.path(view)}: has no depth; reproject with format: exr")
-        return _depth_of(self.path(view), self.lightfield, self._rays, meaning)
+        return depth_of(self.path(view), self.lightfield, self._rays, meaning)
 
     def write_image(self, view: View, target: Path) -> None:
         """Write a view as an 8-bit PNG; one that is such a PNG becomes a second name of that file.
@@ -168,7 +174,7 @@ class Source:
             # A face of a cube map is named after its view: view_0000f_l.
             below = by_name.get(view.name) or by_name[view.name.rpartition("_")[0]]
             path = self._path(below, "exr", ".exr")
-            distance = _depth_of(path, self.rendered, rays, "distance")
+            distance = depth_of(path, self.rendered, rays, "distance")
             yield view, Surface(self.rendered.lens, below, rays, distance)
 
 
@@ -232,12 +238,33 @@ def millimetres(depth: Floats) -> NDArray[np.uint16]:
     return np.where(valid, steps, 0).astype(np.uint16)
 
 
-def _depth_of(path: Path, lightfield: LightField, rays: Floats, meaning: str) -> Floats:
+def depth_of(path: Path, lightfield: LightField, rays: Floats, meaning: str) -> Floats:
+    """Return a view's depth in metres, (h, w), as "z" or "distance"; NaN where there is no ray.
+
+    ``rays`` (h, w, 3) are those of the pixels. Raises `UserError` for a view of another size, and
+    where nothing says what its channel Z means.
+    """
     image = images.read_image(path, ["Z"])
+    check_size(path, lightfield, image.channels["Z"])
     depth = image.channels["Z"].astype(np.float64)
     held = image.attributes.get(images.DEPTH_ATTRIBUTE, lightfield.depth)
+    if held not in ("z", "distance"):
+        raise UserError(
+            f"{lightfield.path}: depth: is {held!r}; must be z or distance "
+            "to say what channel Z of the views holds"
+        )
     if held == meaning:
         # A pixel without a ray saw nothing.
         return np.where(np.isnan(rays[..., 2]), np.nan, depth)
     convert = z_from_distance if meaning == "z" else distance_from_z
     return convert(depth, rays)
+
+
+def check_size(path: Path, lightfield: LightField, pixels: NDArray[Any]) -> None:
+    """Raise `UserError` for pixels (h, w, …) of a view that are not as many as the lens has."""
+    (height, width), lens = pixels.shape[:2], lightfield.lens
+    if (width, height) != (lens.width, lens.height):
+        raise UserError(
+            f"{path}: is {width} × {height}, but {lightfield.path} says "
+            f"{lens.width} × {lens.height}"
+        )
