@@ -90,16 +90,12 @@ CHOSEN_SCENES = list(dict.fromkeys(dataset.scene_name for dataset in CHOSEN))
 RESULTS = SETTINGS.results
 WORK = SETTINGS.work
 # Those that are not chosen may test what is trained on the chosen ones.
-DATASETS = {
-    (dataset.scene_folder, dataset.rig_folder): dataset for dataset in [*SMOKE, *WHOLE]
-}
+DATASETS = {dataset.name: dataset for dataset in [*SMOKE, *WHOLE]}
 # Any dataset of each scene YAML: all of them have the same .blend.
 SCENES = {dataset.scene_name: dataset for dataset in DATASETS.values()}
 
 # The scenes that are somebody else's views, as a wildcard's constraint; "(?!)" matches nothing.
-IMPORTED = (
-    "|".join({folder for (folder, _), d in DATASETS.items() if d.imported}) or "(?!)"
-)
+IMPORTED = "|".join({d.scene_folder for d in DATASETS.values() if d.imported}) or "(?!)"
 
 # Snakemake sets this up by itself if it is run with --software-deployment-method conda.
 ENVIRONMENT = "../envs/environment.yaml"
@@ -171,16 +167,39 @@ def times_of(job):
     return f"{WORK}/benchmarks/{job}.tsv"
 
 
-def dataset_of(wildcards):
-    """Return the dataset that a job's wildcards mean; ends the run where there is none."""
-    key = (wildcards.scene, wildcards.rig)
-    if key not in DATASETS:
-        name = f"{wildcards.scene}/{wildcards.rig}"
-        names = [f"{scene}/{rig}" for scene, rig in DATASETS]
-        near = " or ".join(difflib.get_close_matches(name, names))
+def one_of(known, name, folder, kind):
+    """Return what has a name, which is in a file's path; ends the run where nothing has."""
+    if name not in known:
+        near = " or ".join(difflib.get_close_matches(name, known))
         hint = f"; is {near} meant?" if near else ""
-        sys.exit(f"error: {RESULTS}/{name}: no dataset of the chosen scenes{hint}")
-    return DATASETS[key]
+        sys.exit(f"error: {folder}/{name}: no {kind}{hint}")
+    return known[name]
+
+
+def dataset_of(wildcards):
+    """Return the dataset that a job's wildcards mean."""
+    name = f"{wildcards.scene}/{wildcards.rig}"
+    return one_of(DATASETS, name, RESULTS, "dataset of the chosen scenes")
+
+
+def scene_of(wildcards):
+    """Return any dataset of the scene that a job's wildcard means."""
+    return one_of(SCENES, wildcards.name, WORK, "chosen scene")
+
+
+def reprojection_of(wildcards):
+    """Return the reprojection that a job's wildcards mean; None of the views themselves."""
+    dataset, name = dataset_of(wildcards), stage_of(wildcards)
+    if name == "render":
+        return None
+    return one_of(dataset.reprojections, name, dataset.folder, "reprojection of it")
+
+
+def export_of(wildcards):
+    """Return what an export's job is asked for."""
+    dataset, name = dataset_of(wildcards), wildcards.format
+    folder = f"{dataset.folder}/exports"
+    return one_of(dataset.exports.wanted, name, folder, "export of it")
 
 
 def of_each_shard(function):
@@ -320,14 +339,14 @@ def renewal(wildcards, stage=None):
     record = dataset.record(
         stage or stage_of(wildcards), wildcards.first, wildcards.end
     )
-    if is_false((wildcards.scene, wildcards.rig), record):
+    if is_false(dataset.name, record):
         made_anew(record)
     return []
 
 
 def checked_blend(wildcards):
     """Return a scene's .blend, which is checked again if it is another file than it was."""
-    dataset = SCENES[wildcards.name]
+    dataset = scene_of(wildcards)
     if dataset.blend_changed:
         made_anew(dataset.blend_check)
     return local(dataset.blend)
@@ -335,7 +354,7 @@ def checked_blend(wildcards):
 
 def listed_blend(wildcards):
     """Return a scene's .blend, which is listed again if a file that it reads is another one."""
-    dataset = SCENES[wildcards.name]
+    dataset = scene_of(wildcards)
     if dataset.external_changed(ViewStore(STORE) if STORE else None):
         made_anew(dataset.inventory)
     return local(dataset.blend) if dataset.source.blend else dataset.blend
@@ -466,11 +485,12 @@ def status_words():
 
 def packed(wildcards):
     """Return the datasets in an archive: a rig's, or one of each frame."""
-    return [
-        dataset
-        for dataset in DATASETS.values()
-        if (dataset.scene_folder, dataset.rig_name) == (wildcards.scene, wildcards.rig)
-    ]
+    rigs = {}
+    for dataset in DATASETS.values():
+        name = f"{dataset.scene_folder}/{dataset.rig_name}"
+        rigs.setdefault(name, []).append(dataset)
+    name = f"{wildcards.scene}/{wildcards.rig}"
+    return one_of(rigs, name, RESULTS, "dataset of the chosen scenes")
 
 
 def packed_sums(wildcards):
@@ -630,9 +650,7 @@ def lens_maps_of(wildcards):
 
 def of_reprojection(attribute):
     """Return the function by which a rule asks for an attribute of its reprojection."""
-    return lambda wildcards: getattr(
-        dataset_of(wildcards).reprojections[wildcards.reprojection], attribute
-    )
+    return lambda wildcards: getattr(reprojection_of(wildcards), attribute)
 
 
 def reprojection_words(wildcards):
@@ -642,31 +660,39 @@ def reprojection_words(wildcards):
 
 
 def instant_ngp_words(wildcards, input):
-    """Return the words that say to scripts/export_instant_ngp.py what to write."""
-    dataset = dataset_of(wildcards)
-    folder = Path(dataset.folder, wildcards.get("reprojection", ""))
-    words = dataset.instant_ngp_words(str(folder))
-    return f"{words} --placed-as {input.trained}" if input.trained else words
+    """Return the words that say to scripts/export_instant_ngp.py from what it writes, and what."""
+    dataset, reprojection = dataset_of(wildcards), reprojection_of(wildcards)
+    words = ["--image-suffix", reprojection.suffix if reprojection else ".exr"]
+    if not reprojection:
+        words += ["--image-dir", f"{dataset.folder}/exr"]
+    if dataset.exports.instant_ngp:
+        folder = Path(dataset.folder, wildcards.source)
+        words += dataset.exports.instant_ngp.words(str(folder))
+    if input.trained:
+        words += ["--placed-as", str(input.trained)]
+    return shlex.join(words)
 
 
 def export_words(wildcards):
     """Return the words that say to scripts/export.py from what it exports, and how."""
     dataset = dataset_of(wildcards)
-    name = wildcards.source.rstrip("/")
-    suffix = dataset.reprojections[name].suffix if name else ".exr"
-    options = dataset.exports.wanted[wildcards.format].model_dump_json(
+    reprojection = reprojection_of(wildcards)
+    suffix = reprojection.suffix if reprojection else ".exr"
+    options = export_of(wildcards).model_dump_json(
         exclude_unset=True, exclude={"sources"}
     )
-    words = ["--source", name or VIEWS, "--suffix", suffix, "--options", options]
-    for other in tested_by(dataset, wildcards.format):
+    name = wildcards.source.rstrip("/") or VIEWS
+    words = ["--source", name, "--suffix", suffix, "--options", options]
+    for other in tested_by(wildcards):
         words += ["--tested-by", other.rig_name, other.folder]
     return shlex.join(words)
 
 
-def tested_by(dataset, format):
+def tested_by(wildcards):
     """Return the datasets whose views go into an export of this one, to test with."""
-    rigs = dataset.tested_by if dataset.exports.wanted[format].is_for_training else ()
-    return [DATASETS[dataset.scene_folder, rig] for rig in rigs]
+    dataset = dataset_of(wildcards)
+    rigs = dataset.tested_by if export_of(wildcards).is_for_training else ()
+    return [DATASETS[f"{dataset.scene_folder}/{rig}"] for rig in rigs]
 
 
 def learned_from(dataset):
@@ -683,7 +709,7 @@ def exported_views(wildcards):
     """
     dataset = dataset_of(wildcards)
     files = [*dataset.records("render"), *records(wildcards)]
-    for other in tested_by(dataset, wildcards.format):
+    for other in tested_by(wildcards):
         files += [*other.records("render"), *other.records(stage_of(wildcards))]
         files += [
             f"{other.folder}/{name}lightfield.json" for name in ("", wildcards.source)
@@ -695,8 +721,8 @@ def split_rigs(wildcards):
     """Return the light fields of a scene whose rigs say what their views are for."""
     return [
         f"{dataset.folder}/lightfield.json"
-        for (scene, _), dataset in DATASETS.items()
-        if scene == wildcards.scene and dataset.splits
+        for dataset in DATASETS.values()
+        if dataset.scene_folder == wildcards.scene and dataset.splits
     ]
 
 
@@ -705,9 +731,8 @@ def trained_by(wildcards):
     dataset = dataset_of(wildcards)
     if dataset.trained_by is None:
         return []
-    name = wildcards.get("reprojection")
     folder = f"{RESULTS}/{dataset.scene_folder}/{dataset.trained_by}"
-    return f"{folder}/{f'{name}/' if name else ''}transforms.json"
+    return f"{folder}/{wildcards.source}transforms.json"
 
 
 def check_device():

@@ -33,6 +33,8 @@ def rendering(job):
     if job.rule.name == CALIBRATE:
         dataset = first_dataset(job.wildcards.scene)
         target, most = map(dataset.render.get, ("target_error", "most_samples"))
+        if target is None:
+            return 0, 0.0
         size = min(dataset.rig.camera.resolution)
         return 0, calibration_seconds(target, size, most)
     return 0, 0.0

@@ -1,55 +1,27 @@
 # Files with which trainers open a dataset.
 
 
-rule export_views_to_instant_ngp:
+rule export_to_instant_ngp:
     input:
         records=records,
-        lightfield=f"{DATASET}/lightfield.json",
+        lightfield=f"{DATASET}/{{source}}lightfield.json",
         trained=trained_by,
     output:
-        f"{DATASET}/transforms.json",
+        f"{DATASET}/{{source}}transforms.json",
     log:
-        log_of("{scene}/{rig}/export_instant_ngp"),
+        log_of("{scene}/{rig}/{source}export_instant_ngp"),
     benchmark:
-        times_of("{scene}/{rig}/export/views")
+        times_of("{scene}/{rig}/export/{source}instant_ngp")
     localrule: True
     conda:
         ENVIRONMENT
     params:
-        views=f"{DATASET}/exr",
-        options=instant_ngp_words,
+        words=instant_ngp_words,
     message:
-        "Exporting {wildcards.scene}/{wildcards.rig} for instant-ngp"
+        "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for instant-ngp"
     shell:
         f"{taking('input.records')}python {SCRIPTS}/export_instant_ngp.py"
-        " --input-cfg {input.lightfield}"
-        " --image-dir {params.views} --image-suffix .exr {params.options} --output {output}"
-        " > {log} 2>&1"
-
-
-rule export_reprojection_to_instant_ngp:
-    input:
-        records=records,
-        lightfield=f"{REPROJECTED}/lightfield.json",
-        trained=trained_by,
-    output:
-        f"{REPROJECTED}/transforms.json",
-    log:
-        log_of("{scene}/{rig}/{reprojection}/export_instant_ngp"),
-    benchmark:
-        times_of("{scene}/{rig}/export/{reprojection}")
-    localrule: True
-    conda:
-        ENVIRONMENT
-    params:
-        suffix=of_reprojection("suffix"),
-        options=instant_ngp_words,
-    message:
-        "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection} for instant-ngp"
-    shell:
-        f"{taking('input.records')}python {SCRIPTS}/export_instant_ngp.py"
-        " --input-cfg {input.lightfield}"
-        " --image-suffix {params.suffix} {params.options} --output {output} > {log} 2>&1"
+        " --input-cfg {input.lightfield} {params.words} --output {output} > {log} 2>&1"
 
 
 rule export:

@@ -14,12 +14,12 @@ rule build_scene:
         mem_mb=8000,
         runtime=30,
     params:
-        builder=lambda wildcards: SCENES[wildcards.name].source.builder,
-        parameters=lambda wildcards: SCENES[
-            wildcards.name
-        ].source.parameters.model_dump_json(),
+        builder=lambda wildcards: scene_of(wildcards).source.builder,
+        parameters=lambda wildcards: scene_of(
+            wildcards
+        ).source.parameters.model_dump_json(),
         # Not in the command: a changed builder makes the scene, and then its views, anew.
-        fingerprint=lambda wildcards: SCENES[wildcards.name].fingerprint,
+        fingerprint=lambda wildcards: scene_of(wildcards).fingerprint,
     message:
         "Building the scene {wildcards.name}"
     shell:
@@ -53,7 +53,7 @@ rule check_blend:
 
 rule inventory:
     input:
-        check=lambda wildcards: SCENES[wildcards.name].blend_check,
+        check=lambda wildcards: scene_of(wildcards).blend_check,
         blend=listed_blend,
     output:
         f"{WORK}/{{name}}/inventory.json",

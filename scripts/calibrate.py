@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from lightfield.core.cli import positive, run
+from lightfield.core.errors import UserError
 from lightfield.core.files import whole, write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import calibration, sampling, trials
@@ -29,6 +30,8 @@ def main() -> None:
     arguments = parser.parse_args()
 
     lightfield = LightField.read(arguments.lightfield)
+    if "target_error" not in lightfield.render:
+        raise UserError(f"{arguments.lightfield}: render: is missing the key target_error")
     maker = trials.Trials.of(arguments, lightfield)
     record, seconds = calibration.calibrate(
         maker, lightfield.render, arguments.size, arguments.probes

@@ -239,8 +239,18 @@ def test_the_default_scene_plans_its_stages(preset, smoke):
     assert "check_blend" not in plan
 
 
-def test_a_dataset_that_there_is_not_is_named_beside_one_that_there_is(other):
-    said = failing(other, "--dry-run", "results/smoke/LFCuboid_1x1/sha256sums.txt")
-    last = said.splitlines()[-1]
-    assert last.startswith("error: results/smoke/LFCuboid_1x1: no dataset of the chosen scenes; is")
-    assert "smoke/LFCuboid_1x1x1" in last and "Traceback" not in said
+@pytest.mark.parametrize(
+    ("target", "problem"),
+    [
+        (
+            "results/smoke/LFCuboid_1x1/sha256sums.txt",
+            "results/smoke/LFCuboid_1x1: no dataset of the chosen scenes; is smoke/LFCuboid_1x1x1",
+        ),
+        (f"{CUBOID}/perspectiv/lightfield.json", f"{CUBOID}/perspectiv: no reprojection of it; is"),
+        (f"{CUBOID}/exports/colmab/export.json", "exports/colmab: no export of it; is colmap me"),
+        ("work/smoky/scene.blend", "work/smoky: no chosen scene; is smoke meant?"),
+    ],
+)
+def test_what_there_is_not_is_named_beside_what_there_is(target, problem, other):
+    last = failing(other, "--dry-run", target).splitlines()[-1]
+    assert last.startswith("error: ") and problem in last

@@ -3,7 +3,6 @@
 import json
 import math
 import os
-import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -268,15 +267,6 @@ class Dataset:
     def panorama_width(self) -> int:
         """Twice a 180 degree fisheye view's angular resolution, within 4096 pixels."""
         return min(4 * self.rig.camera.resolution[0], 4096)
-
-    def instant_ngp_words(self, folder: str) -> str:
-        """Return the words that say to scripts/export_instant_ngp.py what the scene YAML asks for.
-
-        ``folder`` is that of the transforms.json.
-        """
-        return shlex.join(
-            self.exports.instant_ngp.words(folder) if self.exports.instant_ngp else []
-        )
 
     # The scene's files, which all rigs and presets have in common.
 
