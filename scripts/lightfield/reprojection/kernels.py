@@ -182,12 +182,7 @@ def _careful(
 
 @kernel
 def nearest(
-    source: Array,
-    valid: Array,
-    coordinates: Array,
-    flags: Array,
-    topology: Topology,
-    out: Array,
+    source: Array, valid: Array, coordinates: Array, flags: Array, topology: Topology, out: Array
 ) -> None:
     """Take the pixel that each sample falls in."""
     height, width = source.shape[0], source.shape[1]
