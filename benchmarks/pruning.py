@@ -32,7 +32,6 @@ from lightfield.core.files import write_csv, write_text
 from lightfield.dataset import config
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.rendering import pruning
 
 # Tried, and not part of the workflow: a pruning must save something and keep every pixel.
 NOT_KEPT = {
@@ -90,27 +89,30 @@ def main() -> None:
         for scene in arguments.scenes:
             for variant in ("as built", "as artists leave it"):
                 blend = Path(folder, f"{scene} {variant}.blend")
-                found = in_process(make_scene, (scene, variant, arguments.detail, blend))
-                for row in measured(blend, found, arguments.repeats):
+                made = in_process(make_scene, (scene, variant, arguments.detail, blend))
+                for row in measured(blend, *made, arguments.repeats):
                     rows.append({"scene": scene, "variant": variant, **row})
                     print(rows[-1], flush=True)
     write(arguments.output_dir, rows)
 
 
 def in_process(function: Any, argument: Any) -> Any:
-    """Run a function in a fresh process, so that bpy starts anew and memory is its own."""
+    """Run a function in a fresh process, so that bpy starts anew and memory is its own.
+
+    Where this one had imported bpy, that would not find its modules.
+    """
     with get_context("spawn").Pool(1) as pool:
         return pool.apply(function, (argument,))
 
 
-def make_scene(task: tuple[str, str, float, Path]) -> dict[str, Any]:
-    """Build a scene, save it, and return its inventory."""
+def make_scene(task: tuple[str, str, float, Path]) -> tuple[dict[str, Any], dict[str, str]]:
+    """Build a scene, save it, and return its inventory, and why what is left out of it is."""
     scene, variant, detail, path = task
     import importlib
 
     import bpy
 
-    from lightfield.rendering import blend_file, inventory
+    from lightfield.rendering import blend_file, inventory, pruning
 
     source = config.load_scene(scene).scene
     blend_file.new_scene()
@@ -122,19 +124,21 @@ def make_scene(task: tuple[str, str, float, Path]) -> dict[str, Any]:
         bpy.context.object.hide_render = True
     blend_file.save_scene(path)
     blend_file.open_scene(path)
-    return inventory.inventory()
+    found = inventory.inventory()
+    return found, {name: pruning.REASONS[name] for name in pruning.left_out(found)}
 
 
-def measured(blend: Path, found: dict[str, Any], repeats: int) -> Iterator[dict[str, Any]]:
+def measured(
+    blend: Path, found: dict[str, Any], reasons: dict[str, str], repeats: int
+) -> Iterator[dict[str, Any]]:
     """Yield a row for each thing that can be left out of a scene, alone, and for all together."""
-    names = tuple(pruning.left_out(found))
     artists = blend.stem.endswith("as artists leave it")
     whole = Task(blend, hidden=tuple(found["hidden"]), passes=artists)
-    kept = replace(whole, left_out=names, passes=False)
+    kept = replace(whole, left_out=tuple(reasons), passes=False)
     # What is left out, why, from what and with what effect.
     compared = [("nothing", "the scene as it is", whole, whole)]
-    for name in names:
-        compared.append((name, pruning.REASONS[name], whole, replace(whole, left_out=(name,))))
+    for name, reason in reasons.items():
+        compared.append((name, reason, whole, replace(whole, left_out=(name,))))
     if artists:
         compared.append(("passes", ALWAYS["passes"], whole, replace(whole, passes=False)))
     compared.append(("all of these", "what the workflow does", whole, kept))

@@ -1,6 +1,8 @@
 """What a scene contains, what follows from that, and that no pixel tells the difference."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +32,13 @@ NOTHING = {"hidden": [], "animated": [], "moving": [], "motion_blur": False}
 )
 def test_what_is_left_out_follows_from_what_is_there(contains, expected):
     assert pruning.left_out(NOTHING | contains) == expected
+
+
+def test_the_benchmark_of_pruning_leaves_blender_to_processes_that_it_spawns():
+    # A process spawned by one that has imported bpy does not find it.
+    code = "import sys, pruning; sys.exit('bpy' in sys.modules)"
+    folder = Path(__file__).resolve().parents[1] / "benchmarks"
+    subprocess.run([sys.executable, "-c", code], cwd=folder, check=True)
 
 
 @pytest.fixture(scope="module")
