@@ -25,6 +25,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -66,14 +67,6 @@ STYLES = {
     "OpenCV": (ORANGE, "P"),
     "peer": ("black", "X"),
 }
-
-
-@dataclass(frozen=True)
-class Scenario:
-    """A view to make: its name, and the lens."""
-
-    name: str
-    target: Rectilinear
 
 
 @dataclass(frozen=True)
@@ -157,21 +150,22 @@ class Waves:
 # Error against run time
 
 
-def scenarios(size: int) -> list[Scenario]:
-    """Return the views: source pixels a target pixel at the centre are 8, 1 and 1/3."""
+def scenarios(size: int) -> dict[str, Rectilinear]:
+    """Return the views by name: source pixels a target pixel at the centre are 8, 1 and 1/3."""
     unity = size / math.pi  # the source's pixels a radian
-    views = []
-    for name, scale, width in (
-        ("minify by 8", 1 / 8, round(unity / 4)),
-        ("unity", 1.0, round(unity * 2)),
-        ("magnify by 3", 3.0, size // 2),
-    ):
-        focal_length = unity * scale / width * SENSOR
-        lens = Rectilinear(
-            width=width, height=width, focal_length=focal_length, sensor_size=(SENSOR, SENSOR)
+    return {
+        name: Rectilinear(
+            width=width,
+            height=width,
+            focal_length=unity * scale / width * SENSOR,
+            sensor_size=(SENSOR, SENSOR),
         )
-        views.append(Scenario(name, lens))
-    return views
+        for name, scale, width in (
+            ("minify by 8", 1 / 8, round(unity / 4)),
+            ("unity", 1.0, round(unity * 2)),
+            ("magnify by 3", 3.0, size // 2),
+        )
+    }
 
 
 def measure_errors(arguments: argparse.Namespace, folder: Path) -> list[Result]:
@@ -191,32 +185,35 @@ def measure_errors(arguments: argparse.Namespace, folder: Path) -> list[Result]:
     images.write_exr(half, dict.fromkeys("RGB", gray.astype(np.float16)))
     (folder / "lightfield.json").write_text(json.dumps(source.to_lightfield()))
     results = []
-    for scenario in scenarios(size):
-        print(f"{scenario.name}: {scenario.target.width} × {scenario.target.height}", flush=True)
-        spans = source.width / math.pi / scenario.target.focal_length
-        spans *= SENSOR / scenario.target.width
-        truth = scene.means(scenario.target, max(3, math.ceil(1.2 * spans) + 4))
-        io = best_cpu(lambda s=scenario: read_and_write(half, folder / "out.exr", s), arguments)
-        for method, samples, resample in methods(source, scenario.target, pixels):
-            out = resample()
-            error = out - truth
-            cpu = best_cpu(resample, arguments)
-            results.append(row(scenario, method, samples, error, cpu, cpu + io))
+    for name, lens in scenarios(size).items():
+        print(f"{name}: {lens.width} × {lens.height}", flush=True)
+        spans = source.width / math.pi / lens.focal_length * SENSOR / lens.width
+        truth = scene.means(lens, max(3, math.ceil(1.2 * spans) + 4))
+        io = best_cpu(partial(read_and_write, half, folder / "out.exr", lens), arguments)
+        for method, samples, resample in methods(source, lens, pixels):
+            error, cpu = resample() - truth, best_cpu(resample, arguments)
+            results.append(row(name, lens, method, samples, error, cpu, cpu + io))
         if arguments.peer:
-            results += peer_rows(arguments, folder, scenario, truth)
+            results += peer_rows(arguments, folder, name, lens, truth)
     return results
 
 
 def row(
-    scenario: Scenario, method: str, samples: int, error: Array, resample: float | None, all_: float
+    name: str,
+    lens: Lens,
+    method: str,
+    samples: int,
+    error: Array,
+    resample: float | None,
+    all_: float,
 ) -> Result:
     """Return a result, and print it."""
     result = Result(
-        scenario.name,
+        name,
         method,
         samples,
-        scenario.target.width,
-        scenario.target.height,
+        lens.width,
+        lens.height,
         float(np.sqrt(np.mean(error**2))),
         float(np.abs(error).max()),
         resample,
@@ -237,31 +234,27 @@ def methods(
         made = lens_map.compute(source, target, np.eye(3), name, samples)
         row, end_row, column, end_column = made.window
         window = np.ascontiguousarray(pixels[row:end_row, column:end_column])
-
-        def ours(window: Array = window, made: lens_map.LensMap = made) -> Array:
-            return np.asarray(resample_colour(window, made)[:, :, 0])
-
-        found.append((name, samples, ours))
+        found.append((name, samples, partial(ours, window, made)))
     if cv2 is not None:
         cv2.setNumThreads(1)
         made = lens_map.compute(source, target, np.eye(3), "bicubic")
         x = made.centers[..., 0] + np.float32(made.window[2] - 0.5)
         y = made.centers[..., 1] + np.float32(made.window[0] - 0.5)
         for flag in (cv2.INTER_LINEAR, cv2.INTER_CUBIC, cv2.INTER_LANCZOS4):
-
-            def theirs(flag: int = flag) -> Array:
-                return np.asarray(cv2.remap(pixels, x, y, flag)[:, :, 0])
-
-            found.append(("OpenCV", 1, theirs))
+            found.append(("OpenCV", 1, lambda flag=flag: cv2.remap(pixels, x, y, flag)[:, :, 0]))
     return found
 
 
-def read_and_write(source: Path, target: Path, scenario: Scenario) -> None:
+def ours(window: Array, made: lens_map.LensMap) -> Array:
+    return np.asarray(resample_colour(window, made)[:, :, 0])
+
+
+def read_and_write(source: Path, target: Path, lens: Lens) -> None:
     """Do what every method does but for resampling: read a view, write one of the target's size."""
     read = images.read_image(source, ["R", "G", "B"]).channels
     wide = widen(*(read[name] for name in "RGB"))
-    rows = np.arange(scenario.target.height) % len(wide)
-    columns = np.arange(scenario.target.width) % wide.shape[1]
+    rows = np.arange(lens.height) % len(wide)
+    columns = np.arange(lens.width) % wide.shape[1]
     half = narrow(np.ascontiguousarray(wide[rows][:, columns]), 3)
     images.write_exr(target, dict(zip("RGB", half, strict=True)))
 
@@ -278,10 +271,9 @@ def best_cpu(function: Callable[[], Any], arguments: argparse.Namespace) -> floa
 
 
 def peer_rows(
-    arguments: argparse.Namespace, folder: Path, scenario: Scenario, truth: Array
+    arguments: argparse.Namespace, folder: Path, name: str, lens: Rectilinear, truth: Array
 ) -> list[Result]:
     """Return the external program's rows; the least CPU time of its process."""
-    lens = scenario.target
     rows = []
     for flag, samples in (("nn", 1), ("bl", 1), ("bc", 1), ("bc", 2), ("bc", 4), ("bc", 8)):
         command = [
@@ -293,7 +285,7 @@ def peer_rows(
         ]  # fmt: skip
         cpu = min(cpu_of(command) for _ in range(arguments.repeats))
         out = images.read_image(folder / "peer" / "view.exr", ["R"]).channels["R"]
-        rows.append(row(scenario, "peer", samples, out.astype(np.float64) - truth, None, cpu))
+        rows.append(row(name, lens, "peer", samples, out.astype(np.float64) - truth, None, cpu))
     return rows
 
 
@@ -381,18 +373,14 @@ def measure_batches(arguments: argparse.Namespace, folder: Path) -> list[dict[st
     }  # fmt: skip
     rows: list[dict[str, Any]] = []
     for job, flags in jobs.items():
-
-        def ours(filter_name: str, flags: list[str] = flags) -> float:
-            program = [sys.executable, str(SCRIPTS / "reproject.py"), "--filter", filter_name]
-            return run_batch(program, folder, flags)
-
+        program = [sys.executable, str(SCRIPTS / "reproject.py"), "--filter"]
         programs = {
-            f"ours, {DEFAULT_FILTER}": lambda ours=ours: ours(DEFAULT_FILTER),
-            "ours, st_warp": lambda ours=ours: ours("st_warp"),
-            "bare read and write": lambda small="0.125" in flags: bare(folder, small),
+            f"ours, {name}": partial(run_batch, [*program, name], folder, flags)
+            for name in (DEFAULT_FILTER, "st_warp")
         }
+        programs["bare read and write"] = partial(bare, folder, "0.125" in flags)
         if arguments.peer:
-            programs["peer"] = lambda flags=flags: run_batch([str(arguments.peer)], folder, flags)
+            programs["peer"] = partial(run_batch, [str(arguments.peer)], folder, flags)
         for program, measure in programs.items():
             cpu = min(measure() for _ in range(2)) / count
             row = {"job": job, "program": program, "views": count}
