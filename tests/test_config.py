@@ -262,6 +262,19 @@ def test_a_rig_can_take_over_another_rigs_settings(tmp_path):
     assert near.camera == far.camera
 
 
+def test_an_export_of_one_rigs_views_takes_no_heed_of_the_others(tmp_path):
+    content = changed("reprojections.same", {"rigs": ["LFSphere"]})
+    content["rigs"]["LFSphere"]["camera"] = {"lens": "rectilinear", "fov": 60, "resolution": [8, 8]}
+    content["exports"]["colmap"] = {"sources": ["same"]}
+    path = tmp_path / "one.yaml"
+    path.write_text(yaml.safe_dump(content))
+    assert config.read_scene(path).exports.colmap
+    content["exports"]["colmap"] = {"sources": ["views"]}
+    path.write_text(yaml.safe_dump(content))
+    with pytest.raises(UserError, match="views has a lens that COLMAP lacks"):
+        config.read_scene(path)
+
+
 def test_defaults_and_limits_are_applied(tmp_path, monkeypatch):
     (tmp_path / "right.yaml").write_text(yaml.safe_dump(RIGHT, sort_keys=False))
     monkeypatch.setattr(config, "SCENES", tmp_path)

@@ -567,24 +567,18 @@ class Scene(Settings):
             if source not in known:
                 raise ValueError(f"{key}: is {source!r}; must be of {', '.join(known)}")
             has_depth = self.render is None or self.render.depth != "none"
-            rigs = [*self.rigs]
-            if source == VIEWS:
-                cameras = {rig.camera for rig in self.rigs.values()}
-            else:
-                camera = self.reprojections[source].camera
-                cameras = {camera} if camera else {rig.camera for rig in self.rigs.values()}
-                has_depth &= self.reprojections[source].format == "exr"
-                rigs = self.reprojections[source].rigs or rigs
-            for camera in cameras:
-                refusal = export.refusal(camera.make(), has_depth)
-                if refusal:
+            reprojection = None if source == VIEWS else self.reprojections[source]
+            if reprojection:
+                has_depth &= reprojection.format == "exr"
+            names = (reprojection and reprojection.rigs) or self.rigs
+            for name, rig in ((name, self.rigs[name]) for name in names):
+                camera = (reprojection and reprojection.camera) or rig.camera
+                if refusal := export.refusal(camera.make(), has_depth):
                     raise ValueError(f"{key}: {source} {refusal}")
-            for rig in rigs:
-                if self.rigs[rig].is_omnidirectional:
-                    raise ValueError(f"{key}: {source} is of the rig {rig}, without a centre")
-                refusal = export.rig_refusal(self.rigs[rig])
-                if refusal:
-                    raise ValueError(f"{key}: {source} is of the rig {rig}, which {refusal}")
+                if rig.is_omnidirectional:
+                    raise ValueError(f"{key}: {source} is of the rig {name}, without a centre")
+                if refusal := export.rig_refusal(rig):
+                    raise ValueError(f"{key}: {source} is of the rig {name}, which {refusal}")
 
     def _check_rig(self, key: str, name: str, rig: Rig) -> None:
         """Check what of a rig depends on its camera, its file and the depth."""
