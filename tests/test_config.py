@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import jsonschema
+import numpy as np
 import pytest
 import yaml
 
@@ -305,13 +306,19 @@ def test_defaults_and_limits_are_applied(tmp_path, monkeypatch):
 
 def test_a_preset_leaves_the_pixels_of_a_perspective_view_square(tmp_path, monkeypatch):
     camera = {"lens": "rectilinear", "fov": 60, "sensor_size": [36, 24], "resolution": [3000, 2000]}
+    camera["principal_point"] = [1515, 970]
     content = changed("rigs.LFSphere.camera", camera)
     (tmp_path / "right.yaml").write_text(yaml.safe_dump(content))
     monkeypatch.setattr(config, "SCENES", tmp_path)
-    for limits, size in ((Preset(), (36, 24)), (Preset(resolution=64), 36)):
+    whole = (Preset(), (36, 24), (3000, 2000))
+    for limits, size, resolution in (whole, (Preset(resolution=65), 36, (64, 42))):
         datasets = scene_datasets("right", limits=limits)
         (rig,) = [dataset.rig for dataset in datasets if dataset.rig_name == "LFSphere"]
         assert rig.camera.sensor_size == size
+        assert rig.camera.resolution == resolution
+        # As far from the middle, in degrees.
+        x, y = np.subtract(rig.camera.principal_point, np.divide(resolution, 2))
+        assert (x, y) == pytest.approx((15 * resolution[0] / 3000, -30 * resolution[0] / 3000))
         assert rig.camera.make().has_square_pixels
     # What is not written stays so.
     cuboid, sphere = scene_datasets("right", limits=Preset(resolution=64))

@@ -909,18 +909,29 @@ def _limited_render(render: Render | None, rig: Rig, limits: Preset) -> dict[str
 
 
 def _limited(camera: CameraSettings, limits: Preset) -> CameraSettings:
-    """Return the camera with its image's longer side at most ``limits.resolution`` pixels."""
-    width, height = camera.resolution
-    scale = min(1.0, (limits.resolution or max(width, height)) / max(width, height))
-    update: dict[str, Any] = {
-        "resolution": (max(1, round(width * scale)), max(1, round(height * scale)))
-    }
+    """Return the camera with its image's longer side at most ``limits.resolution`` pixels.
+
+    An even side stays even, which video and some trainers need.
+    """
+    longer = max(camera.resolution)
+    most = limits.resolution or longer
+    if most >= longer:
+        return camera
+    scale = (most if longer % 2 else max(1, most // 2 * 2)) / longer
+    steps = [2 - side % 2 for side in camera.resolution]
+    sizes = [
+        max(1, step * round(side * scale / step))
+        for side, step in zip(camera.resolution, steps, strict=True)
+    ]
+    update: dict[str, Any] = {"resolution": tuple(sizes)}
     if camera.principal_point:
-        x, y = camera.principal_point
-        update["principal_point"] = (x * scale, y * scale)
+        update["principal_point"] = tuple(
+            (at - side / 2) * scale + size / 2
+            for at, side, size in zip(camera.principal_point, camera.resolution, sizes, strict=True)
+        )
     lens, size = camera.make(), camera.sensor_size
     square = isinstance(lens, Rectilinear) and lens.has_square_pixels
-    if scale < 1 and square and isinstance(size, tuple):
+    if square and isinstance(size, tuple):
         # Pixels stay square where a side is rounded.
         update["sensor_size"] = size[0]
     return camera.model_copy(update=update)
