@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -525,6 +526,10 @@ def test_every_lens_is_a_target_and_a_source(dataset, run, flags):
         ((*PERSPECTIVE, "--png", "--no-reproject"), "--no-reproject: excludes"),
         ((*PERSPECTIVE, "--png", "--i-equidistant", "3"), "the input lens comes from --input-cfg"),
         ((*PERSPECTIVE, "--png", "--filter-prefix", "zebra"), "no image passes the filters"),
+        (
+            (*PERSPECTIVE, "--png", "--views", "0:2", "--filter-prefix", "zebra"),
+            "no image passes the filters",
+        ),
         ((*PERSPECTIVE, "--png", "--lens-map", "none.npy"), "none.npy: is not a lens map"),
     ],
 )
@@ -532,6 +537,13 @@ def test_mistakes_are_named(run, flags, told):
     with pytest.raises(UserError) as error:
         run(*flags)
     assert told in str(error.value)
+
+
+def test_two_images_of_one_name_are_named(dataset, run):
+    for name in ("view.exr", "view.f.exr", "view.png"):
+        shutil.copy(dataset / "exr" / "view_0000f.exr", dataset / "exr" / name)
+    with pytest.raises(UserError, match=r"view\.exr and .*view\.png: would have one output"):
+        run(*PERSPECTIVE, "--png")
 
 
 def test_an_error_is_one_line_and_an_exit_status(dataset, run_program):

@@ -245,21 +245,13 @@ class Job:
         if not folder.is_dir():
             raise UserError(f"--input-dir {folder}: no such folder")
         if arguments.views:
-            return [
-                SourceView(name, _find(folder, name, self.source)) for name in self._chosen_names()
-            ]
-        paths = sorted(
-            path
-            for path in folder.iterdir()
-            if path.suffix.lower() in SUFFIXES and not path.name.startswith(".") and path.is_file()
-        )
-        if isinstance(self.source, CubeMap):
-            stems = [path.stem[:-2] for path in paths if path.stem.endswith("_f")]
-            views = [SourceView(stem, _find(folder, stem, self.source)) for stem in stems]
+            names = [view.name for view in self.lightfield.views]
+            names = names[view_slice(arguments.views, len(names))]
+            views = [SourceView(name, _find(folder, name, self.source)) for name in names]
         else:
-            views = [SourceView(path.stem, (path,)) for path in paths]
+            views = self._views_in(folder)
         views = [view for view in views if self._passes(view.name, view.paths[0].suffix)]
-        for first, second in itertools.pairwise(views):
+        for first, second in itertools.pairwise(sorted(views, key=lambda view: view.name)):
             if first.name == second.name:
                 raise UserError(
                     f"{first.paths[0]} and {second.paths[0]}: would have one output; "
@@ -269,10 +261,16 @@ class Job:
             raise UserError(f"--input-dir {folder}: no image passes the filters")
         return views
 
-    def _chosen_names(self) -> list[str]:
-        names = [view.name for view in self.lightfield.views]
-        chosen = names[view_slice(self.arguments.views, len(names))]
-        return [name for name in chosen if self._passes(name, ".exr")]
+    def _views_in(self, folder: Path) -> list[SourceView]:
+        paths = sorted(
+            path
+            for path in folder.iterdir()
+            if path.suffix.lower() in SUFFIXES and not path.name.startswith(".") and path.is_file()
+        )
+        if isinstance(self.source, CubeMap):
+            stems = [path.stem[:-2] for path in paths if path.stem.endswith("_f")]
+            return [SourceView(stem, _find(folder, stem, self.source)) for stem in stems]
+        return [SourceView(path.stem, (path,)) for path in paths]
 
     def _passes(self, name: str, suffix: str) -> bool:
         """Whether a name passes the filters; theirs may have ``suffix`` or not."""
