@@ -83,9 +83,10 @@ def test_what_no_view_sees_is_a_hole():
     assert np.median(np.abs(colour)) < 0.01
 
 
-def test_a_view_at_a_source_is_that_source():
+@pytest.mark.parametrize("times", [1, 256])
+def test_a_view_at_a_source_is_that_source(times):
     field = sources(look_at_ball)
-    made = field.blended(field.matrices[3], field.lens, [3])
+    made = field.blended(field.matrices[3], field.lens, [3] * times)
     colour, distance = look_at_ball(field.lens, field.matrices[3])
     amid = ~field.surface(3).torn & ~made.holes
     assert amid.mean() > 0.6

@@ -185,11 +185,11 @@ def draw_pixels(pixels: Array, values: Array, wraps: bool, inverse: Array, drawn
 
 
 @kernel
-def blend(inverses: Array, drawn: Array, colour: Array, inverse: Array, count: Array) -> None:
+def blend(inverses: Array, drawn: Array, colour: Array, inverse: Array, holes: Array) -> None:
     """Blend drawings (k, H, W) of which the nearest surface counts, by their weights.
 
-    ``colour`` (H, W, 3) and ``inverse`` (H, W) become NaN where no drawing has anything, ``count``
-    (H, W) the number of drawings that were blended.
+    ``colour`` (H, W, 3) and ``inverse`` (H, W) become NaN where no drawing has anything: there are
+    ``holes`` (H, W).
     """
     number, height, width = inverses.shape
     for i in range(height):
@@ -197,8 +197,8 @@ def blend(inverses: Array, drawn: Array, colour: Array, inverse: Array, count: A
             nearest = np.float32(-1)
             for k in range(number):
                 nearest = max(nearest, inverses[k, i, j])
-            count[i, j] = 0
-            if nearest < 0:
+            holes[i, j] = nearest < 0
+            if holes[i, j]:
                 colour[i, j], inverse[i, j] = np.nan, np.nan
                 continue
             total = mean = red = green = blue = np.float32(0)
@@ -211,7 +211,6 @@ def blend(inverses: Array, drawn: Array, colour: Array, inverse: Array, count: A
                 green += weight * drawn[k, i, j, 1]
                 blue += weight * drawn[k, i, j, 2]
                 mean += weight * inverses[k, i, j]
-                count[i, j] += 1
             inverse[i, j] = mean / total
             colour[i, j, 0] = red / total
             colour[i, j, 1] = green / total

@@ -39,17 +39,12 @@ TORN_WEIGHT = 1e-3
 @dataclass(frozen=True)
 class Synthesised:
     """A picture: linear ``colour`` (h, w, 3), NaN in its holes; ``distance`` (h, w) in metres, inf
-    where nothing was hit; ``count`` (h, w), the number of views that were blended.
+    where nothing was hit; ``holes`` (h, w), which pixels no view sees, or the lens does not.
     """
 
     colour: Array
     distance: Array
-    count: Array
-
-    @property
-    def holes(self) -> Array:
-        """Which pixels (h, w) no view sees, or the lens does not."""
-        return np.equal(self.count, 0)
+    holes: Array
 
     def hole_fraction(self, rays: Array) -> float:
         """Return the part of the lens's ``rays`` (h, w, 3) that no view sees."""
@@ -183,12 +178,12 @@ class Sources:
             surface = self.surface(index)
             self._draw(surface, self.matrices[index], target, lens, inverses[place], drawn[place])
         colour, inverse = np.empty((*shape, 3), np.float32), np.empty(shape, np.float32)
-        blended = np.empty(shape, np.uint8)
-        kernels.blend(inverses, drawn, colour, inverse, blended)
+        holes = np.empty(shape, bool)
+        kernels.blend(inverses, drawn, colour, inverse, holes)
         outside = np.isnan(lens.pixel_rays()[..., 0])
-        colour[outside], inverse[outside], blended[outside] = np.nan, np.nan, 0
+        colour[outside], inverse[outside], holes[outside] = np.nan, np.nan, True
         with np.errstate(divide="ignore"):
-            return Synthesised(colour, 1 / inverse, blended)
+            return Synthesised(colour, 1 / inverse, holes)
 
     def _draw(
         self,
