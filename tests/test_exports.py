@@ -23,6 +23,7 @@ from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.export import disparity
+from lightfield.export.points import evenly
 from lightfield.export.source import Source, Surface
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
@@ -724,3 +725,14 @@ def test_points_are_lifted_from_views_that_see_the_sky_too():
         points, normals = surface.points(1)
     assert points.shape == normals.shape == (16, 3)
     np.testing.assert_allclose(np.linalg.norm(points, axis=1), 3)
+
+
+def test_points_that_several_views_see_alike_are_kept_once():
+    points = np.random.default_rng(1).normal(size=(50, 3))
+    assert evenly(np.repeat(points, 4, axis=0), 100).tolist() == list(range(0, 200, 4))
+
+
+def test_views_of_another_lens_do_not_test(dataset):
+    source = Source(dataset / "perspective", "", ".exr", {"other": dataset / "shifted"})
+    with pytest.raises(UserError, match="camera: is another than that of"):
+        _ = source.lightfield

@@ -106,6 +106,10 @@ def evenly(positions: Floats, count: int) -> NDArray[np.intp]:
     """Return the indices of at most ``count`` of the ``positions`` (n, 3), evenly spread."""
     if len(positions) <= count:
         return np.arange(len(positions))
+    # Views at one place see the same points, of which there may be no more than are wanted.
+    different = np.sort(np.unique(positions, axis=0, return_index=True)[1])
+    if len(different) <= count:
+        return different
     return _one_a_voxel(positions, _voxel_for(positions, count))
 
 

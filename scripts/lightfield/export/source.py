@@ -59,8 +59,10 @@ class Source:
         own.require_centre()
         views = list(own.views)
         for rig, folder in self.beside.items():
-            for view in LightField.read(folder / name / NAME).views:
-                views.append(replace(view, name=f"{rig}_{view.name}"))
+            other = LightField.read(folder / name / NAME)
+            if other.lens != own.lens:
+                raise UserError(f"{other.path}: camera: is another than that of {own.path}")
+            views += [replace(view, name=f"{rig}_{view.name}") for view in other.views]
         return own.changed(views=views)
 
     @property
