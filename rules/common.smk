@@ -298,6 +298,12 @@ def noted_sums():
         return {}
 
 
+@cache
+def damage(path):
+    """Return what is wrong with a file, if anything, which all datasets of a scene may have."""
+    return ledger.damage(noted_sums(), path)
+
+
 def whole(wildcards):
     """Return no input, but let what is broken or out of date of a dataset be made anew.
 
@@ -307,8 +313,10 @@ def whole(wildcards):
     That it is broken is said here; it is set aside when the run starts.
     """
     dataset = dataset_of(wildcards)
-    damaged = ledger.damaged(noted_sums(), dataset.view_sources)
-    for path, problem in (*dataset.broken(), *damaged):
+    sources = ((path, damage(path)) for path in dataset.view_sources)
+    for path, problem in (*dataset.broken(), *sources):
+        if problem is None:
+            continue
         if path not in BROKEN:
             print(f"{path}: {problem}; it is made anew", file=sys.stderr)
             BROKEN[path] = problem

@@ -6,7 +6,7 @@ What lies in a shard is not in it: a shard's own record and log have that.
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -61,11 +61,11 @@ def note(
         write(path, files)
 
 
-def damaged(files: Sums, paths: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Yield each path that has other bytes than those noted in ``files``, and what is wrong."""
-    for path in paths:
-        if path in files and Path(path).is_file() and sha256(path) != files[path]["sha256"]:
-            yield path, f"its sha256 is not the one in {NAME}"
+def damage(files: Sums, path: str) -> str | None:
+    """Say of a file that it has other bytes than those noted in ``files``; None if it has not."""
+    if path in files and Path(path).is_file() and sha256(path) != files[path]["sha256"]:
+        return f"its sha256 is not the one in {NAME}"
+    return None
 
 
 def _digest(files: Any) -> str:
