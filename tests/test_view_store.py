@@ -77,6 +77,15 @@ def test_what_the_store_has_lost_is_made_again(shard, store, tmp_path, spoil):
     assert last.is_finished(third / VIEW, KEY)
 
 
+def test_what_is_cut_short_in_the_store_is_not_there(store, tmp_path):
+    path = write(tmp_path / "texture.png", b"texture")
+    assert not store.has(digest(b"texture"), 7)
+    store.put(path, digest(b"texture"))
+    assert store.has(digest(b"texture"), 7)
+    write(tmp_path / "store/views/sums" / digest(b"texture"), b"text")
+    assert not store.has(digest(b"texture"), 7)
+
+
 def test_consumers_take_what_records_and_manifests_list(shard, store, run_program):
     folder, record = shard("one")
     make(folder, record, VIEW, b"view")

@@ -531,7 +531,7 @@ class Dataset:
         try:
             return any(
                 _size_and_time(home / file["path"]) != (file["bytes"], file["mtime_ns"])
-                or (store and file["bytes"] and not store.has(file["sha256"]))
+                or (store and file["bytes"] and not store.has(file["sha256"], file["bytes"]))
                 for file in json.loads(Path(str(self.inventory)).read_bytes())["external_files"]
             )
         except FileNotFoundError:

@@ -122,10 +122,13 @@ class ViewStore:
         notes = (note.rpartition("@") for note in self.names(f"views/keys/{key}"))
         return [(name.replace("@", "/"), digest) for name, separator, digest in notes if separator]
 
-    def has(self, digest: str) -> bool:
-        """Return whether there is a file of a SHA-256, by its name alone."""
+    def has(self, digest: str, size: int) -> bool:
+        """Return whether there is a file of a SHA-256, by its name and bytes alone."""
         with self._answering():
-            return bool((self._root / "sums" / digest).is_file())
+            try:
+                return bool((self._root / "sums" / digest).stat().st_size == size)
+            except FileNotFoundError:
+                return False
 
     def take(self, digest: str, target: Path) -> bool:
         """Make ``target`` the file of a SHA-256, unless it is; return False where there is none."""
