@@ -78,17 +78,20 @@ rule inventory:
         " --scene {wildcards.name} --blend {input.blend:q} --output {output} > {log} 2>&1"
 
 
+# Several scenes may have one.
+BLENDS = {d.source.blend: name for name, d in SCENES.items() if d.source.blend}
+
 # Only where a scene YAML says from where, and the user has not brought the file: Snakemake removes
 # what a rule makes before it makes it again, as with --forceall, and it may be a work of weeks.
-for name, dataset in SCENES.items():
-    if not dataset.source.url or Path(dataset.blend).exists():
+for blend, name in BLENDS.items():
+    if not SCENES[name].source.url or Path(blend).exists():
         continue
 
     rule:
         name:
             f"fetch_{name}"
         output:
-            local(dataset.blend),
+            local(blend),
         log:
             log_of(f"{name}/fetch_blend"),
         # Where Snakemake runs: a cluster's nodes may not reach the Internet.
@@ -106,19 +109,17 @@ for name, dataset in SCENES.items():
 
 
 # Only where jobs see no common folder: Snakemake brings them the copy in its storage.
-for name, dataset in SCENES.items() if STORE else ():
-    if not dataset.source.blend:
-        continue
+for blend, name in BLENDS.items() if STORE else ():
 
     rule:
         name:
             f"store_{name}"
         input:
             # Another file may be older than the copy of the one before.
-            check=dataset.blend_check,
-            blend=local(dataset.blend),
+            check=SCENES[name].blend_check,
+            blend=local(blend),
         output:
-            dataset.blend,
+            blend,
         log:
             log_of(f"{name}/store_blend"),
         localrule: True

@@ -359,17 +359,19 @@ def test_a_blend_newer_than_bpy_is_an_error_that_names_both_versions(newer, run_
 
 @pytest.mark.slow
 def test_a_blend_needs_no_builder_and_a_builder_no_blend(server, tmp_path):
+    fetched = BLEND_SCENE.format(blend="blends/fetched.blend", more=f", url: {server.url}")
     folder = checkout(
         tmp_path,
         brought=BLEND_SCENE.format(blend="mine.blend", more=""),
-        fetched=BLEND_SCENE.format(blend="blends/fetched.blend", more=f", url: {server.url}"),
+        fetched=fetched,
+        again=fetched,
         built=BLEND_SCENE.replace("blend: {blend}{more}", "builder: room").format(),
     )
     (folder / "mine.blend").write_bytes(CONTENT)
-    chosen = ("--config", "scenes=[brought,fetched,built]", "rigs=all", "preset=full")
+    chosen = ("--config", "scenes=[brought,again,fetched,built]", "rigs=all", "preset=full")
     jobs = planned(folder, *chosen)
-    assert jobs["render"] == 3
-    assert jobs["check_blend"] == 2
+    assert jobs["render"] == 4
+    assert jobs["check_blend"] == 3
     assert jobs["fetch_fetched"] == jobs["build_scene"] == 1
     assert not any(name.startswith("fetch_") for name in jobs if name != "fetch_fetched")
 
@@ -378,5 +380,5 @@ def test_a_blend_needs_no_builder_and_a_builder_no_blend(server, tmp_path):
     assert (folder / "blends" / "fetched.blend").read_bytes() == CONTENT
     # What is there is never removed, to be fetched again.
     jobs = planned(folder, "--forceall", *chosen)
-    assert jobs["check_blend"] == 2
+    assert jobs["check_blend"] == 3
     assert not any(name.startswith("fetch_") for name in jobs)
