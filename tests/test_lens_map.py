@@ -180,8 +180,9 @@ def test_a_file_gives_back_what_was_saved(tmp_path, name, samples):
             assert np.array_equal(found, value, equal_nan=True), key
             assert isinstance(found, np.memmap) and found.flags.aligned, key
     first = path.read_bytes()
-    lens_map.save(path, made)
-    assert path.read_bytes() == first
+    for again in (path, tmp_path / "of another name"):
+        lens_map.save(again, made)
+        assert again.read_bytes() == first
 
 
 @pytest.mark.parametrize("target", [rectilinear(20), rectilinear(21), rectilinear(1)])

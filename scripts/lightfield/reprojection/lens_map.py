@@ -229,7 +229,8 @@ def save(path: Path | str, lens_map: LensMap) -> None:
         record["description"] = description
         for name, array in fields.items():
             record[name][0] = array
-        np.save(temporary, record)
+        with temporary.open("wb") as file:
+            np.save(file, record)
         try:
             # NumPy does not report what is lost when it closes the file.
             np.load(temporary, mmap_mode="r")
