@@ -147,6 +147,9 @@ def test_a_changed_copy_has_another_lens_other_views_and_other_keys(tmp_path: Pa
 def test_a_key_of_ours_that_another_tool_did_not_write_is_named(key: str) -> None:
     with pytest.raises(UserError, match=f"^lightfield.json: {key}: is missing; .*make_lightfield"):
         getattr(LightField.from_rig(PLANE, FISHEYE), key)
+    if key != "render":
+        with pytest.raises(UserError, match=f"^lightfield.json: {key}: must be a "):
+            getattr(LightField.from_rig(PLANE, FISHEYE, **{key: "one"}), key)
 
 
 NO_NAME = "name: must be a file name, not "
@@ -159,6 +162,9 @@ BROKEN = {
     "no camera": ({"frames": []}, "camera: is missing"),
     "no frames": (content(frames=None), "frames: must be a list of views"),
     "no view": (content(frames=[]), "frames: is empty"),
+    "a text for settings": (content(render="cycles"), "render: must be a mapping"),
+    "no list of passes": (content(passes=3), "passes: must be of normal, object"),
+    "a pass that there is not": (content(render={"passes": ["x"]}), "passes: must be of normal"),
     "frame is no mapping": (content(frames=[3]), "frames[0]: must be a mapping, not 3"),
 }
 BROKEN_FRAMES: dict[str, tuple[dict[str, Any], str]] = {

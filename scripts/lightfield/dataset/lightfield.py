@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
 from lightfield.dataset import passes
-from lightfield.dataset.passes import Pass
+from lightfield.dataset.passes import PASSES, Pass
 from lightfield.geometry import lenses, rotations
 from lightfield.geometry.flow import neighbours
 from lightfield.geometry.lenses import Lens
@@ -83,7 +83,7 @@ class LightField:
     ``lens`` is that of every view. ``depth`` is what channel Z of the views means: "z", along the
     optical axis, "distance", or None for no depth; where the file lacks the key, as SILVR's do, it
     is "z" if the lens can have that. Raises `UserError`, one line with ``path`` and the key, for a
-    lens that is not known and for a depth that it cannot have.
+    lens that is not known, for a depth that it cannot have, and for passes that there are not.
     """
 
     content: Mapping[str, Any]
@@ -104,6 +104,10 @@ class LightField:
                 f"{self.path}: depth: is {self.depth!r}; with this lens it must be "
                 f"{'z, ' if usual == 'z' else ''}distance or null"
             )
+        try:
+            self.passes  # noqa: B018
+        except (LookupError, TypeError):
+            raise UserError(f"{self.path}: passes: must be of {', '.join(PASSES)}") from None
 
     @classmethod
     def from_rig(cls, rig: "rigs.Rig | Mapping[str, Any]", lens: Lens, **keys: Any) -> "LightField":
@@ -220,7 +224,8 @@ class LightField:
     @property
     def frame(self) -> int:
         """The frame of the scene that was rendered."""
-        return int(self._key("frame"))
+        frame: int = self._key("frame", int, "a whole number")
+        return frame
 
     @property
     def scene(self) -> Mapping[str, Any]:
@@ -237,13 +242,12 @@ class LightField:
     @property
     def passes(self) -> list[Pass]:
         """What the views have beside colour and depth; of a reprojection, what it has itself."""
-        render = self.content.get("render", {})
-        return passes.wanted(self.content if "passes" in self.content else render)
+        return passes.wanted(self.content if "passes" in self.content else self._render)
 
     @property
     def transparent(self) -> bool:
         """Whether the views' channel A is how much of a pixel the scene covers."""
-        return bool(self.content.get("render", {}).get("transparent"))
+        return bool(self._render.get("transparent"))
 
     def require_rig(self, rig: "rigs.Rig") -> None:
         """Raise `UserError` where these are not as many views as a rig has."""
@@ -260,9 +264,15 @@ class LightField:
                 "sees what they do, and no other program reads their poses"
             )
 
-    def _key(self, key: str) -> Any:
+    @property
+    def _render(self) -> Mapping[str, Any]:
+        return self.render if "render" in self.content else {}
+
+    def _key(self, key: str, kind: type = Mapping, words: str = "a mapping") -> Any:
         if key not in self.content:
             raise UserError(f"{self.path}: {key}: is missing; scripts/make_lightfield.py writes it")
+        if not isinstance(self.content[key], kind):
+            raise UserError(f"{self.path}: {key}: must be {words}")
         return self.content[key]
 
 
