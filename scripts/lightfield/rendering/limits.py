@@ -1,6 +1,6 @@
 """What Cycles renders wrong without a word: far from the origin, behind layers, through glass."""
 
-from collections.abc import Iterator, Set
+from collections.abc import Collection, Iterator
 from typing import Any
 
 import bpy
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lightfield.geometry.rigs.sphere import icosphere
 from lightfield.rendering.clearance import REACH
-from lightfield.rendering.inventory import contributing, surface_features
+from lightfield.rendering.inventory import surface_features
 
 Floats = NDArray[np.float64]
 
@@ -39,14 +39,14 @@ def warnings(positions: Floats, distances: Floats) -> Iterator[str]:
         )
     limit = bpy.context.scene.cycles.transparent_max_bounces
     step = max(1, len(positions) // MOST_CAMERAS)
-    clear = {material.name_full for material in bpy.data.materials if _is_transparent(material)}
+    clear = _materials("transparency")
     some = positions[::step][:MOST_CAMERAS]
     if clear and any(_meets_more(limit, position, clear) for position in some):
         yield (
             f"more than {limit} transparent surfaces lie behind each other, and what is behind "
             f"{limit} may be black: raise Max Bounces: Transparent in the .blend's Light Paths"
         )
-    glass = sorted(material.name_full for material in bpy.data.materials if _is_glass(material))
+    glass = _materials("transmission")
     small = sorted(thing.name_full for thing in bpy.context.scene.objects if _has_no_size(thing))
     # Filter Glossy lets it through, and more dimly.
     if glass and small and not bpy.context.scene.cycles.blur_glossy:
@@ -56,7 +56,7 @@ def warnings(positions: Floats, distances: Floats) -> Iterator[str]:
         )
 
 
-def _meets_more(limit: int, position: Floats, clear: Set[str]) -> bool:
+def _meets_more(limit: int, position: Floats, clear: Collection[str]) -> bool:
     """Return whether a ray from a camera meets more than ``limit`` of the ``clear`` materials."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for vertex in icosphere(2):
@@ -86,19 +86,13 @@ def _material(thing: Any, index: int) -> str | None:
     return str(material.name_full) if material else None
 
 
-def _is_transparent(material: Any) -> bool:
-    return "transparency" in (feature for feature, _ in surface_features(material))
-
-
-def _is_glass(material: Any) -> bool:
-    output = material.node_tree.get_output_node("CYCLES") if material.node_tree else None
-    for node in contributing(output) if output else ():
-        transmission = node.inputs.get("Transmission Weight")
-        if node.bl_idname in ("ShaderNodeBsdfGlass", "ShaderNodeBsdfRefraction") or (
-            transmission and (transmission.is_linked or transmission.default_value)
-        ):
-            return True
-    return False
+def _materials(feature: str) -> list[str]:
+    """Return the full names of the materials that have one of `inventory.FEATURES`."""
+    return sorted(
+        material.name_full
+        for material in bpy.data.materials
+        if feature in (found for found, _ in surface_features(material))
+    )
 
 
 def _has_no_size(thing: Any) -> bool:

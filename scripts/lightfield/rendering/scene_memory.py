@@ -38,16 +38,12 @@ def measure(blend: Path, inventory: Mapping[str, Any], chosen: Mapping[str, Any]
         # What the .blend reads is where it is: nothing is taken from a view store.
         write_json(folder / "inventory.json", {**inventory, "external_files": []})
         words: list[Any] = [
-            "--blend",
-            blend,
-            "--lightfield",
-            folder / "lightfield.json",
-            "--threads",
-            "1",
+            *("--blend", blend, "--lightfield", folder / "lightfield.json"),
+            *("--inventory", folder / "inventory.json", "--journal", folder / "journal.jsonl"),
+            *("--output", folder / "exr", "--device", "cpu", "--threads", "1"),
         ]
-        words += ["--inventory", folder / "inventory.json", "--journal", folder / "journal.jsonl"]
         result = subprocess.run(
-            [sys.executable, PROGRAM, *words, "--output", folder / "exr", "--device", "cpu"],
+            [sys.executable, PROGRAM, *words],
             capture_output=True,
             text=True,
             check=False,

@@ -84,6 +84,11 @@ class ImageSet:
     def views(self) -> list[str]:
         return [view.name for view in self.lightfield.views]
 
+    @cached_property
+    def numbers(self) -> dict[str, int]:
+        """The places of its views by their names."""
+        return {name: number for number, name in enumerate(self.views)}
+
     def camera(self, view: int) -> Camera:
         depth = self.lightfield.depth
         assert depth is not None
@@ -132,9 +137,9 @@ def rendered(sets: Sequence[ImageSet]) -> ImageSet | None:
 
 def source_view(source: ImageSet | None, name: str) -> int | None:
     """Return the number of the view of which a reprojected one of this name was made."""
-    views = source.views if source else []
+    numbers = source.numbers if source else {}
     # A face of a cube map is named for its view, and itself.
-    return next((views.index(n) for n in (name, name.rpartition("_")[0]) if n in views), None)
+    return numbers.get(name, numbers.get(name.rpartition("_")[0]))
 
 
 def _poses(image_set: ImageSet, source: ImageSet | None) -> Check:
@@ -392,10 +397,10 @@ def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:
         elif around[view][1]:
             faults[f"{IMAGES}/{view}.exr"] = "its camera is inside geometry"
     nearest = min((around[view][0] for view in views if view in around), default=math.inf)
-    if math.isinf(nearest):
-        return Check.of_files("cameras", faults, "nothing is near a camera")
-    detail = f"nothing is nearer to a camera than {nearest:.3g} m"
-    figures = {"nearest_metres": round(nearest, 4)}
+    detail, figures = "nothing is near a camera", {}
+    if math.isfinite(nearest):
+        detail = f"nothing is nearer to a camera than {nearest:.3g} m"
+        figures = {"nearest_metres": round(nearest, 4)}
     return Check.of_files("cameras", faults, detail, figures=figures)
 
 
