@@ -423,8 +423,7 @@ def _axis_pixels(lens: Lens, tangent: float) -> tuple[float, float]:
 
 def _is_full_panorama(lens: Lens) -> bool:
     """Whether the lens's rays are those of the loader's ``latlong``."""
-    full = ((-math.pi, math.pi), (-math.pi / 2, math.pi / 2))
-    return isinstance(lens, Equirectangular) and np.allclose((lens.longitude, lens.latitude), full)
+    return isinstance(lens, Equirectangular) and lens.is_full
 
 
 def _ftheta(lens: Lens) -> list[float]:

@@ -72,9 +72,7 @@ class Reference:
     @property
     def weights(self) -> Array:
         """What a squared difference of each pixel and channel is multiplied by, (n, 3)."""
-        gain = 4.0**self.exposure
-        weights: Array = gain / (gain * self.colour[self.counted] ** 2 + EPSILON)
-        return weights
+        return _weights(self.colour[self.counted], self.exposure)
 
     @property
     def unexposed_weights(self) -> tuple[Array, Array]:
@@ -87,6 +85,12 @@ class Reference:
         """Expected relative mean squared error of the reference itself."""
         own = (self.variance[self.counted] * self.weights).mean(axis=-1)
         return float(own[_inliers(own)].mean())
+
+
+def _weights(truth: Array, exposure: float) -> Array:
+    gain = 4.0**exposure
+    weights: Array = gain / (gain * truth**2 + EPSILON)
+    return weights
 
 
 def make_reference(
@@ -230,8 +234,7 @@ def bias_correlation(
         means.append(stack.mean(axis=0) - reference.colour.reshape(-1, 3)[where])
         noise = stack.var(axis=0, ddof=1) / len(stack)
         squares.append(means[-1] ** 2 - noise - reference.variance.reshape(-1, 3)[where])
-    gain = 4.0 ** references[0].exposure
-    weights = gain / (gain * references[0].colour.reshape(-1, 3)[seen[0]] ** 2 + EPSILON)
+    weights = _weights(references[0].colour.reshape(-1, 3)[seen[0]], references[0].exposure)
     known = [(square * weights).mean(axis=-1) for square in squares]
     if any(one.mean() <= 2 * one.std() / math.sqrt(one.size) for one in known):
         return None
@@ -351,8 +354,7 @@ def disagreement(
         image.astype(np.float64).reshape(-1, 3)[where] - truth
         for image, truth, where in zip(images, truths, seen, strict=True)
     ]
-    gain = 4.0 ** references[0].exposure
-    weights = gain / (gain * truths[0] ** 2 + EPSILON)
+    weights = _weights(truths[0], references[0].exposure)
     own = sum(
         r.variance.reshape(-1, 3)[where] * weights
         for r, where in zip(references, seen, strict=True)

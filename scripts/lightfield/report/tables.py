@@ -2,6 +2,7 @@
 
 import csv
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -64,26 +65,19 @@ def reprojection(files: Sequence[Path]) -> Measurement | None:
     if path is None:
         return None
     rows = _read_csv(path, "scenario", "method", "on_front")
-    columns = list(rows[0])
-    front = [row for row in rows if row.get("on_front") == "True"]
+    names = ("scenario", "method", "samples", "rms_error", "largest_error")
     best = Table(
         ["case", "method", "samples", "RMS error", "largest error", "CPU time a view"],
         [
-            [
-                row.get("scenario"),
-                row.get("method"),
-                row.get("samples"),
-                row.get("rms_error"),
-                row.get("largest_error"),
-                _milliseconds(row.get("view_cpu_s")),
-            ]
-            for row in front
+            [*map(row.get, names), _milliseconds(row.get("view_cpu_s"))]
+            for row in rows
+            if row["on_front"] == "True"
         ],
     )
     return Measurement(
         page.plot(path.with_suffix("")),
         {"On the Pareto front: no other method is both faster and better": best},
-        {f"All {len(rows)} measurements": Table(columns, [list(row.values()) for row in rows])},
+        {f"All {len(rows)} measurements": _whole(rows)},
     )
 
 
@@ -93,24 +87,21 @@ def stability(files: Sequence[Path]) -> Measurement | None:
     if path is None:
         return None
     rows = _read_csv(path, "group", "verdict")
-    counts: dict[tuple[str, str], dict[str, int]] = {}
-    for row in rows:
-        verdicts = counts.setdefault((row.get("group", ""), row.get("dtype", "")), {})
-        verdict = row.get("verdict", "")
-        verdicts[verdict] = verdicts.get(verdict, 0) + 1
-    kinds = sorted({verdict for verdicts in counts.values() for verdict in verdicts}, key=len)
+    counts = Counter((row["group"], row.get("dtype", ""), row["verdict"]) for row in rows)
+    kinds = sorted(
+        {verdict for _, _, verdict in counts}, key=lambda verdict: (len(verdict), verdict)
+    )
     summary = Table(
         ["cases", "precision", *kinds],
         [
-            [group, dtype, *(verdicts.get(kind, 0) for kind in kinds)]
-            for (group, dtype), verdicts in counts.items()
+            [*case, *(counts[*case, kind] for kind in kinds)]
+            for case in dict.fromkeys(key[:2] for key in counts)
         ],
     )
     worst = sorted(rows, key=_bound_used, reverse=True)[:WORST_CASES]
-    names = ["case", "dtype", "condition", "error", "error_bound", "unit", "verdict"]
-    shown = [[*(row.get(name) for name in names), f"{_bound_used(row):.0%}"] for row in worst]
-    columns = list(rows[0])
-    failed = sum(not row.get("verdict", "").startswith("ok") for row in rows)
+    names = ("case", "dtype", "condition", "error", "error_bound", "unit", "verdict")
+    shown = [[*map(row.get, names), f"{_bound_used(row):.0%}"] for row in worst]
+    failed = sum(not row["verdict"].startswith("ok") for row in rows)
     return Measurement(
         page.plot(path.with_suffix("")),
         {
@@ -120,7 +111,7 @@ def stability(files: Sequence[Path]) -> Measurement | None:
                 shown,
             ),
         },
-        {f"All {len(rows)} cases": Table(columns, [list(row.values()) for row in rows])},
+        {f"All {len(rows)} cases": _whole(rows)},
         [("cases", str(len(rows))), ("outside their bound", str(failed))],
     )
 
@@ -327,6 +318,11 @@ def _read_csv(path: Path, *columns: str) -> list[dict[str, str]]:
         if column not in rows[0]:
             raise UserError(f"{path}: {column}: is missing; it is a column of the measurement's")
     return rows
+
+
+def _whole(rows: Sequence[Mapping[str, str]]) -> Table:
+    """Return a CSV's rows as they are."""
+    return Table(list(rows[0]), [list(row.values()) for row in rows])
 
 
 def _bound_used(row: Mapping[str, str]) -> float:
