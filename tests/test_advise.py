@@ -1,15 +1,19 @@
 """What could be cheaper at equal error: found where it is known, and by the programs."""
 
 import json
+import os
+import signal
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from lightfield.core.errors import UserError
+from lightfield.core.files import write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.passes import PARTS_OF_LIGHT
 from lightfield.geometry import lenses
-from lightfield.measurement import advice, trials
+from lightfield.measurement import advice, threads, trials
 from lightfield.measurement.metrics import make_reference
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
@@ -127,6 +131,27 @@ def test_of_one_key_the_value_that_saves_most_is_advised(monkeypatch):
     monkeypatch.setattr(maker, "render", faster)
     found = advice.tried(maker, RENDER, INVENTORY, advice.Probes(maker, 32, 1, 64, "room"))
     assert found["yaml"]["denoise_prefilter"] == "fast"
+
+
+def test_without_light_nothing_is_advised(monkeypatch):
+    lit = Simulated.render
+    monkeypatch.setattr(
+        Simulated, "render", lambda *words: replace(t := lit(*words), colour=0 * t.colour)
+    )
+    found = advice.tried(Simulated(), RENDER, INVENTORY, advice.Probes(Simulated(), 32, 1, 64, "a"))
+    assert found["yaml"] == {}
+    assert "Nothing is advised" in advice.table("black", found | {"threads": []})
+
+
+def killed(*words):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_process_that_is_killed_for_memory_is_named(monkeypatch, tmp_path):
+    write_json(tmp_path / "inventory.json", {"memory_bytes": 0})
+    monkeypatch.setattr(threads.probe, "rendered", killed)
+    with pytest.raises(UserError, match="room: one of 2 processes that render it was killed"):
+        threads.tried(lightfield(), "a.blend", tmp_path / "inventory.json", "cpu", 2, "room")
 
 
 def test_a_scene_is_advised_by_the_programs(run_program, room, tmp_path):

@@ -219,8 +219,11 @@ class Probes:
                 biases.append(metrics.bias_and_variance(moved, known)[0])
                 counted = reference.counted
                 noises.append(float((reference.variance[counted] * reference.weights).mean()))
-                light = fmean(float(now.colour[counted].mean()) for now, _ in pairs)
-                lights.append(light / fmean(float(b.colour[counted].mean()) for _, b in pairs) - 1)
+                now, before = (
+                    fmean(float(trial.colour[counted].mean()) for trial in trials)
+                    for trials in zip(*pairs, strict=True)
+                )
+                lights.append(now / before - 1 if before else 0.0)
             found[stratum] = {"bias": fmean(biases), "noise": fmean(noises), "light": fmean(lights)}
         found[WHOLE] = {
             figure: weighted({s: found[s][figure] for s in self.parts}, self.areas)

@@ -1,11 +1,14 @@
 """How many threads a process: many processes of one thread each at once, or fewer of more."""
 
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from pathlib import Path
 from statistics import fmean
 from typing import Any
 
+from lightfield.core.errors import UserError
+from lightfield.core.failures import LESS_MEMORY
 from lightfield.core.files import read_keys
 from lightfield.core.leftovers import temporary_folder
 from lightfield.core.memory import available
@@ -52,7 +55,13 @@ def tried(
                 pool.submit(probe.rendered, *words, temporary / str(number))
                 for number in range(cores // threads)
             ]
-            runs = [run.result() for run in started]
+            try:
+                runs = [run.result() for run in started]
+            except BrokenProcessPool:
+                raise UserError(
+                    f"{name}: one of {len(started)} processes that render it was killed; "
+                    f"most likely memory ran out: {LESS_MEMORY}"
+                ) from None
         if runs[0].start["device"] != "CPU":
             return []
         seconds = [view["wall_seconds"] for run in runs for view in run.later_views]
