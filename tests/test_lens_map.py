@@ -160,8 +160,11 @@ def test_the_smallest_images(size, name):
     made = lens_map.compute(FISHEYE, rectilinear(size), IDENTITY, name)
     assert made.summary["covered"] == 1
     assert 0 < made.summary["min"] <= made.summary["max"] < 100
-    tiny = lens_map.compute(Equidistant(width=size, height=size, fov=2), rectilinear(9), IDENTITY)
-    assert tiny.centers.shape == (9, 9, 2)
+    fisheye = Equidistant(width=size, height=size, fov=2)
+    assert lens_map.compute(fisheye, rectilinear(9), IDENTITY).centers.shape == (9, 9, 2)
+    made = lens_map.compute(FISHEYE, fisheye, IDENTITY, name)
+    assert made.summary["covered"] == np.isfinite(fisheye.pixel_rays()[..., 0]).mean()
+    assert not any("nothing" in warning for warning in lens_map.warnings(made))
 
 
 @pytest.mark.parametrize(("name", "samples"), [("adaptive", 1), ("bicubic", 3), ("nearest", 1)])

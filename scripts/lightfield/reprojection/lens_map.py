@@ -280,8 +280,10 @@ def warnings(lens_map: LensMap) -> list[str]:
     """Return what a person should know of the map's magnification: upsampling and aliasing."""
     if not lens_map.summary["covered"]:
         return ["the source sees nothing of the target image"]
-    found = []
     largest, smallest = lens_map.summary["max"], lens_map.summary["min"]
+    if not smallest:
+        return []
+    found = []
     if largest > 1.5:
         found.append(
             f"upsampling: up to {largest:.3g} target pixels to one of the source (median "
@@ -318,13 +320,14 @@ def report(lens_maps: Sequence[LensMap]) -> None:
 
 def _summary(scale: Array) -> dict[str, float]:
     """Return what a lens map says of its magnification (H, W), NaN where it has no source."""
-    seen = scale[np.isfinite(scale)]
-    if not seen.size:
-        return {"min": 0.0, "median": 0.0, "max": 0.0, "covered": 0.0}
+    # Of a pixel without any neighbour it is infinite.
+    known: Array = scale[np.isfinite(scale)]
+    if not known.size:
+        known = np.zeros(1)
     return {
-        "min": float(seen.min()),
-        "median": float(np.median(seen)),
-        "max": float(seen.max()),
+        "min": float(known.min()),
+        "median": float(np.median(known)),
+        "max": float(known.max()),
         "covered": float(1 - np.isnan(scale).mean()),
     }
 
