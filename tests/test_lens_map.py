@@ -132,6 +132,8 @@ def test_how_sources_continue():
     assert topology(slice_) == topology(high_slice) == (False, False, False)
     assert topology(FISHEYE) == (False, False, False)
     assert topology(CubeMap(width=96, height=16)) == (False, False, False)
+    telescope = Rectilinear(width=64, height=64, focal_length=1e6, sensor_size=(5, 5))
+    assert topology(telescope) == (False, False, False)
 
 
 def test_the_window_holds_all_that_is_read_and_little_more():

@@ -338,8 +338,9 @@ def _topology(source: Lens) -> Topology:
         return False, False, False
     height = np.array([0.25, 0.5, 0.75]) * source.height
     width = np.array([0.0, 0.4, 0.8]) * source.width
-    left, right = source.rays(np.zeros(3), height), source.rays(np.full(3, source.width), height)
-    wraps = bool(np.allclose(left, right, atol=1e-5))
+    left, middle, right = (source.rays(x * source.width, height) for x in (0.0, 0.5, 1.0))
+    # A narrow lens has its edges near each other, too, but no nearer than its middle.
+    wraps = bool(np.abs(left - right).max() < 1e-5 * np.abs(left - middle).max())
     ends = [source.rays(width, np.full(3, y)) for y in (0.0, float(source.height))]
     top, bottom = (wraps and bool(np.allclose(rays, rays[0], atol=1e-5)) for rays in ends)
     return wraps, top, bottom
