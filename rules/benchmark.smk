@@ -112,7 +112,4 @@ rule check_gpu:
 # Without a GPU it says so before the first job.
 rule gpu_check:
     input:
-        [
-            f"{MEASURED}/gpu_check/{name}.json"
-            for name in dict.fromkeys(d.scene_name for d in CHOSEN if not d.imported)
-        ],
+        [f"{MEASURED}/gpu_check/{name}.json" for name in RENDERED_SCENES],

@@ -87,6 +87,8 @@ except UserError as error:
     sys.exit(f"error: {error}")
 
 CHOSEN_SCENES = list(dict.fromkeys(dataset.scene_name for dataset in CHOSEN))
+# Of the others there are views alone.
+RENDERED_SCENES = list(dict.fromkeys(d.scene_name for d in CHOSEN if not d.imported))
 RESULTS = SETTINGS.results
 WORK = SETTINGS.work
 # Those that are not chosen may test what is trained on the chosen ones.

@@ -105,7 +105,7 @@ rule measure_error:
 
 rule error_vs_time:
     input:
-        [f"{RESULTS}/benchmarks/error_vs_time/{name}.json" for name in CHOSEN_SCENES],
+        [f"{RESULTS}/benchmarks/error_vs_time/{name}.json" for name in RENDERED_SCENES],
 
 
 rule try_changes:
@@ -143,7 +143,7 @@ rule try_changes:
 # Without output: it is asked for to be read.
 rule advise:
     input:
-        [f"{RESULTS}/benchmarks/advise/{name}.json" for name in CHOSEN_SCENES],
+        [f"{RESULTS}/benchmarks/advise/{name}.json" for name in RENDERED_SCENES],
     log:
         log_of("advise"),
     localrule: True
