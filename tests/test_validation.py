@@ -507,6 +507,12 @@ def bad_frame(key: str, value: Any) -> Spoil:
 
 BROKEN_VIEWS: dict[str, tuple[Spoil, str, str]] = {
     "missing": (on_file(Path.unlink), "views", "is missing"),
+    "a folder": (on_file(lambda path: path.unlink() or path.mkdir()), "views", "is missing"),
+    "a dead link": (
+        on_file(lambda path: path.unlink() or path.symlink_to("nowhere")),
+        "views",
+        "is missing",
+    ),
     "truncated": (on_file(truncate), "images", "cannot be read"),
     "end cut off": (on_file(cut_tail), "images", "cannot be read"),
     "no image": (on_file(lambda path: path.write_bytes(b"no image")), "images", "no image"),

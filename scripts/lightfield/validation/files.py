@@ -187,7 +187,7 @@ def of_views(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[
     files: list[File] = []
     checks = []
     for number, image_set in enumerate(sets):
-        present = {path.name for path in (dataset / image_set.folder).glob("*")}
+        present = _files(dataset / image_set.folder)
         formats = [
             suffix
             for suffix in ((".exr", ".png") if image_set.name else (".exr",))
@@ -204,6 +204,11 @@ def of_views(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[
         checks.append(Check.of_files(f"{image_set.prefix}views", missing, detail))
         files += own
     return files, checks
+
+
+def _files(folder: Path) -> set[str]:
+    """Return the names of the files in a folder."""
+    return {path.name for path in folder.glob("*") if path.is_file()}
 
 
 def of_passes(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], dict[str, str]]:
@@ -279,7 +284,7 @@ def of_exports(
                     else:
                         others.append(target.relative_to(dataset).as_posix())
         for folder in sorted(folders):
-            present = {path.name for path in (dataset / folder).glob("*")}
+            present = _files(dataset / folder)
             for view in image_set.views:
                 for name in (pattern.format(view=view) for pattern in patterns):
                     if name in present:
