@@ -145,6 +145,33 @@ def test_the_camera_of_the_file_has_its_lens_shift_and_its_focus(project):
     np.testing.assert_allclose(np.median(sky, axis=0), [0.2, 0.3, 0.6], atol=0.01)
 
 
+APERTURE = """
+import sys
+from pathlib import Path
+import bpy
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
+from lightfield.rendering import blend_file, cycles
+blend_file.open_scene(Path(sys.argv[1]))
+bpy.data.cameras["Hero"].lens = 85
+path = Path(sys.argv[2])
+blend_file.save_scene(path)
+lens = lenses.from_camera({"lens": "equirectangular", "resolution": [32, 16]})
+render = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "depth_of_field": True}
+views = LightField({**lens.to_lightfield(), "frame": 1, "render": render}, [])
+cycles.set_up(path, None, views, "cpu", 1)
+camera = bpy.context.scene.camera.data
+print(camera.type, round(camera.lens / camera.dof.aperture_fstop))
+"""
+
+
+def test_a_panorama_has_the_aperture_of_the_file(project, run_program, tmp_path):
+    program = tmp_path / "aperture.py"
+    program.write_text(APERTURE)
+    said = run_program(program, project[0] / "product.blend", tmp_path / "other.blend").stdout
+    assert said.endswith("PANO 425\n")
+
+
 def test_a_changed_texture_makes_another_scene(project):
     folder, _ = project
     path = folder / "results/product/views/lightfield.json"

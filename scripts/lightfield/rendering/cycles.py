@@ -73,7 +73,7 @@ def set_up(
     if OMNIDIRECTIONAL in lightfield.content:
         _set_eyes(scene, lightfield.content[OMNIDIRECTIONAL])
     if focused:
-        _set_focus(scene.camera.data.dof, focused)
+        _set_focus(scene.camera.data, focused)
     if any(found.kind == "motion" for found in passes):
         left_out = [name for name in left_out if name != "animation"]
     pruning.leave_out(left_out)
@@ -275,13 +275,16 @@ def choose_eye(name: str) -> None:
 
 def _set_focus(lens: Any, camera: Any) -> None:
     """Give a camera the aperture and focus of the artist's ``camera`` at the present frame."""
-    own = camera.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.dof
+    own = camera.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    if lens.type == "PANO":
+        # From which Cycles has the aperture's width, and in a panorama nothing else.
+        lens.lens = own.lens
     for name in ("aperture_fstop", "aperture_blades", "aperture_rotation", "aperture_ratio"):
-        setattr(lens, name, getattr(own, name))
-    lens.focus_object = camera.data.dof.focus_object
-    lens.focus_subtarget = camera.data.dof.focus_subtarget
-    lens.focus_distance = own.focus_distance
-    lens.use_dof = True
+        setattr(lens.dof, name, getattr(own.dof, name))
+    lens.dof.focus_object = camera.data.dof.focus_object
+    lens.dof.focus_subtarget = camera.data.dof.focus_subtarget
+    lens.dof.focus_distance = own.dof.focus_distance
+    lens.dof.use_dof = True
 
 
 def view_layer(scene: Any) -> Any:
