@@ -182,13 +182,14 @@ def test_a_power_law_is_found_and_its_slopes_error_is_that_of_linear_regression(
     assert line.at(32) == pytest.approx(3 / 32)
     assert line.inverse(3 / 32) == pytest.approx(32)
     # A denoiser's error may hardly fall, and then no number of samples is enough.
-    assert metrics.Line(-1e-9, 0, 1.0).inverse(0.1) == 1e300
+    assert metrics.Line(-1e-9, 0, 1.0).inverse(0.1) == metrics.Line(0, 0, 1.0).inverse(1) == 1e300
     y = [2.9, 1.6, 0.7, 0.4, 0.18]
     wanted = linregress(np.log(x), np.log(y))
     line = metrics.fit(x, y)
     assert line.slope == pytest.approx(wanted.slope)
     assert line.slope_error == pytest.approx(wanted.stderr)
     assert metrics.fit([5, 5, 5], [1, 2, 3]) is None
+    assert metrics.fit([0, 1, 2], [1, 2, 3]) is metrics.fit([1, 2, 3], [1, 2, 0]) is None
 
 
 def test_the_pareto_front_holds_what_nothing_beats():

@@ -289,9 +289,9 @@ class Line:
 def fit(x: Sequence[float], y: Sequence[float]) -> Line | None:
     """Fit a power law by least squares of the logarithms.
 
-    None for fewer than three different x, and where a y is not above 0.
+    None for fewer than three different x, and where a number is not above 0.
     """
-    if len(set(x)) < 3 or min(y) <= 0:
+    if len(set(x)) < 3 or min(*x, *y) <= 0:
         return None
     found = linregress(np.log(x), np.log(y))
     return Line(float(found.slope), float(found.stderr), float(np.exp(found.intercept)))
