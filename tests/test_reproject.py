@@ -170,12 +170,19 @@ def test_pixels_without_a_source_are_marked(dataset, run):
     assert np.abs(integers[~missing] - z * 1000).max() <= 0.5
 
 
-def test_a_depth_below_zero_is_none_in_a_png(dataset, run):
+def test_a_copy_has_no_depth_below_zero_in_a_png_and_no_pixel_that_is_no_number(dataset, run):
     ones = np.ones((SIZE, SIZE), np.float32)
-    write_exr(dataset / "behind.exr", dict.fromkeys("RGB", ones) | {"Z": -ones})
-    words = ["--no-reproject", "--png", "--depth-png", "1000", "--single"]
-    run(*words, str(dataset / "behind.exr"), source=False)
-    assert not read_image(dataset / "out/behind_depth.png").channels["Y"].any()
+    channels = {**dict.fromkeys("RGB", ones), "G": ones.copy(), "Z": -ones}
+    channels["G"][20, 20] = np.nan
+    write_exr(dataset / "a.exr", channels)
+    words = ["--no-reproject", "--png", "--exr", "--depth-png", "1000", "--single"]
+    run(*words, str(dataset / "a.exr"), source=False)
+    found = {
+        name: read_image(dataset / "out" / name).channels for name in names(dataset / "out")[:3]
+    }
+    assert not found["a_depth.png"]["Y"].any()
+    assert [found["a.png"][c][20, 20] for c in "RGBA"] == [0] * 4
+    assert [found["a.exr"][c][20, 20] for c in "RGB"] == [0] * 3
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg"])

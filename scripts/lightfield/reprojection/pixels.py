@@ -182,8 +182,10 @@ def _resampled(
     colour, depth = source.window(made)
     if job.copies and source.is_z == as_z:
         row, end_row, column, end_column = made.window
-        outside = np.isnan(made.target_cos[row:end_row, column:end_column])
-        colour = np.where(outside[:, :, None], np.float32(np.nan), colour)
+        # A channel that is no number makes a pixel none, as it does where pixels are resampled.
+        none = np.isnan(colour).any(axis=-1)
+        none |= np.isnan(made.target_cos[row:end_row, column:end_column])
+        colour = np.where(none[:, :, None], np.float32(np.nan), colour)
         copy = None if depth is None else _in_frame(depth, made)
         return [(np.s_[:], _in_frame(colour, made))], copy
     if depth is not None:
