@@ -18,7 +18,8 @@ all: .venv/complete
 
 test: check
 	python envs/check_system.py --tests
-	python -m pytest -n $(CORES)
+	@# One more than there are cores: they wait, too, for Slurm, for jobs that are killed, for a browser.
+	python -m pytest -n $$(( $(CORES) + 1 ))
 
 # Style, types, and Snakemake's own advice.
 check: .venv/complete-for-tests

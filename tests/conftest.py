@@ -20,11 +20,20 @@ SCRIPTS = ROOT / "scripts"
 SLOW = {"run_program", "smoke", "blender", "browser", "cycles", "planned", "renders", "simulated"}
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Mark as slow what uses these fixtures; other tests say it themselves."""
+    """Mark as slow what uses these fixtures; other tests say it themselves.
+
+    Files with quick and slow tests come first, as they compile what is then there for the others;
+    those without slow ones come last, to fill the workers' last seconds.
+    """
+    tests = {item.path: [] for item in items}
     for item in items:
         if SLOW & set(item.fixturenames):
             item.add_marker("slow")
+        tests[item.path].append(item.get_closest_marker("slow") is not None)
+    order = {path: (not any(slow), all(slow), len(slow)) for path, slow in tests.items()}
+    items.sort(key=lambda item: order[item.path])
 
 
 @pytest.fixture(scope="session")
