@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 
-from scenes.barbershop.plan import TAU, TOWELS, put, spot
+from scenes.barbershop.plan import TAU, TOWELS, put
 from scenes.library.points import Array, points, polar, smooth_path, xyz
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import prism, sheet
@@ -31,34 +31,30 @@ SHELVES = """Oak: box 0.03 0.32 1.75 0.004 at ±0.39 0.16 0.875;
     Mahogany: box 0.78 0.012 1.75 at 0 0.006 0.875"""
 
 
-def coats(scene: Scene) -> None:
-    """Three coats on the rack's hooks, between two hats."""
-    for k, (y, color) in enumerate(((1.81, "Grey"), (2.33, "Camel"), (2.89, "Green"))):
-        put(coat(scene, f"{color} wool", k), spot(f"right {y}"))
-
-
 def around(scene: Scene) -> tuple[Array, Array]:
     """Angles round something that hangs in folds, and parts of its length as a column."""
     sides, rows = scene.segments(72, 16), scene.segments(32, 6)
     return np.arange(sides) * TAU / sides, np.linspace(0, 1, rows)[:, None]
 
 
-def coat(scene: Scene, wool: str, k: int) -> bpy.types.Mesh:
-    """A coat that hangs in folds from 1.85 m down; the greater its k, the shorter it is."""
-    model, (angle, t) = Model(scene, BUTTONS), around(scene)
+def coats(scene: Scene) -> None:
+    """Three coats that hang in folds from 1.85 m down, each shorter than the last."""
+    (angle, t), steps = around(scene), scene.segments(20, 5)
     width = 0.03 + 0.15 * np.minimum(t * 6, 1) ** 0.6 + 0.05 * t
-    waves = 0.10 * np.sin(7 * angle + 2 * k) + 0.06 * np.sin(11 * angle + k)
-    body = polar(width * (1 + waves * np.minimum(t * 2, 1)), angle, 1.85 - (0.95 - 0.12 * k) * t)
-    body[..., 1] *= 0.5 * (0.2 + 0.8 * t)
-    model.add(sheet(body[::-1], closed=True), wool, (0, 0.135, 0))
     sleeve = points("0.14 0.15 1.74, 0.20 0.18 1.5, 0.19 0.20 1.22, 0.18 0.21 1.12")
     lapel = prism("0 0, 0.06 0.02, 0.075 -0.10, 0 -0.34", 0.008)
-    for side in (-1, 1):
-        path = smooth_path(sleeve * (side, 1, 1), scene.segments(20, 5))
-        model.add(scene.tube(path, np.linspace(0.062, 0.048, len(path)), 18), wool)
-        turn = (90, 0, 180 if side > 0 else 0)
-        model.add(lapel, wool, (side * 0.005, 0.222, 1.74), turn, (1, 1, side))
-    return model.mesh(f"Coat of {wool.lower()}")
+    for k, (y, color) in enumerate(((1.81, "Grey"), (2.33, "Camel"), (2.89, "Green"))):
+        model, wool = Model(scene, BUTTONS), f"{color} wool"
+        waves = 0.10 * np.sin(7 * angle + 2 * k) + 0.06 * np.sin(11 * angle + k)
+        radius, z = width * (1 + waves * np.minimum(t * 2, 1)), 1.85 - (0.95 - 0.12 * k) * t
+        body = polar(radius, angle, z)
+        body[..., 1] *= 0.5 * (0.2 + 0.8 * t)
+        model.add(sheet(body[::-1], closed=True), wool, (0, 0.135, 0))
+        for side, turn in ((-1, 0), (1, 180)):
+            path = smooth_path(sleeve * (side, 1, 1), steps)
+            model.add(scene.tube(path, np.linspace(0.062, 0.048, len(path)), 18), wool)
+            model.add(lapel, wool, (side * 0.005, 0.222, 1.74), (90, 0, turn), (1, 1, side))
+        put(model.mesh(f"Coat of {wool.lower()}"), f"right {y}")
 
 
 def umbrellas(scene: Scene) -> None:
@@ -69,16 +65,16 @@ def umbrellas(scene: Scene) -> None:
     radius = folds * np.interp(t, (0, 0.12, 0.75, 1), (0.006, 0.02, 0.045, 0.018))
     model.add(sheet(polar(radius, angle + t, 0.06 + 0.58 * t), closed=True), "Black")
     data = model.mesh("Umbrella")
-    put(data, spot("right 1.46 0.19 0.01"), degrees=(4, -4, 30))
-    put(data, spot("right 1.53 0.22 0.01"), degrees=(-3, 5, 160))
+    put(data, "right 1.46 0.19 0.01", degrees=(4, -4, 30))
+    put(data, "right 1.53 0.22 0.01", degrees=(-3, 5, 160))
 
 
 def folded_towel(scene: Scene, towel: str) -> bpy.types.Mesh:
     """A towel folded twice, with a stripe."""
     stripe = "White towel" if towel == "Red towel" else "Red towel"
     parts = f"""{towel}: box 0.26 0.17 0.016 0.007 3 at 0 0 0.008..0.036*3;
-            tube 0.022, -0.13 0.078 0.022, 0.13 0.078 0.022
-        {stripe}: box 0.02 0.171 0.002 at -0.09 0 0.0445"""
+        tube 0.022, -0.13 0.078 0.022, 0.13 0.078 0.022
+    {stripe}: box 0.02 0.171 0.002 at -0.09 0 0.0445"""
     return Model(scene, parts).mesh(f"Folded {towel.lower()}")
 
 
@@ -104,7 +100,7 @@ def draped_towel(scene: Scene, towel: str) -> bpy.types.Mesh:
 
 def towel_shelves(scene: Scene) -> None:
     """Open shelves of towels beside the staff door, with a basket on top."""
-    basket, random, where = Model(scene), scene.random("towel shelves"), spot("back -0.42 0.036")
+    basket, random, where = Model(scene), scene.random("towel shelves"), "back -0.42 0.036"
     put(Model(scene, SHELVES).mesh("Towel shelves"), where)
     folded = [folded_towel(scene, towel) for towel in TOWELS]
     rolled = [rolled_towel(scene, towel) for towel in TOWELS]

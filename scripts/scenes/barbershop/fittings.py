@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from scenes.barbershop.plan import TAU, put, spot
+from scenes.barbershop.plan import TAU, put
 from scenes.library.points import points, polar
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import Shape, box, join, lettering, sheet, tube
@@ -25,12 +25,10 @@ Vent | on right 2.9 0 2.46, on left ±3.52 0 2.46
     Gilt: box 0.36 0.014 0.003 at 0 -0.065..0.065*7 0.007 turned 35 0 0
 Dustpan | room -1.98 -3.05 0.002 100
     Red: box 0.26 0.22 0.006 at 0 0 0.004 turned -3 0 0; box 0.005 0.22 0.05 at ±0.13 0 0.027;
-        box 0.26 0.005 0.07 at 0 -0.11 0.04
-    Black: tube 0.012, 0 -0.11 0.05, 0 -0.26 0.07
+        box 0.26 0.005 0.07 at 0 -0.11 0.04; Black: tube 0.012, 0 -0.11 0.05, 0 -0.26 0.07
 """
 CLOCK = """Mahogany: lathe 0.22 0, 0.22 0.03, 0.205 0.05, 0.185 0.045, 0.18 0.02, 0 0.02
-    White: lathe 0.181 0, 0.181 0.022, 0 0.022
-    Brass: ring 0.183 0.006 at 0 0 0.044
+    White: lathe 0.181 0, 0.181 0.022, 0 0.022; Brass: ring 0.183 0.006 at 0 0 0.044
     Black: prism 0.0012, -0.006 -0.02, 0.006 -0.02, 0.006 0.068, 0 0.085, -0.006 0.068
         at 0 0 0.026 turned 0 0 55;
         prism 0.0012, -0.004 -0.02, 0.004 -0.02, 0.004 0.104, 0 0.13
@@ -42,8 +40,7 @@ NUMERALS = ("XII", "I", "II", "III", "IIII", "V", "VI", "VII", "VIII", "IX", "X"
 POLE_CAP = """lathe 0 -0.10, 0.03 -0.095, 0.045 -0.06, 0.09 -0.045, 0.095 -0.01, 0.085 0
         0.085 0.012, 0 0.012"""
 POLE = f"""Chrome: {POLE_CAP}; {POLE_CAP} at 0 0 0.62 turned 180 0 0
-    Opal globe: ball 0.10 at 0 0 0.78
-    Pane: pipe 0.083 0, 0.083 0.62
+    Opal globe: ball 0.10 at 0 0 0.78; Pane: pipe 0.083 0, 0.083 0.62
     Chrome: tube 0.016, 0 0.06 0, 0 0.15 0 at 0 0 -0.03..0.65*2;
         box 0.09 0.015 0.12 0.006 at 0 0.15 -0.03..0.65*2"""
 BROOM = """Oak: tube 0.012, 0 0 0.10, 0 0 1.35; box 0.30 0.05 0.04 0.01 at 0 0 0.10"""
@@ -61,7 +58,7 @@ def clock(scene: Scene) -> None:
     for k, numeral in enumerate(NUMERALS):
         at = polar(0.132, np.radians(90 - 30 * k), 0.0226)
         model.add(lettering(numeral, 0.0005), "Black", at, scale=(0.034, 0.042, 1))
-    put(model.mesh("Clock"), spot("on back -0.88 0.001 2.5"))
+    put(model.mesh("Clock"), "on back -0.88 0.001 2.5")
 
 
 def barber_pole(scene: Scene) -> None:
@@ -73,7 +70,7 @@ def barber_pole(scene: Scene) -> None:
     stripe = np.arange(len(column.quads)) % sides * 8 // sides % 4
     for kind, material in enumerate(("Red", "White", "Blue", "White")):
         model.add(Shape(column.vertices, column.quads[stripe == kind]), material)
-    put(model.mesh("Barber pole"), spot("front 0.78 0.158 1.38 180"))
+    put(model.mesh("Barber pole"), "front 0.78 0.158 1.38 180")
 
 
 def broom_and_bins(scene: Scene) -> None:
@@ -84,11 +81,11 @@ def broom_and_bins(scene: Scene) -> None:
         for x, y in points(f"-0.14..0.14*{scene.count(34, 6)} -0.018..0.018*3")
     ]
     broom.add(join(bristles), "Bristle")
-    put(broom.mesh("Broom"), spot("room -2.02 -3.5 0.004"), degrees=(7, -4, 35))
+    put(broom.mesh("Broom"), "room -2.02 -3.5 0.004", degrees=(7, -4, 35))
     for k in range(scene.count(14, 3)):
         at = (*random.uniform(-0.08, 0.08, 2), 0.33 + 0.02 * (k % 3))
         crumpled = box((0.07, 0.05, 0.04), 0.015)
         waste.add(crumpled, ("Paper", "White")[k % 2], at, random.uniform(0, 360, 3))
     data = waste.mesh("Waste bin")
-    put(data, spot("room -2.28 -3.45"))
-    put(data, spot("room 0.72 -2.55 0 70"))
+    put(data, "room -2.28 -3.45")
+    put(data, "room 0.72 -2.55 0 70")

@@ -6,7 +6,7 @@ import numpy as np
 
 from scenes.barbershop.cloth import folded_towel
 from scenes.barbershop.goods import Goods, lolly_jar, shelf, stock
-from scenes.barbershop.plan import STATIONS, put, spot, spots
+from scenes.barbershop.plan import STATIONS, put, spots
 from scenes.barbershop.prints import magazine
 from scenes.barbershop.stations import PANEL
 from scenes.library.points import rectangle, xyz
@@ -14,8 +14,7 @@ from scenes.library.scene import Model, Scene
 from scenes.library.shapes import Shape, box, copies, join, prism, sheet, transform
 
 CHAIR = """Chrome: lathe 0.33 0, 0.33 0.02, 0.30 0.05, 0.14 0.075, 0.10 0.10, 0.085 0.2, 0.085 0.28
-    Steel: lathe 0.06 0.24, 0.06 0.36, 0.15 0.38, 0.16 0.40
-    Rubber: ring 0.33 0.012 at 0 0 0.014
+    Steel: lathe 0.06 0.24, 0.06 0.36, 0.15 0.38, 0.16 0.40; Rubber: ring 0.33 0.012 at 0 0 0.014
     Cream: box 0.50 0.50 0.07 0.02 3 at 0 0.02 0.435
     Oxblood: box 0.52 0.52 0.10 0.035 3 at 0 0.03 0.515
     Chrome: bend 0.017, 0 0.24 0.42, 0 0.30 0.55, 0 0.27 0.71, 0 0 0.735, 0 -0.24 0.72, 0 -0.26 0.6
@@ -56,8 +55,7 @@ Stool | room 1.45 -3.05
 DESK_PANEL = "frame 0.34 0.56, -0.06 0.006, -0.04 0.022, 0 0.024, 0.02 0.008, 0.025 0"
 FURNITURE = f"""
 Reception desk | room 1.68 -2.45
-    Mahogany: box 1.5 0.5 0.88 at 0 0 0.52
-    Ebony: box 1.42 0.42 0.08 at 0 0 0.04
+    Mahogany: box 1.5 0.5 0.88 at 0 0 0.52; Ebony: box 1.42 0.42 0.08 at 0 0 0.04
     Marble: box 1.58 0.58 0.04 0.012 3 at 0 0 0.98
     Mahogany: {DESK_PANEL} at -0.49..0.49*3 0.25 0.5 turned 90 0 180;
         {DESK_PANEL} at -0.75 0 0.5 turned 90 0 -90
@@ -78,8 +76,7 @@ Till | room 2.1 -2.47 1
         -0.14..0.1*7 0.08 0.2622 turned -40 0 0
     Red: lathe 0.004 0, 0.004 0.02, 0.012 0.021, 0.012 0.027, 0 0.028 at 0.14 0.17 0.186
         0.14 0.14 0.2114, 0.14 0.11 0.2368, 0.14 0.08 0.2622 turned -40 0 0
-    Gilt: box 0.32 0.10 0.12 0.012 2 at 0 -0.09 0.46
-    Black: box 0.28 0.11 0.07 at 0 -0.09 0.465
+    Gilt: box 0.32 0.10 0.12 0.012 2 at 0 -0.09 0.46; Black: box 0.28 0.11 0.07 at 0 -0.09 0.465
     White: box 0.05 0.004 0.055 at -0.09..0.09*4 -0.033 0.465
     Black: word 0.05 0.0005 5 at -0.09 -0.0305 0.465 turned 90 0 180;
         word 0.05 0.0005 2 at -0.03 -0.0305 0.465 turned 90 0 180;
@@ -126,12 +123,10 @@ Display cabinet | right -1.65 0.035
     Brass: ball 0.012 at ±0.035 0.372 1.1, ±0.035 0.388 0.3
     Oak: box 0.85 0.31 0.012 at 0 0.17 0.884, 0 0.17 1.254, 0 0.17 1.624
 Hat box | right -1.85 0.22 2.05, right -1.85 0.22 2.196 30
-    Teal: lathe 0.15 0, 0.15 0.14
-    Cream: lathe 0.155 0.1, 0.155 0.142, 0.15 0.146
+    Teal: lathe 0.15 0, 0.15 0.14; Cream: lathe 0.155 0.1, 0.155 0.142, 0.15 0.146
     Red: box 0.316 0.02 0.002 at 0 0 0.147
 Back cupboard | back 1.68
-    Oak: box 1.4 0.3 0.8 0.006 at 0 0.19 0.42
-    Mahogany: box 1.44 0.34 0.03 0.008 at 0 0.20 0.835
+    Oak: box 1.4 0.3 0.8 0.006 at 0 0.19 0.42; Mahogany: box 1.44 0.34 0.03 0.008 at 0 0.20 0.835
     Oak: frame 0.25 0.6, {PANEL} at -0.525..0.525*4 0.34 0.42 turned 90 0 180
     Brass: ball 0.013 at -0.415..0.635*4 0.365 0.55
 Radio | back 2.08 0.19 0.85 -8
@@ -143,8 +138,7 @@ Radio | back 2.08 0.19 0.85 -8
         box 0.008 0.006 0.183 0.002 at ±0.04 0.086 0.155; box 0.008 0.006 0.2 0.002 at 0 0.086 0.155
     Cream: lathe 0.018 0, 0.016 0.018, 0 0.019 at -0.1..0.1*3 0.08 0.032 turned -90 0 0
 Towel steamer | back 1.33 0.19 0.85
-    Cream: box 0.38 0.22 0.30 0.025 3 at 0 0 0.16
-    Chrome: box 0.30 0.01 0.22 0.004 at 0 0.112 0.17
+    Cream: box 0.38 0.22 0.30 0.025 3 at 0 0 0.16; Chrome: box 0.30 0.01 0.22 0.004 at 0 0.112 0.17
     Cream: box 0.26 0.01 0.18 0.004 at 0 0.116 0.17
     Chrome: bend 0.007, -0.11 0.12 0.11, -0.11 0.145 0.12, -0.11 0.145 0.22, -0.11 0.12 0.23
     White: lathe 0.026 0, 0.026 0.008, 0 0.01 at 0.08 0.12 0.2 turned -90 0 0
@@ -185,7 +179,7 @@ def barber_chairs(scene: Scene) -> None:
     back.add(padding, "Oxblood", (0, 0.03, 0.28), (90, 0, 180))
     seat_mesh, back_mesh = seat.mesh("Barber chair"), back.mesh("Barber chair back")
     for y, turn in zip(STATIONS, (128, 104, 66), strict=True):
-        where = spot(f"room -1.38 {y} 0.009 {turn}")
+        where = f"room -1.38 {y} 0.009 {turn}"
         put(seat_mesh, where)
         put(back_mesh, where, (0, -0.25, 0.58), (14, 0, 0))
 
@@ -195,9 +189,7 @@ def chair_mats(scene: Scene) -> None:
     mat = Model(scene, "Rubber: lathe 0.60 0.001, 0.60 0.007, 0.575 0.012, 0.56 0.009, 0 0.009")
     for k in range(7):
         mat.add(scene.ring(0.14 + 0.06 * k, 0.003, 48, 6), "Rubber", (0, 0, 0.009))
-    data = mat.mesh("Chair mat")
-    for where in spots("room -1.4 -2..2*3"):
-        put(data, where)
+    put(mat.mesh("Chair mat"), "room -1.4 -2..2*3")
 
 
 def waiting_bench(scene: Scene) -> None:
@@ -210,24 +202,24 @@ def waiting_bench(scene: Scene) -> None:
     nails = f"±0.055 0.703 0.16..0.48*{scene.segments(12)}"
     for x in (-1.02, 1.02):
         model.add(scene.ball(0.006, 6).moved(x, 0, 0), "Brass", nails)
-    put(model.mesh("Waiting bench"), spot("right 0.15"))
+    put(model.mesh("Waiting bench"), "right 0.15")
 
 
 def desk_things(scene: Scene) -> None:
     """A jar of lollies on the desk, and an open appointment book with a pen."""
-    put(lolly_jar(scene), spot("room 1.1 -2.39 1"))
+    put(lolly_jar(scene), "room 1.1 -2.39 1")
     model, random = Model(scene, LEDGER), scene.random("ledger")
     for side in (-1, 1):
         for k in range(14):
             width = random.uniform(0.05, 0.14) if k else 0.13
             at = (side * 0.085 - (0.14 - width) / 2, 0.1 - 0.015 * k, 0.0195)
             model.add(box((width, 0.003, 0.0006)), "Navy" if k else "Red", at, (0, side * 2, 0))
-    put(model.mesh("Appointment book"), spot("room 1.35 -2.53 1 -8"))
+    put(model.mesh("Appointment book"), "room 1.35 -2.53 1 -8")
 
 
 def magazines(scene: Scene) -> None:
     """Magazines fanned on the low table, and piles of them on its lower board."""
-    random, where = scene.random("magazines"), spot("room 1.24 0.15 0.008")
+    random, where = scene.random("magazines"), "room 1.24 0.15 0.008"
     issues = [magazine(scene, i) for i in range(6)]
     for k in range(scene.segments(7, 2)):
         at = (-0.02 + 0.015 * k, -0.28 + 0.055 * k, 0.4255 + 0.0062 * k)
@@ -241,14 +233,14 @@ def stocked(scene: Scene, bottles: Goods, pots: Goods) -> None:
     """Goods in the display cabinet and on the trolley, and on shelves behind the desk."""
     random, wares, board = scene.random("stock"), [*bottles, *pots], shelf(scene, 1.4, 0.16)
     for z in (0.516, 0.89, 1.26, 1.63):
-        stock(scene, random, wares, spot(f"right -1.65 0.065 {z}"), 0.84, 0.27)
+        stock(scene, random, wares, f"right -1.65 0.065 {z}", 0.84, 0.27)
     for z, goods in ((1.25, bottles), (1.6, wares), (1.95, wares), (2.3, wares)):
-        rack = spot(f"back 1.68 {0.022 if z == 1.25 else 0} {z}")  # the lowest clears the rail
+        rack = f"back 1.68 {0.022 if z == 1.25 else 0} {z}"  # the lowest clears the rail
         put(board, rack)
         stock(scene, random, goods, rack, 1.36, 0.14)
-    stock(scene, random, pots, spot("back 1.7 0.1 0.85"), 0.34, 0.18)
-    trolley, towel = spot("room -1.55 -3.2 0.003 -20"), folded_towel(scene, "Blue towel")
+    stock(scene, random, pots, "back 1.7 0.1 0.85", 0.34, 0.18)
+    trolley, towel = "room -1.55 -3.2 0.003 -20", folded_towel(scene, "Blue towel")
     for k in range(3):
         put(towel, trolley, (-0.06, 0, 0.487 + 0.0455 * k), (0, 0, 2 * k))
         put(towel, trolley, (0.03, 0, 0.207 + 0.0455 * k), (0, 0, -2 * k))
-    stock(scene, random, pots, trolley @ transform((0, -0.13, 0.747)), 0.42, 0.26)
+    stock(scene, random, pots, spots(trolley)[0] @ transform((0, -0.13, 0.747)), 0.42, 0.26)

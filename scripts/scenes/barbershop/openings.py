@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from scenes.barbershop.plan import TAU, put, spot
+from scenes.barbershop.plan import TAU, put
 from scenes.library.points import points, xyz
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import box, lettering, sheet
@@ -37,8 +37,7 @@ Door pane | on front 1.475 -0.062 1.43
 Transom pane | on front 1.475 -0.062 2.305
     Pane: plane 0.95 0.29
 Door sign | on front 1.475 -0.04 1.5
-    Cream: box 0.3 0.16 0.006 0.002
-    Red: word 0.065 0.0005 CLOSED at 0 0 0.0033
+    Cream: box 0.3 0.16 0.006 0.002; Red: word 0.065 0.0005 CLOSED at 0 0 0.0033
     Green: word 0.09 0.0005 OPEN at 0 0 -0.0033 turned 0 180 0
     Iron: tube 0.0015, -0.13 0.075 0, 0 0.28 -0.01; tube 0.0015, 0.13 0.075 0, 0 0.28 -0.01
 Door bell | front 1.675 0 2.2
@@ -63,8 +62,7 @@ Street lamp | room -2.6 6.2
     Cream: lathe 0.08 3.0, 0.17 3.4, 0.19 3.42, 0.03 3.6, 0 3.66
 """
 STREET = """Street stone: box 24 2.6 0.1 at 0 5.3 -0.15, 0 12.3 -0.15
-    Iron: box 24 5 0.1 at 0 9.1 -0.25
-    Brick: box 24 0.3 9 at 0 13.2 4.4
+    Iron: box 24 5 0.1 at 0 9.1 -0.25; Brick: box 24 0.3 9 at 0 13.2 4.4
     White: box 1 0.12 1.5 at -10.5..10.5*13 13.05 4.2..7*2;
         box 0.04 0.16 1.34 at -10.5..10.5*13 13.02 4.2..7*2;
         box 0.84 0.16 0.04 at -10.5..10.5*13 13.02 4.3..7.1*2;
@@ -86,7 +84,7 @@ def valance(scene: Scene) -> None:
     model = Model(scene, ROD)
     folds = 0.025 * np.sin(x * 40) * (0.4 - 0.6 * drop)
     model.add(sheet(xyz(x, scallops, folds)), "Red towel")
-    put(model.mesh("Valance"), spot("on front -0.75 0.09 2.51"))
+    put(model.mesh("Valance"), "on front -0.75 0.09 2.51")
 
 
 def street(scene: Scene) -> None:
@@ -100,4 +98,4 @@ def street(scene: Scene) -> None:
         for k, color in enumerate((("Green", "Red")[i // 2 % 2], "White")):  # the awning's stripes
             stripes = xyz(x + np.arange(k - 3, 4, 2) * 0.25, 12.6, 2.55)
             model.add(box((0.25, 1.0, 0.02)), color, stripes, (25, 0, 0))
-    put(model.mesh("Street"), spot("room"))
+    put(model.mesh("Street"), "room")

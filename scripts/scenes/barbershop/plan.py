@@ -28,42 +28,30 @@ INKS = ("Red", "Navy", "Teal", "Ochre", "Black", "Green")
 HAIR = ("Brown hair", "Fair hair", "Black hair")
 
 
-def wall(side: str, along: float, out: float = 0.0, z: float = 0.0) -> Matrix:
-    """The frame of something with its back to a wall: y into the room, z up, x to its own left.
-
-    side: left (−X), right, front (+Y) or back. along: the world's y (left, right) or x (front,
-    back). out: the distance from the wall.
-    """
-    location, degrees = {
-        "left": ((out - HALF_X, along, z), -90),
-        "right": ((HALF_X - out, along, z), 90),
-        "front": ((along, HALF_Y - out, z), 180),
-        "back": ((along, out - HALF_Y, z), 0),
-    }[side]
-    return transform(location, (0, 0, np.radians(degrees)))
-
-
 def spots(text: str) -> list[Matrix]:
     """Frames of text, a comma after each; numbers that are 0 may be left out at its end.
 
-    "room 1 2 0 90" is at (1, 2, 0) turned by 90°. "left 2 0.1 1.5" is before the left wall: along,
-    out and z of `wall`, and degrees. "on left 2 0.1 1.5" is for what hangs there. A number may
-    stand for several (see `points`).
+    "room 1 2 0 90" is at (1, 2, 0), turned by 90°. "left 2 0.1 1.5" has its back to the left wall,
+    y into the room and x to its own left: y (x at the front and back), distance from the wall, z,
+    and degrees. "on left 2 0.1 1.5" is for what hangs there. A number may stand for several (see
+    `points`).
     """
     frames = []
     for row in text.split(","):
-        side, numbers = re.fullmatch(r"((?:on )?\w+)(.*)", row.strip()).groups()
+        hangs, side, numbers = re.fullmatch(r"(on )?(\w+)(.*)", row.strip()).groups()
         for given in points(numbers or "0"):
-            a, b, c, turn = (*given, *(0,) * (4 - len(given)))
-            where = transform((a, b, c)) if side == "room" else wall(side.split()[-1], a, b, c)
-            degrees = (90, 0, 180) if side.startswith("on ") else (0, 0, turn)
+            a, b, z, turn = (*given, *(0,) * (4 - len(given)))
+            (x, y), faces = {
+                "room": ((a, b), 0),
+                "left": ((b - HALF_X, a), -90),
+                "right": ((HALF_X - b, a), 90),
+                "front": ((a, HALF_Y - b), 180),
+                "back": ((a, b - HALF_Y), 0),
+            }[side]
+            where = transform((x, y, z), (0, 0, np.radians(faces)))
+            degrees = (90, 0, 180) if hangs else (0, 0, turn)
             frames.append(where @ transform(rotation=np.radians(degrees)))
     return frames
-
-
-def spot(text: str) -> Matrix:
-    """The one frame of a text."""
-    return spots(text)[0]
 
 
 def drawings(text: str) -> list[tuple[str, str, str]]:
@@ -78,17 +66,16 @@ def furnish(scene: Scene, text: str) -> None:
     A line "name | spot, spot, …" begins a model (see `spots`); its parts follow (`Model.draw`).
     """
     for name, where, parts in drawings(text):
-        data = Model(scene, parts).mesh(name)
-        for frame in spots(where):
-            put(data, frame)
+        put(Model(scene, parts).mesh(name), where)
 
 
 def put(
     data: bpy.types.Mesh,
-    where: Matrix,
+    where: Matrix | str,
     at: Sequence[float] = (0, 0, 0),
     degrees: Sequence[float] = (0, 0, 0),
     scale: float | Sequence[float] = 1.0,
 ) -> None:
-    """An instance of a mesh in a frame, scaled turned by XYZ Euler angles, and moved."""
-    place(data.name, data, where @ transform(at, np.radians(degrees), scale))
+    """Instances of a mesh in a frame or at a text's `spots`, scaled, turned by XYZ Euler, moved."""
+    for frame in spots(where) if isinstance(where, str) else [where]:
+        place(data.name, data, frame @ transform(at, np.radians(degrees), scale))

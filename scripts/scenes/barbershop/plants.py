@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 
 from scenes.barbershop.goods import Goods, stock
-from scenes.barbershop.plan import put, spot
+from scenes.barbershop.plan import put
 from scenes.library.points import polar, xyz
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import Shape, sheet
@@ -54,14 +54,14 @@ def plant(scene: Scene, kind: str) -> bpy.types.Mesh:
 
 def plants(scene: Scene, bottles: Goods, pots: Goods) -> None:
     """Plants on the sill, bottles between them; others in the corners, one hanging."""
-    random, room = scene.random("plants"), spot("room")
+    random = scene.random("plants")
     fern, snake, rubber = (plant(scene, kind) for kind in POTTED)
     on_sill = ((-1.8, fern), (-0.95, snake), (-0.3, fern), (0.35, rubber))
     for x, data in on_sill:
         turn = (0, 0, random.uniform(0, 360))
-        put(data, spot(f"front {x} 0.08 1"), degrees=turn, scale=random.uniform(0.5, 0.6))
+        put(data, f"front {x} 0.08 1", degrees=turn, scale=random.uniform(0.5, 0.6))
     for x in (-1.4, -0.63, 0.03):
-        stock(scene, random, bottles, spot(f"front {x} 0.05 1"), 0.34, 0.12)
-    put(rubber, room, (2.18, 3.38, 0), (0, 0, 40), 1.5)
-    put(snake, room, (-2.22, 3.46, 0), (0, 0, 10), 1.3)
-    put(fern, room, (-2.24, 3.42, 1.62), (0, 0, 200), 0.8)
+        stock(scene, random, bottles, f"front {x} 0.05 1", 0.34, 0.12)
+    put(rubber, "room 2.18 3.38 0 40", scale=1.5)
+    put(snake, "room -2.22 3.46 0 10", scale=1.3)
+    put(fern, "room -2.24 3.42 1.62 200", scale=0.8)

@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 
-from scenes.barbershop.plan import HAIR, INKS, drawings, put, spot
+from scenes.barbershop.plan import HAIR, INKS, drawings, put
 from scenes.library.points import circle, points
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import Shape, prism, transform
@@ -29,55 +29,42 @@ masters | Ebony 0.6 0.8
     Cream: lathe 0.165 0, 0.165 0.6 at 0 0.05 2; word 0.068 0.6 MASTER BARBERS at 0 -0.27 1.5
     Ochre: word 0.045 0.6 since 1927 at 0 -0.335 1.5
 moustaches | Gilt 0.5 0.7
-    Cream: box 0.46 0.66 0.6
-    Red: word 0.036 0.6 THE GENTLEMEN'S CHOICE at 0 0.29 1.5
+    Cream: box 0.46 0.66 0.6; Red: word 0.036 0.6 THE GENTLEMEN'S CHOICE at 0 0.29 1.5
 prices | Oak 0.7 1.0
-    Black: box 0.66 0.96 0.6
-    Cream: word 0.12 0.6 PRICES at 0 0.39 1.5
+    Black: box 0.66 0.96 0.6; Cream: word 0.12 0.6 PRICES at 0 0.39 1.5
     Gilt: box 0.5 0.006 0.6 at 0 0.32 1; box 0.006 0.006 0.6 at 0.03..0.14*6 0.235..-0.374*8 1
     Red: word 0.045 0.6 no appointment needed at 0 -0.43 1.5
 haircuts | Ebony 0.7 0.5
-    Teal: box 0.66 0.46 0.6
-    Cream: lathe 0.078 0, 0.078 0.6 at -0.2..0.2*3 0.06..-0.14*2 1
+    Teal: box 0.66 0.46 0.6; Cream: lathe 0.078 0, 0.078 0.6 at -0.2..0.2*3 0.06..-0.14*2 1
     Skin: lathe 0.04 0, 0.04 0.6 at -0.2..0.2*3 0.052..-0.148*2 2 scaled 0.85 1.2 1
     Black: lathe 0.004 0, 0.004 0.6 at -0.213..0.187*3 0.06..-0.14*2 3
         -0.187..0.213*3 0.06..-0.14*2 3
     Cream: word 0.045 0.6 STYLES OF THE SEASON at 0 0.185 1.5
 pole | Mahogany 0.4 0.7
-    Ochre: box 0.36 0.66 0.6
-    White: box 0.12 0.4 0.6 at 0 0 1
+    Ochre: box 0.36 0.66 0.6; White: box 0.12 0.4 0.6 at 0 0 1
     Red: prism 0.6, -0.06 -0.03, 0.06 0.03, 0.06 0.055, -0.06 -0.005 at 0 -0.165..0.135*4 2
     Blue: prism 0.6, -0.06 -0.03, 0.06 0.03, 0.06 0.055, -0.06 -0.005 at 0 -0.115..0.085*3 2
     Black: lathe 0.045 0, 0.045 0.6 at 0 ±0.235 2; box 0.15 0.03 0.6 at 0 ±0.205 3;
-        word 0.042 0.6 SHAVE at -0.125 0.29 1.5
-    Red: word 0.036 0.6 25 cents at 0.105 -0.30 1.5
+        word 0.042 0.6 SHAVE at -0.125 0.29 1.5; Red: word 0.036 0.6 25 cents at 0.105 -0.30 1.5
 deco | Gilt 0.5 0.7
     Red: box 0.46 0.66 0.6
     Cream: word 0.075 0.6 Brilliantine at 0 -0.22 1.5;
         word 0.026 0.6 keeps every hair in its place at 0 -0.28 1.5
 landscape | Gilt 0.62 0.42
-    Cream: box 0.58 0.38 0.6
-    Red: lathe 0.07 0, 0.07 0.6 at 0.12 0.07 1
+    Cream: box 0.58 0.38 0.6; Red: lathe 0.07 0, 0.07 0.6 at 0.12 0.07 1
 certificate | Ebony 0.44 0.32
-    Cream: box 0.40 0.28 0.6
-    Gilt: box 0.38 0.26 0.6 at 0 0 1
-    Cream: box 0.36 0.24 0.6 at 0 0 2
+    Cream: box 0.40 0.28 0.6; Gilt: box 0.38 0.26 0.6 at 0 0 1; Cream: box 0.36 0.24 0.6 at 0 0 2
     Black: word 0.06 0.6 Certificate at 0 0.075 3.5; box 0.26 0.004 0.6 at 0 0.02 3, 0 -0.024 3;
-        box 0.21 0.004 0.6 at 0 -0.002 3, 0 -0.046 3
-    Red: lathe 0.028 0, 0.028 0.6 at 0.12 -0.09 3
+        box 0.21 0.004 0.6 at 0 -0.002 3, 0 -0.046 3; Red: lathe 0.028 0, 0.028 0.6 at 0.12 -0.09 3
 portrait | Gilt 0.26 0.34
     Rug sand: lathe 0.5 0, 0.5 0.6 scaled 0.24 0.32 1
     Skin: lathe 0.05 0, 0.05 0.6 at 0 0 2 scaled 0.85 1.15 1
 """
-PRICES = (
-    *(("Haircut", "1.50"), ("Shave", "1.00"), ("Beard trim", "0.75"), ("Hot towel", "0.50")),
-    *(("Moustache", "0.40"), ("Shampoo", "0.60"), ("Children", "0.90"), ("The works", "3.50")),
-)
-MAGAZINE = """Paper: box 0.20 0.27 12 0.0012 at 0 0 -6
-    {cover}: box 0.199 0.269 0.6
+PRICES = """Haircut 1.50, Shave 1.00, Beard trim 0.75, Hot towel 0.50, Moustache 0.40, Shampoo 0.60,
+    Children 0.90, The works 3.50"""
+MAGAZINE = """Paper: box 0.20 0.27 12 0.0012 at 0 0 -6; {cover}: box 0.199 0.269 0.6
     {ink}: box 0.199 0.06 0.6 at 0 0.1 1
-    White: word 0.06 0.6 {title} at 0 0.1 1.5
-    {disc}: lathe 0.065 0, 0.065 0.6 at 0 -0.02 1
+    White: word 0.06 0.6 {title} at 0 0.1 1.5; {disc}: lathe 0.065 0, 0.065 0.6 at 0 -0.02 1
     Black: box 0.07 0.006 0.6 at -0.05 -0.09..-0.11*2 1;
         box 0.05 0.006 0.6 at -0.05 -0.10..-0.12*2 1"""
 TITLES = ("SHAVE", "GENT", "SPORT", "MOTOR", "JAZZ", "RADIO")
@@ -120,8 +107,8 @@ def moustaches(model: Model) -> None:
 
 
 def prices(model: Model) -> None:
-    for k, (service, price) in enumerate(PRICES):
-        y = 0.25 - 0.087 * k
+    for k, row in enumerate(PRICES.split(",")):
+        (service, price), y = row.strip().rsplit(maxsplit=1), 0.25 - 0.087 * k
         model.draw(f"Cream: word 0.06 0.6 {service} at -0.14 {y} 1.5")
         model.draw(f"Ochre: word 0.06 0.6 {price} at 0.23 {y} 1.5")
 
@@ -187,7 +174,7 @@ def pictures(scene: Scene) -> None:
         made[name] = model.mesh(f"Picture {name}")
     for row in HUNG.replace("\n", ",").split(","):
         name, side, along, z = row.split()
-        put(made[name], spot(f"on {side} {along} 0.001 {z}"))
+        put(made[name], f"on {side} {along} 0.001 {z}")
 
 
 def magazine(scene: Scene, number: int) -> bpy.types.Mesh:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from scenes.barbershop.plan import HAIR, HALF_X, HALF_Y, ROOM, STATIONS, TAU, put, spot, spots, wall
+from scenes.barbershop.plan import HAIR, HALF_X, HALF_Y, ROOM, STATIONS, TAU, put
 from scenes.library.architecture import blocks, frame
 from scenes.library.points import circle, points, polar, xyz
 from scenes.library.scene import Model, Scene
@@ -15,10 +15,8 @@ MOSAIC_RINGS = (  # inner and outer radius, glazes
     *((0.74, 0.79, GREEN), (0.68, 0.735, CREAM), (0.47, 0.515, CREAM), (0.42, 0.465, GREEN)),
     (0.36, 0.415, ["Red", "Ochre"]),
 )
-MOSAIC = """Grout: lathe 0.8 0, 0.8 0.0005
-    Black tile: pipe 0.675 0, 0.675 0.0015, 0.52 0.0015
-    Cream: lathe 0.355 0, 0.355 0.0015
-    Brass: lathe 0.07 0, 0.07 0.0039
+MOSAIC = """Grout: lathe 0.8 0, 0.8 0.0005; Black tile: pipe 0.675 0, 0.675 0.0015, 0.52 0.0015
+    Cream: lathe 0.355 0, 0.355 0.0015; Brass: lathe 0.07 0, 0.07 0.0039
     Black tile: word 0.12 0.0005 B at 0 0 0.0043"""
 RUG = """Rug red: box 0.78 1.9 0.004 0.001 at 0 0 0.002
     Rug sand: box 0.70 1.82 0.004 0.001 at 0 0 0.0032
@@ -85,7 +83,7 @@ def tiles(scene: Scene) -> None:
     for k, material in enumerate(("Cream tile", "Black tile")):
         size = (TILE - 0.004, TILE - 0.004, 0.02)
         model.add(blocks(centers[(i + j) % 2 == k], size, 0.003), material)
-    put(model.mesh("Floor"), spot("room"))
+    put(model.mesh("Floor"), "room")
 
 
 def medallion(scene: Scene) -> None:
@@ -110,7 +108,7 @@ def medallion(scene: Scene) -> None:
         for side, material in ((1, "Ochre"), (-1, "Navy")):
             ray = prism([(0, 0), (0.05 * side, 0.28 * reach), (0, reach)][::side], top)
             model.add(copies(ray, 0 * outwards, forward=outwards), material)
-    put(model.mesh("Floor medallion"), spot("room"))
+    put(model.mesh("Floor medallion"), "room")
 
 
 def rug(scene: Scene) -> None:
@@ -118,7 +116,7 @@ def rug(scene: Scene) -> None:
     model, random = Model(scene, RUG), scene.random("rug")
     for end in points(f"-0.38..0.38*{scene.segments(60, 8)} ±0.975 0.0025"):
         model.add(box((0.006, 0.06, 0.003)), "Rug sand", end, (0, 0, random.uniform(-12, 12)))
-    put(model.mesh("Rug"), spot("room 1.24 0.15"))
+    put(model.mesh("Rug"), "room 1.24 0.15")
 
 
 def hair_clippings(scene: Scene) -> None:
@@ -132,7 +130,7 @@ def hair_clippings(scene: Scene) -> None:
             strand = tube(path, (0.0003, 0.0006, 0.0006, 0.0002), 3)
             at, turn = (*random.normal(0, 0.05, 2), 0.0012), (0, 0, random.uniform(0, 360))
             model.add(strand, hair, at, turn)
-        tuft, around = model.mesh(f"Clippings {hair.lower()}"), spot(f"room -1.4 {y} 0.001")
+        tuft, around = model.mesh(f"Clippings {hair.lower()}"), f"room -1.4 {y} 0.001"
         for _ in range(scene.count(26, 2)):
             at = polar(random.uniform(0.62, 0.85), random.uniform(0, TAU))
             turn, size = (0, 0, random.uniform(0, 360)), random.uniform(0.7, 1.3)
@@ -153,7 +151,7 @@ def metro_tiles(scene: Scene) -> None:
         here = (glaze == k % 3) & ((row < green_rows) == (k < 3)) & (x1 - x0 > 0.02)
         material = f"{'Green' if k < 3 else 'Cream'} glaze {k % 3}"
         model.add(blocks(centers[here], sizes[here], 0.004), material)
-    put(model.mesh("Metro tiles"), wall("left", 0))
+    put(model.mesh("Metro tiles"), "left 0")
 
 
 def wainscot(scene: Scene) -> None:
@@ -169,7 +167,7 @@ def wainscot(scene: Scene) -> None:
         count = round((stop - start) / size)
         width = (stop - start) / count
         for i in range(count):
-            put(data, wall(side, start + (i + 0.5) * width), scale=(width / size, 1, 1))
+            put(data, f"{side} {start + (i + 0.5) * width}", scale=(width / size, 1, 1))
 
 
 def ceiling(scene: Scene) -> None:
@@ -185,10 +183,9 @@ def ceiling(scene: Scene) -> None:
         + 0.030 * np.exp(-((r / 0.13) ** 2))
     )
     tile = scene.mesh("Tin tile", grid(u / 4, u / 4, relief), "Tin")
-    for where in spots("room -2.25..2.25*10 -3.5..3.5*15 3"):
-        put(tile, where, degrees=(180, 0, 0))
+    put(tile, "room -2.25..2.25*10 -3.5..3.5*15 3", degrees=(180, 0, 0))
     cornice, t = Model(scene), np.linspace(0, np.pi / 2, scene.segments(8))
     cove = np.column_stack([-0.13 + 0.09 * np.sin(t), 0.035 + 0.10 * (1 - np.cos(t))])
     profile = [(-0.15, 0), (-0.15, 0.03), *cove, (-0.03, 0.16), (0, 0.16)]
     cornice.add(frame(ROOM[0], ROOM[1], profile), "Cream", (0, 0, ROOM[2]), (180, 0, 0))
-    put(cornice.mesh("Cornice"), spot("room"))
+    put(cornice.mesh("Cornice"), "room")

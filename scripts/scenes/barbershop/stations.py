@@ -5,7 +5,7 @@ import numpy as np
 
 from scenes.barbershop.cloth import draped_towel, folded_towel, rolled_towel
 from scenes.barbershop.goods import Goods, shelf, stock
-from scenes.barbershop.plan import COUNTER_TOP, STATIONS, TOWELS, drawings, put, spot, wall
+from scenes.barbershop.plan import COUNTER_TOP, STATIONS, TOWELS, drawings, put, spots
 from scenes.library.points import circle, points, polar, xyz
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import box, copies, prism, transform, tube
@@ -35,8 +35,7 @@ CLIPPERS = """Black: box 0.048 0.14 0.036 0.014 3 at 0 0 0.019
 PANEL = "-0.05 0.004, -0.03 0.018, 0 0.02, 0.015 0.006, 0.02 0"  # round a cabinet's panel
 KNOB = "Brass: lathe 0.008 0, 0.008 0.014, 0.017 0.02, 0.014 0.03, 0 0.032"
 CABINET = """Mahogany: box 0.64 0.41 0.73 at 0 0.205 0.455;
-        box 0.05 0.02 0.73 0.006 at ±0.32 0.41 0.455
-    Ebony: box 0.64 0.35 0.09 at 0 0.175 0.045
+        box 0.05 0.02 0.73 0.006 at ±0.32 0.41 0.455; Ebony: box 0.64 0.35 0.09 at 0 0.175 0.045
     """
 STATION = f"""
 Counter drawers | left -2.88..2.24*5
@@ -121,9 +120,7 @@ def mirrors(scene: Scene) -> None:
     spiral += xyz(0.10, 0.67, 0.045)
     for side in (-1, 1):
         model.add(scene.bend(spiral * (side, 1, 1), 0.008, 30), "Gilt")
-    data = model.mesh("Station mirror")
-    for y in STATIONS:
-        put(data, spot(f"on left {y} 0.012 1.62"))
+    put(model.mesh("Station mirror"), "on left -2..2*3 0.012 1.62")
 
 
 def station_goods(scene: Scene, bottles: Goods, pots: Goods) -> None:
@@ -134,7 +131,7 @@ def station_goods(scene: Scene, bottles: Goods, pots: Goods) -> None:
     kit = [tools["Scissors"], comb(scene, "Black"), comb(scene, "Oak"), hair_brush(scene)]
     kit += [tools["Razor"], tools["Scissors"]]
     for y in STATIONS:
-        where = wall("left", y, 0, COUNTER_TOP)
+        where = spots(f"left {y} 0 {COUNTER_TOP}")[0]
         for k, tool in enumerate(kit):
             put(tool, where, (0.33 + 0.045 * k, 0.26, 0.0065), (0, 0, random.uniform(-7, 7)))
         put(tools["Clippers"], where, (-0.36, 0.27, 0), (0, 0, random.uniform(-15, 15)))
@@ -151,10 +148,10 @@ def racks(scene: Scene, bottles: Goods, pots: Goods) -> None:
     rolled = [rolled_towel(scene, towel) for towel in TOWELS[:2]]
     for y in (-3, -1, 1, 3):
         for z, goods in ((1.24, 1), (1.58, 1), (1.92, 1), (2.26, 0)):
-            rack = wall("left", y, 0.012, z)
+            rack = f"left {y} 0.012 {z}"
             put(board, rack)
             stock(scene, random, [*bottles, *pots] if goods else bottles, rack, 0.54, 0.125)
-        side = wall("left", y, 0.04, COUNTER_TOP)
+        side = f"left {y} 0.04 {COUNTER_TOP}"
         stock(scene, random, pots, side, 0.72, 0.14)
         for k in range(3):
             turn = (0, 0, random.uniform(-4, 4))
@@ -162,4 +159,4 @@ def racks(scene: Scene, bottles: Goods, pots: Goods) -> None:
         for k, (x, z) in enumerate(((0.13, 0), (0.225, 0), (0.1775, 0.076))):
             put(rolled[k % 2], side, (x, 0.26, z))
     for y, towel in ((-1, "Red towel"), (1, "Blue towel")):
-        put(draped_towel(scene, towel), spot(f"left {y} 0.5 0.706"))
+        put(draped_towel(scene, towel), f"left {y} 0.5 0.706")

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-import bpy
 import numpy as np
 
 from scenes.garden import plan
@@ -101,15 +100,12 @@ def cushion(outline: Array, height: float, rounding: float, rings: int, seed: in
 def kerb(scene: Scene) -> None:
     """Granite blocks that hold the gravel in, but for the pond's shore and the path."""
     random = scene.random("kerb")
-    block = box((0.62, 0.15, 0.26), 0.02, 2)
-    bumps = [0.008 * noise(block.vertices * 6 + i * 9, 41, 2)[:, None] for i in range(3)]
-    blocks = [
-        scene.mesh(f"Kerb.{i}", block.reshaped(block.vertices + bump), "Kerb granite")
-        for i, bump in enumerate(bumps)
-    ]
+    block, blocks = box((0.62, 0.15, 0.26), 0.02, 2), []
+    for i in range(3):
+        bumpy = block.vertices + 0.008 * noise(block.vertices * 6 + i * 9, 41, 2)[:, None]
+        blocks.append(scene.mesh(f"Kerb.{i}", block.reshaped(bumpy), "Kerb granite"))
     x0, y0, x1, y1 = COURT
-    corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-    places = []
+    corners, places = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), []
     for side, (start, end) in enumerate(zip(corners, np.roll(corners, -1, axis=0), strict=True)):
         count = round(np.hypot(*(end - start)) / 0.645)
         for x, y in start + (end - start) * (np.arange(count)[:, None] + 0.5) / count:
@@ -120,21 +116,9 @@ def kerb(scene: Scene) -> None:
     scatter("Kerb", blocks, places)
 
 
-def boulder(scene: Scene, number: int) -> bpy.types.Mesh:
-    """A boulder about 1 m across, weathered and mossy on top."""
-    ball = icosphere(scene.segments(5, 2))
-    v, shift = ball.vertices, np.array([17.0 * number, 5.0, 3.0])
-    ridges = 1 - 2 * np.abs(noise(v * 1.3 + shift, 62, 1))
-    swell = 1 + 0.28 * noise(v * 0.9 + shift, 61, 2) + 0.16 * ridges
-    swell += 0.05 * noise(v * 5 + shift, 63, 3)
-    stretch = scene.random(f"rock{number}").uniform((0.4, 0.34, 0.3), (0.52, 0.48, 0.46))
-    return scene.mesh(f"Rock.{number}", ball.reshaped(v * swell[:, None] * stretch), "Rock")
-
-
 def rocks(scene: Scene) -> None:
     """Rock islands in the gravel, stones along the shore, and boulders in the moss."""
-    random = scene.random("rocks")
-    places = []
+    random, places, boulders = scene.random("rocks"), [], []
     for x, y, radius in plan.ROCK_ISLANDS:
         for dx, dy, size in points("0 0 1.5, 0.62 0.25 0.85, -0.35 0.55 0.6, 0.15 -0.6 0.5"):
             spot = (x + dx * radius, y + dy * radius, 0.22 * size * radius)
@@ -148,4 +132,13 @@ def rocks(scene: Scene) -> None:
         places.append(transform((*shore, -0.02), turn, size))
     spots = spread(random, 26, (-13, -13, 13, 13), 1.2, court=0.7, pond=0.6, path=1.2)
     places += standing(random, spots, (0.4, 1.5), -0.05)
-    scatter("Rock", [boulder(scene, i) for i in range(6)], places)
+    ball = icosphere(scene.segments(5, 2))  # about 1 m across
+    for i in range(6):
+        v, shift = ball.vertices, np.array([17.0 * i, 5.0, 3.0])
+        ridges = 1 - 2 * np.abs(noise(v * 1.3 + shift, 62, 1))
+        swell = 1 + 0.28 * noise(v * 0.9 + shift, 61, 2) + 0.16 * ridges
+        swell += 0.05 * noise(v * 5 + shift, 63, 3)
+        stretch = scene.random(f"rock{i}").uniform((0.4, 0.34, 0.3), (0.52, 0.48, 0.46))
+        weathered = ball.reshaped(v * swell[:, None] * stretch)
+        boulders.append(scene.mesh(f"Rock.{i}", weathered, "Rock"))
+    scatter("Rock", boulders, places)

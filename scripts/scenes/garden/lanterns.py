@@ -71,10 +71,8 @@ def paper_globes(scene: Scene) -> None:
 def floor_lanterns(scene: Scene) -> None:
     """Framed paper lanterns beside the path."""
     width, height = 0.13, 0.52
-    bars = [
-        box((0.022, 0.022, height), 0.004, 1).moved(x, y, height / 2)
-        for x, y in rectangle(2 * width, 2 * width)
-    ]
+    corners, post = rectangle(2 * width, 2 * width), box((0.022, 0.022, height), 0.004, 1)
+    bars = [post.moved(x, y, height / 2) for x, y in corners]
     for z in (0.09, 0.3, height - 0.02):
         bars += [box((2 * width, 0.016, 0.016)).moved(0, y, z) for y in (-width, width)]
         bars += [box((0.016, 2 * width, 0.016)).moved(x, 0, z) for x in (-width, width)]

@@ -7,6 +7,7 @@ import numpy as np
 
 from scenes.garden.plan import STATUE, TAU, TORII, ground_height
 from scenes.library import shapes
+from scenes.library.architecture import upright
 from scenes.library.points import Points, noise, points, polar, smoothstep, xyz
 from scenes.library.scene import Scene, place
 from scenes.library.shapes import Shape, box, copies, icosphere, join, sheet, transform
@@ -20,23 +21,17 @@ def statue(scene: Scene) -> None:
     for i, (width, low, high) in enumerate(points("1.55 -0.1 0.14, 1.32 0.14 0.5, 1.45 0.5 0.58")):
         block, spot = box((width, width, high - low), 0.02, 3), (x, y, (low + high) / 2)
         scene.add(f"Plinth.{i}", block, "Plinth granite", matrix=transform(spot))
-    seat = transform((x, y, 0.58), scale=1.05)
+    seat, spot = transform((x, y, 0.58), scale=1.05), transform((x, y, 0.78), scale=0.92)
     scene.add("Lotus", lotus(scene), "Rough bronze", matrix=seat)
-    body = join([figure(scene), curls(scene)])
-    spot = transform((x, y, 0.78), scale=0.92)
-    scene.add("Statue", body, "Rough bronze", matrix=spot)
-    scene.add("Halo", halo(scene), "Polished brass", matrix=transform((x, y + 0.2, 2.05)))
+    scene.add("Statue", join([figure(scene), curls(scene)]), "Rough bronze", matrix=spot)
+    halo = [scene.ring(0.30, 0.016, 96, 12), scene.ring(0.39, 0.008, 96)]
+    for k, angle in enumerate(np.arange(48) * TAU / 48):  # rays, in turn short and long
+        reach = np.array([0.30, 0.345, 0.414]) + (k % 2) * np.array([0, 0.08, 0.07])
+        halo.append(shapes.tube(polar(reach, angle), [0.007, 0.010, 0.0023], 6))
+    spot = transform((x, y + 0.2, 2.05))
+    scene.add("Halo", upright(join(halo)), "Polished brass", matrix=spot)
     stem = scene.tube("0 0 0, 0 0.02 0.6, 0 0 1.35", 0.018, 10)
     scene.add("Halo stem", stem, "Polished brass", matrix=transform((x, y + 0.22, 0.75)))
-
-
-def halo(scene: Scene) -> Shape:
-    """Two rings and 48 rays, in turn short and long, in the XZ plane."""
-    parts = [scene.ring(0.30, 0.016, 96, 12), scene.ring(0.39, 0.008, 96)]
-    for k, angle in enumerate(np.arange(48) * TAU / 48):
-        reach = np.array([0.30, 0.345, 0.414]) + (k % 2) * np.array([0, 0.08, 0.07])
-        parts.append(shapes.tube(polar(reach, angle), [0.007, 0.010, 0.0023], 6))
-    return join(parts).transformed(transform(rotation=(np.pi / 2, 0, 0)))
 
 
 def ellipsoid(center: Sequence[float], radii: Sequence[float]) -> Shape:
@@ -80,11 +75,7 @@ def figure(scene: Scene) -> Shape:
     melted = whole.evaluated_get(bpy.context.evaluated_depsgraph_get())
     skin = shapes.mesh_shape(melted.data)
     bpy.data.batch_remove([whole, whole.data])
-    return folded(skin)
-
-
-def folded(skin: Shape) -> Shape:
-    """Folds of cloth pressed into the robe: over the left shoulder, and around arms and legs."""
+    # Folds of cloth pressed into the robe: over the left shoulder, and around arms and legs.
     x, y, z = skin.vertices.T
     outward = skin.vertices - xyz(0.5 * x, 0.05, np.clip(z, 0.2, 0.8))
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
@@ -132,13 +123,11 @@ def mirror(scene: Scene) -> None:
     parts.append(box((width + 0.02, 0.012, height)).moved(0, 0.02, height / 2))
     for side in (-1, 1):
         inner, outer = side * (width / 2 + 0.035), side * (width / 2 + 0.12)
-        parts += [
-            box((0.07, 0.05, height), 0.012).moved(inner, 0, height / 2),
-            box((0.07, 0.07, 1.3), 0.012).moved(outer, 0.02, 0.43),
-            box((0.09, 0.55, 0.07), 0.015).moved(outer, 0.02, -0.2),
-        ]
-    towards_viewer = -float(np.arctan2(*MIRROR))
-    spot = transform((*MIRROR, 0.24), (np.radians(-3.0), 0, towards_viewer + np.radians(6.0)))
+        parts.append(box((0.07, 0.05, height), 0.012).moved(inner, 0, height / 2))
+        parts.append(box((0.07, 0.07, 1.3), 0.012).moved(outer, 0.02, 0.43))
+        parts.append(box((0.09, 0.55, 0.07), 0.015).moved(outer, 0.02, -0.2))
+    turn = np.radians(6.0) - np.arctan2(*MIRROR)  # towards the viewer
+    spot = transform((*MIRROR, 0.24), (np.radians(-3.0), 0, turn))
     scene.add("Mirror frame", join(parts), "Dark wood", matrix=spot, smooth=0.7)
     pane = sheet(xyz([-width / 2, width / 2], 0.005, [[0], [height]]))
     place("Mirror", scene.mesh("Mirror", pane, "Mirror", smooth=False), spot)
@@ -146,10 +135,9 @@ def mirror(scene: Scene) -> None:
 
 def torii(scene: Scene) -> None:
     """Two leaning posts with black feet, a tie beam, and two lintels that rise at their ends."""
-    red = [lintel(scene, 1.95, (3.17, 3.36), 0.12, 0.14)]
-    red.append(box((3.4, 0.12, 0.2), 0.01).moved(0, 0, 2.6))
-    red.append(box((0.22, 0.1, 0.4), 0.01).moved(0, 0, 2.9))
-    black = [lintel(scene, 2.2, (3.36, 3.46), 0.17, 0.2)]
+    beams = box((3.4, 0.12, 0.2), 0.01).moved(0, 0, 2.6), box((0.22, 0.1, 0.4), 0.01)
+    red = [lintel(scene, 1.95, 3.17, 3.36, 0.12, 0.14), beams[0], beams[1].moved(0, 0, 2.9)]
+    black = [lintel(scene, 2.2, 3.36, 3.46, 0.17, 0.2)]
     for side in (-1, 1):
         foot, head = np.array([side * 1.5, 0, -0.2]), np.array([side * 1.36, 0, 3.2])
         red.append(scene.tube(np.linspace(foot, head, 9), np.linspace(0.15, 0.125, 9), 32))
@@ -159,12 +147,10 @@ def torii(scene: Scene) -> None:
     scene.add("Torii", shape, "Vermilion", "Black lacquer", matrix=spot, smooth=0.6)
 
 
-def lintel(
-    scene: Scene, half: float, heights: tuple[float, float], depth: float, rise: float
-) -> Shape:
+def lintel(scene: Scene, half: float, low: float, high: float, depth: float, rise: float) -> Shape:
     """A beam along x that is wider above than below and curves upwards to its ends."""
     x = np.linspace(1, -1, scene.segments(24, 6))[:, None]
     y, top = points("-1 0, 1 0, 1 1, -1 1").T  # around its section
-    z = rise * np.abs(x) ** 2.4 + np.where(top == 1, heights[1], heights[0])
+    z = rise * np.abs(x) ** 2.4 + np.where(top == 1, high, low)
     rows = xyz(half * x * (1 + 0.03 * top), depth * y * (1 + 0.15 * top), z)
     return sheet(rows, closed=True, capped=True)

@@ -23,6 +23,8 @@ TORII = (0.2, -8.5)
 MAPLE = (-2.05, -3.0)
 ROCK_ISLANDS = ((2.75, -2.05, 0.75), (-1.85, 2.55, 0.5))  # x, y, radius
 STONE_LANTERNS = ((4.95, 3.1, 1.0), (-1.3, -5.2, 1.1), (-4.6, 4.2, 0.9))  # x, y, scale
+IN_THE_MOSS = [(x, y) for x, y, _ in STONE_LANTERNS]  # what stands there
+IN_THE_MOSS += [MAPLE, (TORII[0] - 1.5, TORII[1]), (TORII[0] + 1.5, TORII[1])]
 CANDLE_COLOR: Color = (1.0, 0.55, 0.22)  # of the lamps in lanterns and beside candles
 SUN_AZIMUTH = np.radians(-174.0)
 
@@ -69,13 +71,6 @@ def ground_height(x: ArrayLike, y: ArrayLike) -> Array:
     height = WATER_LEVEL + 0.06 + (height - WATER_LEVEL - 0.06) * smoothstep(0.0, 1.3, shore)
     height -= 0.6 * smoothstep(0.05, -0.9, shore)
     return np.where(court_distance(x, y) < 0.02, -0.08, height)
-
-
-def clear_of_things(x: Array, y: Array, margin: float) -> Array:
-    """Whether points keep away from what stands in the moss: lanterns, maple, torii's posts."""
-    things = [(lx, ly) for lx, ly, _ in STONE_LANTERNS]
-    things += [MAPLE, (TORII[0] - 1.5, TORII[1]), (TORII[0] + 1.5, TORII[1])]
-    return np.min([np.hypot(x - tx, y - ty) for tx, ty in things], axis=0) > margin
 
 
 def spread(

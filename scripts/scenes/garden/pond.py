@@ -8,7 +8,7 @@ from scenes.garden.plan import POND_CENTER, TAU, WATER_LEVEL, pond_distance, spr
 from scenes.library.plants import blade, tuft
 from scenes.library.points import Array, noise, points, polar, xyz
 from scenes.library.scene import Scene, scatter
-from scenes.library.shapes import Shape, copies, facets, join, sheet, transform
+from scenes.library.shapes import copies, facets, join, sheet, transform
 
 
 def water(scene: Scene) -> None:
@@ -20,12 +20,19 @@ def water(scene: Scene) -> None:
 
 
 def water_lilies(scene: Scene) -> None:
-    """Drifts of lily pads, some in flower."""
+    """Drifts of lily pads, some with a flower of three rings of petals."""
     random = scene.random("pond")
     angle = np.linspace(0.16, TAU - 0.16, scene.segments(40, 8))
     reach, rise = points("1 0.03, 0.97 0.006, 0.6 0.002, 0.05 0").T[:, :, None]
     pad = scene.mesh("Lily pad", sheet(polar(reach, angle, rise)), "Lily pad")
-    lily = scene.mesh("Water lily", water_lily(scene), "Lily petal")
+    u, v = np.linspace(0, 1, scene.segments(7, 3))[:, None], np.linspace(-1, 1, 5)
+    width = 0.022 * np.sin(np.pi * (0.1 + 0.9 * u))
+    petal = sheet(xyz(width * v, 0.085 * u, 0.03 * u**2 + 0.006 * v * v))
+    rings = []
+    for count, lift, size in ((9, 0.1, 1.0), (8, 0.6, 0.9), (6, 1.3, 0.75)):
+        out = polar(1, (np.arange(count) + 0.3 * size) * TAU / count, lift)
+        rings.append(copies(petal, np.full((count, 3), (0, 0, 0.01)), out, size=size))
+    lily = scene.mesh("Water lily", join(rings), "Lily petal")
 
     def allowed(x: Array, y: Array) -> Array:
         return (noise(xyz(x, y) / 1.3, 91) > 0.02) & (pond_distance(x, y) < -0.45)
@@ -37,18 +44,6 @@ def water_lilies(scene: Scene) -> None:
     spots = spread(random, 34, (*(POND_CENTER - 3.2), *(POND_CENTER + 3.2)), 0.30, allowed)
     scatter("Lily pad", [pad], [afloat(x, y, 0.10, 0.19) for x, y in spots])
     scatter("Water lily", [lily], [afloat(x + 0.1, y, 0.8, 1.2) for x, y in spots[::6]])
-
-
-def water_lily(scene: Scene) -> Shape:
-    """A flower of three rings of petals."""
-    u, v = np.linspace(0, 1, scene.segments(7, 3))[:, None], np.linspace(-1, 1, 5)
-    width = 0.022 * np.sin(np.pi * (0.1 + 0.9 * u))
-    petal = sheet(xyz(width * v, 0.085 * u, 0.03 * u**2 + 0.006 * v * v))
-    rings = []
-    for count, lift, size in ((9, 0.1, 1.0), (8, 0.6, 0.9), (6, 1.3, 0.75)):
-        out = polar(1, (np.arange(count) + 0.3 * size) * TAU / count, lift)
-        rings.append(copies(petal, np.full((count, 3), (0, 0, 0.01)), out, size=size))
-    return join(rings)
 
 
 def carp(scene: Scene) -> None:

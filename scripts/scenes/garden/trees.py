@@ -57,15 +57,11 @@ def bamboo_culm(scene: Scene, number: int) -> Shape:
             forward.append(out * 0.6 + random.normal(0, 0.55, (count, 3)) - (0, 0, 0.35))
     at = np.concatenate(spots)
     up, size = random.normal((0, 0, 1), 0.5, at.shape), random.uniform(0.15, 0.27, len(at))
-    leaves = copies(bamboo_leaf(), at, np.concatenate(forward), up, size)
-    return join([*parts, leaves.painted(1)])
-
-
-def bamboo_leaf() -> Shape:
-    """A narrow leaf, 1 long along +Y, folded along its rib."""
     half, y = points("0 0, 0.055 0.25, 0.05 0.6, 0 1").T[:, :, None]
     x = half * (-1, 0, 1)
-    return sheet(xyz(x, y, 0.03 * (x != 0) - 0.25 * y * y))
+    leaf = sheet(xyz(x, y, 0.03 * (x != 0) - 0.25 * y * y))  # folded along its rib
+    leaves = copies(leaf, at, np.concatenate(forward), up, size)
+    return join([*parts, leaves.painted(1)])
 
 
 def maple_leaf() -> Shape:

@@ -3,44 +3,38 @@
 import numpy as np
 
 from scenes.garden.court import flagstone_layout, raked_height
-from scenes.garden.plan import COURT, TAU, clear_of_things, court_distance, spread, standing
+from scenes.garden.plan import COURT, IN_THE_MOSS, TAU, court_distance, spread, standing
 from scenes.garden.trees import maple_leaf
 from scenes.library.plants import blade, oval_leaf, tuft
 from scenes.library.points import Array, noise, polar, xyz
 from scenes.library.scene import Scene, scatter
-from scenes.library.shapes import Shape, copies, icosphere, join
+from scenes.library.shapes import copies, icosphere, join
 
 
 def shrubs(scene: Scene) -> None:
-    """Azaleas clipped into cushions, some in flower."""
-    random = scene.random("shrubs")
-    used = ("Shrub core", "Azalea leaves", "Azalea flowers")
-    shapes = [azalea(scene, random, 7.0 * i, part) for i, part in enumerate((0.0, 0.12, 0.3))]
-    meshes = [scene.mesh("Shrub", shape, *used) for shape in shapes]
+    """Azaleas clipped into cushions 1 m across: a core, leaves, and flowers for a part of them."""
+    random, leaf, core = scene.random("shrubs"), oval_leaf(), icosphere(scene.segments(3, 2))
+    meshes, count = [], scene.count(3600, 60)
+    for shift, flowers in ((0.0, 0.0), (7.0, 0.12), (14.0, 0.3)):
+        z = random.uniform(-0.1, 1.0, count)
+        out = polar(np.sqrt(1 - z * z), random.uniform(0, TAU, count), z)
+        lumps = 1 + 0.16 * noise(out * 1.6 + shift, 96, 2)[:, None]
+        spots = out * 0.5 * lumps * random.uniform(0.9, 1.03, (count, 1)) * (1, 1, 0.85)
+        forward, up = random.normal(0, 1, (count, 3)), out + random.normal(0, 0.45, (count, 3))
+        leaves = copies(leaf, spots, forward, up, random.uniform(0.035, 0.06, count))
+        slots = np.where(random.random(count) < flowers, 2, 1)
+        leaves = leaves._replace(slots=np.repeat(slots, len(leaf.triangles)).astype(np.int32))
+        inner = 0.42 * (1 + 0.16 * noise(core.vertices * 1.6 + shift, 96, 2))[:, None]
+        shape = join([core.reshaped(core.vertices * inner * (1, 1, 0.85)), leaves])
+        meshes.append(scene.mesh("Shrub", shape, "Shrub core", "Azalea leaves", "Azalea flowers"))
 
     def allowed(x: Array, y: Array) -> Array:
-        return (np.hypot(x, y) < 14) & clear_of_things(x, y, 0.6)
+        apart = [np.hypot(x - tx, y - ty) for tx, ty in IN_THE_MOSS]
+        return (np.hypot(x, y) < 14) & (np.min(apart, axis=0) > 0.6)
 
     off = {"court": 0.75, "pond": 0.9, "path": 1.3}
     spots = spread(random, 56, (-14, -14, 14, 14), 1.15, allowed, **off)
     scatter("Shrub", meshes, standing(random, spots, (0.8, 1.9)))
-
-
-def azalea(scene: Scene, random: np.random.Generator, shift: float, flowers: float) -> Shape:
-    """A cushion 1 m across: a core, leaves (slot 1), and flowers (slot 2) for a part of them."""
-    count = scene.count(3600, 60)
-    z = random.uniform(-0.1, 1.0, count)
-    out = polar(np.sqrt(1 - z * z), random.uniform(0, TAU, count), z)
-    lumps = 1 + 0.16 * noise(out * 1.6 + shift, 96, 2)[:, None]
-    spots = out * 0.5 * lumps * random.uniform(0.9, 1.03, (count, 1)) * (1, 1, 0.85)
-    forward, up = random.normal(0, 1, (count, 3)), out + random.normal(0, 0.45, (count, 3))
-    leaf = oval_leaf()
-    leaves = copies(leaf, spots, forward, up, random.uniform(0.035, 0.06, count))
-    slots = np.where(random.random(count) < flowers, 2, 1)
-    leaves = leaves._replace(slots=np.repeat(slots, len(leaf.triangles)).astype(np.int32))
-    core = icosphere(scene.segments(3, 2))
-    inner = 0.42 * (1 + 0.16 * noise(core.vertices * 1.6 + shift, 96, 2))[:, None]
-    return join([core.reshaped(core.vertices * inner * (1, 1, 0.85)), leaves])
 
 
 def grass(scene: Scene) -> None:

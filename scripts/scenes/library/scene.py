@@ -87,36 +87,20 @@ class Scene:
             data.materials.append(bpy.data.materials[material])
         data.polygons.foreach_set("material_index", shape.face_slots().astype(np.int32))
         data.update(calc_edges=True)
-        if smooth is False:
-            data.shade_flat()
-        else:
-            data.shade_smooth()
-            if smooth is not True:
-                data.set_sharp_from_angle(angle=float(smooth))
+        (data.shade_smooth if smooth else data.shade_flat)()
+        if not isinstance(smooth, bool):
+            data.set_sharp_from_angle(angle=float(smooth))
         return data
 
     def add(
-        self,
-        name: str,
-        shape: Shape,
-        *materials: str,
-        matrix: Matrix | None = None,
-        smooth: bool | float = True,
+        self, name: str, shape: Shape, *materials: str, matrix: Matrix | None = None, **smooth: Any
     ) -> bpy.types.Object:
-        """One object of a mesh of its own."""
-        return place(name, self.mesh(name, shape, *materials, smooth=smooth), matrix)
+        """One object of a mesh of its own (see `mesh`)."""
+        return place(name, self.mesh(name, shape, *materials, **smooth), matrix)
 
 
-Element = Callable[[Scene], None]
-
-
-def fill(
-    palette: Callable[[], None], elements: Iterable[Element], parameters: Mapping[str, Any]
-) -> None:
-    """Fill the empty scene: its materials, then its elements.
-
-    parameters: `seed` (int) and `detail` (1.0 is all of it).
-    """
+def fill(palette: Callable, elements: Iterable[Callable], parameters: Mapping[str, Any]) -> None:
+    """Fill the empty scene. parameters: `seed` (int), `detail` (1.0 is all of it)."""
     palette()
     scene = Scene(int(parameters["seed"]), float(parameters["detail"]))
     for element in elements:
@@ -188,9 +172,9 @@ class Model:
             self.parts.append(painted.transformed(transform(where, np.radians(degrees), scale)))
 
     def draw(self, parts: str) -> None:
-        """Add parts that a text lists after the name of their material, a semicolon between them.
+        """Add parts that a text lists, a semicolon or the line's end after each.
 
-        A line without a colon continues the last one.
+        A part that names no material is of the last one's; a line without a colon goes on with it.
 
         "Brass: ball 0.1; lathe 0.04 0, 0 0.02 at ±0.3 0 1 turned 90 0 0 scaled 1 2 1" is a ball and
         a cone at two places, turned by degrees and scaled; what follows the shape may be left out.
@@ -206,16 +190,16 @@ class Model:
             plane    width height
             word     size depth letters
         """
-        for line in re.sub(r"\n(?=[^:\n]*(\n|$))", ",", parts.strip()).splitlines():
-            material, listed = line.split(":")
-            for part in listed.split(";"):
-                kind, data = part.strip(" ,").split(maxsplit=1)
-                data, *rest = re.split(r",?\s+(at|turned|scaled)\s", data)
-                placed = dict(zip(rest[::2], rest[1::2], strict=True))
-                turned, scaled = placed.get("turned", "0 0 0"), placed.get("scaled", "1 1 1")
-                turn, size = points(turned)[0], points(scaled)[0]
-                shape = self._shape(kind, data)
-                self.add(shape, material.strip(), placed.get("at", "0 0 0"), turn, size)
+        material, text = "", re.sub(r"\n(?=[^:\n]*(\n|$))", ",", parts).replace("\n", ";")
+        for part in filter(None, (part.strip(" ,") for part in text.split(";"))):
+            named, _, drawn = part.rpartition(": ")
+            material = named or material
+            kind, data = drawn.split(maxsplit=1)
+            data, *rest = re.split(r",?\s+(at|turned|scaled)\s", data)
+            placed = dict(zip(rest[::2], rest[1::2], strict=True))
+            turned, scaled = placed.get("turned", "0 0 0"), placed.get("scaled", "1 1 1")
+            turn, size = points(turned)[0], points(scaled)[0]
+            self.add(self._shape(kind, data), material, placed.get("at", "0 0 0"), turn, size)
 
     def _shape(self, kind: str, data: str) -> Shape:
         scene = self.scene
