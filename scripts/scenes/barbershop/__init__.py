@@ -30,11 +30,11 @@ def stocked(scene: Scene) -> None:
 
 ELEMENTS = (
     *(partial(furnish, text=text) for text in DRAWN),
-    *(lamps.sky, lamps.lights, room.tiles, room.medallion, room.rug, room.hair_clippings),
+    *(lamps.lights, room.tiles, room.medallion, room.rug, room.hair_clippings),
     *(room.metro_tiles, room.wainscot, room.ceiling, valance, street),
-    *(furniture.barber_chairs, furniture.chair_mats, furniture.waiting_bench),
+    *(furniture.barber_chairs, furniture.waiting_bench),
     *(furniture.desk_things, furniture.magazines, stations.mirrors, cloth.towel_shelves),
-    *(cloth.coats, cloth.umbrellas, prints.pictures, fittings.clock, fittings.barber_pole),
+    *(cloth.coats, prints.pictures, fittings.clock, fittings.barber_pole),
     *(fittings.broom_and_bins, stocked),
 )
 build = partial(fill, palette, ELEMENTS)

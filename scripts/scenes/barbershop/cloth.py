@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 
 from scenes.barbershop.plan import TAU, TOWELS, put
-from scenes.library.points import Array, points, polar, smooth_path, xyz
+from scenes.library.points import points, polar, smooth_path, xyz
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import prism, sheet
 
@@ -31,15 +31,10 @@ SHELVES = """Oak: box 0.03 0.32 1.75 0.004 at ±0.39 0.16 0.875;
     Mahogany: box 0.78 0.012 1.75 at 0 0.006 0.875"""
 
 
-def around(scene: Scene) -> tuple[Array, Array]:
-    """Angles round something that hangs in folds, and parts of its length as a column."""
-    sides, rows = scene.segments(72, 16), scene.segments(32, 6)
-    return np.arange(sides) * TAU / sides, np.linspace(0, 1, rows)[:, None]
-
-
 def coats(scene: Scene) -> None:
-    """Three coats that hang in folds from 1.85 m down, each shorter than the last."""
-    (angle, t), steps = around(scene), scene.segments(20, 5)
+    """Three coats in folds from 1.85 m down, each shorter than the last, and rolled umbrellas."""
+    angle = np.arange(scene.segments(72, 16)) * TAU / scene.segments(72, 16)
+    t, steps = np.linspace(0, 1, scene.segments(32, 6))[:, None], scene.segments(20, 5)
     width = 0.03 + 0.15 * np.minimum(t * 6, 1) ** 0.6 + 0.05 * t
     sleeve = points("0.14 0.15 1.74, 0.20 0.18 1.5, 0.19 0.20 1.22, 0.18 0.21 1.12")
     lapel = prism("0 0, 0.06 0.02, 0.075 -0.10, 0 -0.34", 0.008)
@@ -55,16 +50,12 @@ def coats(scene: Scene) -> None:
             model.add(scene.tube(path, np.linspace(0.062, 0.048, len(path)), 18), wool)
             model.add(lapel, wool, (side * 0.005, 0.222, 1.74), (90, 0, turn), (1, 1, side))
         put(model.mesh(f"Coat of {wool.lower()}"), f"right {y}")
-
-
-def umbrellas(scene: Scene) -> None:
-    """Two rolled umbrellas in their stand."""
     stick = "0 0 0.02, 0 0 0.4, 0 0 0.78, 0.03 0 0.85, 0.075 0 0.83, 0.08 0 0.79"
-    model, (angle, t) = Model(scene, f"Oak: bend 0.009, {stick}"), around(scene)
+    umbrella = Model(scene, f"Oak: bend 0.009, {stick}")
     folds = 1 + 0.22 * np.cos(8 * angle)
     radius = folds * np.interp(t, (0, 0.12, 0.75, 1), (0.006, 0.02, 0.045, 0.018))
-    model.add(sheet(polar(radius, angle + t, 0.06 + 0.58 * t), closed=True), "Black")
-    data = model.mesh("Umbrella")
+    umbrella.add(sheet(polar(radius, angle + t, 0.06 + 0.58 * t), closed=True), "Black")
+    data = umbrella.mesh("Umbrella")
     put(data, "right 1.46 0.19 0.01", degrees=(4, -4, 30))
     put(data, "right 1.53 0.22 0.01", degrees=(-3, 5, 160))
 

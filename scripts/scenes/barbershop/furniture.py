@@ -172,7 +172,7 @@ def cushion(scene: Scene, size: Sequence[float], tufts: Sequence[int]) -> Shape:
 
 
 def barber_chairs(scene: Scene) -> None:
-    """Three hydraulic chairs of chrome, enamel and buttoned leather turned to their mirrors."""
+    """Three hydraulic chairs, turned to their mirrors, on mats of ribbed rubber."""
     seat, back = Model(scene, CHAIR), Model(scene, CHAIR_BACK)
     seat.add(cushion(scene, (0.50, 0.50, 0.05), (4, 4)), "Oxblood", (0, 0.03, 0.56))
     padding = cushion(scene, (0.46, 0.54, 0.07), (4, 4))
@@ -182,10 +182,6 @@ def barber_chairs(scene: Scene) -> None:
         where = f"room -1.38 {y} 0.009 {turn}"
         put(seat_mesh, where)
         put(back_mesh, where, (0, -0.25, 0.58), (14, 0, 0))
-
-
-def chair_mats(scene: Scene) -> None:
-    """A ribbed rubber mat below each chair."""
     mat = Model(scene, "Rubber: lathe 0.60 0.001, 0.60 0.007, 0.575 0.012, 0.56 0.009, 0 0.009")
     for k in range(7):
         mat.add(scene.ring(0.14 + 0.06 * k, 0.003, 48, 6), "Rubber", (0, 0, 0.009))

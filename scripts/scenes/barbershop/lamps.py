@@ -35,8 +35,12 @@ Wall lamp | right -1.05 0 2.12, right 1.35 0 2.12, back ±0.82 0 2.12, front 0.7
 def lights(scene: Scene) -> None:
     """A few large lights, which converge soon: daylight, a low sun, and the lamps' own light.
 
-    No camera or mirror sees them; what seems to shine is a glowing mesh.
+    No camera or mirror sees them; what seems to shine is a glowing mesh. A plain bright sky lights
+    the street, but is not sampled from inside the room.
     """
+    graph = SkyGraph()
+    graph.finish((0.72, 0.86, 1.0), 1.6)
+    graph.world.cycles.sampling_method = "NONE"
     x, z = WINDOW_MIDDLE
     window = transform((x, HALF_Y - 0.16, z), (-np.pi / 2, 0, 0))
     above = transform((0, 0, 2.05), (np.pi, 0, 0))
@@ -54,10 +58,3 @@ def lights(scene: Scene) -> None:
         area_light("Mirror light", tubes, (5.2, 0.14), 56, (1.0, 0.9, 0.76)),
     ):
         lamp.visible_camera = lamp.visible_glossy = lamp.visible_transmission = False
-
-
-def sky(scene: Scene) -> None:
-    """A plain bright sky, which lights the street but is not sampled from inside the room."""
-    graph = SkyGraph()
-    graph.finish((0.72, 0.86, 1.0), 1.6)
-    graph.world.cycles.sampling_method = "NONE"

@@ -36,9 +36,9 @@ def palette() -> None:
         paper(name, tint)
     for name, *tint in rows(BARKS, 3):
         bark(name, tint)
-    for name, *color, glow in rows(FLAMES, 4):
+    for name, *tint, glow in rows(FLAMES, 4):
         graph = MaterialGraph(name)
-        graph.finish(volume=graph.emission(color, glow))
+        graph.finish(volume=graph.add("Emission", {"Color": tint, "Strength": glow}))
     for each in NAMED:
         each(MaterialGraph(each.__name__.capitalize().replace("_", " ")))
 
@@ -142,7 +142,7 @@ def fog(graph: MaterialGraph) -> None:
     """Fog that glows with the light it would scatter to the viewer: no noise, hardly any cost."""
     density = 0.012  # part of the light lost a metre
     veil = graph.add("VolumeAbsorption", {"Color": (0.0, 0.0, 0.0), "Density": density})
-    glow = graph.emission((0.62, 0.60, 0.62), density)
+    glow = graph.add("Emission", {"Color": (0.62, 0.60, 0.62), "Strength": density})
     graph.finish(volume=graph.add("AddShader", {0: veil, 1: glow}))
 
 
@@ -225,7 +225,7 @@ def candle_flame(graph: MaterialGraph) -> None:
     """A flame, blue at its foot; the lamps beside the candles give its light."""
     height = graph.span(graph.xyz(graph.coordinates())["Z"], 0.0, 1.0, 0.2, 0.252)
     tint = graph.ramp(height, "0 0.15 0.2 0.8, 0.2 1 0.45 0.12, 0.6 1 0.72 0.32, 1 1 0.4 0.08")
-    graph.finish(graph.emission(tint, 9.0), is_lamp=False)
+    graph.finish(graph.add("Emission", {"Color": tint, "Strength": 9.0}), is_lamp=False)
 
 
 NAMED = (moss, gravel, wet_stone, mountain, fog, rough_bronze, vermilion, water, koi, bamboo_culm)

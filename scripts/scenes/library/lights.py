@@ -15,10 +15,7 @@ from scenes.library.shapes import transform
 def point_light(
     name: str, location: Sequence[float], watts: float, color: Color, radius: float
 ) -> bpy.types.Object:
-    """A spherical lamp that lights but is not itself seen: give it a flame or bulb to be seen.
-
-    A radius of 0.02 m or more keeps the noise down.
-    """
+    """A spherical lamp that lights but is not itself seen: give it a flame or bulb to be seen."""
     light = bpy.data.lights.new(name, "POINT")
     light.energy, light.color, light.shadow_soft_size = watts, color, radius
     lamp = place(name, light, transform(location))

@@ -134,10 +134,6 @@ class Graph:
         back = self.add("BsdfTranslucent", {"Color": color})
         return self.mix_shaders(through, self.diffuse(color), back)
 
-    def emission(self, color: Any, strength: Any) -> bpy.types.Node:
-        """Light of its own: radiance from a surface, radiance a metre from a volume."""
-        return self.add("Emission", {"Color": color, "Strength": strength})
-
     def mix_shaders(self, factor: Any, a: Any, b: Any) -> bpy.types.Node:
         """Two shaders mixed: a at factor 0, b at factor 1."""
         return self.add("MixShader", {0: factor, 1: a, 2: b})

@@ -39,7 +39,12 @@ def arcades(scene: Scene) -> None:
     pier.add(pillar(PIER), "Ashlar", (0, 0, SPRINGING))
     pier.add(pillar(PIER_HEAD), "Carved stone", (0, 0, SPRINGING))
     on_sides("Pier", [pier.mesh("Pier")], -ARCADE, ARCADE)
-    long.add(low_wall(scene), "Limestone")
+    random = scene.random("low wall")
+    for count, gate, depth, z, height in points(LOW_WALL):
+        for sign in (-1, 1):
+            middle, length = cut(random, gate, ARCADE - 0.38, int(count))
+            places, sizes = xyz(sign * middle, ARCADE, z), xyz(length - 0.007, depth, height)
+            long.add(blocks(places, sizes, 0.016), "Limestone")
     front = (0, FRONT, plan.ARCADE_TOP)
     strings = [(0, 0, -0.28, 2 * FRONT, 0.13, 0.06), (0, 0, -0.1, 2 * FRONT, 0.2, 0.07)]
     dentils = xyz(np.arange(0.12 - FRONT, FRONT - 0.05, 0.2), -0.03, -0.19)
@@ -87,17 +92,6 @@ def leaf(scene: Scene, height: float, reach: float) -> Shape:
     x = across * (0.034 * np.sin(np.pi * (0.25 + 0.75 * t)) ** 0.5 + 0.004)
     out = 0.088 + 0.05 * t**2.2 + reach * t**3 + 0.006 * (1 - np.abs(across))
     return sheet(xyz(x, out - 0.3 * np.abs(x), height * (t - 0.42 * t**4)))
-
-
-def low_wall(scene: Scene) -> Shape:
-    """The stones under a side's columns: two courses and a coping."""
-    random, parts = scene.random("low wall"), []
-    for count, gate, depth, z, height in points(LOW_WALL):
-        for sign in (-1, 1):
-            middle, length = cut(random, gate, ARCADE - 0.38, int(count))
-            places, sizes = xyz(sign * middle, ARCADE, z), xyz(length - 0.007, depth, height)
-            parts.append(blocks(places, sizes, 0.016))
-    return join(parts)
 
 
 def vaults(scene: Scene) -> None:

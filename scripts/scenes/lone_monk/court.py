@@ -58,26 +58,21 @@ def lawns(scene: Scene) -> None:
     x, y = np.meshgrid(along, along)
     bumps = 0.012 * noise(xyz(x, y) * 1.5, scene.seed) - 0.01
     lawn.add(grid(along, along, np.where(np.hypot(x, y) < PLAZA - 0.2, -0.1, bumps)), "Turf")
-    lawn.add(kerb(), "Limestone")
+    # Kerb stones round it, and round its cut corner.
+    corner = np.arcsin(CROSS_PATH / PLAZA)
+    arc = ring_of_stones(5, PLAZA + 0.05, 0.1, 0.0, 0.14, np.pi / 2 - 2 * corner)
+    lawn.add(arc.transformed(transform(rotation=(0, 0, corner))), "Limestone")
+    for line, start in ((CROSS_PATH, PLAZA * np.cos(corner)), (LAWN, CROSS_PATH)):
+        length = (LAWN - start) / 9
+        run = start + (np.arange(9) + 0.5) * length
+        lawn.add(blocks(xyz(run, line), (length - 0.01, 0.1, 0.14)), "Limestone")
+        lawn.add(blocks(xyz(line, run), (0.1, length - 0.01, 0.14)), "Limestone")
     on_sides("Lawn", [lawn.mesh("Lawn")])
     patches = [grass_patch(scene, random) for _ in range(6)]
     x, y = CROSS_PATH + (np.indices((CELLS, CELLS)).reshape(2, -1) + 0.5) * CELL
     x, y = np.stack([x, y])[:, np.hypot(x, y) > PLAZA + 0.3]
     turn, size = 90 * random.integers(4, size=len(x)), random.uniform(0.95, 1.15, len(x))
     on_sides("Grass", patches, x, y, 0, turn, size)
-
-
-def kerb() -> Shape:
-    """Kerb stones round a lawn in the quadrant x, y > 0, and round its cut corner."""
-    corner = np.arcsin(CROSS_PATH / PLAZA)
-    arc = ring_of_stones(5, PLAZA + 0.05, 0.1, 0.0, 0.14, np.pi / 2 - 2 * corner)
-    parts = [arc.transformed(transform(rotation=(0, 0, corner)))]
-    for line, start in ((CROSS_PATH, PLAZA * np.cos(corner)), (LAWN, CROSS_PATH)):
-        length = (LAWN - start) / 9
-        run = start + (np.arange(9) + 0.5) * length
-        parts.append(blocks(xyz(run, line), (length - 0.01, 0.1, 0.14)))
-        parts.append(blocks(xyz(line, run), (0.1, length - 0.01, 0.14)))
-    return join(parts)
 
 
 def grass_patch(scene: Scene, random: Generator) -> bpy.types.Mesh:

@@ -43,8 +43,14 @@ def monk(scene: Scene) -> None:
     for hangs in ((0, 0.05, -0.05), (0, 0.08, 0.05)):
         model.add(cord, "Rope", hangs)
     model.add(stones("0.2 0.11 0.03 0.24 0.09 0.06, 0.13 -0.11 0.03 0.24 0.09 0.06", 0.025), "Wood")
-    for part, stuff in ((hood(scene), "Robe"), (face(), "Skin"), (hair(scene), "Daisy")):
-        model.add(part.transformed(HEAD), stuff)
+    model.add(hood(scene).transformed(HEAD), "Robe")
+    model.add(face().transformed(HEAD), "Skin")
+    random = scene.random("hair")
+    for *at, count, length, x, y, z in points(HAIR):
+        n = scene.count(count)
+        root = directions(random, n) * at[3:] + at[:3]
+        hair = leaves_at(random, root, random.normal((x, y, z), 0.25, (n, 3)), length, 0.12)
+        model.add(hair.transformed(HEAD), "Daisy")
     mesh = model.mesh("Monk", smooth=np.radians(50))
     place("Monk", mesh, side(NORTH, (4.35, -0.25, 0.015), 177, 1.06))
 
@@ -74,13 +80,3 @@ def face() -> Shape:
         skin[:, 0] -= 0.018 * np.exp(-((from_eye / 0.02) ** 2))
     nose = tube("0.073 0 0.035, 0.10 0 -0.005, 0.08 0 -0.02", [0.008, 0.014, 0.013])
     return join([ball.reshaped(skin), nose])
-
-
-def hair(scene: Scene) -> Shape:
-    """A beard, and brows."""
-    random, parts = scene.random("hair"), []
-    for *at, count, length, x, y, z in points(HAIR):
-        n = scene.count(count)
-        root = directions(random, n) * at[3:] + at[:3]
-        parts.append(leaves_at(random, root, random.normal((x, y, z), 0.25, (n, 3)), length, 0.12))
-    return join(parts)

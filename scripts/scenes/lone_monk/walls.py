@@ -7,7 +7,7 @@ import numpy as np
 from scenes.library.architecture import arch_outline, blocks, filled, panel, stones, upright
 from scenes.library.points import Array, xyz
 from scenes.library.scene import Model, Scene
-from scenes.library.shapes import Shape, box, copies, join, sheet, transform
+from scenes.library.shapes import box, copies, join, sheet, transform
 from scenes.lone_monk import plan
 from scenes.lone_monk.plan import ARCADE, BACK, BACK_WALL, LEAN_TO_TOP, WALK_FLOOR, on_sides
 from scenes.lone_monk.roofs import house, ridge
@@ -18,8 +18,7 @@ WINDOW = (0.38, 1.15, 1.80, 0.38)
 UPPER_WINDOW = (0.42, 6.0, 6.62, 0.12)
 WALK_WALL = (plan.BAY, 0.0, LEAN_TO_TOP, BACK_WALL)  # of a bay: width, foot, top, thickness
 # A shutter's frame: middle x, y, z and width, depth, height.
-SHUTTER = """-0.19 0 0 0.05 0.035 0.74, 0.19 0 0 0.05 0.035 0.74
-    0 0 0.34 0.34 0.035 0.06, 0 0 -0.34 0.34 0.035 0.06, 0 0 0 0.34 0.035 0.06"""
+SHUTTER = "±0.19 0 0 0.05 0.035 0.74, 0 0 0.34..-0.34*2 0.34 0.035 0.06, 0 0 0 0.34 0.035 0.06"
 
 
 def wall(
@@ -89,6 +88,9 @@ def upper_storeys(scene: Scene) -> None:
     """The storeys above the walks in the north and south, with shutters at their windows."""
     hole, bays = arch_outline(*UPPER_WINDOW, scene.segments(16)), 8
     width = 2 * BACK / bays
+    slat = box((0.34, 0.01, 0.05)).transformed(transform(rotation=(0.6, 0, 0)))
+    slats = copies(slat, xyz(0, 0, np.linspace(-0.28, 0.28, 14)))
+    shutter = join([stones(SHUTTER, 0.006), slats])  # one wing, 0.42 by 0.72 m, about its middle
     for number, top, left in ((plan.NORTH, 7.7, -BACK - 0.5), (plan.SOUTH, 7.2, -BACK)):
         meshes = []
         for swing in (21, 7, 7, 7):
@@ -96,18 +98,12 @@ def upper_storeys(scene: Scene) -> None:
             bay.add(stones("0 -0.03 5.95 1.1 0.18 0.1", 0.015), "Limestone")
             glaze(bay, hole, 0.22, 1, "Wood")
             for sign in (-1, 1):
-                wing = shutter().moved(0.22 * sign, 0, 0)
+                wing = shutter.moved(0.22 * sign, 0, 0)
                 bay.add(wing, "Wood", (0.53 * sign, -0.05, 6.36), (0, 0, sign * swing))
             meshes.append(bay.mesh("Upper wall"))
         x = (np.arange(bays) + 0.5) * width - BACK
         on_sides("Upper wall", meshes, x, BACK, sides=[number])
         house(scene, number, (left, left + 2 * BACK + 0.5), top, 12, "Plaster")
-
-
-def shutter() -> Shape:
-    """One wing of a louvred shutter, 0.42 by 0.72 m, about its middle."""
-    slat = box((0.34, 0.01, 0.05)).transformed(transform(rotation=(0.6, 0, 0)))
-    return join([stones(SHUTTER, 0.006), copies(slat, xyz(0, 0, np.linspace(-0.28, 0.28, 14)))])
 
 
 def west_wall(scene: Scene) -> None:

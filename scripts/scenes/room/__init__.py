@@ -19,8 +19,11 @@ PAINTS = """sphere 0.7 0.15 0.1 0.6, torus 0.1 0.5 0.2 0.6, pillar 0.75 0.7 0.6 
 def build(parameters: Mapping[str, Any]) -> None:
     """Fill the empty scene; the room has nothing random, so the parameters change nothing."""
     scene, walls = Scene(0, 1.0), box(SIZE)
-    checker()
     plains(PAINTS)
+    graph = MaterialGraph("walls")  # checks 0.5 m wide
+    tints = {"Color1": (0.75, 0.72, 0.68), "Color2": (0.35, 0.42, 0.5)}
+    checks = {"Vector": graph.geometry("Position"), "Scale": 2.0} | tints
+    graph.finish(graph.principled(Base_Color=graph.add("TexChecker", checks), Roughness=0.6))
     inwards = walls._replace(quads=walls.quads[:, ::-1])
     scene.add("room", inwards, "walls", matrix=transform((0, 0, SIZE[2] / 2)), smooth=False)
     for name, shape, location, rotation in (
@@ -32,12 +35,3 @@ def build(parameters: Mapping[str, Any]) -> None:
     ):
         scene.add(name, shape, name, matrix=transform(location, rotation), smooth=False)
     area_light("lamp", transform((0, 0, SIZE[2] - 0.05)), (2, 2), 300, (1.0, 1.0, 1.0))
-
-
-def checker() -> None:
-    """The walls' material: checks 0.5 m wide."""
-    graph = MaterialGraph("walls")
-    tints = {"Color1": (0.75, 0.72, 0.68), "Color2": (0.35, 0.42, 0.5)}
-    checks = {"Vector": graph.geometry("Position"), "Scale": 2.0} | tints
-    surface = graph.principled(Base_Color=graph.add("TexChecker", checks), Roughness=0.6)
-    graph.finish(surface)
