@@ -79,16 +79,6 @@ def rolled_towel(scene: Scene, towel: str) -> bpy.types.Mesh:
     return model.mesh(f"Rolled {towel.lower()}")
 
 
-def draped_towel(scene: Scene, towel: str) -> bpy.types.Mesh:
-    """A towel over a rail along x at the origin, hanging down on both sides."""
-    x = np.linspace(-0.16, 0.16, scene.segments(28, 6))
-    s = np.linspace(0.46, -0.36, scene.segments(48, 10))[:, None]
-    bow = np.clip(s / 0.022, -np.pi / 2, np.pi / 2)
-    y = 0.022 * np.sin(bow) + 0.016 * np.sin(38 * x + 2) * np.abs(s) / 0.4
-    z = 0.022 * np.cos(bow) - np.maximum(np.abs(s) - 0.0345, 0)
-    return scene.mesh(f"Draped {towel.lower()}", sheet(xyz(x, y, z)), towel)
-
-
 def towel_shelves(scene: Scene) -> None:
     """Open shelves of towels beside the staff door, with a basket on top."""
     basket, random, where = Model(scene), scene.random("towel shelves"), "back -0.42 0.036"

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from scenes.barbershop.cloth import folded_towel
-from scenes.barbershop.goods import Goods, lolly_jar, shelf, stock
-from scenes.barbershop.plan import STATIONS, put, spots
+from scenes.barbershop.goods import Goods, scattered, shelf, stock
+from scenes.barbershop.plan import INKS, STATIONS, put, spots
 from scenes.barbershop.prints import magazine
 from scenes.barbershop.stations import PANEL
 from scenes.library.points import rectangle, xyz
@@ -145,6 +145,8 @@ Towel steamer | back 1.33 0.19 0.85
     Red: word 0.05 0.0005 HOT at 0.02 0.1225 0.12 turned 90 0 180
     Rubber: lathe 0.015 0, 0.02 0.015 at ±0.15 ±0.05 0
 """
+LOLLY_JAR = """Steel: lathe 0.064 0, 0.064 0.004
+    Pane: pipe 0.06 0.004, 0.07 0.02, 0.07 0.14, 0.05 0.17"""
 LEDGER = """Oxblood: box 0.36 0.25 0.006 0.002 at 0 0 0.003
     Paper: box 0.17 0.235 0.012 0.003 at -0.087 0 0.012 turned 0 -2 0;
         box 0.17 0.235 0.012 0.003 at 0.087 0 0.012 turned 0 2 0
@@ -203,7 +205,12 @@ def waiting_bench(scene: Scene) -> None:
 
 def desk_things(scene: Scene) -> None:
     """A jar of lollies on the desk, and an open appointment book with a pen."""
-    put(lolly_jar(scene), "room 1.1 -2.39 1")
+    random, model = scene.random("lollies"), Model(scene, LOLLY_JAR)
+    stick = scene.tube("0 0 0, 0 0 0.07", 0.0015, 5)
+    for k, at in enumerate(scattered(random, scene.count(40, 6), 0.055, 0.02, 0.13)):
+        model.add(scene.ball(0.013, 10), INKS[k % 6], at)
+        model.add(stick, "White", at, random.uniform(-25, 25, 3))
+    put(model.mesh("Lolly jar"), "room 1.1 -2.39 1")
     model, random = Model(scene, LEDGER), scene.random("ledger")
     for side in (-1, 1):
         for k in range(14):

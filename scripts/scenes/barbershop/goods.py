@@ -56,8 +56,6 @@ Shaving mug |
 COTTON_JAR = """Steel: lathe 0.046 0, 0.046 0.003
     Pane: pipe 0.045 0.002, 0.05 0.008, 0.05 0.11, 0.044 0.12
     Chrome: lathe 0.047 0.12, 0.047 0.13, 0.012 0.14, 0.014 0.15, 0 0.155"""
-LOLLY_JAR = """Steel: lathe 0.064 0, 0.064 0.004
-    Pane: pipe 0.06 0.004, 0.07 0.02, 0.07 0.14, 0.05 0.17"""
 
 
 def bottles(scene: Scene) -> Goods:
@@ -112,16 +110,6 @@ def scattered(
     """Points (count, 3) evenly spread in an upright cylinder round the Z axis."""
     r, angle = radius * np.sqrt(random.uniform(size=count)), random.uniform(0, TAU, count)
     return polar(r, angle, random.uniform(low, high, count))
-
-
-def lolly_jar(scene: Scene) -> bpy.types.Mesh:
-    """Lollies of six colours on their sticks, in a jar of thin glass."""
-    random, model = scene.random("lollies"), Model(scene, LOLLY_JAR)
-    stick = scene.tube("0 0 0, 0 0 0.07", 0.0015, 5)
-    for k, at in enumerate(scattered(random, scene.count(40, 6), 0.055, 0.02, 0.13)):
-        model.add(scene.ball(0.013, 10), INKS[k % 6], at)
-        model.add(stick, "White", at, random.uniform(-25, 25, 3))
-    return model.mesh("Lolly jar")
 
 
 def shelf(scene: Scene, width: float, depth: float) -> bpy.types.Mesh:

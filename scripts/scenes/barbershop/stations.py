@@ -3,12 +3,12 @@
 import bpy
 import numpy as np
 
-from scenes.barbershop.cloth import draped_towel, folded_towel, rolled_towel
+from scenes.barbershop.cloth import folded_towel, rolled_towel
 from scenes.barbershop.goods import Goods, shelf, stock
 from scenes.barbershop.plan import COUNTER_TOP, STATIONS, TOWELS, drawings, put, spots
 from scenes.library.points import circle, points, polar, xyz
 from scenes.library.scene import Model, Scene
-from scenes.library.shapes import box, copies, prism, transform, tube
+from scenes.library.shapes import box, copies, prism, sheet, transform, tube
 
 BLADE = "prism 0.0018, -0.005 -0.01, 0.006 -0.01, 0.007 0.02, 0.001 0.10, -0.002 0.10"
 TOOLS = f"""
@@ -77,14 +77,6 @@ MIRROR = """Mirror: plane 0.92 1.1 at 0 0 0.026
         0.095 0.03, 0.095 0; ball 0.04 at 0 0.675 0.04 scaled 1 1 0.5"""
 
 
-def clippers(scene: Scene) -> bpy.types.Mesh:
-    """Electric clippers with a coiled cord."""
-    model, s = Model(scene, CLIPPERS), np.linspace(0, 1, scene.segments(140, 16))
-    coil = xyz(0.012 * np.cos(70 * s) + 0.1 * s, -0.08 - 0.13 * s, 0.014 + 0.01 * np.sin(70 * s))
-    model.add(scene.tube(coil, 0.0022, 5), "Black")
-    return model.mesh("Clippers")
-
-
 def comb(scene: Scene, material: str) -> bpy.types.Mesh:
     """A comb with fine teeth on one half and coarse ones on the other."""
     model = Model(scene, f"{material}: box 0.17 0.01 0.004 0.0015 at 0 0.012 0.002")
@@ -127,14 +119,17 @@ def station_goods(scene: Scene, bottles: Goods, pots: Goods) -> None:
     """The tools, bottles and pots of the three stations."""
     random = scene.random("station goods")
     tools = {name: Model(scene, parts).mesh(name) for name, _, parts in drawings(TOOLS)}
-    tools["Clippers"] = clippers(scene)
+    model, s = Model(scene, CLIPPERS), np.linspace(0, 1, scene.segments(140, 16))
+    cord = xyz(0.012 * np.cos(70 * s) + 0.1 * s, -0.08 - 0.13 * s, 0.014 + 0.01 * np.sin(70 * s))
+    model.add(scene.tube(cord, 0.0022, 5), "Black")
+    clippers = model.mesh("Clippers")
     kit = [tools["Scissors"], comb(scene, "Black"), comb(scene, "Oak"), hair_brush(scene)]
     kit += [tools["Razor"], tools["Scissors"]]
     for y in STATIONS:
         where = spots(f"left {y} 0 {COUNTER_TOP}")[0]
         for k, tool in enumerate(kit):
             put(tool, where, (0.33 + 0.045 * k, 0.26, 0.0065), (0, 0, random.uniform(-7, 7)))
-        put(tools["Clippers"], where, (-0.36, 0.27, 0), (0, 0, random.uniform(-15, 15)))
+        put(clippers, where, (-0.36, 0.27, 0), (0, 0, random.uniform(-15, 15)))
         put(tools["Hair dryer"], where, (-0.52, 0.28, 0), (0, 0, random.uniform(60, 85)))
         for x, some in ((-0.42, bottles[:9]), (0.42, bottles[9:])):
             strip = where @ transform((x, 0.04, 0))
@@ -158,5 +153,11 @@ def racks(scene: Scene, bottles: Goods, pots: Goods) -> None:
             put(folded[(k + y) % 4], side, (-0.22, 0.26, 0.045 * k), turn)
         for k, (x, z) in enumerate(((0.13, 0), (0.225, 0), (0.1775, 0.076))):
             put(rolled[k % 2], side, (x, 0.26, z))
-    for y, towel in ((-1, "Red towel"), (1, "Blue towel")):
-        put(draped_towel(scene, towel), f"left {y} 0.5 0.706")
+    x = np.linspace(-0.16, 0.16, scene.segments(28, 6))
+    s = np.linspace(0.46, -0.36, scene.segments(48, 10))[:, None]
+    bow = np.clip(s / 0.022, -np.pi / 2, np.pi / 2)
+    y = 0.022 * np.sin(bow) + 0.016 * np.sin(38 * x + 2) * np.abs(s) / 0.4
+    draped = sheet(xyz(x, y, 0.022 * np.cos(bow) - np.maximum(np.abs(s) - 0.0345, 0)))
+    for along, color in ((-1, "red"), (1, "blue")):
+        towel = scene.mesh(f"Draped {color} towel", draped, f"{color.capitalize()} towel")
+        put(towel, f"left {along} 0.5 0.706")

@@ -12,20 +12,7 @@ FLOOR_LANTERNS = ((-0.72, -3.25), (0.85, -3.3))
 
 
 def stone_lanterns(scene: Scene) -> None:
-    """Kasuga lanterns, 1.75 m high, with paper panes."""
-    stone = scene.mesh("Lantern stone", lantern_stone(scene), "Lantern granite", smooth=0.6)
-    corners = circle(0.205, 6)
-    panes = scene.mesh("Lantern panes", paper_wall(corners, 1.05, 1.37), "Pane paper", smooth=False)
-    for i, (x, y, size) in enumerate(STONE_LANTERNS):
-        z = float(ground_height(x, y)) - 0.03
-        spot = transform((x, y, z), (0, 0, 0.4 * i), size)
-        place(f"Lantern stone.{i}", stone, spot)
-        place(f"Lantern panes.{i}", panes, spot)
-        point_light(f"Lantern light.{i}", (x, y, z + 1.2 * size), 14.0, CANDLE_COLOR, 0.06)
-
-
-def lantern_stone(scene: Scene) -> Shape:
-    """The stone of a lantern: base, shaft, fire box with six posts, curved roof, and knob."""
+    """Kasuga lanterns, 1.75 m high: base, shaft, fire box with paper panes, curved roof, knob."""
     shaft = "0.12 0.26, 0.115 0.5, 0.14 0.53, 0.14 0.57, 0.115 0.6, 0.12 0.86"
     stack = [
         prism(circle(0.36, 6), 0.12),
@@ -42,7 +29,16 @@ def lantern_stone(scene: Scene) -> Shape:
     upturned = np.clip((side - 0.866) / 0.134, 0, 1) ** 3 * (1 - u) ** 2
     roof = polar((0.45 - 0.36 * u**0.72) * side, angle, 1.42 + 0.22 * u**1.3 + 0.09 * upturned)
     under, lip = roof[:1] * (0.45, 0.45, 1) - (0, 0, 0.03), roof[:1] - (0, 0, 0.045)
-    return join([*stack, sheet(np.concatenate([under, lip, roof]), closed=True)])
+    stack.append(sheet(np.concatenate([under, lip, roof]), closed=True))
+    stone = scene.mesh("Lantern stone", join(stack), "Lantern granite", smooth=0.6)
+    corners = circle(0.205, 6)
+    panes = scene.mesh("Lantern panes", paper_wall(corners, 1.05, 1.37), "Pane paper", smooth=False)
+    for i, (x, y, size) in enumerate(STONE_LANTERNS):
+        z = float(ground_height(x, y)) - 0.03
+        spot = transform((x, y, z), (0, 0, 0.4 * i), size)
+        place(f"Lantern stone.{i}", stone, spot)
+        place(f"Lantern panes.{i}", panes, spot)
+        point_light(f"Lantern light.{i}", (x, y, z + 1.2 * size), 14.0, CANDLE_COLOR, 0.06)
 
 
 def paper_wall(outline: np.ndarray, low: float, high: float) -> Shape:

@@ -96,37 +96,35 @@ def maple(scene: Scene) -> None:
 
 
 def pines(scene: Scene) -> None:
-    """Cloud-pruned pines: crooked stems with pads of needles."""
-    random = scene.random("pines")
-    trees = [pine(scene, random, number) for number in range(2)]
-    meshes = [scene.mesh("Pine", tree, "Pine bark", "Pine needles") for tree in trees]
+    """Cloud-pruned pines, 3 m high: swaying stems, limbs, and a dome of brushes on each."""
+    random, meshes = scene.random("pines"), []
+    for number in range(2):
+        needle = sheet(xyz([[-0.045, 0.045], [-0.04, 0.04], [-0.004, 0.004]], [[0], [0.5], [1]]))
+        out, up = random.normal((0, 0, 0.7), 0.6, (9, 3)), random.normal(0, 1, (9, 3))
+        brush = copies(needle, np.zeros((9, 3)), out, up, 0.11)
+        t, turn = np.linspace(0, 1, 14), random.uniform(0, TAU)
+        stem = polar(0.42 * np.sin(t * 6.0 + number) * t, turn, 3.1 * t - 0.2)
+        parts, pads = [scene.tube(stem, np.linspace(0.15, 0.04, 14), 12)], []
+        for k, at in enumerate((4, 6, 7, 9, 10, 11, 13)):
+            reach, size = (0.0 if at == 13 else 1.35 - 0.075 * at), 0.75 - 0.022 * at
+            tip = stem[at] + polar(reach, turn + 2.2 * k, 0.12)
+            if reach:
+                bow = np.linspace(0, 1, 6)[:, None]
+                path = stem[at] + bow * (tip - stem[at]) - (0, 0, 0.12) * np.sin(np.pi * bow)
+                parts.append(scene.tube(path, np.linspace(0.05, 0.02, 6)))
+            count = scene.count(520 * size, 12)
+            radius = np.sqrt(random.random(count))
+            dome = (1 - radius**2) * 0.45 * random.uniform(0.2, 1.0, count)
+            spots = size * polar(radius, random.uniform(0, TAU, count), dome)
+            forward = random.normal(0, 1, (count, 3)) * (1, 1, 0.1)
+            upwards = spots * (1.2, 1.2, 0.4) + (0, 0, 0.6)
+            pads.append(
+                copies(brush, spots + tip, forward, upwards, random.uniform(0.8, 1.25, count))
+            )
+        tree = join([*parts, join(pads).painted(1)])
+        meshes.append(scene.mesh("Pine", tree, "Pine bark", "Pine needles"))
     spots = points("5.9 0.2, 3.1 6.3, -7.6 -2.6, -3.3 5.6, 6.4 5.4, -5.8 -5.6, 9.5 2.4")
     scatter("Pine", meshes, standing(random, spots, (0.85, 1.3)))
-
-
-def pine(scene: Scene, random: np.random.Generator, number: int) -> Shape:
-    """A pine, 3 m high: a swaying stem, limbs, and a dome of brushes (slot 1) on each."""
-    needle = sheet(xyz([[-0.045, 0.045], [-0.04, 0.04], [-0.004, 0.004]], [[0], [0.5], [1]]))
-    out, up = random.normal((0, 0, 0.7), 0.6, (9, 3)), random.normal(0, 1, (9, 3))
-    brush = copies(needle, np.zeros((9, 3)), out, up, 0.11)
-    t, turn = np.linspace(0, 1, 14), random.uniform(0, TAU)
-    stem = polar(0.42 * np.sin(t * 6.0 + number) * t, turn, 3.1 * t - 0.2)
-    parts, pads = [scene.tube(stem, np.linspace(0.15, 0.04, 14), 12)], []
-    for k, at in enumerate((4, 6, 7, 9, 10, 11, 13)):
-        reach, size = (0.0 if at == 13 else 1.35 - 0.075 * at), 0.75 - 0.022 * at
-        tip = stem[at] + polar(reach, turn + 2.2 * k, 0.12)
-        if reach:
-            bow = np.linspace(0, 1, 6)[:, None]
-            path = stem[at] + bow * (tip - stem[at]) - (0, 0, 0.12) * np.sin(np.pi * bow)
-            parts.append(scene.tube(path, np.linspace(0.05, 0.02, 6)))
-        count = scene.count(520 * size, 12)
-        radius = np.sqrt(random.random(count))
-        dome = (1 - radius**2) * 0.45 * random.uniform(0.2, 1.0, count)
-        spots = size * polar(radius, random.uniform(0, TAU, count), dome)
-        forward = random.normal(0, 1, (count, 3)) * (1, 1, 0.1)
-        upwards = spots * (1.2, 1.2, 0.4) + (0, 0, 0.6)
-        pads.append(copies(brush, spots + tip, forward, upwards, random.uniform(0.8, 1.25, count)))
-    return join([*parts, join(pads).painted(1)])
 
 
 def woods(scene: Scene) -> None:

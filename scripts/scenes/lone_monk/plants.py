@@ -1,7 +1,6 @@
 """What grows in and over the court, and the leaves that have fallen."""
 
 import numpy as np
-from numpy.random import Generator
 
 from scenes.library.plants import Growth, branches, folded_leaf, leaf_cloud, leaves_at, leaves_on
 from scenes.library.points import (
@@ -90,29 +89,25 @@ def ivy_face(x: Array, z: Array) -> Array:
 
 def geraniums(scene: Scene) -> None:
     """Pots of geraniums beside the gates, and smaller ones on the low walls."""
-    random = scene.random("geraniums")
-    pots = [geranium(scene, random).mesh("Geranium") for _ in range(3)]
+    random, pots = scene.random("geraniums"), []
+    for _ in range(3):
+        model = Model(scene)
+        model.add(scene.lathe(POT, capped=False), "Pot")
+        model.add(scene.lathe("0.17 0.28, 0.02 0.295"), "Soil")
+        bush = leaf_cloud(random, scene.count(420), (0.25, 0.25, 0.2), 0.06, 0.95)
+        model.add(bush, "Box leaf", (0, 0, 0.46))
+        for out in directions(random, 9):
+            head = (*out[:2] * 0.25, 0.55 + 0.17 * abs(out[2]))
+            model.add(leaf_cloud(random, scene.count(26), 0.035, 0.028, 0.9), "Petal", head)
+            stalk = scene.tube([(0, 0, 0.3), np.multiply(head, (0.5, 0.5, 0.85)), head], 0.003, 4)
+            model.add(stalk, "Box leaf")
+        pots.append(model.mesh("Geranium"))
     for number in plan.SIDES:
         x = np.delete(plan.BAY_AXES, 3)[random.random(6) < 0.6]
         x = x + random.uniform(-0.4, 0.4, len(x))
         place_on = (x, ARCADE - 0.05, plan.STYLOBATE, 300 * x, 0.72)
         plan.on_sides("Small geranium", pots, *place_on, sides=[number])
     plan.on_sides("Geranium", pots, (-1.22, 1.22), ARCADE - 0.62, 0.015, (0, 130), 1.15)
-
-
-def geranium(scene: Scene, random: Generator) -> Model:
-    """A terracotta pot of soil, leaves and red flower heads."""
-    model = Model(scene)
-    model.add(scene.lathe(POT, capped=False), "Pot")
-    model.add(scene.lathe("0.17 0.28, 0.02 0.295"), "Soil")
-    bush = leaf_cloud(random, scene.count(420), (0.25, 0.25, 0.2), 0.06, 0.95)
-    model.add(bush, "Box leaf", (0, 0, 0.46))
-    for out in directions(random, 9):
-        head = (*out[:2] * 0.25, 0.55 + 0.17 * abs(out[2]))
-        model.add(leaf_cloud(random, scene.count(26), 0.035, 0.028, 0.9), "Petal", head)
-        stalk = scene.tube([(0, 0, 0.3), np.multiply(head, (0.5, 0.5, 0.85)), head], 0.003, 4)
-        model.add(stalk, "Box leaf")
-    return model
 
 
 def shrubs(scene: Scene) -> None:
@@ -127,25 +122,22 @@ def shrubs(scene: Scene) -> None:
         x, y = spots[away].T  # where no rig is near
         size = random.uniform(0.85, 1.15, len(x))
         plan.on_sides("Box ball", meshes, x, y, 0.3, 50 * size, size, sides=[number])
-    bushes = [lavender(scene, random).mesh("Lavender") for _ in range(2)]
+    bushes = []
+    for _ in range(2):
+        model, count = Model(scene), scene.count(100)
+        out = directions(random, scene.count(350))
+        out[:, 2] = np.abs(out[:, 2]) + 0.3
+        model.add(leaves_at(random, out * (0.06, 0.06, 0.02), out, 0.26, 0.07), "Olive leaf")
+        lean = unit(random.normal((0, 0, 1), (0.33, 0.33, 0), (count, 3)))
+        tall = random.uniform(0.33, 0.46, (count, 1))
+        model.add(leaves_at(random, lean * 0.05, lean, tall[:, 0], 0.012), "Olive leaf")
+        for below in np.arange(5) * 0.02 - 0.09:
+            forward = directions(random, count) + lean
+            model.add(leaves_at(random, lean * (tall + below), forward, 0.032, 0.7), "Lavender")
+        bushes.append(model.mesh("Lavender"))
     x = np.arange(1.95, LAWN - 0.85, 0.42)
     size, sunny = random.uniform(0.8, 1.1, len(x)), (NORTH, EAST, WEST)
     plan.on_sides("Lavender", bushes, x, LAWN - 0.3, 0, 200 * x, size, sides=sunny)
-
-
-def lavender(scene: Scene, random: Generator) -> Model:
-    """A cushion of grey leaves with flower spikes on thin stalks."""
-    model, count = Model(scene), scene.count(100)
-    out = directions(random, scene.count(350))
-    out[:, 2] = np.abs(out[:, 2]) + 0.3
-    model.add(leaves_at(random, out * (0.06, 0.06, 0.02), out, 0.26, 0.07), "Olive leaf")
-    lean = unit(random.normal((0, 0, 1), (0.33, 0.33, 0), (count, 3)))
-    tall = random.uniform(0.33, 0.46, (count, 1))
-    model.add(leaves_at(random, lean * 0.05, lean, tall[:, 0], 0.012), "Olive leaf")
-    for below in np.arange(5) * 0.02 - 0.09:
-        forward = directions(random, count) + lean
-        model.add(leaves_at(random, lean * (tall + below), forward, 0.032, 0.7), "Lavender")
-    return model
 
 
 def fallen_leaves(scene: Scene) -> None:
