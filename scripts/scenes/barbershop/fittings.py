@@ -5,7 +5,7 @@ import numpy as np
 from scenes.barbershop.plan import TAU, put
 from scenes.library.points import points, polar
 from scenes.library.scene import Model, Scene
-from scenes.library.shapes import Shape, box, join, lettering, sheet, tube
+from scenes.library.shapes import Shape, box, lettering, sheet, tube
 
 FITTINGS = """
 Radiator section | front -1.301..-0.199*20 0.14 0.03
@@ -76,16 +76,11 @@ def barber_pole(scene: Scene) -> None:
 def broom_and_bins(scene: Scene) -> None:
     """A broom leaning in the corner by the counter, and two bins of paper."""
     broom, waste, random = Model(scene, BROOM), Model(scene, BIN), scene.random("waste")
-    bristles = [
-        tube([(x, y, 0.085), (x * 1.1, y * 1.4, 0)], 0.0035, 5)
-        for x, y in points(f"-0.14..0.14*{scene.count(34, 6)} -0.018..0.018*3")
-    ]
-    broom.add(join(bristles), "Bristle")
+    for x, y in points(f"-0.14..0.14*{scene.count(34, 6)} -0.018..0.018*3"):
+        broom.add(tube([(x, y, 0.085), (x * 1.1, y * 1.4, 0)], 0.0035, 5), "Bristle")
     put(broom.mesh("Broom"), "room -2.02 -3.5 0.004", degrees=(7, -4, 35))
     for k in range(scene.count(14, 3)):
         at = (*random.uniform(-0.08, 0.08, 2), 0.33 + 0.02 * (k % 3))
         crumpled = box((0.07, 0.05, 0.04), 0.015)
         waste.add(crumpled, ("Paper", "White")[k % 2], at, random.uniform(0, 360, 3))
-    data = waste.mesh("Waste bin")
-    put(data, "room -2.28 -3.45")
-    put(data, "room 0.72 -2.55 0 70")
+    put(waste.mesh("Waste bin"), "room -2.28 -3.45, room 0.72 -2.55 0 70")

@@ -168,8 +168,7 @@ def cushion(scene: Scene, size: Sequence[float], tufts: Sequence[int]) -> Shape:
     back = prism(rectangle(width, height), 1e-4).moved(0, 0, -1e-4)
     a, b = np.meshgrid(np.arange(1 - columns, columns), np.arange(1 - rows, rows))
     places = xyz(a * width / 2 / columns, b * height / 2 / rows, 0.6 * thickness)
-    ball = scene.ball(0.009, 8)
-    button = ball.scaled(1, 1, 0.6)
+    button = scene.ball(0.009, 8).scaled(1, 1, 0.6)
     return join([front, back, copies(button, places[(a + b) % 2 == 0])])
 
 

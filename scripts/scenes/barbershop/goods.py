@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 from mathutils import Matrix
+from numpy.random import Generator
 
 from scenes.barbershop.plan import INKS, TAU, drawings, put
 from scenes.library.points import Array, points, polar
@@ -104,9 +105,7 @@ def pots(scene: Scene) -> Goods:
     return made
 
 
-def scattered(
-    random: np.random.Generator, count: int, radius: float, low: float, high: float
-) -> Array:
+def scattered(random: Generator, count: int, radius: float, low: float, high: float) -> Array:
     """Points (count, 3) evenly spread in an upright cylinder round the Z axis."""
     r, angle = radius * np.sqrt(random.uniform(size=count)), random.uniform(0, TAU, count)
     return polar(r, angle, random.uniform(low, high, count))
@@ -125,12 +124,7 @@ def shelf(scene: Scene, width: float, depth: float) -> bpy.types.Mesh:
 
 
 def stock(
-    scene: Scene,
-    random: np.random.Generator,
-    goods: Goods,
-    where: Matrix,
-    width: float,
-    depth: float,
+    scene: Scene, random: Generator, goods: Goods, where: Matrix | str, width: float, depth: float
 ) -> None:
     """Stand goods side by side along x on z = 0 of a frame, in two rows where it is deep enough."""
     radii = [np.hypot(*mesh_shape(item).vertices[:, :2].T).max() for item in goods]

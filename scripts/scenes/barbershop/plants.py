@@ -56,8 +56,7 @@ def plants(scene: Scene, bottles: Goods, pots: Goods) -> None:
     """Plants on the sill, bottles between them; others in the corners, one hanging."""
     random = scene.random("plants")
     fern, snake, rubber = (plant(scene, kind) for kind in POTTED)
-    on_sill = ((-1.8, fern), (-0.95, snake), (-0.3, fern), (0.35, rubber))
-    for x, data in on_sill:
+    for x, data in ((-1.8, fern), (-0.95, snake), (-0.3, fern), (0.35, rubber)):
         turn = (0, 0, random.uniform(0, 360))
         put(data, f"front {x} 0.08 1", degrees=turn, scale=random.uniform(0.5, 0.6))
     for x in (-1.4, -0.63, 0.03):

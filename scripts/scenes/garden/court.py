@@ -10,8 +10,7 @@ from scenes.library.points import Array, noise, points, polar, smoothstep, xyz
 from scenes.library.scene import Scene, scatter
 from scenes.library.shapes import Shape, box, grid, icosphere, sheet, transform
 
-Flagstone = tuple[Array, float]
-"""A stone's outline (n, 2) and its height."""
+Flagstone = tuple[Array, float]  # a stone's outline (n, 2) and its height
 
 STEPS = """-0.1 -0.05 0.58, 0.66 -0.62 0.38, -0.72 0.50 0.40, 0.66 0.42 0.42, -0.62 -0.66 0.38
     0.15 0.98 0.45, -0.05 1.85 0.42, 0.08 2.62 0.40, 0.05 -1.12 0.44, -0.12 -1.98 0.42

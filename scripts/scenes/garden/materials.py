@@ -32,10 +32,9 @@ def palette() -> None:
     foliage(LEAVES)
     for name, *tint, moss_part in rows(GRANITES, 4):
         granite(name, tint, moss_part)
-    for name, *tint in rows(PAPERS, 3):
-        paper(name, tint)
-    for name, *tint in rows(BARKS, 3):
-        bark(name, tint)
+    for make, table in ((paper, PAPERS), (bark, BARKS)):
+        for name, *tint in rows(table, 3):
+            make(name, tint)
     for name, *tint, glow in rows(FLAMES, 4):
         graph = MaterialGraph(name)
         graph.finish(volume=graph.add("Emission", {"Color": tint, "Strength": glow}))
@@ -56,11 +55,9 @@ def granite(name: str, tint: Color, moss: float) -> None:
     upwards = graph.math("ADD", upwards, graph.math("MULTIPLY", broad, 1.6))
     cover = graph.span(upwards, 0.0, 1.0, 2.05 - moss, 2.25 - moss)
     green = graph.ramp(speckle, "0.3 0.03 0.05 0.008, 0.7 0.10 0.13 0.025")
-    surface = graph.principled(
-        Base_Color=graph.mix(cover, stone, green),
-        Roughness=graph.span(cover, 0.62, 0.95),
-        Normal=graph.bump(speckle, 0.003),
-    )
+    color, roughness = graph.mix(cover, stone, green), graph.span(cover, 0.62, 0.95)
+    normal = graph.bump(speckle, 0.003)
+    surface = graph.principled(Base_Color=color, Roughness=roughness, Normal=normal)
     graph.finish(graph.plain_when_diffuse(surface, tint))
 
 
@@ -80,9 +77,6 @@ def bark(name: str, tint: Color) -> None:
     dark = tuple(0.3 * c for c in tint)
     color = graph.ramp(cracks, [(0.35, *dark), (0.6, *tint), (0.75, 0.09, 0.11, 0.06)])
     graph.finish(graph.diffuse(color, Normal=graph.bump(cracks, 0.03)))
-
-
-# Materials that are named as their functions.
 
 
 def moss(graph: MaterialGraph) -> None:
@@ -115,12 +109,10 @@ def wet_stone(graph: MaterialGraph) -> None:
     veins = graph.noise(where, 3.2, 5.0, 0.65, 0.8)
     wet = graph.span(graph.noise(where, 2.1, 2.0), 0.0, 1.0, 0.44, 0.56)
     dry = graph.ramp(veins, "0.3 0.075 0.08 0.085, 0.52 0.13 0.13 0.125, 0.6 0.2 0.19 0.17")
-    surface = graph.principled(
-        Base_Color=graph.mix(wet, dry, graph.mix(1.0, dry, (0.42, 0.42, 0.45), "MULTIPLY")),
-        Roughness=graph.math("MULTIPLY_ADD", grain, 0.12, graph.span(wet, 0.34, 0.07)),
-        IOR=1.6,
-        Normal=graph.bump(grain, 0.0012),
-    )
+    color = graph.mix(wet, dry, graph.mix(1.0, dry, (0.42, 0.42, 0.45), "MULTIPLY"))
+    roughness = graph.math("MULTIPLY_ADD", grain, 0.12, graph.span(wet, 0.34, 0.07))
+    look = {"Roughness": roughness, "IOR": 1.6, "Normal": graph.bump(grain, 0.0012)}
+    surface = graph.principled(Base_Color=color, **look)
     graph.finish(graph.plain_when_diffuse(surface, (0.09, 0.09, 0.09)))
 
 
@@ -228,5 +220,6 @@ def candle_flame(graph: MaterialGraph) -> None:
     graph.finish(graph.add("Emission", {"Color": tint, "Strength": 9.0}), is_lamp=False)
 
 
+# Materials that are named as their functions.
 NAMED = (moss, gravel, wet_stone, mountain, fog, rough_bronze, vermilion, water, koi, bamboo_culm)
 NAMED += (embers, wax, candle_flame)

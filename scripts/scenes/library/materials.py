@@ -7,8 +7,7 @@ import bpy
 
 from scenes.library.points import Points, points
 
-Color = tuple[float, float, float]
-"""Linear red, green and blue."""
+Color = tuple[float, float, float]  # linear red, green and blue
 
 
 class Graph:

@@ -109,17 +109,11 @@ def branches(scene: Scene, random: Generator, growth: Growth) -> tuple[Shape, Ar
 
 
 def leaves_on(
-    random: Generator,
-    twigs: Array,
-    leaf: Shape,
-    count: int,
-    size: tuple[float, float],
-    droop: float,
-    spread: float,
+    random: Generator, twigs: Array, leaf: Shape, count: int, size: tuple, droop: float, off: float
 ) -> Shape:
     """`count` leaves on each of the twigs (n, k, 3), flat side up, their stalks near the twig.
 
-    size: from and to, metres. droop: how much they point down. spread: metres off the twig.
+    size: from and to, metres. droop: how much they point down. off: metres from the twig.
     """
     number = len(twigs) * count
     which = np.repeat(np.arange(len(twigs)), count)
@@ -127,7 +121,7 @@ def leaves_on(
     low = np.minimum(at.astype(int), twigs.shape[1] - 2)
     part = (at - low)[:, None]
     spots = twigs[which, low] * (1 - part) + twigs[which, low + 1] * part
-    spots = spots + random.normal(0, spread, (number, 3))
+    spots = spots + random.normal(0, off, (number, 3))
     away = unit(twigs[:, -1] - twigs[:, 0])[which]
     forward = away + random.normal(0, 0.6, (number, 3)) - (0, 0, droop)
     up = random.normal((0, 0, 1), 0.45, (number, 3))

@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 Array = NDArray[Any]
-Points = str | ArrayLike
-"""Points (n, 2) or (n, 3): numbers, or text that `points` reads."""
+Points = str | ArrayLike  # points (n, 2) or (n, 3): numbers, or text that `points` reads
 
 
 def points(data: Points) -> Array:

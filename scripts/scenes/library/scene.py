@@ -16,8 +16,7 @@ from scenes.library.architecture import frame
 from scenes.library.points import Points, points, rectangle, smooth_path, xyz
 from scenes.library.shapes import Shape, box, join, lettering, prism, sheet, transform
 
-SHARP = np.radians(35)
-"""The usual angle between faces above which an edge stays sharp."""
+SHARP = np.radians(35)  # the usual angle between faces above which an edge stays sharp
 
 
 @dataclass(frozen=True)
@@ -215,10 +214,8 @@ class Model:
             case "box":
                 width, depth, height, bevel, segments = *numbers, *(0, 1)[len(numbers) - 3 :]
                 return box((width, depth, height), bevel, int(segments))
-            case "ball":
-                return scene.ball(*numbers, _segments(numbers[0]))
-            case "ring":
-                return scene.ring(*numbers, _segments(numbers[0]))
+            case "ball" | "ring":
+                return getattr(scene, kind)(*numbers, _segments(numbers[0]))
             case "tube":
                 return scene.tube(rest, *numbers, 4 + 60 * numbers[0] ** 0.5)
             case "bend":

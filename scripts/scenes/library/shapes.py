@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import bmesh
 import bpy
@@ -15,11 +15,9 @@ from scenes.library.points import Array, Points, points, polar, unit, xyz
 
 
 def transform(
-    location: Sequence[float] = (0, 0, 0),
-    rotation: Sequence[float] = (0, 0, 0),
-    scale: float | Sequence[float] = 1.0,
+    location: Sequence[float] = (0, 0, 0), rotation: Sequence[float] = (0, 0, 0), scale: Any = 1.0
 ) -> Matrix:
-    """The matrix of a location, XYZ Euler rotation in radians, and scale."""
+    """The matrix of a location, XYZ Euler rotation in radians, and scale (one, or three)."""
     size = (scale,) * 3 if isinstance(scale, int | float) else scale
     return Matrix.LocRotScale(Vector(location), Euler(rotation), Vector(size))
 

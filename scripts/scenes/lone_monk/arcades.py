@@ -31,7 +31,17 @@ LOW_WALL = "10 0.9 0.54 0.13 0.246, 10 0.9 0.54 0.38 0.246, 6 0.87 0.66 0.552 0.
 
 def arcades(scene: Scene) -> None:
     """Low walls with columns, open at the gates, and piers where two arcades meet."""
-    on_sides("Arcade", [bay(scene).mesh("Arcade bay")], plan.BAY_AXES, ARCADE, SPRINGING)
+    # The wall over one arch, with voussoirs and hood moulds; its origin is at the springing.
+    bay, n = Model(scene), scene.segments(24)
+    opening = arch_outline(ARCH_RADIUS, 0.0, 0.0, ARCH_RADIUS, n)
+    wall = panel(plan.BAY, 0.0, plan.ARCADE_TOP - SPRINGING, opening, ARCADE_WALL - 0.06)
+    bay.add(wall, "Plaster", (0, 0.03 - ARCADE_WALL / 2, 0))
+    bay.add(arch_stones(ARCH_RADIUS - 0.015, ARCADE_WALL + 0.02, 15), "Limestone")
+    x, z = arch_outline(plan.BAY / 2 - 0.001, 0.0, 0.0, plan.BAY / 2 - 0.001, n).T
+    hood = scene.tube(xyz(x, 0, z), 0.035)
+    for face in (0.01 - ARCADE_WALL / 2, ARCADE_WALL / 2 - 0.01):
+        bay.add(hood, "Limestone", (0, face, 0))
+    on_sides("Arcade", [bay.mesh("Arcade bay")], plan.BAY_AXES, ARCADE, SPRINGING)
     column, pier, long = Model(scene), Model(scene), Model(scene)
     column.add(twin_column(scene), "Carved stone")
     on_sides("Column", [column.mesh("Column")], plan.COLUMNS[1:-1], ARCADE, plan.STYLOBATE)
@@ -51,20 +61,6 @@ def arcades(scene: Scene) -> None:
     long.add(stones(strings), "Limestone", front)
     long.add(blocks(dentils, (0.09, 0.12, 0.11), 0.008), "Limestone", front)
     on_sides("Low wall", [long.mesh("Low wall and cornice")])
-
-
-def bay(scene: Scene) -> Model:
-    """The wall over one arch, with voussoirs and hood moulds; its origin is at the springing."""
-    model, n = Model(scene), scene.segments(24)
-    opening = arch_outline(ARCH_RADIUS, 0.0, 0.0, ARCH_RADIUS, n)
-    wall = panel(plan.BAY, 0.0, plan.ARCADE_TOP - SPRINGING, opening, ARCADE_WALL - 0.06)
-    model.add(wall, "Plaster", (0, 0.03 - ARCADE_WALL / 2, 0))
-    model.add(arch_stones(ARCH_RADIUS - 0.015, ARCADE_WALL + 0.02, 15), "Limestone")
-    x, z = arch_outline(plan.BAY / 2 - 0.001, 0.0, 0.0, plan.BAY / 2 - 0.001, n).T
-    hood = scene.tube(xyz(x, 0, z), 0.035)
-    for face in (0.01 - ARCADE_WALL / 2, ARCADE_WALL / 2 - 0.01):
-        model.add(hood, "Limestone", (0, face, 0))
-    return model
 
 
 def pillar(section: Points) -> Shape:

@@ -5,7 +5,7 @@ import numpy as np
 from scenes.library.architecture import arch_outline, blocks, filled, panel, stones, upright
 from scenes.library.points import Array, circle, polar, xyz
 from scenes.library.scene import Model, Scene, place
-from scenes.library.shapes import Shape, box, join, lathe, transform
+from scenes.library.shapes import box, join, lathe, transform
 from scenes.lone_monk.plan import BACK, EAST, LEAN_TO_TOP, NORTH, SIDES, on_sides, side
 from scenes.lone_monk.roofs import EXPOSED, PITCH, house, lay_tiles
 from scenes.lone_monk.walls import glaze, wall
@@ -34,7 +34,13 @@ def church(scene: Scene) -> None:
     radius, height = ROSE
     hole = circle(radius, scene.segments(40, 8)) + np.array((0, height))
     rose = wall(scene, "Brick", area, hole, (0.2, 0.06))
-    rose.add(tracery(scene), "Limestone", (0, 0.16, height))
+    parts = [scene.ring(0.3, 0.045), scene.ring(1.12, 0.05)]
+    circlet, foil = scene.ring(0.25, 0.03), scene.ring(0.09, 0.015, 12)
+    for angle in np.arange(8) * np.pi / 4:
+        parts.append(scene.tube(polar([0.3, 1.12], angle), 0.035))
+        parts.append(circlet.moved(*polar(0.84, angle + np.pi / 8)))
+        parts.append(foil.moved(*polar(0.14, angle)))
+    rose.add(upright(join(parts)), "Limestone", (0, 0.16, height))
     rose.add(filled(hole, 0.3), "Glass")
     x = np.delete(in_row(BAYS), BAYS // 2)
     on_sides("Lancet bay", [lancet.mesh("Lancet bay")], x, BACK, sides=[EAST])
@@ -53,17 +59,6 @@ def church(scene: Scene) -> None:
 def in_row(count: int) -> Array:
     """The x of things a bay's width apart, symmetric about 0."""
     return (np.arange(count) - (count - 1) / 2) * WIDTH
-
-
-def tracery(scene: Scene) -> Shape:
-    """The stone spokes and rings of the rose window, about its middle, facing −Y."""
-    parts = [scene.ring(0.3, 0.045), scene.ring(1.12, 0.05)]
-    circlet, foil = scene.ring(0.25, 0.03), scene.ring(0.09, 0.015, 12)
-    for angle in np.arange(8) * np.pi / 4:
-        parts.append(scene.tube(polar([0.3, 1.12], angle), 0.035))
-        parts.append(circlet.moved(*polar(0.84, angle + np.pi / 8)))
-        parts.append(foil.moved(*polar(0.14, angle)))
-    return upright(join(parts))
 
 
 def tower(scene: Scene) -> None:

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
-import bpy
 import numpy as np
 from numpy.random import Generator
 
@@ -68,20 +67,23 @@ def lawns(scene: Scene) -> None:
         lawn.add(blocks(xyz(run, line), (length - 0.01, 0.1, 0.14)), "Limestone")
         lawn.add(blocks(xyz(line, run), (0.1, length - 0.01, 0.14)), "Limestone")
     on_sides("Lawn", [lawn.mesh("Lawn")])
-    patches = [grass_patch(scene, random) for _ in range(6)]
+    patches, count = [], scene.count(150)
+    for _ in range(6):  # squares of grass, with a daisy here and there
+        foot = xyz(*random.uniform(-CELL / 2, CELL / 2, (2, count)), -0.01)
+        forward, up = (
+            random.normal(0, (1, 1, 0), (count, 3)),
+            random.normal((0, 0, 1), 0.3, (count, 3)),
+        )
+        parts = [
+            copies(blade(0.055, 3, 0.35), foot, forward, up, random.uniform(0.035, 0.085, count))
+        ]
+        for _ in range(random.integers(2)):
+            petals, middle = polar(1, np.arange(8) * np.pi / 4, 0.25), foot[0] + (0, 0, 0.08)
+            parts.append(
+                copies(folded_leaf(0.5), middle + 0 * petals, petals, size=0.013).painted(1)
+            )
+        patches.append(scene.mesh("Grass", join(parts), "Grass", "Daisy", smooth=False))
     x, y = CROSS_PATH + (np.indices((CELLS, CELLS)).reshape(2, -1) + 0.5) * CELL
     x, y = np.stack([x, y])[:, np.hypot(x, y) > PLAZA + 0.3]
     turn, size = 90 * random.integers(4, size=len(x)), random.uniform(0.95, 1.15, len(x))
     on_sides("Grass", patches, x, y, 0, turn, size)
-
-
-def grass_patch(scene: Scene, random: Generator) -> bpy.types.Mesh:
-    """A square of grass blades, with a daisy here and there."""
-    count = scene.count(150)
-    foot = xyz(*random.uniform(-CELL / 2, CELL / 2, (2, count)), -0.01)
-    forward, up = random.normal(0, (1, 1, 0), (count, 3)), random.normal((0, 0, 1), 0.3, (count, 3))
-    parts = [copies(blade(0.055, 3, 0.35), foot, forward, up, random.uniform(0.035, 0.085, count))]
-    for _ in range(random.integers(2)):
-        petals, middle = polar(1, np.arange(8) * np.pi / 4, 0.25), foot[0] + (0, 0, 0.08)
-        parts.append(copies(folded_leaf(0.5), middle + 0 * petals, petals, size=0.013).painted(1))
-    return scene.mesh("Grass", join(parts), "Grass", "Daisy", smooth=False)

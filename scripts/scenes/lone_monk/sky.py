@@ -18,14 +18,9 @@ def sky(scene: Scene) -> None:
     """
     sun_light("Sun", SUN_AZIMUTH, SUN_ELEVATION, 16.0, (1.0, 0.80, 0.56), np.radians(0.6))
     graph = SkyGraph()
-    blue = graph.add(
-        "TexSky",
-        sky_type="MULTIPLE_SCATTERING",
-        sun_disc=False,
-        sun_elevation=SUN_ELEVATION,
-        sun_rotation=np.pi / 2 - SUN_AZIMUTH,  # counted from +Y, clockwise
-        aerosol_density=0.6,
-    )
+    look = {"sky_type": "MULTIPLE_SCATTERING", "sun_disc": False, "aerosol_density": 0.6}
+    clockwise = np.pi / 2 - SUN_AZIMUTH  # from +Y
+    blue = graph.add("TexSky", sun_elevation=SUN_ELEVATION, sun_rotation=clockwise, **look)
     direction = graph.add("TexCoord").outputs["Generated"]
     height = graph.math("MAXIMUM", graph.xyz(direction)["Z"], 0.05)
     plane = graph.vector_math("DIVIDE", direction, height)[0]

@@ -75,8 +75,8 @@ def back_walls(scene: Scene) -> None:
     bays = window.mesh("Wall with window"), doorway(scene, 0.22).mesh("Wall with door")
     for number in plan.SIDES:
         for i, x in enumerate(plan.BAY_AXES):
-            has_door = i in (3, number * 2 % 7)
-            on_sides(f"Wall.{i}", [bays[has_door]], x, BACK, sides=[number])
+            bay = bays[i in (3, number * 2 % 7)]
+            on_sides(f"Wall.{i}", [bay], x, BACK, sides=[number])
     ends, width, top = Model(scene), BACK - ARCADE, LEAN_TO_TOP
     for x in (-ARCADE - width / 2, ARCADE + width / 2):
         ends.add(box((width, BACK_WALL, top)), "Whitewash", (x, BACK + BACK_WALL / 2, top / 2))

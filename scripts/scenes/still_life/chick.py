@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 
-from scenes.library.points import Array, points, unit
+from scenes.library.points import points, unit
 from scenes.library.scene import Model, Scene, place
 from scenes.library.shapes import transform
 
@@ -29,15 +29,25 @@ STEPS = 6
 
 
 def chick(scene: Scene) -> None:
+    """Its hairs point outwards, backwards and down, each a little curled."""
     matrix = transform((-0.105, -0.145, 0), (0, 0, np.radians(-22)))
-    model = Model(scene, FACE)
+    model, found, t = Model(scene, FACE), [], np.linspace(0, 1, STEPS)[:, None]
     for path, radius in FOOT:
         for side in (-1, 1):
             model.add(scene.bend(points(path) * (side, 1, 1), radius, 14, 10), "Beak")
-    for middle, axes, *_ in PARTS:
+    for middle, axes, full, length in PARTS:
         model.add(scene.ball(1.0, 32), "Skin", middle, scale=axes)
+        random, count = scene.random(f"down {middle}"), scene.count(full, 60)
+        outward = unit(random.normal(size=(count, 3)))
+        normal = unit(outward / axes)
+        lean = unit(normal + (0, 0.55, -0.45) + 0.28 * random.normal(size=(count, 3)))
+        curl = 0.35 * random.normal(size=(count, 3)) + (0, 0.1, -0.35)
+        reach = length * random.uniform(0.65, 1.15, count)[:, None, None]
+        roots = (middle + outward * axes)[:, None]
+        found.append(roots + reach * (t * lean[:, None] + 0.5 * t**2 * curl[:, None]))
     place("Chick", model.mesh("Chick", True), matrix)
-    hairs = np.concatenate([_hairs(scene, *part) for part in PARTS])
+    hairs = np.concatenate(found)
+    hairs[..., 2] = np.maximum(hairs[..., 2], 0.002)
     away = np.linalg.norm(hairs[:, 0, None] - points(EYES_AND_BEAK), axis=-1)
     hairs = hairs[(away > (0.0062, 0.0062, 0.0075)).all(axis=1)]
     down = bpy.data.hair_curves.new("Down")
@@ -47,18 +57,3 @@ def chick(scene: Scene) -> None:
     down.points.foreach_set("radius", radii)
     down.materials.append(bpy.data.materials["Down"])
     place("Down", down, matrix)
-
-
-def _hairs(scene: Scene, middle: object, axes: object, count: int, length: float) -> Array:
-    """Hairs (n, STEPS, 3) from an ellipsoid: outwards, backwards and down, each a little curled."""
-    random, size = scene.random(f"down {middle}"), (scene.count(count, 60), 3)
-    outward = unit(random.normal(size=size))
-    normal = unit(outward / axes)
-    lean = unit(normal + (0, 0.55, -0.45) + 0.28 * random.normal(size=size))
-    curl = 0.35 * random.normal(size=size) + (0, 0.1, -0.35)
-    t = np.linspace(0, 1, STEPS)[:, None]
-    reach = length * random.uniform(0.65, 1.15, size[0])[:, None, None]
-    roots = (middle + outward * axes)[:, None]
-    hairs = roots + reach * (t * lean[:, None] + 0.5 * t**2 * curl[:, None])
-    hairs[..., 2] = np.maximum(hairs[..., 2], 0.002)
-    return hairs

@@ -61,11 +61,8 @@ def linen(name: str, color: Color) -> None:
     graph.finish(graph.principled(Base_Color=tint, Normal=graph.bump(weave, 0.0006), **look))
 
 
-# Fruit: inputs of its Principled BSDF besides those of flesh.
-
-
 def pear(graph: MaterialGraph) -> dict[str, object]:
-    """Green to yellow, with a blush on one side and freckles."""
+    """A fruit's inputs besides those of flesh: green to yellow, with a blush and freckles."""
     where = graph.coordinates()
     side = graph.math("ADD", graph.xyz(where)["X"], graph.noise(where, 40.0))
     ground = graph.ramp(side, "0.44 0.38 0.42 0.05, 0.50 0.62 0.47 0.06, 0.54 0.55 0.12 0.03")
