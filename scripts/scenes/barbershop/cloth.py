@@ -64,8 +64,8 @@ def folded_towel(scene: Scene, towel: str) -> bpy.types.Mesh:
     """A towel folded twice, with a stripe."""
     stripe = "White towel" if towel == "Red towel" else "Red towel"
     parts = f"""{towel}: box 0.26 0.17 0.016 0.007 3 at 0 0 0.008..0.036*3;
-        tube 0.022, -0.13 0.078 0.022, 0.13 0.078 0.022
-    {stripe}: box 0.02 0.171 0.002 at -0.09 0 0.0445"""
+            tube 0.022, -0.13 0.078 0.022, 0.13 0.078 0.022
+        {stripe}: box 0.02 0.171 0.002 at -0.09 0 0.0445"""
     return Model(scene, parts).mesh(f"Folded {towel.lower()}")
 
 

@@ -98,9 +98,9 @@ def pots(scene: Scene) -> Goods:
     for i, word in enumerate(("WAX", "CLAY", "BALM", "SOAP")):
         r, h = 0.034 + 0.006 * (i % 2), 0.03 + 0.012 * i
         tin = f"""{INKS[i]}: lathe {r} 0, {r} {h * 0.6}
-    {("Gilt", "Steel")[i % 2]}: lathe {r + 0.001} {h * 0.6}, {r + 0.001} {h - 0.003}
+            {("Gilt", "Steel")[i % 2]}: lathe {r + 0.001} {h * 0.6}, {r + 0.001} {h - 0.003}
                 {r - 0.003} {h}, 0 {h}
-    Black: word 0.016 0.0005 {word} at 0 0 {h}"""
+            Black: word 0.016 0.0005 {word} at 0 0 {h}"""
         made.append(Model(scene, tin).mesh(f"Pomade tin {i}"))
     return made
 
@@ -115,11 +115,11 @@ def shelf(scene: Scene, width: float, depth: float) -> bpy.types.Mesh:
     """A wooden board on two brass brackets, with a low rail; its top at z = 0, back at y = 0."""
     end, rail = width / 2 - 0.01, depth - 0.008
     parts = f"""Mahogany x: box {width} {depth} 0.02 0.005 at 0 {depth / 2} -0.01
-    Brass: bend 0.006, 0 0.008 -0.12, 0 0.05 -0.09, 0 {depth * 0.5} -0.035
-        0 {depth * 0.85} -0.024 at ±{end - 0.07} 0 0;
-        box 0.02 0.008 0.13 at ±{end - 0.07} 0.004 -0.08;
-        tube 0.004, -{end} {rail} 0.035, {end} {rail} 0.035;
-        tube 0.003, 0 0 0, 0 0 0.035 at -{end}..{end}*4 {rail} 0"""
+        Brass: bend 0.006, 0 0.008 -0.12, 0 0.05 -0.09, 0 {depth * 0.5} -0.035
+            0 {depth * 0.85} -0.024 at ±{end - 0.07} 0 0;
+            box 0.02 0.008 0.13 at ±{end - 0.07} 0.004 -0.08;
+            tube 0.004, -{end} {rail} 0.035, {end} {rail} 0.035;
+            tube 0.003, 0 0 0, 0 0 0.035 at -{end}..{end}*4 {rail} 0"""
     return Model(scene, parts).mesh("Shelf board")
 
 

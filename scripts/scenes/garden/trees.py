@@ -98,8 +98,8 @@ def maple(scene: Scene) -> None:
 def pines(scene: Scene) -> None:
     """Cloud-pruned pines, 3 m high: swaying stems, limbs, and a dome of brushes on each."""
     random, meshes = scene.random("pines"), []
+    needle = sheet(xyz([[-0.045, 0.045], [-0.04, 0.04], [-0.004, 0.004]], [[0], [0.5], [1]]))
     for number in range(2):
-        needle = sheet(xyz([[-0.045, 0.045], [-0.04, 0.04], [-0.004, 0.004]], [[0], [0.5], [1]]))
         out, up = random.normal((0, 0, 0.7), 0.6, (9, 3)), random.normal(0, 1, (9, 3))
         brush = copies(needle, np.zeros((9, 3)), out, up, 0.11)
         t, turn = np.linspace(0, 1, 14), random.uniform(0, TAU)
@@ -118,9 +118,8 @@ def pines(scene: Scene) -> None:
             spots = size * polar(radius, random.uniform(0, TAU, count), dome)
             forward = random.normal(0, 1, (count, 3)) * (1, 1, 0.1)
             upwards = spots * (1.2, 1.2, 0.4) + (0, 0, 0.6)
-            pads.append(
-                copies(brush, spots + tip, forward, upwards, random.uniform(0.8, 1.25, count))
-            )
+            sizes = random.uniform(0.8, 1.25, count)
+            pads.append(copies(brush, spots + tip, forward, upwards, sizes))
         tree = join([*parts, join(pads).painted(1)])
         meshes.append(scene.mesh("Pine", tree, "Pine bark", "Pine needles"))
     spots = points("5.9 0.2, 3.1 6.3, -7.6 -2.6, -3.3 5.6, 6.4 5.4, -5.8 -5.6, 9.5 2.4")

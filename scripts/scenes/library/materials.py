@@ -195,9 +195,7 @@ def emissive(name: str, color: Color, strength: float) -> None:
 
 
 def foliage(table: str) -> None:
-    """Thin leaves, each of its own tint, of a table: name, dark and light colour of each, and how
-    much of the light comes out behind.
-    """
+    """Thin leaves, each of its own tint: rows of name, dark and light colour, and `thin`'s part."""
     for name, *tints, through in rows(table, 7):
         graph = MaterialGraph(name)
         graph.finish(graph.thin(graph.piece_tint(tints[:3], tints[3:]), through))
