@@ -136,22 +136,24 @@ def test_what_is_missing_or_of_another_size_is_named(dataset, tmp_path, run_prog
     problem = f"{TESTS[1]}.exr: has colour that is no number where it is compared"
     assert (result.returncode, result.stderr.splitlines()[-1].endswith(problem)) == (1, True)
     assert [path.name for path in tmp_path.iterdir()] == ["renders"]
+    source = Source(dataset, "perspective", ".exr")
     images.write_png(tmp_path / "small.png", np.zeros((4, 6, 3), np.uint8))
-    with pytest.raises(UserError, match="is 6 × 4, but the dataset's views are 64 × 48"):
-        evaluation.rendered(tmp_path / "small.png", Source(dataset, "perspective", ".exr"))
     images.write_png(tmp_path / "grey.png", np.zeros((48, 64), np.uint8))
-    with pytest.raises(UserError, match="has the channels Y; must have RGB"):
-        evaluation.rendered(tmp_path / "grey.png", Source(dataset, "perspective", ".exr"))
     images.write_exr(tmp_path / "grey.exr", {"Z": np.ones((48, 64), np.float32)})
-    with pytest.raises(UserError, match="has the channels Z; must have RGB"):
-        evaluation.rendered(tmp_path / "grey.exr", Source(dataset, "perspective", ".exr"))
+    for name, problem in (
+        ("small.png", r"is 6 × 4, but .*lightfield\.json says 64 × 48"),
+        ("grey.png", "has the channels Y; must have RGB"),
+        ("grey.exr", "has the channels Z; must have RGB"),
+    ):
+        with pytest.raises(UserError, match=problem):
+            evaluation.rendered(tmp_path / name, source)
     mask = tmp_path / "view_0001f.png"
     for pixels, problem in (
         (np.ones((48, 64, 3), np.uint8), "has no channel Y; it has R, G, B"),
-        (np.ones((4, 6), np.uint8), "is 6 × 4, but its view is 64 × 48"),
+        (np.ones((4, 6), np.uint8), r"is 6 × 4, but .*lightfield\.json says 64 × 48"),
     ):
         images.write_png(mask, pixels)
         with pytest.raises(UserError, match=problem):
-            evaluation.mask(mask, (48, 64))
+            evaluation.mask(mask, source)
     images.write_png(mask, np.eye(48, 64, dtype=np.uint8))
-    assert evaluation.mask(mask, (48, 64)).sum() == 48
+    assert evaluation.mask(mask, source).sum() == 48

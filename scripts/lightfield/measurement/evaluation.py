@@ -17,7 +17,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import View
-from lightfield.export.source import Bools, Floats, Source
+from lightfield.export.source import Bools, Floats, Source, check_size
 from lightfield.geometry.depth import distance_from_z
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb, tone_map
@@ -47,12 +47,10 @@ def find(folder: Path, view: View) -> Path:
     raise UserError(f"{folder}: has no {view.name}.png or .exr, which is a view to test with")
 
 
-def mask(path: Path, shape: tuple[int, ...]) -> Bools:
+def mask(path: Path, source: Source) -> Bools:
     """Return where a grey picture is not 0; raises `UserError` for one of another size or kind."""
     pixels = images.read_image(path, ["Y"]).channels["Y"]
-    if pixels.shape != shape:
-        sizes = (f"{width} × {height}" for height, width in (pixels.shape, shape))
-        raise UserError(f"{path}: is {', but its view is '.join(sizes)}")
+    check_size(path, source.lightfield, pixels)
     return np.asarray(pixels > 0)
 
 
@@ -75,18 +73,13 @@ def rendered(path: Path, source: Source) -> Pictures:
     image = images.read_image(path)
     if not {*"RGB"} <= image.channels.keys():
         raise UserError(f"{path}: has the channels {', '.join(image.channels)}; must have RGB")
+    check_size(path, source.lightfield, image.channels["R"])
     if path.suffix == ".png":
         pixels = np.stack([image.channels[name] for name in "RGB"], axis=-1)
         colour = pixels / np.iinfo(pixels.dtype).max
     else:
         developed = tone_map(image.colour, source.exposure, source.reinhard)
         colour = np.asarray(encode_srgb(developed), np.float64)
-    size = (source.lens.height, source.lens.width)
-    if colour.shape[:2] != size:
-        raise UserError(
-            f"{path}: is {colour.shape[1]} × {colour.shape[0]}, but the dataset's views are "
-            f"{size[1]} × {size[0]}"
-        )
     depth = image.channels.get("Z")
     normals = _normals(path.parent / NORMALS / f"{path.stem}.exr")
     return Pictures(colour, None if depth is None else depth.astype(np.float64), normals)

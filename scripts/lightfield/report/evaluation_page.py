@@ -36,7 +36,7 @@ def write(
         true = evaluation.truth(source, view, path)
         counted = np.ones(shown.colour.shape[:2], bool)
         if masks:
-            counted = evaluation.mask(masks / f"{view.name}.png", counted.shape)
+            counted = evaluation.mask(masks / f"{view.name}.png", source)
         parts = evaluation.regions(source, view, counted, true.depth)
         if not parts:
             raise UserError(f"{path}: its mask leaves no pixel that the lens sees")
