@@ -24,10 +24,9 @@ rule costs:
         # A calibration belongs to the preset, the scene itself to all of them.
         scene_benchmarks=lambda wildcards: [
             f"{WORK}/benchmarks/{folder}"
-            for folder in {
-                dataset_of(wildcards).scene_name: None,
-                wildcards.scene: None,
-            }
+            for folder in dict.fromkeys(
+                (dataset_of(wildcards).scene_name, wildcards.scene)
+            )
         ],
         blend=optional("blend"),
         energy=SETTINGS.energy.model_dump_json(),

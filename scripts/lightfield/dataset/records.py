@@ -58,8 +58,8 @@ class ShardRecord:
         last = self._last_logged.get(self._name(file), {})
         if last.get("key") == key and last.get("sha256") != sha256(file):
             raise UserError(
-                f"{file}: has other bytes than when it was taken over, in the same file; put back "
-                f"the right one, or remove {_log(self._path)} to take them as they are now"
+                f"{file}: has other bytes than when it was taken over, in the same file; put the "
+                f"right one where it came from, or remove {_log(self._path)} to take it as it is"
             )
 
     def add(self, file: Path, key: str) -> None:
