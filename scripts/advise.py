@@ -7,14 +7,18 @@ import argparse
 from pathlib import Path
 
 from lightfield.core.cli import run
+from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, write_text
 from lightfield.measurement import advice
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("measured", nargs="+", type=Path, help="JSON of a scene, named after it")
-    for path in parser.parse_args().measured:
+    parser.add_argument("measured", nargs="*", type=Path, help="JSON of a scene, named after it")
+    measured = parser.parse_args().measured
+    if not measured:
+        raise UserError("the views of all chosen scenes are there already: nothing is rendered")
+    for path in measured:
         text = advice.table(path.stem, read_keys(path, "try_changes.py", *advice.SHOWN))
         write_text(path.with_suffix(".md"), text)
         print(text)

@@ -8,6 +8,7 @@ import argparse
 from pathlib import Path
 
 from lightfield.core.cli import counted, run
+from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, write_text
 from lightfield.measurement import plan
 
@@ -18,7 +19,7 @@ def main() -> None:
         "--dataset",
         action="append",
         nargs=3,
-        required=True,
+        default=[],
         metavar=("NAME", "FRAMES", "PROBE"),
         help="scene/rig, how many frames it has, and its probe's JSON",
     )
@@ -32,6 +33,8 @@ def main() -> None:
     )
     parser.add_argument("--output", required=True, type=Path, help="Markdown to write")
     arguments = parser.parse_args()
+    if not arguments.dataset:
+        raise UserError("the views of all chosen datasets are there already: nothing is rendered")
     text = plan.table(
         [
             (name, counted("--dataset", frames), read_keys(probe, "probe.py", *plan.PROBED))

@@ -96,7 +96,10 @@ def test_nothing_is_rendered_of_it(published, tmp_path):
     assert jobs.keys() >= {"import_views", "reproject", "validate", "page"}
     rendering = {"render", "render_panorama", "build_scene", "inventory", "check_cameras"}
     assert not rendering & jobs.keys()
-    assert planned(tmp_path, "advise", *words) == {"advise": 1}
+    for target in ("plan", "advise"):
+        assert planned(tmp_path, target, *words) == {target: 1}
+        terminal = snakemake(tmp_path, target, *words).stderr
+        assert f"{target} failed: error: the views of all chosen" in terminal
     dataset, (view, *_) = tmp_path / "results/theirs/LFPlane", (published / "exr").iterdir()
     again = []
     for part in (1, 0.5):
