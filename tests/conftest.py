@@ -24,15 +24,15 @@ SLOW = {"run_program", "smoke", "blender", "browser", "cycles", "planned", "rend
 def pytest_collection_modifyitems(items):
     """Mark as slow what uses these fixtures; other tests say it themselves.
 
-    Files with quick and slow tests come first, as they compile what is then there for the others;
-    those without slow ones come last, to fill the workers' last seconds.
+    Files of few tests come first, which take long, and those without a slow one last, so that the
+    workers end together.
     """
     tests = {item.path: [] for item in items}
     for item in items:
         if SLOW & set(item.fixturenames):
             item.add_marker("slow")
         tests[item.path].append(item.get_closest_marker("slow") is not None)
-    order = {path: (not any(slow), all(slow), len(slow)) for path, slow in tests.items()}
+    order = {path: (not any(slow), len(slow)) for path, slow in tests.items()}
     items.sort(key=lambda item: order[item.path])
 
 
