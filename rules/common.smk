@@ -315,10 +315,8 @@ def whole(wildcards):
     That it is broken is said here; it is set aside when the run starts.
     """
     dataset = dataset_of(wildcards)
-    sources = ((path, damage(path)) for path in dataset.view_sources)
-    for path, problem in (*dataset.broken(), *sources):
-        if problem is None:
-            continue
+    damaged = [(path, damage(path)) for path in dataset.view_sources if damage(path)]
+    for path, problem in (*dataset.broken(), *damaged):
         if path not in BROKEN:
             print(f"{path}: {problem}; it is made anew", file=sys.stderr)
             BROKEN[path] = problem
@@ -638,17 +636,14 @@ def optional(*names, **flags):
 
     Each has a flag of its own name, or the one that is given.
     """
+    flags |= dict(zip(names, names))
 
     def words(wildcards, input):
-        given = {flag: input[name] for flag, name in flags.items()}
+        given = [(flag, input[name]) for flag, name in flags.items() if input[name]]
         return shlex.join(
-            word
-            for flag, path in given.items()
-            if path
-            for word in (f"--{flag}", str(path))
+            word for flag, path in given for word in (f"--{flag}", str(path))
         )
 
-    flags |= {name: name for name in names}
     return words
 
 
