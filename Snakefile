@@ -39,7 +39,9 @@ report: "captions/workflow.rst"
 
 
 include: "rules/common.smk"
+include: "rules/internals.smk"
 include: "rules/storage.smk"
+include: "rules/ledger.smk"
 include: "rules/display.smk"
 include: "rules/scene.smk"
 include: "rules/rig.smk"
@@ -66,25 +68,26 @@ onstart:
             ViewStore(STORE).check()
         keep_shards()
         remove_leftovers()
-        for path in BROKEN:
-            set_aside(Path(path), Path(REMOVED))
+        announce_damage()
+        set_damage_aside()
         if SETTINGS.accept_blend:
             for name in SCENES:
                 accept_blend(name)
     except UserError as error:
         sys.exit(f"error: {error}")
     begin_display()
+    begin_notes()
 
 
 onsuccess:
     end_display()
-    note_sums()
+    end_notes()
     print_pages()
 
 
 onerror:
     end_display()
-    note_sums()
+    end_notes()
     # Snakemake has something to say after this, too: what failed is repeated when it has.
     atexit.register(
         print,

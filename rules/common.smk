@@ -5,6 +5,7 @@ import inspect
 import json
 import math
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -27,15 +28,15 @@ from lightfield.core.failures import (
     first_sentence,
     is_newer,
 )
-from lightfield.core.files import read_json, set_aside
 from lightfield.core.gpus import visible
 from lightfield.core.memory import available
-from lightfield.dataset import journal, ledger, memory, shard_counts
+from lightfield.dataset import journal, memory, shard_counts
 from lightfield.dataset.config import accept_blend, load_config, load_scene, scene_path
 from lightfield.dataset.dataset import (
     MOST_SHARDS,
     PICTURES,
     PLOTS,
+    SOURCE_KEYS,
     check_presence,
     load_datasets,
     scene_datasets,
@@ -44,7 +45,6 @@ from lightfield.dataset.exports import MANIFEST, VIEWS
 from lightfield.dataset.splits import SPLITS
 from lightfield.dataset.view_store import VARIABLE, ViewStore
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
-from lightfield.measurement.sampling import calibrated
 
 # Where machines see no common folder: what is declared lies in Snakemake's own storage there, and
 # views in the view store.
@@ -109,11 +109,8 @@ PANORAMA = f"{MADE}/panorama"
 REPROJECTED = f"{DATASET}/{{reprojection}}"
 # Of a cube map each face has one, with _f, _b, … before the suffix.
 LENS_MAP = f"{MADE}/{{reprojection}}/lens_map.npy"
-# What is not what a program wrote there, and what is wrong with it.
-BROKEN = {}
-# Where that is moved to, for nobody to lose anything.
+# Where damaged files are moved to, so that nobody loses anything.
 REMOVED = f"{WORK}/removed"
-SUMS = f"{WORK}/{ledger.NAME}"
 SHARDS = f"{WORK}/{shard_counts.NAME}"
 MEMORY = available()
 # One for each render, and as many renders at once as this machine has GPUs; nodes count their own.
@@ -229,158 +226,6 @@ def records(wildcards):
     return dataset_of(wildcards).records(stage_of(wildcards))
 
 
-def made_anew(path):
-    """Let a file be made anew that is there, but no longer says what is true.
-
-    Snakemake itself only sees whether it is there, and how old it is. Nothing is removed before
-    its job runs: a dry run shows the job and leaves the file.
-    """
-    workflow.dag.forcefiles.add(stored(path))
-
-
-def note_sums():
-    """Note the checksums of what the jobs of this run have made, and of what has none yet.
-
-    Only a run in which a job ran comes to this.
-    """
-    if STORE:
-        return
-    made, others = set(), set()
-    for job in own(workflow.dag.jobs):
-        files = {*map(str, job.output), *([job.benchmark] if job.benchmark else [])}
-        for path in map(Path, job.output):
-            # A shard's log of checksums and journal lie beside its record.
-            files.update(
-                map(str, path.parent.glob(f"{path.stem}.*.jsonl"))
-                if path.suffix == ".json"
-                else []
-            )
-        (made if workflow.dag.finished(job) else others).update(files)
-    folders = [f"{root}/" for d in DATASETS.values() for root in (d.folder, d.work)]
-    current = {file for d in DATASETS.values() for file in (*d.files, *d.intermediates)}
-    ledger.note(
-        Path(SUMS),
-        made,
-        others,
-        lambda name: name not in current and name.startswith(tuple(folders)),
-    )
-
-
-def outdated(dataset):
-    """Return the files that say that they were made from other settings than the present ones.
-
-    Snakemake remembers settings, too, but only as long as its own folder is kept.
-    """
-    if dataset.source.blend:
-        inventory = Path(dataset.inventory)
-        if not inventory.exists() or inventory in map(Path, BROKEN):
-            return []
-        # What an older program wrote is made anew.
-        if "blend" not in read_json(inventory):
-            return []
-        dataset = dataset.resolved(inventory)
-    render = dataset.render
-    if dataset.calibration:
-        record = Path(dataset.calibration)
-        if not record.exists() or record in map(Path, BROKEN):
-            return []
-        try:
-            render = calibrated(render, record)
-        except UserError:
-            return [str(record)]
-    return list(dataset.outdated(render))
-
-
-@cache
-def noted_sums():
-    """Return the ledger's checksums; none where it is damaged, which `snakemake verify` says."""
-    try:
-        return ledger.read(Path(SUMS))
-    except UserError:
-        return {}
-
-
-@cache
-def damage(path):
-    """Return what is wrong with a file, if anything, which all datasets of a scene may have."""
-    return ledger.damage(noted_sums(), path)
-
-
-def whole(wildcards):
-    """Return no input, but let what is broken or out of date of a dataset be made anew.
-
-    So is what views are made from where it has other bytes than those that a job wrote. The page
-    asks, which every target of a finished dataset leads to.
-
-    That it is broken is said here; it is set aside when the run starts.
-    """
-    dataset = dataset_of(wildcards)
-    damaged = [(path, damage(path)) for path in dataset.view_sources if damage(path)]
-    for path, problem in (*dataset.broken(), *damaged):
-        if path not in BROKEN:
-            print(f"{path}: {problem}; it is made anew", file=sys.stderr)
-            BROKEN[path] = problem
-        made_anew(path)
-    for path in outdated(dataset):
-        made_anew(path)
-    # A run without a job would note no checksums.
-    if not (STORE or Path(SUMS).exists()):
-        made_anew(dataset.page)
-    return []
-
-
-@cache
-def is_false(dataset, record):
-    """Return whether a record's files are not on disk; each plan asks twice."""
-    return DATASETS[dataset].is_false(record)
-
-
-@of_each_shard
-def renewal(wildcards, stage=None):
-    """Return no input, but let a shard's record be made anew if its files are not on disk.
-
-    What is in a store is looked at by the job that takes it.
-    """
-    if STORE:
-        return []
-    dataset = dataset_of(wildcards)
-    record = dataset.record(
-        stage or stage_of(wildcards), wildcards.first, wildcards.end
-    )
-    if is_false(dataset.name, record):
-        made_anew(record)
-    return []
-
-
-def checked_blend(wildcards):
-    """Return a scene's .blend, which is checked again if it is another file than it was."""
-    dataset = scene_of(wildcards)
-    if dataset.blend_changed:
-        made_anew(dataset.blend_check)
-    return local(dataset.blend)
-
-
-def listed_blend(wildcards):
-    """Return a scene's .blend, which is listed again if a file that it reads is another one."""
-    dataset = scene_of(wildcards)
-    if dataset.external_changed(ViewStore(STORE) if STORE else None):
-        made_anew(dataset.inventory)
-    return local(dataset.blend) if dataset.source.blend else dataset.blend
-
-
-def inventory_settings(wildcards):
-    """Return what a scene's inventory depends on of its scene YAML."""
-    written = load_scene(wildcards.name)
-    source = written.scene
-    return [
-        # Of the list itself: with how paths are traced, and what is translucent.
-        2,
-        *(source.scene_name, source.view_layers, source.allow_missing),
-        [dataset.camera_frames for dataset in scene_datasets(wildcards.name)],
-        written.render.motion_blur,
-    ]
-
-
 @of_each_shard
 def shard_threads(wildcards):
     """Give each shard so many cores that what runs at once fits this machine's memory."""
@@ -453,20 +298,18 @@ def full_datasets(name):
     return {dataset.rig_folder: dataset for dataset in scene_datasets(name)}
 
 
-def full_size(wildcards):
-    """Return what the scene YAML says of a dataset's size, whatever the preset, as JSON.
+def full_size(dataset):
+    """Return what the scene YAML says of a dataset's size, whatever the preset.
 
     Without samples and denoise where the YAML has a target error instead, or there is no render.
     """
-    full = full_datasets(dataset_of(wildcards).scene_name)[wildcards.rig]
+    full = full_datasets(dataset.scene_name)[dataset.rig_folder]
     settings = {key: full.render.get(key) for key in ("samples", "denoise")}
-    return json.dumps(
-        {
-            "views": full.view_count,
-            "resolution": full.rig.camera.resolution,
-            **{key: value for key, value in settings.items() if value is not None},
-        }
-    )
+    return {
+        "views": full.view_count,
+        "resolution": full.rig.camera.resolution,
+        **{key: value for key, value in settings.items() if value is not None},
+    }
 
 
 def full_sizes(wildcards):
@@ -569,11 +412,6 @@ def rebuilding(wildcards):
     choice = [f"scenes={dataset.scene_name}", f"rigs={dataset.rig_name}"]
     words += ["--cores", "all", "--config", *choice, f"preset={dataset.preset}"]
     return shlex.join(["snakemake", *words])
-
-
-def measurement_times(wildcards):
-    """Return when those files were made: a page is made anew when this changes."""
-    return [file.stat().st_mtime_ns for file in measurements(wildcards)]
 
 
 def reach(dataset):
@@ -720,15 +558,6 @@ def exported_views(wildcards):
             f"{other.folder}/{name}lightfield.json" for name in ("", wildcards.source)
         ]
     return list(dict.fromkeys(files))
-
-
-def split_rigs(wildcards):
-    """Return the light fields of a scene whose rigs say what their views are for."""
-    return [
-        f"{dataset.folder}/lightfield.json"
-        for dataset in DATASETS.values()
-        if dataset.scene_folder == wildcards.scene and dataset.splits
-    ]
 
 
 def trained_by(wildcards):

@@ -3,6 +3,14 @@
 
 rule costs:
     input:
+        settings=settings_of(
+            "costs",
+            lambda dataset: {
+                "energy": SETTINGS.energy.model_dump(mode="json"),
+                "full": full_size(dataset),
+                "reprojections": [*dataset.reprojections],
+            },
+        ),
         validation=f"{DATASET}/validation.json",
         records=stored_records,
         published=of_dataset("published"),
@@ -30,7 +38,7 @@ rule costs:
         ],
         blend=optional("blend"),
         energy=SETTINGS.energy.model_dump_json(),
-        full=full_size,
+        full=lambda wildcards: json.dumps(full_size(dataset_of(wildcards))),
         inventory=optional("inventory"),
         reprojections=reprojection_words,
     message:

@@ -157,6 +157,7 @@ def print_forecast():
     """Print at the end of a dry run how many jobs there are, and what rendering will take."""
     if not (workflow.dryrun and workflow.scheduler and len(workflow.dag)):
         return
+    announce_damage()
     works = {}
     for job in needed_jobs():
         views, seconds = rendering(job)

@@ -2,8 +2,25 @@
 # may give instead of samples.
 
 
+def probe_settings(wildcards):
+    """Return the settings file of a scene's probe cameras: those of its first rig."""
+    dataset = first_dataset(wildcards.scene)
+    if dataset.name in DATASETS:
+        mark_stale_files(dataset.name)
+    content = {
+        "rig": json.loads(dataset.rig_json),
+        "render": dataset.render,
+        "frame": dataset.source.frame,
+        "scene": dataset.source.model_dump(mode="json", include=SOURCE_KEYS),
+        "fingerprint": dataset.builder_fingerprint,
+        "limits": dataset.limits.model_dump(mode="json", exclude_none=True),
+    }
+    return settings_file(f"{WORK}/{wildcards.scene}/settings/probes.json", content)
+
+
 rule probe_cameras:
     input:
+        settings=probe_settings,
         inventory=of_first("blend_inventory"),
         places=of_first("places"),
     output:
@@ -18,10 +35,6 @@ rule probe_cameras:
         limits=of_first("limits_json"),
         places=optional("places"),
         inventory=optional("inventory"),
-        # Not in the command: when what the YAML says changes, so does the file.
-        rig=of_first("rig_json"),
-        render=of_first("render"),
-        fingerprint=of_first("builder_fingerprint"),
     message:
         "Placing the probe cameras of {wildcards.scene}"
     shell:

@@ -1,8 +1,30 @@
 # Files with which trainers open a dataset.
 
 
+def export_settings(wildcards):
+    """Return the settings file of an export: its options, and the rigs that test it."""
+    dataset = dataset_of(wildcards)
+    mark_stale_files(dataset.name)
+    name = wildcards.get("format", "instant_ngp")
+    source = wildcards.source.rstrip("/") or VIEWS
+    reprojection = reprojection_of(wildcards)
+    # A transforms.json can be asked for where the scene YAML has no such export.
+    wanted = dataset.exports.wanted.get(name)
+    testing = tested_by(wildcards) if "format" in wildcards.keys() else []
+    content = {
+        "options": wanted.recorded if wanted else {},
+        "suffix": reprojection.suffix if reprojection else ".exr",
+        "trained_by": dataset.trained_by,
+        "tested_by": [other.rig_folder for other in testing],
+    }
+    return settings_file(
+        f"{dataset.work}/settings/exports/{source}/{name}.json", content
+    )
+
+
 rule export_to_instant_ngp:
     input:
+        settings=export_settings,
         records=records,
         lightfield=f"{DATASET}/{{source}}lightfield.json",
         trained=trained_by,
@@ -26,6 +48,7 @@ rule export_to_instant_ngp:
 
 rule export:
     input:
+        settings=export_settings,
         views=exported_views,
         lightfield=f"{DATASET}/{{source}}lightfield.json",
         dataset=f"{DATASET}/lightfield.json",

@@ -6,7 +6,6 @@ rule flow:
         # A neighbour may be of another shard.
         records=records,
         lightfield=f"{DATASET}/lightfield.json",
-        renewal=lambda wildcards: renewal(wildcards, "flow"),
     output:
         f"{MADE}/flow/{{first}}-{{end}}.json",
     log:

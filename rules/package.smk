@@ -1,9 +1,25 @@
 # A dataset as archives with a card, as SILVR publishes its own.
 
 
+def pack_settings(wildcards):
+    """Return the settings file of an archive: what is in it, its size, and what its card says."""
+    name = packed_scene(wildcards)
+    written = load_scene(name)
+    content = {
+        "datasets": [dataset.name for dataset in packed(wildcards)],
+        "gigabytes": SETTINGS.package_gigabytes,
+        "scene": written.model_dump(
+            mode="json", include={"description", "licence", "credit"}
+        ),
+    }
+    path = f"{WORK}/{wildcards.scene}/{wildcards.rig}/settings/pack.json"
+    return settings_file(path, content)
+
+
 rule pack:
     input:
-        packed_sums,
+        settings=pack_settings,
+        sums=packed_sums,
     output:
         archive=f"{RESULTS}/{{scene}}/{{scene}}_{{rig}}.tar",
         card=f"{RESULTS}/{{scene}}/{{scene}}_{{rig}}.json",

@@ -8,7 +8,6 @@ ruleorder: import_views > render
 rule import_views:
     input:
         lightfield=f"{DATASET}/lightfield.json",
-        renewal=renewal,
     output:
         f"{MADE}/render/{{first}}-{{end}}.json",
     log:
@@ -38,7 +37,6 @@ rule render:
         inventory=of_dataset("inventory"),
         lightfield=f"{DATASET}/lightfield.json",
         cameras=f"{MADE}/cameras.json",
-        renewal=renewal,
     output:
         f"{MADE}/render/{{first}}-{{end}}.json",
     log:

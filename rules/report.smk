@@ -3,6 +3,18 @@
 
 rule panorama_lightfield:
     input:
+        settings=settings_of(
+            "panorama",
+            lambda dataset: {
+                "width": dataset.panorama_width,
+                "center": dataset.rig.center,
+                "render": dataset.render,
+                "frame": dataset.source.frame,
+                "scene": dataset.source.model_dump(mode="json", include=SOURCE_KEYS),
+                "fingerprint": dataset.builder_fingerprint,
+                "limits": dataset.limits.model_dump(mode="json", exclude_none=True),
+            },
+        ),
         inventory=of_dataset("blend_inventory"),
         calibration=of_dataset("calibration"),
     output:
@@ -20,9 +32,6 @@ rule panorama_lightfield:
         width=of_dataset("panorama_width"),
         calibration=optional("calibration"),
         inventory=optional("inventory"),
-        render=of_dataset("render"),
-        center=lambda wildcards: dataset_of(wildcards).rig.center,
-        fingerprint=of_dataset("builder_fingerprint"),
     message:
         "Placing the panorama of {wildcards.scene}/{wildcards.rig}"
     shell:
@@ -64,6 +73,9 @@ rule render_panorama:
 
 rule figures:
     input:
+        settings=settings_of(
+            "figures", lambda dataset: {"rig": json.loads(dataset.rig_json)}
+        ),
         records=records,
         lightfield=f"{DATASET}/lightfield.json",
         panorama=of_dataset("panorama"),
@@ -96,6 +108,22 @@ rule figures:
         " --panorama {input.panorama} --output {params.dataset}/report > {log} 2>&1"
 
 
+def page_settings(wildcards):
+    """Return the settings file of a page: the scene YAML's text, and which measurements it shows."""
+    dataset = dataset_of(wildcards)
+    mark_stale_files(dataset.name)
+    content = {
+        "rig": json.loads(dataset.rig_json),
+        "yaml": scene_path(dataset.scene_name).read_text(),
+        "command": rebuilding(wildcards),
+        "panorama": dataset.panorama,
+        "measurements": [
+            [str(path), path.stat().st_mtime_ns] for path in measurements(wildcards)
+        ],
+    }
+    return settings_file(f"{dataset.work}/settings/page.json", content)
+
+
 rule page:
     input:
         records=stored_records,
@@ -104,7 +132,7 @@ rule page:
         validation=f"{DATASET}/validation.json",
         costs=f"{DATASET}/report/costs.json",
         inventory=of_dataset("blend_inventory"),
-        whole=whole,
+        settings=page_settings,
     output:
         f"{DATASET}/report/index.html",
     log:
@@ -122,10 +150,6 @@ rule page:
         command=rebuilding,
         measurements=measurements,
         inventory=optional("inventory"),
-        # Not in the command: when the YAML is another, so is the page.
-        text=lambda wildcards: scene_path(dataset_of(wildcards).scene_name).read_text(),
-        # Not in the command: when a measurement was made anew, so is the page.
-        measured=measurement_times,
     message:
         "Making the page of {wildcards.scene}/{wildcards.rig}"
     shell:
@@ -139,7 +163,10 @@ rule page:
 
 rule index:
     input:
-        [dataset.page for dataset in CHOSEN],
+        settings=lambda wildcards: settings_file(
+            f"{WORK}/settings/index.json", {"pages": [d.page for d in CHOSEN]}
+        ),
+        pages=[dataset.page for dataset in CHOSEN],
     output:
         f"{RESULTS}/index.html",
     log:

@@ -1,9 +1,35 @@
 # The same views through other lenses, by one lens map for each rig and reprojection.
 
 
+def reprojection_settings_of(stage, content):
+    """Return the input function for the settings of a reprojection: ``content`` of it."""
+
+    def input_function(wildcards):
+        dataset, name = dataset_of(wildcards), wildcards.reprojection
+        mark_stale_files(dataset.name)
+        path = f"{dataset.work}/settings/{name}/{stage}.json"
+        return settings_file(path, content(reprojection_of(wildcards)))
+
+    return input_function
+
+
+# What to compute, which a lens map holds; and what to write as well.
+optics_settings = reprojection_settings_of(
+    "lens_map", lambda reprojection: {"optics": reprojection.optics}
+)
+reprojection_settings = reprojection_settings_of(
+    "reproject",
+    lambda reprojection: {
+        "optics": reprojection.optics,
+        "development": reprojection.development,
+    },
+)
+
+
 rule reprojected_lightfield:
     input:
-        f"{DATASET}/lightfield.json",
+        settings=reprojection_settings,
+        lightfield=f"{DATASET}/lightfield.json",
     output:
         f"{REPROJECTED}/lightfield.json",
     log:
@@ -23,13 +49,14 @@ rule reprojected_lightfield:
     shell:
         f"python {SCRIPTS}/reproject.py"
         " --dry-run {params.optics} {params.development}"
-        " --input-cfg {input} --output-cfg {output} --input-dir {params.views}"
+        " --input-cfg {input.lightfield} --output-cfg {output} --input-dir {params.views}"
         " --output-dir {params.folder} > {log} 2>&1"
 
 
 rule lens_map:
     input:
-        f"{DATASET}/lightfield.json",
+        settings=optics_settings,
+        lightfield=f"{DATASET}/lightfield.json",
     output:
         LENS_MAP,
     log:
@@ -46,7 +73,7 @@ rule lens_map:
         "Computing the lens map of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
         f"python {SCRIPTS}/lens_map.py"
-        " {params.file} {params.optics} --input-cfg {input} > {log} 2>&1"
+        " {params.file} {params.optics} --input-cfg {input.lightfield} > {log} 2>&1"
 
 
 use rule lens_map as lens_maps with:
@@ -63,7 +90,7 @@ rule reproject:
         record=f"{MADE}/render/{{first}}-{{end}}.json",
         lightfield=f"{DATASET}/lightfield.json",
         lens_maps=lens_maps_of,
-        renewal=renewal,
+        settings=reprojection_settings,
     output:
         f"{MADE}/{{reprojection}}/{{first}}-{{end}}.json",
     log:

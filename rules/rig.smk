@@ -1,9 +1,26 @@
 # Where the cameras are and through which lens they look.
 
 
+def free_rig(dataset):
+    """Return what a random rig says of its places."""
+    return dataset.rig.model_dump(
+        mode="json", exclude_unset=True, exclude={"camera", "split"}
+    )
+
+
 # Only a random rig's cameras have to know the scene.
 rule free_places:
     input:
+        settings=settings_of(
+            "free_places",
+            lambda dataset: {
+                "rig": free_rig(dataset),
+                "frame": dataset.source.frame,
+                "scene": dataset.source.model_dump(
+                    mode="json", include={"scene_name", "view_layers"}
+                ),
+            },
+        ),
         check=of_dataset("blend_check"),
         blend=of_dataset("blend"),
         inventory=of_dataset("blend_inventory"),
@@ -19,9 +36,7 @@ rule free_places:
         mem_mb=8000,
         runtime=60,
     params:
-        rig=lambda wildcards: dataset_of(wildcards).rig.model_dump_json(
-            exclude_unset=True, exclude={"camera", "split"}
-        ),
+        rig=lambda wildcards: json.dumps(free_rig(dataset_of(wildcards))),
         name=of_dataset("scene_name"),
         frame=lambda wildcards: dataset_of(wildcards).source.frame,
         inventory=optional("inventory"),
@@ -36,6 +51,19 @@ rule free_places:
 
 rule lightfield:
     input:
+        settings=settings_of(
+            "lightfield",
+            lambda dataset: {
+                "rig": json.loads(dataset.rig_json),
+                "depth": dataset.depth,
+                "render": dataset.render,
+                "frame": dataset.source.frame,
+                "scene": dataset.source.model_dump(mode="json", include=SOURCE_KEYS),
+                "fingerprint": dataset.builder_fingerprint,
+                "flow": bool(dataset.flow),
+                "limits": dataset.limits.model_dump(mode="json", exclude_none=True),
+            },
+        ),
         inventory=of_dataset("blend_inventory"),
         calibration=of_dataset("calibration"),
         places=of_dataset("places"),
@@ -54,10 +82,6 @@ rule lightfield:
         calibration=optional("calibration"),
         places=optional("places"),
         inventory=optional("inventory"),
-        # Not in the command: when what the YAML says of this dataset changes, so does the file.
-        rig=of_dataset("rig_json"),
-        render=of_dataset("render"),
-        fingerprint=of_dataset("builder_fingerprint"),
     message:
         "Placing the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
@@ -94,9 +118,25 @@ rule check_cameras:
         " --output {output} > {log} 2>&1"
 
 
+def split_rigs(wildcards):
+    """Return the light fields of a scene whose rigs say what their views are for."""
+    return [
+        f"{dataset.folder}/lightfield.json"
+        for dataset in DATASETS.values()
+        if dataset.scene_folder == wildcards.scene and dataset.splits
+    ]
+
+
+def splits_settings(wildcards):
+    """Return the settings file of a scene's splits: which rigs they are of."""
+    path = f"{WORK}/{wildcards.scene}/settings/splits.json"
+    return settings_file(path, {"lightfields": split_rigs(wildcards)})
+
+
 rule splits:
     input:
-        split_rigs,
+        settings=splits_settings,
+        lightfields=split_rigs,
     output:
         f"{RESULTS}/{{scene}}/{SPLITS}",
     log:
@@ -107,4 +147,5 @@ rule splits:
     message:
         "Listing what the views of {wildcards.scene} are for"
     shell:
-        f"python {SCRIPTS}/splits.py" " --output {output} {input} > {log} 2>&1"
+        f"python {SCRIPTS}/splits.py"
+        " --output {output} {input.lightfields} > {log} 2>&1"

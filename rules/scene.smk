@@ -2,6 +2,16 @@
 
 
 rule build_scene:
+    input:
+        settings=scene_settings_of(
+            "build_scene",
+            lambda dataset: {
+                "builder": dataset.source.builder,
+                "parameters": dataset.source.parameters.model_dump(mode="json"),
+                # With another text of the builder, the scene, and then its views, are made anew.
+                "fingerprint": dataset.fingerprint,
+            },
+        ),
     output:
         f"{WORK}/{{name}}/scene.blend",
     log:
@@ -18,8 +28,6 @@ rule build_scene:
         parameters=lambda wildcards: scene_of(
             wildcards
         ).source.parameters.model_dump_json(),
-        # Not in the command: a changed builder makes the scene, and then its views, anew.
-        fingerprint=lambda wildcards: scene_of(wildcards).fingerprint,
     message:
         "Building the scene {wildcards.name}"
     shell:
@@ -30,7 +38,15 @@ rule build_scene:
 
 rule check_blend:
     input:
-        checked_blend,
+        settings=scene_settings_of(
+            "check_blend",
+            lambda dataset: {
+                "sha256": dataset.source.sha256,
+                # With another bpy all that is made of the file is made anew.
+                "bpy": version("bpy"),
+            },
+        ),
+        blend=lambda wildcards: local(scene_of(wildcards).blend),
     output:
         f"{WORK}/{{name}}/blend.json",
     log:
@@ -40,21 +56,39 @@ rule check_blend:
     localrule: True
     conda:
         ENVIRONMENT
-    params:
-        # Not in the command: with another bpy all that is made of the file is made anew.
-        bpy=version("bpy"),
     message:
-        "Checking {input}"
+        "Checking {input.blend}"
     shell:
         f"python {SCRIPTS}/check_blend.py"
-        " --scene {wildcards.name} --blend {input:q}"
+        " --scene {wildcards.name} --blend {input.blend:q}"
         " --output {output} > {log} 2>&1"
+
+
+def inventory_settings(dataset):
+    """Return what a scene's inventory depends on of its scene YAML."""
+    written = load_scene(dataset.scene_name)
+    return {
+        # Raised when the program lists something else.
+        "version": 2,
+        "scene_name": written.scene.scene_name,
+        "view_layers": written.scene.view_layers,
+        "allow_missing": written.scene.allow_missing,
+        "motion_blur": written.render.motion_blur,
+        "camera_frames": [d.camera_frames for d in scene_datasets(dataset.scene_name)],
+    }
+
+
+def blend_of(wildcards):
+    """Return a scene's .blend, which a user has where Snakemake runs."""
+    dataset = scene_of(wildcards)
+    return local(dataset.blend) if dataset.source.blend else dataset.blend
 
 
 rule inventory:
     input:
+        settings=scene_settings_of("inventory", inventory_settings),
         check=lambda wildcards: scene_of(wildcards).blend_check,
-        blend=listed_blend,
+        blend=blend_of,
     output:
         f"{WORK}/{{name}}/inventory.json",
     log:
@@ -68,9 +102,6 @@ rule inventory:
     resources:
         mem_mb=8000,
         runtime=30,
-    params:
-        # Not in the command: the program reads the scene YAML.
-        settings=inventory_settings,
     message:
         "Listing what the scene {wildcards.name} contains"
     shell:

@@ -4,6 +4,14 @@
 # An invalid dataset is an outcome too: it gets its validation.json and its page, and fails below.
 rule validate:
     input:
+        settings=settings_of(
+            "validate",
+            lambda dataset: {
+                "reprojections": [*dataset.reprojections],
+                "exports": dataset.export_lists,
+                "records": dataset.all_records,
+            },
+        ),
         records=of_dataset("all_records"),
         published=of_dataset("published"),
         cameras=of_dataset("cameras"),

@@ -5,13 +5,14 @@ Snakemake has nothing to do in it, and what a test spoils in it must be planned 
 
 import contextlib
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 from checkouts import snakemake
 
 from lightfield.core.files import sha256, write_json, write_text
-from lightfield.dataset import ledger
+from lightfield.dataset import ledger, records
 from lightfield.dataset.dataset import Dataset, scene_datasets
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.records import ShardRecord
@@ -36,14 +37,43 @@ def build(folder: Path) -> list[Dataset]:
         text = "".join(f"{digest}  {name}\n" for name, digest in sums)
         write_text(folder / dataset.folder / "sha256sums.txt", text)
         write_text(folder / dataset.work / "checksums.txt", text)
-    names = [name for dataset in datasets for name in (*dataset.files, *dataset.intermediates)]
-    names += [str(path.relative_to(folder)) for path in folder.glob("work/**/*.sums.jsonl")]
-    with contextlib.chdir(folder):
-        ledger.note(Path("work/sums.json"), names, (), lambda _: False)
+    # The plan writes the settings of every job.
+    plan = snakemake(folder, "--dry-run", "--quiet", "all", "--", "smoke")
+    assert plan.returncode == 0, plan.stderr
     for name in ("results", "work"):
         for path in (folder / name).rglob("*"):
             os.utime(path, (WHEN, WHEN))
+    _note_jobs(folder, datasets)
     return datasets
+
+
+def note(names: Iterable[str]) -> None:
+    """Write into the ledger that a job of its own made each of these files."""
+    jobs = ledger.Ledger(Path("work", ledger.NAME))
+    for name in names:
+        stamps = {name: ledger.Stamp.of(name)}
+        is_history = name.endswith((".jsonl", ".tsv"))
+        files, history = ({}, stamps) if is_history else (stamps, {})
+        jobs.note(ledger.Job([name], files, history, {}))
+
+
+def _note_jobs(folder: Path, datasets: list[Dataset]) -> None:
+    """Write the ledger, as if every file had a job of its own."""
+    with contextlib.chdir(folder):
+        jobs = ledger.Ledger(Path("work", ledger.NAME))
+        for dataset in datasets:
+            for name in (*dataset.files, *dataset.intermediates):
+                if name in jobs:
+                    continue
+                files = {name: ledger.Stamp.of(name)}
+                history = {}
+                if name in dataset.all_records:
+                    listed = [f"{dataset.folder}/{view}" for view in records.read(Path(name))]
+                    files |= {view: ledger.Stamp.of(view) for view in listed}
+                    log = f"{name.removesuffix('.json')}.sums.jsonl"
+                    history[log] = ledger.Stamp.of(log)
+                jobs.note(ledger.Job([name], files, history, {}))
+        os.utime(Path("work", ledger.NAME), (WHEN, WHEN))
 
 
 def planned(folder: Path, *arguments: str) -> set[str]:

@@ -17,9 +17,8 @@ from sphere import LENSES, RADIUS, colour_of, write_views
 
 from lightfield import export
 from lightfield.core.errors import UserError
-from lightfield.core.files import sha256, write_json
+from lightfield.core.files import sha256
 from lightfield.dataset.config import Scene
-from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.export import disparity
@@ -644,23 +643,6 @@ def test_a_rig_that_a_consumer_cannot_take_is_refused_when_the_yaml_is_read():
             TypeAdapter(Scene).validate_python(content)
     content["exports"] = {"instant_ngp": {"sources": ["views"], "bounds": "depth"}}
     assert TypeAdapter(Scene).validate_python(content).exports.instant_ngp
-
-
-@pytest.mark.parametrize("name", ["exports/miv/export.json", "transforms.json"])
-def test_an_export_that_is_no_longer_asked_for_lets_a_dataset_be_validated_again(
-    name, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    dataset = next(d for d in scene_datasets("smoke") if d.rig.split)
-    assert [Path(path).name for path in dataset.export_lists] == [
-        *("transforms.json", "transforms_train.json"),
-        *("transforms_validation.json", "transforms_test.json"),
-    ]
-    for path in dataset.export_lists:
-        write_json(path, {"options": dataset.exports.instant_ngp.recorded})
-    assert list(dataset.outdated(dataset.render)) == []
-    write_json(f"{dataset.folder}/{name}", {})
-    assert list(dataset.outdated(dataset.render)) == [f"{dataset.folder}/validation.json"]
 
 
 def test_nothing_but_an_earlier_export_is_replaced(dataset, tmp_path):

@@ -163,7 +163,7 @@ def test_free_places_are_in_the_room_and_clear_of_all_that_stands_in_it(tmp_path
     assert not (tmp_path / "none.json").exists()
 
 
-def test_a_random_rig_is_outdated_with_its_places(tmp_path, monkeypatch):
+def test_a_random_rigs_places_are_a_file_of_its_dataset(tmp_path, monkeypatch):
     camera = {"lens": "rectilinear", "fov": 60, "resolution": [8, 8]}
     rigs = {"somewhere": RANDOM | {"camera": camera}}
     content = {"scene": {"builder": "room"}, "render": {"samples": 1}, "rigs": rigs}
@@ -173,12 +173,6 @@ def test_a_random_rig_is_outdated_with_its_places(tmp_path, monkeypatch):
     (dataset,) = scene_datasets("somewhere")
     assert dataset.places == "work/somewhere/somewhere/places.json"
     assert dataset.places in dataset.intermediates
-    assert list(dataset.outdated(dataset.render)) == []
-    Path(dataset.work).mkdir(parents=True)
-    for box, expected in ((dataset.rig.box, []), ({"count": 1}, [dataset.places])):
-        written = {"box": box, "places": [[0, 0, 0]] * 40}
-        Path(dataset.places).write_text(json.dumps(written))
-        assert list(dataset.outdated(dataset.render)) == expected
     with pytest.raises(UserError, match="frames: goes without type random"):
         from_settings(RANDOM | {"frames": {"first": 1, "last": 2}})
 

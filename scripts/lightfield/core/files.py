@@ -86,6 +86,18 @@ def write_json(path: Path | str, content: Any) -> None:
     write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
+def write_json_if_changed(path: Path, content: Any) -> bool:
+    """Write ``content`` as JSON, atomically, unless the file holds just that; return if it did."""
+    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
+    try:
+        if path.read_text(encoding="utf-8") == text:
+            return False
+    except (OSError, UnicodeDecodeError):
+        pass
+    write_text(path, text)
+    return True
+
+
 def write_csv(path: Path | str, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write rows of the same columns as CSV, atomically, the first line their names."""
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:

@@ -12,7 +12,7 @@ from statistics import fmean
 from typing import Any, Literal, Self
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import broken, read_keys
+from lightfield.core.files import read_keys
 from lightfield.dataset import (
     blend,
     config,
@@ -33,14 +33,14 @@ from lightfield.dataset.config import (
 )
 from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
 from lightfield.dataset.keys import scene_fingerprint
-from lightfield.dataset.lightfield import NAME, OMNIDIRECTIONAL
+from lightfield.dataset.lightfield import OMNIDIRECTIONAL
 from lightfield.dataset.splits import SPLITS
 from lightfield.dataset.view_store import ViewStore
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.overview import sees_all_round
-from lightfield.geometry.rigs import BlendCamera, Pose, Poses, Random, Rig
+from lightfield.geometry.rigs import BlendCamera, Poses, Random, Rig
 from lightfield.geometry.rigs.split import PARTS
 
 # For planning only, measured on one core of a 2-core x86-64 machine: path tracing of one sample of
@@ -195,41 +195,6 @@ class Dataset:
             },
             "render": render,
         }
-
-    def outdated(self, render: dict[str, Any]) -> Iterator[str]:
-        """Yield those published files that were made from other settings, as they themselves say.
-
-        A lightfield.json holds scene, ``render``, lens and poses, or how views were reprojected, an
-        export its options. A file that is broken or missing is none of them.
-        """
-        if isinstance(self.rig, Random):
-            places = str(self.places)
-            if not Path(places).exists() or _differs(places, {"box": self.rig.box}):
-                # All follows from these.
-                yield from filter(os.path.exists, [places])
-                return
-        own = f"{self.folder}/{NAME}"
-        if Path(own).exists():
-            expected = self.origin(render) | self.rig.camera.make().to_lightfield()
-            if _differs(own, expected, self.placed_rig.poses(), bool(self.flow)):
-                yield own
-        for name, reprojection in self.reprojections.items():
-            path = f"{self.folder}/{name}/{NAME}"
-            expected = reprojection.lens(self.rig.camera).to_lightfield()
-            if _differs(path, expected | {"reprojection": reprojection.recorded}):
-                yield from (path, *self.lens_maps(name), *self.records(name))
-        folder = Path(self.folder)
-        known = {folder / name / NAME for name in self.reprojections}
-        known |= {Path(path) for path in self.export_lists}
-        lists = ("transforms*.json", f"exports/*/{MANIFEST}")
-        there = {path for name in lists for part in ("", "*/") for path in folder.glob(part + name)}
-        if not known.issuperset(there.union(folder.glob(f"*/{NAME}"))):
-            # What there was makes the dataset invalid until validation removes it.
-            yield f"{self.folder}/validation.json"
-        for path in self.exported:
-            name = Path(path).parent.name if path.endswith(MANIFEST) else "instant_ngp"
-            if _differs(path, {"options": self.exports.wanted[name].recorded}):
-                yield path
 
     @property
     def builder_fingerprint(self) -> str | None:
@@ -449,52 +414,33 @@ class Dataset:
         ]
 
     @property
-    def view_sources(self) -> list[str]:
-        """What jobs make and views are made from: verified before it is used.
-
-        A user's own .blend is checked by its proof, lens maps carry a checksum.
-        """
-        scene = self.blend if self.source.builder else []
-        return _paths(scene, self.inventory, self.calibration)
-
-    @property
     def package(self) -> str:
         """A rig's dataset as one archive, all frames of a sequence in it, named as SILVR's are."""
         return f"{self.results_root}/{self.scene_folder}/{self.scene_folder}_{self.rig_name}.tar"
 
-    def is_false(self, record: str) -> bool:
-        """Whether the files on disk are no longer those that a record describes.
+    def outgrown_records(self) -> list[str]:
+        """Return the records of imported views that were written anew since they were taken over.
 
-        A view that was deleted or cut short shows in its size. Its shard then runs again, makes
-        what is missing, and by the log of checksums finds every other file that is not as it was.
-        So it does where views that somebody else has rendered are no longer those it took over.
+        So is one whose source has another size. A view that left its source is needed no more.
         """
+        if not self.imported:
+            return []
+        return [path for path in self.records("render") if self._is_outgrown(Path(path))]
+
+    def _is_outgrown(self, record: Path) -> bool:
         try:
-            sizes = shard_files.recorded(Path(record), self.folder)
-            return sizes is None or self._is_older_than_its_source(Path(record), sizes)
+            sizes = shard_files.recorded(record, self.folder) or {}
+            taken = record.stat().st_mtime_ns
         except FileNotFoundError:
             return False
-
-    def _is_older_than_its_source(self, record: Path, sizes: dict[str, int]) -> bool:
-        """Whether a view was written anew, or has another size, where it was taken over from."""
-        if not self.imported or record.parent.name != "render":
-            return False
-        taken = record.stat().st_mtime_ns
         for name, size in sizes.items():
-            # What is no longer there is not needed any more.
-            found, changed = _size_and_time(Path(self.imported, name))
-            if changed and (found != size or changed > taken):
+            source_size, changed = _size_and_time(Path(str(self.imported), name))
+            if changed and (source_size != size or changed > taken):
                 return True
         return False
 
     def broken(self) -> Iterator[tuple[str, str]]:
-        """Yield each file that cannot be what a program wrote there, and what is wrong with it.
-
-        Of a view no more is looked at than whether it is a file; `is_false` compares its size.
-        """
-        for path in [*self.files, *self.intermediates]:
-            if problem := broken(Path(path)):
-                yield path, problem
+        """Yield each view and journal that is no file at all, and what it is."""
         views = (view for name in self.image_folders for view in _entries(self.folder, name))
         journals = (journal for stage in self.stages for journal in _entries(self.work, stage))
         for entry in (*views, *journals):
@@ -505,20 +451,6 @@ class Dataset:
                     yield entry.path, "is a link that leads to no file"
             elif entry.is_dir():
                 yield entry.path, "is a folder"
-
-    @property
-    def blend_changed(self) -> bool:
-        """Whether the user's .blend is no longer the file that was checked."""
-        if not self.source.blend:
-            return False
-        proof, blend = Path(f"{self.scene_work}/blend.json"), Path(self.source.blend)
-        if not (proof.exists() and blend.exists()):
-            return False
-        try:
-            checked, found = json.loads(proof.read_bytes()), blend.stat()
-            return (found.st_size, found.st_mtime_ns) != (checked["bytes"], checked["mtime_ns"])
-        except (OSError, ValueError, LookupError, TypeError):
-            return True
 
     def external_changed(self, store: ViewStore | None) -> bool:
         """Whether a file that the user's .blend reads is no longer the one in its inventory.
@@ -673,35 +605,6 @@ def _scene_memory(inventory: Path, _changed: int) -> int:
         return int(1.2 * json.loads(inventory.read_bytes())["memory_bytes"])
     except (OSError, ValueError, LookupError, TypeError):
         return memory.UNKNOWN_SCENE
-
-
-def _differs(
-    path: str, expected: dict[str, Any], poses: Sequence[Pose] = (), flow: bool = False
-) -> bool:
-    """Whether a JSON file is there and says something else than is ``expected`` of its keys.
-
-    Its frames must be the ``poses``, if there are any, and have flow or not.
-    """
-    others = iter(poses)
-
-    def is_pose(mapping: dict[str, Any]) -> Any:
-        # Of a hundred thousand views nothing else is kept in memory.
-        if not (poses and "world_matrix" in mapping):
-            return mapping
-        pose = next(others)
-        found = (mapping["name"], *mapping["position"], *mapping["rotation"], mapping.get("split"))
-        same = found == (pose.name, *pose.position, *pose.rotation, pose.split)
-        return same and ("flow" in mapping) == flow
-
-    try:
-        content = json.loads(Path(path).read_bytes(), object_hook=is_pose)
-        if any(content[key] != value for key, value in json.loads(json.dumps(expected)).items()):
-            return True
-        return bool(poses) and content["frames"] != [True] * len(poses)
-    except FileNotFoundError:
-        return False
-    except (OSError, ValueError, LookupError, TypeError, StopIteration, RecursionError):
-        return True
 
 
 def _paths(*perhaps: str | list[str]) -> list[str]:

@@ -1,72 +1,293 @@
-"""The ledger: the checksum of every file that a job of the workflow made, noted when a run ends.
+"""The ledger: what each job of the workflow made, and from what.
 
-work/sums.json: "files" gives each one's "bytes" and "sha256" by its path, "sha256" is of "files".
-What lies in a shard is not in it: a shard's own record and log have that.
+work/ledger.txt has one line for each finished job: the SHA-256 of the rest of the line, a blank,
+and a JSON mapping:
+
+- ``outputs``: the paths that the job's rule declares;
+- ``files``: a `Stamp` for each file that the job wrote: its outputs, and what they list;
+- ``history``: the same for files that only grow, such as journals; no job can make them again;
+- ``inputs``: a `Stamp` for each file that the job read, taken before it started.
+
+A line counts until a later line names the same outputs. A line whose SHA-256 does not hold counts
+for nothing. So every file knows what it was made from, wherever Snakemake's own notes are, and a
+file that was damaged or made from something else is found when a run is planned.
 """
 
+import fcntl
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, sha256, write_json
+from lightfield.core.files import atomic_path, broken, sha256, writing
 
-NAME = "sums.json"
-Sums = dict[str, dict[str, Any]]
+NAME = "ledger.txt"
+# The ledger is written anew when more than this part of its lines counts no more.
+_OBSOLETE_PART = 0.5
 
 
-def read(path: Path) -> Sums:
-    """Return the bytes and SHA-256 of each file by its path; nothing where there is no ledger.
+class Stamp(NamedTuple):
+    """What tells whether a file changed: its SHA-256, and what its file system says of it.
 
-    Raises `UserError` for one that is damaged.
+    ``changed_ns`` is the inode's change time, which no program can set back. A file of the same
+    size and times is taken for unchanged, as Git does.
     """
-    if not path.exists():
-        return {}
-    content = read_json(path)
-    if not isinstance(content, dict) or content.get("sha256") != _digest(content.get("files")):
-        raise UserError(f"{path}: is damaged: its own checksum does not hold")
-    files: Sums = content["files"]
-    return files
+
+    sha256: str
+    bytes: int
+    modified_ns: int
+    changed_ns: int
+
+    @classmethod
+    def of(cls, path: str | Path, digest: str | None = None) -> Self:
+        """Return the stamp of a file, whose SHA-256 is computed unless it is given."""
+        status = os.stat(path)  # noqa: PTH116, a `Path` for each of a hundred thousand is slow
+        digest = digest or sha256(path)
+        return cls(digest, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+
+    def is_current(self, path: str | Path) -> bool:
+        """Return whether a file has this size and these times."""
+        try:
+            status = os.stat(path)  # noqa: PTH116, as above
+        except OSError:
+            return False
+        return (status.st_size, status.st_mtime_ns, status.st_ctime_ns) == self[1:]
 
 
-def write(path: Path, files: Mapping[str, Any]) -> None:
-    """Write the ledger, atomically."""
-    ordered = dict(sorted(files.items()))
-    write_json(path, {"files": ordered, "sha256": _digest(ordered)})
+class Job(NamedTuple):
+    """One line of the ledger; see the module's docstring."""
+
+    outputs: list[str]
+    files: dict[str, Stamp]
+    history: dict[str, Stamp]
+    inputs: dict[str, Stamp]
 
 
-def note(
-    path: Path, made: Iterable[str], others: Iterable[str], is_obsolete: Callable[[str], bool]
-) -> None:
-    """Note the files that were ``made`` now, and those of the ``others`` that it lacks.
+class Ledger:
+    """The ledger at ``path``, as it was when it was opened and as ``note`` has extended it.
 
-    The others were made by a run that was killed before it could note them. What ``is_obsolete``
-    and no longer there is left out from now on.
+    Of jobs that ``is_current`` says nothing of, only the sums of their outputs are kept.
     """
+
+    def __init__(self, path: Path, is_current: Callable[[str], bool] = lambda _: True) -> None:
+        self._path = path
+        # By output: the SHA-256 of the file, and the stamps of what it was made from.
+        self.sums: dict[str, str] = {}
+        self._inputs: dict[str, dict[str, Stamp]] = {}
+        # Jobs of which a file is not as it was noted.
+        self._suspects: list[Job] = []
+        lines = obsolete = 0
+        for job in jobs(path):
+            lines += 1
+            if all(name in self._inputs for name in job.outputs):
+                obsolete += 1
+                continue
+            self._keep(job)
+            if not any(map(is_current, job.outputs)):
+                continue
+            if not all(stamp.is_current(name) for name, stamp in job.files.items()):
+                self._suspects.append(job)
+        self.is_cluttered = obsolete > _OBSOLETE_PART * lines
+
+    def _keep(self, job: Job) -> None:
+        for name in job.outputs:
+            if name not in self._inputs:
+                self._inputs[name] = job.inputs
+                if name in job.files:
+                    self.sums[name] = job.files[name].sha256
+
+    def __contains__(self, output: str) -> bool:
+        return output in self._inputs
+
+    def note(self, job: Job) -> None:
+        """Add the line of a job that has just finished."""
+        _append(self._path, job)
+        for name in job.outputs:
+            self._inputs[name] = job.inputs
+            self.sums.pop(name, None)
+            if name in job.files:
+                self.sums[name] = job.files[name].sha256
+
+    @cached_property
+    def damage(self) -> dict[str, tuple[str, list[str]]]:
+        """By path: what is wrong with a damaged file, and the outputs of the job that made it.
+
+        A file of other times is compared with its SHA-256. A missing file counts only if its job
+        did not declare it: Snakemake sees the others.
+        """
+        damage = {}
+        for job in self._suspects:
+            for name, stamp in job.files.items():
+                if stamp.is_current(name) or (name in job.outputs and not os.path.lexists(name)):
+                    continue
+                if problem := _problem(name, stamp):
+                    damage[name] = (problem, job.outputs)
+        return damage
+
+    def refresh(self) -> None:
+        """Note the present times of files that have new times but their old content."""
+        for job in self._suspects:
+            if not self.damage.keys() & job.files.keys():
+                files = {
+                    name: Stamp.of(name, stamp.sha256)
+                    for name, stamp in job.files.items()
+                    if Path(name).exists()
+                }
+                _append(self._path, job._replace(files=files))
+
+    def changed_input(self, output: str) -> str | None:
+        """Return an input that is no longer the one from which an output was made; None if none.
+
+        An input that no longer exists is Snakemake's to judge.
+        """
+        for name, stamp in self._inputs[output].items():
+            if name in self.sums:
+                if self.sums[name] != stamp.sha256:
+                    return name
+            elif not stamp.is_current(name) and self._has_changed(name, stamp):
+                return name
+        return None
+
+    def last_read(self, name: str, digest: str) -> int | None:
+        """Return when a file of this SHA-256 was changed that a job has read, in nanoseconds."""
+        for inputs in self._inputs.values():
+            if name in inputs and inputs[name].sha256 == digest:
+                return inputs[name].modified_ns
+        return None
+
+    @staticmethod
+    def _has_changed(name: str, stamp: Stamp) -> bool:
+        try:
+            return sha256(name) != stamp.sha256
+        except OSError:
+            return False
+
+    def input_stamps(self, names: Iterable[str]) -> dict[str, Stamp]:
+        """Return the stamps of the files that a job is about to read, those that exist."""
+        stamps = {}
+        for name in names:
+            if Path(name).is_file():
+                stamps[name] = Stamp.of(name, self._trusted_sum(name))
+        return stamps
+
+    def _trusted_sum(self, name: str) -> str | None:
+        """Return the noted SHA-256 of a file that no damage was found in; None if unknown."""
+        return None if name in self.damage else self.sums.get(name)
+
+    def compact(self) -> None:
+        """Write the ledger without the lines that count no more."""
+        with _locked(self._path):
+            kept: list[Job] = []
+            outputs: set[str] = set()
+            for job in jobs(self._path):
+                if not outputs.issuperset(job.outputs):
+                    outputs.update(job.outputs)
+                    kept.append(job)
+            with atomic_path(self._path) as temporary:
+                temporary.write_bytes(b"".join(map(_line, reversed(kept))))
+
+
+def jobs(path: Path) -> Iterator[Job]:
+    """Yield the jobs of a ledger, the latest first; none where there is no ledger.
+
+    Lines that are damaged are left out.
+    """
+    for line in reversed(_lines(path)):
+        if (job := _parse(line)) is not None:
+            yield job
+
+
+def damaged_lines(path: Path) -> list[int]:
+    """Return the numbers, from 1 on, of the lines whose SHA-256 does not hold."""
+    return [number for number, line in enumerate(_lines(path), 1) if _parse(line) is None]
+
+
+def read(path: Path) -> dict[str, str]:
+    """Return the SHA-256 of every file in the ledger, also of history, by its path."""
+    digests: dict[str, str] = {}
+    for job in jobs(path):
+        for name, stamp in (*job.files.items(), *job.history.items()):
+            digests.setdefault(name, stamp.sha256)
+    return digests
+
+
+def forget(path: Path, name: str) -> None:
+    """Remove a file of history from every line."""
+    with _locked(path):
+        kept = []
+        for job in jobs(path):
+            history = {other: stamp for other, stamp in job.history.items() if other != name}
+            kept.append(job._replace(history=history))
+        with atomic_path(path) as temporary:
+            temporary.write_bytes(b"".join(map(_line, reversed(kept))))
+
+
+def _problem(name: str, stamp: Stamp) -> str | None:
+    """Say what is wrong with a file; None if it has the bytes of its stamp."""
+    if not os.path.lexists(name):
+        return "is missing"
+    if problem := broken(Path(name)):
+        return problem
     try:
-        files = read(path)
-    except UserError:
-        files = {}
-    known = dict(files)
-    new = [*made, *(name for name in others if name not in known)]
-    for file in map(Path, new):
-        if file.is_file():
-            files[str(file)] = {"bytes": file.stat().st_size, "sha256": sha256(file)}
-    for name in list(files):
-        if is_obsolete(name) and not Path(name).exists():
-            del files[name]
-    if files != known:
-        write(path, files)
+        same = sha256(name) == stamp.sha256
+    except OSError as error:
+        return f"cannot be read: {error.strerror}"
+    return None if same else f"its sha256 is not the one in {NAME}"
 
 
-def damage(files: Sums, path: str) -> str | None:
-    """Say of a file that it has other bytes than those noted in ``files``; None if it has not."""
-    if path in files and Path(path).is_file() and sha256(path) != files[path]["sha256"]:
-        return f"its sha256 is not the one in {NAME}"
-    return None
+def _lines(path: Path) -> list[bytes]:
+    try:
+        return path.read_bytes().splitlines()
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
 
 
-def _digest(files: Any) -> str:
-    return hashlib.sha256(json.dumps(files, sort_keys=True).encode()).hexdigest()
+def _parse(line: bytes) -> Job | None:
+    digest, _, text = line.partition(b" ")
+    if digest.decode(errors="replace") != hashlib.sha256(text).hexdigest():
+        return None
+    content = json.loads(text)
+    return Job(
+        content["outputs"],
+        _stamps(content["files"]),
+        _stamps(content["history"]),
+        _stamps(content["inputs"]),
+    )
+
+
+def _stamps(entries: Mapping[str, Any]) -> dict[str, Stamp]:
+    return {name: Stamp(*entry) for name, entry in entries.items()}
+
+
+def _line(job: Job) -> bytes:
+    text = json.dumps(job._asdict(), separators=(",", ":")).encode()
+    return hashlib.sha256(text).hexdigest().encode() + b" " + text + b"\n"
+
+
+def _append(path: Path, job: Job) -> None:
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        line = _line(job)
+        with _locked(path), path.open("a+b") as file:
+            if file.tell():
+                # A kill or a full disk may have cut the last line short.
+                file.seek(-1, os.SEEK_END)
+                line = line if file.read() == b"\n" else b"\n" + line
+            file.write(line)
+            file.flush()
+            os.fsync(file.fileno())
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Hold the lock of a ledger: two runs may note jobs at the same time."""
+    with path.with_name(f".{path.name}.lock").open("a") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield

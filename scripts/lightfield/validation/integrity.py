@@ -53,15 +53,9 @@ class Integrity:
 
     def faults(self) -> Iterator[Fault]:
         """Yield every fault, one for each file."""
-        try:
-            expected = self._expected
-        except UserError as error:
-            name, _, why = str(error).partition(": ")
-            yield Fault(Path(name), why)
-            return
-        if self.work and not self._ledger:
-            missing = "is missing: what is not published has no checksum before the next run"
-            yield Fault(self.work / ledger.NAME, missing)
+        expected = self._expected
+        if self.work:
+            yield from self._ledger_faults(self.work / ledger.NAME)
         found = {path: self._problem(path, sums) for path, sums in expected.items()}
         for path, problem in found.items():
             if problem:
@@ -76,16 +70,29 @@ class Integrity:
         wrong = {path for path, problem in found.items() if problem}
         yield from (fault for fault in self._contents(expected) if fault.path not in wrong)
 
+    def _ledger_faults(self, path: Path) -> Iterator[Fault]:
+        damaged = ledger.damaged_lines(path)
+        if damaged:
+            numbers = ", ".join(map(str, damaged[:8]))
+            yield Fault(path, f"lines that are damaged: {numbers}; their files are made again")
+        elif not self._ledger:
+            yield Fault(path, "is missing: the next run makes again what nobody has a checksum of")
+
     def mend(self, fault: Fault) -> None:
         """Set a faulty file aside, and what the next run must make anew for it to be made again."""
         assert self.work
-        is_ledger = fault.path == self.work / ledger.NAME
-        for path in (fault.path, *(() if is_ledger else self._followers(fault.path))):
+        own_ledger = self.work / ledger.NAME
+        if fault.path == own_ledger:
+            if own_ledger.exists():
+                ledger.Ledger(own_ledger).compact()
+            return
+        for path in (fault.path, *self._followers(fault.path)):
             if os.path.lexists(path):
                 set_aside(path, self.work / "removed")
         if fault.path.name.endswith(_HISTORY):
-            path = self.work / ledger.NAME
-            ledger.note(path, (), (), lambda name: os.path.relpath(name) == str(fault.path))
+            for name in ledger.read(own_ledger):
+                if os.path.relpath(name) == str(fault.path):
+                    ledger.forget(own_ledger, name)
 
     def _followers(self, path: Path) -> Iterator[Path]:
         """Yield the file by which the job is known that has made a file, where that is another."""
@@ -105,15 +112,15 @@ class Integrity:
         entry = self._ledger.get(str(path))
         if entry is None:
             return not self._ledger
-        return self._problem(path, (entry["sha256"], "the ledger")) is None
+        return self._problem(path, (entry, "the ledger")) is None
 
     def _is_noted(self, path: Path) -> bool:
         return str(path) in self._ledger
 
     @cached_property
-    def _ledger(self) -> ledger.Sums:
+    def _ledger(self) -> dict[str, str]:
         files = ledger.read(self.work / ledger.NAME) if self.work else {}
-        return {os.path.relpath(name): sums for name, sums in files.items()}
+        return {os.path.relpath(name): digest for name, digest in files.items()}
 
     @cached_property
     def _recorded(self) -> dict[Path, str]:
@@ -160,9 +167,9 @@ class Integrity:
         """The SHA-256 that each file shall have, and what says so."""
         sums = {path: (digest, SUMS) for path, digest in self._published.items()}
         sums |= {path: (digest, "its record") for path, digest in self._recorded.items()}
-        for name, entry in self._ledger.items():
+        for name, digest in self._ledger.items():
             if self._is_own(Path(name)):
-                sums[Path(name)] = (entry["sha256"], f"{self.work}/{ledger.NAME}")
+                sums[Path(name)] = (digest, f"{self.work}/{ledger.NAME}")
         return dict(sorted(sums.items()))
 
     def _is_own(self, path: Path) -> bool:

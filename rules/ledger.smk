@@ -1,0 +1,243 @@
+# Which files are damaged or were made from something else, by the ledger of finished jobs.
+import logging
+
+from snakemake_interface_logger_plugins.common import LogEvent
+
+from lightfield.core.files import read_json, set_aside, sha256, write_json_if_changed
+from lightfield.dataset import ledger
+
+# What shards of other bounds have made is nobody's any more.
+SHARD_RECORDS = {file for d in DATASETS.values() for file in d.all_records}
+
+
+def is_current(output):
+    """Return whether an output is of a job that these settings may still ask for."""
+    return output in SHARD_RECORDS or not re.search(r"/\d+-\d+\.json$", output)
+
+
+@cache
+def finished_work():
+    """Return the ledger of what finished jobs made."""
+    path = Path(f"{WORK}/{ledger.NAME}")
+    if STORE:
+        ViewStore(STORE).bring(str(path))
+    return ledger.Ledger(path, is_current)
+
+
+def settings_file(path, content):
+    """Write settings as JSON where the file has another text; return it as an input.
+
+    Settings with which jobs have run before get their time of then: they are no newer than what
+    these jobs made. What was made from others since, the ledger knows.
+    """
+    try:
+        if write_json_if_changed(Path(path), content):
+            time = finished_work().last_read(path, sha256(path))
+            if time:
+                os.utime(path, ns=(time, time))
+    except UserError as error:
+        sys.exit(f"error: {error}")
+    # With a store each run and job writes its own.
+    return local(path) if STORE else path
+
+
+def settings_of(stage, content):
+    """Return the input function for a dataset's settings of a stage: ``content`` of the dataset."""
+
+    def input_function(wildcards):
+        dataset = dataset_of(wildcards)
+        mark_stale_files(dataset.name)
+        return settings_file(f"{dataset.work}/settings/{stage}.json", content(dataset))
+
+    return input_function
+
+
+def scene_settings_of(stage, content):
+    """Return the input function for a scene's settings: ``content`` of any of its datasets."""
+
+    def input_function(wildcards):
+        dataset = scene_of(wildcards)
+        mark_stale_files(dataset.name)
+        folder = f"{dataset.scene_work}/settings"
+        return settings_file(f"{folder}/{stage}.json", content(dataset))
+
+    return input_function
+
+
+# By the path of each damaged file: what is wrong with it, and the outputs of the jobs that mend it.
+DAMAGED = {}
+
+
+@cache
+def mark_damaged_files():
+    """Mark the files that no longer have the bytes that their jobs wrote."""
+    DAMAGED.update(finished_work().damage)
+    for _, outputs in DAMAGED.values():
+        rerun(outputs)
+
+
+@cache
+def mark_stale_files(name):
+    """Mark the dataset's damaged or outdated files, so that Snakemake rebuilds them."""
+    if not workflow.is_main_process:
+        return
+    mark_damaged_files()
+    dataset = DATASETS[name]
+    files = [*dataset.files, *dataset.intermediates]
+    rerun(filter(is_outdated, files))
+    rerun(dataset.outgrown_records())
+    if dataset.external_changed(ViewStore(STORE) if STORE else None):
+        rerun([dataset.inventory])
+    for path, problem in dataset.broken():
+        DAMAGED.setdefault(path, (problem, files))
+
+
+def is_outdated(path):
+    """Return whether a file was made from something else, or nobody knows from what."""
+    jobs = finished_work()
+    if path in jobs:
+        return jobs.changed_input(path) is not None
+    return os.path.lexists(path)
+
+
+def damage_to_mend():
+    """Return what is wrong with the damaged files that this run makes again, by path."""
+    made = {unstored(file) for job in needed_jobs() for file in job.output}
+    return {
+        path: problem
+        for path, (problem, outputs) in sorted(DAMAGED.items())
+        if not made.isdisjoint(outputs)
+    }
+
+
+def announce_damage():
+    """Say which damaged files this run makes again."""
+    for path, problem in damage_to_mend().items():
+        print(f"{path}: {problem}; it is made anew", file=sys.stderr)
+
+
+def set_damage_aside():
+    """Move the damaged files that this run makes again to where nobody loses them."""
+    for path in damage_to_mend():
+        if os.path.lexists(path):
+            set_aside(Path(path), Path(REMOVED))
+
+
+def listed_files(job):
+    """Return the files that a job wrote beside its outputs, with their SHA-256 where it is noted.
+
+    A shard's record and the list of an export name them.
+    """
+    files = {}
+    for output in map(Path, job.output):
+        if output.suffix != ".json":
+            continue
+        content = read_json(output)
+        listed = content.get("files") if isinstance(content, dict) else None
+        if isinstance(listed, dict):
+            is_record = output.name != MANIFEST
+            folder = dataset_of(job.wildcards).folder if is_record else output.parent
+            for name, entry in listed.items():
+                digest = entry["sha256"] if is_record else entry
+                files[os.path.normpath(f"{folder}/{name}")] = digest
+        elif output.name == "transforms.json":
+            files |= dict.fromkeys(map(str, beside_transforms(output, content)))
+    return files
+
+
+def beside_transforms(output, content):
+    """Return the files that the export for instant-ngp wrote beside its transforms.json."""
+    folder = output.parent
+    yield from folder.glob("transforms_*.json")
+    for frame in content["frames"]:
+        image = folder / frame["file_path"]
+        yield from image.parent.glob(f"dynamic_mask_{image.stem}.png")
+        if image.parent.name == "instant_ngp":
+            yield image
+        if "depth_path" in frame:
+            yield folder / frame["depth_path"]
+
+
+def history_of(job):
+    """Return the files of a job that only grow: a shard's logs, and what the job took."""
+    files = [str(job.benchmark)] if job.benchmark else []
+    for output in map(Path, job.output):
+        files += map(str, output.parent.glob(f"{output.stem}.*.jsonl"))
+    return files
+
+
+class JobNotes(logging.Handler):
+    """Notes each job in the ledger: what it read when it starts, what it made when it is finished.
+
+    Snakemake says when it starts jobs, whatever it prints. What has finished since is noted then.
+    """
+
+    def __init__(self, jobs):
+        super().__init__()
+        self.unfinished = {job.jobid: job for job in jobs}
+        self.inputs = {}
+
+    def emit(self, record):
+        if getattr(record, "event", None) is not LogEvent.JOB_STARTED:
+            return
+        self.note_finished()
+        for number in record.jobs:
+            if number in self.unfinished:
+                self.inputs[number] = read_stamps(self.unfinished[number])
+
+    def note_finished(self):
+        finished = [
+            n for n, job in self.unfinished.items() if workflow.dag.finished(job)
+        ]
+        for number in finished:
+            job = self.unfinished.pop(number)
+            # The jobs of a group are not announced one by one.
+            stamps = self.inputs.pop(number, None) or read_stamps(job)
+            finished_work().note(line_of(job, stamps))
+        if finished and STORE:
+            ViewStore(STORE).send(f"{WORK}/{ledger.NAME}")
+
+
+def read_stamps(job):
+    """Return the stamps of the files that a job reads, but for those whose content is not read."""
+    names = [unstored(file) for file in job.input if not is_ancient(file)]
+    return finished_work().input_stamps(names)
+
+
+def stamps(digests):
+    """Return the stamps of those files that are there, whose SHA-256 may be known."""
+    return {
+        name: ledger.Stamp.of(name, digest)
+        for name, digest in digests.items()
+        if os.path.isfile(name)
+    }
+
+
+def line_of(job, inputs):
+    """Return the line of the ledger for a finished job."""
+    outputs = [unstored(file) for file in job.output]
+    if STORE:
+        # What the job made lies in the storage.
+        return ledger.Job(outputs, {}, {}, inputs)
+    files = stamps(dict.fromkeys(outputs) | listed_files(job))
+    return ledger.Job(outputs, files, stamps(dict.fromkeys(history_of(job))), inputs)
+
+
+# The notes of this run, while there is one.
+NOTES = []
+
+
+def begin_notes():
+    """Note the jobs of this run in the ledger, from now on."""
+    jobs = finished_work()
+    jobs.refresh()
+    if jobs.is_cluttered:
+        jobs.compact()
+    NOTES.append(JobNotes(needed_jobs()))
+    logging.getLogger("snakemake.logging").addHandler(NOTES[0])
+
+
+def end_notes():
+    """Note the jobs that have finished last."""
+    for notes in NOTES:
+        notes.note_finished()

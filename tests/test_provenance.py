@@ -1,0 +1,206 @@
+"""Every file knows what it was made from: what changes is planned again without Snakemake's notes.
+
+Snakemake's own notes lie in .snakemake, which a fresh clone beside an old build lacks.
+"""
+
+import hashlib
+import json
+import os
+import re
+import shutil
+
+import pytest
+from checkouts import checkout, planned, snakemake
+
+pytestmark = pytest.mark.slow
+CUBOID = "LFCuboid_1x1x1"
+
+
+@pytest.fixture(scope="module")
+def built(smoke, tmp_path_factory):
+    """A fresh clone beside the old folders of results and work."""
+    return copy_of(smoke, tmp_path_factory.mktemp("provenance"))
+
+
+def copy_of(built, parent):
+    folder = checkout(parent / "plenoforge")
+    for name in ("results", "work"):
+        # With its times.
+        shutil.copytree(built / name, folder / name)
+    return folder
+
+
+@pytest.fixture
+def folder(built, tmp_path):
+    return copy_of(built, tmp_path)
+
+
+def in_yaml(old, new):
+    def change(folder):
+        path = folder / "configs/scenes/smoke.yaml"
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new, 1))
+
+    return change
+
+
+def in_builder(folder):
+    path = folder / "scripts/scenes/room/__init__.py"
+    path.write_text(path.read_text().replace("0.7 0.15 0.1 0.6", "0.1 0.15 0.7 0.6"))
+
+
+def in_library(folder):
+    path = folder / "scripts/scenes/library/lights.py"
+    path.write_text(path.read_text() + "\n# Another light.\n")
+
+
+def in_config(old, new):
+    def change(folder):
+        path = folder / "config.yaml"
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new, 1))
+
+    return change
+
+
+SCENE = {"build_scene", "inventory", "lightfield", "render", "page"}
+VIEWS = {"lightfield", "check_cameras", "render", "reproject", "validate", "checksums", "page"}
+OPTICS = {"lens_map", "reprojected_lightfield", "reproject", "export_to_instant_ngp", "validate"}
+# What is changed, the jobs that must run again, and those that must not.
+CHANGES = {
+    "a colour in the builder": (in_builder, SCENE, set()),
+    "the library of all builders": (in_library, SCENE, set()),
+    "scene.parameters": (
+        in_yaml("builder: room", "builder: room\n  parameters: {seed: 2}"),
+        SCENE,
+        set(),
+    ),
+    "scene.frame": (in_yaml("builder: room", "builder: room\n  frame: 5"), VIEWS, {"build_scene"}),
+    "render.samples": (in_yaml("samples: 4", "samples: 5"), VIEWS, {"build_scene", "inventory"}),
+    "render.motion_blur": (
+        in_yaml("samples: 4", "samples: 4\n  motion_blur: true"),
+        VIEWS | {"inventory"},
+        {"build_scene"},
+    ),
+    "render.passes": (
+        in_yaml("samples: 4", "samples: 4\n  passes: [normal]"),
+        VIEWS,
+        {"build_scene"},
+    ),
+    "a rig's size": (in_yaml("size: 1\n", "size: 1.1\n"), VIEWS, {"build_scene", "inventory"}),
+    "a rig's split": (
+        in_yaml("split: odd", "split: {every: 3}"),
+        {"lightfield", "splits"},
+        {"inventory"},
+    ),
+    "a rig's lens": (in_yaml("fov: 180, res", "fov: 170, res"), VIEWS, {"build_scene"}),
+    "a reprojection's lens": (in_yaml("focal_length: 18", "focal_length: 17"), OPTICS, {"render"}),
+    "a reprojection's development": (
+        in_yaml("exposure: -1", "exposure: -2"),
+        OPTICS - {"lens_map"},
+        {"render", "lens_map"},
+    ),
+    "a reprojection less": (
+        in_yaml(
+            "rigs: [LFCuboid_1x1x1, LFPlane_3x2_equisolid, LFLattice_2panos]",
+            "rigs: [LFCuboid_1x1x1]",
+        ),
+        {"validate", "costs", "page"},
+        {"render", "lens_map"},
+    ),
+    "an export's options": (
+        in_yaml("points: 2000, depth", "points: 1000, depth"),
+        {"export"},
+        {"render", "reproject"},
+    ),
+    "instant-ngp's options": (
+        in_yaml("instant_ngp:\n", "instant_ngp:\n    scale: 0.5\n"),
+        {"export_to_instant_ngp"},
+        {"render", "export"},
+    ),
+    "an export less": (
+        in_yaml("  nerf_synthetic: {sources: [perspective_hdr]}\n", ""),
+        {"validate"},
+        {"render", "export"},
+    ),
+    "flow": (
+        in_yaml("exports:", "flow: {pairs: neighbours}\n\nexports:"),
+        {"lightfield", "flow"},
+        {"build_scene"},
+    ),
+    "the description": (in_yaml("A tiny rig", "A small rig"), {"page"}, {"render", "lightfield"}),
+    "the price of energy": (
+        in_config("price_per_kwh: 0.32", "price_per_kwh: 0.4"),
+        {"costs", "page"},
+        {"render"},
+    ),
+}
+
+
+def test_a_fresh_clone_beside_an_old_build_has_nothing_to_do(built):
+    result = snakemake(built, "--dry-run", "smoke")
+    assert "Nothing to be done" in result.stdout + result.stderr
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_what_was_made_from_something_else_is_made_again(folder, change):
+    apply, again, untouched = CHANGES[change]
+    apply(folder)
+    jobs = planned(folder, "smoke").keys()
+    assert again <= jobs
+    assert not untouched & jobs
+
+
+def test_views_of_an_old_scene_are_not_published_as_those_of_a_new_one(folder):
+    """The whole run, as a user sees it: another colour of the sphere is another picture."""
+    target = f"results/smoke/{CUBOID}/sha256sums.txt"
+    before = (folder / target).read_text()
+    in_builder(folder)
+    blend = (folder / "work/smoke/scene.blend").read_bytes()
+    result = snakemake(folder, target)
+    assert result.returncode == 0, result.stderr
+    assert (folder / "work/smoke/scene.blend").read_bytes() != blend
+    view = re.compile(r"^(\w+)  exr/view_r0000f.exr$", re.M)
+    assert view.search(before)[1] != view.search((folder / target).read_text())[1]
+    again = snakemake(folder, "--dry-run", target)
+    assert "Nothing to be done" in again.stdout + again.stderr
+
+
+def test_a_plan_between_two_builds_hides_no_change(folder):
+    """The settings files are newer then, whatever the times say later."""
+    in_yaml("samples: 4", "samples: 5")(folder)
+    assert planned(folder, "smoke").keys() >= VIEWS
+    for root in ("results", "work"):
+        for path in (folder / root).rglob("*"):
+            os.utime(path, (1_700_000_000, 1_700_000_000))
+    assert planned(folder, "smoke").keys() >= VIEWS
+
+
+def test_what_the_ledger_lacks_is_made_again(folder):
+    path = folder / "work/ledger.txt"
+    lines = path.read_text().splitlines(keepends=True)
+    kept = [
+        line for line in lines if '"work/smoke/scene.blend"],' not in line.partition('"files"')[0]
+    ]
+    assert len(kept) == len(lines) - 1
+    path.write_text("".join(kept))
+    assert {"build_scene", "inventory", "render"} <= planned(folder, "smoke").keys()
+
+
+def test_a_changed_input_that_no_job_makes_is_noticed(smoke, tmp_path):
+    """Two builds beside each other: an export that was made while its light field was replaced."""
+    folder = copy_of(smoke, tmp_path)
+    path = folder / "work/ledger.txt"
+    lines = path.read_text().splitlines()
+    changed = []
+    for line in lines:
+        content = json.loads(line.partition(" ")[2])
+        if any(name.endswith("colmap/export.json") for name in content["outputs"]):
+            name = next(name for name in content["inputs"] if name.endswith("/lightfield.json"))
+            content["inputs"][name][0] = "0" * 64
+        text = json.dumps(content)
+        changed.append(f"{hashlib.sha256(text.encode()).hexdigest()} {text}\n")
+    path.write_text("".join(changed))
+    assert "export" in planned(folder, "smoke")
