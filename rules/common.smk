@@ -30,7 +30,7 @@ from lightfield.core.failures import (
 )
 from lightfield.core.gpus import visible
 from lightfield.core.memory import available
-from lightfield.dataset import journal, memory, shard_counts
+from lightfield.dataset import journal, ledger, memory, shard_counts
 from lightfield.dataset.config import accept_blend, load_config, load_scene, scene_path
 from lightfield.dataset.dataset import (
     MOST_SHARDS,
@@ -109,6 +109,7 @@ PANORAMA = f"{MADE}/panorama"
 REPROJECTED = f"{DATASET}/{{reprojection}}"
 # Of a cube map each face has one, with _f, _b, … before the suffix.
 LENS_MAP = f"{MADE}/{{reprojection}}/lens_map.npy"
+LEDGER = f"{WORK}/{ledger.NAME}"
 # Where damaged files are moved to, so that nobody loses anything.
 REMOVED = f"{WORK}/removed"
 SHARDS = f"{WORK}/{shard_counts.NAME}"

@@ -4,7 +4,6 @@ import logging
 from snakemake_interface_logger_plugins.common import LogEvent
 
 from lightfield.core.files import read_json, set_aside, sha256, write_json_if_changed
-from lightfield.dataset import ledger
 
 # What shards of other bounds have made is nobody's any more.
 SHARD_RECORDS = {file for d in DATASETS.values() for file in d.all_records}
@@ -18,10 +17,9 @@ def is_current(output):
 @cache
 def finished_work():
     """Return the ledger of what finished jobs made."""
-    path = Path(f"{WORK}/{ledger.NAME}")
     if STORE:
-        ViewStore(STORE).bring(str(path))
-    return ledger.Ledger(path, is_current)
+        ViewStore(STORE).bring(LEDGER)
+    return ledger.Ledger(Path(LEDGER), is_current)
 
 
 def settings_file(path, content):
@@ -195,7 +193,7 @@ class JobNotes(logging.Handler):
             stamps = self.inputs.pop(number, None) or read_stamps(job)
             finished_work().note(line_of(job, stamps))
         if finished and STORE:
-            ViewStore(STORE).send(f"{WORK}/{ledger.NAME}")
+            ViewStore(STORE).send(LEDGER)
 
 
 def read_stamps(job):

@@ -36,13 +36,15 @@ rule validate:
         exports=of_dataset("export_lists"),
         optional=optional("inventory", "splits", clearance="cameras"),
         removed=REMOVED,
+        # The storage has its own copies of what other machines made.
+        ledger=f"--ledger {LEDGER}" if not STORE else "",
     message:
         "Validating {wildcards.scene}/{wildcards.rig}"
     shell:
         f"{taking('input')}python {SCRIPTS}/validate.py"
         " {params.dataset} {params.reprojections} --exports {params.exports}"
         " --records {input.records} {params.optional} --processes {threads}"
-        " --removed {params.removed}"
+        " --removed {params.removed} {params.ledger}"
         " --output {output.validation} --sums {output.sums} > {log} 2>&1"
 
 

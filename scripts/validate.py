@@ -17,6 +17,7 @@ from pathlib import Path
 from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
+from lightfield.dataset import ledger
 from lightfield.dataset.lightfield import NAME
 from lightfield.export import MANIFESTS
 from lightfield.validation.files import remove_leftovers, remove_strays, write_sums
@@ -38,6 +39,7 @@ def main() -> None:
     add("--reprojection", type=normpath, action="extend", nargs="+", default=[], help=folders)
     lists = "export.json or transforms.json of each export that it shall have (default: any)"
     add("--exports", type=Path, nargs="*", help=lists)
+    add("--ledger", type=Path, help="the workflow's ledger of what its jobs made")
     add("--removed", type=Path, help="folder to which files go that are not the dataset's")
     add("--processes", type=positive, default=1, help="worker processes (default: 1)")
     arguments = parser.parse_args()
@@ -71,6 +73,7 @@ def main() -> None:
         MANIFESTS,
         arguments.splits,
         wanted,
+        noted_sums(arguments.ledger, arguments.dataset) if arguments.ledger else None,
     )
     print(result.summary())
     for line in result.failures():
@@ -80,6 +83,16 @@ def main() -> None:
         write_sums(arguments.sums, result.checksums, arguments.dataset, arguments.output)
     elif not result.valid:
         raise UserError(f"{arguments.dataset}: is not valid")
+
+
+def noted_sums(path: Path, dataset: Path) -> dict[str, str]:
+    """Return the SHA-256 that the ledger has of the dataset's files, by their path in it."""
+    prefix = f"{dataset}/"
+    return {
+        name.removeprefix(prefix): digest
+        for name, digest in ledger.read(path).items()
+        if name.startswith(prefix)
+    }
 
 
 if __name__ == "__main__":

@@ -357,11 +357,16 @@ def checksums(
     recorded: Mapping[str, tuple[int, str]] | None,
     found: Mapping[str, tuple[int, str]],
     sets: Sequence[ImageSet],
+    altered_files: Mapping[str, str],
 ) -> Check:
-    """Compare the images' sizes and SHA-256, by path, with those that their writers recorded."""
-    if recorded is None:
+    """Compare the images' sizes and SHA-256, by path, with those that their writers recorded.
+
+    The ``altered_files`` that the ledger found fail, too.
+    """
+    if recorded is None and not altered_files:
         return Check("checksums", None, "no record was given")
-    faults = {}
+    recorded = recorded or {}
+    faults = dict(altered_files)
     for path, (size, digest) in sorted(recorded.items()):
         if path not in found:
             faults[path] = "is recorded but is no image of this dataset"
@@ -379,6 +384,18 @@ def checksums(
             faults[path] = "has no record"
     detail = f"{len(recorded)} of {len(found)} images have a record"
     return Check.of_files("checksums", faults, detail)
+
+
+def altered(published: Mapping[str, str], noted: Mapping[str, str]) -> dict[str, str]:
+    """Return the published files that no longer have the SHA-256 ``noted`` when they were made.
+
+    Both are by path; the values say what is wrong. Without this, damage would get a checksum.
+    """
+    return {
+        path: f"has the sha256 {published[path]}, but {noted[path]} when it was made"
+        for path in sorted(published.keys() & noted.keys())
+        if published[path] != noted[path]
+    }
 
 
 def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:

@@ -8,7 +8,7 @@ The result is a list of checks, each passed, failed, or not applicable and why: 
 checked is said, never counted as right.
 """
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -41,6 +41,7 @@ def validate(
     manifests: Sequence[Manifest] = (),
     splits: Path | None = None,
     wanted: Collection[Path] | None = None,
+    noted: Mapping[str, str] | None = None,
 ) -> Result:
     """Check a dataset's files, and what its pixels must satisfy.
 
@@ -49,7 +50,8 @@ def validate(
     each camera (``views``: name: ``distance`` in metres, ``inside``); ``inventory`` one of what the
     scene contains; ``manifests`` those of the exports that it may hold; ``splits`` the scene's
     splits.json, if it has one; ``wanted`` those of the exports' lists that it is to have, if it is
-    not every one that is there. Raises `UserError` where one of these cannot be read; whatever is
+    not every one that is there; ``noted`` the SHA-256 of files by their path in the dataset, as
+    they were when they were made. Raises `UserError` where one of these cannot be read; whatever is
     wrong with the dataset is in the result.
     """
     dataset = dataset.resolve()
@@ -84,14 +86,18 @@ def validate(
     published, listing = files.listing(dataset, sets, {*lists, *found})
     if len(sets) <= len(reprojections):
         listing = Check("files", None, "a lightfield.json that cannot be understood lists no files")
-    sums = files.checksums(dict(written) if records else None, found, sets)
+    digests = {
+        path: found[path][1] if path in found else sha256(dataset / path) for path in published
+    }
+    altered = files.altered(digests, noted or {})
+    sums = files.checksums(dict(written) if records else None, found, sets, altered)
     checks += [listing, sums, cameras, *split]
     rendered = files.rendered(sets)
     return Result(
         f"{dataset.parent.name}/{dataset.name}",
         len(rendered.views) if rendered else 0,
         checks,
-        {path: found[path][1] if path in found else sha256(dataset / path) for path in published},
+        digests,
     )
 
 
