@@ -96,8 +96,11 @@ def test_a_dataset_that_was_begun_keeps_its_shards(sphere):
     assert len(replace(begun, views_per_shard=321).shards) == 2
     shard_counts.note(sphere.work_root, {sphere.name: (641, 400)})
     assert len(replace(begun).shards) == 100
-    Path(sphere.work_root, shard_counts.NAME).write_text("{")
-    assert len(replace(begun).shards) == 100
+    notes = Path(sphere.work_root, shard_counts.NAME)
+    # Another digit at the same size, and what is no JSON.
+    for damaged in (notes.read_text().replace("641", "642"), "{"):
+        notes.write_text(damaged)
+        assert len(replace(begun).shards) == 100
     shard_counts.note(sphere.work_root, {sphere.name: (642, 7)})
     assert len(replace(begun).shards) == 7
 

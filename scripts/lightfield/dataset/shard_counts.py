@@ -1,9 +1,11 @@
 """Into how many shards the views of each dataset are cut, noted when the first is rendered.
 
-work/shards.json: "views" and "shards" by dataset. What a count follows from may be another later,
-as --jobs or a probe, or not be known where a job runs: a dataset that was begun keeps its own.
+work/shards.json: "datasets" has "views" and "shards" of each, and "sha256" is of "datasets". A
+damaged file counts for nothing. What a count follows from may change later, such as --jobs or a
+probe, or be unknown where a job runs. So a dataset that was begun keeps its own.
 """
 
+import hashlib
 import json
 from functools import lru_cache
 from pathlib import Path
@@ -25,7 +27,7 @@ def noted(work: str, dataset: str, views: int) -> int | None:
     try:
         entry = _read(path, path.stat().st_mtime_ns)[dataset]
         return max(1, min(int(entry["shards"]), views)) if entry["views"] == views else None
-    except (OSError, ValueError, LookupError, TypeError):
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return None
 
 
@@ -34,13 +36,22 @@ def note(work: str, counts: dict[str, tuple[int, int]]) -> None:
     path = Path(work, NAME)
     try:
         known = dict(_read(path, path.stat().st_mtime_ns))
-    except (OSError, ValueError, TypeError):
+    except (OSError, ValueError, TypeError, AttributeError):
         known = {}
     new = {name: {"views": views, "shards": shards} for name, (views, shards) in counts.items()}
     if known != known | new:
-        write_json(path, known | new)
+        datasets = known | new
+        write_json(path, {"datasets": datasets, "sha256": _digest(datasets)})
 
 
 @lru_cache(maxsize=1)
 def _read(path: Path, _changed: int) -> Any:
-    return json.loads(path.read_bytes())
+    """Return what is noted of each dataset; raises ValueError for a file that is damaged."""
+    content = json.loads(path.read_bytes())
+    if content.get("sha256") != _digest(content.get("datasets")):
+        raise ValueError(f"{path}: is damaged")
+    return content["datasets"]
+
+
+def _digest(datasets: Any) -> str:
+    return hashlib.sha256(json.dumps(datasets, sort_keys=True).encode()).hexdigest()
