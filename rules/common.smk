@@ -45,6 +45,7 @@ from lightfield.dataset.exports import MANIFEST, VIEWS
 from lightfield.dataset.splits import SPLITS
 from lightfield.dataset.view_store import VARIABLE, ViewStore
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
+from lightfield.geometry.rigs import Poses
 
 # Where machines see no common folder: what is declared lies in Snakemake's own storage there, and
 # views in the view store.

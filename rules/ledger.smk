@@ -23,20 +23,28 @@ def finished_work():
 
 
 def settings_file(path, content):
-    """Write settings as JSON where the file has another text; return it as an input.
-
-    Settings with which jobs have run before get their time of then: they are no newer than what
-    these jobs made. What was made from others since, the ledger knows.
-    """
+    """Write settings as JSON where the file has another text; return it as an input."""
     try:
+        if STORE:
+            ViewStore(STORE).bring(path)
         if write_json_if_changed(Path(path), content):
-            time = finished_work().last_read(path, sha256(path))
-            if time:
-                os.utime(path, ns=(time, time))
+            if not STORE:
+                restore_time(path)
+            elif workflow.is_main_process:
+                ViewStore(STORE).send(path)
     except UserError as error:
         sys.exit(f"error: {error}")
-    # With a store each run and job writes its own.
-    return local(path) if STORE else path
+    return path
+
+
+def restore_time(path):
+    """Give settings with which jobs have run before the time that they had then.
+
+    They are no newer than what these jobs made. What was made from others since, the ledger knows.
+    """
+    time = finished_work().last_read(path, sha256(path))
+    if time:
+        os.utime(path, ns=(time, time))
 
 
 def settings_of(stage, content):

@@ -49,12 +49,18 @@ rule free_places:
         " --output {output} > {log} 2>&1"
 
 
+def poses_sum(dataset):
+    """Return the SHA-256 of the file from which a rig has its poses; None of other rigs."""
+    return sha256(dataset.rig.file) if isinstance(dataset.rig, Poses) else None
+
+
 rule lightfield:
     input:
         settings=settings_of(
             "lightfield",
             lambda dataset: {
                 "rig": json.loads(dataset.rig_json),
+                "poses": poses_sum(dataset),
                 "depth": dataset.depth,
                 "render": dataset.render,
                 "frame": dataset.source.frame,
