@@ -167,12 +167,15 @@ class Build:
         return result.stdout
 
     def files(self) -> list[Path]:
-        """Return the files of the dataset and of its scene, which have checksums."""
+        """Return the files of the dataset and of its scene that jobs made.
+
+        Settings are none: each plan writes what is not as it should be.
+        """
         return [
             path
             for part in (DATASET, WORK.parent)
             for path in sorted((self.root / part).rglob("*"))
-            if path.is_file() and path.stat().st_size > 1
+            if path.is_file() and path.stat().st_size > 1 and "settings" not in path.parts
         ]
 
     def published(self) -> dict[str, str]:
