@@ -73,10 +73,10 @@ onstart:
         if SETTINGS.accept_blend:
             for name in SCENES:
                 accept_blend(name)
+        begin_display()
+        begin_notes()
     except UserError as error:
         sys.exit(f"error: {error}")
-    begin_display()
-    begin_notes()
 
 
 onsuccess:

@@ -180,7 +180,7 @@ class JobNotes(logging.Handler):
 
     def __init__(self, jobs):
         super().__init__()
-        self.unfinished = {job.jobid: job for job in jobs}
+        self.unfinished = {job.jobid: job for job in jobs if job.output}
         self.inputs = {}
 
     def emit(self, record):

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import simulated
 from checkouts import assert_same_bytes, checkout, rendered, snakemake, start_snakemake, wait_until
 
 from lightfield.core.files import sha256, write_json
@@ -133,6 +134,7 @@ def test_an_invalid_dataset_gets_its_page_and_no_checksums_until_it_is_mended(sm
         "sha256": sha256(view),
     }
     write_json(record, content)
+    simulated.note_again(folder, record.relative_to(folder))
     # Of itself no fault: it is moved out of the way.
     (dataset / "notes.txt").touch()
 
