@@ -38,10 +38,12 @@ for key, value in read_config(FOLDER / "config.yaml").items():
 report: "captions/workflow.rst"
 
 
-include: "rules/common.smk"
 include: "rules/internals.smk"
+include: "rules/common.smk"
 include: "rules/storage.smk"
 include: "rules/ledger.smk"
+include: "rules/start.smk"
+include: "rules/failures.smk"
 include: "rules/display.smk"
 include: "rules/scene.smk"
 include: "rules/rig.smk"
@@ -54,8 +56,8 @@ include: "rules/report.smk"
 include: "rules/costs.smk"
 include: "rules/package.smk"
 include: "rules/plan.smk"
-include: "rules/benchmark.smk"
 include: "rules/error.smk"
+include: "rules/benchmark.smk"
 include: "rules/synthesis.smk"
 include: "rules/learn.smk"
 
@@ -91,7 +93,7 @@ onerror:
     # Snakemake has something to say after this, too: what failed is repeated when it has.
     atexit.register(
         print,
-        failure_report(failed_jobs(workflow.scheduler.failed)),
+        failure_report(failed_jobs(failed_entries())),
         file=sys.stderr,
         flush=True,
     )

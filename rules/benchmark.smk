@@ -3,6 +3,19 @@
 MEASURED = f"{RESULTS}/benchmarks"
 
 
+def full_sizes(wildcards):
+    """Return the views and the resolution of each rig of a scene at full size, as JSON."""
+    return json.dumps(
+        {
+            name: {
+                "views": dataset.view_count,
+                "resolution": dataset.rig.camera.resolution,
+            }
+            for name, dataset in full_datasets(wildcards.scene).items()
+        }
+    )
+
+
 rule reprojection_benchmark:
     output:
         multiext(f"{MEASURED}/reprojection", ".csv", ".svg"),

@@ -64,14 +64,14 @@ TASKS = {}
 
 def look():
     """Return the jobs that are running, finished and failed."""
-    running, failed = list(workflow.scheduler.running), list(workflow.scheduler.failed)
-    return jobs_of(running), filter(workflow.dag.finished, TASKS), jobs_of(failed)
+    finished = filter(is_finished, TASKS)
+    return jobs_of(running_jobs()), finished, jobs_of(failed_entries())
 
 
 def explain(jobs):
     """Return why these jobs failed, and their groups."""
-    failed = list(workflow.scheduler.failed)
-    return failure_report(failed_jobs(one for one in failed if jobs & jobs_of([one])))
+    failed = [entry for entry in failed_entries() if jobs & jobs_of([entry])]
+    return failure_report(failed_jobs(failed))
 
 
 DISPLAY = RunDisplay(look, explain)
@@ -79,7 +79,7 @@ DISPLAY = RunDisplay(look, explain)
 
 def is_quiet_about(kind):
     """Whether --quiet names a kind of output: ALL, PROGRESS, …"""
-    return kind in {choice.name for choice in workflow.output_settings.quiet or ()}
+    return kind in QUIET_ABOUT
 
 
 def passes(record):
@@ -141,7 +141,7 @@ def end_display():
 
 def print_pages():
     """Print where the pages are of the datasets that are valid: all that this run was for."""
-    made = {str(file) for job in workflow.dag.jobs for file in job.output}
+    made = all_outputs()
     valid = [
         d for d in DATASETS.values() if stored(f"{d.folder}/sha256sums.txt") in made
     ]
@@ -155,7 +155,7 @@ def print_pages():
 
 def print_forecast():
     """Print at the end of a dry run how many jobs there are, and what rendering will take."""
-    if not (workflow.dryrun and workflow.scheduler and len(workflow.dag)):
+    if not is_planned_dry_run():
         return
     announce_damage()
     works = {}
@@ -172,7 +172,7 @@ def print_forecast():
                 name, work.views + views, work.seconds + seconds, work.size + size
             )
     if is_quiet_about("PROGRESS"):
-        print(workflow.dag.stats()[0])
+        print(job_table())
     if works:
         print(forecast([works[name] for name in sorted(works)]))
 

@@ -2,6 +2,24 @@
 # may give instead of samples.
 
 
+@cache
+def first_dataset(folder):
+    """Return the dataset of a scene's first rig, whose views are its probes.
+
+    A folder that is not being built is a scene's name, which means the scene at full size.
+    """
+    for dataset in DATASETS.values():
+        if dataset.scene_folder == folder:
+            name, preset = dataset.scene_name, dataset.preset
+            return scene_datasets(name, preset, dataset.limits, SETTINGS)[0]
+    return scene_datasets(folder, settings=SETTINGS)[0]
+
+
+def of_first(attribute):
+    """Return the function by which a rule asks for an attribute of that dataset."""
+    return lambda wildcards: getattr(first_dataset(wildcards.scene), attribute)
+
+
 def probe_settings(wildcards):
     """Return the settings file of a scene's probe cameras: those of its first rig."""
     dataset = first_dataset(wildcards.scene)

@@ -1,4 +1,66 @@
-# What no public interface of Snakemake gives: the only file that reaches inside, each with its reason.
+# What no public interface of Snakemake gives. This is the only file that reaches inside Snakemake;
+# each piece says why.
+import inspect
+
+from snakemake_interface_executor_plugins.executors.base import SubmittedJobInfo
+
+from lightfield.core import processors
+
+# A Snakefile is read again by each job on a cluster: these say who reads it, and to what end.
+IS_MAIN_PROCESS = workflow.is_main_process
+RUNS_HERE = workflow.local_exec
+RUNS_ELSEWHERE = workflow.remote_exec
+
+# What the command line and the profile say: a Snakefile is given only the configuration.
+STORE = workflow.storage_settings.default_storage_prefix or ""
+SHARES_FILES = SharedFSUsage.INPUT_OUTPUT in workflow.storage_settings.shared_fs_usage
+NODES = workflow.resource_settings.nodes
+CORES = workflow.resource_settings.cores
+QUIET_ABOUT = {choice.name for choice in workflow.output_settings.quiet or ()}
+ASKS_FOR_GPUS = "gpu" in (workflow.resource_settings.default_resources or ())
+
+# Without --cores and --jobs Snakemake refuses to run. `cores: all` in a profile takes the cores of
+# the machine, where a container may have fewer.
+if (CORES, NODES) == (None, None):
+    workflow.resource_settings.cores = processors.available()
+    workflow.register_resource("_cores", processors.available())
+
+
+def limit_resource(name, amount):
+    """Have jobs share a resource, as --resources does, unless the command line limits it."""
+    if name not in workflow.global_resources:
+        workflow.register_resource(name, amount)
+
+
+def given_slurm_extra():
+    """Return what the user's profile gives Slurm beside our own: a rule's value replaces it."""
+    given = workflow.resource_settings._parsed_default_resources.get("slurm_extra")
+    # Snakemake has an entry without a text where none is given.
+    return given.raw.strip("'\"") if given and given.raw else ""
+
+
+def rule_name(name):
+    """Return what a rule of ours is called, where we are a module of another workflow."""
+    return workflow.modifier.modify_rulename(name)
+
+
+def stored(path):
+    """Return where Snakemake has its copy of a file or folder; without a store that is itself."""
+    return str(workflow.modifier.path_modifier.apply_default_storage(path))
+
+
+def unstored(file):
+    """Return the path of an input or output as the rules have it, without Snakemake's storage."""
+    return str(file).removeprefix(stored(WORK).removesuffix(WORK))
+
+
+def of_each_shard(function):
+    """Return an input or params function whose signature Snakemake need not work out each time.
+
+    It does so several times for each shard: a plan of 2,000 shards takes a second less.
+    """
+    function.__signature__ = inspect.signature(function)
+    return function
 
 
 def rerun(outputs):
@@ -10,10 +72,81 @@ def rerun(outputs):
 
 
 def is_ancient(file):
-    """Return whether a rule declares that an input's age, and so its content, is no matter."""
+    """Return whether a rule declares an input as ``ancient``: its content does not matter."""
     return file.is_ancient
 
 
-def unstored(file):
-    """Return the path of an input or output as the rules have it, without Snakemake's storage."""
-    return str(file).removeprefix(stored(WORK).removesuffix(WORK))
+# Rules see one job at a time. The display, the ledger and the checks before the first job need all.
+
+
+def own_jobs(jobs):
+    """Return those jobs that are of these rules: another workflow may have some of its own."""
+    jobs = [job for job in jobs if not job.is_group()]
+    return [job for job in jobs if Path(job.rule.snakefile).is_relative_to(FOLDER)]
+
+
+def needed_jobs():
+    """Return the jobs of these rules that this run needs, those that are finished too."""
+    return own_jobs(workflow.dag.needrun_jobs(exclude_finished=False))
+
+
+def all_outputs():
+    """Return the outputs of all jobs that lead to the targets, also of those with nothing to do."""
+    return {str(file) for job in workflow.dag.jobs for file in job.output}
+
+
+def is_finished(job):
+    """Return whether a job of this run is finished."""
+    return workflow.dag.finished(job)
+
+
+def running_jobs():
+    """Return the jobs and groups that run now."""
+    return list(workflow.scheduler.running)
+
+
+def failed_entries():
+    """Return the jobs and groups that have failed."""
+    return list(workflow.scheduler.failed)
+
+
+def is_planned_dry_run():
+    """Return whether this is a dry run that got as far as a plan with jobs."""
+    return workflow.dryrun and workflow.scheduler and len(workflow.dag)
+
+
+def job_table():
+    """Return Snakemake's table of how many jobs of each rule there are."""
+    return workflow.dag.stats()[0]
+
+
+def start_of_run():
+    """Return when this run began, in seconds since 1970."""
+    return workflow.start_time.timestamp()
+
+
+def hear_executor(note):
+    """Call ``note`` with each failed job and what the executor says of it.
+
+    Snakemake keeps that from a group's log. For a group that it cannot even submit, as with an
+    account that does not exist, Slurm's executor reports nothing, and Snakemake waits for ever.
+    """
+    executor = workflow.scheduler._executor
+    report_job_error, run_job = executor.report_job_error, executor.run_job
+
+    def report_and_note(job_info, msg=None, **details):
+        note(job_info.job, msg)
+        report_job_error(job_info, msg=msg, **details)
+
+    def run_or_report(job):
+        try:
+            run_job(job)
+        except AttributeError as error:
+            if not (job.is_group() and error.__context__):
+                raise
+            report_and_note(
+                SubmittedJobInfo(job), f"not submitted: {error.__context__}"
+            )
+
+    executor.report_job_error = report_and_note
+    executor.run_job = run_or_report

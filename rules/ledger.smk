@@ -30,7 +30,7 @@ def settings_file(path, content):
         if write_json_if_changed(Path(path), content):
             if not STORE:
                 restore_time(path)
-            elif workflow.is_main_process:
+            elif IS_MAIN_PROCESS:
                 ViewStore(STORE).send(path)
     except UserError as error:
         sys.exit(f"error: {error}")
@@ -85,7 +85,7 @@ def mark_damaged_files():
 @cache
 def mark_stale_files(name):
     """Mark the dataset's damaged or outdated files, so that Snakemake rebuilds them."""
-    if not workflow.is_main_process:
+    if not IS_MAIN_PROCESS:
         return
     mark_damaged_files()
     dataset = DATASETS[name]
@@ -192,9 +192,7 @@ class JobNotes(logging.Handler):
                 self.inputs[number] = read_stamps(self.unfinished[number])
 
     def note_finished(self):
-        finished = [
-            n for n, job in self.unfinished.items() if workflow.dag.finished(job)
-        ]
+        finished = [n for n, job in self.unfinished.items() if is_finished(job)]
         for number in finished:
             job = self.unfinished.pop(number)
             # The jobs of a group are not announced one by one.

@@ -1,6 +1,17 @@
 # The same views through other lenses, by one lens map for each rig and reprojection.
 
 
+def lens_maps_of(wildcards):
+    """Return the lens maps of a reprojection; none of what is not one."""
+    dataset, name = dataset_of(wildcards), wildcards.reprojection
+    return dataset.lens_maps(name) if name in dataset.reprojections else []
+
+
+def of_reprojection(attribute):
+    """Return the function by which a rule asks for an attribute of its reprojection."""
+    return lambda wildcards: getattr(reprojection_of(wildcards), attribute)
+
+
 def reprojection_settings_of(stage, content):
     """Return the input function for the settings of a reprojection: ``content`` of it."""
 

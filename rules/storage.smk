@@ -2,19 +2,12 @@
 # at the same place, views, of which there are too many to declare.
 
 # A shard's views are not among the outputs that Snakemake would bring to and from a job.
-if not (
-    STORE or SharedFSUsage.INPUT_OUTPUT in workflow.storage_settings.shared_fs_usage
-):
+if not (STORE or SHARES_FILES):
     sys.exit(
         "error: shared-fs-usage: is without input-output; give --default-storage-provider and "
         "--default-storage-prefix, where views are then put, too, or let all nodes see one folder "
         "of results and work (a volume, NFS), and shared-fs-usage hold input-output"
     )
-
-
-def stored(path):
-    """Return where Snakemake has its copy of a file or folder; without a store that is itself."""
-    return str(workflow.modifier.path_modifier.apply_default_storage(path))
 
 
 def taking(lists):
@@ -84,7 +77,7 @@ if STORE:
         use_copies(RESULTS)
         use_copies(WORK)
         ViewStore(STORE).bring(SHARDS)
-        if workflow.is_main_process:
+        if IS_MAIN_PROCESS:
             bring_settings()
     except UserError as error:
         sys.exit(f"error: {error}")

@@ -1,0 +1,42 @@
+# Why jobs failed, for the end of a run.
+
+
+# What the executor said of a job or group that failed.
+SAID = {}
+
+
+def note_failures():
+    """Note what the executor says of jobs that fail, such as that they were refused."""
+    hear_executor(SAID.__setitem__)
+
+
+def failed_jobs(failed):
+    """Return rule, cause and log of each of these jobs; of a group's, of those that said why.
+
+    Of a job that said nothing, as one that never began, it is the batch system's log, if there is,
+    or else what the executor said.
+    """
+    found = []
+    # Clocks of nodes differ.
+    start = start_of_run() - 5
+    for one in failed:
+        jobs = own_jobs([one])
+        if one.is_group():
+            jobs = [
+                job
+                for job in own_jobs(one.jobs)
+                if not all(map(os.path.exists, job.output))
+            ]
+        logs = [(job.rule.name, Path(job.log[0])) for job in jobs]
+        for _, log in logs if STORE else ():
+            name = os.path.relpath(log, stored(WORK))
+            ViewStore(STORE).bring(f"{WORK}/{name}")
+        spoke = [(name, cause(log), log) for name, log in logs if is_newer(log, start)]
+        spoke = [(name, why, log) for name, why, log in spoke if why]
+        if logs and not spoke:
+            name, log = min(logs)
+            batch = batch_log(one.name, start)
+            why = batch and cause(batch) or first_sentence(SAID.get(one) or "")
+            spoke = [(name, why or "it said nothing", batch or log)]
+        found += spoke
+    return sorted(found)
