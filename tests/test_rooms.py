@@ -64,3 +64,16 @@ def test_what_each_run_and_job_reads_the_rules_with_imports_nothing_heavy():
     ).stdout.split()
     assert "lightfield.dataset.dataset" in found
     assert not {"numba", "skimage", "scipy", "OpenImageIO", "matplotlib", "bpy"} & set(found)
+
+
+# What a Snakefile may ask of Snakemake by its documentation.
+PUBLIC = r"workflow\.(?:cores|current_basedir)\b|workflow\.rst"
+INSIDE = re.compile(rf"(?!{PUBLIC})\bworkflow\.\w+|__signature__|\b(?:from|import) snakemake\b")
+
+
+def test_one_file_of_rules_alone_reaches_inside_snakemake():
+    files = [ROOT / "Snakefile", *(ROOT / "rules").glob("*.smk")]
+    reaching = {
+        file.name: INSIDE.findall(file.read_text()) for file in files if file.stem != "internals"
+    }
+    assert {name: found for name, found in reaching.items() if found} == {}
