@@ -1,19 +1,10 @@
 # Measurements that anybody can repeat; asked for by name, no part of a dataset.
 
+
+include: "helpers/benchmark.smk"
+
+
 MEASURED = f"{RESULTS}/benchmarks"
-
-
-def full_sizes(wildcards):
-    """Return the views and the resolution of each rig of a scene at full size, as JSON."""
-    return json.dumps(
-        {
-            name: {
-                "views": dataset.view_count,
-                "resolution": dataset.rig.camera.resolution,
-            }
-            for name, dataset in full_datasets(wildcards.scene).items()
-        }
-    )
 
 
 rule reprojection_benchmark:

@@ -2,38 +2,7 @@
 # may give instead of samples.
 
 
-@cache
-def first_dataset(folder):
-    """Return the dataset of a scene's first rig, whose views are its probes.
-
-    A folder that is not being built is a scene's name, which means the scene at full size.
-    """
-    for dataset in DATASETS.values():
-        if dataset.scene_folder == folder:
-            name, preset = dataset.scene_name, dataset.preset
-            return scene_datasets(name, preset, dataset.limits, SETTINGS)[0]
-    return scene_datasets(folder, settings=SETTINGS)[0]
-
-
-def of_first(attribute):
-    """Return the function by which a rule asks for an attribute of that dataset."""
-    return lambda wildcards: getattr(first_dataset(wildcards.scene), attribute)
-
-
-def probe_settings(wildcards):
-    """Return the settings file of a scene's probe cameras: those of its first rig."""
-    dataset = first_dataset(wildcards.scene)
-    if dataset.name in DATASETS:
-        mark_stale_files(dataset.name)
-    content = {
-        "rig": json.loads(dataset.rig_json),
-        "render": dataset.render,
-        "frame": dataset.source.frame,
-        "scene": dataset.source.model_dump(mode="json", include=SOURCE_KEYS),
-        "fingerprint": dataset.builder_fingerprint,
-        "limits": dataset.limits.model_dump(mode="json", exclude_none=True),
-    }
-    return settings_file(f"{WORK}/{wildcards.scene}/settings/probes.json", content)
+include: "helpers/error.smk"
 
 
 rule probe_cameras:

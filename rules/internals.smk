@@ -72,7 +72,7 @@ def rerun(outputs):
 
 
 def is_ancient(file):
-    """Return whether a rule declares an input as ``ancient``: its content does not matter."""
+    """Return whether an input is declared as ``ancient``, so that its content does not matter."""
     return file.is_ancient
 
 

@@ -11,7 +11,8 @@ SHARD_RECORDS = {file for d in DATASETS.values() for file in d.all_records}
 
 def is_current(output):
     """Return whether an output is of a job that these settings may still ask for."""
-    return output in SHARD_RECORDS or not re.search(r"/\d+-\d+\.json$", output)
+    is_record = re.fullmatch(r"\d+-\d+\.json", Path(output).name)
+    return output in SHARD_RECORDS or not is_record
 
 
 @cache

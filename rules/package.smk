@@ -1,48 +1,7 @@
 # A dataset as archives with a card, as SILVR publishes its own.
 
 
-def packed(wildcards):
-    """Return the datasets in an archive: a rig's, or one of each frame."""
-    rigs = {}
-    for dataset in DATASETS.values():
-        name = f"{dataset.scene_folder}/{dataset.rig_name}"
-        rigs.setdefault(name, []).append(dataset)
-    name = f"{wildcards.scene}/{wildcards.rig}"
-    return one_of(rigs, name, RESULTS, "dataset of the chosen scenes")
-
-
-def packed_sums(wildcards):
-    """Return the checksums that say that everything in an archive is finished.
-
-    With a store also what is in it, and what lists it.
-    """
-    datasets = packed(wildcards)
-    files = [f"{dataset.folder}/sha256sums.txt" for dataset in datasets]
-    if STORE:
-        for dataset in datasets:
-            files += [f"{dataset.folder}/validation.json", *dataset.published]
-            files += dataset.all_records
-    return files
-
-
-def packed_scene(wildcards):
-    """Return the name of an archive's scene YAML."""
-    return packed(wildcards)[0].scene_name
-
-
-def pack_settings(wildcards):
-    """Return the settings file of an archive: what is in it, its size, and what its card says."""
-    name = packed_scene(wildcards)
-    written = load_scene(name)
-    content = {
-        "datasets": [dataset.name for dataset in packed(wildcards)],
-        "gigabytes": SETTINGS.package_gigabytes,
-        "scene": written.model_dump(
-            mode="json", include={"description", "licence", "credit"}
-        ),
-    }
-    path = f"{WORK}/{wildcards.scene}/{wildcards.rig}/settings/pack.json"
-    return settings_file(path, content)
+include: "helpers/package.smk"
 
 
 rule pack:

@@ -1,6 +1,9 @@
 # A .blend: built by a scene builder, or brought by the user and checked.
 
 
+include: "helpers/scene.smk"
+
+
 rule build_scene:
     input:
         settings=scene_settings_of(
@@ -63,26 +66,6 @@ rule check_blend:
         f"python {SCRIPTS}/check_blend.py"
         " --scene {wildcards.name} --blend {input.blend:q}"
         " --output {output} > {log} 2>&1"
-
-
-def inventory_settings(dataset):
-    """Return what a scene's inventory depends on of its scene YAML."""
-    written = load_scene(dataset.scene_name)
-    return {
-        # Raised when the program lists something else.
-        "version": 2,
-        "scene_name": written.scene.scene_name,
-        "view_layers": written.scene.view_layers,
-        "allow_missing": written.scene.allow_missing,
-        "motion_blur": written.render.motion_blur,
-        "camera_frames": [d.camera_frames for d in scene_datasets(dataset.scene_name)],
-    }
-
-
-def blend_of(wildcards):
-    """Return a scene's .blend, which a user has where Snakemake runs."""
-    dataset = scene_of(wildcards)
-    return local(dataset.blend) if dataset.source.blend else dataset.blend
 
 
 rule inventory:

@@ -56,7 +56,7 @@ def test_no_files_import_each_other_in_a_circle():
 
 
 def test_what_each_run_and_job_reads_the_rules_with_imports_nothing_heavy():
-    lines = "\n".join(file.read_text() for file in (ROOT / "rules").glob("*.smk"))
+    lines = "\n".join(file.read_text() for file in (ROOT / "rules").rglob("*.smk"))
     imports = re.findall(r"^from lightfield\S* import (?:\([^)]*\)|.*)", lines, re.M)
     program = "\n".join([*imports, "import sys", "print(*sys.modules)"])
     found = subprocess.run(
@@ -72,7 +72,7 @@ INSIDE = re.compile(rf"(?!{PUBLIC})\bworkflow\.\w+|__signature__|\b(?:from|impor
 
 
 def test_one_file_of_rules_alone_reaches_inside_snakemake():
-    files = [ROOT / "Snakefile", *(ROOT / "rules").glob("*.smk")]
+    files = [ROOT / "Snakefile", *(ROOT / "rules").rglob("*.smk")]
     reaching = {
         file.name: INSIDE.findall(file.read_text()) for file in files if file.stem != "internals"
     }

@@ -1,0 +1,51 @@
+# What the rules of report.smk ask of the configuration.
+
+
+def panorama_memory(wildcards, attempt):
+    """Ask for the same for the panorama."""
+    dataset = dataset_of(wildcards)
+    need = dataset.memory_bytes(dataset.panorama_width**2 // 2)
+    return math.ceil(need / 1e6) * attempt
+
+
+def measurements(wildcards):
+    """Return the files of those measurements of interest to a dataset that have been made.
+
+    They are no input, for a page must never start a measurement: that takes an hour.
+    """
+    dataset = dataset_of(wildcards)
+    stems = ["reprojection", "stability", f"error_vs_time/{dataset.scene_name}"]
+    for kind in ("synthesis", "learn"):
+        stems.append(f"{kind}/{dataset.scene_folder}/{dataset.rig_folder}")
+    files = [
+        Path(RESULTS, "benchmarks", f"{stem}{suffix}")
+        for stem in stems
+        for suffix in (".csv", ".json", ".svg", ".png")
+    ]
+    return [file for file in files if file.exists()]
+
+
+def rebuilding(wildcards):
+    """Return the command that makes a dataset, to be shown on its page."""
+    dataset = dataset_of(wildcards)
+    snakefile = os.path.relpath(FOLDER / "Snakefile")
+    words = [] if snakefile == "Snakefile" else ["-s", snakefile]
+    choice = [f"scenes={dataset.scene_name}", f"rigs={dataset.rig_name}"]
+    words += ["--cores", "all", "--config", *choice, f"preset={dataset.preset}"]
+    return shlex.join(["snakemake", *words])
+
+
+def page_settings(wildcards):
+    """Return the settings file of a page: the scene YAML's text, and which measurements it shows."""
+    dataset = dataset_of(wildcards)
+    mark_stale_files(dataset.name)
+    content = {
+        "rig": json.loads(dataset.rig_json),
+        "yaml": scene_path(dataset.scene_name).read_text(),
+        "command": rebuilding(wildcards),
+        "panorama": dataset.panorama,
+        "measurements": [
+            [str(path), path.stat().st_mtime_ns] for path in measurements(wildcards)
+        ],
+    }
+    return settings_file(f"{dataset.work}/settings/page.json", content)

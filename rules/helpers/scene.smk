@@ -1,0 +1,21 @@
+# What the rules of scene.smk ask of the configuration.
+
+
+def inventory_settings(dataset):
+    """Return what a scene's inventory depends on of its scene YAML."""
+    written = load_scene(dataset.scene_name)
+    return {
+        # Raised when the program lists something else.
+        "version": 2,
+        "scene_name": written.scene.scene_name,
+        "view_layers": written.scene.view_layers,
+        "allow_missing": written.scene.allow_missing,
+        "motion_blur": written.render.motion_blur,
+        "camera_frames": [d.camera_frames for d in scene_datasets(dataset.scene_name)],
+    }
+
+
+def blend_of(wildcards):
+    """Return a scene's .blend, which a user has where Snakemake runs."""
+    dataset = scene_of(wildcards)
+    return local(dataset.blend) if dataset.source.blend else dataset.blend
