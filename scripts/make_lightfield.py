@@ -5,8 +5,6 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-from pydantic import TypeAdapter
-
 from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
 from lightfield.core.settings import checked
@@ -16,6 +14,9 @@ from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import rigs
 from lightfield.measurement.sampling import calibrated
+
+# isort: split
+from pydantic import TypeAdapter
 
 
 def main() -> None:
