@@ -1,4 +1,5 @@
-# `make` sets up the environment and builds the default dataset; `make test` sets up and runs the tests.
+# `make` sets up the environment and builds the default dataset; `make test` sets up and runs the tests,
+# and `make test-other` those that are not slow, with the other of the two Pythons and its own lock.
 # `make consumers` reads exports with the consumers' own code, in an environment of theirs; `make learn`
 # learns radiance fields from exported files.
 
@@ -7,11 +8,12 @@ CORES ?= $(shell getconf _NPROCESSORS_ONLN)
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
 PIP = .venv/bin/pip -qq --disable-pip-version-check
-# Of the environment's Python, as in the locks' names.
+# Of the environment's Python, as in the locks' names; and the other one that is supported.
 VERSION = $$(.venv/bin/python -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+OTHER = $$(test $(VERSION) = 3.13 && echo 3.11 || echo 3.13)
 LOCK = uv pip compile --generate-hashes --no-emit-index-url --no-header --quiet
 
-.PHONY: all test check consumers learn soak locks
+.PHONY: all test test-other check consumers learn soak locks
 
 all: .venv/complete
 	snakemake --cores $(CORES)
@@ -20,6 +22,10 @@ test: check
 	python envs/check_system.py --tests
 	@# One more than there are cores: they wait, too, for Slurm, for jobs that are killed, for a browser.
 	python -m pytest -n $$(( $(CORES) + 1 ))
+
+test-other: export PATH := $(CURDIR)/.venv-other/bin:$(PATH)
+test-other: .venv-other/complete
+	python -m pytest -n $(CORES) -m "not slow"
 
 # Style, types, and Snakemake's own advice.
 check: .venv/complete-for-tests
@@ -61,6 +67,15 @@ soak: .venv/complete
 
 .venv/complete-for-tests: .venv/complete envs/requirements-test-3.13.txt envs/requirements-test-3.11.txt
 	@$(PIP) install --require-hashes -r envs/requirements-test-$(VERSION).txt
+	@touch $@
+
+.venv-other/complete: .venv/complete envs/requirements-test-3.13.txt envs/requirements-test-3.11.txt
+	@set -e; python=$$(envs/find_python.sh $(OTHER)); \
+	echo "setting up .venv-other with $$python: some minutes, mostly to download 400 MB"; \
+	"$$python" envs/check_system.py; \
+	"$$python" -m venv --clear .venv-other
+	@.venv-other/bin/pip -qq --disable-pip-version-check install --require-hashes \
+		-r envs/requirements-test-$(OTHER).txt
 	@touch $@
 
 # Where machines see no common folder.

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Print the path of the interpreter that `make` builds .venv with: the one named as first word, else
-# Python 3.13, else 3.11, else a 3.13 that uv downloads. An interpreter counts once it has run: a
-# version manager's shim may be there and not work.
+# Python 3.13, else 3.11, else a 3.13 that uv downloads. A first word of 3.13 or 3.11 is a version to
+# find, or else to download. An interpreter counts once it has run: a version manager's shim may be
+# there and not work.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -14,8 +15,8 @@ runs() {
 find_version() {
     local python
     while read -r python; do
-        # Not the environment that is about to be replaced.
-        if [[ $python != "$PWD"/.venv/* ]] && runs "$python" "$1"; then
+        # Not the environments that are about to be replaced.
+        if [[ $python != "$PWD"/.venv* ]] && runs "$python" "$1"; then
             echo "$python"
             return
         fi
@@ -30,7 +31,8 @@ find_any() {
     find_version 3.13 || find_version 3.11
 }
 
-# Let uv, if need be installed for this alone, download a Python into .python; print its path.
+# download VERSION: let uv, if need be installed for this alone, download a Python into .python;
+# print its path.
 download() {
     local uv=uv
     if ! uv --version >/dev/null 2>&1; then
@@ -38,9 +40,19 @@ download() {
         python3 -m venv .python/uv && .python/uv/bin/pip install --quiet --disable-pip-version-check \
             --require-hashes -r envs/requirements-uv.txt || return
     fi
-    UV_PYTHON_INSTALL_DIR=$PWD/.python "$uv" python install --quiet 3.13 &&
-        UV_PYTHON_INSTALL_DIR=$PWD/.python "$uv" python find --managed-python 3.13
+    UV_PYTHON_INSTALL_DIR=$PWD/.python "$uv" python install --quiet "$1" &&
+        UV_PYTHON_INSTALL_DIR=$PWD/.python "$uv" python find --managed-python "$1"
 }
+
+if [[ ${1-} == 3.13 || ${1-} == 3.11 ]]; then
+    find_version "$1" && exit
+    echo "Python $1 does not run here: downloading $1 with uv" >&2
+    download "$1" 2>/dev/null || {
+        echo "error: no Python $1 runs here, and none could be downloaded; install it, as with pyenv" >&2
+        exit 1
+    }
+    exit
+fi
 
 if [[ $# -gt 0 ]]; then
     runs "$1" 3.13 || runs "$1" 3.11 || {
@@ -58,7 +70,7 @@ if ! python3 -c 'import ensurepip' >/dev/null 2>&1 && [[ $(id -u) == 0 ]] && typ
     find_any && exit
 fi
 echo "neither Python 3.13 nor 3.11 runs here: downloading 3.13 with uv" >&2
-download 2>/dev/null || {
+download 3.13 2>/dev/null || {
     echo "error: no Python 3.13 or 3.11 runs here, and none could be downloaded; on Debian or Ubuntu:" \
         "sudo apt-get install python3 python3-venv; or name one: make PYTHON=/path/to/python3.13" >&2
     exit 1

@@ -5,13 +5,14 @@ import importlib
 import json
 from pathlib import Path
 
-from pydantic import TypeAdapter
-
 from lightfield.core.cli import run
 from lightfield.core.files import atomic_path
 from lightfield.core.settings import checked
 from lightfield.dataset import config
 from lightfield.rendering import blend_file
+
+# isort: split
+from pydantic import TypeAdapter
 
 
 def main() -> None:

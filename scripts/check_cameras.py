@@ -4,9 +4,6 @@ import argparse
 import sys
 from pathlib import Path
 
-import bpy
-import numpy as np
-
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, write_json
@@ -14,6 +11,10 @@ from lightfield.dataset.lightfield import LightField
 from lightfield.rendering import blend_file, clearance
 from lightfield.rendering.clearance import REACH, TOUCHING
 from lightfield.rendering.limits import warnings
+
+# isort: split
+import bpy
+import numpy as np
 
 
 def main() -> None:

@@ -4,14 +4,15 @@ import argparse
 import json
 from pathlib import Path
 
-from pydantic import TypeAdapter
-
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, write_json
 from lightfield.core.settings import checked
 from lightfield.dataset.config import FILE, Energy
 from lightfield.measurement import costs
+
+# isort: split
+from pydantic import TypeAdapter
 
 
 def main() -> None:

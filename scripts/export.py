@@ -9,13 +9,14 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter
-
 from lightfield import export
 from lightfield.core.cli import run
 from lightfield.core.settings import checked
 from lightfield.dataset.exports import VIEWS, Exports, settings_of
 from lightfield.export.source import Source
+
+# isort: split
+from pydantic import TypeAdapter
 
 
 def main() -> None:

@@ -8,8 +8,6 @@ the other view sees the same point. All are 0 where it has no ray for it.
 import argparse
 from pathlib import Path
 
-import numpy as np
-
 from lightfield.core.cli import run, view_slice
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
@@ -21,6 +19,9 @@ from lightfield.dataset.records import ShardRecord
 from lightfield.export.source import Source
 from lightfield.geometry.flow import flow
 from lightfield.imaging import images
+
+# isort: split
+import numpy as np
 
 
 def main() -> None:

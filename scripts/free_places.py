@@ -4,9 +4,6 @@ import argparse
 import json
 from pathlib import Path
 
-import bpy
-from pydantic import TypeAdapter
-
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, write_json
@@ -15,6 +12,10 @@ from lightfield.dataset import config
 from lightfield.geometry import rigs
 from lightfield.geometry.rigs.rig import Frame
 from lightfield.rendering import blend_file, clearance
+
+# isort: split
+import bpy
+from pydantic import TypeAdapter
 
 
 def main() -> None:

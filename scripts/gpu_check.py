@@ -4,8 +4,6 @@ import argparse
 import json
 from pathlib import Path
 
-from pydantic import TypeAdapter
-
 from lightfield.core import processors
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
@@ -14,6 +12,9 @@ from lightfield.core.settings import checked
 from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import gpu_check, trials
 from lightfield.measurement.costs import FullSize
+
+# isort: split
+from pydantic import TypeAdapter
 
 
 def main() -> None:

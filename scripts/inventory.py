@@ -9,8 +9,6 @@ import os.path
 from pathlib import Path
 from typing import Any
 
-import bpy
-
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
@@ -20,6 +18,9 @@ from lightfield.dataset.view_store import ViewStore
 from lightfield.geometry.rigs import BlendCamera
 from lightfield.rendering import blend_facts, blend_file, external_files, pruning, scene_memory
 from lightfield.rendering.inventory import FEATURES, inventory
+
+# isort: split
+import bpy
 
 
 def main() -> None:

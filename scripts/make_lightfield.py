@@ -5,17 +5,19 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-from pydantic import TypeAdapter
-
+from lightfield.core import machine
 from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
 from lightfield.core.settings import checked
 from lightfield.dataset import passes
 from lightfield.dataset.config import Preset
 from lightfield.dataset.dataset import scene_datasets
-from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.lightfield import MACHINE, LightField
 from lightfield.geometry import rigs
 from lightfield.measurement.sampling import calibrated
+
+# isort: split
+from pydantic import TypeAdapter
 
 
 def main() -> None:
@@ -72,7 +74,8 @@ def main() -> None:
         dataset = replace(dataset, rig=dataset.rig.placed(arguments.places))
     if arguments.calibration:
         render = calibrated(render, arguments.calibration)
-    made = LightField.from_rig(dataset.rig, dataset.rig.camera.make(), **dataset.origin(render))
+    keys = dataset.origin(render) | {MACHINE: machine.describe(render["denoise"])}
+    made = LightField.from_rig(dataset.rig, dataset.rig.camera.make(), **keys)
     if dataset.flow and not arguments.panorama:
         made = made.with_flow()
     made.write(arguments.output)

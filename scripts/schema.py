@@ -8,12 +8,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel
-from pydantic.json_schema import GenerateJsonSchema
-
 from lightfield.core.cli import run
 from lightfield.core.files import write_text
 from lightfield.dataset.config import ROOT, Configuration, Scene
+
+# isort: split
+from pydantic import BaseModel
+from pydantic.json_schema import GenerateJsonSchema
 
 FOLDER = ROOT / "configs" / "schema"
 MODELS: dict[str, type[BaseModel]] = {"config": Configuration, "scene": Scene}

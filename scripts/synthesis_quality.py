@@ -9,8 +9,6 @@ have the quality against number and bytes of the views that it is made of.
 import argparse
 from pathlib import Path
 
-import numpy as np
-
 from lightfield.core.cli import positive, run
 from lightfield.core.files import write_csv
 from lightfield.core.progress import Progress
@@ -18,6 +16,9 @@ from lightfield.export.source import Source
 from lightfield.export.splits import splits
 from lightfield.imaging import images, pictures
 from lightfield.measurement import summaries, synthesis_quality
+
+# isort: split
+import numpy as np
 
 
 def main() -> None:

@@ -16,8 +16,6 @@ import argparse
 from contextlib import nullcontext
 from pathlib import Path
 
-import numpy as np
-
 from lightfield.core.cli import positive, run, stops
 from lightfield.core.errors import UserError
 from lightfield.core.files import keep_apart
@@ -30,6 +28,9 @@ from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images, pictures
 from lightfield.imaging.video import video
 from lightfield.synthesis.view import BEST, Sources, reader
+
+# isort: split
+import numpy as np
 
 
 def main() -> None:

@@ -93,6 +93,29 @@ def test_a_named_python_must_run_and_be_of_a_supported_version(machine):
         assert result.stderr.startswith(f"error: PYTHON is {wrong}, which is not Python 3.13 or")
 
 
+def test_a_version_is_found_beside_another(machine):
+    machine.add("python3.13", "echo 3.13")
+    older = machine.add("python3.11", "echo 3.11")
+    assert machine.find("3.11").stdout == f"{older}\n"
+
+
+def test_a_version_that_is_not_there_is_downloaded(machine):
+    machine.add("python3.13", "echo 3.13")
+    machine.add("uv", '[[ $2 != find ]] || echo "$UV_PYTHON_INSTALL_DIR/bin/python$4"')
+    result = machine.find("3.11")
+    assert result.stdout == f"{ROOT}/.python/bin/python3.11\n"
+    assert "downloading 3.11" in result.stderr
+
+
+def test_a_version_that_cannot_be_downloaded_is_an_error_of_one_line(machine):
+    machine.add("python3.13", "echo 3.13")
+    machine.add("uv", "[[ $1 == --version ]]")
+    result = machine.find("3.11")
+    assert (result.returncode, result.stdout) == (1, "")
+    *_, last = result.stderr.splitlines()
+    assert last.startswith("error: no Python 3.11 runs here, and none could be downloaded")
+
+
 @pytest.fixture
 def check_system(machine, monkeypatch):
     """Look for what tests need where it is not, and an apt-get that writes down what it does."""

@@ -10,6 +10,7 @@ import re
 import shutil
 import signal
 import subprocess
+from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
 from itertools import product
@@ -647,6 +648,39 @@ def test_a_pose_is_compared_to_the_digits_that_blender_keeps(small_dataset: Path
     for by, away, passed in ((5e-3, 1e3, True), (2e-2, 1e3, False), (1e-4, 0.0, False)):
         rewrite(small_dataset, displaced(by, away))
         assert check(validate(small_dataset), "lightfield").passed is passed
+
+
+INTEL, AMD = "GenuineIntel AVX2, glibc 2.36", "AuthenticAMD AVX2, glibc 2.36"
+GPU = f"OPTIX NVIDIA H200, {INTEL}"
+
+
+@pytest.mark.parametrize(
+    ("machines", "warned"),
+    [
+        ([INTEL, INTEL, INTEL], []),
+        ([GPU, GPU, GPU], []),
+        ([INTEL, AMD, INTEL], [f"1 on {AMD}", f"2 on {INTEL}"]),
+        ([INTEL, INTEL, GPU], [f"2 on {INTEL}", f"1 on {GPU}"]),
+        # On nodes of another kind than where the build was begun.
+        ([AMD, AMD, AMD], [f"3 on {AMD}", f"lightfield.json names {INTEL}"]),
+    ],
+)
+def test_machines_whose_views_may_differ_in_the_last_digits_are_named(
+    machines: list[str], warned: list[str], small_dataset: Path
+) -> None:
+    rewrite(small_dataset, lambda content: content.update(machine=INTEL))
+    for name, machine in zip(names(small_dataset), machines, strict=True):
+        repaint(small_dataset, name, header={images.MACHINE_ATTRIBUTE: machine})
+    result = validate(small_dataset)
+    assert result.valid
+    machine_check = check(result, "machines")
+    assert machine_check.figures == Counter(machines)
+    assert len(machine_check.warnings) == bool(warned)
+    assert all(text in result.summary() for text in warned)
+
+
+def test_views_that_name_no_machine_are_not_checked_for_it(small_dataset: Path) -> None:
+    assert "machines" not in [check.name for check in validate(small_dataset).checks]
 
 
 def test_clamped_values_are_a_warning(small_dataset: Path) -> None:

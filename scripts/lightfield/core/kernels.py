@@ -8,16 +8,18 @@ from typing import Any, TypeVar, cast
 
 @contextmanager
 def _hidden(*names: str) -> Iterator[None]:
-    """Let what is imported in here not find these modules, but for those that are loaded."""
-    hidden = {name: None for name in names if name not in sys.modules}
-    sys.modules.update(hidden)  # type: ignore[arg-type]
+    """Let what is imported in here not find these modules, not even those that are loaded."""
+    loaded = {name: sys.modules[name] for name in names if name in sys.modules}
+    sys.modules.update(dict.fromkeys(names))  # type: ignore[arg-type]
     yield
-    for name in hidden:
+    for name in names:
         del sys.modules[name]
+    sys.modules.update(loaded)
 
 
 # Numba looks for options in YAML, for scipy's version, and in the module that its first kernel
 # imports for scipy's BLAS, which takes longer to import than numba. No kernel needs any of them.
+# Options in the folder where a program runs could even change what kernels compute.
 with _hidden("scipy", "scipy.linalg.cython_blas", "yaml"):
     import numba
     import numba.np.arraymath

@@ -2,7 +2,9 @@
 
 Two views with equal keys have equal pixels, so a finished view is recognised by its key and
 never rendered twice, and a change of settings is never mistaken for a finished view. What pruning
-leaves out changes no byte (see `lightfield.rendering.pruning`) and is therefore not in the key.
+leaves out changes no byte (see `lightfield.rendering.pruning`) and is therefore not in the key. Nor
+is the machine, which changes last digits (see `lightfield.core.machine`): a build goes on wherever
+it is resumed, each view names the machine that rendered it, and validation says if these differ.
 """
 
 import hashlib
@@ -15,11 +17,11 @@ from typing import Any
 from lightfield.core.errors import UserError
 from lightfield.dataset import published
 from lightfield.dataset.config import BUILDERS, Source
-from lightfield.dataset.lightfield import LightField, View
+from lightfield.dataset.lightfield import MACHINE, LightField, View
 
 # Raised when the program that renders changes what it writes for the same settings, and that which
 # computes flow.
-RENDER_VERSION = 3
+RENDER_VERSION = 4
 FLOW_VERSION = 1
 
 
@@ -54,7 +56,8 @@ def scene_fingerprint(source: Source, external: Sequence[tuple[str, str | None]]
 def render_key(lightfield: LightField, view: View) -> str:
     """Return the key of one of the views of a light field: 64 hexadecimal digits."""
     pose = view.matrix.tolist()
-    return _digest([RENDER_VERSION, version("bpy"), lightfield.content, view.name, pose])
+    content = {key: value for key, value in lightfield.content.items() if key != MACHINE}
+    return _digest([RENDER_VERSION, version("bpy"), content, view.name, pose])
 
 
 def names_key(lightfield: LightField) -> str:

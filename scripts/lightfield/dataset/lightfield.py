@@ -2,9 +2,9 @@
 
 The keys are SILVR's (``camera``, ``lf_type``, ``resolution``, ``sensor_size``, ``frames``) and ours
 beside them: ``depth``, what channel Z of the views means, ``frame`` of the scene, ``scene`` and
-``render``, what was rendered and how. ``passes``, of a reprojection, are those of ``render`` that
-it has. A frame's ``split`` is what the view is for, and its ``flow`` the view to which its flow
-leads. Files that SILVR's tools wrote are read too.
+``render``, what was rendered and how, and ``machine``, what of it changes last digits. ``passes``,
+of a reprojection, are those of ``render`` that it has. A frame's ``split`` is what the view is for,
+and its ``flow`` the view to which its flow leads. Files that SILVR's tools wrote are read too.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,6 +33,8 @@ Floats = NDArray[np.float64]
 NAME = "lightfield.json"
 # Where this key is, metres between the eyes of a pair, the views have no centre.
 OMNIDIRECTIONAL = "omnidirectional_stereo"
+# What of the machine changes bytes, as where the file was made; each view names its own.
+MACHINE = "machine"
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,11 +23,12 @@ from lightfield.core.files import atomic_path
 Attribute = str | int | float
 
 # In a view's EXR header: what channel Z means, the key of the settings that made the pixels, the
-# version of bpy that did, and how many values had to be clamped to the half range or were not a
-# number.
+# version of bpy that did, on what machine, and how many values had to be clamped to the half range
+# or were not a number.
 DEPTH_ATTRIBUTE = "plenoforge:depth"
 KEY_ATTRIBUTE = "plenoforge:key"
 BPY_ATTRIBUTE = "plenoforge:bpy"
+MACHINE_ATTRIBUTE = "plenoforge:machine"
 CLAMPED_ATTRIBUTE = "plenoforge:clamped"
 NAN_ATTRIBUTE = "plenoforge:nan"
 

@@ -12,7 +12,7 @@ from lightfield.core.files import atomic_path
 # A picture is written to a file, never to a screen.
 matplotlib.use("agg")
 
-from matplotlib import pyplot
+from matplotlib import pyplot, style
 
 # Okabe and Ito's palette, which people with any kind of colour vision can tell apart.
 BLUE, ORANGE, GREEN, VERMILION = "#0072b2", "#e69f00", "#009e73", "#d55e00"
@@ -46,7 +46,8 @@ def plot(
 
     One panel yields its axes, several an array of them. ``size`` is that of the figure, in inches.
     """
-    with matplotlib.rc_context(_STYLE):
+    # Whatever a user's matplotlibrc says.
+    with style.context(("default", _STYLE)):
         figure, axes = pyplot.subplots(rows, columns, figsize=size)
         try:
             yield axes

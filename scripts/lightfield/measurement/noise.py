@@ -27,13 +27,16 @@ def relative_noise(luminance: Array, block: int = SMALLEST_BLOCK) -> Array:
     light = luminance.astype(np.float64)
     with np.errstate(invalid="ignore", divide="ignore"):
         residual = np.abs(np.diff(np.diff(light, 2, axis=0), 2, axis=1)) / MASK_NORM
-        deviation = np.median(_blocks(residual, block), axis=(2, 3)) / MEDIAN_OF_NORMAL
-        mean = np.mean(_blocks(light[1:-1, 1:-1], block), axis=(2, 3))
+        deviation = np.median(_blocks(residual, block), axis=2) / MEDIAN_OF_NORMAL
+        mean = np.mean(_blocks(light[1:-1, 1:-1], block), axis=2)
         ratio = deviation / mean
     return np.where((mean > 0) & np.isfinite(mean), ratio, np.nan)
 
 
 def _blocks(values: Array, block: int) -> Array:
-    """Return (rows, columns, block, block) of the whole blocks of (height, width)."""
+    """Return (rows, columns, block²) of the whole blocks of (height, width)."""
     rows, columns = (side // block * block for side in values.shape)
-    return np.asarray(view_as_blocks(np.ascontiguousarray(values[:rows, :columns]), (block, block)))
+    whole = np.ascontiguousarray(values[:rows, :columns])
+    blocks = view_as_blocks(whole, (block, block))
+    # numpy 1.26 refuses the median over two axes where there is no block at all.
+    return np.asarray(blocks.reshape(*blocks.shape[:2], block**2))

@@ -8,6 +8,7 @@ import bpy
 
 from lightfield.core import gpus
 from lightfield.core.errors import UserError
+from lightfield.core.machine import describe
 from lightfield.dataset.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.dataset.passes import Pass
 from lightfield.geometry.rigs.rig import EYES
@@ -224,6 +225,16 @@ def _use_device(scene: Any, device: str) -> None:
         preferences.compute_device_type = kind
         for entry in preferences.devices:
             entry.use = entry.type == kind
+
+
+def machine(denoise: bool) -> str:
+    """Return what of this machine changes bytes, with the GPU that Cycles renders on, if any."""
+    here = describe(denoise)
+    if bpy.context.scene.cycles.device == "CPU":
+        return here
+    preferences = bpy.context.preferences.addons["cycles"].preferences
+    gpus_in_use = sorted({entry.name for entry in preferences.devices if entry.use})
+    return f"{preferences.compute_device_type} {' + '.join(gpus_in_use)}, {here}"
 
 
 def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:

@@ -159,7 +159,7 @@ def _render_views(
 ) -> None:
     """Render ``views`` one after the other, in the scene that is set up for them."""
     from lightfield.rendering.colour_pass import render_colour
-    from lightfield.rendering.cycles import choose_eye
+    from lightfield.rendering.cycles import choose_eye, machine
     from lightfield.rendering.geometry_pass import render_geometry
 
     rays = depth_rays(lightfield)
@@ -169,6 +169,10 @@ def _render_views(
     compression = lightfield.render.get("compression", "zip")
     names = {found.name for found in wanted}
     has_geometry = lightfield.depth or not all(found.of_colour for found in wanted)
+    made_here = {
+        images.BPY_ATTRIBUTE: version("bpy"),
+        images.MACHINE_ATTRIBUTE: machine(lightfield.render["denoise"]),
+    }
     process = psutil.Process()
     past: list[float] = []
     progress.begin()
@@ -196,7 +200,7 @@ def _render_views(
             channels["Z"] = depth_channel(geometry.depth, lightfield, rays)
             attributes[images.DEPTH_ATTRIBUTE] = str(lightfield.depth)
         key = keys.render_key(lightfield, view)
-        made = {images.KEY_ATTRIBUTE: key, images.BPY_ATTRIBUTE: version("bpy")}
+        made = {images.KEY_ATTRIBUTE: key, **made_here}
         contents = [(channels, attributes)]
         contents += [pass_channels(found, geometry, colour, lightfield.lens) for found in wanted]
         for path, (channels, attributes) in zip(

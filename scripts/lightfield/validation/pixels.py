@@ -42,10 +42,10 @@ MOST_REGIONS = 16
 class Facts:
     """What one file shows by itself; ``faults`` by the check to which they belong.
 
-    ``clamped`` and ``nan`` are the renderer's counts, ``marked`` whether the pixels without a
-    source could be compared, ``constant`` whether a reprojected view has one colour (as a piece of
-    sky or a wall may), ``missed`` the part of the lens's pixels that hit nothing and ``patches``
-    what geometry needs, both of a view with depth.
+    ``clamped`` and ``nan`` are the renderer's counts, ``machine`` is where it ran, ``marked``
+    whether the pixels without a source could be compared, ``constant`` whether a reprojected view
+    has one colour (as a piece of sky or a wall may), ``missed`` the part of the lens's pixels that
+    hit nothing and ``patches`` what geometry needs, both of a view with depth.
     """
 
     checksum: str
@@ -53,6 +53,7 @@ class Facts:
     faults: dict[str, list[str]] = field(default_factory=dict)
     clamped: int | None = None
     nan: int | None = None
+    machine: str | None = None
     marked: bool = False
     constant: bool = False
     missed: float = 0.0
@@ -152,6 +153,8 @@ class Examiner:
             facts.fault("depth", f"{wrong} depths are not positive", wrong)
             facts.missed = float(np.isposinf(depth[seen]).mean())
             facts.patches = consistency.sample(image_set.camera(file.view), depth, RAYS_A_VIEW)
+        if is_rendered and images.MACHINE_ATTRIBUTE in image.attributes:
+            facts.machine = str(image.attributes[images.MACHINE_ATTRIBUTE])
         if not is_rendered:
             self._compare_marks(file, image, facts)
         elif images.NAN_ATTRIBUTE in image.attributes:

@@ -23,7 +23,7 @@ from lightfield.core.failures import LESS_MEMORY
 from lightfield.core.files import read_json, sha256
 from lightfield.core.progress import Progress
 from lightfield.dataset.records import read as read_record
-from lightfield.validation import files, geometry, pixels
+from lightfield.validation import files, geometry, machines, pixels
 from lightfield.validation import splits as validation_splits
 from lightfield.validation.consistency import Answer
 from lightfield.validation.files import File, Manifest
@@ -76,6 +76,7 @@ def validate(
             seen = {file: fact.patches for file, fact in own.items() if fact.patches is not None}
             checks += [presence[number], *pixels.checks(image_set, own, volumes)]
             checks.append(geometry.check(image_set, seen, lambda asked: mapped(_answer, asked)))
+            checks += machines.check(image_set.lightfield, [fact.machine for fact in own.values()])
     if passes or missing:
         checks.append(pixels.of_passes({file: facts[file] for file in passes}, missing))
     checks.append(pixels.with_extras(exports, {file: facts[file] for file in extras}))
