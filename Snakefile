@@ -38,6 +38,10 @@ for key, value in read_config(FOLDER / "config.yaml").items():
 report: "captions/workflow.rst"
 
 
+# For --software-deployment-method apptainer: each job runs in the image of envs/plenoforge.def.
+container: f"{FOLDER}/envs/plenoforge.sif"
+
+
 include: "rules/internals.smk"
 include: "rules/common.smk"
 include: "rules/storage.smk"

@@ -17,8 +17,6 @@ rule reprojection_benchmark:
         ),
     log:
         log_of("reprojection_benchmark"),
-    conda:
-        ENVIRONMENT
     # Alone on the machine, so that nothing else is in the figures.
     threads: lambda wildcards: workflow.cores or 1
     params:
@@ -39,8 +37,6 @@ rule stability:
         ),
     log:
         log_of("stability"),
-    conda:
-        ENVIRONMENT
     params:
         folder=lambda wildcards, output: str(Path(output[0]).parent),
     message:
@@ -54,8 +50,6 @@ rule extremes:
         multiext(f"{MEASURED}/extremes", ".csv", ".md"),
     log:
         log_of("extremes"),
-    conda:
-        ENVIRONMENT
     params:
         folder=lambda wildcards, output: str(Path(output[0]).parent),
     message:
@@ -69,8 +63,6 @@ rule render_overhead:
         f"{MEASURED}/render_overhead.md",
     log:
         log_of("render_overhead"),
-    conda:
-        ENVIRONMENT
     threads: lambda wildcards: workflow.cores or 1
     message:
         "Measuring what the workflow adds to Cycles' own render time"
@@ -89,8 +81,6 @@ rule check_gpu:
         multiext(f"{MEASURED}/gpu_check/{{scene}}", ".json", ".md"),
     log:
         log_of("{scene}/gpu_check"),
-    conda:
-        ENVIRONMENT
     # Alone on the machine, so that nothing else is in the times.
     threads: lambda wildcards: workflow.cores or 1
     resources:

@@ -44,11 +44,16 @@ from lightfield.dataset.view_store import VARIABLE, ViewStore
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import Poses
 
-# A prefix takes the place of Snakemake's own, strict mode and all. The rules call `python`: let
-# that be the one that runs Snakemake, and a signal that ends it be named in the job's log.
+# The rules call `python`: that is the one that runs Snakemake, or a container's own.
+OWN_PYTHON = (
+    ""
+    if USES_CONTAINERS
+    else f" export PATH={shlex.quote(str(Path(sys.executable).parent))}:$PATH;"
+)
+# A prefix replaces Snakemake's own, strict mode and all. Ours also has the log of a job name the
+# signal that ended its program.
 shell.prefix(
-    f"set -euo pipefail; export {VARIABLE}={shlex.quote(STORE)};"
-    f" export PATH={shlex.quote(str(Path(sys.executable).parent))}:$PATH;"
+    f"set -euo pipefail; export {VARIABLE}={shlex.quote(STORE)};{OWN_PYTHON}"
     ' python() {{ command python "$@" || {{ local status=$?; if ((status > 128)); then'
     ' echo "error: killed by SIG$(kill -l $status)" >&2; fi; return $status; }}; }}; '
 )
@@ -86,9 +91,6 @@ SCENES = {dataset.scene_name: dataset for dataset in DATASETS.values()}
 
 # The scenes that are somebody else's views, as a wildcard's constraint; "(?!)" matches nothing.
 IMPORTED = "|".join({d.scene_folder for d in DATASETS.values() if d.imported}) or "(?!)"
-
-# Snakemake sets this up by itself if it is run with --software-deployment-method conda.
-ENVIRONMENT = "../envs/environment.yaml"
 
 # `folder` and `work` of a Dataset, with wildcards.
 DATASET = f"{RESULTS}/{{scene}}/{{rig}}"

@@ -25,8 +25,6 @@ rule costs:
     log:
         log_of("{scene}/{rig}/costs"),
     localrule: True
-    conda:
-        ENVIRONMENT
     params:
         dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
         # What the jobs above left there is read, as far as it goes back.
@@ -59,8 +57,6 @@ rule status:
     log:
         log_of("status"),
     localrule: True
-    conda:
-        ENVIRONMENT
     params:
         results=RESULTS,
         work=WORK,

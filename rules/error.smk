@@ -15,8 +15,6 @@ rule probe_cameras:
     log:
         log_of("{scene}/probe_cameras"),
     localrule: True
-    conda:
-        ENVIRONMENT
     params:
         name=of_first("scene_name"),
         limits=of_first("limits_json"),
@@ -43,8 +41,6 @@ rule calibrate:
         log_of("{scene}/calibrate"),
     benchmark:
         times_of("{scene}/calibrate")
-    conda:
-        ENVIRONMENT
     threads: lambda wildcards: workflow.cores or 1
     resources:
         mem_mb=6000,
@@ -81,8 +77,6 @@ rule measure_error:
         ),
     log:
         log_of("{scene}/error_vs_time"),
-    conda:
-        ENVIRONMENT
     # Alone on the machine, and on one core of it, so that nothing else is in the times.
     threads: lambda wildcards: workflow.cores or 1
     resources:
@@ -119,8 +113,6 @@ rule try_changes:
         f"{RESULTS}/benchmarks/advise/{{scene}}.json",
     log:
         log_of("{scene}/try_changes"),
-    conda:
-        ENVIRONMENT
     # As above.
     threads: lambda wildcards: workflow.cores or 1
     resources:
@@ -147,8 +139,6 @@ rule advise:
     log:
         log_of("advise"),
     localrule: True
-    conda:
-        ENVIRONMENT
     message:
         "Saying what could be cheaper"
     shell:

@@ -17,8 +17,6 @@ rule export_to_instant_ngp:
     benchmark:
         times_of("{scene}/{rig}/export/{source}instant_ngp")
     localrule: True
-    conda:
-        ENVIRONMENT
     params:
         words=instant_ngp_words,
     message:
@@ -40,8 +38,6 @@ rule export:
         log_of("{scene}/{rig}/{source}export_{format}"),
     benchmark:
         times_of("{scene}/{rig}/export/{source}{format}")
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=4000,
         runtime=120,

@@ -12,8 +12,6 @@ rule flow:
         log_of("{scene}/{rig}/flow/{first}-{end}"),
     benchmark:
         times_of("{scene}/{rig}/flow/{first}-{end}")
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=2000,
     params:

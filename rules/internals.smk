@@ -17,6 +17,9 @@ SHARES_FILES = SharedFSUsage.INPUT_OUTPUT in workflow.storage_settings.shared_fs
 NODES = workflow.resource_settings.nodes
 CORES = workflow.resource_settings.cores
 QUIET_ABOUT = {choice.name for choice in workflow.output_settings.quiet or ()}
+USES_CONTAINERS = "APPTAINER" in {
+    method.name for method in workflow.deployment_settings.deployment_method
+}
 ASKS_FOR_GPUS = "gpu" in (workflow.resource_settings.default_resources or ())
 
 # Without --cores and --jobs Snakemake refuses to run. `cores: all` in a profile takes the cores of

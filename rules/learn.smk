@@ -13,8 +13,6 @@ rule measure_learning:
         ),
     log:
         log_of("{scene}/{rig}/learn"),
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=2000,
         runtime=120,

@@ -13,8 +13,6 @@ rule pack:
         card=f"{RESULTS}/{{scene}}/{{scene}}_{{rig}}.json",
     log:
         log_of("{scene}/{rig}/package"),
-    conda:
-        ENVIRONMENT
     params:
         name=packed_scene,
         folder=f"{RESULTS}/{{scene}}/{{rig}}",

@@ -11,8 +11,6 @@ rule rig_tables:
     log:
         log_of("rig_tables"),
     localrule: True
-    conda:
-        ENVIRONMENT
     params:
         table=f"{RESULTS}/tables/rigs.md",
         figures=f"{RESULTS}/tables/rigs.csv",
@@ -34,8 +32,6 @@ rule probe:
         f"{MADE}/probe.json",
     log:
         log_of("{scene}/{rig}/probe"),
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=6000,
         runtime=60,
@@ -58,8 +54,6 @@ rule plan:
     log:
         log_of("plan"),
     localrule: True
-    conda:
-        ENVIRONMENT
     params:
         datasets=" ".join(
             f"--dataset {name} {frames} {probe}" for name, frames, probe in probes()

@@ -19,8 +19,6 @@ rule import_views:
         scene=IMPORTED,
     # With a store the views lie where Snakemake runs.
     localrule: bool(STORE)
-    conda:
-        ENVIRONMENT
     params:
         dataset=of_dataset("imported"),
         folder=f"{DATASET}/exr",
@@ -46,8 +44,6 @@ rule render:
         log_of("{scene}/{rig}/render/{first}-{end}"),
     benchmark:
         times_of("{scene}/{rig}/render/{first}-{end}")
-    conda:
-        ENVIRONMENT
     threads: shard_threads
     resources:
         mem_mb=shard_memory,

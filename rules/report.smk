@@ -27,8 +27,6 @@ rule panorama_lightfield:
     benchmark:
         times_of("{scene}/{rig}/panorama/lightfield")
     localrule: True
-    conda:
-        ENVIRONMENT
     params:
         name=of_dataset("scene_name"),
         limits=of_dataset("limits_json"),
@@ -56,8 +54,6 @@ rule render_panorama:
         log_of("{scene}/{rig}/panorama/render"),
     benchmark:
         times_of("{scene}/{rig}/panorama/render")
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=panorama_memory,
         runtime=120,
@@ -98,8 +94,6 @@ rule figures:
     benchmark:
         times_of("{scene}/{rig}/report/figures")
     localrule: True
-    conda:
-        ENVIRONMENT
     params:
         dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
         rig=of_dataset("rig_json"),
@@ -127,8 +121,6 @@ rule page:
     benchmark:
         times_of("{scene}/{rig}/report/page")
     localrule: True
-    conda:
-        ENVIRONMENT
     params:
         dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
         rig=of_dataset("rig_json"),
@@ -159,8 +151,6 @@ rule index:
     log:
         log_of("index"),
     localrule: True
-    conda:
-        ENVIRONMENT
     params:
         results=lambda wildcards, output: str(Path(output[0]).parent),
     message:

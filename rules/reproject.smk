@@ -28,8 +28,6 @@ rule reprojected_lightfield:
     benchmark:
         times_of("{scene}/{rig}/{reprojection}/lightfield")
     localrule: True
-    conda:
-        ENVIRONMENT
     params:
         views=f"{DATASET}/exr",
         folder=REPROJECTED,
@@ -55,8 +53,6 @@ rule lens_map:
     benchmark:
         times_of("{scene}/{rig}/{reprojection}/lens_map")
     localrule: True
-    conda:
-        ENVIRONMENT
     params:
         optics=of_reprojection("optics"),
         file=LENS_MAP,
@@ -88,8 +84,6 @@ rule reproject:
         log_of("{scene}/{rig}/{reprojection}/{first}-{end}"),
     benchmark:
         times_of("{scene}/{rig}/{reprojection}/{first}-{end}")
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=2000,
         # In a group with the renders, whose jobs must agree.

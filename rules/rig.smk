@@ -26,8 +26,6 @@ rule free_places:
         log_of("{scene}/{rig}/free_places"),
     benchmark:
         times_of("{scene}/{rig}/cameras/free_places")
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=8000,
         runtime=60,
@@ -71,8 +69,6 @@ rule lightfield:
     benchmark:
         times_of("{scene}/{rig}/cameras/lightfield")
     localrule: True
-    conda:
-        ENVIRONMENT
     params:
         name=of_dataset("scene_name"),
         limits=of_dataset("limits_json"),
@@ -100,8 +96,6 @@ rule check_cameras:
         log_of("{scene}/{rig}/check_cameras"),
     benchmark:
         times_of("{scene}/{rig}/cameras/check_cameras")
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=8000,
         runtime=60,
@@ -124,8 +118,6 @@ rule splits:
     log:
         log_of("{scene}/splits"),
     localrule: True
-    conda:
-        ENVIRONMENT
     message:
         "Listing what the views of {wildcards.scene} are for"
     shell:

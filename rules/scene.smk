@@ -21,8 +21,6 @@ rule build_scene:
         log_of("{name}/build_scene"),
     benchmark:
         times_of("{name}/build_scene")
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=8000,
         runtime=30,
@@ -58,8 +56,6 @@ rule check_blend:
     benchmark:
         times_of("{name}/check_blend")
     localrule: True
-    conda:
-        ENVIRONMENT
     message:
         "Checking {input.blend}"
     shell:
@@ -81,8 +77,6 @@ rule inventory:
         times_of("{name}/inventory")
     # With a store a user's files lie where Snakemake runs.
     localrule: bool(STORE) and any(d.source.blend for d in SCENES.values())
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=8000,
         runtime=30,
@@ -111,8 +105,6 @@ for blend, name in BLENDS.items():
             log_of(f"{name}/fetch_blend"),
         # Where Snakemake runs: a cluster's nodes may not reach the Internet.
         localrule: True
-        conda:
-            ENVIRONMENT
         params:
             name=name,
         message:
@@ -138,8 +130,6 @@ for blend, name in BLENDS.items() if STORE else ():
         log:
             log_of(f"{name}/store_blend"),
         localrule: True
-        conda:
-            ENVIRONMENT
         message:
             "Storing {input.blend}"
         shell:

@@ -15,8 +15,6 @@ rule measure_synthesis:
         ),
     log:
         log_of("{scene}/{rig}/synthesis"),
-    conda:
-        ENVIRONMENT
     resources:
         mem_mb=4000,
     params:

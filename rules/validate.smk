@@ -24,8 +24,6 @@ rule validate:
         log_of("{scene}/{rig}/validate"),
     benchmark:
         times_of("{scene}/{rig}/validate")
-    conda:
-        ENVIRONMENT
     threads: 2
     resources:
         mem_mb=4000,
@@ -59,8 +57,6 @@ rule checksums:
     log:
         log_of("{scene}/{rig}/checksums"),
     localrule: True
-    conda:
-        ENVIRONMENT
     message:
         "Publishing the checksums of {wildcards.scene}/{wildcards.rig}"
     shell:
@@ -76,8 +72,6 @@ rule verify:
         stored_lists,
     log:
         log_of("verify"),
-    conda:
-        ENVIRONMENT
     params:
         folders=shlex.join(dataset.folder for dataset in CHOSEN),
         work=WORK,

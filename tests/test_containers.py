@@ -1,0 +1,50 @@
+"""Jobs in containers: with Snakemake's --sdm apptainer each runs with the image's own Python."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from checkouts import checkout
+
+TARGET = "results/smoke/LFPlane_3x2_equisolid/lightfield.json"
+# In Apptainer's place: an image that has a folder of programs, of which it takes no other.
+APPTAINER = """#!/bin/sh
+case "$1" in
+--version) echo "apptainer version 1.4.5"; exit ;;
+esac
+for word; do command=$word; done
+echo "$@" | grep -q "plenoforge.sif" || exit 1
+PATH={image}:/usr/bin:/bin exec bash -c "$command"
+"""
+PYTHON = """#!/bin/sh
+echo "$1" >> {seen}
+exec {python} "$@"
+"""
+
+
+def write_program(path, text):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    path.chmod(0o755)
+
+
+@pytest.mark.slow
+def test_a_job_in_a_container_runs_with_the_python_of_the_image(tmp_path):
+    folder, seen = checkout(tmp_path / "plenoforge"), tmp_path / "seen"
+    (folder / "envs/plenoforge.sif").touch()
+    write_program(tmp_path / "bin/apptainer", APPTAINER.format(image=tmp_path / "image"))
+    python = PYTHON.format(seen=seen, python=sys.executable)
+    write_program(tmp_path / "image/python", python)
+    snakemake = Path(sys.executable).with_name("snakemake")
+    run = subprocess.run(
+        [snakemake, "--cores", "1", "--sdm", "apptainer", "--", TARGET],
+        cwd=folder,
+        env=os.environ | {"PATH": f"{tmp_path / 'bin'}:{os.environ['PATH']}"},
+        capture_output=True,
+        text=True,
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert (folder / TARGET).is_file()
+    assert seen.read_text() == "scripts/make_lightfield.py\n"
