@@ -132,6 +132,20 @@ def write_lightfield(path, frame, **render):
     ).write(path)
 
 
+@pytest.mark.parametrize("name", CASES[:4])
+def test_cameras_are_checked_against_what_their_frame_shows(name, folder, run_program, tmp_path):
+    def checked(frame):
+        lightfield = tmp_path / f"{frame}.json"
+        write_lightfield(lightfield, frame)
+        words = ("--blend", folder / f"{name}.blend", "--lightfield", lightfield)
+        return run_program("check_cameras.py", *words, "--output", tmp_path / "out", check=False)
+
+    assert checked(1).returncode == 0
+    inside = checked(5)
+    assert inside.returncode == 1
+    assert "1 of 2 cameras are inside late: view_0000f" in inside.stderr
+
+
 @pytest.mark.parametrize(
     ("blend", "shown"),
     [
