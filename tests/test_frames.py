@@ -35,6 +35,9 @@ CASES = [
     "keyed_bone",
     "keyed_world",
     "keyed_light",
+    "keyed_samples",
+    "keyed_simplification",
+    "keyed_view_layer",
     "blur_across_a_change_of_visibility",
     "blur_of_a_light_that_changes",
     "blur_by_a_target_in_another_scene",
@@ -83,6 +86,11 @@ def test_objects_are_counted_at_the_frame_that_shows_most(scenes):
     assert found["fullest_frame"] == 5
     # The room's six, and the cube.
     assert found["objects"] == 7
+
+
+@pytest.mark.parametrize("name", ["keyed_samples", "keyed_view_layer"])
+def test_keyframes_do_not_override_what_the_yaml_says(name, scenes):
+    assert scenes[name]["pixels"] == scenes["keyed_light"]["pixels"]
 
 
 LATE = """

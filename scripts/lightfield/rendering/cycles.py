@@ -11,7 +11,7 @@ from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.dataset.passes import Pass
 from lightfield.geometry.rigs.rig import EYES
-from lightfield.rendering import blend_file, ids, instances, pruning, volumes
+from lightfield.rendering import animation, blend_file, ids, instances, pruning, volumes
 
 # In the order in which `auto` tries them.
 GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
@@ -59,6 +59,8 @@ def set_up(
     focused = scene.camera if lightfield.render.get("depth_of_field") else None
     for marker in scene.timeline_markers:
         marker.camera = None
+    # What is not set here keeps the value that it has at this frame.
+    animation.mute(scene, ("render.", "cycles."))
     scene.render.engine = "CYCLES"
     _set_quality(lightfield.render)
     _set_output(scene, lightfield, threads)
