@@ -48,6 +48,8 @@ ALWAYS = {
 
 
 VIEWS = 6
+# Another one than that at which the scenes are saved.
+FRAME = 5
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,7 @@ def make_scene(task: tuple[str, str, float, Path]) -> tuple[dict[str, Any], dict
         bpy.context.object.hide_render = True
     blend_file.save_scene(path)
     blend_file.open_scene(path)
-    found = inventory.inventory()
+    found = inventory.inventory([FRAME])
     return found, {name: pruning.REASONS[name] for name in pruning.left_out(found)}
 
 
@@ -205,7 +207,7 @@ class Renderer:
         rig = {"type": "lattice", "cameras": [VIEWS, 1, 1], "size": 0.3, "center": [0, 0, 1.1]}
         settings = {"samples": 4, "adaptive_threshold": 0, "denoise": False}
         depth = "z" if task.depth else None
-        lightfield = LightField.from_rig(rig, lens, depth=depth, frame=1, render=settings)
+        lightfield = LightField.from_rig(rig, lens, depth=depth, frame=FRAME, render=settings)
         self.depth = task.depth
         self.poses = lightfield.matrices
         self.digest = hashlib.sha256()

@@ -13,7 +13,8 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import blend, config
-from lightfield.dataset.dataset import scene_datasets
+from lightfield.dataset.config import FILE
+from lightfield.dataset.dataset import rendered_frames, scene_datasets
 from lightfield.dataset.view_store import ViewStore
 from lightfield.geometry.rigs import BlendCamera
 from lightfield.rendering import blend_facts, blend_file, external_files, pruning, scene_memory
@@ -33,14 +34,17 @@ def main() -> None:
     written = config.load_scene(arguments.scene) if arguments.scene else None
     chosen = written.scene.model_dump() if written else {}
     layers = blend_file.open_scene(arguments.blend, chosen)
-    datasets = scene_datasets(arguments.scene) if chosen.get("blend") else []
+    datasets = scene_datasets(arguments.scene) if arguments.scene else []
+    saved_frame = bpy.context.scene.frame_current
+    wanted = rendered_frames(datasets) or [FILE]
+    frames = sorted({saved_frame if frame == FILE else frame for frame in wanted})
     found: dict[str, Any] = {}
-    if datasets:
-        frames = [frame for dataset in datasets for frame in dataset.camera_frames]
-        found = {"blend": blend_facts.facts(frames) | {"layers": layers}}
+    if chosen.get("blend"):
+        camera_frames = [frame for dataset in datasets for frame in dataset.camera_frames]
+        found = {"blend": blend_facts.facts(camera_frames) | {"layers": layers}}
     if written and written.render and written.render.motion_blur is not None:
         bpy.context.scene.render.use_motion_blur = written.render.motion_blur
-    found |= inventory()
+    found |= inventory(frames)
     if found["missing"] and not chosen.get("allow_missing"):
         raise UserError(refusal(arguments.blend, found["missing"]))
     if store := ViewStore.configured():
@@ -51,7 +55,7 @@ def main() -> None:
     blend_file.new_scene()
     found["memory_bytes"] = scene_memory.measure(arguments.blend, found, chosen)
     write_json(arguments.output, found)
-    if datasets:
+    if chosen.get("blend"):
         resolved = [dataset.resolved(arguments.output) for dataset in datasets]
         shown = sorted({dataset.source.frame for dataset in resolved})
         own_camera = any(isinstance(dataset.rig, BlendCamera) for dataset in datasets)

@@ -13,7 +13,7 @@ import numpy as np
 
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
-from lightfield.rendering import blend_file, cycles, inventory, pruning
+from lightfield.rendering import animation, blend_file, cycles, inventory, pruning
 from lightfield.rendering.colour_pass import render_colour
 from lightfield.rendering.geometry_pass import render_geometry
 from scenes import room
@@ -22,8 +22,9 @@ RENDER = {"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0}
 FRAME = 7
 
 
-def add(kind, **settings):
+def add(kind, name=None, **settings):
     getattr(bpy.ops.mesh, f"primitive_{kind}_add")(**settings)
+    bpy.context.object.name = name or kind
     return bpy.context.object
 
 
@@ -133,17 +134,18 @@ def features():
     walls.links.new(mix.outputs[0], walls.nodes["Material Output"].inputs["Surface"])
 
 
-def rendered(path, found=None):
-    """Return the colours and depths of a view of a scene, pruned if its inventory is given."""
+def rendered(path, found=None, frame=FRAME):
+    """Return the colours and depths of views of a scene, pruned if its inventory is given."""
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
-    rig = {"type": "lattice", "cameras": [1, 1, 1], "center": [0.2, 0.1, 1.4]}
-    lightfield = LightField.from_rig(rig, lens, depth="distance", frame=FRAME, render=RENDER)
+    rig = {"type": "lattice", "cameras": [2, 1, 1], "size": 0.4, "center": [0.2, 0.1, 1.4]}
+    lightfield = LightField.from_rig(rig, lens, depth="distance", frame=frame, render=RENDER)
     if found:
         found = found | {"left_out": pruning.left_out(found)}
     cycles.set_up(path, found, lightfield, "cpu", 1)
-    pose = lightfield.views[0].matrix
-    # The second view shows what the first may have changed.
-    views = [(render_colour(pose, seed), render_geometry(pose)) for seed in (1, 2)]
+    # The last view shows what those before it may have changed.
+    first, second = (view.matrix for view in lightfield.views)
+    poses = ((first, 1), (second, 1), (first, 2))
+    views = [(render_colour(pose, seed), render_geometry(pose)) for pose, seed in poses]
     return np.stack([np.dstack([colour.pixels, geometry.depth]) for colour, geometry in views])
 
 
@@ -157,7 +159,7 @@ def main():
         make()
         blend_file.save_scene(path)
         blend_file.open_scene(path)
-        found = inventory.inventory()
+        found = inventory.inventory([FRAME])
         whole, pruned = rendered(path), rendered(path, found)
         results[make.__name__] = {
             "inventory": found,
@@ -165,7 +167,7 @@ def main():
             "same": bool(np.array_equal(whole, pruned, equal_nan=True)),
             "objects": len(bpy.data.objects),
             "materials": [material.name for material in bpy.data.materials],
-            "animated": [owner.name for owner, _ in pruning.animated()],
+            "animated": [owner.name for owner, _ in animation.animated()],
         }
     (folder / "results.json").write_text(json.dumps(results))
 

@@ -14,7 +14,10 @@ from lightfield.core.files import sha256
 from lightfield.dataset.view_store import VARIABLE
 from lightfield.rendering import pruning
 
-NOTHING = {"hidden": [], "animated": [], "moving": [], "motion_blur": False}
+NOTHING = {
+    **{"hidden": [], "animated": [], "simulated": [], "uses_visibility": []},
+    "motion_blur": False,
+}
 
 
 @pytest.mark.parametrize(
@@ -24,10 +27,10 @@ NOTHING = {"hidden": [], "animated": [], "moving": [], "motion_blur": False}
         ({"hidden": ["cutter"]}, ["viewport", "hidden_objects"]),
         ({"motion_blur": True}, ["viewport", "motion_blur"]),
         ({"animated": ["Water"]}, ["viewport", "animation"]),
-        ({"animated": ["Water"], "motion_blur": True}, ["viewport", "motion_blur", "animation"]),
-        ({"animated": ["Fire"], "moving": ["Fire"]}, ["viewport", "animation"]),
-        ({"animated": ["Fire"], "moving": ["Fire"], "motion_blur": True}, ["viewport"]),
-        ({"moving": ["Cloth"], "motion_blur": True}, ["viewport"]),
+        ({"animated": ["Water"], "motion_blur": True}, ["viewport"]),
+        ({"simulated": ["Cloth"], "motion_blur": True}, ["viewport"]),
+        ({"simulated": ["Cloth"], "animated": ["Wind"]}, ["viewport"]),
+        ({"animated": ["Door"], "uses_visibility": ["Door"]}, ["animation"]),
     ],
 )
 def test_what_is_left_out_follows_from_what_is_there(contains, expected):
@@ -67,7 +70,6 @@ def test_an_animation_is_frozen_at_the_frame_of_the_dataset(scenes):
     found = scenes["animated"]
     assert found["left_out"] == ["viewport", "animation"]
     assert set(found["inventory"]["animated"]) == {"cone", "sphere", "Key", "pillar", "torus"}
-    assert set(found["inventory"]["moving"]) == {"cone", "Key", "pillar", "torus"}
     # What the viewport does not show is not evaluated there: its value is not known, so it stays.
     assert found["animated"] == ["torus"]
 

@@ -3,7 +3,7 @@
 import json
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -745,6 +745,12 @@ def scene_datasets(
                 )
             )
     return found
+
+
+def rendered_frames(datasets: Iterable[Dataset]) -> list[int | Literal["file"]]:
+    """Return the frames of a scene that its ``datasets`` render; FILE is the .blend's own."""
+    frames = {dataset.source.frame for dataset in datasets}
+    return sorted(frames, key=lambda frame: (frame == FILE, frame))
 
 
 def check_presence(dataset: Dataset) -> None:

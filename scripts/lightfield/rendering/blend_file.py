@@ -10,6 +10,7 @@ import bpy
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.view_store import ViewStore
+from lightfield.rendering import animation
 from lightfield.rendering.quiet import quiet
 
 
@@ -113,6 +114,8 @@ def _choose(scene_name: str | None, view_layers: str | Sequence[str] | None) -> 
                 raise UserError(f"view_layers: {name!r} is none of {known}")
         layers = [found[name] for name in view_layers]
     _join(layers)
+    # Keyframes may turn view layers on and off.
+    animation.mute(window.scene, ("view_layers[",))
     for layer in found:
         layer.use = layer == layers[0]
     window.view_layer = layers[0]

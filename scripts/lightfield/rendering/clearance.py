@@ -14,6 +14,8 @@ from lightfield.core.errors import UserError
 from lightfield.core.progress import Progress
 from lightfield.geometry.rigs.random import Random
 from lightfield.geometry.rigs.sphere import icosphere
+from lightfield.rendering import animation
+from lightfield.rendering.render_graph import in_render
 from lightfield.rendering.volumes import alone
 
 Floats = NDArray[np.float64]
@@ -28,11 +30,15 @@ _SAMPLES = 64
 
 
 def show_what_is_rendered() -> None:
-    """Let the viewport, in which what follows looks, have what a render shows, less its volumes."""
-    volumes = alone()
+    """Let the viewport, in which what follows looks, have what a render shows, less its volumes.
+
+    A render is meant at the present frame.
+    """
+    shown = in_render(_shown) - alone()
     layer = bpy.context.view_layer
     for thing in bpy.data.objects:
-        thing.hide_viewport = thing.hide_render or thing.name_full in volumes
+        animation.mute(thing, ("hide_viewport",))
+        thing.hide_viewport = thing.name_full not in shown
     for thing in layer.objects:
         thing.hide_set(False)
     for collection in bpy.data.collections:
@@ -41,6 +47,12 @@ def show_what_is_rendered() -> None:
     for part in parts:
         part.hide_viewport = False
         parts += part.children
+
+
+def _shown(depsgraph: Any) -> set[str]:
+    """Return the full names of the objects that are not hidden in a render."""
+    things = (entry.object for entry in depsgraph.object_instances)
+    return {str(thing.original.name_full) for thing in things if not thing.hide_render}
 
 
 def clearances(positions: Floats, reach: float = REACH) -> Floats:
@@ -68,7 +80,10 @@ def instances() -> Iterator[tuple[Any, Any, Floats, Floats]]:
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for instance in depsgraph.object_instances:
         thing = instance.object
-        if not instance.show_self or thing.type != "MESH" or thing.hide_render:
+        if not instance.show_self or thing.type != "MESH":
+            continue
+        # Particles place copies of an object that is hidden itself.
+        if thing.hide_render and not instance.is_instance:
             continue
         matrix = instance.matrix_world.copy()
         corners = np.array([matrix @ Vector(corner) for corner in thing.bound_box])

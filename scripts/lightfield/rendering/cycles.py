@@ -12,7 +12,7 @@ from lightfield.core.machine import describe
 from lightfield.dataset.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.dataset.passes import Pass
 from lightfield.geometry.rigs.rig import EYES
-from lightfield.rendering import blend_file, ids, instances, pruning, volumes
+from lightfield.rendering import animation, blend_file, ids, instances, pruning, volumes
 
 # In the order in which `auto` tries them.
 GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
@@ -55,22 +55,24 @@ def set_up(
     for kind in {"object" if kind == "instance" else kind for kind in numbered}:
         ids.assign(kind)
     scene = bpy.context.scene
+    # At this frame a marker may choose the artist's camera, and later none may.
+    scene.frame_set(lightfield.frame)
+    focused = scene.camera if lightfield.render.get("depth_of_field") else None
+    for marker in scene.timeline_markers:
+        marker.camera = None
+    # What is not set here keeps the value that it has at this frame.
+    animation.mute(scene, ("render.", "cycles."))
     scene.render.engine = "CYCLES"
     _set_quality(lightfield.render)
     _set_output(scene, lightfield, threads)
     _set_passes(scene, passes)
     _use_device(scene, device)
-    # At this frame a marker may choose the artist's camera, and later none may.
-    scene.frame_set(lightfield.frame)
+    _set_camera(scene, lightfield.content)
     volumes.alone.cache_clear()
     volumes.alone()
     if "instance" in numbered:
         instances.set_up(view_layer(scene))
         instances.shown()
-    focused = scene.camera if lightfield.render.get("depth_of_field") else None
-    for marker in scene.timeline_markers:
-        marker.camera = None
-    _set_camera(scene, lightfield.content)
     if OMNIDIRECTIONAL in lightfield.content:
         _set_eyes(scene, lightfield.content[OMNIDIRECTIONAL])
     if focused:

@@ -15,6 +15,7 @@ import numpy as np
 
 from lightfield.rendering import instances, volumes
 from lightfield.rendering.cycles import GEOMETRY_PASSES, pass_property, view_layer
+from lightfield.rendering.render_graph import changed
 from lightfield.rendering.view import Array, render_view
 
 # Cycles gives this depth to a ray that hits nothing.
@@ -96,31 +97,20 @@ def _geometry_settings(wanted: Iterable[str]) -> Iterator[None]:
     layer = view_layer(scene)
     with ExitStack() as stack:
         for name, value in _SAMPLING.items():
-            stack.enter_context(_changed(scene.cycles, name, value))
-        stack.enter_context(_changed(scene.render, "use_motion_blur", False))
-        stack.enter_context(_changed(scene.camera.data.dof, "use_dof", False))
+            stack.enter_context(changed(scene.cycles, name, value))
+        stack.enter_context(changed(scene.render, "use_motion_blur", False))
+        stack.enter_context(changed(scene.camera.data.dof, "use_dof", False))
         for name in wanted:
-            stack.enter_context(_changed(*pass_property(layer, name), True))
-        stack.enter_context(_changed(layer, "pass_alpha_threshold", OPACITY))
-        stack.enter_context(_changed(layer.cycles, "pass_debug_sample_count", False))
+            stack.enter_context(changed(*pass_property(layer, name), True))
+        stack.enter_context(changed(layer, "pass_alpha_threshold", OPACITY))
+        stack.enter_context(changed(layer.cycles, "pass_debug_sample_count", False))
         for thing in bpy.data.objects:
             if thing.visible_camera and thing.name_full in volumes.alone():
-                stack.enter_context(_changed(thing, "visible_camera", False))
+                stack.enter_context(changed(thing, "visible_camera", False))
         for shader in (*bpy.data.materials, scene.world):
             if shader and volumes.has_volume(shader) and volumes.has_surface(shader):
                 stack.enter_context(_without_volume(shader.node_tree))
         yield
-
-
-@contextmanager
-def _changed(owner: Any, name: str, value: Any) -> Iterator[None]:
-    """Give a property another value for a while."""
-    before = getattr(owner, name)
-    setattr(owner, name, value)
-    try:
-        yield
-    finally:
-        setattr(owner, name, before)
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from typing import Any
 import bpy
 
 from lightfield.core.errors import UserError
+from lightfield.rendering import animation
 
 # Blender's greatest index.
 MOST = 32767
@@ -26,6 +27,7 @@ def assign(kind: str) -> None:
             f"{MOST} at most; leave this pass out"
         )
     for number, block in enumerate(blocks, 1):
+        animation.mute(block, ("pass_index",))
         block.pass_index = number
 
 

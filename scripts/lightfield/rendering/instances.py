@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.rendering.ids import has_no_surface
-from lightfield.rendering.pruning import unhidden
+from lightfield.rendering.render_graph import in_render
 
 Array = NDArray[Any]
 
@@ -84,24 +84,31 @@ def _node_group() -> Any:
 @cache
 def shown() -> Instances:
     """Return what the opened scene shows at its frame."""
-    entries: dict[str, tuple[int, int]] = {}
+    entries = in_render(_entries)
     own = np.zeros(max((thing.pass_index for thing in bpy.data.objects), default=0) + 1, np.uint32)
-    with unhidden(bpy.data.objects):
-        for entry in bpy.context.evaluated_depsgraph_get().object_instances:
-            thing = entry.object.original
-            if has_no_surface(thing):
-                continue
-            name, number = str(thing.name_full), int(thing.pass_index)
-            if entry.is_instance:
-                places = [str(place) for place in entry.persistent_id if place != _NO_INDEX]
-                name = f"{entry.parent.name_full} > {name} {' '.join(places)}"
-                number = min(int(np.float32(entry.random_id & 0xFFFFFFFF)), _LARGEST)
-            else:
-                own[number] = number
-            entries[name] = (number, thing.pass_index)
-    names = {name: number for name, (number, _) in sorted(entries.items())}
-    numbers, objects = np.array(sorted(entries.values()), np.int64).reshape(-1, 2).T
+    for number, index, is_instance in entries.values():
+        if not is_instance:
+            own[index] = number
+    names = {name: number for name, (number, *_) in sorted(entries.items())}
+    pairs = sorted((number, index) for number, index, _ in entries.values())
+    numbers, objects = np.array(pairs, np.int64).reshape(-1, 2).T
     return Instances(names, numbers, objects, own)
+
+
+def _entries(depsgraph: Any) -> dict[str, tuple[int, int, bool]]:
+    """Return by name each thing's number, its object's index, and whether it is an instance."""
+    entries = {}
+    for entry in depsgraph.object_instances:
+        thing = entry.object.original
+        if has_no_surface(thing):
+            continue
+        name, number = str(thing.name_full), int(thing.pass_index)
+        if entry.is_instance:
+            places = [str(place) for place in entry.persistent_id if place != _NO_INDEX]
+            name = f"{entry.parent.name_full} > {name} {' '.join(places)}"
+            number = min(int(np.float32(entry.random_id & 0xFFFFFFFF)), _LARGEST)
+        entries[name] = (number, int(thing.pass_index), bool(entry.is_instance))
+    return entries
 
 
 def decoded(passes: dict[str, Array], objects: Array) -> Array:

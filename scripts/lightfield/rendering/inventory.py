@@ -1,12 +1,14 @@
 """What a scene contains: geometry, materials, textures, what moves, and which files it reads."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import bpy
+import numpy as np
 
-from lightfield.rendering import cycles, pruning
+from lightfield.rendering import animation, cycles, pruning
 from lightfield.rendering.external_files import external_files, problems
+from lightfield.rendering.render_graph import in_render
 
 # Shader nodes by the feature that they give a material; the Principled BSDF by its inputs.
 SHADERS = {
@@ -34,22 +36,29 @@ FEATURES = sorted(
     {*SHADERS.values(), *OUTPUT_INPUTS.values(), *(name for name, _ in PRINCIPLED_INPUTS.values())}
 )
 IMAGE_NODES = ("ShaderNodeTexImage", "ShaderNodeTexEnvironment")
-# Modifiers whose result depends on time by itself.
-SIMULATIONS = {
-    *("CLOTH", "DYNAMIC_PAINT", "EXPLODE", "FLUID", "MESH_CACHE", "MESH_SEQUENCE_CACHE", "OCEAN"),
-    *("PARTICLE_INSTANCE", "PARTICLE_SYSTEM", "SOFT_BODY", "WAVE", "BUILD"),
-}
+# So many of the frames are counted.
+MOST_FRAMES = 8
 
 
-def inventory() -> dict[str, Any]:
-    """Return what the open scene contains; the file is left with that alone."""
+def inventory(frames: Sequence[int]) -> dict[str, Any]:
+    """Return what the open scene contains at any frame; the file is left with that alone.
+
+    Objects and triangles are counted at the ``frames`` that are rendered.
+    """
     scene = bpy.context.scene
-    others = [other for other in bpy.data.scenes if other not in (scene, scene.background_set)]
+    hidden = pruning.removable_objects()
+    # The objects of another scene may move those of this one.
+    changing = {
+        "animated": sorted({str(owner.name_full) for owner, _ in animation.animated()}),
+        "simulated": animation.simulated(),
+        "uses_visibility": animation.uses_visibility(),
+    }
+    shown = {scene, *pruning.background_scenes(scene)}
+    others = [other for other in bpy.data.scenes if other not in shown]
     for other in others:
         bpy.data.scenes.remove(other)
     if others:
         pruning.remove_unused()
-    hidden = pruning.removable_objects()
     pruning.remove_objects(hidden)
     objects = list(bpy.data.objects)
     materials = sorted(
@@ -73,28 +82,39 @@ def inventory() -> dict[str, Any]:
         features["hair"].add("objects")
     features["volumes"] |= {thing.name_full for thing in objects if thing.type == "VOLUME"}
     return {
-        **triangles(),
+        "frames": list(frames),
+        **_fullest(frames),
         "lights": sorted(light.name_full for light in lights),
         **{name: sorted(features[name]) for name in FEATURES},
         "sampling": cycles.sampling(),
         "textures": sorted(image.name_full for image in images),
         "hidden": hidden,
-        "animated": sorted(owner.name_full for owner, _ in pruning.animated()),
-        "moving": moving(objects),
+        **changing,
         "motion_blur": bool(scene.render.use_motion_blur),
         "external_files": external_files(),
         "missing": problems(images),
     }
 
 
-def triangles() -> dict[str, int]:
-    """Count objects and triangles, as the viewport's levels of detail have them."""
-    for thing in bpy.context.scene.objects:
-        thing.hide_viewport = False
+def _fullest(frames: Sequence[int]) -> dict[str, int]:
+    """Return the frame of most triangles as ``fullest_frame``, and what it shows.
+
+    Of many frames `MOST_FRAMES` are looked at, because each one has to be evaluated.
+    """
+    counts = []
+    for place in np.linspace(0, len(frames) - 1, min(len(frames), MOST_FRAMES)):
+        frame = frames[round(place)]
+        bpy.context.scene.frame_set(frame)
+        counts.append({"fullest_frame": frame, **in_render(_triangles)})
+    return max(counts, key=lambda count: count["triangles"])
+
+
+def _triangles(depsgraph: Any) -> dict[str, int]:
+    """Count objects and triangles, as a render has them."""
     meshes: dict[Any, int] = {}
     total = count = 0
-    for instance in bpy.context.evaluated_depsgraph_get().object_instances:
-        if instance.object.type != "MESH":
+    for instance in depsgraph.object_instances:
+        if instance.object.type != "MESH" or not instance.show_self:
             continue
         mesh = instance.object.data
         meshes[mesh] = len(mesh.loops) - 2 * len(mesh.polygons)
@@ -133,7 +153,7 @@ def surface_features(shader: Any) -> Iterator[tuple[str | None, Any]]:
         elif node.bl_idname == "ShaderNodeBsdfPrincipled":
             for name, (feature, without) in PRINCIPLED_INPUTS.items():
                 socket = node.inputs[name]
-                if socket.is_linked or socket.default_value != without:
+                if socket.is_linked or socket.default_value != without or _is_animated(socket):
                     yield feature, None
 
 
@@ -152,24 +172,6 @@ def contributing(node: Any) -> Iterator[Any]:
             waiting += [n for n in node.node_tree.nodes if n.bl_idname == "NodeGroupOutput"]
 
 
-def moving(objects: list[Any]) -> list[str]:
-    """Return what may change its shape or place with time."""
-    shading = (bpy.types.Material, bpy.types.World, bpy.types.Light, bpy.types.ShaderNodeTree)
-    found = {owner.name_full for owner, _ in pruning.animated() if not isinstance(owner, shading)}
-    for thing in objects:
-        if thing.rigid_body or any(
-            modifier.type in SIMULATIONS or (modifier.type == "NODES" and keeps_time(modifier))
-            for modifier in thing.modifiers
-        ):
-            found.add(thing.name_full)
-    return sorted(found)
-
-
-def keeps_time(modifier: Any) -> bool:
-    """Return whether a geometry nodes modifier asks for the time or simulates."""
-    timed = ("GeometryNodeInputSceneTime", "GeometryNodeSimulationOutput")
-    return modifier.node_group is not None and any(
-        node.bl_idname in timed
-        for node in modifier.node_group.nodes
-        for node in (contributing(node) if node.bl_idname == "NodeGroupOutput" else ())
-    )
+def _is_animated(socket: Any) -> bool:
+    """Return whether the value of a node's input has keyframes or a driver."""
+    return f"{socket.path_from_id()}.default_value" in animation.paths(socket.id_data)

@@ -24,7 +24,7 @@ def warnings(positions: Floats, distances: Floats) -> Iterator[str]:
     """Yield a line for each thing in the open scene that the views will show wrong.
 
     ``positions`` (n, 3) are the cameras', and ``distances`` (n,) those to their nearest surfaces,
-    inf beyond `REACH`.
+    inf beyond `REACH`. The viewport must have what is rendered: see `show_what_is_rendered`.
     """
     # Cycles computes in float32, in world space.
     steps = np.spacing(np.abs(positions).max(axis=1).astype(np.float32)).astype(np.float64)
@@ -96,8 +96,8 @@ def _materials(feature: str) -> list[str]:
 
 
 def _has_no_size(thing: Any) -> bool:
-    """Whether an object is a light that shines from a point or a direction alone."""
-    if thing.type != "LIGHT" or thing.hide_render:
+    """Whether an object is a light that is shown and shines from a point or a direction alone."""
+    if thing.type != "LIGHT" or not thing.visible_get():
         return False
     light = thing.data
     size = {"SUN": "angle", "POINT": "shadow_soft_size", "SPOT": "shadow_soft_size"}.get(light.type)

@@ -3,60 +3,72 @@
 Only what keeps every byte of every view is left out, so none of it enters the render key, and only
 what saves measurably: benchmarks/pruning.py measures each of these, and what was tried and is not
 here (bounces of volumes, of transmission and of transparency where there are none: nothing saved).
+
+What is left out holds for every frame. So nothing is decided by a value that keyframes, a driver or
+a simulation may change.
 """
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import bpy
 
+from lightfield.rendering import animation
 from lightfield.rendering.quiet import quiet
+from lightfield.rendering.render_graph import in_render
 
 REASONS = {
     "viewport": "nobody looks at the viewport: its copy of the scene is not kept",
-    "hidden_objects": "objects that no render shows and nothing else refers to are unloaded",
-    "motion_blur": "nothing moves: the scene is not evaluated at the shutter's opening and closing",
+    "hidden_objects": "objects that no frame shows and nothing else refers to are unloaded",
+    "motion_blur": "nothing changes: the scene is not evaluated when the shutter opens and closes",
     "animation": "a dataset shows one frame: the scene is not evaluated anew for each view",
 }
 
 
 def left_out(inventory: Mapping[str, Any]) -> list[str]:
     """Decide from a scene's inventory which of `REASONS` apply to it."""
-    blurred = bool(inventory["motion_blur"] and inventory["moving"])
+    changes = inventory["animated"] or inventory["simulated"]
     applies = {
-        "viewport": True,
+        "viewport": not inventory["uses_visibility"],
         "hidden_objects": bool(inventory["hidden"]),
-        "motion_blur": inventory["motion_blur"] and not blurred,
-        # What is blurred has to move while its view is rendered.
-        "animation": bool(inventory["animated"]) and not blurred,
+        "motion_blur": inventory["motion_blur"] and not changes,
+        # What is blurred has to move while its view is rendered. A simulation may ask where things
+        # were at earlier frames.
+        "animation": bool(inventory["animated"])
+        and not inventory["motion_blur"]
+        and not inventory["simulated"],
     }
     return [name for name in REASONS if applies[name]]
 
 
 def removable_objects() -> list[str]:
-    """Return the names of the objects that no render shows and that nothing but the scene holds.
+    """Return the names of the objects that no frame shows and that nothing but the scene holds.
 
     Hidden are objects by themselves, by their collections, or by having every kind of ray turned
-    off. What a modifier, an instancer or a physics simulation may use is not removable.
+    off. An object with keyframes or drivers is not removable, as they may show it. Blender animates
+    neither the visibility of collections nor what a modifier, a constraint or an instancer refers
+    to. What these or a physics simulation may use is not removable, nor what drivers read.
     """
-    layer = bpy.context.view_layer
+    scene = bpy.context.scene
     shown: set[Any] = set()
-    _collect_shown(layer.layer_collection, shown)
+    _collect_shown(bpy.context.view_layer.layer_collection, shown)
+    for background in background_scenes(scene):
+        shown.update(background.objects)
     users = bpy.data.user_map()
-    instanced: set[Any] = set()
+    needed = animation.reached()
     for collection in bpy.data.collections:
         if any(not isinstance(user, _HOLDS_ONLY) for user in users[collection]):
-            instanced.update(collection.all_objects)
+            needed.update(collection.all_objects)
     removable = {
         thing
-        for thing in bpy.context.scene.objects
+        for thing in scene.objects
         if (thing not in shown or not _meets_rays(thing))
-        and thing not in instanced
+        and thing not in needed
         and thing.type != "CAMERA"
-        and not thing.rigid_body
-        and (thing.field is None or thing.field.type == "NONE")
-        and not any(modifier.type == "COLLISION" for modifier in thing.modifiers)
+        and not animation.is_animated(thing)
+        and not _is_physical(thing)
+        # Blender takes nothing out of a collection of another file.
+        and not any(collection.library for collection in thing.users_collection)
     }
     while used := {
         thing
@@ -65,6 +77,14 @@ def removable_objects() -> list[str]:
     }:
         removable -= used
     return sorted(thing.name_full for thing in removable)
+
+
+def background_scenes(scene: Any) -> list[Any]:
+    """Return the scene that a scene is rendered with as its background, that one's, and so on."""
+    backgrounds: list[Any] = []
+    while (scene := scene.background_set) and scene not in backgrounds:
+        backgrounds.append(scene)
+    return backgrounds
 
 
 def remove_objects(names: Collection[str]) -> None:
@@ -89,37 +109,12 @@ def leave_out(names: Collection[str]) -> None:
     if "motion_blur" in names:
         scene.render.use_motion_blur = False
     if "animation" in names:
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        for owner, tree in list(animated()):
-            _freeze(owner, tree, depsgraph)
+        for block in in_render(_standing):
+            block.animation_data_clear()
     if "viewport" in names:
         for thing in scene.objects:
             thing.hide_viewport = True
         bpy.context.view_layer.update()
-
-
-@contextmanager
-def unhidden(things: Iterable[Any]) -> Iterator[None]:
-    """Show those of the ``things`` in the viewport for a while that only a render shows."""
-    hidden = [thing for thing in things if thing.hide_viewport and not thing.hide_render]
-    for thing in hidden:
-        thing.hide_viewport = False
-    yield
-    for thing in hidden:
-        thing.hide_viewport = True
-
-
-def animated() -> Iterator[tuple[Any, bool]]:
-    """Yield every data-block with animation or drivers, and whether these are its node tree's."""
-    for name, collection in bpy.data.bl_rna.properties.items():
-        # Blender 5.2 lists everything once more in `all_ids`.
-        if collection.type != "COLLECTION" or name == "all_ids":
-            continue
-        for owner in getattr(bpy.data, name):
-            for block in (owner, getattr(owner, "node_tree", None)):
-                data = getattr(block, "animation_data", None)
-                if data and (data.action or data.drivers or data.nla_tracks):
-                    yield owner, block != owner
 
 
 # What lists objects without making anything of them.
@@ -149,33 +144,46 @@ def _meets_rays(thing: Any) -> bool:
     )
 
 
-def _freeze(owner: Any, tree: bool, depsgraph: Any) -> None:
-    """Remove a data-block's animation where its properties already hold this frame's values."""
-    evaluated = owner.evaluated_get(depsgraph)
-    if owner.library or not evaluated.is_evaluated:
-        return
-    block, now = (owner.node_tree, evaluated.node_tree) if tree else (owner, evaluated)
-    data = block.animation_data
-    if data.nla_tracks:
-        return
-    curves = list(data.drivers)
-    if data.action:
-        curves += [
-            curve
-            for layer in data.action.layers
-            for strip in layer.strips
-            for bag in strip.channelbags
-            if bag.slot_handle == data.action_slot_handle
-            for curve in bag.fcurves
-        ]
-    if all(_value(block, curve) == _value(now, curve) for curve in curves):
-        block.animation_data_clear()
+def _is_physical(thing: Any) -> bool:
+    """Return whether a physics simulation may use an object that it does not refer to."""
+    return (
+        animation.is_simulated(thing)
+        or (thing.field is not None and thing.field.type != "NONE")
+        or any(modifier.type == "COLLISION" for modifier in thing.modifiers)
+    )
+
+
+def _standing(depsgraph: Any) -> list[Any]:
+    """Return what can go without its animation: its properties already hold this frame's values.
+
+    These are data-blocks and node trees. What drivers make of variables may depend on more than the
+    frame, such as the camera or a render's levels of detail.
+    """
+    blocks = []
+    for owner, block in animation.animated():
+        evaluated = owner.evaluated_get(depsgraph)
+        data = block.animation_data
+        if owner.library or not evaluated.is_evaluated or data.nla_tracks:
+            continue
+        now = evaluated if block == owner else evaluated.node_tree
+        if all(
+            not (curve.driver and curve.driver.variables)
+            and _value(block, curve) == _value(now, curve)
+            for curve in animation.curves(block)
+        ):
+            blocks.append(block)
+    return blocks
 
 
 def _value(block: Any, curve: Any) -> Any:
-    """Return the property that an animation curve sets; the block itself if there is no such."""
+    """Return the property of a block that an animation curve sets; the block itself if none."""
     try:
         value = block.path_resolve(curve.data_path)
-        return value[curve.array_index] if hasattr(value, "__len__") else value
+        # Where a path leads to another block, Blender does not always take it there.
+        place = block.path_resolve(curve.data_path, False)
+        if getattr(place, "id_data", block) != block:
+            return block
+        is_array = hasattr(value, "__getitem__") and not isinstance(value, str)
+        return value[curve.array_index] if is_array else value
     except (ValueError, IndexError):
         return block

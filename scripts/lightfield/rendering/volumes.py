@@ -6,21 +6,25 @@ from typing import Any
 
 import bpy
 
-from lightfield.rendering.pruning import unhidden
+from lightfield.rendering.render_graph import in_render
 
 
 @cache
 def alone() -> frozenset[str]:
     """Return the full names of the opened scene's objects that are volumes alone, at its frame."""
     by_nodes = [t for t in bpy.data.objects if any(m.type == "NODES" for m in t.modifiers)]
-    with unhidden(by_nodes):
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        found = {
-            thing: all(map(_is_volume, _parts(thing.evaluated_get(depsgraph).evaluated_geometry())))
-            for thing in by_nodes
-            if thing.evaluated_get(depsgraph).is_evaluated
+
+    def made(depsgraph: Any) -> dict[Any, bool]:
+        evaluated = {thing: thing.evaluated_get(depsgraph) for thing in by_nodes}
+        return {
+            thing: all(map(_is_volume, _parts(now.evaluated_geometry())))
+            for thing, now in evaluated.items()
+            if now.is_evaluated
         }
-    found = {thing: _is_volume(thing) for thing in bpy.data.objects} | found
+
+    found = {thing: _is_volume(thing) for thing in bpy.data.objects}
+    if by_nodes:
+        found |= in_render(made)
     return frozenset(str(thing.name_full) for thing in found if found[thing])
 
 

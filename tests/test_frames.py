@@ -1,0 +1,197 @@
+"""Scenes that change with time: what holds for one frame is not taken to hold for another."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lightfield.dataset import config
+from lightfield.dataset.dataset import rendered_frames, scene_datasets
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
+from lightfield.imaging import images
+
+RENDER = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0}
+
+CASES = [
+    "keyed_visibility",
+    "keyed_visibility_that_the_viewport_never_shows",
+    "visibility_keyed_for_viewport_and_render",
+    "visibility_driven_by_the_frame",
+    "visibility_driven_by_an_object",
+    "visibility_driven_by_the_viewport",
+    "visibility_in_an_nla_track",
+    "keyed_rays",
+    "keyed_instancer",
+    "keyed_part_of_an_instanced_collection",
+    "keyed_part_of_a_collection_that_nodes_place",
+    "keyed_switch_of_nodes",
+    "particles_from_a_keyed_emitter",
+    "keyed_object_of_a_linked_collection",
+    "keyed_material",
+    "keyed_modifier",
+    "keyed_constraint",
+    "keyed_bone",
+    "keyed_world",
+    "keyed_light",
+    "keyed_samples",
+    "keyed_simplification",
+    "keyed_view_layer",
+    "blur_across_a_change_of_visibility",
+    "blur_of_a_light_that_changes",
+    "blur_by_a_target_in_another_scene",
+    "blur_by_a_sequence_of_images",
+    "background_that_shows_what_the_scene_excludes",
+    "driver_that_finds_a_hidden_object_by_the_scene",
+    "driver_that_follows_the_camera",
+    "driver_of_what_a_render_has_in_more_detail",
+]
+
+
+@pytest.fixture(scope="module")
+def folder(run_program, tmp_path_factory):
+    """A folder with a .blend of each case, saved at frame 1, and what was rendered of it."""
+    folder = tmp_path_factory.mktemp("animated")
+    run_program(Path(__file__).with_name("animated_renders.py"), folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def scenes(folder):
+    return json.loads((folder / "results.json").read_text())
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_pruning_changes_no_pixel_at_any_frame(name, scenes):
+    assert scenes[name]["same"] == [True, True]
+    # The two frames differ: there is something to lose.
+    assert scenes[name]["changes"]
+
+
+@pytest.mark.parametrize("name", ["blur_by_velocities", "blur_by_velocities_from_nodes"])
+def test_what_has_velocities_is_blurred_though_it_stands_still(name, scenes):
+    assert scenes[name]["left_out"] == ["viewport"]
+
+
+def test_what_has_keyframes_is_known_by_all_the_values_that_it_may_have(scenes):
+    found = scenes["keyed_material"]["inventory"]
+    assert found["transmission"] == found["transparency"] == ["sphere"]
+    assert found["emission"] == ["torus"]
+
+
+def test_objects_are_counted_at_the_frame_that_shows_most(scenes):
+    found = scenes["keyed_visibility"]["inventory"]
+    assert found["frames"] == [1, 5]
+    assert found["fullest_frame"] == 5
+    # The room's six, and the cube.
+    assert found["objects"] == 7
+
+
+@pytest.mark.parametrize("name", ["keyed_samples", "keyed_view_layer"])
+def test_keyframes_do_not_override_what_the_yaml_says(name, scenes):
+    assert scenes[name]["pixels"] == scenes["keyed_light"]["pixels"]
+
+
+LATE = """
+scene: {blend: keyed_visibility.blend, frame: 5}
+render: {samples: 1}
+rigs:
+  View:
+    type: plane
+    cameras: [1, 1]
+    center: [0, 0, 1]
+    camera: {lens: rectilinear, fov: 60, resolution: [9, 9]}
+"""
+
+
+def test_a_cube_that_appears_at_the_yamls_frame_is_in_the_view(folder, run_program):
+    for name in ("configs/scenes", "View"):
+        (folder / name).mkdir(parents=True)
+    (folder / "configs/scenes/late.yaml").write_text(LATE)
+    blend = ("--blend", "keyed_visibility.blend")
+    inventory = ("--inventory", "inventory.json")
+    made = "View/lightfield.json"
+    for program, *words in (
+        ("check_blend.py", "--scene", "late", *blend, "--output", "blend.json"),
+        ("inventory.py", "--scene", "late", *blend, "--output", "inventory.json"),
+        ("make_lightfield.py", "--scene", "late", *inventory, "--output", made),
+        ("render_shard.py", *blend, *inventory, "--lightfield", made, "--output", "View/exr"),
+    ):
+        run_program(program, *words, cwd=folder)
+    found = json.loads((folder / "inventory.json").read_text())
+    assert found["frames"] == [json.loads((folder / made).read_text())["frame"]] == [5]
+    assert found["hidden"] == []
+    depth = images.read_image(folder / "View/exr/view_0000f.exr").channels["Z"]
+    assert depth[4, 4] == pytest.approx(1.5 - 0.4, abs=1e-5)
+
+
+def write_lightfield(path, frame, **render):
+    """Write a light field of two cameras: one where the cube is at frame 5, one beside it."""
+    lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
+    rig = {"type": "lattice", "cameras": [2, 1, 1], "size": 1, "center": [0.5, 1.5, 1]}
+    LightField.from_rig(
+        rig,
+        lens,
+        depth="distance",
+        frame=frame,
+        scene={"fingerprint": "0"},
+        render={**RENDER, "depth_precision": "float", **render},
+    ).write(path)
+
+
+@pytest.mark.parametrize("name", CASES[:4])
+def test_cameras_are_checked_against_what_their_frame_shows(name, folder, run_program, tmp_path):
+    def checked(frame):
+        lightfield = tmp_path / f"{frame}.json"
+        write_lightfield(lightfield, frame)
+        words = ("--blend", folder / f"{name}.blend", "--lightfield", lightfield)
+        return run_program("check_cameras.py", *words, "--output", tmp_path / "out", check=False)
+
+    assert checked(1).returncode == 0
+    inside = checked(5)
+    assert inside.returncode == 1
+    assert "1 of 2 cameras are inside late: view_0000f" in inside.stderr
+
+
+@pytest.mark.parametrize(
+    ("blend", "shown"),
+    [
+        ("keyed_visibility_that_the_viewport_never_shows", "late"),
+        ("particles_from_a_keyed_emitter", "plane > grain"),
+    ],
+)
+def test_instances_that_only_a_render_shows_are_told(blend, shown, folder, run_program, tmp_path):
+    write_lightfield(tmp_path / "lightfield.json", 5, passes=["instance"])
+    words = ("--blend", folder / f"{blend}.blend", "--views", "1:2")
+    words += ("--lightfield", tmp_path / "lightfield.json", "--output", tmp_path / "exr")
+    run_program("render_shard.py", *words)
+    names = json.loads((tmp_path / "instance/names.json").read_text())
+    numbers = [number for name, number in names.items() if name.startswith(shown)]
+    (pixels,) = images.read_image(tmp_path / "instance/view_0001f.exr").channels.values()
+    assert np.isin(pixels, numbers).any()
+
+
+SEQUENCE = """
+scene: {builder: garden, frame: 5}
+render: {samples: 1}
+rigs:
+  Still:
+    type: plane
+    cameras: [2, 1]
+    camera: {lens: rectilinear, fov: 60, resolution: [8, 8]}
+  Sequence:
+    type: plane
+    cameras: [2, 1]
+    frames: {first: 1, last: 9, step: 4}
+    camera: {lens: rectilinear, fov: 60, resolution: [8, 8]}
+"""
+
+
+def test_the_frames_of_a_scene_are_those_of_all_its_rigs(tmp_path, monkeypatch):
+    (tmp_path / "moving.yaml").write_text(SEQUENCE)
+    monkeypatch.setattr(config, "SCENES", tmp_path)
+    assert rendered_frames(scene_datasets("moving")) == [1, 5, 9]
+    own = SEQUENCE.replace("builder: garden, frame: 5", "blend: a.blend, frame: file")
+    (tmp_path / "moving.yaml").write_text(own)
+    assert rendered_frames(scene_datasets("moving")) == [1, 5, 9, "file"]
