@@ -447,7 +447,8 @@ def _ftheta(lens: Lens) -> list[float]:
         if np.abs(fit(nodes) - across).max() < 1e-9:
             break
     pixel = np.abs(np.gradient(across, nodes))
-    miss = np.abs(fit(nodes) - np.stack([across, down])) / pixel
+    beside = _beside_diagonal(lens, nodes, fit(nodes))
+    miss = np.stack([*np.abs(fit(nodes) - [across, down]), beside]) / pixel
     error = float(np.nanmax(miss))
     if not error <= _FIT_LIMIT:
         raise UserError(_not_followed(f"its polynomial misses it by {error:.2g} pixels"))
@@ -464,6 +465,19 @@ def _angles(lens: Lens, radius: Floats) -> tuple[Floats, Floats]:
     right = lens.rays(x + radius, np.full_like(radius, y))
     below = lens.rays(np.full_like(radius, x), y + radius)
     return np.arctan2(right[:, 0], -right[:, 2]), np.arctan2(-below[:, 1], -below[:, 2])
+
+
+def _beside_diagonal(lens: Lens, radius: Floats, angle: Floats) -> Floats:
+    """Return by which angle (n,) the rays from the centre to a corner differ from a fisheye's.
+
+    The fisheye has ``angle`` (n,) at ``radius`` (n,). NaN where the lens has no ray.
+    """
+    x, y = lens.center
+    rays = lens.rays(x + radius * math.sqrt(0.5), y + radius * math.sqrt(0.5))
+    side = np.sin(angle) * math.sqrt(0.5)
+    expected = np.stack([side, -side, -np.cos(angle)], axis=-1)
+    apart: Floats = 2 * np.arcsin((np.linalg.norm(rays - expected, axis=-1) / 2).clip(max=1))
+    return apart
 
 
 def _not_followed(reason: str) -> str:
