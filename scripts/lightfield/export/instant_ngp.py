@@ -33,6 +33,7 @@ from lightfield.core.cli import above_zero, finite
 from lightfield.core.errors import UserError
 from lightfield.core.files import keep_apart, read_json, write_json
 from lightfield.core.progress import Progress
+from lightfield.dataset.exports import BOUNDS_PIXELS, BOUNDS_VIEWS
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.view_store import ViewStore
 from lightfield.export.source import DEPTH_UNIT, Floats, check_size, depth_of, millimetres
@@ -54,10 +55,6 @@ MASK = "dynamic_mask_{view}.png"
 """Beside a PNG view: the loader trains on no pixel where this is above 0."""
 
 _FIT_LIMIT = 0.25  # pixels by which the loader's polynomial may miss a fisheye's ray
-
-# Enough views to know how far the scene reaches, and pixels of each.
-_BOUNDS_VIEWS = 64
-_BOUNDS_PIXELS = 64
 
 
 def _pictures(path: Path) -> list[str]:
@@ -213,9 +210,9 @@ class _Writer:
     def seen_points(self) -> Iterator[Floats]:
         """Yield world points (n, 3) seen by views spread over the rig."""
         views = self.lightfield.views
-        step = max(1, max(self.lens.width, self.lens.height) // _BOUNDS_PIXELS)
+        step = max(1, max(self.lens.width, self.lens.height) // BOUNDS_PIXELS)
         part = np.s_[step // 2 :: step, step // 2 :: step]
-        for index in np.unique(np.linspace(0, len(views) - 1, _BOUNDS_VIEWS).round().astype(int)):
+        for index in np.unique(np.linspace(0, len(views) - 1, BOUNDS_VIEWS).round().astype(int)):
             view, distance = views[index], self.depth(views[index], "distance")[part]
             points = (self.rays[part] * distance[..., None])[np.isfinite(distance)]
             yield points @ view.matrix[:3, :3].T + view.matrix[:3, 3]
