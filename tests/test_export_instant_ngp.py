@@ -38,6 +38,7 @@ FISHEYE = {"lens": "equidistant", "resolution": [64, 64], "fov": 180}
 WIDE = {"lens": "equidistant", "resolution": [65, 65], "fov": 220}
 ORTHOGRAPHIC = {"lens": "orthographic", "resolution": [512, 512], "fov": 180}
 PANORAMA = {"lens": "equirectangular", "resolution": [64, 32]}
+HALF_PANORAMA = {"lens": "equirectangular", "longitude": [-90, 90], "resolution": [32, 32]}
 
 
 class Dataset:
@@ -524,6 +525,8 @@ def test_what_is_a_polynomial_goes_as_it_is(turned: int, dataset: Dataset) -> No
         (ORTHOGRAPHIC | {"resolution": [40, 40]}, [], "misses it by 0.26 pixels"),
         (PANORAMA | {"latitude": [-45, 45]}, [], "instant-ngp cannot follow"),
         (PANORAMA | {"longitude": [-180, 170]}, [], "instant-ngp cannot follow"),
+        # A fisheye along both axes of the image, and none between them.
+        (HALF_PANORAMA, [], "instant-ngp cannot follow"),
         (FISHEYE, ["--offset", 0, 0, 0], "--offset: goes with --scale"),
         (FISHEYE, ["--placed-as", __file__], r"\.py: is not JSON"),
         (FISHEYE, ["--image-suffix", ".exr"], "view_0000f.exr: no such file"),

@@ -3,10 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from lightfield.dataset.exports import FARTHEST
 from lightfield.export.source import Floats
-
-FARTHEST = 1000.0
-"""Metres: where nothing is hit, and what is farther, is taken to be here."""
 
 
 def depth_range(depth: Floats) -> tuple[float, float]:

@@ -33,6 +33,7 @@ from lightfield.core.cli import above_zero, finite
 from lightfield.core.errors import UserError
 from lightfield.core.files import keep_apart, read_json, write_json
 from lightfield.core.progress import Progress
+from lightfield.dataset.exports import BOUNDS_PIXELS, BOUNDS_VIEWS
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.view_store import ViewStore
 from lightfield.export.source import DEPTH_UNIT, Floats, check_size, depth_of, millimetres
@@ -54,10 +55,6 @@ MASK = "dynamic_mask_{view}.png"
 """Beside a PNG view: the loader trains on no pixel where this is above 0."""
 
 _FIT_LIMIT = 0.25  # pixels by which the loader's polynomial may miss a fisheye's ray
-
-# Enough views to know how far the scene reaches, and pixels of each.
-_BOUNDS_VIEWS = 64
-_BOUNDS_PIXELS = 64
 
 
 def _pictures(path: Path) -> list[str]:
@@ -213,9 +210,9 @@ class _Writer:
     def seen_points(self) -> Iterator[Floats]:
         """Yield world points (n, 3) seen by views spread over the rig."""
         views = self.lightfield.views
-        step = max(1, max(self.lens.width, self.lens.height) // _BOUNDS_PIXELS)
+        step = max(1, max(self.lens.width, self.lens.height) // BOUNDS_PIXELS)
         part = np.s_[step // 2 :: step, step // 2 :: step]
-        for index in np.unique(np.linspace(0, len(views) - 1, _BOUNDS_VIEWS).round().astype(int)):
+        for index in np.unique(np.linspace(0, len(views) - 1, BOUNDS_VIEWS).round().astype(int)):
             view, distance = views[index], self.depth(views[index], "distance")[part]
             points = (self.rays[part] * distance[..., None])[np.isfinite(distance)]
             yield points @ view.matrix[:3, :3].T + view.matrix[:3, 3]
@@ -447,7 +444,8 @@ def _ftheta(lens: Lens) -> list[float]:
         if np.abs(fit(nodes) - across).max() < 1e-9:
             break
     pixel = np.abs(np.gradient(across, nodes))
-    miss = np.abs(fit(nodes) - np.stack([across, down])) / pixel
+    beside = _beside_diagonal(lens, nodes, fit(nodes))
+    miss = np.stack([*np.abs(fit(nodes) - [across, down]), beside]) / pixel
     error = float(np.nanmax(miss))
     if not error <= _FIT_LIMIT:
         raise UserError(_not_followed(f"its polynomial misses it by {error:.2g} pixels"))
@@ -464,6 +462,19 @@ def _angles(lens: Lens, radius: Floats) -> tuple[Floats, Floats]:
     right = lens.rays(x + radius, np.full_like(radius, y))
     below = lens.rays(np.full_like(radius, x), y + radius)
     return np.arctan2(right[:, 0], -right[:, 2]), np.arctan2(-below[:, 1], -below[:, 2])
+
+
+def _beside_diagonal(lens: Lens, radius: Floats, angle: Floats) -> Floats:
+    """Return by which angle (n,) the rays from the centre to a corner differ from a fisheye's.
+
+    The fisheye has ``angle`` (n,) at ``radius`` (n,). NaN where the lens has no ray.
+    """
+    x, y = lens.center
+    rays = lens.rays(x + radius * math.sqrt(0.5), y + radius * math.sqrt(0.5))
+    side = np.sin(angle) * math.sqrt(0.5)
+    expected = np.stack([side, -side, -np.cos(angle)], axis=-1)
+    apart: Floats = 2 * np.arcsin((np.linalg.norm(rays - expected, axis=-1) / 2).clip(max=1))
+    return apart
 
 
 def _not_followed(reason: str) -> str:

@@ -13,9 +13,9 @@ import numpy as np
 
 from lightfield.core.files import write_json
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import OpenDibr
+from lightfield.dataset.exports import FARTHEST, OpenDibr
 from lightfield.export import cameras, yuv
-from lightfield.export.disparity import FARTHEST, depth_range, levels
+from lightfield.export.disparity import depth_range, levels
 from lightfield.export.source import Floats, Source
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant

@@ -238,6 +238,17 @@ def names(sets: Sequence[ImageSet]) -> list[str]:
     return [f"{each.name}/{NAMES}" for each in found if each.kind == "id"]
 
 
+def lists_of(
+    dataset: Path,
+    image_set: ImageSet,
+    manifest: Manifest,
+    wanted: Collection[Path] | None = None,
+) -> list[Path]:
+    """Return a set's lists of one kind of export; only those ``wanted``, if it is given."""
+    there = sorted((dataset / image_set.name).glob(manifest.lists))
+    return [path for path in there if wanted is None or path.resolve() in wanted]
+
+
 def of_exports(
     dataset: Path,
     sets: Sequence[ImageSet],
@@ -256,8 +267,7 @@ def of_exports(
     for number, image_set in enumerate(sets):
         folders, patterns = {image_set.folder}, [BESIDE]
         for manifest in manifests:
-            there = sorted((dataset / image_set.name).glob(manifest.lists))
-            taken = [path for path in there if wanted is None or path.resolve() in wanted]
+            taken = lists_of(dataset, image_set, manifest, wanted)
             patterns += manifest.beside if taken or wanted is None else ()
             for path in taken:
                 lists.append(path.relative_to(dataset).as_posix())

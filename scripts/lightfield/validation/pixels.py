@@ -17,8 +17,9 @@ from lightfield.dataset.passes import MANIFEST, NAMES, Pass
 from lightfield.geometry.flow import in_frame
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
-from lightfield.validation import consistency
+from lightfield.validation import consistency, depth_questions
 from lightfield.validation.consistency import Answer, Patches
+from lightfield.validation.depth_questions import Question
 from lightfield.validation.files import IMAGES, File, ImageSet, rendered, source_view
 from lightfield.validation.result import Check
 
@@ -45,7 +46,8 @@ class Facts:
     ``clamped`` and ``nan`` are the renderer's counts, ``machine`` is where it ran, ``marked``
     whether the pixels without a source could be compared, ``constant`` whether a reprojected view
     has one colour (as a piece of sky or a wall may), ``missed`` the part of the lens's pixels that
-    hit nothing and ``patches`` what geometry needs, both of a view with depth.
+    hit nothing and ``patches`` what geometry needs, both of a view with depth. ``of_depth``
+    answers what it was asked.
     """
 
     checksum: str
@@ -58,6 +60,7 @@ class Facts:
     constant: bool = False
     missed: float = 0.0
     patches: Patches | None = None
+    of_depth: depth_questions.Answer | None = None
 
     def fault(self, check: str, text: str, found: bool | int = True) -> None:
         """Note what a check finds wrong, if it was ``found`` at all."""
@@ -74,8 +77,11 @@ class Examiner:
         self.regions: dict[Any, tuple[Bools, Bools]] = {}
         self.numbers: dict[Pass, set[int]] = {}
 
-    def examine(self, file: File) -> Facts:
-        """Read an image file whole and find out what it shows by itself."""
+    def examine(self, file: File, question: Question | None = None) -> Facts:
+        """Read an image file whole and find out what it shows by itself.
+
+        A view with depth also answers the ``question`` about that.
+        """
         path = self.dataset / file.path
         facts = Facts(sha256(path), path.stat().st_size)
         image_set = self.sets[file.set]
@@ -99,6 +105,9 @@ class Examiner:
                 facts.fault("images", problem)
             else:
                 self._examine_view(file, image, facts)
+                if question and "Z" in image.channels:
+                    camera, depth = image_set.camera(file.view), image.channels["Z"]
+                    facts.of_depth = depth_questions.answer(question, camera, depth)
         return facts
 
     def answer(self, file: File, questions: list[tuple[int, Patches]]) -> list[Answer]:
@@ -110,6 +119,14 @@ class Examiner:
             consistency.ask(patches, image_set.camera(asking), camera, depth)
             for asking, patches in questions
         ]
+
+    def answer_depth(self, file: File, question: Question) -> depth_questions.Answer | None:
+        """Answer a question about a view's depth; None if it cannot be read."""
+        try:
+            depth = images.read_image(self.dataset / file.path, ["Z"]).channels["Z"]
+        except UserError:
+            return None
+        return depth_questions.answer(question, self.sets[file.set].camera(file.view), depth)
 
     def _examine_view(self, file: File, image: images.Image, facts: Facts) -> None:
         image_set = self.sets[file.set]

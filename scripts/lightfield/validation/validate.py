@@ -2,7 +2,9 @@
 
 `validate` reads every image once, in as many processes as it is given, for what one file can tell
 (`pixels`); the views with depth are read once more for what only several views together can tell
-(`geometry`). Memory holds a few hundred points a view.
+(`geometry`). Exports are read back before (`exported_cameras`); what they say of depth is compared
+while the views are read (`exported_depth`). Memory holds a few hundred points a view, and the
+exported ones.
 
 The result is a list of checks, each passed, failed, or not applicable and why: what could not be
 checked is said, never counted as right.
@@ -23,9 +25,18 @@ from lightfield.core.failures import LESS_MEMORY
 from lightfield.core.files import read_json, sha256
 from lightfield.core.progress import Progress
 from lightfield.dataset.records import read as read_record
-from lightfield.validation import files, geometry, machines, pixels
+from lightfield.validation import (
+    depth_questions,
+    exported_cameras,
+    files,
+    geometry,
+    machines,
+    pixels,
+)
 from lightfield.validation import splits as validation_splits
 from lightfield.validation.consistency import Answer
+from lightfield.validation.depth_questions import Question
+from lightfield.validation.exported_depth import ExportedDepth
 from lightfield.validation.files import File, Manifest
 from lightfield.validation.pixels import Examiner, Facts
 from lightfield.validation.result import Check, Result
@@ -64,11 +75,15 @@ def validate(
     written = [sums for record in records for sums in read_record(record).items()]
     cameras = files.clearance(clearance, sets)
     split = [validation_splits.check(splits, dataset, sets)] if splits else []
+    of_cameras, exported = exported_cameras.check(dataset, sets, manifests, wanted)
+    checks += of_cameras
+    exported_depth = ExportedDepth(dataset, sets, exported)
     facts: dict[File, Facts] = {}
     with _workers(Examiner(dataset, sets), processes) as mapped:
         images = views + passes + extras
         progress = Progress(len(images), f"validate {dataset.name}", "files")
-        for file, fact in mapped(_examine, images):
+        with_questions = [(file, exported_depth.question(file)) for file in images]
+        for file, fact in mapped(_examine, with_questions):
             facts[file] = fact
             progress.done()
         for number, image_set in enumerate(sets):
@@ -77,6 +92,8 @@ def validate(
             checks += [presence[number], *pixels.checks(image_set, own, volumes)]
             checks.append(geometry.check(image_set, seen, lambda asked: mapped(_answer, asked)))
             checks += machines.check(image_set.lightfield, [fact.machine for fact in own.values()])
+        answers = {(f.set, f.view): fact.of_depth for f, fact in facts.items() if fact.of_depth}
+        checks += exported_depth.checks(answers, lambda asked: mapped(_answer_depth, asked))
     if passes or missing:
         checks.append(pixels.of_passes({file: facts[file] for file in passes}, missing))
     checks.append(pixels.with_extras(exports, {file: facts[file] for file in extras}))
@@ -142,8 +159,13 @@ def _start_worker(examiner: Examiner) -> None:
     oiio.attribute("exr_threads", 1)
 
 
-def _examine(file: File) -> tuple[File, Facts]:
-    return file, _examiner.examine(file)
+def _examine(asked: tuple[File, Question | None]) -> tuple[File, Facts]:
+    file, question = asked
+    return file, _examiner.examine(file, question)
+
+
+def _answer_depth(asked: tuple[File, Question]) -> depth_questions.Answer | None:
+    return _examiner.answer_depth(*asked)
 
 
 def _answer(question: geometry.Question) -> list[Answer]:

@@ -1,0 +1,281 @@
+"""Do the exports have the cameras of lightfield.json? Each is read as its consumer reads it.
+
+Compared are each view's pose, each lens by where it projects the rays of pixels, which views are
+there and what they are for, and the numbers that a file has twice. Numbers agree that are a few
+steps of float32 apart, for consumers compute with that.
+"""
+
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from lightfield.core.errors import UserError
+from lightfield.dataset.lightfield import NAME, LightField, View
+from lightfield.dataset.splits import SPLITS
+from lightfield.geometry import rotations
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.rigs.split import PARTS
+from lightfield.validation import unit_cube
+from lightfield.validation.files import ImageSet, Manifest, lists_of
+from lightfield.validation.readers import read
+from lightfield.validation.readers.cameras import Camera, PolynomialFisheye
+from lightfield.validation.readers.contents import FLOAT32, Exported, ExportedView, Floats
+from lightfield.validation.result import Check
+
+# Rays are compared at so many pixels along each side of an image.
+GRID = 33
+# instant-ngp's polynomial is fitted to a lens that is none; so many pixels it may miss it.
+FITTED_PIXELS = 0.25
+# Where the scene has no split, every such view by name tests, as in most trainers' own examples.
+EVERY = 8
+
+
+@dataclass(frozen=True)
+class SetExport:
+    """What one export says of the views of the set with this number.
+
+    ``fits_depth`` is whether instant-ngp's unit cube is fitted to the depth of these views.
+    """
+
+    number: int
+    exported: Exported
+    fits_depth: bool
+
+
+class Expected:
+    """What lightfield.json says of a set's views, and the scene's other rigs of theirs."""
+
+    def __init__(self, dataset: Path, image_set: ImageSet) -> None:
+        self.dataset = dataset
+        self.image_set = image_set
+        self.path = f"{image_set.prefix}{NAME}"
+        self.own = image_set.numbers
+
+    @cached_property
+    def others(self) -> dict[str, View]:
+        """The views of rigs in the same scene, named <rig>_<view>, as far as they are here."""
+        return {
+            f"{rig}_{view.name}": view
+            for rig, folder in self.other_rigs.items()
+            for view in _views(folder / self.image_set.name / NAME)
+        }
+
+    @cached_property
+    def other_rigs(self) -> dict[str, Path]:
+        """The datasets of the scene's other rigs, by their names; none without a splits.json."""
+        # A frame of a sequence lies one folder deeper.
+        for home in self.dataset.parents[:2]:
+            if (home / SPLITS).is_file():
+                rig, *below = self.dataset.relative_to(home).parts
+                folders = {path.parent.name: path.parent for path in home.glob(f"*/{NAME}")}
+                if below:
+                    found = home.glob(f"*/{below[0]}/{NAME}")
+                    folders = {path.parent.parent.name: path.parent for path in found}
+                return {name: folder for name, folder in folders.items() if name != rig}
+        return {}
+
+    @property
+    def has_split(self) -> bool:
+        """Whether the scene itself says what the views are for."""
+        return any(view.split for view in self.image_set.lightfield.views)
+
+    @cached_property
+    def parts(self) -> Mapping[str, set[str]]:
+        """The names of the views of each part: by the scene's split, or every eighth to test."""
+        views = dict(zip(self.own, self.image_set.lightfield.views, strict=True))
+        if self.has_split:
+            views |= self.others
+            parts = {
+                str(part): {name for name, view in views.items() if view.split == part}
+                for part in PARTS
+            }
+        else:
+            tests = set(sorted(views)[::EVERY])
+            parts = {"train": views.keys() - tests, "validation": set(), "test": tests}
+        # Without views of their own, those to test with validate.
+        parts["validation"] = parts["validation"] or parts["test"]
+        return parts
+
+    @property
+    def lacks_rigs(self) -> bool:
+        """Whether other rigs test what these views train, and their datasets are not here."""
+        return not self.parts["test"]
+
+    def view(self, name: str) -> View | None:
+        """Return the view of a name that an export has; None if it is not here."""
+        if name in self.own:
+            return self.image_set.lightfield.views[self.own[name]]
+        return self.others.get(name)
+
+
+def _views(path: Path) -> Sequence[View]:
+    """Return the views of another rig; none where its lightfield.json cannot be read."""
+    try:
+        return LightField.read(path).views
+    except UserError:
+        return ()
+
+
+def check(
+    dataset: Path,
+    sets: Sequence[ImageSet],
+    manifests: Sequence[Manifest],
+    wanted: Collection[Path] | None = None,
+) -> tuple[list[Check], list[SetExport]]:
+    """Return a check for each set that has exports, and what could be read of them.
+
+    ``wanted`` is that of `files.of_exports`.
+    """
+    checks = []
+    found: list[SetExport] = []
+    for number, image_set in enumerate(sets):
+        expected = Expected(dataset, image_set)
+        lens = image_set.lightfield.lens
+        problems: list[str] = []
+        views = 0
+        paths = [
+            path
+            for manifest in manifests
+            for path in lists_of(dataset, image_set, manifest, wanted)
+        ]
+        for path in paths:
+            try:
+                exported = read(path, (lens.width, lens.height))
+            except UserError as error:
+                problems.append(str(error))
+                continue
+            cube = exported.cube
+            if cube and not unit_cube.is_of_rig(cube, image_set, expected.other_rigs):
+                cube = None
+            found.append(SetExport(number, exported, cube is not None and cube.fits_depth))
+            views += len(exported.views)
+            problems += exported.faults
+            problems += _faults(exported, expected)
+            if cube and not cube.fits_depth:
+                problems += unit_cube.faults(cube, image_set.lightfield.matrices)
+        if paths:
+            shown = [problem.replace(f"{dataset}/", "") for problem in problems]
+            detail = f"{len(paths)} exports have {views} cameras as {expected.path} has them"
+            if problems:
+                detail = f"{len(paths)} exports have {views} cameras, not all as {expected.path}"
+            name = f"{image_set.prefix}exported_cameras"
+            checks.append(Check(name, not problems, detail, problems=shown))
+    return checks, found
+
+
+def _faults(exported: Exported, expected: Expected) -> Iterator[str]:
+    """Yield what one export says otherwise than lightfield.json."""
+    lens = expected.image_set.lightfield.lens
+    errors: dict[Camera, str | None] = {}
+    for given in exported.cameras:
+        if given.camera not in errors:
+            errors[given.camera] = _lens_fault(given.camera, lens)
+        if fault := errors[given.camera]:
+            yield f"{given.place}: {fault} {expected.path}"
+    if exported.views:
+        yield from _pose_faults(exported.views, expected)
+        yield from _name_faults(exported, expected)
+    for part in exported.parts:
+        yield from _different_names(part.place, part.names, expected.parts[part.part], expected)
+
+
+def _lens_fault(camera: Camera, lens: Lens) -> str | None:
+    """Say how a camera differs from the lens, for "… that of" a file to follow."""
+    if (camera.width, camera.height) != (lens.width, lens.height):
+        size = f"{camera.width} × {camera.height} pixels"
+        return f"its image has {size}, not the {lens.width} × {lens.height} of"
+    across, down = (np.linspace(0.5, side - 0.5, GRID) for side in (lens.width, lens.height))
+    x, y = (axis.ravel() for axis in np.meshgrid(across, down))
+    rays = lens.rays(x, y)
+    seen = np.isfinite(rays).all(axis=-1)
+    limit = FLOAT32 * max(lens.width, lens.height)
+    if isinstance(camera, PolynomialFisheye):
+        # Its loader sees less than 90 degrees from the axis.
+        seen &= rays[:, 2] < -1e-6
+        limit = limit if camera.is_equidistant else FITTED_PIXELS
+    found = camera.pixels(rays[seen])
+    apart = np.abs(found - np.stack([x, y], axis=-1)[seen]).max(axis=-1)
+    if (apart <= limit).all():
+        return None
+    if np.isnan(apart).any():
+        return "its camera does not see all rays that are seen by the lens of"
+    return f"its camera has rays up to {apart.max():.3g} pixels from where they are by the lens of"
+
+
+def _pose_faults(views: Sequence[ExportedView], expected: Expected) -> Iterator[str]:
+    """Yield the views whose matrix is not that of lightfield.json, in either of its two forms."""
+    matrices = np.array([view.matrix for view in views])
+    named = [expected.view(view.name) if view.name else None for view in views]
+    if all(view.name is None for view in views):
+        named = list(_nearest(matrices[:, :3, 3], expected))
+    compared = [index for index, view in enumerate(named) if view]
+    if not compared:
+        return
+    right = [view for view in named if view]
+    forms = np.array([[view.matrix for view in right], [view.matrix for view in right]])
+    forms[1, :, :3, :3] = rotations.euler_to_matrix(np.array([view.rotation for view in right]))
+    forms[1, :, :3, 3] = [view.position for view in right]
+    difference = np.abs(matrices[compared] - forms)
+    turned = difference[..., :3, :3].max(axis=(-1, -2)).min(axis=0)
+    moved = difference[..., :3, 3].max(axis=-1).min(axis=0)
+    last = difference[..., 3, :].max(axis=-1).min(axis=0)
+    reach = 1 + np.abs(forms[..., :3, 3]).max(axis=(0, -1))
+    for row, (index, view) in enumerate(zip(compared, right, strict=True)):
+        where = f"{views[index].file}: {views[index].place} ({views[index].name or view.name})"
+        if not moved[row] <= FLOAT32 * reach[row]:
+            yield f"{where}: its position is {moved[row]:.2g} m from that in {expected.path}"
+        if not turned[row] <= FLOAT32:
+            yield (
+                f"{where}: its rotation differs by {turned[row]:.2g} from that in {expected.path}"
+            )
+        if last[row] != 0:
+            yield f"{where}: the last row of its matrix is not 0, 0, 0, 1"
+
+
+def _nearest(positions: Floats, expected: Expected) -> Iterable[View]:
+    """Return the view of the set that is nearest to each of the positions (n, 3)."""
+    from scipy.spatial import KDTree
+
+    lightfield = expected.image_set.lightfield
+    rows = KDTree(lightfield.matrices[:, :3, 3]).query(positions)[1]
+    return [lightfield.views[row] for row in rows]
+
+
+def _name_faults(exported: Exported, expected: Expected) -> Iterator[str]:
+    """Yield the views that a file lacks, has twice, or that it must not have."""
+    first = exported.views[0]
+    if first.name is None:
+        if len(exported.views) != len(expected.own):
+            counts = f"{len(exported.views)} views, but {expected.path} {len(expected.own)}"
+            yield f"{first.file}: has {counts}"
+        return
+    names = [view.name or "" for view in exported.views]
+    for part in exported.parts:
+        for name in sorted(set(part.names).difference(names)):
+            yield f"{part.place}: has {name}, which is none of its views"
+    # The lists of NeRF's synthetic scenes are compared as parts of the split.
+    if all(view.file == first.file for view in exported.views):
+        wanted = set(expected.own)
+        if exported.views_of and expected.has_split:
+            wanted = wanted & expected.parts[exported.views_of]
+        yield from _different_names(str(first.file), names, wanted, expected)
+
+
+def _different_names(
+    place: str, names: Sequence[str], wanted: Collection[str], expected: Expected
+) -> Iterator[str]:
+    """Yield the names that are there twice, are missing, or are too many."""
+    for name, count in Counter(names).items():
+        if count > 1:
+            yield f"{place}: has {name} {count} times"
+    for name in sorted(set(wanted).difference(names)):
+        yield f"{place}: lacks {name} of {expected.path}"
+    for name in sorted(set(names).difference(wanted)):
+        if name in expected.own:
+            yield f"{place}: has {name}, which is for something else by {expected.path}"
+        elif expected.view(name) is None and not expected.lacks_rigs:
+            yield f"{place}: has {name}, but {expected.path} has no such view"

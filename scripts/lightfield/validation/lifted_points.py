@@ -1,0 +1,75 @@
+"""Which views' pixels have exported points been lifted from?
+
+A point that was lifted from a view lies on the ray of one of its pixels' centres. Exporters lift
+view by view; so the views of some points tell between which the views of the others are.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lightfield.geometry.lenses import Lens
+from lightfield.validation.readers.contents import FLOAT32, Floats
+
+Ints = NDArray[np.int64]
+
+# At most so many pairs of a point and a view are tried at once.
+MOST_PAIRS = 300_000
+
+
+def likely_views(points: NDArray[Any], lens: Lens, matrices: Floats) -> tuple[Ints, Ints]:
+    """Return pairs, as two arrays of indices: points, and views from which they may be lifted.
+
+    ``points`` (n, 3) are taken to be in the order of their views (m, 4, 4). The middle point is
+    tried with all views; those on whose pixels' rays it lies bound the views of the points before
+    and after it, and so on in both halves. A point may be in no pair, or in several.
+    """
+    low, high = np.array([0]), np.array([len(points)])
+    first, last = np.array([0]), np.array([len(matrices) - 1])
+    pairs = [(np.empty(0, np.int64), np.empty(0, np.int64))]
+    while True:
+        settled = first == last
+        for start, end, view in zip(low[settled], high[settled], first[settled], strict=True):
+            pairs.append((np.arange(start, end), np.full(end - start, view)))
+        is_open = (first < last) & (low < high)
+        low, high, first, last = (each[is_open] for each in (low, high, first, last))
+        counts = last - first + 1
+        if not 0 < counts.sum() <= MOST_PAIRS:
+            break
+        middle = (low + high) // 2
+        which = np.repeat(np.arange(len(middle)), counts)
+        view = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts - first, counts)
+        near = on_pixel_rays(points[middle[which]], lens, matrices[view])
+        which, view = which[near], view[near]
+        pairs.append((middle[which], view))
+        least, most = last.copy(), first.copy()
+        np.minimum.at(least, which, view)
+        np.maximum.at(most, which, view)
+        unknown = most < least
+        least, most = np.where(unknown, first, least), np.where(unknown, last, most)
+        low, high = np.concatenate([low, middle + 1]), np.concatenate([middle, high])
+        first, last = np.concatenate([first, least]), np.concatenate([most, last])
+    found_points, found_views = zip(*pairs, strict=True)
+    return np.concatenate(found_points), np.concatenate(found_views)
+
+
+def on_pixel_rays(points: NDArray[Any], lens: Lens, matrices: Floats) -> NDArray[np.bool_]:
+    """Return whether points (n, 3) lie on rays of pixels' centres of their views (n, 4, 4)."""
+    # A damaged point may be anywhere.
+    with np.errstate(invalid="ignore", over="ignore"):
+        away = points.astype(np.float64) - matrices[:, :3, 3]
+        local = np.einsum("nij,ni->nj", matrices[:, :3, :3], away)
+        pixels = lens.pixels(local)
+        x, y = np.floor(pixels.T) + 0.5
+        rays = lens.rays(x, y)
+        beside = local - (local * rays).sum(axis=1, keepdims=True) * rays
+        inside = ((pixels >= 0) & (pixels < [lens.width, lens.height])).all(axis=1)
+        near: NDArray[np.bool_] = inside & (np.linalg.norm(beside, axis=1) <= resolved(points))
+    return near
+
+
+def resolved(points: NDArray[Any]) -> Floats:
+    """Return by how many metres (n,) the numbers of points (n, 3) may be off."""
+    limit: Floats = FLOAT32 * (1 + np.abs(points.astype(np.float64)).max(axis=1, initial=0))
+    return limit

@@ -1,0 +1,398 @@
+"""A COLMAP model, binary or text, read by COLMAP's format.rst and models.h.
+
+Poses are world to camera with x right, y down and z forward. What the model says twice must agree:
+an image's points with the points' tracks, and where an image has a point with where its camera
+projects it.
+"""
+
+import struct
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lightfield.validation.readers.cameras import Camera, OpenCVFisheye, Pinhole
+from lightfield.validation.readers.contents import (
+    FLOAT32,
+    Cloud,
+    Exported,
+    ExportedCamera,
+    ExportedView,
+    Floats,
+    Part,
+    from_texts,
+    numbers,
+    reading,
+)
+
+Ints = NDArray[np.int64]
+
+# COLMAP's id, name and class of each model, with the number of its parameters.
+MODELS: dict[int, tuple[str, Callable[..., Camera], int]] = {
+    1: ("PINHOLE", Pinhole, 4),
+    5: ("OPENCV_FISHEYE", OpenCVFisheye, 8),
+}
+NAMES = {name: number for number, (name, _, _) in MODELS.items()}
+
+# POINTS2D that see no point have this number.
+NO_POINT = -1
+
+# From COLMAP's camera to that of lightfield.json (y up, looks along −z), and back.
+_FLIP = np.diag([1.0, -1.0, -1.0])
+
+
+@dataclass(frozen=True)
+class Image:
+    """One image: ``pixels`` (m, 2) are where it sees the points called ``points`` (m,)."""
+
+    number: int
+    name: str
+    camera: int
+    turn: Floats
+    shift: Floats
+    pixels: Floats
+    points: Ints
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points (n,) and their tracks, one after the other: ``sizes`` (n,) are the tracks' lengths.
+
+    A row of ``tracks`` is the number of an image, and the place among the points that it sees.
+    ``errors`` (n,) are how many pixels on average the images have a point beside its projection.
+    """
+
+    numbers: Ints
+    positions: Floats
+    errors: Floats
+    sizes: Ints
+    tracks: Ints
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model in a ``folder``, whose files end in ``suffix``."""
+
+    folder: Path
+    suffix: str
+    cameras: dict[int, Camera]
+    images: list[Image]
+    points: Points
+
+    def file(self, name: str) -> Path:
+        return self.folder / f"{name}{self.suffix}"
+
+
+def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Exported:
+    """Read the model of an export, and the names of the images to test with."""
+    folder = listing.parent / "sparse" / "0"
+    model = read_model(folder, ".bin" if options["format"] == "binary" else ".txt")
+    exported = exported_model(model, listing.parent / "images")
+    tests = folder / "test.txt"
+    if tests.is_file():
+        with reading(tests, "list of images"):
+            names = [Path(line).stem for line in tests.read_text(encoding="utf-8").splitlines()]
+        exported.parts.append(Part(str(tests), "test", names))
+    if options["depth"]:
+        for image in model.images:
+            _check_depth_map(
+                listing.parent / "stereo/depth_maps" / f"{image.name}.geometric.bin", size, exported
+            )
+    return exported
+
+
+def read_model(folder: Path, suffix: str) -> Model:
+    """Read the three files of a model, ``.bin`` or ``.txt``."""
+    readers = {".bin": (_binary_cameras, _binary_images, _binary_points)}
+    readers[".txt"] = (_text_cameras, _text_images, _text_points)
+    contents: list[Any] = []
+    for name, parse in zip(("cameras", "images", "points3D"), readers[suffix], strict=True):
+        path = folder / f"{name}{suffix}"
+        with reading(path, f"COLMAP {name} file"):
+            contents.append(parse(path))
+            if not contents[-1] and name != "points3D":
+                raise ValueError("it is empty")
+    return Model(folder, suffix, *contents)
+
+
+def exported_model(model: Model, pictures: Path) -> Exported:
+    """Return what a model says of the images in the folder ``pictures``."""
+    exported = Exported()
+    cameras_file, images_file = model.file("cameras"), model.file("images")
+    for number, camera in model.cameras.items():
+        exported.cameras.append(ExportedCamera(f"{cameras_file}: camera {number}", camera))
+    seen: set[int] = set()
+    for image in model.images:
+        place = f"image {image.number}"
+        if image.number in seen:
+            exported.faults.append(f"{images_file}: {place}: is there twice")
+        seen.add(image.number)
+        if image.camera not in model.cameras:
+            exported.faults.append(f"{images_file}: {place}: has no camera {image.camera}")
+        if not (pictures / image.name).is_file():
+            exported.faults.append(f"{images_file}: {place}: {image.name} is no file")
+        matrix = np.eye(4)
+        matrix[:3, :3] = image.turn.T @ _FLIP
+        matrix[:3, 3] = -image.turn.T @ image.shift
+        view = ExportedView(images_file, place, Path(image.name).stem, matrix)
+        exported.views.append(view)
+    points_file, points = model.file("points3D"), model.points
+    if len(np.unique(points.numbers)) < len(points.numbers):
+        exported.faults.append(f"{points_file}: two points have one number")
+    exported.clouds.append(Cloud(points_file, "point", points.numbers, points.positions))
+    exported.faults += _track_faults(model)
+    exported.faults += _projection_faults(model)
+    return exported
+
+
+def _turn(quaternion: Floats) -> Floats:
+    """Return the matrix (3, 3) of a quaternion (w, x, y, z), as COLMAP's readers compute it.
+
+    None of them makes a quaternion a unit one first, so the matrix of any other is no rotation.
+    """
+    w, x, y, z = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _camera(model: int, width: int, height: int, parameters: Floats) -> Camera:
+    name, kind, count = MODELS[model]
+    if len(parameters) != count:
+        raise ValueError(f"{name} has {count} parameters, not {len(parameters)}")
+    return kind(width, height, *parameters.tolist())
+
+
+# ---- binary ---------------------------------------------------------------------------------
+
+
+def _binary_cameras(path: Path) -> dict[int, Camera]:
+    content, place = path.read_bytes(), 8
+    cameras = {}
+    for _ in range(struct.unpack_from("<Q", content)[0]):
+        number, model, width, height = struct.unpack_from("<iiQQ", content, place)
+        if model not in MODELS:
+            raise ValueError(f"camera {number}: its model is {model}, not {[*MODELS]}")
+        count = MODELS[model][2]
+        parameters = numbers(np.frombuffer(content, "<f8", count, place + 24), (count,))
+        cameras[number] = _camera(model, width, height, parameters)
+        place += 24 + 8 * count
+    _require_end(content, place)
+    return cameras
+
+
+def _binary_images(path: Path) -> list[Image]:
+    content, place = path.read_bytes(), 8
+    row = np.dtype([("pixel", "<f8", 2), ("point", "<i8")])
+    images = []
+    for _ in range(struct.unpack_from("<Q", content)[0]):
+        number, *values, camera = struct.unpack_from("<i7di", content, place)
+        pose = numbers(values, (7,))
+        end = content.index(b"\0", place + 64)
+        name = content[place + 64 : end].decode()
+        (count,) = struct.unpack_from("<Q", content, end + 1)
+        seen = np.frombuffer(content, row, count, end + 9) if count else np.empty(0, row)
+        place = end + 9 + count * row.itemsize
+        turn = _turn(pose[:4])
+        images.append(Image(number, name, camera, turn, pose[4:], seen["pixel"], seen["point"]))
+    _require_end(content, place)
+    return images
+
+
+def _binary_points(path: Path) -> Points:
+    content, place = path.read_bytes(), 8
+    count = struct.unpack_from("<Q", content)[0]
+    heads, tracks = [], []
+    head = struct.Struct("<Q3d3BdQ")
+    for _ in range(count):
+        number, x, y, z, _, _, _, error, size = head.unpack_from(content, place)
+        heads.append((number, x, y, z, error, size))
+        place += head.size + 8 * size
+        if place > len(content):
+            raise ValueError(f"point {number}: it has {size} views, more than the file holds")
+        tracks.append(content[place - 8 * size : place])
+    _require_end(content, place)
+    pairs = np.frombuffer(b"".join(tracks), "<i4").reshape(-1, 2).astype(np.int64)
+    return _points(heads, pairs)
+
+
+def _require_end(content: bytes, place: int) -> None:
+    if place != len(content):
+        raise ValueError(f"it has {len(content)} bytes, and its entries {place}")
+
+
+# ---- text -----------------------------------------------------------------------------------
+
+
+def _lines(path: Path) -> Iterator[str]:
+    with path.open(encoding="utf-8") as file:
+        yield from (line for line in file if not line.startswith("#"))
+
+
+def _text_cameras(path: Path) -> dict[int, Camera]:
+    cameras = {}
+    for line in _lines(path):
+        number, model, width, height, *parameters = line.split()
+        if model not in NAMES:
+            raise ValueError(f"camera {number}: its model is {model}, not {[*NAMES]}")
+        cameras[int(number)] = _camera(
+            NAMES[model], int(width), int(height), from_texts(parameters)
+        )
+    return cameras
+
+
+def _text_images(path: Path) -> list[Image]:
+    images = []
+    lines = _lines(path)
+    for line in lines:
+        number, *texts, camera, name = line.split()
+        pose = numbers(from_texts(texts), (7,))
+        seen = np.array(next(lines).split(), np.float64).reshape(-1, 3)
+        turn = _turn(pose[:4])
+        points = _whole(seen[:, 2])
+        images.append(Image(int(number), name, int(camera), turn, pose[4:], seen[:, :2], points))
+    return images
+
+
+def _text_points(path: Path) -> Points:
+    heads = []
+    tracks = [np.empty((0, 2), np.int64)]
+    for line in _lines(path):
+        number, x, y, z, _, _, _, error, *track = line.split()
+        heads.append((int(number), *map(float, (x, y, z, error)), len(track) // 2))
+        tracks.append(np.array(track, np.int64).reshape(-1, 2))
+    return _points(heads, np.concatenate(tracks))
+
+
+def _points(heads: Sequence[tuple[Any, ...]], tracks: Ints) -> Points:
+    """Return points of their numbers, positions, errors and lengths of tracks, and the tracks."""
+    table = np.array([head[1:5] for head in heads], np.float64).reshape(-1, 4)
+    first, last = (np.array([head[place] for head in heads], np.int64) for place in (0, 5))
+    return Points(first, table[:, :3], table[:, 3], last, tracks)
+
+
+def _whole(values: Floats) -> Ints:
+    """Return whole numbers that were read as floats; raises ValueError for others."""
+    with np.errstate(invalid="ignore"):
+        found = values.astype(np.int64)
+    if not (found == values).all():
+        raise ValueError("a number of a point is not whole")
+    return found
+
+
+# ---- what the files say twice ---------------------------------------------------------------
+
+
+def _track_faults(model: Model) -> list[str]:
+    """Compare the points' tracks with the lists of points that the images have."""
+    path, points = model.file("points3D"), model.points
+    by_number = {image.number: index for index, image in enumerate(model.images)}
+    starts = np.cumsum([0, *(len(image.points) for image in model.images)])
+    listed = np.concatenate([np.empty(0, np.int64), *(image.points for image in model.images)])
+    image_numbers, inverse = np.unique(points.tracks[:, 0], return_inverse=True)
+    images = np.array([by_number.get(number, -1) for number in image_numbers.tolist()], np.int64)
+    image = images[inverse] if len(inverse) else np.empty(0, np.int64)
+    index = points.tracks[:, 1]
+    inside = (image >= 0) & (index >= 0) & (index < (starts[1:] - starts[:-1])[image])
+    place = np.where(inside, starts[image] + index, 0)
+    owner = np.repeat(points.numbers, points.sizes)
+    right = inside & (listed[place] == owner) if len(listed) else inside
+    faults = [
+        f"{path}: point {number}: its track has what is no such point of an image"
+        for number in np.unique(owner[~right]).tolist()
+    ]
+    is_tracked = listed == NO_POINT
+    is_tracked[place[right]] = True
+    untracked = np.flatnonzero(~is_tracked)
+    images_of = np.searchsorted(starts, untracked, side="right") - 1
+    for point, number in zip(listed[untracked], images_of, strict=True):
+        faults.append(f"{path}: point {point}: its track lacks {model.images[number].name}")
+    return faults
+
+
+def _projection_faults(model: Model) -> list[str]:
+    """Compare where each image has its points with where its camera projects them."""
+    faults: list[str] = []
+    # How many images have each point, and of those that have it elsewhere the image, the place
+    # among the image's points, and the row of the point.
+    totals = np.zeros(len(model.points.numbers), np.int64)
+    off = [np.empty((0, 3), np.int64)]
+    sizes = []
+    order = np.argsort(model.points.numbers)
+    for number, image in enumerate(model.images):
+        places, rows = _places_and_rows(image, model, order)
+        unknown = rows < 0
+        for place in places[unknown].tolist():
+            point = image.points[place]
+            faults.append(f"{model.file('images')}: {image.name}: there is no point {point}")
+        places, rows = places[~unknown], rows[~unknown]
+        wrong = _is_projected_elsewhere(image, model, places, rows)
+        totals += np.bincount(rows, minlength=len(totals))
+        sizes.append(len(rows))
+        numbers_of = np.full(int(wrong.sum()), number)
+        off.append(np.stack([numbers_of, places[wrong], rows[wrong]], axis=-1))
+    images, places, rows = np.concatenate(off).T
+    all_off = (np.bincount(images, minlength=len(sizes)) == sizes) & (np.array(sizes) > 0)
+    if all_off.any() and all_off.sum() == np.count_nonzero(sizes):
+        return [*faults, f"{model.file('cameras')}: no image has its points where its camera does"]
+    limit = FLOAT32 * max(max(c.width, c.height) for c in model.cameras.values())
+    for point in model.points.numbers[~(np.abs(model.points.errors) <= limit)].tolist():
+        faults.append(
+            f"{model.file('points3D')}: point {point}: its error is not that of its images"
+        )
+    misplaced = (np.bincount(rows, minlength=len(totals)) == totals) & (totals > 0)
+    for number in np.flatnonzero(all_off).tolist():
+        name = model.images[number].name
+        faults.append(f"{model.file('images')}: {name}: no point is where its camera sees it")
+    for point in model.points.numbers[misplaced].tolist():
+        faults.append(f"{model.file('points3D')}: point {point}: is where no image has it")
+    alone = ~all_off[images] & ~misplaced[rows]
+    for number, place, row in zip(images[alone], places[alone], rows[alone], strict=True):
+        name, point = model.images[number].name, model.points.numbers[row]
+        faults.append(
+            f"{model.file('images')}: {name}: POINTS2D {place}: is not where its camera sees "
+            f"point {point}"
+        )
+    return faults
+
+
+def _places_and_rows(image: Image, model: Model, order: Ints) -> tuple[Ints, Ints]:
+    """Return the places of an image's points, and their rows in the model's, −1 for none there.
+
+    ``order`` (n,) sorts the numbers of the model's points.
+    """
+    places = np.flatnonzero(image.points != NO_POINT)
+    if not len(order):
+        return places, np.full(len(places), -1)
+    found = np.searchsorted(model.points.numbers, image.points[places], sorter=order)
+    rows = order[found.clip(max=len(order) - 1)]
+    return places, np.where(model.points.numbers[rows] == image.points[places], rows, -1)
+
+
+def _is_projected_elsewhere(image: Image, model: Model, places: Ints, rows: Ints) -> NDArray[Any]:
+    """Return which of an image's points its camera does not project to where the image has them."""
+    camera = model.cameras.get(image.camera)
+    if camera is None:
+        return np.ones(len(rows), bool)
+    # A damaged number may be anything.
+    with np.errstate(over="ignore", invalid="ignore"):
+        local = (model.points.positions[rows] @ image.turn.T + image.shift) @ _FLIP
+        apart = np.abs(camera.pixels(local) - image.pixels[places]).max(axis=-1)
+    return ~(apart <= FLOAT32 * max(camera.width, camera.height))
+
+
+def _check_depth_map(path: Path, size: tuple[int, int], exported: Exported) -> None:
+    """Check a depth map's header and its number of bytes."""
+    width, height = size
+    header = f"{width}&{height}&1&".encode()
+    with reading(path, "depth map of COLMAP"):
+        with path.open("rb") as file:
+            exported.expect(f"{path}: header", file.read(len(header)), header)
+        exported.expect(f"{path}: bytes", path.stat().st_size, len(header) + 4 * width * height)

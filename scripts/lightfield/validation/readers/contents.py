@@ -1,0 +1,187 @@
+"""What an export says of a dataset, in the axes and metres of lightfield.json."""
+
+import struct
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lightfield.core.errors import UserError
+from lightfield.validation.readers.cameras import Camera
+
+Floats = NDArray[np.float64]
+
+FLOAT32 = 4 * float(np.finfo(np.float32).eps)
+"""Relative difference up to which two numbers are the same: consumers compute with float32."""
+
+
+@dataclass(frozen=True)
+class ExportedView:
+    """One view: ``matrix`` (4, 4) is camera-to-world, metres, x right, y up, looking along −z.
+
+    ``file`` and ``place`` say where it stands. ``name`` is the view's, or None where the export
+    numbers its pictures.
+    """
+
+    file: Path
+    place: str
+    name: str | None
+    matrix: Floats
+
+
+@dataclass(frozen=True)
+class ExportedCamera:
+    """A lens, and the ``place`` in the file that has its numbers."""
+
+    place: str
+    camera: Camera
+
+
+@dataclass(frozen=True)
+class Part:
+    """The names of the views that a ``place`` in a file has for a part of the split."""
+
+    place: str
+    part: str
+    names: list[str]
+
+
+@dataclass(frozen=True)
+class DepthRange:
+    """The nearest and the farthest depth in metres, "z" or "distance", of a view.
+
+    ``view`` is None where the range is that of all views together. What is farther than
+    ``farthest``, and where nothing is hit, counts as that far.
+    """
+
+    place: str
+    view: str | None
+    near: float
+    far: float
+    meaning: str
+    farthest: float
+
+
+@dataclass(frozen=True)
+class DepthMap:
+    """A view's depth in integers: so many ``metres`` a step, "z" or "distance", 0 for none."""
+
+    place: str
+    path: Path
+    view: str
+    metres: float
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """World points (n, 3) in metres; ``numbers`` (n,) are what the file calls them by."""
+
+    file: Path
+    kind: str
+    numbers: NDArray[np.int64]
+    positions: NDArray[np.floating[Any]]
+
+    def name(self, index: int) -> str:
+        return f"{self.file}: {self.kind} {self.numbers[index]}"
+
+
+@dataclass(frozen=True)
+class UnitCube:
+    """How instant-ngp maps turned world points into its unit cube: times ``scale`` + ``offset``.
+
+    ``asked_scale`` is what was asked for, and ``asked_place`` where the mean camera was to lie
+    then. Without a scale the cube is fitted to the rig, or to depth if ``fits_depth``.
+    """
+
+    place: str
+    scale: float
+    offset: Floats
+    asked_scale: float | None
+    asked_place: Floats | None
+    fits_depth: bool
+
+
+@dataclass
+class Exported:
+    """One export. ``views_of`` is the part of the split of which it holds the views, if not all.
+
+    ``faults`` are what contradicts itself or its consumer, a line each that names the file.
+    """
+
+    views: list[ExportedView] = field(default_factory=list)
+    views_of: str | None = None
+    cameras: list[ExportedCamera] = field(default_factory=list)
+    parts: list[Part] = field(default_factory=list)
+    ranges: list[DepthRange] = field(default_factory=list)
+    depth_map: DepthMap | None = None
+    clouds: list[Cloud] = field(default_factory=list)
+    cube: UnitCube | None = None
+    faults: list[str] = field(default_factory=list)
+
+    def expect(self, place: str, found: Any, expected: Any) -> None:
+        """Note a fault where a number or a text is not the ``expected`` one."""
+        if not same(found, expected):
+            self.faults.append(f"{place}: is {found!r}; must be {expected!r}")
+
+    def expect_picture(self, place: str, path: Path, view: str, picture: str) -> None:
+        """Note a fault where a ``path`` is no file, or not called as the ``view``'s ``picture``.
+
+        ``picture`` is a file's name with the view's in braces: "{}_depth.png".
+        """
+        if path.name != picture.format(view):
+            self.faults.append(f"{place}: is {path.name}; must be {picture.format(view)}")
+        elif not path.is_file():
+            self.faults.append(f"{place}: there is no file {path}")
+
+
+def same(found: Any, expected: Any) -> bool:
+    """Return whether two values are equal, numbers to what float32 resolves of the largest."""
+    if expected is None or isinstance(expected, str | bytes | bool):
+        return type(found) is type(expected) and bool(found == expected)
+    try:
+        one, other = np.array(found, np.float64), np.array(expected, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return False
+    if one.shape != other.shape:
+        return False
+    limit = FLOAT32 * np.abs(other).max(initial=0)
+    return bool((np.abs(one - other) <= limit).all())
+
+
+def numbers(value: ArrayLike, shape: tuple[int, ...] = ()) -> Floats:
+    """Return finite numbers as an array of a shape; raises ValueError for anything else."""
+    array = np.array(value)
+    if array.shape != shape or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+        size = " × ".join(map(str, shape)) or "one"
+        raise ValueError(f"must be {size} finite numbers, not {value!r}")
+    return array.astype(np.float64)
+
+
+def number(value: Any) -> float:
+    """Return a finite number; raises ValueError for anything else."""
+    return float(numbers(value))
+
+
+def from_texts(texts: Sequence[str]) -> Floats:
+    """Return the finite numbers (n,) of a text file; raises ValueError for anything else."""
+    return numbers([float(text) for text in texts], (len(texts),))
+
+
+@contextmanager
+def reading(path: Path, kind: str) -> Iterator[None]:
+    """Turn whatever keeps a file from being read as its ``kind`` into a `UserError`."""
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+    except KeyError as error:
+        raise UserError(f"{path}: {error.args[0]}: is missing") from None
+    except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
+        raise UserError(f"{path}: is no {kind}: {error}") from None
+    except struct.error:
+        raise UserError(f"{path}: is no {kind}: it is cut short") from None

@@ -1,0 +1,90 @@
+"""The layout of the HCI 4D light field benchmark: parameters.cfg, and maps of depth as PFM.
+
+The views are numbered row by row from the top left, as far apart across as down, and are turned as
+the one in the middle, whose pose is there. Disparity is b f (1 / Z − 1 / F). Source: Honauer et al.
+2016, and the benchmark's parameters.
+"""
+
+import configparser
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightfield.geometry.rotations import euler_to_matrix
+from lightfield.validation.readers.cameras import Pinhole
+from lightfield.validation.readers.contents import (
+    DepthRange,
+    Exported,
+    ExportedCamera,
+    ExportedView,
+    reading,
+)
+
+INFINITY = 1e9
+"""Metres: the focus of cameras that look in parallel."""
+
+
+def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Exported:
+    """Read the parameters.cfg of an export."""
+    folder = listing.parent
+    path = folder / "parameters.cfg"
+    exported = Exported()
+    with reading(path, "parameters.cfg of the HCI benchmark"):
+        config = configparser.ConfigParser()
+        try:
+            config.read_string(path.read_text(encoding="utf-8"))
+        except configparser.Error as error:
+            raise ValueError(" ".join(str(error).split())) from None
+        intrinsics, extrinsics, meta = (
+            config[name] for name in ("intrinsics", "extrinsics", "meta")
+        )
+        width, height = (int(intrinsics[f"image_resolution_{axis}_px"]) for axis in "xy")
+        # The sensor's longer side.
+        focal = float(intrinsics["focal_length_mm"]) / float(intrinsics["sensor_size_mm"])
+        focal *= max(width, height)
+        camera = Pinhole(width, height, focal, focal, width / 2, height / 2)
+        exported.cameras.append(ExportedCamera(f"{path}: intrinsics", camera))
+        columns, rows = (int(extrinsics[f"num_cams_{axis}"]) for axis in "xy")
+        if columns * rows != len([*folder.glob("input_Cam*.png")]):
+            raise ValueError(f"num_cams_x, num_cams_y: there are no {columns} × {rows} pictures")
+        baseline = float(extrinsics["baseline_mm"]) / 1000
+        middle = np.eye(4)
+        angles = [float(extrinsics[f"center_cam_r{axis}_rad"]) for axis in "xyz"]
+        middle[:3, :3] = euler_to_matrix(np.array(angles))
+        middle[:3, 3] = [float(extrinsics[f"center_cam_{axis}_m"]) for axis in "xyz"]
+        for index in range(columns * rows):
+            right, down = index % columns - columns // 2, index // columns - rows // 2
+            matrix = middle.copy()
+            matrix[:3, 3] += baseline * (right * middle[:3, 0] - down * middle[:3, 1])
+            exported.views.append(ExportedView(path, f"Cam{index:03}", None, matrix))
+            _check_files(folder, f"_Cam{index:03}", (width, height), exported)
+        exported.expect(f"{path}: offset", float(extrinsics["offset"]), 0.0)
+        exported.expect(f"{path}: depth_map_scale", float(meta["depth_map_scale"]), 1.0)
+        # Cameras that look in parallel focus at infinity: d = b f / Z, and 0 where nothing is hit.
+        focus = float(extrinsics["focus_distance_m"])
+        exported.expect(f"{path}: focus_distance_m", focus, INFINITY)
+        far, near = (_depth(baseline * focal, float(meta[f"disp_{end}"])) for end in ("min", "max"))
+        place = f"{path}: disp_min, disp_max"
+        exported.ranges.append(DepthRange(place, None, near, far, "z", math.inf))
+    _check_files(folder, "", (width, height), exported)
+    return exported
+
+
+def _depth(unit: float, disparity: float) -> float:
+    """Return the depth of a disparity, of which one metre has ``unit``."""
+    return unit / disparity if disparity else math.inf
+
+
+def _check_files(folder: Path, end: str, size: tuple[int, int], exported: Exported) -> None:
+    """Check that a view's maps have the views' size; the middle view's are there without number."""
+    if end and not (folder / f"input{end}.png").is_file():
+        exported.faults.append(f"{folder}/parameters.cfg: there is no input{end}.png of it")
+    width, height = size
+    header = f"Pf\n{width} {height}\n-1.0\n".encode()
+    for kind in ("depth", "disp"):
+        path = folder / f"gt_{kind}_lowres{end}.pfm"
+        with reading(path, "portable float map"), path.open("rb") as file:
+            exported.expect(f"{path}: header", file.read(len(header)), header)
+            exported.expect(f"{path}: bytes", path.stat().st_size, len(header) + 4 * width * height)

@@ -1,0 +1,44 @@
+"""NeRF's synthetic layout, read as the original NeRF's load_blender.py does.
+
+Poses are in the axes of lightfield.json; one horizontal angle is all that a list says of the lens.
+"""
+
+import math
+from pathlib import Path
+from typing import Any
+
+from lightfield.core.files import read_json
+from lightfield.validation.readers.cameras import Pinhole
+from lightfield.validation.readers.contents import (
+    Exported,
+    ExportedCamera,
+    ExportedView,
+    Part,
+    number,
+    numbers,
+    reading,
+)
+from lightfield.validation.readers.nerfstudio import PARTS
+
+
+def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Exported:
+    """Read the three lists of an export."""
+    exported = Exported()
+    width, height = size
+    for part, name in PARTS.items():
+        path = listing.parent / f"transforms_{part}.json"
+        names = []
+        with reading(path, "list of NeRF's synthetic scenes"):
+            content = read_json(path)
+            focal = width / 2 / math.tan(number(content["camera_angle_x"]) / 2)
+            camera = Pinhole(width, height, focal, focal, width / 2, height / 2)
+            exported.cameras.append(ExportedCamera(f"{path}: camera_angle_x", camera))
+            for index, frame in enumerate(content["frames"]):
+                place = f"frames[{index}]"
+                picture = listing.parent / f"{frame['file_path']}.png"
+                names.append(picture.stem)
+                exported.expect_picture(f"{path}: {place}: file_path", picture, names[-1], "{}.png")
+                matrix = numbers(frame["transform_matrix"], (4, 4))
+                exported.views.append(ExportedView(path, place, names[-1], matrix))
+        exported.parts.append(Part(str(path), name, names))
+    return exported

@@ -1,0 +1,37 @@
+"""The keys of a camera that OpenDIBR and MIV share.
+
+Depth maps are normalised disparity between the ends of ``Depth_range``: of Z for perspective views,
+of distance for the others.
+"""
+
+import math
+from typing import Any
+
+from lightfield.dataset.exports import FARTHEST
+from lightfield.validation.readers.cameras import Camera, OpenCVFisheye, Panorama, Pinhole
+from lightfield.validation.readers.contents import DepthRange, number, numbers
+
+
+def lens_of(camera: dict[str, Any]) -> Camera:
+    """Return a camera's lens; of a panorama's longitudes those to the left are positive."""
+    width, height = (int(side) for side in numbers(camera["Resolution"], (2,)))
+    projection = camera["Projection"]
+    if projection == "Perspective":
+        fx, fy = numbers(camera["Focal"], (2,)).tolist()
+        cx, cy = numbers(camera["Principle_point"], (2,)).tolist()
+        return Pinhole(width, height, fx, fy, cx, cy)
+    if projection == "Equirectangular":
+        right, left = map(math.radians, numbers(camera["Hor_range"], (2,)).tolist())
+        south, north = map(math.radians, numbers(camera["Ver_range"], (2,)).tolist())
+        return Panorama(width, height, -left, -right, north, south)
+    if projection == "Fisheye_Equidistant":
+        fov = math.radians(number(camera["Fov"]))
+        return OpenCVFisheye(width, height, width / fov, height / fov, width / 2, height / 2)
+    raise ValueError(f"Projection: {projection!r} is no projection of it")
+
+
+def depth_range_of(place: str, view: str, camera: dict[str, Any]) -> DepthRange:
+    """Return the range of a camera's depth map."""
+    near, far = numbers(camera["Depth_range"], (2,)).tolist()
+    meaning = "z" if camera["Projection"] == "Perspective" else "distance"
+    return DepthRange(f"{place}: Depth_range", view, near, far, meaning, FARTHEST)

@@ -1,0 +1,83 @@
+"""OpenDIBR's cameras.json, read as its ioHelper.h and vertex.fs do.
+
+Its world is OpenGL's, y up: (x, y, z) of lightfield.json is (x, z, −y) there. The first camera is
+the one that is shown at first, and has no picture.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightfield.core.files import read_json
+from lightfield.geometry.rotations import euler_to_matrix
+from lightfield.validation.readers.contents import (
+    Exported,
+    ExportedCamera,
+    ExportedView,
+    Floats,
+    numbers,
+    reading,
+)
+from lightfield.validation.readers.omaf import depth_range_of, lens_of
+
+# Rows: the axes of OpenGL's world in lightfield.json's.
+WORLD = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+# By the option ``format``: suffix, bits of colour, bits of depth.
+PICTURES = {"png": (".png", 8, 16), "h265": (".mp4", 10, 12)}
+
+
+def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Exported:
+    """Read the cameras.json of an export."""
+    folder = listing.parent
+    path = folder / "cameras.json"
+    exported = Exported()
+    with reading(path, "list of OpenDIBR's cameras"):
+        content = read_json(path)
+        exported.expect(f"{path}: Axial_system", content["Axial_system"], "OPENGL")
+        suffix, colour_bits, depth_bits = PICTURES[options["format"]]
+        viewport, *cameras = content["cameras"]
+        for index, camera in enumerate(cameras, 1):
+            place = f"cameras[{index}]"
+            name = str(camera["NameColor"]).removesuffix(f"_texture{suffix}")
+            for key, kind in (("NameColor", "texture"), ("NameDepth", "depth")):
+                picture = folder / str(camera[key])
+                exported.expect_picture(
+                    f"{path}: {place}: {key}", picture, name, f"{{}}_{kind}{suffix}"
+                )
+            for key, bits in (("BitDepthColor", colour_bits), ("BitDepthDepth", depth_bits)):
+                exported.expect(f"{path}: {place} ({name}): {key}", camera[key], bits)
+            where = f"{path}: {place} ({name})"
+            exported.views.append(ExportedView(path, place, name, _matrix(camera)))
+            exported.cameras.append(ExportedCamera(where, lens_of(camera)))
+            exported.ranges.append(depth_range_of(where, name, camera))
+        _check_viewport(f"{path}: cameras[0]", viewport, exported)
+    return exported
+
+
+def _matrix(camera: dict[str, Any]) -> Floats:
+    """Return the camera-to-world matrix (4, 4) of a position and XYZ Euler degrees."""
+    matrix = np.eye(4)
+    angles = np.radians(numbers(camera["Rotation"], (3,)))
+    matrix[:3, :3] = WORLD.T @ euler_to_matrix(angles)
+    matrix[:3, 3] = WORLD.T @ numbers(camera["Position"], (3,))
+    return matrix
+
+
+def _check_viewport(place: str, viewport: dict[str, Any], exported: Exported) -> None:
+    """Check that the first picture is from the middle of the views, turned as the first of them."""
+    matrix = _matrix(viewport)
+    middle = np.mean([view.matrix[:3, 3] for view in exported.views], axis=0)
+    width, height = numbers(viewport["Resolution"], (2,)).tolist()
+    fx, fy = numbers(viewport["Focal"], (2,)).tolist()
+    near, far = numbers(viewport["Depth_range"], (2,)).tolist()
+    exported.expect(f"{place}: NameColor", viewport["NameColor"], "viewport")
+    exported.expect(f"{place}: Projection", viewport["Projection"], "Perspective")
+    exported.expect(f"{place}: Position", matrix[:3, 3].tolist(), middle.tolist())
+    turn = exported.views[0].matrix[:3, :3]
+    exported.expect(f"{place}: Rotation", matrix[:3, :3].tolist(), turn.tolist())
+    exported.expect(
+        f"{place}: Principle_point", viewport["Principle_point"], [width / 2, height / 2]
+    )
+    exported.expect(f"{place}: Focal", [fx, fy], [width / 2] * 2)
+    exported.expect(f"{place}: Depth_range: grows", 0 < near < far, True)

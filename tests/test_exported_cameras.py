@@ -1,0 +1,653 @@
+"""Validation reads every export back: a number that is not that of lightfield.json is named.
+
+The scene is a ball in a sphere, every export one of it that this project wrote.
+"""
+
+import argparse
+import json
+import re
+import shutil
+import struct
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter
+from sphere import LENSES, look_at_ball, write_views
+
+from lightfield import export
+from lightfield.core.files import read_json, write_json
+from lightfield.dataset.exports import settings_of
+from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.splits import listed
+from lightfield.export import MANIFESTS, instant_ngp
+from lightfield.export.source import Source
+from lightfield.validation import exported_cameras
+from lightfield.validation.exported_depth import ExportedDepth
+from lightfield.validation.files import File, read_sets
+from lightfield.validation.pixels import Examiner
+from lightfield.validation.validate import validate
+
+VIEWS = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
+# As far apart across as down, which HCI's layout needs; no number of a pose is round.
+RIG = {
+    "type": "plane",
+    "cameras": [5, 2],
+    "size": [0.8, 1, 0.2],
+    "center": [0.3, -0.2, 0.1],
+    "rotation": [10, 20, 30],
+}
+SPLIT = {"test": ["view_0001f"], "validation": ["view_0004f"]}
+SETS = {
+    "perspective": LENSES["perspective"],
+    "shifted": LENSES["shifted"],
+    "fisheye": LENSES["fisheye"],
+    "wide": LENSES["wide"],
+    "opencv": LENSES["opencv"],
+    "panorama": LENSES["panorama"],
+    "half": LENSES["half"],
+    "split": LENSES["perspective"],
+}
+# What each set is exported as; "views" are the rendered ones.
+EXPORTS = {
+    "views": {"opendibr": {}, "point_cloud": {"voxel": 0.1}},
+    "perspective": {
+        "colmap": {"format": "text", "points": 60, "depth": True},
+        "nerfstudio": {"points": 60, "depth": True},
+        "nerf_synthetic": {},
+        "opendibr": {},
+        "miv": {},
+        "hci": {},
+        "poses_csv": {},
+    },
+    "shifted": {"colmap": {"points": 60}, "nerfstudio": {"points": 60}, "opendibr": {}, "miv": {}},
+    "fisheye": {"colmap": {"points": 60}, "opendibr": {}, "scannetpp": {"points": 60}},
+    "wide": {"nerfstudio": {"points": 60}},
+    "opencv": {"colmap": {"format": "text", "points": 60}},
+    "panorama": {"nerfstudio": {"points": 60}, "opendibr": {}, "miv": {}},
+    "half": {"opendibr": {}, "miv": {}},
+    "split": {"colmap": {"format": "text", "points": 60}, "nerfstudio": {"points": 60}},
+}
+INSTANT_NGP = {
+    "views": ["--depth-bounds"],
+    "perspective": ["--depth-bounds", "--aabb-scale", "4"],
+    "shifted": [
+        *("--scale", "0.3", "--offset", "0.1", "0.2", "0.3", "--aabb-scale", "2"),
+        *("--render-aabb", "0.1", "0.2", "0.3", "0.6", "0.7", "0.8"),
+    ],
+    "wide": [],
+    "opencv": [],
+    "panorama": [],
+    "split": [],
+}
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("exported") / "scene" / "dataset"
+    write_views(folder, VIEWS, RIG, see=look_at_ball)
+    for name, camera in SETS.items():
+        rig = RIG | ({"split": SPLIT} if name == "split" else {})
+        write_views(folder / name, camera, rig, see=look_at_ball)
+    for name, formats in EXPORTS.items():
+        for kind, options in formats.items():
+            write_export(folder, name, kind, options)
+    for name, words in INSTANT_NGP.items():
+        write_instant_ngp(folder, name, words)
+    return folder
+
+
+def home(folder, name):
+    return folder if name == "views" else folder / name
+
+
+def write_export(folder, name, kind, options, beside=None):
+    settings = TypeAdapter(settings_of(kind)).validate_python({"sources": [name], **options})
+    source = Source(folder, "" if name == "views" else name, ".exr", beside or {})
+    export.run(kind, source, settings, home(folder, name) / "exports" / kind)
+
+
+def write_instant_ngp(folder, name, words):
+    parser = argparse.ArgumentParser()
+    instant_ngp.add_arguments(parser)
+    own = home(folder, name)
+    files = ["--input-cfg", own / "lightfield.json", "--output", own / "transforms.json"]
+    files += ["--image-suffix", ".exr", "--image-dir", folder / "exr" if own == folder else own]
+    files += ["--depth-dir", own / "instant_ngp" / "depth"]
+    instant_ngp.export(parser.parse_args([*map(str, files), *words]))
+
+
+def problems(folder, name, kind):
+    """Return what the checks of one kind of export of a set find, of the views' depth too."""
+    lists = home(folder, name).glob("transforms*.json")
+    if kind != "instant_ngp":
+        lists = [home(folder, name) / "exports" / kind / "export.json"]
+    wanted = {path.resolve() for path in lists}
+    sets, _ = read_sets(folder, [] if name == "views" else [name])
+    found, exports = exported_cameras.check(folder, sets, MANIFESTS, wanted)
+    of_depth = ExportedDepth(folder, sets, exports)
+    examiner = Examiner(folder, sets)
+
+    def ask(asked):
+        return [examiner.answer_depth(*each) for each in asked]
+
+    files = [
+        File(f"{one.folder}/{view}.exr", number, index)
+        for number, one in enumerate(sets)
+        for index, view in enumerate(one.views)
+    ]
+    asked = [(file, of_depth.question(file)) for file in files if of_depth.question(file)]
+    answers = {(file.set, file.view): one for (file, _), one in zip(asked, ask(asked), strict=True)}
+    found += of_depth.checks(answers, ask)
+    return [line for check in found for line in check.problems]
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_right_exports_agree_with_their_views(name, dataset):
+    result = validate(dataset, [] if name == "views" else [name], manifests=MANIFESTS)
+    prefix = "" if name == "views" else f"{name}/"
+    found = {check.name.removeprefix(prefix): check for check in result.checks}
+    for check in (found["exported_cameras"], found["exported_depth"]):
+        assert check.passed, check.problems
+    own = EXPORTS[name]
+    with_points = {"colmap", "nerfstudio", "scannetpp", "point_cloud"} & own.keys()
+    assert (found["exported_depth"].figures["points"] >= 30 * len(with_points)) or not with_points
+    # A part of the split has a list of instant-ngp's, too.
+    lists = len(own) + (name in INSTANT_NGP) * (4 if name == "split" else 1)
+    assert f"{lists} exports" in found["exported_cameras"].detail
+
+
+def other_digit(text, place=0):
+    """Return a number of the same length that differs in one digit.
+
+    It is that at a ``place`` among those that count, or the last one.
+    """
+    digits = [index for index, letter in enumerate(text.partition("e")[0]) if letter.isdigit()]
+    while text[digits[0]] == "0" and len(digits) > 1:
+        digits.pop(0)
+    index = digits[min(place, len(digits) - 1)]
+    return f"{text[:index]}{(int(text[index]) + 3) % 10}{text[index + 1 :]}"
+
+
+@contextmanager
+def changed(path, content):
+    """Let a file have another content of the same length for a while."""
+    right = path.read_bytes()
+    assert len(content) == len(right)
+    assert content != right
+    path.write_bytes(content)
+    try:
+        yield
+    finally:
+        path.write_bytes(right)
+
+
+def in_json(path, keys, place):
+    """Return a JSON file's bytes with one digit of the number at ``keys`` changed."""
+    content = read_json(path)
+    *parents, last = keys
+    parent = content
+    for key in parents:
+        parent = parent[key]
+    parent[last] = f"@{other_digit(json.dumps(parent[last]), place)}@"
+    return (json.dumps(content, indent=1) + "\n").replace('"@', "").replace('@"', "").encode()
+
+
+def in_text(path, pattern, place):
+    """Return a text's bytes with one digit of the number changed that is the pattern's group."""
+    text = path.read_text()
+    match = re.search(pattern, text, re.M)
+    start, end = match.span(1)
+    return f"{text[:start]}{other_digit(match[1], place)}{text[end:]}".encode()
+
+
+FRAME = ("frames", 3, "transform_matrix")
+OF_FRAME = "transforms.json: frames[3] (view_0003f): its"
+OF_POSITION, OF_ROTATION = f"{OF_FRAME} position", f"{OF_FRAME} rotation"
+OF_LENS = "transforms.json: its camera"
+CAMERA = ("cameras", 4)
+OF_CAMERA = "cameras[4] (view_0003f)"
+
+# Of the set and the export: the number in JSON by its keys, and what validation says of it.
+IN_JSON = [
+    ("perspective", "instant_ngp", "", (*FRAME, 0, 3), OF_POSITION),
+    ("perspective", "instant_ngp", "", (*FRAME, 2, 1), OF_ROTATION),
+    ("perspective", "instant_ngp", "", (*FRAME, 3, 0), "the last row of its matrix"),
+    ("perspective", "instant_ngp", "", ("fl_x",), OF_LENS),
+    ("perspective", "instant_ngp", "", ("fl_y",), OF_LENS),
+    ("perspective", "instant_ngp", "", ("cx",), OF_LENS),
+    ("perspective", "instant_ngp", "", ("cy",), OF_LENS),
+    ("perspective", "instant_ngp", "", ("camera_angle_x",), "camera_angle_x"),
+    ("perspective", "instant_ngp", "", ("camera_angle_y",), "camera_angle_y"),
+    ("perspective", "instant_ngp", "", ("w",), "its image has"),
+    ("perspective", "instant_ngp", "", ("h",), "its image has"),
+    ("perspective", "instant_ngp", "", ("integer_depth_scale",), "integer_depth_scale"),
+    ("perspective", "instant_ngp", "", ("aabb_scale",), "aabb_scale"),
+    ("perspective", "instant_ngp", "", ("options", "aabb_scale"), "aabb_scale"),
+    ("perspective", "instant_ngp", "", ("scale",), "scale, offset"),
+    ("perspective", "instant_ngp", "", ("offset", 1), "scale, offset"),
+    ("views", "instant_ngp", "", ("ftheta_p1",), OF_LENS),
+    ("views", "instant_ngp", "", ("ftheta_p2",), OF_LENS),
+    ("views", "instant_ngp", "", ("fl_x",), "fl_x"),
+    ("views", "instant_ngp", "", ("scale",), "scale, offset"),
+    ("opencv", "instant_ngp", "", ("ftheta_p1",), "fl_x"),
+    ("opencv", "instant_ngp", "", (*FRAME, 0, 1), OF_ROTATION),
+    ("wide", "instant_ngp", "", ("cx",), OF_LENS),
+    ("wide", "instant_ngp", "", ("scale",), "scale, offset"),
+    ("wide", "instant_ngp", "", ("offset", 0), "scale, offset"),
+    ("panorama", "instant_ngp", "", ("cx",), "cx"),
+    ("panorama", "instant_ngp", "", ("fl_y",), "fl_y"),
+    ("panorama", "instant_ngp", "", (*FRAME, 1, 3), OF_POSITION),
+    ("shifted", "instant_ngp", "", ("scale",), "scale: is 0."),
+    ("shifted", "instant_ngp", "", ("offset", 2), "offset: puts the mean camera"),
+    ("shifted", "instant_ngp", "", ("render_aabb", 1, 0), "render_aabb"),
+    ("shifted", "instant_ngp", "", ("options", "offset", 1), "offset: puts the mean camera"),
+    ("perspective", "nerfstudio", "transforms.json", (*FRAME, 2, 3), OF_POSITION),
+    ("perspective", "nerfstudio", "transforms.json", (*FRAME, 0, 0), OF_ROTATION),
+    ("perspective", "nerfstudio", "transforms.json", ("fl_y",), OF_LENS),
+    ("perspective", "nerfstudio", "transforms.json", ("cx",), OF_LENS),
+    ("perspective", "nerfstudio", "transforms.json", ("h",), "its image has"),
+    ("perspective", "nerfstudio", "transforms.json", ("applied_transform", 1, 2), "view_0003f"),
+    ("wide", "nerfstudio", "transforms.json", ("fl_x",), OF_LENS),
+    ("wide", "nerfstudio", "transforms.json", ("k1",), OF_LENS),
+    ("wide", "nerfstudio", "transforms.json", ("k4",), OF_LENS),
+    ("panorama", "nerfstudio", "transforms.json", ("fl_x",), OF_LENS),
+    ("panorama", "nerfstudio", "transforms.json", ("cy",), OF_LENS),
+    *(
+        ("perspective", "nerf_synthetic", f"transforms_{part}.json", keys, said)
+        for part in ("train", "val", "test")
+        for keys, said in (
+            (("camera_angle_x",), f"transforms_{part}.json: camera_angle_x"),
+            (("frames", 1, "transform_matrix", 1, 3), f"transforms_{part}.json: frames[1] (view_0"),
+        )
+    ),
+    ("perspective", "opendibr", "cameras.json", (*CAMERA, "Position", 0), OF_CAMERA),
+    ("perspective", "opendibr", "cameras.json", (*CAMERA, "Rotation", 2), OF_CAMERA),
+    ("perspective", "opendibr", "cameras.json", (*CAMERA, "Focal", 1), OF_CAMERA),
+    ("perspective", "opendibr", "cameras.json", (*CAMERA, "Principle_point", 0), OF_CAMERA),
+    ("perspective", "opendibr", "cameras.json", (*CAMERA, "Resolution", 0), OF_CAMERA),
+    ("perspective", "opendibr", "cameras.json", (*CAMERA, "Depth_range", 0), OF_CAMERA),
+    ("perspective", "opendibr", "cameras.json", (*CAMERA, "Depth_range", 1), OF_CAMERA),
+    ("perspective", "opendibr", "cameras.json", (*CAMERA, "BitDepthDepth"), OF_CAMERA),
+    ("perspective", "opendibr", "cameras.json", (*CAMERA, "BitDepthColor"), OF_CAMERA),
+    ("perspective", "opendibr", "cameras.json", ("cameras", 0, "Position", 1), "cameras[0]"),
+    ("perspective", "opendibr", "cameras.json", ("cameras", 0, "Focal", 0), "cameras[0]: Focal"),
+    ("fisheye", "opendibr", "cameras.json", (*CAMERA, "Fov"), OF_CAMERA),
+    ("views", "opendibr", "cameras.json", (*CAMERA, "Depth_range", 1), OF_CAMERA),
+    ("half", "opendibr", "cameras.json", (*CAMERA, "Hor_range", 0), OF_CAMERA),
+    ("panorama", "opendibr", "cameras.json", (*CAMERA, "Ver_range", 1), OF_CAMERA),
+    ("perspective", "miv", "sequence.json", ("cameras", 3, "Position", 2), "view_0003f"),
+    ("perspective", "miv", "sequence.json", ("cameras", 3, "Rotation", 0), "view_0003f"),
+    ("perspective", "miv", "sequence.json", ("cameras", 3, "Focal", 0), "view_0003f"),
+    ("perspective", "miv", "sequence.json", ("cameras", 3, "Principle_point", 1), "view_0003f"),
+    ("perspective", "miv", "sequence.json", ("cameras", 3, "Resolution", 1), "view_0003f"),
+    ("perspective", "miv", "sequence.json", ("cameras", 3, "Depth_range", 0), "view_0003f"),
+    ("perspective", "miv", "sequence.json", ("cameras", 3, "BitDepthColor"), "view_0003f"),
+    ("perspective", "miv", "sequence.json", ("Frames_number",), "view_0003f_depth"),
+    ("perspective", "miv", "sequence.json", ("BoundingBox_center", 0), "BoundingBox_center"),
+    ("half", "miv", "sequence.json", ("cameras", 3, "Hor_range", 1), "view_0003f"),
+    ("half", "miv", "sequence.json", ("cameras", 3, "Ver_range", 0), "view_0003f"),
+    ("half", "miv", "sequence.json", ("cameras", 3, "Depth_range", 1), "view_0003f"),
+]
+
+
+@pytest.mark.parametrize("place", [0, 2], ids=["first digit", "third digit"])
+@pytest.mark.parametrize(("name", "kind", "file", "keys", "said"), IN_JSON)
+def test_a_changed_digit_in_json_is_found(name, kind, file, keys, said, place, dataset):
+    path = home(dataset, name) / (f"exports/{kind}/{file}" if file else "transforms.json")
+    with changed(path, in_json(path, keys, place)):
+        found = problems(dataset, name, kind)
+    assert any(said in line for line in found), found
+    shown = path.relative_to(dataset).as_posix().removesuffix(".json")
+    assert all(shown in line or f"exports/{kind}/" in line for line in found)
+
+
+NUMBER = r"(-?\d+\.\d+(?:e-\d+)?)"
+
+
+def image_number(place):
+    """Return the pattern of a number of the fourth image in images.txt: quaternion, translation."""
+    return rf"^4 (?:\S+ ){{{place}}}{NUMBER} .*view_0003f"
+
+
+def point_number(place):
+    """Return the pattern of a number of the tenth point in points3D.txt."""
+    return rf"^10 (?:\S+ ){{{place}}}(\S+)"
+
+
+MODEL = "colmap/sparse/0"
+# The same of texts: the number is the group of a pattern.
+IN_TEXT = [
+    *(
+        (name, kind, f"{folder}/{file}", pattern, said)
+        for name, kind, folder in (
+            ("perspective", "colmap", MODEL),
+            ("opencv", "colmap", MODEL),
+            ("fisheye", "scannetpp", "scannetpp/colmap"),
+        )
+        for file, pattern, said in (
+            *(("images.txt", image_number(k), "image 4 (view_0003f): its") for k in range(7)),
+            *(("points3D.txt", point_number(axis), "point 10: ") for axis in range(3)),
+            ("points3D.txt", point_number(6), "point 10: its error"),
+            ("points3D.txt", point_number(7), "point 10: its track"),
+            ("points3D.txt", point_number(8), "point 10: its track"),
+            ("images.txt", rf"view_0003f.png\n{NUMBER} ", "view_0003f.png: POINTS2D 0: "),
+            (
+                "images.txt",
+                rf"view_0003f.png\n(?:\S+ ){{4}}{NUMBER} ",
+                "view_0003f.png: POINTS2D 1",
+            ),
+            ("images.txt", r"view_0003f.png\n\S+ \S+ (\d+) ", "point"),
+            ("images.txt", r"^(4) .*view_0003f", "images.txt"),
+            ("images.txt", r"^4 .* (1) view_0003f", "image 4: has no camera 4"),
+            *(
+                ("cameras.txt", rf"^1 \w+ \d+ \d+ (?:\S+ ){{{k}}}(\S+)", "camera 1")
+                for k in range(4)
+            ),
+            ("cameras.txt", r"^1 \w+ (\d+)", "camera 1: its image has"),
+            ("cameras.txt", r"^1 \w+ \d+ (\d+)", "camera 1: its image has"),
+        )
+    ),
+    *(
+        ("opencv", "colmap", f"{MODEL}/cameras.txt", rf"^1 (?:\S+ ){{{k}}}(\S+)", "camera 1")
+        for k in range(7, 11)
+    ),
+    ("fisheye", "scannetpp", "scannetpp/colmap/cameras.txt", r"(0)\.0$", "camera 1"),
+    *(
+        ("perspective", "poses_csv", "poses_csv/poses.csv", pattern, "row 5 (view_0003f): its")
+        for pattern in (rf"view_0003f(?:,[^,]+){{{k}}},{NUMBER}" for k in range(6))
+    ),
+    *(
+        ("perspective", "hci", "hci/parameters.cfg", rf"{key} = (\S+)", said)
+        for key, said in (
+            ("focal_length_mm", "intrinsics: its camera"),
+            ("sensor_size_mm", "intrinsics: its camera"),
+            ("image_resolution_x_px", "intrinsics: its image has"),
+            ("image_resolution_y_px", "intrinsics: its image has"),
+            ("num_cams_x", "num_cams_x"),
+            ("num_cams_y", "num_cams_x"),
+            ("baseline_mm", "Cam000 (view_0000f): its position"),
+            ("focus_distance_m", "focus_distance_m"),
+            ("offset", "offset"),
+            ("disp_min", "disp_min"),
+            ("disp_max", "disp_max"),
+            ("depth_map_scale", "depth_map_scale"),
+            *((f"center_cam_{axis}_m", "(view_0003f): its position") for axis in "xyz"),
+            *((f"center_cam_r{axis}_rad", "its rotation differs by") for axis in "xyz"),
+        )
+    ),
+]
+
+
+@pytest.mark.parametrize("place", [0, 2], ids=["first digit", "third digit"])
+@pytest.mark.parametrize(("name", "kind", "file", "pattern", "said"), IN_TEXT)
+def test_a_changed_digit_in_text_is_found(name, kind, file, pattern, said, place, dataset):
+    path = home(dataset, name) / "exports" / file
+    with changed(path, in_text(path, pattern, place)):
+        found = problems(dataset, name, kind)
+    assert any(said in line for line in found), found
+    assert all(f"{name}/exports/{kind}/" in line for line in found)
+
+
+def binary_places(folder):
+    """Yield file, byte and type of numbers of the binary model in a folder, and what is said."""
+    for index in range(4):
+        yield "cameras.bin", 32 + 8 * index, "d", "camera 1: its camera"
+    yield "cameras.bin", 16, "Q", "camera 1: its image has"
+    yield "cameras.bin", 12, "i", "its model is"
+    for index in range(7):
+        yield "images.bin", 12 + 8 * index, "d", "image 1 (view_0000f): its"
+    content = (folder / "images.bin").read_bytes()
+    first = content.index(b"\0", 8 + 4 + 56 + 4) + 9
+    for place, kind in ((0, "d"), (8, "d"), (16, "Q"), (24, "d")):
+        yield "images.bin", first + place, kind, "point"
+    for index in range(3):
+        yield "points3D.bin", 16 + 8 * index, "d", "point 1: "
+    yield "points3D.bin", 43, "d", "point 1: its error"
+    yield "points3D.bin", 59, "i", "point 1: its track"
+    yield "points3D.bin", 63, "i", "point 1: its track"
+
+
+@pytest.mark.parametrize("name", ["shifted", "fisheye"])
+def test_a_changed_number_in_a_binary_model_is_found(name, dataset):
+    folder = dataset / name / "exports" / MODEL
+    for file, start, kind, said in binary_places(folder):
+        content = bytearray((folder / file).read_bytes())
+        (value,) = struct.unpack_from(f"<{kind}", content, start)
+        struct.pack_into(
+            f"<{kind}", content, start, 1.001 * value + 0.001 if kind == "d" else value + 1
+        )
+        with changed(folder / file, content):
+            found = problems(dataset, name, "colmap")
+        assert any(said in line for line in found), (file, start, found)
+        assert all(f"{name}/exports/colmap/sparse/0/" in line for line in found)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("perspective", "nerfstudio"), ("wide", "nerfstudio"), ("views", "point_cloud")],
+)
+def test_every_changed_coordinate_of_a_point_cloud_is_found(name, kind, dataset):
+    path = home(dataset, name) / "exports" / kind / "points.ply"
+    right = path.read_bytes()
+    start = right.index(b"end_header\n") + len(b"end_header\n")
+    size = 27
+    count = (len(right) - start) // size
+    content = bytearray(right)
+    moved = [*range(0, count, 4)]
+    for vertex in moved:
+        place = start + size * vertex + 4 * (vertex % 3)
+        (value,) = struct.unpack_from("<f", content, place)
+        struct.pack_into("<f", content, place, value + 1e-4)
+    with changed(path, content):
+        found = problems(dataset, name, kind)
+    expected = [f"points.ply: vertex {vertex}: is no point of a view's depth" for vertex in moved]
+    shown = [line.split("exports/")[1].split("/", 1)[1].split(";")[0] for line in found]
+    if len(moved) > 100:
+        assert f"{len(moved)} of" in found[-1]
+        shown, expected = shown[:-1], expected[:100]
+    assert shown == expected
+    content = bytearray(right)
+    (value,) = struct.unpack_from("<f", content, start + 12)
+    struct.pack_into("<f", content, start + 12, value + 0.5)
+    with changed(path, content):
+        assert "vertex 0: its normal is no unit vector" in problems(dataset, name, kind)[0]
+
+
+def test_the_program_names_file_view_and_number_of_a_changed_matrix(dataset, run_program):
+    path = dataset / "perspective" / "transforms.json"
+    with changed(path, in_json(path, (*FRAME, 0, 3), 1)):
+        result = run_program("validate.py", dataset, "--reprojection", "perspective", check=False)
+    assert result.returncode == 1
+    line = next(line for line in result.stderr.splitlines() if "exported_cameras" in line)
+    assert "perspective/transforms.json: frames[3] (view_0003f): its position is 0." in line
+    assert line.endswith("from that in perspective/lightfield.json")
+    assert "Traceback" not in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "file"),
+    [
+        ("perspective", "colmap", f"{MODEL}/images.txt"),
+        ("perspective", "colmap", f"{MODEL}/points3D.txt"),
+        ("fisheye", "colmap", f"{MODEL}/cameras.bin"),
+        ("fisheye", "colmap", f"{MODEL}/images.bin"),
+        ("fisheye", "colmap", f"{MODEL}/points3D.bin"),
+        ("wide", "nerfstudio", "nerfstudio/transforms.json"),
+        ("wide", "nerfstudio", "nerfstudio/points.ply"),
+        ("perspective", "nerf_synthetic", "nerf_synthetic/transforms_val.json"),
+        ("half", "opendibr", "opendibr/cameras.json"),
+        ("half", "miv", "miv/sequence.json"),
+        ("perspective", "hci", "hci/parameters.cfg"),
+        ("perspective", "hci", "hci/gt_depth_lowres_Cam003.pfm"),
+        ("perspective", "poses_csv", "poses_csv/poses.csv"),
+        ("fisheye", "scannetpp", "scannetpp/train_test_lists.json"),
+        ("half", "miv", "miv/export.json"),
+    ],
+)
+def test_a_file_that_its_consumer_cannot_open_is_named(name, kind, file, dataset, tmp_path):
+    path = home(dataset, name) / "exports" / file
+    right = path.read_bytes()
+    for content in (b"", right[: len(right) // 2], b"\xff" * 64, b"{}", b"[1]"):
+        path.write_bytes(content)
+        try:
+            found = problems(dataset, name, kind)
+        finally:
+            path.write_bytes(right)
+        assert any(line.startswith(f"{name}/exports/{file}: ") for line in found), content[:9]
+    if path.name != "export.json":
+        path.rename(tmp_path / "away")
+        try:
+            assert problems(dataset, name, kind)
+        finally:
+            (tmp_path / "away").rename(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "file", "old", "new", "said"),
+    [
+        ("perspective", "instant_ngp", "", "view_0003f.exr", "view_0002f.exr", "lacks view_0003f"),
+        ("perspective", "instant_ngp", "", "view_0003f.exr", "view_9003f.exr", "has view_9003f"),
+        ("perspective", "instant_ngp", "", "th/view_0003f", "th/view_0002f", "depth_path"),
+        ("split", "instant_ngp", "_test", "view_0001f.exr", "view_0002f.exr", "lacks view_0001f"),
+        (
+            *("split", "nerfstudio", "transforms.json", '_filenames": [\n  "images/view_0000f'),
+            *('_filenames": [\n  "images/view_0002f', "train_filenames: lacks view_0000f"),
+        ),
+        (
+            *("perspective", "nerfstudio", "transforms.json", "depths/view_0003f"),
+            *("depths/view_0002f", "frames[3]: depth_file_path"),
+        ),
+        ("split", "colmap", f"{MODEL}/test.txt", "view_0001f", "view_0002f", "test.txt: lacks"),
+        (
+            *("fisheye", "scannetpp", "scannetpp/train_test_lists.json", '"has_masks": true'),
+            *('"has_masks": null', "has_masks"),
+        ),
+        (
+            *("perspective", "opendibr", "cameras.json", "view_0003f_depth"),
+            *("view_0002f_depth", "cameras[4]: NameDepth"),
+        ),
+        ("perspective", "miv", "sequence.json", '  "view_0003f"', '  "view_0002f"', "sourceCamera"),
+        ("perspective", "opendibr", "cameras.json", "OPENGL", "COLMAP", "Axial_system"),
+        (
+            "wide",
+            "nerfstudio",
+            "transforms.json",
+            "OPENCV_FISHEYE",
+            "OPENCV_FISHEYA",
+            "camera_model",
+        ),
+    ],
+)
+def test_a_changed_name_is_found(name, kind, file, old, new, said, dataset):
+    if kind == "instant_ngp":
+        path = dataset / name / f"transforms{file}.json"
+    else:
+        path = home(dataset, name) / "exports" / (file if "/" in file else f"{kind}/{file}")
+    text = path.read_text()
+    assert old in text
+    with changed(path, text.replace(old, new, 1).encode()):
+        found = problems(dataset, name, kind)
+    assert any(said in line for line in found), found
+
+
+def test_points_are_found_in_any_order(dataset):
+    path = dataset / "exports" / "point_cloud" / "points.ply"
+    head, end, body = path.read_bytes().partition(b"end_header\n")
+    vertices = np.frombuffer(body, "V27")
+    order = np.random.default_rng(1).permutation(len(vertices))
+    with changed(path, head + end + vertices[order].tobytes()):
+        assert problems(dataset, "views", "point_cloud") == []
+
+
+def test_a_list_of_a_part_is_of_all_views_where_nothing_is_split(tmp_path):
+    folder = tmp_path / "dataset"
+    write_views(folder, LENSES["perspective"], RIG, see=look_at_ball)
+    write_instant_ngp(folder, "views", [])
+    (folder / "transforms.json").rename(folder / "transforms_test.json")
+    assert problems(folder, "views", "instant_ngp") == []
+
+
+def test_points_of_views_that_cannot_be_read_are_not_called_right(dataset):
+    path = dataset / "exr" / "view_0003f.exr"
+    right = path.read_bytes()
+    path.write_bytes(right[:500])
+    try:
+        result = validate(dataset, manifests=MANIFESTS)
+    finally:
+        path.write_bytes(right)
+    (check,) = (check for check in result.checks if check.name == "exported_depth")
+    assert check.passed is None
+    assert "1 views cannot be read" in check.detail
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """A scene of a rig to train on, exported with the one that tests it."""
+    folder = tmp_path_factory.mktemp("rigs") / "scene"
+    for name, split in (("around", "train"), ("along", "test")):
+        rig = RIG | {"split": split, "center": [0.1 * len(name), 0, 0]}
+        write_views(folder / name / "dataset", LENSES["perspective"], rig, see=look_at_ball)
+        for path in (folder / name / "dataset").iterdir():
+            path.rename(folder / name / path.name)
+        (folder / name / "dataset").rmdir()
+    beside = {"along": folder / "along"}
+    for kind in ("colmap", "nerfstudio", "nerf_synthetic"):
+        options = {} if kind == "nerf_synthetic" else {"points": 60}
+        write_export(folder / "around", "views", kind, options, beside)
+    write_instant_ngp(folder / "around", "views", [])
+    trained = folder / "around" / "transforms.json"
+    write_instant_ngp(folder / "along", "views", ["--placed-as", str(trained)])
+    lightfields = {n: LightField.read(folder / n / "lightfield.json") for n in ("around", "along")}
+    write_json(folder / "splits.json", listed(lightfields))
+    return folder
+
+
+def test_views_of_the_rig_that_tests_are_compared_with_its_own_lightfield(scene):
+    for rig in ("around", "along"):
+        for kind in ("colmap", "nerfstudio", "nerf_synthetic", "instant_ngp"):
+            if rig == "around" or kind == "instant_ngp":
+                assert problems(scene / rig, "views", kind) == []
+    path = scene / "around" / "exports" / "nerf_synthetic" / "transforms_test.json"
+    keys = ("frames", 2, "transform_matrix", 1, 3)
+    with changed(path, in_json(path, keys, 2)):
+        found = problems(scene / "around", "views", "nerf_synthetic")
+    assert "transforms_test.json: frames[2] (along_view_0002f): its position" in found[0]
+    path = scene / "along" / "transforms.json"
+    for keys in (("scale",), ("offset", 1)):
+        with changed(path, in_json(path, keys, 2)):
+            assert "scale, offset" in problems(scene / "along", "views", "instant_ngp")[0]
+
+
+def test_an_unpacked_dataset_may_have_views_of_rigs_that_are_not_here(scene, tmp_path):
+    for rig in ("around", "along"):
+        shutil.copytree(scene / rig, tmp_path / f"scene_{rig}")
+    for kind in ("colmap", "nerfstudio", "nerf_synthetic", "instant_ngp"):
+        assert problems(tmp_path / "scene_around", "views", kind) == []
+    assert problems(tmp_path / "scene_along", "views", "instant_ngp") == []
+
+
+def test_a_rig_that_looks_inward_fills_the_unit_cube(tmp_path):
+    rig = {"type": "sphere", "subdivisions": 1, "size": 1.7, "face_inside": True}
+    write_views(tmp_path / "dataset", LENSES["perspective"], rig, see=look_at_ball)
+    write_instant_ngp(tmp_path / "dataset", "views", [])
+    assert problems(tmp_path / "dataset", "views", "instant_ngp") == []
+    path = tmp_path / "dataset" / "transforms.json"
+    for keys in (("scale",), ("offset", 1)):
+        with changed(path, in_json(path, keys, 2)):
+            assert "scale, offset" in problems(tmp_path / "dataset", "views", "instant_ngp")[0]
+
+
+def test_a_light_field_may_say_a_pose_twice_in_two_roundings(tmp_path):
+    folder = tmp_path / "dataset"
+    write_views(folder, LENSES["perspective"], RIG, see=look_at_ball)
+    content = read_json(folder / "lightfield.json")
+    for frame in content["frames"]:
+        frame["position"] = [round(value, 6) for value in frame["position"]]
+        frame["rotation"] = [round(value, 6) for value in frame["rotation"]]
+    write_json(folder / "lightfield.json", content)
+    # The one export is by its angles, the other by its matrices.
+    write_instant_ngp(folder, "views", [])
+    write_export(folder, "views", "nerfstudio", {"points": 60})
+    for kind in ("instant_ngp", "nerfstudio"):
+        assert problems(folder, "views", kind) == []
