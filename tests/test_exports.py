@@ -116,7 +116,7 @@ def test_colmap_model_projects_its_points_to_where_the_views_see_them(dataset, t
     on_sphere(np.array([*model.positions.values()]), 1e-5)
     for number, place in model.positions.items():
         np.testing.assert_allclose(model.colours[number], colour_of(place), atol=6)
-        assert len({image for image, _ in model.tracks[number]}) == len(model.tracks[number]) >= 2
+        assert len({image for image, _ in model.tracks[number]}) == len(model.tracks[number]) >= 1
         for image, index in model.tracks[number]:
             assert model.seen[image][index, 2] == number
     found = 0
@@ -521,8 +521,37 @@ def test_a_surface_in_front_hides_points_behind_it(dataset, tmp_path):
     folder = exported(tmp_path / "dataset", "colmap", "perspective", tmp_path, format="text")
     model = Colmap(folder / "sparse" / "0")
     number = next(key for key, (name, *_) in model.images.items() if name == "view_0000f.png")
-    assert len(model.seen[number]) == 0
-    assert all(len(rows) for key, rows in model.seen.items() if key != number)
+    _, turn, shift = model.images[number]
+    # No other view sees the wall, and its points are kept.
+    assert len(model.seen[number]) > 10
+    for index in model.seen[number][:, 2]:
+        assert model.tracks[int(index)][:, 0].tolist() == [number]
+        assert (turn @ model.positions[int(index)] + shift)[2] == pytest.approx(0.01, rel=1e-3)
+    assert all(len(rows) for rows in model.seen.values())
+
+
+def test_every_image_has_a_point_where_its_depth_is_finite(tmp_path, capsys):
+    camera = {"lens": "rectilinear", "fov": 40, "resolution": [24, 24]}
+    write_views(tmp_path / "dataset", camera, {"type": "sphere", "subdivisions": 2, "size": 0.2})
+    sky = "view_0007f"
+    path = tmp_path / "dataset" / "exr" / f"{sky}.exr"
+    image = images.read_image(path)
+    nothing = {**image.channels, "Z": np.full_like(image.channels["Z"], np.inf)}
+    images.write_exr(path, nothing, {images.DEPTH_ATTRIBUTE: "z"})
+    # The views look in 42 directions, and four points are too few for all of them.
+    folder = exported(tmp_path / "dataset", "colmap", "views", tmp_path, format="text", points=4)
+    model = Colmap(folder / "sparse" / "0")
+    assert len(model.images) == 42
+    for number, (name, turn, shift) in model.images.items():
+        rows = model.seen[number]
+        assert len(rows) > 0 or name == f"{sky}.png"
+        if len(rows):
+            places = np.array([model.positions[int(index)] for index in rows[:, 2]])
+            on_sphere(places, 1e-5)
+            np.testing.assert_allclose(rows[:, :2], model.project(places, turn, shift), atol=1e-6)
+    alone = sum(len(track) == 1 for track in model.tracks.values())
+    printed = capsys.readouterr().out
+    assert f"{len(model.positions)} points, of which one view alone sees {alone}" in printed
 
 
 def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(dataset, tmp_path):
@@ -683,18 +712,17 @@ def test_what_a_consumer_cannot_take_is_refused_by_hand_too(dataset, tmp_path, n
     assert not [*tmp_path.iterdir()]
 
 
-def test_a_model_as_text_may_be_without_points(dataset, tmp_path):
-    source = Source(dataset, "perspective", ".exr")
-    # A point has two views at least.
-    lone = source.lightfield.views[:1]
-    vars(source)["lightfield"] = source.lightfield.changed(views=lone)
-    settings = settings_of("colmap")(sources=["perspective"], format="text")
-    export.run("colmap", source, settings, tmp_path / "colmap")
-    model = Colmap(tmp_path / "colmap/sparse/0")
-    assert len(model.images) == 1
+def test_a_model_as_text_may_be_without_points(tmp_path):
+    def sky(lens, _):
+        shape = (lens.height, lens.width)
+        return np.ones((*shape, 3)), np.full(shape, np.inf)
+
+    write_views(tmp_path / "dataset", LENSES["perspective"], RIG, see=sky)
+    folder = exported(tmp_path / "dataset", "colmap", "views", tmp_path, format="text")
+    model = Colmap(folder / "sparse" / "0")
+    assert len(model.images) == 12
     assert not model.positions
-    images_txt = tmp_path / "colmap/sparse/0/images.txt"
-    assert images_txt.read_text().endswith(".png\n\n")
+    assert (folder / "sparse/0/images.txt").read_text().endswith(".png\n\n")
 
 
 def test_points_are_lifted_from_views_that_see_the_sky_too():
