@@ -148,6 +148,65 @@ def test_colmap_model_projects_its_points_to_where_the_views_see_them(dataset, t
     assert found == every
 
 
+def read_by_3dgrut(model):
+    """Return the angles that 3DGRUT gives to pixels, in radians, and those it takes to pixels.
+
+    By its dataset_colmap.py, OpenCVFisheyeCameraModel in NCore and cameraProjections.cuh: the
+    angles (h, w) of pixels, and radii in focal lengths of angles up to its largest, two rows.
+    """
+    width, height = map(int, model.size_and_parameters[:2])
+    fx, fy, cx, cy, *distortion = model.parameters
+    corner = math.hypot(max(cx, width - cx), max(cy, height - cy))
+    largest = max(corner / fx, corner / fy)
+    radius = np.polynomial.Polynomial([c for k in (1, *distortion) for c in (0, k)])
+    y, x = np.mgrid[:height, :width] + 0.5
+    seen = np.hypot((x - cx) / fx, (y - cy) / fy)
+    angles = seen * largest / max(width / 2 / fx, height / 2 / fy)
+    for _ in range(3):
+        angles = angles - (radius(angles) - seen) / radius.deriv()(angles)
+    projected = np.linspace(0, largest, 1000)
+    return angles, np.stack([projected, radius(projected)])
+
+
+TURNING = [0.02, -0.01, 0.003, -0.001]
+
+
+@pytest.mark.parametrize(
+    ("changed", "problem"),
+    [
+        ({"coefficients": TURNING}, "stops growing at 109.2°, but 3DGRUT reads it up to 121.5°"),
+        ({"coefficients": [0, 0, 0, 0]}, None),
+        ({"coefficients": [0.02, 0.01, 0, 0]}, None),
+        # Newton's method begins beyond the corner's angle, where the radius falls.
+        ({"coefficients": [0.021, -0.0043, -0.002, -0.0006], "fov": 174}, "stops growing at"),
+        ({"coefficients": TURNING, "focal_length": 40}, None),
+        ({"coefficients": [-0.1, 0, 0, 0], "focal_length": 24}, "draws nothing beyond 60.8°"),
+    ],
+)
+def test_a_fisheye_that_3dgrut_misreads_is_warned_of(tmp_path, capsys, changed, problem):
+    camera = {
+        "lens": "kannala_brandt",
+        "focal_length": 12,
+        "fov": 160,
+        "resolution": [96, 96],
+        **changed,
+    }
+    write_views(tmp_path / "dataset", camera, {"type": "plane", "cameras": [2, 1], "size": 0.2})
+    folder = exported(tmp_path / "dataset", "colmap", "views", tmp_path, format="text", points=50)
+    warned = [line for line in capsys.readouterr().err.splitlines() if "warning" in line]
+    assert [problem in line for line in warned] == [True] * (problem is not None)
+    rays = lenses.from_camera(camera).pixel_rays()
+    seen = np.isfinite(rays[..., 0])
+    true = np.arccos(-rays[..., 2][seen])
+    with np.errstate(all="ignore"):
+        angles, (projected, radii) = read_by_3dgrut(Colmap(folder / "sparse/0"))
+    off = np.abs(angles[seen] - true).max() > 0.01
+    unseen = projected > true.max() + 0.02
+    folds_in = (radii[unseen] < radii[~unseen].max() - 0.01).any()
+    cut = true.max() > projected.max()
+    assert (off or folds_in or cut) == (problem is not None)
+
+
 def test_colmap_binary_says_what_its_text_says(dataset, tmp_path):
     text = exported(dataset, "colmap", "fisheye", tmp_path / "text", format="text", points=50)
     binary = exported(dataset, "colmap", "fisheye", tmp_path / "binary", points=50)

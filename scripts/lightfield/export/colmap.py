@@ -9,6 +9,7 @@ Source: COLMAP's format.rst and scene/reconstruction_io.
 """
 
 import struct
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -45,6 +46,8 @@ TESTS = "test.txt"
 
 def export(source: Source, settings: Colmap, folder: Path) -> None:
     """Write the model of a source's views into ``folder``."""
+    if problem := cameras.misreading(source.lens):
+        print(f"warning: {source.lightfield.path}: camera: {problem}", file=sys.stderr)
     views = source.lightfield.views
     if any(view.split for view in views):
         tests = [f"{view.name}.png\n".encode() for view in splits(source.lightfield).test]
