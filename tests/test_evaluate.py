@@ -76,6 +76,55 @@ def test_the_truth_scores_perfectly(dataset, tmp_path, name, run_program):
     assert "train" not in html
 
 
+def named(dataset, tmp_path, folder):
+    """Return the source of a copy of the perspective views in a folder of that name."""
+    shutil.copytree(dataset / "perspective", tmp_path / folder / "perspective")
+    path = tmp_path / folder / "perspective" / "lightfield.json"
+    LightField.read(path).changed(scene={"name": "ball"}).write(path)
+    return Source(tmp_path / folder, "perspective", ".exr")
+
+
+@pytest.mark.parametrize(
+    ("folder", "prefix"),
+    [
+        ("spiral", "spiral_"),
+        ("spiral/f00002", "spiral_"),
+        ("ball_spiral", "spiral_"),
+        ("ball_preview_low_spiral", "low_spiral_"),
+    ],
+)
+def test_a_render_is_found_by_the_name_that_exports_give_it(dataset, tmp_path, folder, prefix):
+    source = named(dataset, tmp_path, folder)
+    view = source.lightfield.views[1]
+    # The name of each rig's view in a folder of several rigs' views.
+    for name in (view.name, f"high_{view.name}", f"{prefix}{view.name}"):
+        images.write_png(tmp_path / f"{name}.png", np.zeros((48, 64, 3), np.uint8))
+        found = evaluation.find(tmp_path, source, view)
+        assert found.name == f"{prefix if name.startswith(prefix) else ''}{view.name}.png"
+
+
+def test_renders_and_masks_under_exported_names_are_compared(dataset, tmp_path, run_program):
+    source = named(dataset, tmp_path, "spiral")
+    for view in source.lightfield.views:
+        if view.name in TESTS:
+            name = f"spiral_{view.name}.png"
+            images.write_png(tmp_path / "renders" / name, source.colour(view))
+            images.write_png(tmp_path / "masks" / name, np.eye(48, 64, dtype=np.uint8))
+    words = [
+        "--source",
+        "perspective",
+        "--masks",
+        tmp_path / "masks",
+        "--output",
+        tmp_path / "page",
+    ]
+    run_program("evaluate.py", tmp_path / "renders", "--dataset", source.dataset, *words)
+    with (tmp_path / "page" / "evaluation.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if row["region"] == "all"]
+    assert [row["view"] for row in rows] == [*TESTS, "mean"]
+    assert {(row["psnr"], float(row["pixels"])) for row in rows} == {("inf", 48)}
+
+
 def test_errors_are_those_that_were_made(dataset, tmp_path):
     path = dataset / "perspective" / "view_0001f.exr"
     image = images.read_image(path)
@@ -126,7 +175,7 @@ def test_what_is_missing_or_of_another_size_is_named(dataset, tmp_path, run_prog
     words = ["--dataset", dataset, "--source", "perspective", "--output", tmp_path / "page"]
     result = run_program("evaluate.py", tmp_path, *words, check=False)
     assert result.returncode == 1
-    assert "has no view_0001f.png or .exr, which is a view to test with" in result.stderr
+    assert "has no view_0001f.exr or .png, nor dataset_view_0001f.exr or .png" in result.stderr
     renders = tmp_path / "renders"
     for number, view in enumerate(TESTS):
         light = {name: np.full((48, 64), 0.5, np.float32) for name in "RGB"}

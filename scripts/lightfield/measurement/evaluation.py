@@ -1,13 +1,15 @@
 """How well somebody's views of a dataset are those that were rendered: view by view, by region.
 
 A render is ``<view>.png``, sRGB, or ``<view>.exr``, linear, whose channel Z is depth as the
-dataset's; normals are ``normal/<view>.exr``, as the dataset's pass of that name. What is compared
-is the developed picture. LPIPS is not among the metrics: no package of this environment holds the
-weights of its network.
+dataset's; normals are ``normal/<view>.exr``, as the dataset's pass of that name. Each may have the
+rig's name before the view's, as exports of several rigs have: ``spiral_view_0000f.png``. What is
+compared is the developed picture. LPIPS is not among the metrics: no package of this environment
+holds the weights of its network.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import whole
 from lightfield.dataset.lightfield import View
 from lightfield.export.source import Bools, Floats, Source, check_size
 from lightfield.geometry.depth import distance_from_z
@@ -38,13 +41,41 @@ class Pictures:
     normals: Floats | None
 
 
-def find(folder: Path, view: View) -> Path:
-    """Return the render of a view; raises `UserError` where there is none."""
-    for suffix in (".exr", ".png"):
-        path = folder / f"{view.name}{suffix}"
-        if path.is_file():
-            return path
-    raise UserError(f"{folder}: has no {view.name}.png or .exr, which is a view to test with")
+def find(
+    folder: Path, source: Source, view: View, suffixes: Sequence[str] = (".exr", ".png")
+) -> Path:
+    """Return the picture of a view in a folder; raises `UserError` where there is none.
+
+    The name with the rig's before it goes first: the other may be that of another rig's view.
+    """
+    names = [*(f"{rig}_{view.name}" for rig in _rig_names(source)), view.name]
+    for name in names:
+        for suffix in suffixes:
+            path = folder / f"{name}{suffix}"
+            if path.is_file():
+                return path
+    endings = " or ".join(suffixes)
+    raise UserError(
+        f"{folder}: has no {view.name}{endings}, nor {names[0]}{endings}; "
+        "it must have each view to test with"
+    )
+
+
+def _rig_names(source: Source) -> list[str]:
+    """Return what the rig of a dataset's folder may be called, the whole folder's name first.
+
+    The folder of a frame lies in the rig's. A package unfolds to <scene>_<rig>, where a preset may
+    stand between.
+    """
+    folder = whole(source.dataset)
+    if re.fullmatch(r"f\d{5,}", folder.name):
+        folder = folder.parent
+    lightfield = source.lightfield
+    scene = lightfield.scene.get("name") if "scene" in lightfield.content else None
+    if not folder.name.startswith(f"{scene}_"):
+        return [folder.name]
+    parts = folder.name.split("_")
+    return ["_".join(parts[first:]) for first in range(len(parts))]
 
 
 def mask(path: Path, source: Source) -> Bools:

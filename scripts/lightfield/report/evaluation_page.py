@@ -27,7 +27,7 @@ def write(
 
     Raises `UserError` for one that the folder ``renders`` lacks, or that cannot be compared.
     """
-    paths = {view.name: evaluation.find(renders, view) for view in tests}
+    paths = {view.name: evaluation.find(renders, source, view) for view in tests}
     rows = []
     progress = Progress(len(tests), "evaluate", "views")
     for view in tests:
@@ -36,7 +36,7 @@ def write(
         true = evaluation.truth(source, view, path)
         counted = np.ones(shown.colour.shape[:2], bool)
         if masks:
-            counted = evaluation.mask(masks / f"{view.name}.png", source)
+            counted = evaluation.mask(evaluation.find(masks, source, view, [".png"]), source)
         parts = evaluation.regions(source, view, counted, true.depth)
         if not parts:
             raise UserError(f"{path}: its mask leaves no pixel that the lens sees")
