@@ -1,11 +1,16 @@
 """Compare renders of a dataset's test views with the truth: errors as CSV, and a page of both.
 
 RENDERS holds <view>.png or <view>.exr for each view that the dataset's split has to test with
-(without a split every eighth), and may hold normal/<view>.exr. See docs/evaluation.md.
+(without a split every eighth), and may hold normal/<view>.exr. The rig's name may precede each, as
+in exports: <rig>_<view>.png. See docs/evaluation.md.
 """
 
 import argparse
+import re
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from lightfield.core.cli import run, stops, white
 from lightfield.core.leftovers import temporary_folder
@@ -13,6 +18,8 @@ from lightfield.dataset.exports import VIEWS
 from lightfield.export.source import Source
 from lightfield.export.splits import splits
 from lightfield.report import evaluation_page
+
+NAMED_COLOURS = {"black": "000000", "white": "ffffff"}
 
 
 def main() -> None:
@@ -24,6 +31,13 @@ def main() -> None:
     add("--suffix", choices=[".png", ".exr"], default=".exr", help="of the dataset's views")
     add("--exposure", type=stops, default=0.0, help="of EXR views, in stops, as in the export")
     add("--reinhard", type=white, default=1.0, help="of EXR views: what becomes white; 1 is none")
+    add(
+        "--background",
+        type=colour,
+        default=colour("black"),
+        metavar="COLOUR",
+        help="what is behind transparent pixels: black, white or rrggbb (default: black)",
+    )
     add("--masks", type=Path, help="folder of <view>.png: where they are 0, nothing is compared")
     add("--output", type=Path, required=True, help="folder to write")
     arguments = parser.parse_args()
@@ -36,7 +50,9 @@ def main() -> None:
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
     # An evaluation that fails leaves nothing, or the one before it.
     with temporary_folder(arguments.output.parent) as made:
-        overall = evaluation_page.write(made, source, tests, arguments.renders, arguments.masks)
+        overall = evaluation_page.write(
+            made, source, tests, arguments.renders, arguments.masks, arguments.background
+        )
         for path in filter(Path.is_file, [*made.rglob("*")]):
             target = arguments.output / path.relative_to(made)
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -45,6 +61,16 @@ def main() -> None:
         f"{len(tests)} views: PSNR {overall['psnr']:.2f} dB, SSIM {overall['ssim']:.4f}, FLIP "
         f"{overall['flip']:.4f}; LPIPS is left out: no installed package has its weights"
     )
+
+
+def colour(text: str) -> NDArray[np.float64]:
+    """Return a colour (3,) in sRGB, 0 to 1."""
+    code = NAMED_COLOURS.get(text, text.removeprefix("#"))
+    if not re.fullmatch("[0-9a-fA-F]{6}", code):
+        raise argparse.ArgumentTypeError(
+            f"is {text}; must be black, white or rrggbb, two hexadecimal digits a channel"
+        )
+    return np.array([*bytes.fromhex(code)]) / 255
 
 
 if __name__ == "__main__":

@@ -35,12 +35,15 @@ def dataset(tmp_path_factory):
     return folder
 
 
+BLACK, WHITE = np.zeros(3), np.ones(3)
+
+
 def rows_of(dataset, name, shown, mask=True, view="view_0001f"):
     """Return the errors of a render by region."""
     source = Source(dataset, name, ".exr")
     found = next(each for each in source.lightfield.views if each.name == view)
-    rendered = evaluation.rendered(shown, source)
-    true = evaluation.truth(source, found, shown)
+    rendered = evaluation.rendered(shown, source, BLACK)
+    true = evaluation.truth(source, found, shown, BLACK)
     counted = np.broadcast_to(mask, rendered.colour.shape[:2])
     parts = evaluation.regions(source, found, counted, true.depth)
     return dict(evaluation.errors(rendered, true, parts))
@@ -76,6 +79,55 @@ def test_the_truth_scores_perfectly(dataset, tmp_path, name, run_program):
     assert "train" not in html
 
 
+def named(dataset, tmp_path, folder):
+    """Return the source of a copy of the perspective views in a folder of that name."""
+    shutil.copytree(dataset / "perspective", tmp_path / folder / "perspective")
+    path = tmp_path / folder / "perspective" / "lightfield.json"
+    LightField.read(path).changed(scene={"name": "ball"}).write(path)
+    return Source(tmp_path / folder, "perspective", ".exr")
+
+
+@pytest.mark.parametrize(
+    ("folder", "prefix"),
+    [
+        ("spiral", "spiral_"),
+        ("spiral/f00002", "spiral_"),
+        ("ball_spiral", "spiral_"),
+        ("ball_preview_low_spiral", "low_spiral_"),
+    ],
+)
+def test_a_render_is_found_by_the_name_that_exports_give_it(dataset, tmp_path, folder, prefix):
+    source = named(dataset, tmp_path, folder)
+    view = source.lightfield.views[1]
+    # The name of each rig's view in a folder of several rigs' views.
+    for name in (view.name, f"high_{view.name}", f"{prefix}{view.name}"):
+        images.write_png(tmp_path / f"{name}.png", np.zeros((48, 64, 3), np.uint8))
+        found = evaluation.find(tmp_path, source, view)
+        assert found.name == f"{prefix if name.startswith(prefix) else ''}{view.name}.png"
+
+
+def test_renders_and_masks_under_exported_names_are_compared(dataset, tmp_path, run_program):
+    source = named(dataset, tmp_path, "spiral")
+    for view in source.lightfield.views:
+        if view.name in TESTS:
+            name = f"spiral_{view.name}.png"
+            images.write_png(tmp_path / "renders" / name, source.colour(view))
+            images.write_png(tmp_path / "masks" / name, np.eye(48, 64, dtype=np.uint8))
+    words = [
+        "--source",
+        "perspective",
+        "--masks",
+        tmp_path / "masks",
+        "--output",
+        tmp_path / "page",
+    ]
+    run_program("evaluate.py", tmp_path / "renders", "--dataset", source.dataset, *words)
+    with (tmp_path / "page" / "evaluation.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if row["region"] == "all"]
+    assert [row["view"] for row in rows] == [*TESTS, "mean"]
+    assert {(row["psnr"], float(row["pixels"])) for row in rows} == {("inf", 48)}
+
+
 def test_errors_are_those_that_were_made(dataset, tmp_path):
     path = dataset / "perspective" / "view_0001f.exr"
     image = images.read_image(path)
@@ -108,6 +160,112 @@ def test_errors_are_those_that_were_made(dataset, tmp_path):
     assert found["normal"] == pytest.approx(45)
 
 
+@pytest.fixture
+def transparent(tmp_path):
+    """The source of views of a grey wall whose alpha falls from 1 at the left to 0."""
+    folder = tmp_path / "spiral"
+    write_views(folder / "views", LENSES["perspective"], RIG)
+    (folder / "views").rename(folder / "exr")
+    path = folder / "exr" / "lightfield.json"
+    LightField.read(path).changed(render={"transparent": True}).write(folder / "lightfield.json")
+    alpha = np.tile(np.clip(np.linspace(1.5, -0.5, 64), 0, 1), (48, 1)).astype(np.float32)
+    for view in TESTS:
+        channels = dict.fromkeys("RGB", np.float32(0.25) * alpha) | {"A": alpha, "Z": 1 + alpha}
+        images.write_exr(folder / "exr" / f"{view}.exr", channels)
+    return Source(folder, "", ".exr")
+
+
+def compared(source, path, background):
+    """Return the errors of a render before a background, and what is wrong with its own."""
+    view = next(view for view in source.lightfield.views if path.stem.endswith(view.name))
+    shown = evaluation.rendered(path, source, background)
+    true = evaluation.truth(source, view, path, background)
+    parts = {"all": np.ones((48, 64), bool)}
+    ((_, errors),) = evaluation.errors(shown, true, parts)
+    return errors, evaluation.background_problem(shown, true, parts["all"], background)
+
+
+def on(background, alpha):
+    """The wall's sRGB colour, 0 to 255, before a background in sRGB, 0 to 1, as trainers blend."""
+    wall = 0.5371  # 0.25 of light, by IEC 61966-2-1
+    alpha = alpha[..., None].astype(np.float64)
+    return np.rint(255 * (alpha * wall + (1 - alpha) * background)).astype(np.uint8)
+
+
+@pytest.mark.parametrize("background", [BLACK, WHITE, np.array([1, 0.5, 0])])
+def test_renders_without_alpha_are_compared_before_their_background(
+    transparent, tmp_path, background
+):
+    alpha = images.read_image(transparent.path(transparent.lightfield.views[1])).channels["A"]
+    path = tmp_path / "spiral_view_0001f.png"
+    images.write_png(path, on(background, alpha))
+    errors, problem = compared(transparent, path, background)
+    # A step of 8 bits at most.
+    assert errors["psnr"] > -20 * math.log10(1 / 255)
+    assert problem is None
+    errors, problem = compared(transparent, path, np.array([0, 0, 1]))
+    assert errors["psnr"] < 10
+    code = {0: "#000000", 3: "#ffffff"}.get(background.sum(), "#ff8000")
+    assert f"has no alpha, and is {code} where the truth is transparent" in problem
+
+
+def test_linear_renders_are_before_their_background_as_light_is(transparent, tmp_path):
+    alpha = images.read_image(transparent.path(transparent.lightfield.views[1])).channels["A"]
+    path = tmp_path / "view_0001f.exr"
+    images.write_exr(path, dict.fromkeys("RGB", (np.float32(0.25) * alpha + 1 - alpha)))
+    assert compared(transparent, path, WHITE)[0]["psnr"] > 100
+    images.write_exr(path, dict.fromkeys("RGB", np.float32(0.25) * alpha))
+    assert compared(transparent, path, BLACK)[0]["psnr"] > 100
+
+
+@pytest.mark.parametrize("background", [BLACK, WHITE])
+def test_renders_with_alpha_are_put_before_the_background_too(transparent, tmp_path, background):
+    view = transparent.lightfield.views[1]
+    for path in (tmp_path / f"{view.name}.png", transparent.path(view)):
+        if path.suffix == ".png":
+            transparent.write_image(view, path)
+        errors, problem = compared(transparent, path, background)
+        assert (errors["psnr"], problem) == (math.inf, None)
+    pixels = np.dstack([transparent.colour(view), np.full((48, 64), 255, np.uint8)])
+    images.write_png(tmp_path / f"{view.name}.png", pixels)
+    _, problem = compared(transparent, tmp_path / f"{view.name}.png", background)
+    # It differs by more than 0.1 in all but 16 columns, and three at the ramp's upper end.
+    assert "has another alpha than the truth in 70% of its pixels" in problem
+
+
+def test_a_render_with_holes_of_opaque_views_is_warned_of(dataset, tmp_path):
+    source = Source(dataset, "perspective", ".exr")
+    view = source.lightfield.views[1]
+    alpha = np.full((48, 64), 255, np.uint8)
+    path = tmp_path / f"{view.name}.png"
+    for hole, expected in ((0, None), (12, "has another alpha than the truth in 25% of")):
+        alpha[:hole] = 0
+        images.write_png(path, np.dstack([source.colour(view), alpha]))
+        _, problem = compared(source, path, BLACK)
+        assert problem is None if expected is None else expected in problem
+
+
+def test_white_renders_are_warned_of_until_their_background_is_given(
+    transparent, tmp_path, run_program
+):
+    alpha = images.read_image(transparent.path(transparent.lightfield.views[1])).channels["A"]
+    for view in TESTS:
+        images.write_png(tmp_path / "renders" / f"spiral_{view}.png", on(WHITE, alpha))
+    words = [tmp_path / "renders", "--dataset", transparent.dataset, "--output", tmp_path / "page"]
+    result = run_program("evaluate.py", *words)
+    assert f"spiral_{TESTS[0]}.png: has no alpha, and is #ffffff where" in result.stderr
+    assert "give --background" in result.stderr
+    assert "(and 1 more of 2)" in result.stderr
+    assert "#ffffff" in (tmp_path / "page" / "index.html").read_text()
+    result = run_program("evaluate.py", *words, "--background", "white")
+    assert "warning" not in result.stderr
+    with (tmp_path / "page" / "evaluation.csv").open() as file:
+        assert min(float(row["psnr"]) for row in csv.DictReader(file)) > 48
+    result = run_program("evaluate.py", *words, "--background", "sky", check=False)
+    assert result.returncode == 2
+    assert "must be black, white or rrggbb" in result.stderr
+
+
 def test_regions_are_where_the_lens_sees_and_where_depth_jumps(dataset):
     source = Source(dataset, "fisheye", ".exr")
     distance = np.ones((48, 48))
@@ -126,7 +284,7 @@ def test_what_is_missing_or_of_another_size_is_named(dataset, tmp_path, run_prog
     words = ["--dataset", dataset, "--source", "perspective", "--output", tmp_path / "page"]
     result = run_program("evaluate.py", tmp_path, *words, check=False)
     assert result.returncode == 1
-    assert "has no view_0001f.png or .exr, which is a view to test with" in result.stderr
+    assert "has no view_0001f.exr or .png, nor dataset_view_0001f.exr or .png" in result.stderr
     renders = tmp_path / "renders"
     for number, view in enumerate(TESTS):
         light = {name: np.full((48, 64), 0.5, np.float32) for name in "RGB"}
@@ -146,7 +304,7 @@ def test_what_is_missing_or_of_another_size_is_named(dataset, tmp_path, run_prog
         ("grey.exr", "has the channels Z; must have RGB"),
     ):
         with pytest.raises(UserError, match=problem):
-            evaluation.rendered(tmp_path / name, source)
+            evaluation.rendered(tmp_path / name, source, BLACK)
     mask = tmp_path / "view_0001f.png"
     for pixels, problem in (
         (np.ones((48, 64, 3), np.uint8), "has no channel Y; it has R, G, B"),

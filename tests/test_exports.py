@@ -116,7 +116,7 @@ def test_colmap_model_projects_its_points_to_where_the_views_see_them(dataset, t
     on_sphere(np.array([*model.positions.values()]), 1e-5)
     for number, place in model.positions.items():
         np.testing.assert_allclose(model.colours[number], colour_of(place), atol=6)
-        assert len({image for image, _ in model.tracks[number]}) == len(model.tracks[number]) >= 2
+        assert len({image for image, _ in model.tracks[number]}) == len(model.tracks[number]) >= 1
         for image, index in model.tracks[number]:
             assert model.seen[image][index, 2] == number
     found = 0
@@ -146,6 +146,65 @@ def test_colmap_model_projects_its_points_to_where_the_views_see_them(dataset, t
             inside &= (valid[row, column] > 0) & (angle <= LENSES[source]["fov"] / 2)
         every += inside.sum()
     assert found == every
+
+
+def read_by_3dgrut(model):
+    """Return the angles that 3DGRUT gives to pixels, in radians, and those it takes to pixels.
+
+    By its dataset_colmap.py, OpenCVFisheyeCameraModel in NCore and cameraProjections.cuh: the
+    angles (h, w) of pixels, and radii in focal lengths of angles up to its largest, two rows.
+    """
+    width, height = map(int, model.size_and_parameters[:2])
+    fx, fy, cx, cy, *distortion = model.parameters
+    corner = math.hypot(max(cx, width - cx), max(cy, height - cy))
+    largest = max(corner / fx, corner / fy)
+    radius = np.polynomial.Polynomial([c for k in (1, *distortion) for c in (0, k)])
+    y, x = np.mgrid[:height, :width] + 0.5
+    seen = np.hypot((x - cx) / fx, (y - cy) / fy)
+    angles = seen * largest / max(width / 2 / fx, height / 2 / fy)
+    for _ in range(3):
+        angles = angles - (radius(angles) - seen) / radius.deriv()(angles)
+    projected = np.linspace(0, largest, 1000)
+    return angles, np.stack([projected, radius(projected)])
+
+
+TURNING = [0.02, -0.01, 0.003, -0.001]
+
+
+@pytest.mark.parametrize(
+    ("changed", "problem"),
+    [
+        ({"coefficients": TURNING}, "stops growing at 109.2°, but 3DGRUT reads it up to 121.5°"),
+        ({"coefficients": [0, 0, 0, 0]}, None),
+        ({"coefficients": [0.02, 0.01, 0, 0]}, None),
+        # Newton's method begins beyond the corner's angle, where the radius falls.
+        ({"coefficients": [0.021, -0.0043, -0.002, -0.0006], "fov": 174}, "stops growing at"),
+        ({"coefficients": TURNING, "focal_length": 40}, None),
+        ({"coefficients": [-0.1, 0, 0, 0], "focal_length": 24}, "draws nothing beyond 60.8°"),
+    ],
+)
+def test_a_fisheye_that_3dgrut_misreads_is_warned_of(tmp_path, capsys, changed, problem):
+    camera = {
+        "lens": "kannala_brandt",
+        "focal_length": 12,
+        "fov": 160,
+        "resolution": [96, 96],
+        **changed,
+    }
+    write_views(tmp_path / "dataset", camera, {"type": "plane", "cameras": [2, 1], "size": 0.2})
+    folder = exported(tmp_path / "dataset", "colmap", "views", tmp_path, format="text", points=50)
+    warned = [line for line in capsys.readouterr().err.splitlines() if "warning" in line]
+    assert [problem in line for line in warned] == [True] * (problem is not None)
+    rays = lenses.from_camera(camera).pixel_rays()
+    seen = np.isfinite(rays[..., 0])
+    true = np.arccos(-rays[..., 2][seen])
+    with np.errstate(all="ignore"):
+        angles, (projected, radii) = read_by_3dgrut(Colmap(folder / "sparse/0"))
+    off = np.abs(angles[seen] - true).max() > 0.01
+    unseen = projected > true.max() + 0.02
+    folds_in = (radii[unseen] < radii[~unseen].max() - 0.01).any()
+    cut = true.max() > projected.max()
+    assert (off or folds_in or cut) == (problem is not None)
 
 
 def test_colmap_binary_says_what_its_text_says(dataset, tmp_path):
@@ -521,8 +580,37 @@ def test_a_surface_in_front_hides_points_behind_it(dataset, tmp_path):
     folder = exported(tmp_path / "dataset", "colmap", "perspective", tmp_path, format="text")
     model = Colmap(folder / "sparse" / "0")
     number = next(key for key, (name, *_) in model.images.items() if name == "view_0000f.png")
-    assert len(model.seen[number]) == 0
-    assert all(len(rows) for key, rows in model.seen.items() if key != number)
+    _, turn, shift = model.images[number]
+    # No other view sees the wall, and its points are kept.
+    assert len(model.seen[number]) > 10
+    for index in model.seen[number][:, 2]:
+        assert model.tracks[int(index)][:, 0].tolist() == [number]
+        assert (turn @ model.positions[int(index)] + shift)[2] == pytest.approx(0.01, rel=1e-3)
+    assert all(len(rows) for rows in model.seen.values())
+
+
+def test_every_image_has_a_point_where_its_depth_is_finite(tmp_path, capsys):
+    camera = {"lens": "rectilinear", "fov": 40, "resolution": [24, 24]}
+    write_views(tmp_path / "dataset", camera, {"type": "sphere", "subdivisions": 2, "size": 0.2})
+    sky = "view_0007f"
+    path = tmp_path / "dataset" / "exr" / f"{sky}.exr"
+    image = images.read_image(path)
+    nothing = {**image.channels, "Z": np.full_like(image.channels["Z"], np.inf)}
+    images.write_exr(path, nothing, {images.DEPTH_ATTRIBUTE: "z"})
+    # The views look in 42 directions, and four points are too few for all of them.
+    folder = exported(tmp_path / "dataset", "colmap", "views", tmp_path, format="text", points=4)
+    model = Colmap(folder / "sparse" / "0")
+    assert len(model.images) == 42
+    for number, (name, turn, shift) in model.images.items():
+        rows = model.seen[number]
+        assert len(rows) > 0 or name == f"{sky}.png"
+        if len(rows):
+            places = np.array([model.positions[int(index)] for index in rows[:, 2]])
+            on_sphere(places, 1e-5)
+            np.testing.assert_allclose(rows[:, :2], model.project(places, turn, shift), atol=1e-6)
+    alone = sum(len(track) == 1 for track in model.tracks.values())
+    printed = capsys.readouterr().out
+    assert f"{len(model.positions)} points, of which one view alone sees {alone}" in printed
 
 
 def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(dataset, tmp_path):
@@ -683,18 +771,17 @@ def test_what_a_consumer_cannot_take_is_refused_by_hand_too(dataset, tmp_path, n
     assert not [*tmp_path.iterdir()]
 
 
-def test_a_model_as_text_may_be_without_points(dataset, tmp_path):
-    source = Source(dataset, "perspective", ".exr")
-    # A point has two views at least.
-    lone = source.lightfield.views[:1]
-    vars(source)["lightfield"] = source.lightfield.changed(views=lone)
-    settings = settings_of("colmap")(sources=["perspective"], format="text")
-    export.run("colmap", source, settings, tmp_path / "colmap")
-    model = Colmap(tmp_path / "colmap/sparse/0")
-    assert len(model.images) == 1
+def test_a_model_as_text_may_be_without_points(tmp_path):
+    def sky(lens, _):
+        shape = (lens.height, lens.width)
+        return np.ones((*shape, 3)), np.full(shape, np.inf)
+
+    write_views(tmp_path / "dataset", LENSES["perspective"], RIG, see=sky)
+    folder = exported(tmp_path / "dataset", "colmap", "views", tmp_path, format="text")
+    model = Colmap(folder / "sparse" / "0")
+    assert len(model.images) == 12
     assert not model.positions
-    images_txt = tmp_path / "colmap/sparse/0/images.txt"
-    assert images_txt.read_text().endswith(".png\n\n")
+    assert (folder / "sparse/0/images.txt").read_text().endswith(".png\n\n")
 
 
 def test_points_are_lifted_from_views_that_see_the_sky_too():

@@ -144,7 +144,9 @@ class Colmap(Developed):
     is_for_training: ClassVar[bool] = True
 
     format: Literal["binary", "text"] = "binary"
-    points: PointCount = Field(50000, description="Points lifted from depth, at most.")
+    points: PointCount = Field(
+        50000, description="Points lifted from depth, at most; one more for an image without any."
+    )
     depth: bool = Field(False, description="Depth maps too, from sources with depth.")
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
@@ -239,7 +241,9 @@ class ScanNetPP(Developed):
 
     is_for_training: ClassVar[bool] = True
 
-    points: PointCount = Field(50000, description="Points lifted from depth, at most.")
+    points: PointCount = Field(
+        50000, description="Points lifted from depth, at most; one more for an image without any."
+    )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if isinstance(lens, Equidistant) and lens.fov < math.pi:

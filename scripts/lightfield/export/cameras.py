@@ -1,7 +1,10 @@
 """A lens as other programs' camera models have it, in pixels."""
 
+import math
+
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.increasing_polynomial import IncreasingPolynomial
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
@@ -24,3 +27,39 @@ def opencv_fisheye(lens: Lens) -> tuple[float, ...]:
     if isinstance(lens, Equidistant):
         return (lens.width / lens.fov, lens.height / lens.fov, 0.0, 0.0, 0.0, 0.0)
     raise TypeError(f"{type(lens).__name__} is no fisheye of OpenCV's")
+
+
+def misreading(lens: Lens) -> str | None:
+    """Say what 3DGRUT misreads of a fisheye in a COLMAP model; None if nothing.
+
+    For the largest angle θ it takes the corner's distance from the axis divided by the focal
+    length. It projects points up to there, and inverts r(θ) by Newton's method from an angle in
+    proportion to r. So r(θ) must grow that far, and no pixel may see farther. Source: 3DGRUT's
+    dataset_colmap.py and cameraProjections.cuh, and OpenCVFisheyeCameraModel in NCore.
+    """
+    if not isinstance(lens, Equidistant | KannalaBrandt):
+        return None
+    fx, fy, *distortion = opencv_fisheye(lens)
+    across = max(lens.center[0], lens.width - lens.center[0])
+    down = max(lens.center[1], lens.height - lens.center[1])
+    largest = math.hypot(across, down) / min(fx, fy)
+    coefficients = [coefficient for k in (1.0, *distortion) for coefficient in (0.0, k)]
+    corner = math.hypot((across - 0.5) / fx, (down - 0.5) / fy)
+    visible = IncreasingPolynomial(coefficients, last=lens.fov / 2, last_value=corner)
+    side = max(lens.width / 2 / fx, lens.height / 2 / fy)
+    first_guess = visible.value(visible.end) * largest / side
+    needed = max(largest, first_guess)
+    turning = IncreasingPolynomial(coefficients, last=needed).end
+    if turning < needed:
+        return (
+            f"its radius stops growing at {math.degrees(turning):.1f}°, but 3DGRUT reads it up to "
+            f"{math.degrees(needed):.1f}°, and gets rays and points wrong; give it equidistant "
+            "views"
+        )
+    if visible.end > largest:
+        return (
+            f"it sees up to {math.degrees(visible.end):.1f}°, but 3DGRUT draws nothing beyond "
+            f"{math.degrees(largest):.1f}° (corner radius / focal length); give it "
+            "equidistant views"
+        )
+    return None

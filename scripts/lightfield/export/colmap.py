@@ -3,11 +3,13 @@
 ``sparse/0/`` holds cameras, images and points3D, in binary or as text, ``images/`` the views as
 8-bit PNG, ``masks/<image>.png`` (0 is ignored) of views with pixels that show nothing, and on
 demand ``stereo/depth_maps/<image>.geometric.bin``, Z-depth in metres. Poses are world to camera,
-with x right, y down and z forward. Points are lifted from depth; each has the views that see it.
+with x right, y down and z forward. Points are lifted from depth; each has the views that see it,
+which may be one alone: depth says where it is, and no second view is needed.
 Source: COLMAP's format.rst and scene/reconstruction_io.
 """
 
 import struct
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -20,7 +22,14 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.exports import Colmap
 from lightfield.dataset.lightfield import View
 from lightfield.export import cameras
-from lightfield.export.points import Observations, Points, lift, observations
+from lightfield.export.points import (
+    Observations,
+    Points,
+    joined,
+    lift,
+    lift_one_each,
+    observations,
+)
 from lightfield.export.source import Source
 from lightfield.export.splits import splits
 from lightfield.geometry.colmap import pose
@@ -37,6 +46,8 @@ TESTS = "test.txt"
 
 def export(source: Source, settings: Colmap, folder: Path) -> None:
     """Write the model of a source's views into ``folder``."""
+    if problem := cameras.misreading(source.lens):
+        print(f"warning: {source.lightfield.path}: camera: {problem}", file=sys.stderr)
     views = source.lightfield.views
     if any(view.split for view in views):
         tests = [f"{view.name}.png\n".encode() for view in splits(source.lightfield).test]
@@ -57,12 +68,25 @@ def export(source: Source, settings: Colmap, folder: Path) -> None:
 
 
 def model(source: Source, count: int) -> "Model":
-    """Lift ``count`` points at most, and return them with the views that see each."""
+    """Lift ``count`` points, and return them with the views that see each; print how many.
+
+    A view that sees none of them gets one more of its own surface, for gsplat's depth loss ends in
+    a KeyError at an image without points.
+    """
     points = lift(source, count=count)
     seen = observations(source, points)
-    # A track has two views at least.
-    counts = np.bincount(np.concatenate([o.indices for o in seen]), minlength=len(points.positions))
-    return Model(source, points, seen, np.flatnonzero(counts >= 2))
+    views = zip(source.lightfield.views, seen, strict=True)
+    missing_points = lift_one_each(source, [view for view, own in views if not len(own.indices)])
+    if len(missing_points.positions):
+        points = joined([points, missing_points])
+        seen = observations(source, points)
+    views_of_each = np.bincount(
+        np.concatenate([o.indices for o in seen]), minlength=len(points.positions)
+    )
+    kept = np.flatnonzero(views_of_each)
+    alone = int((views_of_each == 1).sum())
+    print(f"{len(kept):,} points, of which one view alone sees {alone:,}")
+    return Model(source, points, seen, kept)
 
 
 def camera(lens: Lens) -> tuple[tuple[int, str], list[float]]:

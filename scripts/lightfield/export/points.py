@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from lightfield.core.files import write_bytes
 from lightfield.core.progress import Progress
-from lightfield.export.source import Floats, Source, pixel_indices
+from lightfield.dataset.lightfield import View
+from lightfield.export.source import Floats, Source, Surface, pixel_indices
 
 # Candidates for each point that is wanted, of which an even selection is taken.
 _CANDIDATES = 8
@@ -23,7 +24,7 @@ class Points:
     colours: NDArray[np.uint8]
     normals: Floats
 
-    def chosen(self, which: NDArray[np.generic]) -> "Points":
+    def chosen(self, which: NDArray[np.generic] | slice) -> "Points":
         return Points(self.positions[which], self.colours[which], self.normals[which])
 
 
@@ -49,18 +50,33 @@ def lift(source: Source, count: int | None = None, voxel: float | None = None) -
     progress = Progress(len(views), "points", "views")
     kept: Points | None = None
     for view, surface in source.surfaces(views):
-        positions, normals = surface.points(step)
-        local = (positions - view.matrix[:3, 3]) @ view.matrix[:3, :3]
-        column, row, inside = pixel_indices(source.lens, local)
-        inside &= source.valid(view)[row, column]
-        found = Points(positions, source.colour(view)[row, column], normals).chosen(inside)
+        found = _points_of(source, view, surface, step)
         # With a voxel, memory stays that of the cloud, however many views there are.
-        kept = _joined([kept, found]) if kept else found
+        kept = joined([kept, found]) if kept else found
         if voxel:
             kept = kept.chosen(_one_a_voxel(kept.positions, voxel))
         progress.done()
     assert kept
     return kept.chosen(evenly(kept.positions, count)) if count else kept
+
+
+def lift_one_each(source: Source, views: Sequence[View]) -> Points:
+    """Lift one point from each of the ``views`` whose depth is finite anywhere in the frame."""
+    found = [Points(np.empty((0, 3)), np.empty((0, 3), np.uint8), np.empty((0, 3)))]
+    for view, surface in source.surfaces(views):
+        points = _points_of(source, view, surface, step=1)
+        middle = len(points.positions) // 2
+        found.append(points.chosen(np.s_[middle : middle + 1]))
+    return joined(found)
+
+
+def _points_of(source: Source, view: View, surface: Surface, step: int) -> Points:
+    """Return the points of a surface at every ``step``-th pixel that the ``view`` shows."""
+    positions, normals = surface.points(step)
+    local = (positions - view.matrix[:3, 3]) @ view.matrix[:3, :3]
+    column, row, inside = pixel_indices(source.lens, local)
+    inside &= source.valid(view)[row, column]
+    return Points(positions, source.colour(view)[row, column], normals).chosen(inside)
 
 
 def observations(source: Source, points: Points) -> list[Observations]:
@@ -94,7 +110,8 @@ def write_ply(path: Path, points: Points) -> None:
     write_bytes(path, header.encode() + vertices.tobytes())
 
 
-def _joined(parts: Sequence[Points]) -> Points:
+def joined(parts: Sequence[Points]) -> Points:
+    """Return the points of all ``parts``, in order."""
     return Points(
         np.concatenate([part.positions for part in parts]),
         np.concatenate([part.colours for part in parts]),

@@ -1,13 +1,15 @@
 """How well somebody's views of a dataset are those that were rendered: view by view, by region.
 
 A render is ``<view>.png``, sRGB, or ``<view>.exr``, linear, whose channel Z is depth as the
-dataset's; normals are ``normal/<view>.exr``, as the dataset's pass of that name. What is compared
-is the developed picture. LPIPS is not among the metrics: no package of this environment holds the
-weights of its network.
+dataset's; normals are ``normal/<view>.exr``, as the dataset's pass of that name. Each may have the
+rig's name before the view's, as exports of several rigs have: ``spiral_view_0000f.png``. What is
+compared is the developed picture; one with alpha is put before a background. LPIPS is not among
+the metrics: no package of this environment holds the weights of its network.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,35 +18,72 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import whole
 from lightfield.dataset.lightfield import View
 from lightfield.export.source import Bools, Floats, Source, check_size
 from lightfield.geometry.depth import distance_from_z
 from lightfield.imaging import images
-from lightfield.imaging.tonemap import encode_srgb, tone_map
+from lightfield.imaging.tonemap import decode_srgb, encode_srgb, tone_map
 from lightfield.measurement import metrics
 
 # Neighbouring depths of different surfaces differ by more than this part.
 EDGE = 0.1
 EDGE_PIXELS = 5  # the width of what counts as an edge
 NORMALS = "normal"
+# A render's alpha is another than the truth's where they differ by more than this, in more than
+# this part of the pixels: at silhouettes they always differ somewhat.
+ALPHA_STEP = 0.1
+ALPHA_PART = 0.01
 
 
 @dataclass(frozen=True)
 class Pictures:
-    """What one view is compared by: sRGB-encoded colour (h, w, 3), depth (h, w), normals."""
+    """What one view is compared by: sRGB-encoded colour (h, w, 3), depth (h, w), normals.
+
+    The colour is before the background; ``alpha`` (h, w) is how much of a pixel is not background.
+    """
 
     colour: Floats
+    alpha: Floats | None
     depth: Floats | None
     normals: Floats | None
 
 
-def find(folder: Path, view: View) -> Path:
-    """Return the render of a view; raises `UserError` where there is none."""
-    for suffix in (".exr", ".png"):
-        path = folder / f"{view.name}{suffix}"
-        if path.is_file():
-            return path
-    raise UserError(f"{folder}: has no {view.name}.png or .exr, which is a view to test with")
+def find(
+    folder: Path, source: Source, view: View, suffixes: Sequence[str] = (".exr", ".png")
+) -> Path:
+    """Return the picture of a view in a folder; raises `UserError` where there is none.
+
+    The name with the rig's before it goes first: the other may be that of another rig's view.
+    """
+    names = [*(f"{rig}_{view.name}" for rig in _rig_names(source)), view.name]
+    for name in names:
+        for suffix in suffixes:
+            path = folder / f"{name}{suffix}"
+            if path.is_file():
+                return path
+    endings = " or ".join(suffixes)
+    raise UserError(
+        f"{folder}: has no {view.name}{endings}, nor {names[0]}{endings}; "
+        "it must have each view to test with"
+    )
+
+
+def _rig_names(source: Source) -> list[str]:
+    """Return what the rig of a dataset's folder may be called, the whole folder's name first.
+
+    The folder of a frame lies in the rig's. A package unfolds to <scene>_<rig>, where a preset may
+    stand between.
+    """
+    folder = whole(source.dataset)
+    if re.fullmatch(r"f\d{5,}", folder.name):
+        folder = folder.parent
+    lightfield = source.lightfield
+    scene = lightfield.scene.get("name") if "scene" in lightfield.content else None
+    if not folder.name.startswith(f"{scene}_"):
+        return [folder.name]
+    parts = folder.name.split("_")
+    return ["_".join(parts[first:]) for first in range(len(parts))]
 
 
 def mask(path: Path, source: Source) -> Bools:
@@ -54,19 +93,31 @@ def mask(path: Path, source: Source) -> Bools:
     return np.asarray(pixels > 0)
 
 
-def truth(source: Source, view: View, like: Path) -> Pictures:
-    """Return a dataset's own view; as coarse as a PNG if what it is compared with is ``like``."""
-    coarse = like.suffix == ".png"
+def truth(source: Source, view: View, like: Path, background: Floats) -> Pictures:
+    """Return a dataset's own view before a background (3,) in sRGB, 0 to 1.
+
+    It is as coarse as a PNG if what it is compared with is ``like``.
+    """
+    transparent = source.lightfield.transparent
+    if like.suffix == ".png":
+        alpha = source.alpha(view) / 255 if transparent else None
+        colour = _on_background(source.colour(view) / 255, alpha, background, 255)
+    else:
+        image = images.read_image(source.path(view))
+        # Of views that are not transparent it says where another lens saw nothing.
+        alpha = _alpha(image) if transparent else None
+        colour = _developed(image, alpha, source, background)
     has_depth = source.suffix == ".exr" and source.lightfield.depth
     return Pictures(
-        source.colour(view) / 255 if coarse else source.encoded(view),
+        colour,
+        alpha,
         source.depth(view, source.lightfield.depth or "") if has_depth else None,
         _normals(source.dataset / source.name / NORMALS / f"{view.name}.exr"),
     )
 
 
-def rendered(path: Path, source: Source) -> Pictures:
-    """Return somebody's view.
+def rendered(path: Path, source: Source, background: Floats) -> Pictures:
+    """Return somebody's view before a background (3,) in sRGB, 0 to 1.
 
     Raises `UserError` where it has no colour, or another size than the dataset's.
     """
@@ -74,15 +125,77 @@ def rendered(path: Path, source: Source) -> Pictures:
     if not {*"RGB"} <= image.channels.keys():
         raise UserError(f"{path}: has the channels {', '.join(image.channels)}; must have RGB")
     check_size(path, source.lightfield, image.channels["R"])
-    if path.suffix == ".png":
-        pixels = np.stack([image.channels[name] for name in "RGB"], axis=-1)
-        colour = pixels / np.iinfo(pixels.dtype).max
-    else:
-        developed = tone_map(image.colour, source.exposure, source.reinhard)
-        colour = np.asarray(encode_srgb(developed), np.float64)
+    alpha = _alpha(image)
+    colour = _developed(image, alpha, source, background)
     depth = image.channels.get("Z")
     normals = _normals(path.parent / NORMALS / f"{path.stem}.exr")
-    return Pictures(colour, None if depth is None else depth.astype(np.float64), normals)
+    return Pictures(colour, alpha, None if depth is None else depth.astype(np.float64), normals)
+
+
+def _alpha(image: images.Image) -> Floats | None:
+    """Return a picture's alpha (h, w), 0 to 1; None if it has none."""
+    alpha = image.channels.get("A")
+    if alpha is None:
+        return None
+    return alpha / (np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1.0)
+
+
+def _developed(
+    image: images.Image, alpha: Floats | None, source: Source, background: Floats
+) -> Floats:
+    """Return a picture's sRGB colour (h, w, 3) before a background.
+
+    An EXR's colour is multiplied by alpha, and the background is added as light. A PNG's is not,
+    and sRGB values are blended, as trainers blend those of RGBA pictures.
+    """
+    if image.channels["R"].dtype.kind == "u":
+        pixels = np.stack([image.channels[name] for name in "RGB"], axis=-1)
+        largest = np.iinfo(pixels.dtype).max
+        return _on_background(pixels / largest, alpha, background, largest)
+    light = tone_map(image.colour, source.exposure, source.reinhard)
+    if alpha is not None:
+        light = light + (1 - alpha[..., np.newaxis]) * decode_srgb(background)
+    return np.asarray(encode_srgb(light), np.float64)
+
+
+def _on_background(
+    colour: Floats, alpha: Floats | None, background: Floats, largest: int
+) -> Floats:
+    """Blend sRGB colour (h, w, 3) with a background, in steps of 1 / ``largest``."""
+    if alpha is None:
+        return colour
+    covered = alpha[..., np.newaxis]
+    blended = covered * colour + (1 - covered) * background
+    return np.asarray(np.rint(largest * blended) / largest)
+
+
+def background_problem(
+    shown: Pictures, true: Pictures, counted: Bools, background: Floats
+) -> str | None:
+    """Say how a render's alpha or background is not the truth's; None if they agree.
+
+    A render without alpha must have the ``background`` where the truth is transparent.
+    """
+    if shown.alpha is None:
+        if true.alpha is None or not (empty := counted & (true.alpha == 0)).any():
+            return None
+        colour = np.median(shown.colour[empty], axis=0)
+        if np.abs(colour - background).max() <= ALPHA_STEP:
+            return None
+        return (
+            f"has no alpha, and is {hexadecimal(colour)} where the truth is transparent; "
+            f"give --background, which is {hexadecimal(background)}"
+        )
+    alphas = [np.ones(counted.shape) if one.alpha is None else one.alpha for one in (shown, true)]
+    part = float((np.abs(alphas[0] - alphas[1])[counted] > ALPHA_STEP).mean())
+    if part <= ALPHA_PART:
+        return None
+    return f"has another alpha than the truth in {part:.0%} of its pixels"
+
+
+def hexadecimal(colour: Floats) -> str:
+    """Return an sRGB colour (3,), 0 to 1, as #rrggbb."""
+    return "#" + "".join(f"{round(255 * value):02x}" for value in colour.tolist())
 
 
 def regions(source: Source, view: View, counted: Bools, depth: Floats | None) -> dict[str, Bools]:

@@ -1,5 +1,6 @@
 """The errors of somebody's views as a table and as a page, which shows them beside the truth."""
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import whole, write_csv
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import View
-from lightfield.export.source import Source
+from lightfield.export.source import Floats, Source
 from lightfield.imaging import images
 from lightfield.measurement import evaluation, metrics
 from lightfield.report import page
@@ -21,27 +22,37 @@ WIDEST = 1500
 
 
 def write(
-    output: Path, source: Source, tests: Sequence[View], renders: Path, masks: Path | None
+    output: Path,
+    source: Source,
+    tests: Sequence[View],
+    renders: Path,
+    masks: Path | None,
+    background: Floats,
 ) -> dict[str, Any]:
     """Write the table, the page and the pictures of the views to test with; return all's means.
 
-    Raises `UserError` for one that the folder ``renders`` lacks, or that cannot be compared.
+    What has alpha is compared before a ``background`` (3,) in sRGB, 0 to 1. Warns of renders whose
+    alpha or background is another than the truth's. Raises `UserError` for one that the folder
+    ``renders`` lacks, or that cannot be compared.
     """
-    paths = {view.name: evaluation.find(renders, view) for view in tests}
+    paths = {view.name: evaluation.find(renders, source, view) for view in tests}
     rows = []
+    problems = []
     progress = Progress(len(tests), "evaluate", "views")
     for view in tests:
         path = paths[view.name]
-        shown = evaluation.rendered(path, source)
-        true = evaluation.truth(source, view, path)
+        shown = evaluation.rendered(path, source, background)
+        true = evaluation.truth(source, view, path, background)
         counted = np.ones(shown.colour.shape[:2], bool)
         if masks:
-            counted = evaluation.mask(masks / f"{view.name}.png", source)
+            counted = evaluation.mask(evaluation.find(masks, source, view, [".png"]), source)
         parts = evaluation.regions(source, view, counted, true.depth)
         if not parts:
             raise UserError(f"{path}: its mask leaves no pixel that the lens sees")
         if not np.isfinite(shown.colour[parts["all"]]).all():
             raise UserError(f"{path}: has colour that is no number where it is compared")
+        if problem := evaluation.background_problem(shown, true, parts["all"], background):
+            problems.append(f"{path}: {problem}")
         for region, errors in evaluation.errors(shown, true, parts):
             rows.append({"view": view.name, "region": region, **errors})
         pictures = [np.nan_to_num(one.colour) for one in (true, shown)]
@@ -51,6 +62,9 @@ def write(
             output / "pictures" / f"{view.name}.png", np.round(strip * 255).astype(np.uint8)
         )
         progress.done()
+    if problems:
+        others = f" (and {len(problems) - 1} more of {len(tests)})" if problems[1:] else ""
+        print(f"warning: {problems[0]}{others}", file=sys.stderr)
     means = evaluation.means(rows)
     write_csv(output / "evaluation.csv", [*rows, *means])
     page.write(
@@ -60,6 +74,8 @@ def write(
         renders=whole(renders).name,
         means=means,
         rows=rows,
+        background=evaluation.hexadecimal(background),
+        problems=[problem.removeprefix(f"{renders}/") for problem in problems],
         pictures={
             view.name: page.photo(output / "pictures" / f"{view.name}.png", WIDEST)
             for view in tests[:SHOWN_VIEWS]
