@@ -245,6 +245,62 @@ def test_text_that_is_no_scene_is_told_so(text, expected, tmp_path):
     assert "\n" not in str(caught.value)
 
 
+CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [8, 8]}
+TURNED_ON_THE_SPOT = "name,x,y,z,rx,ry,rz\na,1,2,3,0,0,0\nb,1,2,3,0,1,0\n"
+
+
+def flowing(rig, **scene):
+    """Return a scene YAML of one rig with flow."""
+    content = {
+        **RIGHT,
+        "rigs": {"View": {**rig, "camera": CAMERA}},
+        "flow": {"pairs": "neighbours"},
+    }
+    return {**content, "reprojections": {}, "exports": {}, **scene}
+
+
+@pytest.mark.parametrize(
+    ("rig", "refused"),
+    [
+        ({"type": "plane", "cameras": [1, 1]}, True),
+        ({"type": "plane", "cameras": [1, 1], "stereo": {"distance": 0.06}}, False),
+        ({"type": "plane", "cameras": [3, 2], "size": 0}, True),
+        ({"type": "plane", "cameras": [1, 3], "size": [1, 1, 0]}, True),
+        ({"type": "plane", "cameras": [1, 3], "size": [0, 0, 1]}, False),
+        ({"type": "path", "count": 1, "keys": [{"position": [0, 0, i]} for i in (1, 2)]}, True),
+        ({"type": "path", "count": 2, "keys": [{"position": [0, 0, i]} for i in (1, 2)]}, False),
+        ({"type": "poses", "file": "spot.csv"}, True),
+        ({"type": "blend_camera"}, True),
+        ({"type": "blend_camera", "frames": {"first": 1, "last": 9}}, False),
+    ],
+)
+def test_flow_of_a_rig_at_one_place_is_refused(rig, refused, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("spot.csv").write_text(TURNED_ON_THE_SPOT)
+    source = {"blend": "a.blend"} if rig["type"] == "blend_camera" else {"builder": "room"}
+    file = tmp_path / "spot.yaml"
+    file.write_text(yaml.safe_dump(flowing(rig, scene=source)))
+    if not refused:
+        assert config.read_scene(file).flow
+        return
+    with pytest.raises(UserError) as caught:
+        config.read_scene(file)
+    message = str(caught.value)
+    assert message.startswith(f"{file}: flow: ")
+    assert "rigs.View" in message
+    assert "\n" not in message
+
+
+def test_flow_of_a_rig_that_a_preset_leaves_one_place_is_refused(tmp_path, monkeypatch):
+    (tmp_path / "row.yaml").write_text(
+        yaml.safe_dump(flowing({"type": "plane", "cameras": [4, 1]}))
+    )
+    monkeypatch.setattr(config, "SCENES", tmp_path)
+    with pytest.raises(UserError, match=r"row\.yaml: flow: .*preset tiny .*rigs\.View"):
+        scene_datasets("row", "tiny", Preset(views=1))
+    assert scene_datasets("row", "tiny", Preset(views=2))[0].flow
+
+
 def test_a_rig_can_take_over_another_rigs_settings(tmp_path):
     path = tmp_path / "merged.yaml"
     path.write_text(

@@ -883,11 +883,28 @@ def nothing_seen(channels: Any) -> dict[str, np.ndarray]:
     return {**black, "Z": np.full((64, 64), np.inf, np.float32)}
 
 
+def opaque_rim(channels: Any) -> dict[str, np.ndarray]:
+    """Show nothing, with the opaque rim that Cycles gives an image circle."""
+    y, x = np.mgrid[:64, :64] + 0.5
+    rim = np.abs(np.hypot(x - 32, y - 32) - 31.5) < 0.5
+    return {**nothing_seen(channels), "A": (0.5 * rim).astype(np.float16)}
+
+
+def one_speck(channels: Any) -> dict[str, np.ndarray]:
+    """Show a thing that covers one pixel."""
+    seen = nothing_seen(channels)
+    for name, value in zip("RGBAZ", (0.3, 0.2, 0.1, 1, 7), strict=True):
+        seen[name][40, 20] = value
+    return seen
+
+
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
         (alpha(0.5), None),
         (nothing_seen, None),
+        (opaque_rim, None),
+        (one_speck, None),
         (alpha(1.001), "1 values of alpha are not between 0 and 1"),
         (alpha(-0.001), "1 values of alpha are not between 0 and 1"),
         (alpha(np.nan), "1 values of alpha are not between 0 and 1"),
@@ -1140,6 +1157,21 @@ def test_a_reprojected_view_is_where_its_source_is(
     found = check(validate(one_view, ["panorama"]), "panorama/lightfield")
     assert found.passed is (fault is None)
     assert fault is None or fault in found.problems[0]
+
+
+def test_a_transparent_view_of_nothing_may_be_reprojected(one_view: Path) -> None:
+    rewrite(one_view, lambda held: held.update(render={"transparent": True}))
+    painted(opaque_rim)(one_view)
+
+    def nothing_but_rim(channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        covered = np.where(np.isnan(channels["Z"]), 0, 0.25).astype(np.float16)
+        depth = np.where(np.isnan(channels["Z"]), np.nan, np.inf).astype(np.float32)
+        return {**dict.fromkeys("RGB", covered * 0), "A": covered, "Z": depth}
+
+    add_panoramas(one_view, nothing_but_rim)
+    result = validate(one_view, ["panorama"])
+    assert failed(result) == []
+    assert check(result, "panorama/colour").warnings == []
 
 
 @pytest.mark.parametrize("transparent", [True, False])

@@ -39,6 +39,8 @@ SCENES = ROOT / "configs" / "scenes"
 OWN_SCENES = Path("configs", "scenes")
 BUILDERS = ROOT / "scripts" / "scenes"
 
+FLOW_PLACES = "needs views from two or more places"
+
 # What already has these names beside a scene's folder, a rig's, and a reprojection's.
 SCENE_NEIGHBOURS = {"benchmarks", "logs", "removed", "tables"}
 RIG_NEIGHBOURS = {"trials"}
@@ -619,6 +621,8 @@ class Scene(Settings):
         _check_cube_map(key, rig)
         if rig.is_omnidirectional:
             self._check_without_centre(key, name)
+        if self.flow and rig.is_at_one_place():
+            raise ValueError(f"flow: {FLOW_PLACES}, but all views of {key} are from one")
 
     def _check_without_centre(self, key: str, name: str) -> None:
         """Check that nothing is asked of a rig's views for which they would need a centre."""

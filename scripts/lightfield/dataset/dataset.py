@@ -680,6 +680,7 @@ def scene_datasets(
     """
     limits = limits or Preset()
     written = config.load_scene(scene)
+    file = f"{config.OWN_SCENES}/{scene}.yaml"
     source = written.scene
     if source.blend:
         checksum = config.blend_sha256(scene, source)[0]
@@ -718,8 +719,12 @@ def scene_datasets(
         try:
             limited = _limited_rig(rig, limits, written.render is not None)
         except UserError as error:
-            file = f"{config.OWN_SCENES}/{scene}.yaml"
             raise UserError(f"{file}: rigs.{name}: {error}; let the preset have more") from None
+        if written.flow and limited.is_at_one_place():
+            raise UserError(
+                f"{file}: flow: {config.FLOW_PLACES}, but the preset "
+                f"{preset} leaves one of rigs.{name}; let the preset have more views"
+            )
         render = _limited_render(written.render, rig, limits)
         for folder, frame in _frames(name, rig, source.frame):
             below = folder.removeprefix(name)

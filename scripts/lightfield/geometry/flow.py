@@ -5,6 +5,7 @@ import numpy as np
 from lightfield.core.errors import UserError
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.rigs.rig import ONE_PLACE
 
 # A point is hidden if the other view sees a surface that is nearer by more than this part of it.
 HIDDEN = 0.01
@@ -23,7 +24,7 @@ def neighbours(matrices: Array) -> list[int]:
     found = []
     for place, look in zip(places, ahead, strict=True):
         away = np.linalg.norm(places - place, axis=1)
-        away[away < AS_NEAR] = np.inf
+        away[away < ONE_PLACE] = np.inf
         if np.isinf(away.min()):
             raise UserError("flow: all views are from one place; must be two or more")
         near = np.flatnonzero(away <= away.min() * (1 + AS_NEAR))

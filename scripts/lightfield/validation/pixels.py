@@ -135,7 +135,6 @@ class Examiner:
         depth = image.channels.get("Z")
         empty = depth is not None and bool(np.isposinf(depth).all())
         transparent = image_set.lightfield.transparent
-        invisible = transparent and not image.channels["A"].any()
         if transparent and file.path.endswith(".exr"):
             alpha = image.channels["A"]
             wrong = int((~((alpha >= 0) & (alpha <= 1))).sum())
@@ -145,12 +144,13 @@ class Examiner:
         facts.fault("colour", f"{nan} values are not a number", nan)
         infinite = int(np.isinf(colour).sum())
         facts.fault("colour", f"{infinite} values are infinite", infinite)
-        facts.fault("colour", "is black", not colour.any() and not invisible)
+        shows_nothing = transparent and _shows_nothing(image, seen, is_rendered)
+        facts.fault("colour", "is black", not colour.any() and not shows_nothing)
         middle = colour[:, colour.shape[1] // 2, colour.shape[2] // 2]
         others = ((colour != middle[:, np.newaxis, np.newaxis]) & seen).sum(axis=(1, 2)).max()
         constant = bool(others <= FEW * seen.sum())
-        facts.constant = constant and not is_rendered
-        alone = constant and is_rendered and not empty and not invisible
+        facts.constant = constant and not is_rendered and not shows_nothing
+        alone = constant and is_rendered and not empty and not shows_nothing
         facts.fault("colour", "has one colour everywhere", alone)
         # Cycles leaves a few values of 1e-6 there, and its denoiser a little more.
         if is_rendered and outside.any():
@@ -392,6 +392,18 @@ def _inner(region: Bools) -> Bools:
     """Return a region without its rim; the image's edge is no rim."""
     inner: Bools = binary_erosion(region, np.ones((3, 3)), RIM_PIXELS, border_value=1)
     return inner
+
+
+def _shows_nothing(image: images.Image, seen: Bools, is_rendered: bool) -> bool:
+    """Return whether a transparent view shows nothing but some few pixels.
+
+    At the rim of an image circle, which touches the image's edge, Cycles calls black samples
+    opaque. A reprojection spreads that rim, so there the colour alone counts.
+    """
+    if not is_rendered:
+        return not any(image.channels[name].any() for name in "RGB")
+    within = binary_erosion(seen, np.ones((3, 3)), RIM_PIXELS)
+    return bool((image.channels["A"][within] > 0).sum() <= FEW * seen.sum())
 
 
 def _format_problem(file: File, image_set: ImageSet, image: images.Image) -> str | None:

@@ -55,6 +55,9 @@ class BlendCamera(Rig):
         """Return the rig with its cameras where a .blend's inventory has them."""
         return self.model_copy(update={"file": str(file), "rendered": rendered})
 
+    def is_at_one_place(self) -> bool:
+        return self.view_count == 1  # Whether the camera moves is known once the .blend is read.
+
     def unit_poses(self) -> UnitPoses:
         """Return the views; raises `UserError` before the inventory is known."""
         if self.file is None:

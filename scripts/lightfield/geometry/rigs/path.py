@@ -56,6 +56,9 @@ class Path(CountedRig):
             raise ValueError("keys: two in a row are at one place")
         return self
 
+    def is_at_one_place(self) -> bool:
+        return self.view_count == 1  # No two keys in a row are at one place.
+
     def unit_poses(self) -> UnitPoses:
         # SciPy takes long to import, and no plan needs it.
         from scipy.interpolate import PchipInterpolator

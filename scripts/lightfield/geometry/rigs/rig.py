@@ -29,6 +29,9 @@ Side = Annotated[float, Field(strict=True, ge=0, le=FARTHEST)]
 Size = TypeAliasType("Size", Side | Annotated[tuple[Side, Side, Side], as_list(3)])
 Frame = Annotated[int, Field(ge=0, le=1048574)]
 
+# Cameras that are nearer together than so many metres are at one place.
+ONE_PLACE = 1e-6
+
 
 @dataclass(frozen=True)
 class Pose:
@@ -186,6 +189,18 @@ class Rig(Settings):
     def is_omnidirectional(self) -> bool:
         """Whether its views have no centre from which all of their rays start."""
         return self.stereo is not None and self.stereo.omnidirectional
+
+    def is_at_one_place(self) -> bool:
+        """Return whether all views are from one place, as far as the settings tell.
+
+        Raises `UserError` for a pose file that cannot be read.
+        """
+        if self.stereo and not self.is_omnidirectional:
+            return False
+        if self.positions == 1:
+            return True
+        places = self.to_world(self.unit_poses().positions)
+        return bool(np.all(np.ptp(places, axis=0) < ONE_PLACE))
 
     @property
     def lf_type(self) -> str:
