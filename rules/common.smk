@@ -36,6 +36,7 @@ from lightfield.dataset.dataset import (
     SOURCE_KEYS,
     check_presence,
     load_datasets,
+    rendered_frames,
     scene_datasets,
 )
 from lightfield.dataset.exports import MANIFEST, VIEWS

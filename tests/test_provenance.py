@@ -79,7 +79,11 @@ CHANGES = {
         SCENE,
         set(),
     ),
-    "scene.frame": (in_yaml("builder: room", "builder: room\n  frame: 5"), VIEWS, {"build_scene"}),
+    "scene.frame": (
+        in_yaml("builder: room", "builder: room\n  frame: 5"),
+        VIEWS | {"inventory"},
+        {"build_scene"},
+    ),
     "render.samples": (in_yaml("samples: 4", "samples: 5"), VIEWS, {"build_scene", "inventory"}),
     "render.motion_blur": (
         in_yaml("samples: 4", "samples: 4\n  motion_blur: true"),

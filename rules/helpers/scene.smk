@@ -4,14 +4,16 @@
 def inventory_settings(dataset):
     """Return what a scene's inventory depends on of its scene YAML."""
     written = load_scene(dataset.scene_name)
+    datasets = scene_datasets(dataset.scene_name)
     return {
         # Raised when the program lists something else.
-        "version": 2,
+        "version": 3,
         "scene_name": written.scene.scene_name,
         "view_layers": written.scene.view_layers,
         "allow_missing": written.scene.allow_missing,
         "motion_blur": written.render.motion_blur,
-        "camera_frames": [d.camera_frames for d in scene_datasets(dataset.scene_name)],
+        "rendered_frames": rendered_frames(datasets),
+        "camera_frames": [each.camera_frames for each in datasets],
     }
 
 
