@@ -231,6 +231,8 @@ IN_JSON = [
     ("views", "instant_ngp", "", ("fl_x",), "fl_x"),
     ("views", "instant_ngp", "", ("scale",), "scale, offset"),
     ("opencv", "instant_ngp", "", ("ftheta_p1",), "fl_x"),
+    ("opencv", "instant_ngp", "", ("ftheta_p3",), OF_LENS),
+    ("opencv", "instant_ngp", "", ("ftheta_p4",), OF_LENS),
     ("opencv", "instant_ngp", "", (*FRAME, 0, 1), OF_ROTATION),
     ("wide", "instant_ngp", "", ("cx",), OF_LENS),
     ("wide", "instant_ngp", "", ("scale",), "scale, offset"),

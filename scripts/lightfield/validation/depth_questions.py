@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.geometry.depth import distance_from_z, z_from_distance
 from lightfield.geometry.lenses import Lens
 from lightfield.validation.consistency import Camera
 
@@ -33,29 +32,26 @@ class Answer:
     """What a view says.
 
     ``apart`` (n,) is how many metres each point is from what its pixel sees, NaN if that is
-    nothing. ``nearest`` and ``farthest`` are in metres, inf and 0 where no depth is finite;
-    ``has_misses`` and ``has_unknown`` say whether some are +inf or NaN. ``seen`` (m, 3) are the
-    world points that were asked for.
+    nothing. ``nearest`` and ``farthest`` are in metres, inf for a miss; ``has_unknown`` says
+    whether a depth is NaN. ``seen`` (m, 3) are the world points that were asked for.
     """
 
     apart: Floats
     nearest: float
     farthest: float
-    has_misses: bool
     has_unknown: bool
     seen: Floats
 
 
 def answer(question: Question, camera: Camera, depth: NDArray[Any]) -> Answer:
     """Answer a question about a view's ``depth`` (height, width)."""
-    nearest, farthest, has_misses, has_unknown = np.inf, 0.0, False, False
+    nearest, farthest, has_unknown = np.inf, 0.0, False
     if question.meaning:
         values = converted(depth, camera, question.meaning)
-        finite = (values > 0) & (values < np.inf)
-        has_misses = bool(np.isposinf(values).any())
-        has_unknown = bool(np.isnan(values).any())
-        nearest = float(values.min(where=finite, initial=np.inf))
-        farthest = float(values.max(where=finite, initial=0))
+        known = ~np.isnan(values)
+        has_unknown = not known.all()
+        if known.any():
+            nearest, farthest = float(np.nanmin(values)), float(np.nanmax(values))
     seen = np.empty((0, 3))
     if question.step:
         down, across = (np.arange(question.step // 2, side, question.step) for side in depth.shape)
@@ -63,21 +59,24 @@ def answer(question: Question, camera: Camera, depth: NDArray[Any]) -> Answer:
         seen = camera.lift(depth[rows, columns].astype(np.float64), columns, rows)
         seen = seen[np.isfinite(seen).all(axis=1)]
     apart = _apart(question.points, camera, depth)
-    return Answer(apart, nearest, farthest, has_misses, has_unknown, seen)
+    return Answer(apart, nearest, farthest, has_unknown, seen)
 
 
 def converted(depth: NDArray[Any], camera: Camera, meaning: str) -> NDArray[Any]:
-    """Return a view's depth (height, width) as "z" or "distance"."""
+    """Return a view's depth (height, width) as "z" or "distance"; NaN where that cannot be."""
     if meaning == camera.depth:
         return depth
-    convert = z_from_distance if meaning == "z" else distance_from_z
-    return convert(depth.astype(np.float64), _pixel_rays(camera.lens))
+    values: NDArray[Any] = depth * _factors(camera.lens, meaning)
+    return values
 
 
 @lru_cache(maxsize=1)
-def _pixel_rays(lens: Lens) -> Floats:
-    rays: Floats = lens.pixel_rays()
-    return rays
+def _factors(lens: Lens, meaning: str) -> Floats:
+    """Return by what (height, width) the other kind of depth is multiplied to have this one."""
+    cosine = -lens.pixel_rays()[..., 2]
+    cosine = np.where(cosine > 0, cosine, np.nan)
+    factors: Floats = cosine if meaning == "z" else 1 / cosine
+    return factors
 
 
 def _apart(points: NDArray[Any], camera: Camera, depth: NDArray[Any]) -> Floats:

@@ -12,6 +12,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import NAME, LightField, View
@@ -28,8 +29,9 @@ from lightfield.validation.result import Check
 
 # Rays are compared at so many pixels along each side of an image.
 GRID = 33
-# instant-ngp's polynomial is fitted to a lens that is none; so many pixels it may miss it.
-FITTED_PIXELS = 0.25
+# To a lens that is no polynomial one is fitted for instant-ngp. It may miss the lens by so many
+# pixels, and by so many times what one fitted here does.
+FITTED_PIXELS, FITTED_TIMES = 0.25, 3.0
 # Where the scene has no split, every such view by name tests, as in most trainers' own examples.
 EVERY = 8
 
@@ -189,21 +191,37 @@ def _lens_fault(camera: Camera, lens: Lens) -> str | None:
         size = f"{camera.width} × {camera.height} pixels"
         return f"its image has {size}, not the {lens.width} × {lens.height} of"
     across, down = (np.linspace(0.5, side - 0.5, GRID) for side in (lens.width, lens.height))
-    x, y = (axis.ravel() for axis in np.meshgrid(across, down))
-    rays = lens.rays(x, y)
+    pixels = np.stack([axis.ravel() for axis in np.meshgrid(across, down)], axis=-1)
+    rays = lens.rays(pixels[:, 0], pixels[:, 1])
     seen = np.isfinite(rays).all(axis=-1)
     limit = FLOAT32 * max(lens.width, lens.height)
     if isinstance(camera, PolynomialFisheye):
-        # Its loader sees less than 90 degrees from the axis.
-        seen &= rays[:, 2] < -1e-6
-        limit = limit if camera.is_equidistant else FITTED_PIXELS
-    found = camera.pixels(rays[seen])
-    apart = np.abs(found - np.stack([x, y], axis=-1)[seen]).max(axis=-1)
+        fitted = _fitted(lens)
+        # Its loader sees less than 90 degrees from the axis, and nothing at the very centre. Where
+        # the angle at the centre is not 0, rays around it may be those of the other side.
+        hole = 2 * abs(fitted.terms[0] / fitted.terms[1])
+        seen &= (rays[:, 2] < -1e-6) & (np.hypot(*(pixels - lens.center).T) > hole)
+        if not camera.is_equidistant:
+            best = np.abs(fitted.pixels(rays[seen]) - pixels[seen]).max()
+            limit = max(limit, min(FITTED_PIXELS, FITTED_TIMES * best))
+    pixels, rays = pixels[seen], rays[seen]
+    apart = np.abs(camera.pixels(rays) - pixels).max(axis=-1)
     if (apart <= limit).all():
         return None
     if np.isnan(apart).any():
         return "its camera does not see all rays that are seen by the lens of"
     return f"its camera has rays up to {apart.max():.3g} pixels from where they are by the lens of"
+
+
+def _fitted(lens: Lens) -> PolynomialFisheye:
+    """Return a polynomial fitted to a lens to the right of its centre, up to 90 degrees."""
+    x, y = lens.center
+    radius = np.linspace(0, max(lens.width, lens.height), 1000)[1:]
+    rays = lens.rays(x + radius, np.full_like(radius, y))
+    seen = rays[:, 2] < 0
+    angles = np.arctan2(rays[seen, 0], -rays[seen, 2])
+    p0, p1, p2, p3, p4 = Polynomial.fit(radius[seen], angles, 4).convert().coef.tolist()
+    return PolynomialFisheye(lens.width, lens.height, x, y, (p0, p1, p2, p3, p4))
 
 
 def _pose_faults(views: Sequence[ExportedView], expected: Expected) -> Iterator[str]:

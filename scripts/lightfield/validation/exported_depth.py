@@ -256,14 +256,11 @@ def _lifting_views(image_set: ImageSet, source: ImageSet) -> Ints:
 
 def _range_fault(given: DepthRange, answers: Sequence[Answer]) -> Iterator[str]:
     """Compare a range with the nearest and the farthest depth of its views."""
-    nearest = min(answer.nearest for answer in answers)
-    farthest = max(answer.farthest for answer in answers)
+    near = min(given.farthest, *(answer.nearest for answer in answers))
+    far = max(near, *(min(answer.farthest, given.farthest) for answer in answers))
     # Without an end of what is far, pixels without a source count as being there too.
-    endless = np.isinf(given.farthest) and any(answer.has_unknown for answer in answers)
-    if endless or any(answer.has_misses for answer in answers):
-        farthest = given.farthest
-    near = min(nearest, given.farthest)
-    far = max(min(farthest, given.farthest), near)
+    if np.isinf(given.farthest) and any(answer.has_unknown for answer in answers):
+        far = given.farthest
     is_near = same(given.near, near)
     is_far = given.far == far or same(given.far, far) or far <= given.far <= WIDENED * near
     if not (is_near and is_far):
