@@ -20,7 +20,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, read_text
-from lightfield.core.settings import FARTHEST
+from lightfield.core.settings import FARTHEST, pattern
 from lightfield.geometry import colmap
 from lightfield.geometry.rigs.rig import Rig, UnitPoses
 from lightfield.geometry.rotations import (
@@ -56,7 +56,7 @@ class Poses(Rig):
 
     type: Literal["poses"]
     file: str = Field(
-        pattern=r"\.(json|csv|txt|bin)$",
+        pattern=pattern(r"\.(json|csv|txt|bin)$", "a path that ends in .json, .csv, .txt or .bin"),
         description="A lightfield.json; a CSV of name,x,y,z,rx,ry,rz in metres and radians, or of "
         "name,x,y,z,qw,qx,qy,qz; a transforms.json; COLMAP's images.txt or images.bin.",
     )
