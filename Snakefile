@@ -32,7 +32,9 @@ if Path("config.yaml").exists() and Path.cwd() != FOLDER:
 
 # Snakemake reads no file for a module that is given its configuration, and takes 12:30 for 750.
 for written in (read_config(FOLDER / "config.yaml"), OWN):
-    as_written(config, {key: value for key, value in written.items() if key not in GIVEN})
+    as_written(
+        config, {key: value for key, value in written.items() if key not in GIVEN}
+    )
 
 
 report: "captions/workflow.rst"
