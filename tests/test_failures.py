@@ -327,6 +327,23 @@ def test_a_device_that_is_not_there_is_reported_before_the_first_job(
     assert "views" not in terminal
 
 
+@pytest.mark.slow
+def test_a_device_of_the_nodes_need_not_be_on_the_machine_that_submits(failing):
+    program = failing.folder / "scripts/check_device.py"
+    shutil.copy(ROOT / "scripts/check_device.py", program)
+    submit = failing.folder / "submit.sh"
+    submit.write_text('bash "$1" > node.log 2>&1 && echo success || echo failed\n')
+    options = [
+        *("--executor", "cluster-generic", "--jobs", "1", "--cluster-generic-status-cmd", "echo"),
+        *("--cluster-generic-submit-cmd", "bash submit.sh", "--seconds-between-status-checks", "1"),
+    ]
+    try:
+        terminal = failing.fail("render", options=options, config=["device=metal"])
+    finally:
+        program.write_text("")
+    assert terminal.endswith(last_words(failing, "render")), terminal
+
+
 @pytest.mark.parametrize(
     ("problem", "said"),
     [
