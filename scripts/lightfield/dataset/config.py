@@ -886,7 +886,9 @@ def read_yaml(path: Path, file: str) -> Any:
         with path.open("rb") as stream:
             content = stream.read(LARGEST_YAML + 1)
         if len(content) > LARGEST_YAML:
-            raise UserError(f"{file}: is larger than {LARGEST_YAML} bytes, so it is no settings")
+            raise UserError(
+                f"{file}: is larger than {LARGEST_YAML // 1000} kB, so it is no settings"
+            )
         loader = _UniqueKeyLoader(content.decode())
         node = loader.get_single_node()
         if _size(node, {}) > MOST_NODES:
