@@ -8,13 +8,14 @@ from lightfield.core import processors
 
 # A Snakefile is read again by each job on a cluster: these say who reads it, and to what end.
 IS_MAIN_PROCESS = workflow.is_main_process
-RUNS_HERE = workflow.local_exec
 RUNS_ELSEWHERE = workflow.remote_exec
 
 # What the command line and the profile say: a Snakefile is given only the configuration.
 STORE = workflow.storage_settings.default_storage_prefix or ""
 SHARES_FILES = SharedFSUsage.INPUT_OUTPUT in workflow.storage_settings.shared_fs_usage
 NODES = workflow.resource_settings.nodes
+# `workflow.local_exec` is true until the plan is made. Only an executor of nodes has --jobs.
+RUNS_HERE = not NODES
 CORES = workflow.resource_settings.cores
 QUIET_ABOUT = {choice.name for choice in workflow.output_settings.quiet or ()}
 USES_CONTAINERS = "APPTAINER" in {

@@ -145,7 +145,47 @@ BROKEN = {
     "bad sum": (
         "scene",
         {"blend": "a.blend", "sha256": "123"},
-        'scene.sha256: is "123"; must be of the form ^[0-9a-f]',
+        'scene.sha256: is "123"; must be 64 hexadecimal digits in small letters',
+    ),
+    "sum that is a number": (
+        "scene",
+        {"blend": "a.blend", "sha256": 7},
+        "scene.sha256: is 7; must be a text: put it in quotes",
+    ),
+    "no .blend": (
+        "scene",
+        {"blend": "a.obj"},
+        'scene.blend: is "a.obj"; must be a path that ends in .blend',
+    ),
+    "no address": (
+        "scene",
+        {"blend": "a.blend", "url": "example.org"},
+        'scene.url: is "example.org"; must be an address that begins with http',
+    ),
+    "focal length of nothing": (
+        "reprojections.perspective.camera.focal_length",
+        1e-300,
+        "camera.focal_length: is 1e-300; must be a number at least 0.001",
+    ),
+    "focal length below Blender's": (
+        "rigs.LFSphere.camera",
+        {"lens": "rectilinear", "fov": 175, "resolution": [9, 9]},
+        "rigs.LFSphere.camera: its focal length in mm is 0.7859; Blender has at least 1",
+    ),
+    "fisheye below Blender's": (
+        "rigs.LFSphere.camera.fov",
+        5,
+        "rigs.LFSphere.camera: its fov in degrees is 5; Blender has at least 9.998",
+    ),
+    "fisheye beyond Blender's": (
+        "rigs.LFSphere.camera",
+        {"lens": "equisolid", "focal_length": 200, "fov": 20, "resolution": [9, 9]},
+        "rigs.LFSphere.camera: its focal length in mm is 200; Blender has at most 100",
+    ),
+    "sensor below Blender's": (
+        "rigs.LFSphere.camera",
+        {"lens": "rectilinear", "focal_length": 2, "sensor_size": 0.5, "resolution": [9, 9]},
+        "rigs.LFSphere.camera.sensor_size: is 0.5; Blender has at least 1 mm",
     ),
     "unknown rig type": (
         "rigs.LFSphere.type",
@@ -233,6 +273,13 @@ def test_every_mistake_names_file_key_value_and_what_is_right(name, tmp_path):
         ("render: {samples: 4}\nrender: {samples: 5}\n", "the key 'render' is given twice"),
         ("1: 2\n", "the key 1 is not a text"),
         ("- a\n- b\n", 'is ["a", "b"]; must be a mapping'),
+        ("scene:\n\tbuilder: room\n", "line 2, column 1: is indented with a tab; use spaces"),
+        ("a:\n  - b\n\t- c\n", "line 3, column 1: is indented with a tab; use spaces"),
+        ("scene: {blend: a.blend, sha256: 0123}\n", 'scene.sha256: is "0123"; must be 64 hex'),
+        ("render: {samples: 12:30:45}\n", 'render.samples: is "12:30:45"; must be a whole number'),
+        ("render: {samples: 010}\n", 'render.samples: is "010"; must be a whole number'),
+        ("render: {samples: 0b11}\n", 'render.samples: is "0b11"; must be a whole number'),
+        ("render: {clamp_indirect: 1:30.5}\n", 'clamp_indirect: is "1:30.5"; must be a number'),
         ("scene: !!python/object/apply:os.getcwd []\n", "could not determine a constructor"),
     ],
 )
@@ -299,6 +346,14 @@ def test_flow_of_a_rig_that_a_preset_leaves_one_place_is_refused(tmp_path, monke
     with pytest.raises(UserError, match=r"row\.yaml: flow: .*preset tiny .*rigs\.View"):
         scene_datasets("row", "tiny", Preset(views=1))
     assert scene_datasets("row", "tiny", Preset(views=2))[0].flow
+
+
+def test_numbers_of_yaml_1_1_that_look_like_numbers_stay_numbers(tmp_path):
+    file = tmp_path / "numbers.yaml"
+    numbers = {"7": 7, "-7": -7, "0": 0, "1_000": 1000, "0x1F": 31, "+1.5": 1.5, ".5": 0.5}
+    numbers |= {"2.": 2.0, "1.0e-3": 0.001, "-.inf": -float("inf"), "-0.0": 0.0}
+    file.write_text("".join(f"{key!r}: {key}\n" for key in numbers))
+    assert config.read_yaml(file, "numbers") == numbers
 
 
 def test_a_rig_can_take_over_another_rigs_settings(tmp_path):
@@ -468,7 +523,9 @@ def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
     ("arguments", "expected"),
     [
         (["preset=best"], "preset: is 'best'; must be one of tiny, preview, full"),
-        (["scenes=[gardn]"], "there is no scene 'gardn'"),
+        (["scenes=[gardn]"], "there is no scene 'gardn'; is garden meant?"),
+        (["scenes=nowhere"], "there is no scene 'nowhere'; there are barbershop, "),
+        (["work=results/smoke"], "work: is 'results/smoke', and results is 'results'; must be two"),
         (["rigs=[LFSpher]"], "rigs: 'LFSpher' is in none of the scenes garden"),
         (
             ["scenes=[garden, lone_monk]", "rigs=LFSphere_e100cm_d170cm"],

@@ -13,8 +13,13 @@ import pytest
 from checkouts import checkout
 from sphere import write_views
 
+from lightfield.core import files
 from lightfield.core.cli import finite, positive, run, stops
+from lightfield.core.errors import UserError
 from lightfield.core.failures import cause, failure_report
+from lightfield.geometry.rigs import from_settings
+from lightfield.imaging import images
+from lightfield.reprojection import lens_map
 
 ROOT = Path(__file__).parents[1]
 # A scene that needs what the smoke scene does not: a download, a calibration, and free places.
@@ -147,7 +152,7 @@ class Failing:
         jobs = [self.jobs[rule] for rule in rules]
         targets = [job["output"][0] if job["output"] else job["rule"] for job in jobs]
         work = {job["log"][0]: job["output"] for job in jobs}
-        for file in (file for files in work.values() for file in files):
+        for file in (file for outputs in work.values() for file in outputs):
             # A .blend that is there is not fetched.
             (self.folder / file).unlink()
         run = self.run(
@@ -327,11 +332,29 @@ def test_a_device_that_is_not_there_is_reported_before_the_first_job(
     assert "views" not in terminal
 
 
+@pytest.mark.slow
+def test_a_device_of_the_nodes_need_not_be_on_the_machine_that_submits(failing):
+    program = failing.folder / "scripts/check_device.py"
+    shutil.copy(ROOT / "scripts/check_device.py", program)
+    submit = failing.folder / "submit.sh"
+    submit.write_text('bash "$1" > node.log 2>&1 && echo success || echo failed\n')
+    options = [
+        *("--executor", "cluster-generic", "--jobs", "1", "--cluster-generic-status-cmd", "echo"),
+        *("--cluster-generic-submit-cmd", "bash submit.sh", "--seconds-between-status-checks", "1"),
+    ]
+    try:
+        terminal = failing.fail("render", options=options, config=["device=metal"])
+    finally:
+        program.write_text("")
+    assert terminal.endswith(last_words(failing, "render")), terminal
+
+
 @pytest.mark.parametrize(
     ("problem", "said"),
     [
         (MemoryError(), "error: out of memory: lower --cores"),
         (OSError(28, "No space left on device", "/tmp/a"), "error: /tmp/a: No space left on"),
+        (OSError(27, "File too large"), "error: File too large; "),
         (FileNotFoundError(2, "No usable temporary directory"), "error: No usable temporary"),
     ],
 )
@@ -342,6 +365,21 @@ def test_what_the_system_refuses_is_one_line(problem, said):
     with pytest.raises(SystemExit) as caught:
         run(main)
     assert str(caught.value).startswith(said)
+
+
+@pytest.mark.parametrize(
+    "name", ["view.exr", "view.png", "lens_map.npy", "record.json", "log.jsonl", "poses.csv"]
+)
+def test_a_file_that_may_not_be_read_is_named_with_the_cause(name, nobody):
+    path = nobody / name
+    path.write_bytes(b"anything")
+    path.chmod(0)
+    readers = {".exr": images.read_image, ".png": images.read_header, ".npy": lens_map.load}
+    readers |= {".json": files.read_json, ".jsonl": files.read_json_lines}
+    readers[".csv"] = lambda path: from_settings({"type": "poses", "file": str(path)}).poses()
+    with pytest.raises(UserError) as caught:
+        readers[path.suffix](path)
+    assert str(caught.value).startswith(f"{path}: cannot be read: you may not read it: change")
 
 
 @pytest.mark.parametrize("count", ["0", "-1", "1.5", "many"])

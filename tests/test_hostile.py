@@ -2,6 +2,7 @@
 
 import datetime
 import json
+import re
 import subprocess
 import sys
 
@@ -51,6 +52,8 @@ TEXTS = {
     "a key that is true": "yes: 1\n",
     "two documents": "scene: {builder: room}\n---\nscene: {builder: room}\n",
     "tabs": "scene:\n\tbuilder: room\n",
+    "a tab in a list": "rigs:\n  - a\n\t- b\n",
+    "a tab in brackets": "scene: {\n\tbuilder: room}\n",
     "an open bracket": "scene: {builder: room\n",
     "an open quote": 'scene: "room\n',
     "a null byte": "scene: {builder: ro\0om}\n",
@@ -104,7 +107,39 @@ VALUES = [
     ("reprojections.perspective.reinhard", 1e31),
     ("reprojections.perspective.reinhard", 1e-30),
     ("reprojections.perspective.rotation", [0, 0, 1e31]),
-    ("reprojections.perspective.camera.focal_length", 1e31),
+    *(
+        ("reprojections.perspective.camera.focal_length", value)
+        for value in (1e31, 1e-300, 5e-324, 0, -0.0, "1e-300", "12:30", [50])
+    ),
+    *(
+        ("reprojections.perspective.camera.sensor_size", value)
+        for value in (1e-300, 0, [36, 1e-300], [36], [36, 24, 1], "36")
+    ),
+    *(
+        ("rigs.LFSphere.camera", {"lens": "rectilinear", "resolution": [8, 8], **keys})
+        for keys in (
+            {"fov": 179.9999999},
+            {"fov": 1e-300},
+            {"focal_length": 0.5},
+            {"focal_length": 50, "sensor_size": 0.5},
+            {"focal_length": 50, "fov": 40},
+            {},
+        )
+    ),
+    *(("rigs.LFSphere.camera.fov", value) for value in (1e-300, 5, 360.1, "180")),
+    *(
+        ("render.samples", value)
+        for value in ("12:30:45", "010", "0b11", "1,000", "64 ", "sixty", "٣")
+    ),
+    *(
+        ("scene", {"blend": "a.blend", "sha256": value})
+        for value in (83, "0123", "A" * 64, "0" * 63, "0" * 65, "g" * 64, 0.5, True, ["0" * 64])
+    ),
+    *(
+        ("scene", {"blend": "a.blend", "url": value})
+        for value in ("ftp://a/b", "//a/b", " http://a", "javascript:0", 7, "")
+    ),
+    *(("scene.builder", value) for value in ("Room", "room ", "ro-om", "library", "__init__", 7)),
     ("reprojections.perspective.rigs", ["x\ny"]),
     ("scene.builder", "../../etc/passwd"),
     ("scene.builder", "room\n"),
@@ -132,6 +167,22 @@ SETTINGS = [
     *({"results": value} for value in ("", "a|b", "a>b", "a&b", "a`b", "~", "*", LONG * 10, 7)),
     *({"results": value} for value in ("work", "./work/", "..")),
     *({"work": value} for value in ("a b", ".", "/", "\0", None, ["a"], {"a": "b"})),
+    *(
+        {key: value}
+        for key in ("results", "work")
+        for value in (
+            ".git",
+            "scripts",
+            "scripts/lightfield",
+            "a/../configs",
+            ".snakemake/a",
+            "a/.git",
+        )
+    ),
+    *({"work": value} for value in ("results", "results/smoke", "./results/../results/a")),
+    *({"results": value} for value in ("work/a", "work/../work")),
+    {"results": str(config.ROOT / "rules")},
+    {"results": str(config.ROOT / "README.md")},
     *(
         {"scenes": [value]}
         for value in ("a.b", "tables", "logs", "benchmarks", "removed", *NOT_A_NAME)
@@ -210,6 +261,8 @@ def assert_refused(read):
         read()
     message = str(caught.value)
     assert message.isprintable() and len(message) <= 2001
+    # Nobody is shown a regular expression.
+    assert not re.search(r"\^[\[\\\w]|\]\*?\$", message), message
     return message
 
 
@@ -263,21 +316,28 @@ sys.exit(status)
 """
 
 
+CHOICE = "scenes: hostile\nrigs: all\npreset: full\n"
+
+
 @pytest.mark.parametrize(
-    ("text", "arguments"),
+    ("text", "own", "arguments"),
     [
-        ("a0: &a0 [x]\n" + BOMB + "rigs: *a11\n", []),
-        (yaml.safe_dump(changed("rigs.LFSphere.frames", {"first": 0, "last": 1_000_000})), []),
-        (yaml.safe_dump(RIGHT), ["work=a;id"]),
-        (None, []),
+        ("a0: &a0 [x]\n" + BOMB + "rigs: *a11\n", CHOICE, []),
+        (
+            yaml.safe_dump(changed("rigs.LFSphere.frames", {"first": 0, "last": 1_000_000})),
+            *(CHOICE, []),
+        ),
+        (yaml.safe_dump(RIGHT), CHOICE, ["work=a;id"]),
+        (yaml.safe_dump(RIGHT), CHOICE + "views_per_shard: 12:30\n", []),
+        (yaml.safe_dump(RIGHT), CHOICE + "presets: {full: {samples: 1:30}}\n", []),
+        ("", "a0: &a0 [x]\n" + BOMB, []),
     ],
 )
 @pytest.mark.slow
-def test_a_hostile_plan_ends_with_one_line_and_little_memory(text, arguments, tmp_path):
-    """In a user's own folder, where config.yaml is the user's: without a scene it is a bomb."""
+def test_a_hostile_plan_ends_with_one_line_and_little_memory(text, own, arguments, tmp_path):
+    """In a user's own folder, where config.yaml is the user's."""
     (tmp_path / "configs/scenes").mkdir(parents=True)
-    (tmp_path / "configs/scenes/hostile.yaml").write_text(text or "")
-    own = "scenes: hostile\nrigs: all\npreset: full\n" if text else "a0: &a0 [x]\n" + BOMB
+    (tmp_path / "configs/scenes/hostile.yaml").write_text(text)
     (tmp_path / "config.yaml").write_text(own)
     words = ("-n", "--cores", "1", "--snakefile", config.ROOT / "Snakefile")
     command = [SNAKEMAKE, *words, *(["--config", *arguments] if arguments else [])]
@@ -290,8 +350,8 @@ def test_a_hostile_plan_ends_with_one_line_and_little_memory(text, arguments, tm
     )
     assert run.returncode != 0
     *lines, largest = (run.stderr + run.stdout).splitlines()
-    own = ("host: ", "Using workflow specific profile ", "Config file ")
-    assert [line for line in lines if not line.startswith(own)] == [lines[-1]]
+    header = ("host: ", "Using workflow specific profile ", "Config file ")
+    assert [line for line in lines if not line.startswith(header)] == [lines[-1]]
     assert lines[-1].startswith("error: ")
     # In KiB, but for macOS.
     assert int(largest) * (1 if sys.platform == "darwin" else 1024) < 500e6

@@ -2,11 +2,13 @@
 
 import errno
 import os
+import re
 import subprocess
 import sys
 import time
 from collections import namedtuple
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from checkouts import checkout, snakemake
@@ -42,9 +44,10 @@ with temporary_folder(sys.argv[1]) as folder:
     [([40, 40], None), ([50, 45], "warning"), ([150, 45], "warning"), ([150, 55], "error")],
 )
 def test_what_is_written_to_one_disk_is_added_up(sizes, expected, tmp_path, monkeypatch):
-    monkeypatch.setattr(room.shutil, "disk_usage", lambda _: Usage(100))
-    needs = [(tmp_path / f"not/there/{number}", size) for number, size in enumerate(sizes)]
-    text = f"{needs[0][0]}: 100 bytes are free on its disk, and this run writes some {sum(sizes)}"
+    monkeypatch.setattr(room.shutil, "disk_usage", lambda _: Usage(100e9))
+    folders = [tmp_path / f"not/there/{number}" for number in range(len(sizes))]
+    needs = [room.Need(folder, size * 1e9) for folder, size in zip(folders, sizes, strict=True)]
+    text = f"{folders[0]}: 100 GB are free on its disk, and this run writes some {sum(sizes)} GB"
     if expected == "error":
         with pytest.raises(UserError, match=text):
             list(room.check(needs))
@@ -53,13 +56,57 @@ def test_what_is_written_to_one_disk_is_added_up(sizes, expected, tmp_path, monk
     assert [warning.startswith(text) for warning in warnings] == [True] * (expected == "warning")
 
 
+@pytest.mark.parametrize(
+    ("size", "text"),
+    [(0, "0 GB"), (4096, "less than 0.01 GB"), (5.4e8, "0.54 GB"), (12638171136, "13 GB")],
+)
+def test_sizes_are_gigabytes(size, text):
+    assert room.gigabytes(size) == text
+
+
+DISK = {"f_flag": 0, "f_frsize": 4096, "f_files": 10**6, "f_favail": 10**5}
+DISK |= dict.fromkeys(("f_blocks", "f_bfree", "f_bavail"), 10**9)
+
+
+@pytest.mark.parametrize(
+    ("state", "files", "cause"),
+    [
+        ({}, 10**5, None),
+        ({"f_favail": 50}, 60, "takes 50 more files (inodes), and this run writes some 60"),
+        ({"f_favail": 0}, 0, "takes no more files (its inodes are used up): remove some files"),
+        ({"f_files": 0, "f_favail": 0}, 60, None),
+        ({"f_bavail": 0}, 0, "is full: make room"),
+        ({"f_flag": os.ST_RDONLY}, 0, "is read-only: mount its disk for writing, or write else"),
+    ],
+)
+def test_a_disk_that_takes_nothing_more_is_refused_with_the_cause(
+    state, files, cause, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(room.os, "statvfs", lambda _: SimpleNamespace(**DISK | state))
+    needs = [room.Need(tmp_path / "results", 1, files)]
+    if cause is None:
+        assert list(room.check(needs)) == []
+        return
+    with pytest.raises(UserError, match=re.escape(cause)) as caught:
+        list(room.check(needs))
+    assert str(caught.value).startswith(f"{tmp_path / 'results'}: ")
+
+
+def test_a_folder_of_somebody_else_is_refused_with_the_cause(nobody):
+    nobody.chmod(0o500)
+    with pytest.raises(UserError, match=r"you may not write in .*: change its permissions"):
+        list(room.check([room.Need(nobody / "results", 1)]))
+    with pytest.raises(UserError, match=r"cannot be written: you may not write in .*: change"):
+        files.write_text(nobody / "results/names.json", "text")
+
+
 @pytest.mark.slow
 def test_a_run_that_cannot_fit_ends_before_its_first_job(tmp_path):
     folder = checkout(tmp_path, huge=HUGE)
     result = snakemake(folder, "--config", "scenes=huge", "preset=full")
     assert result.returncode != 0
     (said,) = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
-    assert said.startswith("error: results: ") and "bytes are free on its disk" in said
+    assert said.startswith("error: results: ") and " GB are free on its disk" in said
     assert "Traceback" not in result.stderr
     assert not (folder / "results").exists()
     # The plan writes the settings of its jobs, and nothing else.

@@ -6,9 +6,12 @@ import os
 import re
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_MEMORY
+from lightfield.core.files import read_problem
+from lightfield.core.room import REMEDIES, write_problem
 
 
 def run(main: Callable[[], None]) -> None:
@@ -30,8 +33,17 @@ def run(main: Callable[[], None]) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
-        sys.exit(f"error: {where}{error.strerror or error}")
+        sys.exit(f"error: {_refusal(error)}")
+
+
+def _refusal(error: OSError) -> str:
+    """Return what the system refused, and what to do."""
+    path = error.filename if isinstance(error.filename, str) else ""
+    if path and Path(path).is_file() and isinstance(error, PermissionError):
+        return f"{path}: cannot be read: {read_problem(error)}"
+    if error.errno in REMEDIES:
+        return f"{f'{path}: ' if path else ''}{write_problem(Path(path), error)}"
+    return f"{f'{path}: ' if path else ''}{error.strerror or error}"
 
 
 def _as_value(word: str) -> str:

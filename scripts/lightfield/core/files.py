@@ -11,20 +11,34 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.errors import UserError
+from lightfield.core.room import write_problem
 
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn an OSError into a `UserError` that names ``path`` and the room on its disk."""
+    """Turn an OSError into a `UserError` that names ``path``, the cause, and what to do."""
     try:
         yield
     except OSError as error:
-        folder = next(part for part in (path, *path.absolute().parents) if part.exists())
-        free = shutil.disk_usage(folder).free
-        reason = error.strerror or error
-        raise UserError(
-            f"{path}: cannot be written: {reason}; {free} bytes are free on its disk"
-        ) from None
+        raise UserError(f"{path}: cannot be written: {write_problem(path, error)}") from None
+
+
+def read_problem(error: OSError) -> str:
+    """Return why a file cannot be read, from what the system said of it, and what to do."""
+    if isinstance(error, PermissionError):
+        return "you may not read it: change its permissions (chmod u+r)"
+    return error.strerror or str(error)
+
+
+def check_readable(path: Path | str) -> None:
+    """Raise `UserError` for a file that is missing, or that may not be read.
+
+    Libraries say of both that it is none of theirs.
+    """
+    try:
+        Path(path).open("rb").close()
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
 
 
 @contextmanager
@@ -129,7 +143,7 @@ def read_json_lines(path: Path) -> list[dict[str, Any]]:
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
     for line in content.splitlines():
         try:
             entry = json.loads(line)
@@ -157,7 +171,7 @@ def broken(path: Path) -> str | None:
     except FileNotFoundError:
         return None
     except OSError as error:
-        return f"cannot be read: {error.strerror}"
+        return f"cannot be read: {read_problem(error)}"
     except UserError as error:
         return str(error).removeprefix(f"{path}: ")
 
@@ -201,7 +215,7 @@ def read_text(path: Path | str) -> str:
     try:
         return Path(path).read_text(encoding="utf-8")
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
     except UnicodeDecodeError:
         raise UserError(f"{path}: is no text in UTF-8") from None
 

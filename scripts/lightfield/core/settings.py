@@ -73,8 +73,27 @@ FARTHEST = 1e7
 Coordinate = Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)]
 # Named, so that the JSON schema has it once; a model's settings do not reach in there.
 Vector = TypeAliasType("Vector", Annotated[tuple[Coordinate, Coordinate, Coordinate], as_list(3)])
+# What a text of a pattern is, in words: nobody is shown a regular expression.
+_MEANINGS: dict[str, str] = {}
+
+
+def pattern(expression: str, meaning: str) -> str:
+    """Return a field's pattern; ``meaning`` says in messages what such a text is."""
+    _MEANINGS[expression] = meaning
+    return expression
+
+
 # Of a folder that a key names.
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$", max_length=100)]
+Name = Annotated[
+    str,
+    Field(
+        pattern=pattern(
+            r"^[A-Za-z0-9][A-Za-z0-9_.-]*$",
+            "a name of letters, digits and . _ - with a letter or digit first",
+        ),
+        max_length=100,
+    ),
+]
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
@@ -117,10 +136,7 @@ def _first(errors: list[ErrorDetails], content: Any) -> str:
     if error["loc"][-1:] == ("[key]",):
         # Not of the path: rigs that are somebody else's folders are not in the content.
         *above, name, _ = error["loc"]
-        return (
-            f"{'.'.join(map(str, above))}: {name!r} is no name; "
-            "use letters, digits and . _ - , with a letter or digit first"
-        )
+        return f"{'.'.join(map(str, above))}: {name!r} is no name; must {_allowed(error)}"
     text = json.dumps(value, default=str)
     text = text if len(text) <= 60 else f"{text[:57]}..."
     allowed = dict.fromkeys(_allowed(error) for _, error in same)
@@ -153,11 +169,12 @@ def _allowed(error: ErrorDetails) -> str:
         case "float_type" | "float_parsing":
             return "be a number"
         case "string_type":
-            return "be a text"
+            is_number = isinstance(error["input"], int | float)
+            return "be a text: put it in quotes" if is_number else "be a text"
         case "bool_type":
             return "be true or false"
         case "string_pattern_mismatch":
-            return f"be of the form {error['ctx']['pattern']}"
+            return f"be {_MEANINGS[error['ctx']['pattern']]}"
         case "list_type":
             return "be a list"
         case "literal_error":

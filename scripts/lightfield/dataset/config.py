@@ -4,9 +4,12 @@ From these models scripts/schema.py makes the JSON schemas in configs/schema/, b
 complete and check the files. Nothing else in the project reads a scene YAML.
 """
 
+import difflib
 import math
+import os
 import re
 import shlex
+from collections.abc import Mapping
 from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -22,7 +25,15 @@ from pydantic import (
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
-from lightfield.core.settings import AS_WRITTEN, Name, Settings, Vector, checked, suggestion
+from lightfield.core.settings import (
+    AS_WRITTEN,
+    Name,
+    Settings,
+    Vector,
+    checked,
+    pattern,
+    suggestion,
+)
 from lightfield.dataset import published
 from lightfield.dataset.exports import VIEWS, Export, Exports
 from lightfield.dataset.passes import FLOW, PASSES, in_order
@@ -41,12 +52,23 @@ BUILDERS = ROOT / "scripts" / "scenes"
 
 FLOW_PLACES = "needs views from two or more places"
 
+# Folders of the project, of a user's inputs, and of the programs that both are used with.
+RESERVED = {
+    *(".ci", ".snakemake", ".venv", "benchmarks", "captions", "configs", "docs", "envs"),
+    *("profiles", "rules", "scripts", "tests"),
+}
 # What already has these names beside a scene's folder, a rig's, and a reprojection's.
 SCENE_NEIGHBOURS = {"benchmarks", "logs", "removed", "tables"}
 RIG_NEIGHBOURS = {"trials"}
 REPROJECTION_NEIGHBOURS = {"exr", "exports", "panorama", "render", "report", FLOW.name, *PASSES}
 # Files lie there, too, and folders of a sequence's frames.
 OTHER_NEIGHBOURS = re.compile(r"f\d{5,7}|.*\.(blend|html|json|txt)")
+# Of a camera in lightfield.json: Blender's least and most, the unit in words, and what it is.
+BLENDER_LIMITS = {
+    "focal_length": (1.0, 1e6, 1.0, "focal length in mm"),
+    "fisheye_fov": (0.1745, 31.4159, math.pi / 180, "fov in degrees"),
+    "fisheye_lens": (0.01, 100.0, 1.0, "focal length in mm"),
+}
 # More of them have no use, and planning them would take hours.
 MOST_FRAMES = 10_000
 MOST_VIEWS = 1_000_000
@@ -80,9 +102,19 @@ PassNames = Annotated[
     list[Annotated[str, Field(json_schema_extra={"enum": list(PASSES)})]], AfterValidator(in_order)
 ]
 Auto = Literal["auto"]
-Address = Annotated[str, Field(pattern=r"^https?://")]
+Address = Annotated[
+    str, Field(pattern=pattern(r"^https?://", "an address that begins with http:// or https://"))
+]
 # A path that the rules write into commands, with {wildcards} beside it.
-Folder = Annotated[str, Field(pattern=r"^[\w./][\w./+=@-]*$", max_length=1000)]
+Folder = Annotated[
+    str,
+    Field(
+        pattern=pattern(
+            r"^[\w./][\w./+=@-]*$", "a path of letters, digits and . _ / + = @ - without blanks"
+        ),
+        max_length=1000,
+    ),
+]
 # Of a path that is quoted there.
 QUOTED = r"[^{}*?\[\]\x00-\x1f\x7f]{1,1000}"
 AtLeastOne = Annotated[int, Field(ge=1, le=2**31 - 1)]
@@ -117,7 +149,18 @@ class Configuration(Settings):
         "all", description="all, or the names of the rigs to build."
     )
     preset: str = Field(description="One of the presets below.")
-    presets: dict[Annotated[str, Field(pattern="^[a-z][a-z0-9]*$", max_length=30)], Preset]
+    presets: dict[
+        Annotated[
+            str,
+            Field(
+                pattern=pattern(
+                    "^[a-z][a-z0-9]*$", "a name of small letters and digits with a letter first"
+                ),
+                max_length=30,
+            ),
+        ],
+        Preset,
+    ]
     results: Folder = Field("results", description="Folder of the datasets.")
     work: Folder = Field(
         "work",
@@ -159,13 +202,27 @@ class Configuration(Settings):
             if "." in name or name in SCENE_NEIGHBOURS:
                 taken = ", ".join(sorted(SCENE_NEIGHBOURS))
                 raise ValueError(f"scenes: {name} is no name for a scene; no dots, and not {taken}")
-        others = [Path.cwd(), *Path.cwd().parents, ROOT, *ROOT.parents]
         for key in ("results", "work"):
-            folder = getattr(self, key)
-            if Path(folder).resolve() in others:
-                raise ValueError(f"{key}: is {folder!r}; must be a folder of its own")
-            others.append(Path(folder).resolve())
+            _check_folder(key, getattr(self, key))
+        results, work = Path(self.results).resolve(), Path(self.work).resolve()
+        if results == work or results in work.parents or work in results.parents:
+            raise ValueError(
+                f"work: is {self.work!r}, and results is {self.results!r}; "
+                "must be two folders, neither in the other"
+            )
         return self
+
+
+def _check_folder(key: str, folder: str) -> None:
+    """Refuse what is not a folder of its own: the project's, the user's inputs, and Git's."""
+    path = Path(os.path.normpath(Path(folder).absolute()))
+    above = [Path.cwd(), *Path.cwd().parents, ROOT, *ROOT.parents]
+    reserved = {home / name for home in (Path.cwd(), ROOT) for name in RESERVED}
+    inside = not reserved.isdisjoint([path, *path.parents]) or ".git" in path.parts
+    if path in above or path.resolve() in above or inside:
+        raise ValueError(f"{key}: is {folder!r}; must be a folder of its own")
+    if path.exists() and not path.is_dir():
+        raise ValueError(f"{key}: is {folder!r}, which is a file; must be a folder")
 
 
 class Parameters(Settings):
@@ -186,13 +243,17 @@ class Source(Settings):
 
     builder: str | None = Field(
         None,
-        pattern="^[a-z][a-z0-9_]*$",
+        pattern=pattern(
+            "^[a-z][a-z0-9_]*$", "a name of small letters, digits and _ with a letter first"
+        ),
         description="The builder's file in scripts/scenes/, without .py.",
     )
     parameters: Parameters = Parameters()
     blend: str | None = Field(
         None,
-        pattern=rf"^{QUOTED}\.blend$",
+        pattern=pattern(
+            rf"^{QUOTED}\.blend$", "a path that ends in .blend, without { } * ? [ ] and line breaks"
+        ),
         description="The user's own .blend file, relative to the scene YAML's repository.",
     )
     dataset: str | None = Field(
@@ -221,7 +282,7 @@ class Source(Settings):
     )
     sha256: str | None = Field(
         None,
-        pattern="^[0-9a-f]{64}$",
+        pattern=pattern("^[0-9a-f]{64}$", "64 hexadecimal digits in small letters"),
         description="The .blend file's SHA-256, as sha256sum prints it; "
         "without it, the one recorded at first use.",
     )
@@ -608,6 +669,8 @@ class Scene(Settings):
                 f"{key}.camera.lens: is {camera.lens!r}, which Cycles does not have; "
                 f"must be one of {known} (reproject for the others)"
             )
+        if self.render:
+            _check_blender_takes(f"{key}.camera", lens)
         if self.render and isinstance(lens, Rectilinear) and not lens.has_square_pixels:
             raise ValueError(
                 f"{key}.camera.sensor_size: is {list(lens.sensor)}, but the pixels of Cycles' "
@@ -636,6 +699,18 @@ class Scene(Settings):
         for other, reprojection in self.reprojections.items():
             if reprojection.camera and name in (reprojection.rigs or self.rigs):
                 raise ValueError(f"reprojections.{other}: goes {without}")
+
+
+def _check_blender_takes(key: str, lens: Lens) -> None:
+    """Refuse what Blender would change to the nearest value that it has."""
+    camera = lens.to_lightfield()["camera"]
+    for name, (least, most, unit, words) in BLENDER_LIMITS.items():
+        value = camera.get(name, least)
+        if not least <= value <= most:
+            bound = f"at least {least / unit:.4g}" if value < least else f"at most {most / unit:g}"
+            raise ValueError(f"{key}: its {words} is {value / unit:.4g}; Blender has {bound}")
+    if max(lens.sensor) < 1:
+        raise ValueError(f"{key}.sensor_size: is {lens.sensor[0]:g}; Blender has at least 1 mm")
 
 
 def _check_cube_map(key: str, settings: Rig | Reprojection) -> None:
@@ -685,8 +760,10 @@ def load_scene(scene: str) -> Scene:
     path = scene_path(scene)
     if not path.is_file():
         files = {*SCENES.glob("*.yaml"), *OWN_SCENES.glob("*.yaml")}
-        known = ", ".join(sorted({file.stem for file in files}))
-        raise UserError(f"config.yaml: scenes: there is no scene {scene!r}; there are {known}")
+        known = sorted({file.stem for file in files})
+        near = " or ".join(difflib.get_close_matches(scene, known))
+        hint = f"is {near} meant?" if near else f"there are {', '.join(known)}"
+        raise UserError(f"config.yaml: scenes: there is no scene {scene!r}; {hint}")
     return read_scene(path)
 
 
@@ -770,6 +847,36 @@ class _UniqueKeyLoader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
+# YAML 1.1 takes 12:30 for 750, 0123 for 83 and 0b11 for 3. Here they stay the texts that they look
+# like, which messages show as they were written.
+_UniqueKeyLoader.yaml_implicit_resolvers = {
+    first: [(tag, form) for tag, form in resolvers if not tag.endswith((":int", ":float"))]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+_UniqueKeyLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:int",
+    re.compile(r"[-+]?(?:0|[1-9][0-9_]*|0x[0-9a-fA-F_]+)$"),
+    list("-+0123456789"),
+)
+_UniqueKeyLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(
+        r"[-+]?(?:[0-9][0-9_]*\.[0-9_]*|\.[0-9][0-9_]*)(?:[eE][-+][0-9]+)?$"
+        r"|[-+]?\.(?:inf|Inf|INF)$|\.(?:nan|NaN|NAN)$"
+    ),
+    list("-+0123456789."),
+)
+
+
+def as_written(content: dict[str, Any], written: Mapping[str, Any]) -> None:
+    """Replace in ``content`` what Snakemake has read of a file by our own reading, ``written``."""
+    for key, value in written.items():
+        if isinstance(value, Mapping) and isinstance(content.get(key), dict):
+            as_written(content[key], value)
+        else:
+            content[key] = value
+
+
 def read_yaml(path: Path, file: str) -> Any:
     """Read a YAML file, which errors name ``file``; raises `UserError` for what is none.
 
@@ -779,7 +886,9 @@ def read_yaml(path: Path, file: str) -> Any:
         with path.open("rb") as stream:
             content = stream.read(LARGEST_YAML + 1)
         if len(content) > LARGEST_YAML:
-            raise UserError(f"{file}: is larger than {LARGEST_YAML} bytes, so it is no settings")
+            raise UserError(
+                f"{file}: is larger than {LARGEST_YAML // 1000} kB, so it is no settings"
+            )
         loader = _UniqueKeyLoader(content.decode())
         node = loader.get_single_node()
         if _size(node, {}) > MOST_NODES:
@@ -788,9 +897,18 @@ def read_yaml(path: Path, file: str) -> Any:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
-        raise UserError(f"{file}: {where}{error.problem}") from None
+        problem = error.problem
+        if mark and _is_indented_by_tabs(content, mark.line):
+            problem = "is indented with a tab; use spaces"
+        raise UserError(f"{file}: {where}{problem}") from None
     except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         raise UserError(f"{file}: cannot be read as YAML: {error}") from None
+
+
+def _is_indented_by_tabs(content: bytes, line: int) -> bool:
+    """Return whether blanks with a tab among them begin a line, counted from 0."""
+    text = dict(enumerate(content.splitlines())).get(line, b"")
+    return b"\t" in text[: len(text) - len(text.lstrip())]
 
 
 def _size(node: yaml.Node | None, sizes: dict[int, float]) -> float:

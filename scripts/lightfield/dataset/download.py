@@ -9,6 +9,7 @@ from typing import Any
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.core.progress import Progress
+from lightfield.core.room import gigabytes
 
 _CHUNK = 1 << 20
 _TIMEOUT_SECONDS = 60
@@ -31,7 +32,7 @@ def fetch(url: str, target: Path, expected: str | None, origin: str) -> None:
             break
         if _size(part) <= before:
             raise UserError(
-                f"{url}: {problem}; {_size(part)} bytes are kept in {part}, "
+                f"{url}: {problem}; {gigabytes(_size(part))} are kept in {part}, "
                 "and the same command goes on from there"
             )
     found = sha256(part)
@@ -86,7 +87,7 @@ def _receive(answer: Any, part: Path, have: int) -> str | None:
             if total is not None:
                 progress.done()
     if total is not None and _size(part) < total:
-        return f"the transfer broke off at {_size(part)} of {total} bytes"
+        return f"the transfer broke off at {gigabytes(_size(part))} of {gigabytes(total)}"
     return None
 
 

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, broken, sha256, writing
+from lightfield.core.files import atomic_path, broken, read_problem, sha256, writing
 
 NAME = "ledger.txt"
 # The ledger is written anew when more than this part of its lines counts no more.
@@ -236,7 +236,7 @@ def _problem(name: str, stamp: Stamp) -> str | None:
     try:
         same = sha256(name) == stamp.sha256
     except OSError as error:
-        return f"cannot be read: {error.strerror}"
+        return f"cannot be read: {read_problem(error)}"
     return None if same else f"its sha256 is not the one in {NAME}"
 
 
@@ -246,7 +246,7 @@ def _lines(path: Path) -> list[bytes]:
     except FileNotFoundError:
         return []
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
 
 
 def _parse(line: bytes) -> Job | None:

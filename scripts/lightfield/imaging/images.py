@@ -18,7 +18,7 @@ import numpy as np
 import OpenEXR
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path
+from lightfield.core.files import atomic_path, check_readable
 
 Attribute = str | int | float
 
@@ -251,6 +251,7 @@ def _open(path: Path | str) -> Any:
 
     if not Path(path).is_file():
         raise UserError(f"{path}: no such file")
+    check_readable(path)
     configuration = oiio.ImageSpec()
     configuration.attribute("oiio:UnassociatedAlpha", 1)
     file = oiio.ImageInput.open(str(path), configuration)

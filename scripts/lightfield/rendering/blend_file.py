@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import check_readable
 from lightfield.dataset.view_store import ViewStore
 from lightfield.rendering import animation
 from lightfield.rendering.quiet import quiet
@@ -66,6 +67,7 @@ def open_scene(
         with quiet():
             bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
     except RuntimeError as error:
+        check_readable(path)
         raise UserError(f"{path}: Blender {here} cannot open it: {str(error).strip()}") from None
     libraries = [(path_of(library), library.version) for library in bpy.data.libraries]
     for file, saved in [(path, bpy.data.version), *libraries]:

@@ -70,10 +70,11 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
             channels = [channel for group in names.values() for channel in group]
             image = images.read_image(path, channels)
         except UserError as error:
-            free = shutil.disk_usage(folder).free
+            free = room.gigabytes(shutil.disk_usage(folder).free)
+            needed = room.gigabytes(pixels * PASSES_PIXEL_BYTES)
             raise UserError(
-                f"{error}; {free} bytes are free there: make room, or set TMPDIR to a folder with "
-                f"{pixels * PASSES_PIXEL_BYTES} bytes"
+                f"{error}; {free} are free there: make room, or set TMPDIR to a folder with "
+                f"{needed}"
             ) from None
     return Rendered(
         {

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json
+from lightfield.core.files import read_json, read_problem
 from lightfield.measurement import summaries
 from lightfield.report import page
 
@@ -310,7 +310,9 @@ def _read_csv(path: Path, *columns: str) -> list[dict[str, str]]:
                 {str(key): value or "" for key, value in row.items() if key}
                 for row in csv.DictReader(file)
             ]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
+    except (UnicodeDecodeError, csv.Error) as error:
         raise UserError(f"{path}: cannot be read as CSV: {error}") from None
     if not rows:
         raise UserError(f"{path}: has no row")

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path
+from lightfield.core.files import atomic_path, read_problem
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.reprojection.filters import DEFAULT_FILTER, FILTERS
@@ -254,7 +254,9 @@ def load(path: Path | str) -> LensMap:
             window=tuple(description["window"]),
             **{"coordinates": arrays["centers"]} | {k: v for k, v in arrays.items() if k in known},
         )
-    except (OSError, EOFError, ValueError, KeyError, IndexError, TypeError) as error:
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
+    except (EOFError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise UserError(f"{path}: is not a lens map that can be read: {error}") from None
 
 

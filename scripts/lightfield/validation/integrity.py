@@ -13,7 +13,15 @@ from functools import cached_property
 from pathlib import Path
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import broken, read_json, read_json_lines, set_aside, sha256, whole
+from lightfield.core.files import (
+    broken,
+    read_json,
+    read_json_lines,
+    read_problem,
+    set_aside,
+    sha256,
+    whole,
+)
 from lightfield.dataset import ledger, records
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
@@ -192,7 +200,7 @@ class Integrity:
         try:
             found = sha256(path)
         except OSError as error:
-            return f"cannot be read: {error.strerror}"
+            return f"cannot be read: {read_problem(error)}"
         return None if found == digest else f"its sha256 is {found}, but {source} says {digest}"
 
     def _present(self) -> Iterator[Path]:

@@ -45,7 +45,7 @@ LENSES: dict[str, "type[Lens]"] = {}
 
 Pixels = Annotated[int, Field(ge=1, le=65536)]
 Place = Annotated[float, Field(ge=-1e6, le=1e6)]
-Millimetres = Annotated[float, Field(gt=0, le=1e6)]
+Millimetres = Annotated[float, Field(ge=1e-3, le=1e6)]
 FocalLength = Annotated[Millimetres, Field(description="Millimetres.")]
 
 

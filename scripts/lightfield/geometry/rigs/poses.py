@@ -19,8 +19,9 @@ from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, read_text
-from lightfield.core.settings import FARTHEST
+from lightfield.core.files import read_json, read_problem, read_text
+from lightfield.core.room import gigabytes
+from lightfield.core.settings import FARTHEST, pattern
 from lightfield.geometry import colmap
 from lightfield.geometry.rigs.rig import Rig, UnitPoses
 from lightfield.geometry.rotations import (
@@ -56,7 +57,7 @@ class Poses(Rig):
 
     type: Literal["poses"]
     file: str = Field(
-        pattern=r"\.(json|csv|txt|bin)$",
+        pattern=pattern(r"\.(json|csv|txt|bin)$", "a path that ends in .json, .csv, .txt or .bin"),
         description="A lightfield.json; a CSV of name,x,y,z,rx,ry,rz in metres and radians, or of "
         "name,x,y,z,qw,qx,qy,qz; a transforms.json; COLMAP's images.txt or images.bin.",
     )
@@ -92,9 +93,10 @@ def _read_poses(path: Path) -> PosesFile:
     try:
         status = path.stat()
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
     if status.st_size > LARGEST_FILE:
-        raise UserError(f"{path}: is {status.st_size} bytes; must be at most {LARGEST_FILE}")
+        size = gigabytes(status.st_size)
+        raise UserError(f"{path}: has {size}; must be at most {gigabytes(LARGEST_FILE)}")
     return _read_whole(path, status.st_mtime_ns)
 
 
@@ -210,7 +212,7 @@ def _csv_rows(path: Path) -> Iterator[Any]:
                 matrix[:3, 3] = numbers[:3]
                 yield where, row[0], [], _keyed(matrix)
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise UserError(f"{path}: is not CSV: {error}") from None
 
