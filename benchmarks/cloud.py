@@ -206,7 +206,7 @@ def kill(build: Cloud, count: int, seconds: float, rng: random.Random) -> Counte
     """Kill a job, or all of them and the run, at random moments; the last run finishes.
 
     A run fails where one of its jobs was killed more often than it is submitted, and goes on.
-    Raises `UserError` for one that fails although nothing was killed.
+    One that fails although nothing was killed ends the program.
     """
     killed: Counter[str] = Counter()
     progress = Progress(count, "cloud", "kills")
@@ -219,7 +219,7 @@ def kill(build: Cloud, count: int, seconds: float, rng: random.Random) -> Counte
         if process.poll() is not None:
             said, _ = process.communicate()
             if not disturbed:
-                raise UserError(f"a build failed that nothing disturbed:\n{said}")
+                sys.exit(f"error: a build failed that nothing disturbed:\n{said}")
             process, disturbed = build.start(), False
         elif rng.random() < 0.5 and (running := build.running()):
             kill_group(rng.choice(running))

@@ -38,6 +38,20 @@ def test_a_server_that_cannot_start_is_named_with_its_own_words(tmp_path, monkey
 
 
 @pytest.mark.slow
+def test_settings_that_a_killed_run_could_not_send_are_sent_by_the_next(tmp_path):
+    build = Cloud(tmp_path / "cloud", 2, str(tmp_path / "store"))
+    build.start("--dry-run").communicate()
+    settings = list((tmp_path / "store").glob("work/**/settings/*.json"))
+    assert settings
+    for path in settings:
+        path.unlink()
+    again = build.start("--dry-run")
+    said, _ = again.communicate()
+    assert again.returncode == 0, said
+    assert all(path.exists() for path in settings)
+
+
+@pytest.mark.slow
 def test_a_build_in_isolated_folders_loses_no_view_when_its_jobs_are_killed(smoke, tmp_path):
     folder = tmp_path / "store"
     build, store = Cloud(tmp_path / "cloud", 2, str(folder)), ViewStore(str(folder))
