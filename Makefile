@@ -83,6 +83,13 @@ soak: .venv/complete
 	@$(PIP) install --require-hashes -r envs/requirements-storage-$(VERSION).txt
 	@touch $@
 
+# The S3 server of benchmarks/cloud.py: it wants other versions of what the environment has.
+.venv-s3-server/complete: .venv/complete envs/requirements-s3-server.txt
+	.venv/bin/python -m venv --clear .venv-s3-server
+	.venv-s3-server/bin/pip -qq --disable-pip-version-check install --require-hashes \
+		-r envs/requirements-s3-server.txt
+	@touch $@
+
 # Resolve anew what the locks do not hold yet; delete a lock to renew all that is in it. Needs uv.
 locks:
 	for version in 3.13 3.11; do \
@@ -93,3 +100,4 @@ locks:
 		done; \
 	done
 	echo uv | $(LOCK) --universal - -o envs/requirements-uv.txt
+	echo 'moto[server]' | $(LOCK) --universal --python-version 3.11 - -o envs/requirements-s3-server.txt

@@ -5,11 +5,12 @@ from the storage, and whatever is to stay of it goes there. A build that nothing
 disk, says what bytes are right. Prints how often jobs and the whole run were killed, and what was
 lost or made twice. Needs, beside the environment:
 
-    make .venv/complete-with-storage && pip install 'moto[server]'
+    make .venv/complete-with-storage .venv-s3-server/complete
 """
 
 import argparse
 import contextlib
+import importlib.util
 import json
 import os
 import random
@@ -27,11 +28,18 @@ import psutil
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
+from lightfield.core.cli import run
+from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.progress import Progress
 from lightfield.dataset.view_store import ViewStore
 from soak import DATASET, ROOT, SCENE, Build, write_text
 
+# An environment of its own, in the repository, and the packages that the environment here needs.
+SERVER = ".venv-s3-server"
+# Until the server answers.
+SERVER_SECONDS = 60
+STORAGE_PACKAGES = ("snakemake_storage_plugin_s3", "upath", "s3fs")
 BUCKET, STORE = "plenoforge", "s3://plenoforge"
 # Exports write files that are not declared one by one either.
 EXPORTS = """
@@ -148,23 +156,43 @@ class Cloud(Disk):
         return Counter(json.loads(line)["view"] for line in lines if line.startswith('{"view"'))
 
 
+def check_environment() -> None:
+    """Raise `UserError` with what to set up, where the S3 server or the storage's packages lack."""
+    targets = []
+    if any(importlib.util.find_spec(package) is None for package in STORAGE_PACKAGES):
+        targets.append(".venv/complete-with-storage")
+    if not (ROOT / SERVER / "complete").exists():
+        targets.append(f"{SERVER}/complete")
+    if targets:
+        raise UserError(f"packages are missing: make {' '.join(targets)}")
+
+
 def serve(folder: Path) -> tuple[subprocess.Popen[bytes], dict[str, str]]:
-    """Start an S3 server with a bucket; return it and the environment by which it is found."""
+    """Start an S3 server with a bucket; return it and the environment by which it is found.
+
+    Raises `UserError` where it does not answer.
+    """
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
         port = one.getsockname()[1]
     url = f"http://127.0.0.1:{port}"
-    with (folder / "server.log").open("wb") as log:
+    log = folder / "server.log"
+    with log.open("wb") as output:
+        python = ROOT / SERVER / "bin/python"
         server = subprocess.Popen(
-            [sys.executable, "-m", "moto.server", "-p", str(port)], stdout=log, stderr=log
+            [python, "-m", "moto.server", "-p", str(port)], stdout=output, stderr=output
         )
     bucket = urllib.request.Request(f"{url}/{BUCKET}", method="PUT")
-    for _ in range(120):
-        try:
+    deadline = time.monotonic() + SERVER_SECONDS
+    while True:
+        with contextlib.suppress(OSError):
             urllib.request.urlopen(bucket)
             break
-        except OSError:
-            time.sleep(0.5)
+        if server.poll() is not None or time.monotonic() > deadline:
+            server.kill()
+            *_, last = log.read_text().splitlines() or ["it said nothing"]
+            raise UserError(f"the S3 server does not answer: {last}")
+        time.sleep(0.5)
     keys = {"AWS_ACCESS_KEY_ID": "test", "AWS_SECRET_ACCESS_KEY": "test"}
     return server, {"AWS_ENDPOINT_URL": url, "AWS_DEFAULT_REGION": "us-east-1", **keys}
 
@@ -178,28 +206,32 @@ def kill(build: Cloud, count: int, seconds: float, rng: random.Random) -> Counte
     """Kill a job, or all of them and the run, at random moments; the last run finishes.
 
     A run fails where one of its jobs was killed more often than it is submitted, and goes on.
+    One that fails although nothing was killed ends the program.
     """
     killed: Counter[str] = Counter()
     progress = Progress(count, "cloud", "kills")
-    process = build.start()
+    process, disturbed = build.start(), False
     while killed.total() < count:
         progress.done(killed.total() - progress.count)
         time.sleep(rng.uniform(0.1, 1.0) * seconds)
         if process.poll() == 0:
             break
         if process.poll() is not None:
-            process.communicate()
-            process = build.start()
+            said, _ = process.communicate()
+            if not disturbed:
+                sys.exit(f"error: a build failed that nothing disturbed:\n{said}")
+            process, disturbed = build.start(), False
         elif rng.random() < 0.5 and (running := build.running()):
             kill_group(rng.choice(running))
             killed["a job"] += 1
+            disturbed = True
         else:
             for group in (process.pid, *build.running()):
                 kill_group(group)
             process.communicate()
             killed["the run and its jobs"] += 1
             build.run("--unlock")
-            process = build.start()
+            process, disturbed = build.start(), False
     said, _ = process.communicate()
     if process.returncode:
         print(said, file=sys.stderr)
@@ -216,6 +248,7 @@ def main() -> None:
         "--folder", type=Path, help="for all of it, kept (default: a temporary one)"
     )
     arguments = parser.parse_args()
+    check_environment()
     with tempfile.TemporaryDirectory() as name:
         folder = (arguments.folder or Path(name)).resolve()
         folder.mkdir(parents=True, exist_ok=True)
@@ -243,4 +276,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run(main)

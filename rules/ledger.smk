@@ -27,15 +27,24 @@ def settings_file(path, content):
     """Write settings as JSON where the file has another text; return it as an input."""
     try:
         if STORE:
-            ViewStore(STORE).bring(path)
-        if write_json_if_changed(Path(path), content):
-            if not STORE:
-                restore_time(path)
-            elif IS_MAIN_PROCESS:
-                ViewStore(STORE).send(path)
+            store_settings(path, content)
+        elif write_json_if_changed(Path(path), content):
+            restore_time(path)
     except UserError as error:
         sys.exit(f"error: {error}")
     return path
+
+
+def store_settings(path, content):
+    """Write settings, and send them where the storage has others, or none.
+
+    A run that was killed may have written them here, and not sent them.
+    """
+    store = ViewStore(STORE)
+    in_storage = store.bring(path)
+    changed = write_json_if_changed(Path(path), content)
+    if IS_MAIN_PROCESS and (changed or not in_storage):
+        store.send(path)
 
 
 def restore_time(path):

@@ -4,12 +4,14 @@ import json
 import os
 import signal
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
+from lightfield.dataset import journal
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.passes import PARTS_OF_LIGHT
 from lightfield.geometry import lenses
@@ -150,8 +152,24 @@ def killed(*words):
 def test_a_process_that_is_killed_for_memory_is_named(monkeypatch, tmp_path):
     write_json(tmp_path / "inventory.json", {"memory_bytes": 0})
     monkeypatch.setattr(threads.probe, "rendered", killed)
-    with pytest.raises(UserError, match="room: one of 2 processes that render it was killed"):
+    with pytest.raises(UserError, match=r"room: one of 1 .* was killed"):
         threads.tried(lightfield(), "a.blend", tmp_path / "inventory.json", "cpu", 2, "room")
+
+
+def on_gpu(lightfield, blend, inventory, device, threads, folder):
+    """Stand in for a process that renders on a GPU; leave a file that says that it was started."""
+    Path(inventory).with_name(f"started-{os.getpid()}").touch()
+    run = journal.Run({"device": "GPU", "start_up_seconds": 1.0})
+    run.views += [{"wall_seconds": 1.0}, {"wall_seconds": 1.0}]
+    return run
+
+
+def test_one_process_alone_is_tried_on_a_gpu(monkeypatch, tmp_path):
+    write_json(tmp_path / "inventory.json", {"memory_bytes": 0})
+    monkeypatch.setattr(threads.probe, "rendered", on_gpu)
+    scene = ("a.blend", tmp_path / "inventory.json")
+    assert threads.tried(lightfield(), *scene, "auto", 4, "room") == []
+    assert len(list(tmp_path.glob("started-*"))) == 1
 
 
 def test_a_scene_is_advised_by_the_programs(run_program, room, tmp_path):

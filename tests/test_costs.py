@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import statistics
 
 import numpy as np
@@ -195,6 +196,11 @@ def test_the_full_dataset_is_extrapolated_from_the_path_tracing_of_the_views(dat
     )
     assert found["gigabytes"] == pytest.approx(300 / 3 * 40 * 4 / 1e9)
     assert "4 views: 8 × 4 pixels, 2 samples" in found["basis"]
+    # What it says of itself follows from this build alone.
+    assert "40 times the path tracing" in found["basis"]
+    same = dataset(*lines)["extrapolation"]["basis"]
+    assert "times the path tracing" not in same
+    assert not re.search(r"\d\.\d", found["basis"] + same)
 
 
 def test_what_other_programs_took_is_no_part_of_a_views_path_tracing():

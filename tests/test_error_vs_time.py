@@ -320,3 +320,39 @@ def test_the_same_wall_is_found_in_both_views():
     # Nothing is seen where the second depth says that something is in front.
     near = Reference(zero, zero, depth / 2, mask, 0.0)
     assert not len(trials.both_see(cameras, windows, (reference, near))[0])
+
+
+ON_TWO_DEVICES = """
+import sys
+from pathlib import Path
+from lightfield.dataset.lightfield import LightField
+from lightfield.measurement import trials
+from lightfield.rendering import cycles
+
+folder = Path(sys.argv[1])
+lightfield = LightField.read(folder / "lightfield.json")
+
+
+def kept(device):
+    scene = (Path(sys.argv[2]), folder / "inventory.json")
+    maker = trials.Trials(*scene, lightfield, device, 1, folder / "cache")
+    maker.render(maker.windows(8, 1)[0], 1, {"samples": 1})
+    return len(list((folder / "cache").iterdir()))
+
+
+counts = [kept("cpu")]
+cycles.device_name = lambda device: "cpu"
+counts.append(kept("auto"))
+cycles.device_name = lambda device: "OPTIX of another machine"
+counts.append(kept("auto"))
+print(*counts)
+"""
+
+
+def test_what_one_device_rendered_is_not_taken_for_anothers(run_program, room, tmp_path):
+    lightfield().write(tmp_path / "lightfield.json")
+    run_program("inventory.py", "--blend", room, "--output", tmp_path / "inventory.json")
+    (tmp_path / "program.py").write_text(ON_TWO_DEVICES)
+    counts = run_program(tmp_path / "program.py", tmp_path, room).stdout.split()[-3:]
+    # On the processor `auto` is the processor; where it is a GPU, the window is rendered again.
+    assert counts == ["1", "1", "2"]

@@ -3,6 +3,8 @@
 No GPU is needed: what is taken is its name.
 """
 
+import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +13,7 @@ import pytest
 from conftest import SCRIPTS
 
 from lightfield.core import gpus
+from lightfield.core.errors import UserError
 from lightfield.core.gpus import CUDA, HIP, Gpu
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
@@ -62,6 +65,30 @@ def test_a_gpu_is_free_whoever_had_it_before(nobody):
     gpu, lock = gpus.take(FAKE[:1], nobody)
     lock.close()
     assert gpu == FAKE[0]
+
+
+@pytest.mark.parametrize("kind", ["file", "missing", "folder"])
+def test_a_link_in_a_folder_of_all_users_is_refused_and_not_followed(tmp_path, kind):
+    victim = tmp_path / "victim"
+    if kind == "file":
+        victim.write_text("mine")
+        victim.chmod(0o600)
+    elif kind == "folder":
+        victim.mkdir()
+    lock = tmp_path / "plenoforge-CUDA_VISIBLE_DEVICES_GPU_a.lock"
+    lock.symlink_to(victim)
+    with pytest.raises(UserError, match=re.escape(str(lock))):
+        gpus.take(FAKE[:1], tmp_path)
+    assert victim.exists() == (kind != "missing")
+    assert kind != "file" or victim.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_lock_that_was_made_first_may_be_locked_by_every_user(tmp_path):
+    umask = os.umask(0o077)
+    _, lock = gpus.take(FAKE[:1], tmp_path)
+    os.umask(umask)
+    lock.close()
+    assert next(tmp_path.iterdir()).stat().st_mode & 0o777 == 0o666
 
 
 @pytest.mark.parametrize(

@@ -36,6 +36,21 @@ def test_an_error_changes_nothing():
     assert os.sched_getaffinity(0) == allowed
 
 
+WITHOUT_AFFINITY = """
+import os
+del os.sched_getaffinity, os.sched_setaffinity
+from lightfield.core import processors
+with processors.only(1):
+    print(processors.available())
+"""
+
+
+def test_a_system_that_lets_nobody_choose_processors_uses_all(run_program, tmp_path):
+    program = tmp_path / "program.py"
+    program.write_text(WITHOUT_AFFINITY)
+    assert int(run_program(program).stdout) == os.cpu_count()
+
+
 PROGRAM = """
 import sys
 from pathlib import Path

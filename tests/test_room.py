@@ -147,6 +147,19 @@ def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path, monkey
     keepers[0].wait()
 
 
+def test_a_link_with_a_temporary_folders_name_leads_to_no_removal(tmp_path, monkeypatch):
+    monkeypatch.setattr(leftovers.tempfile, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(leftovers, "FOLDER_AGE", -1)
+    kept = tmp_path / "kept/view.exr"
+    kept.parent.mkdir()
+    kept.write_bytes(b"mine")
+    link = tmp_path / f"{leftovers.PREFIX}link"
+    link.symlink_to(kept.parent)
+    assert link not in leftovers.remove()
+    assert link.is_symlink()
+    assert kept.read_bytes() == b"mine"
+
+
 def test_a_temporary_folder_needs_no_locks(tmp_path, monkeypatch):
     def flock(*_):
         raise OSError(errno.EBADF, "Bad file descriptor")

@@ -6,7 +6,9 @@ import pytest
 from checkouts import ROOT, wait_until
 from sphere import write_views
 
+import cloud
 from cloud import Cloud, kill_group
+from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.dataset import records
 from lightfield.dataset.view_store import ViewStore
@@ -17,6 +19,36 @@ WORDS = (
     *("--groups", "render=shard", "reproject=shard", "--"),
     f"results/{PANORAMAS}/validation.json",
 )
+
+
+def test_without_its_server_the_benchmark_says_at_once_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setattr(cloud, "ROOT", tmp_path)
+    with pytest.raises(UserError, match=r"make .*\.venv-s3-server/complete"):
+        cloud.check_environment()
+
+
+def test_a_server_that_cannot_start_is_named_with_its_own_words(tmp_path, monkeypatch):
+    monkeypatch.setattr(cloud, "ROOT", tmp_path)
+    python = tmp_path / cloud.SERVER / "bin/python"
+    python.parent.mkdir(parents=True)
+    python.write_text("#!/bin/sh\necho No module named moto >&2\nexit 1\n")
+    python.chmod(0o755)
+    with pytest.raises(UserError, match="S3 server does not answer: No module named moto"):
+        cloud.serve(tmp_path)
+
+
+@pytest.mark.slow
+def test_settings_that_a_killed_run_could_not_send_are_sent_by_the_next(tmp_path):
+    build = Cloud(tmp_path / "cloud", 2, str(tmp_path / "store"))
+    build.start("--dry-run").communicate()
+    settings = list((tmp_path / "store").glob("work/**/settings/*.json"))
+    assert settings
+    for path in settings:
+        path.unlink()
+    again = build.start("--dry-run")
+    said, _ = again.communicate()
+    assert again.returncode == 0, said
+    assert all(path.exists() for path in settings)
 
 
 @pytest.mark.slow

@@ -86,6 +86,39 @@ def test_what_is_cut_short_in_the_store_is_not_there(store, tmp_path):
     assert not store.has(digest(b"texture"), 7)
 
 
+@pytest.mark.parametrize("content", [b"", b"tex", b"something longer"])
+def test_an_object_with_other_bytes_is_not_taken_and_is_mended(store, tmp_path, content):
+    path = write(tmp_path / "texture.png", b"texture")
+    write(tmp_path / "store/views/sums" / digest(b"texture"), content)
+    assert not store.take(digest(b"texture"), tmp_path / "taken.png")
+    assert not (tmp_path / "taken.png").exists()
+    store.put(path, digest(b"texture"))
+    assert store.take(digest(b"texture"), tmp_path / "taken.png")
+    assert (tmp_path / "taken.png").read_bytes() == b"texture"
+
+
+def test_who_reads_an_object_gets_all_of_it_while_another_job_puts_it(store, tmp_path):
+    store.put(write(tmp_path / "one", b"texture"), digest(b"texture"))
+    with (tmp_path / "store/views/sums" / digest(b"texture")).open("rb", 0) as reader:
+        assert reader.read(3) == b"tex"
+        # Another job's copy, of which only a part is there yet.
+        store.put(write(tmp_path / "other", b"tex"), digest(b"texture"))
+        assert reader.read() == b"ture"
+
+
+def test_who_reads_a_stored_list_gets_all_of_it_while_it_is_sent_again(
+    store, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / RECORD, b"first")
+    store.send(RECORD)
+    with (tmp_path / "store" / RECORD).open("rb", 0) as reader:
+        write(tmp_path / RECORD, b"2")
+        store.send(RECORD)
+        assert reader.read() == b"first"
+    assert (tmp_path / "store" / RECORD).read_bytes() == b"2"
+
+
 def test_consumers_take_what_records_and_manifests_list(shard, store, run_program):
     folder, record = shard("one")
     make(folder, record, VIEW, b"view")

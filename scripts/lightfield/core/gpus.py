@@ -8,9 +8,12 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
+
+from lightfield.core.errors import UserError
 
 # From these, CUDA (and OptiX) and HIP read which GPUs a process sees.
 CUDA, HIP = "CUDA_VISIBLE_DEVICES", "HIP_VISIBLE_DEVICES"
@@ -78,17 +81,25 @@ def take(gpus: Sequence[Gpu], folder: Path | None = None) -> tuple[Gpu, BinaryIO
 def _opened(path: Path) -> int:
     """Open a lock file, which may be another user's and not to be written, or create it.
 
-    In a folder of all users Linux refuses to open another's file with O_CREAT. For writing if it
-    can be, for NFS locks no others.
+    For writing if it can be, for NFS locks no others. A link is never followed: in a folder of all
+    users it may be anybody's, and lead to a file of this user. Raises `UserError` for one.
     """
-    try:
-        return os.open(path, os.O_RDWR)
-    except PermissionError:
-        return os.open(path, os.O_RDONLY)
-    except FileNotFoundError:
-        file = os.open(path, os.O_RDWR | os.O_CREAT)
-        os.fchmod(file, 0o666)
-        return file
+    # A pipe that somebody has put there must not be waited for.
+    flags = os.O_NOFOLLOW | os.O_NONBLOCK
+    while True:
+        try:
+            return os.open(path, os.O_RDWR | flags)
+        except PermissionError:
+            return os.open(path, os.O_RDONLY | flags)
+        except FileNotFoundError:
+            # Unless another process is quicker.
+            with suppress(FileExistsError):
+                file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+                # Whatever the umask: another user's process must be able to lock it.
+                os.fchmod(file, 0o666)
+                return file
+        except OSError as error:
+            raise UserError(f"{path}: cannot be locked: {error.strerror}; remove it") from None
 
 
 _taken: list[BinaryIO] = []

@@ -81,9 +81,9 @@ def _is_old(path: Path, age: float) -> bool:
 
 
 def _is_in_use(folder: Path) -> bool:
-    """Whether the process lives that has made a temporary folder."""
+    """Whether the process lives that has made a temporary folder; a link is nobody's to remove."""
     try:
-        lock = os.open(folder, os.O_RDONLY)
+        lock = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW)
     except OSError:
         return True
     try:

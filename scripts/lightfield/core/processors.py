@@ -5,10 +5,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+# macOS, where Cycles renders with Metal, lets no process choose its processors.
+_HAS_AFFINITY = hasattr(os, "sched_getaffinity")
+
 
 def available() -> int:
     """Return how many processors this process may use."""
-    return len(os.sched_getaffinity(0))
+    return len(os.sched_getaffinity(0)) if _HAS_AFFINITY else os.cpu_count() or 1
 
 
 @contextmanager
@@ -17,8 +20,12 @@ def only(count: int) -> Iterator[None]:
 
     TBB, whose threads Blender and OpenImageDenoise use beside Cycles' own, makes one for each
     processor that it may use when it is loaded. Idle ones keep asking for work: they take a tenth
-    of each processor from the renders of other shards.
+    of each processor from the renders of other shards. Where a process cannot choose its
+    processors, this changes nothing.
     """
+    if not _HAS_AFFINITY:
+        yield
+        return
     allowed = os.sched_getaffinity(0)
     os.sched_setaffinity(0, sorted(allowed)[:count])
     try:

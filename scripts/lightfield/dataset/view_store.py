@@ -16,7 +16,7 @@ import hashlib
 import os
 import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -26,6 +26,10 @@ from lightfield.core.files import atomic_path, sha256
 
 # The environment variable by which the workflow says to its programs where the store is.
 VARIABLE = "PLENOFORGE_STORE"
+
+
+class _OtherBytesError(Exception):
+    """An object of the store is not the file that its name says."""
 
 
 class ViewStore:
@@ -85,9 +89,7 @@ class ViewStore:
     def send(self, path: str) -> None:
         """Store a file under its path, as Snakemake does."""
         with self._answering():
-            stored = self._place(path)
-            stored.parent.mkdir(parents=True, exist_ok=True)
-            stored.write_bytes(Path(path).read_bytes())
+            self._write(Path(path), self._place(path))
 
     def remove(self, path: str) -> None:
         """Remove what Snakemake has stored under a path."""
@@ -95,12 +97,21 @@ class ViewStore:
             self._place(path).unlink(missing_ok=True)
 
     def put(self, file: Path, digest: str) -> None:
-        """Put a file, whose SHA-256 is given."""
+        """Put a file, whose SHA-256 is given, in place of what may be there, as one cut short."""
         with self._answering():
-            target = self._root / "sums" / digest
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with file.open("rb") as source, target.open("wb") as stored:
-                shutil.copyfileobj(source, stored, 1 << 20)
+            self._write(file, self._root / "sums" / digest)
+
+    def _write(self, file: Path, target: Any) -> None:
+        """Write a file to a place of the store, where others see all of it or none.
+
+        A folder's file is renamed. Object stores replace an object when all of it has arrived.
+        """
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if "://" in self.url:
+            target.fs.put_file(str(file), target.path)
+        else:
+            with atomic_path(target) as temporary:
+                shutil.copyfile(file, temporary)
 
     def put_view(self, file: Path, name: str, key: str, digest: str) -> None:
         """Put a dataset's file, and note that the settings of ``key`` made it under ``name``."""
@@ -139,14 +150,15 @@ class ViewStore:
                 stored = (self._root / "sums" / digest).open("rb")
             except FileNotFoundError:
                 return False
-            with stored, atomic_path(target) as temporary, temporary.open("wb") as file:
-                found = hashlib.sha256()
-                while block := stored.read(1 << 20):
-                    found.update(block)
-                    file.write(block)
-                if found.hexdigest() == digest:
-                    return True
-            target.unlink()
+            with stored, suppress(_OtherBytesError), atomic_path(target) as temporary:
+                with temporary.open("wb") as file:
+                    copied = hashlib.sha256()
+                    while block := stored.read(1 << 20):
+                        copied.update(block)
+                        file.write(block)
+                if copied.hexdigest() != digest:
+                    raise _OtherBytesError
+                return True
         return False
 
     @contextmanager

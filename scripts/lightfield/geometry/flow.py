@@ -20,16 +20,20 @@ def neighbours(matrices: Array) -> list[int]:
     Views from the very same place are none, for between these nothing is hidden. Raises `UserError`
     where there are no others.
     """
+    from lightfield.geometry.nearest import Cameras
+
     places, ahead = matrices[:, :3, 3], matrices[:, :3, 2]
-    found = []
-    for place, look in zip(places, ahead, strict=True):
-        away = np.linalg.norm(places - place, axis=1)
+    cameras = Cameras(places)
+    chosen = []
+    for view, look in enumerate(ahead):
+        candidates = cameras.nearest_apart(view, ONE_PLACE, AS_NEAR)
+        away = np.linalg.norm(places[candidates] - places[view], axis=1)
         away[away < ONE_PLACE] = np.inf
         if np.isinf(away.min()):
             raise UserError("flow: all views are from one place; must be two or more")
-        near = np.flatnonzero(away <= away.min() * (1 + AS_NEAR))
-        found.append(int(near[np.argmax(np.round(ahead[near] @ look, 6))]))
-    return found
+        near = candidates[away <= away.min() * (1 + AS_NEAR)]
+        chosen.append(int(near[np.argmax(np.round(ahead[near] @ look, 6))]))
+    return chosen
 
 
 def flow(

@@ -45,7 +45,8 @@ def tried(
         return []
     progress = Progress(len(counts), f"{name}: threads a process", "numbers")
     found = []
-    for threads in counts:
+    # One process first: where it finds itself on a GPU, no more are started there.
+    for threads in reversed(counts):
         with (
             temporary_folder() as temporary,
             ProcessPoolExecutor(cores // threads, get_context("spawn")) as pool,
@@ -59,7 +60,7 @@ def tried(
                 runs = [run.result() for run in started]
             except BrokenProcessPool:
                 raise UserError(
-                    f"{name}: one of {len(started)} processes that render it was killed; "
+                    f"{name}: one of {len(started)} process(es) that render it was killed; "
                     f"most likely memory ran out: {LESS_MEMORY}"
                 ) from None
         if runs[0].start["device"] != "CPU":
@@ -76,4 +77,4 @@ def tried(
             }
         )
         progress.done()
-    return found
+    return found[::-1]

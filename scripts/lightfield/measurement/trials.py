@@ -4,7 +4,8 @@ Whole views made small would show more detail a pixel than the dataset does, whi
 tell from noise; so a window is a part of a view at the view's own resolution.
 
 Every render is kept in a folder, under a key of all that it follows from, with the time that it
-took, so that what is interrupted goes on where it was and what is repeated costs nothing.
+took, so that what is interrupted goes on where it was and what is repeated costs nothing. The key
+names the device that rendered, not `auto`: seconds of one device are not those of another.
 """
 
 import argparse
@@ -89,8 +90,9 @@ class Trial:
 class Trials:
     """Renders windows of the dataset of a lightfield.json, or takes them from ``cache``.
 
-    Blender starts only when something has to be rendered, and in a process one after the other:
-    after another has rendered, this one must not. With ``parts`` it is a pilot.
+    Blender starts only when something has to be rendered, or to see what ``auto`` is here. In a
+    process one renders after the other: after another has rendered, this one must not. With
+    ``parts`` it is a pilot.
     """
 
     def __init__(
@@ -155,7 +157,7 @@ class Trials:
         """Render a window under the render settings that ``sampling`` changes."""
         settings = {**self.lightfield.render, **PLAIN, **sampling, "seed": seed}
         place = [window.x, window.y, window.width, window.height]
-        one = self.lightfield.changed(render=settings, device=self._device, window=place)
+        one = self.lightfield.changed(render=settings, device=self._renders_on, window=place)
         key = keys.render_key(one, window.view)
         path = self._cache / f"{key[:32]}.exr"
         if not images.is_finished(path, key):
@@ -219,6 +221,15 @@ class Trials:
                 tried.append((float(self.mask(window).mean()), window))
             found.append(max(tried, key=lambda one: one[0])[1])
         return found
+
+    @cached_property
+    def _renders_on(self) -> str:
+        """What the device is on this machine, where `auto` and `gpu` mean what is there."""
+        if self._device == "cpu":
+            return "cpu"
+        with processors.only(self._threads):
+            from lightfield.rendering import cycles
+        return cycles.device_name(self._device)
 
     def _render(self, window: Window, settings: Mapping[str, Any], path: Path, key: str) -> None:
         with processors.only(self._threads):

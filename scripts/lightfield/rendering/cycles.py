@@ -212,15 +212,32 @@ def gpu(device: str) -> str | None:
     return None
 
 
-def _use_device(scene: Any, device: str) -> None:
-    """Choose what Cycles renders on; a device that is asked for by name must be there.
+def device_name(device: str) -> str:
+    """Return what a ``device`` means on this machine: cpu, or kind and model of the GPU.
 
-    Of several GPUs of a machine it is one that no other process renders on.
+    Raises `UserError` where one is asked for that is not there.
+    """
+    kind = _gpu_of_this_process(device)
+    if not kind:
+        return "cpu"
+    entries = bpy.context.preferences.addons["cycles"].preferences.get_devices_for_type(kind)
+    return " ".join([kind, *sorted(entry.name for entry in entries if entry.type == kind)])
+
+
+def _gpu_of_this_process(device: str) -> str | None:
+    """Return the kind of GPU that a ``device`` means, as `gpu` does.
+
+    Of several GPUs of a machine this process has one that no other process renders on.
     """
     if device != "cpu":
         # Before Cycles looks for them for the first time.
         gpus.use_one()
-    kind = gpu(device)
+    return gpu(device)
+
+
+def _use_device(scene: Any, device: str) -> None:
+    """Choose what Cycles renders on; a device that is asked for by name must be there."""
+    kind = _gpu_of_this_process(device)
     scene.cycles.device = "GPU" if kind else "CPU"
     if kind:
         preferences = bpy.context.preferences.addons["cycles"].preferences

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from lightfield.geometry import depth as depth_conversion
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.nearest import Cameras
 
 Array = NDArray[np.float64]
 
@@ -49,6 +50,8 @@ FEWEST_POINTS = 30
 NEIGHBOURS = 6
 # Among so many of the nearest views are the farther neighbours.
 NEIGHBOURHOOD = 48
+# Distances that are the same in so many decimals of a metre are the same.
+DECIMALS = 6
 
 # Residuals beyond this many footprints are another surface, not a slightly wrong view.
 SAME_SURFACE = 1.0
@@ -339,13 +342,15 @@ def view_pairs(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tu
     whose wider baselines show what the near ones cannot. Views at one place count as neighbours.
     """
     positions = np.array([camera.position for camera in cameras])
+    nearest = Cameras(positions)
     pairs = set()
     for view, own in enumerate(patches):
         if len(own) < FEWEST_POINTS:
             continue
-        away = np.round(np.linalg.norm(positions - positions[view], axis=1), 6)
-        away[view] = -1.0
-        near = np.argsort(away, kind="stable")[1 : NEIGHBOURHOOD + 1]
+        candidates = nearest.nearest(view, NEIGHBOURHOOD, 10**-DECIMALS)
+        away = np.linalg.norm(positions[candidates] - positions[view], axis=1)
+        order = np.argsort(np.round(away, DECIMALS), kind="stable")
+        near = candidates[order[:NEIGHBOURHOOD]]
         starts = [0] * (NEIGHBOURS // 2)
         starts += [len(near) * step // 4 for step in range(1, NEIGHBOURS - NEIGHBOURS // 2 + 1)]
         chosen: set[int] = set()

@@ -1,6 +1,7 @@
 """Do the views of a set see the same world? Each is compared with its neighbours."""
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from lightfield.core.progress import Progress
@@ -69,8 +70,12 @@ def _judged(
         limit, scale_limit = REPROJECTED_DISPLACEMENT_LIMIT, REPROJECTED_SCALE_LIMIT
     contradictions: dict[int, float] = {}
     displacements: dict[int, tuple[float, float]] = {}
+    of_view: dict[int, list[Answer]] = defaultdict(list)
+    for pair, answer in both.items():
+        for view in pair:
+            of_view[view].append(answer)
     for view in range(len(files)):
-        own = [answer for pair, answer in both.items() if view in pair]
+        own = of_view[view]
         contradiction = _low_median(answer.contradiction for answer in own)
         if contradiction is not None:
             contradictions[view] = contradiction
