@@ -300,6 +300,11 @@ def keyed_simplification():
     switched(scene.render, "simplify_subdivision_render", 0, 3)
 
 
+def keyed_number():
+    switched(thing("torus"), "pass_index", 0, 99)
+    switched(thing("lamp").data, "energy", 300, 100)
+
+
 def keyed_view_layer():
     switched(bpy.context.view_layer, "use", True, False)
     switched(thing("lamp").data, "energy", 300, 100)
@@ -413,7 +418,7 @@ CASES = [
     *(keyed_part_of_an_instanced_collection, keyed_part_of_a_collection_that_nodes_place),
     *(keyed_switch_of_nodes, particles_from_a_keyed_emitter, keyed_object_of_a_linked_collection),
     *(keyed_material, keyed_modifier, keyed_constraint, keyed_bone, keyed_world, keyed_light),
-    *(keyed_samples, keyed_simplification, keyed_view_layer),
+    *(keyed_samples, keyed_simplification, keyed_number, keyed_view_layer),
     *(blur_across_a_change_of_visibility, blur_of_a_light_that_changes),
     *(blur_by_a_target_in_another_scene, blur_by_a_sequence_of_images, blur_by_velocities),
     *(blur_by_velocities_from_nodes, background_that_shows_what_the_scene_excludes),

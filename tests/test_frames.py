@@ -37,6 +37,7 @@ CASES = [
     "keyed_light",
     "keyed_samples",
     "keyed_simplification",
+    "keyed_number",
     "keyed_view_layer",
     "blur_across_a_change_of_visibility",
     "blur_of_a_light_that_changes",
@@ -126,10 +127,10 @@ def test_a_cube_that_appears_at_the_yamls_frame_is_in_the_view(folder, run_progr
     assert depth[4, 4] == pytest.approx(1.5 - 0.4, abs=1e-5)
 
 
-def write_lightfield(path, frame, **render):
+def write_lightfield(path, frame, center=(0.5, 1.5, 1), **render):
     """Write a light field of two cameras: one where the cube is at frame 5, one beside it."""
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
-    rig = {"type": "lattice", "cameras": [2, 1, 1], "size": 1, "center": [0.5, 1.5, 1]}
+    rig = {"type": "lattice", "cameras": [2, 1, 1], "size": 1, "center": list(center)}
     LightField.from_rig(
         rig,
         lens,
@@ -152,6 +153,26 @@ def test_cameras_are_checked_against_what_their_frame_shows(name, folder, run_pr
     inside = checked(5)
     assert inside.returncode == 1
     assert "1 of 2 cameras are inside late: view_0000f" in inside.stderr
+
+
+def test_cameras_are_checked_against_what_particles_place(folder, run_program, tmp_path):
+    # The first camera is where the emitter is at frame 5. Each grain is hidden itself.
+    write_lightfield(tmp_path / "lightfield.json", 5, center=[1.5, 1, 1.05])
+    words = ("--blend", folder / "particles_from_a_keyed_emitter.blend")
+    words += ("--lightfield", tmp_path / "lightfield.json", "--output", tmp_path / "cameras.json")
+    result = run_program("check_cameras.py", *words, check=False)
+    assert "1 of 2 cameras are inside grain: view_0000f" in result.stderr
+
+
+def test_keyframes_do_not_number_objects(folder, run_program, tmp_path):
+    write_lightfield(tmp_path / "lightfield.json", 5, passes=["object"])
+    words = ("--blend", folder / "keyed_number.blend", "--views", "1:2")
+    words += ("--lightfield", tmp_path / "lightfield.json", "--output", tmp_path / "exr")
+    run_program("render_shard.py", *words)
+    names = json.loads((tmp_path / "object/names.json").read_text())
+    (pixels,) = images.read_image(tmp_path / "object/view_0001f.exr").channels.values()
+    assert names["torus"] in pixels
+    assert set(np.unique(pixels).tolist()) <= set(names.values())
 
 
 @pytest.mark.parametrize(

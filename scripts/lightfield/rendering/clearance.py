@@ -39,6 +39,8 @@ def show_what_is_rendered() -> None:
     for thing in bpy.data.objects:
         animation.mute(thing, ("hide_viewport",))
         thing.hide_viewport = thing.name_full not in shown
+    for settings in bpy.data.particles:
+        settings.display_percentage = 100
     for thing in layer.objects:
         thing.hide_set(False)
     for collection in bpy.data.collections:
