@@ -9,15 +9,16 @@ import argparse
 import re
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lightfield.core.cli import run, stops, white
 from lightfield.core.leftovers import temporary_folder
 from lightfield.dataset.exports import VIEWS
 from lightfield.export.source import Source
 from lightfield.export.splits import splits
 from lightfield.report import evaluation_page
+
+# isort: split
+import numpy as np
+from numpy.typing import NDArray
 
 NAMED_COLOURS = {"black": "000000", "white": "ffffff"}
 

@@ -74,7 +74,10 @@ def main() -> None:
         dataset = replace(dataset, rig=dataset.rig.placed(arguments.places))
     if arguments.calibration:
         render = calibrated(render, arguments.calibration)
-    keys = dataset.origin(render) | {MACHINE: machine.describe(render["denoise"])}
+    keys = dataset.origin(render)
+    # Views that somebody else has rendered were so elsewhere.
+    if not dataset.imported:
+        keys[MACHINE] = machine.describe(render["denoise"])
     made = LightField.from_rig(dataset.rig, dataset.rig.camera.make(), **keys)
     if dataset.flow and not arguments.panorama:
         made = made.with_flow()
