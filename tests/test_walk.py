@@ -8,7 +8,7 @@ import shutil
 import numpy as np
 import pytest
 from PIL import Image
-from sphere import look_at_ball, write_views
+from sphere import BALL, RED, look_at_ball, write_views
 
 from lightfield.dataset.lightfield import LightField
 from lightfield.export.source import Source
@@ -31,11 +31,7 @@ VIEWS = 6
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory):
     folder = tmp_path_factory.mktemp("walk") / "dataset"
-    write_views(folder, RIG["camera"], RIG, see=look_at_ball)
-    field = LightField.read(folder / "lightfield.json")
-    field.changed(frame=1, scene={"name": "ball"}, render={"samples": 1}).write(field.path)
-    origin = dataset_page.Origin(rigs.from_settings(RIG), "", "snakemake", False)
-    dataset_page.write(folder / "index.html", folder, "ball/sphere", origin)
+    written_page(folder, RIG["camera"], RIG, look_at_ball)
     return folder
 
 
@@ -57,6 +53,25 @@ def wait(tab):
             return
         tab.wait_for_timeout(100)
     raise AssertionError("the walk did not begin")
+
+
+def written_page(folder, camera, rig, see):
+    """Write views and their page into a folder; return the page's path."""
+    write_views(folder, camera, rig, see=see)
+    field = LightField.read(folder / "lightfield.json")
+    field.changed(frame=1, scene={"name": "ball"}, render={"samples": 1}).write(field.path)
+    origin = dataset_page.Origin(
+        rigs.from_settings(rig | {"camera": camera}), "", "snakemake", False
+    )
+    dataset_page.write(folder / "index.html", folder, "ball/sphere", origin)
+    return folder / "index.html"
+
+
+def look_at_ball_alone(lens, matrix):
+    """The ball before nothing at all."""
+    colour, distance = look_at_ball(lens, matrix)
+    ball = (colour == RED).all(axis=-1)
+    return np.where(ball[..., None], colour, 0), np.where(ball, distance, np.inf)
 
 
 def look_from(tab, place, yaw, pitch):
@@ -140,6 +155,33 @@ def test_it_is_walked_by_keys_by_mouse_and_by_touch(tab):
     assert opened.evaluate(state) == home
 
 
+NARROW = {"lens": "rectilinear", "fov": 50, "resolution": [96, 96]}
+AROUND = {"size": 3.0, "center": BALL.tolist(), "camera": NARROW}
+DOWN = {"type": "plane", "cameras": [3, 3], "size": 0.5, "rotation": [-90, 0, 0]}
+
+
+@pytest.mark.parametrize(
+    "rig",
+    [
+        AROUND | {"type": "hemisphere", "count": 12},
+        AROUND | {"type": "ring", "count": 8},
+        DOWN | {"camera": NARROW, "center": [0, 1.8, 1.5]},
+    ],
+    ids=["hemisphere", "ring", "from above"],
+)
+def test_it_begins_where_the_cameras_look(tmp_path, show, rig):
+    page = written_page(tmp_path / "dataset", NARROW, rig, look_at_ball_alone)
+    opened = show(page)
+    wait(opened)
+    at, yaw, pitch = opened.evaluate("[walk.at, walk.yaw, walk.pitch]")
+    shown = look_from(opened, at, yaw, pitch)
+    # The ball is in the middle of the picture, red, and not faded as at the volume's edge.
+    middle = shown[HEIGHT // 2, WIDTH // 2]
+    assert middle[0] > 0.5
+    assert middle[0] > 2 * middle[1]
+    assert opened.evaluate("room(walk.at)") > -1e-6
+
+
 def test_nobody_leaves_the_volume(tab):
     opened = tab()
     opened.evaluate("moved(5, 0, 0)")
@@ -175,7 +217,7 @@ def test_a_sequence_goes_on_from_where_the_eye_was(dataset, show, tmp_path):
     assert opened.locator("#walk-frame").input_value() == "0"
 
 
-def test_a_place_that_is_none_is_the_centre(tab):
+def test_a_place_that_is_none_is_the_start(tab):
     opened = tab()
     state = "[...walk.at, walk.yaw, walk.pitch, walk.mode]"
     home = opened.evaluate(state)

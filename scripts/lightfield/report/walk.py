@@ -28,13 +28,15 @@ def collect(lens: Lens, places: Array, distances: Array) -> dict[str, Any]:
     ``distances`` (m, h, w) are what embedded views see, in metres.
     ``rays`` are those of the pixels, row by row, octahedral in two times 16 bits; ``sight`` has a
     byte for each direction of an octahedral map, 1 where the lens sees it; ``planes`` (m, 4) bound
-    the volume between the cameras: n · p + c ≤ 0.
+    the volume between the cameras: n · p + c ≤ 0. ``nearest`` is how near to a camera, in metres,
+    its surroundings are, but for the nearest hundredth of them.
     """
     steps = (np.arange(SIGHT) + 0.5) / SIGHT
     x, y = np.meshgrid(steps, steps)
     _, _, sees = pixel_indices(lens, _direction(np.stack([x, y], axis=-1)).reshape(-1, 3))
     some = distances[:: max(1, len(distances) // 4)]
     seen = some[some > 0]
+    hit = seen[np.isfinite(seen)]
     coded = np.round(_octahedral(np.nan_to_num(lens.pixel_rays())) * 65535).astype("<u2")
     return {
         "rays": packed_bytes(coded.tobytes()),
@@ -43,6 +45,7 @@ def collect(lens: Lens, places: Array, distances: Array) -> dict[str, Any]:
         "planes": np.round(_bounds(places), 6).tolist(),
         "steepest": float(synthesis.steepest(lens)),
         "distances": synthesis.typical(1 / seen).tolist() if seen.size else [1.0, 1.0],
+        "nearest": float(np.percentile(hit, 1)) if hit.size else 1.0,
         "best": synthesis.BEST,
         "directions": synthesis.DIRECTIONS,
         "distance": synthesis.DISTANCE,

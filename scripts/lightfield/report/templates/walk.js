@@ -8,6 +8,7 @@ const MOST_SOURCES = WALK ? WALK.best : 0;
 // Of the eye: the nearest that it sees, in metres, and its field of view across the longer side.
 const NEAR = 0.01;
 const WIDE = (80 * Math.PI) / 180;
+const STEEPEST_PITCH = 1.5;
 // Between the last vertex of a row and the first of the next so many numbers are left out: what draws
 // without a graphics card keeps a vertex by its number modulo 64, where the one below would drop it.
 const APART = 32;
@@ -22,6 +23,7 @@ const walk = {
   canvas: element("walk"),
   overlay: element("walk-overlay"),
   at: null,
+  fadeFrom: 0,
   yaw: 0,
   pitch: 0,
   mode: 0,
@@ -153,7 +155,7 @@ void main() {
   } else if (mode == 3) {
     colour = hole ? vec3(0.0) : texture(palette, vec2(used / float(count), 0.5)).rgb;
   }
-  // The edge of the volume is felt: colour fades towards it.
+  // The edge of the volume is felt: colour fades towards it, from where the walk begins at most.
   result = vec4(mix(colour, vec3(dot(colour, vec3(1.0 / 3.0))) * 0.5, edge), 1.0);
 }`;
 
@@ -427,7 +429,7 @@ function drawEye(at, eyeAxes, lens, chosen, target, corner, width, height) {
   gl.uniform1f(names.white, DATA.white);
   gl.uniform1f(names.same, WALK.same);
   gl.uniform1f(names.far, WALK.far);
-  gl.uniform1f(names.edge, clamp(1 - 4 * (room(walk.at) / walk.extent), 0, 0.8));
+  gl.uniform1f(names.edge, clamp(1 - room(walk.at) / Math.max(walk.fadeFrom, NEAR), 0, 0.8));
   gl.uniform2fv(names.shown, DATA.depth.shown);
   gl.drawArrays(gl.TRIANGLES, 0, 3);
 }
@@ -522,7 +524,7 @@ function moved(forward, sideways, upwards) {
 
 function turned(x, y) {
   walk.yaw -= x;
-  walk.pitch = clamp(walk.pitch - y, -1.5, 1.5);
+  walk.pitch = clamp(walk.pitch - y, -STEEPEST_PITCH, STEEPEST_PITCH);
   drawWalkSoon();
 }
 
@@ -650,12 +652,25 @@ function goWhereItWas() {
   element("walk-section").scrollIntoView();
 }
 
+// The walk begins where the cameras see something: amid them, unless they look inwards. Amid those
+// is what they look at, so it begins before one of them, and looks as that does.
 function goHome() {
-  const places = walk.order.map(({ view }) => view.at);
-  walk.at = kept([0, 1, 2].map((axis) => places.reduce((sum, at) => sum + at[axis], 0) / places.length));
-  const first = DATA.views[DATA.embedded[DATA.first].view].ahead;
-  walk.yaw = Math.hypot(first[0], first[1]) > 0.1 ? Math.atan2(-first[0], first[1]) : 0;
-  walk.pitch = 0;
+  const views = walk.order.map(({ view }) => view);
+  const mean = (vectors) => [0, 1, 2].map((axis) => vectors.reduce((sum, vector) => sum + vector[axis], 0) / vectors.length);
+  const centre = mean(views.map((view) => view.at));
+  const first = DATA.views[DATA.embedded[DATA.first].view];
+  const inwards = views.map((view) => {
+    const way = minus(centre, view.at);
+    return dot(view.ahead, way) / (Math.hypot(...way) || 1);
+  });
+  const lookInwards = inwards.reduce((sum, value) => sum + value, 0) > views.length / 2;
+  const lookAlike = Math.hypot(...mean(views.map((view) => view.ahead))) > 0.5;
+  // Away from the edge, but not into what is seen.
+  const step = Math.min(walk.extent, WALK.nearest) / 4;
+  walk.at = kept(lookInwards ? along(first.at, first.ahead, step) : centre);
+  walk.yaw = Math.hypot(first.ahead[0], first.ahead[1]) > 0.1 ? Math.atan2(-first.ahead[0], first.ahead[1]) : 0;
+  walk.pitch = lookInwards || lookAlike ? clamp(Math.asin(clamp(first.ahead[2], -1, 1)), -STEEPEST_PITCH, STEEPEST_PITCH) : 0;
+  walk.fadeFrom = Math.min(walk.extent / 4, room(walk.at));
   drawWalkSoon();
 }
 
