@@ -10,7 +10,8 @@ import shlex
 import subprocess
 import sys
 import tempfile
-from functools import cache
+import time
+from functools import cache, lru_cache
 from importlib.metadata import version
 from pathlib import Path
 
@@ -42,6 +43,7 @@ from lightfield.dataset.dataset import (
     scene_datasets,
 )
 from lightfield.dataset.exports import MANIFEST, VIEWS
+from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 from lightfield.dataset.splits import SPLITS
 from lightfield.dataset.view_store import VARIABLE, ViewStore
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
@@ -274,9 +276,21 @@ def failing_nodes(record, attempt):
     In the first attempt, in which there may be thousands of shards, of the others' alone.
     """
     folder = Path(record).parent
-    own = Path(record).with_suffix(".journal.jsonl") if attempt > 1 else None
-    journals = {path: journal.read(path) for path in folder.glob("*.journal.jsonl")}
-    return journal.avoided(journals.pop(own, []), journals.values())
+    own = Path(record).with_suffix(JOURNAL_SUFFIX)
+    others = {**journals(folder, time.monotonic() // JOURNALS_AGE)}
+    others.pop(own, None)
+    shard = journal.read(own) if attempt > 1 and own.exists() else []
+    return journal.avoided(shard, others.values())
+
+
+# Seconds: where a thousand shards fail at once, not each of them reads all journals.
+JOURNALS_AGE = 60
+
+
+@lru_cache(maxsize=8)
+def journals(folder, _period):
+    """Return the runs in each journal of a folder, as they were some time in a period."""
+    return {path: journal.read(path) for path in folder.glob(journal.JOURNALS)}
 
 
 @of_each_shard
