@@ -9,7 +9,8 @@ import shlex
 import subprocess
 import sys
 import tempfile
-from functools import cache
+import time
+from functools import cache, lru_cache
 from importlib.metadata import version
 from pathlib import Path
 
@@ -40,6 +41,7 @@ from lightfield.dataset.dataset import (
     scene_datasets,
 )
 from lightfield.dataset.exports import MANIFEST, VIEWS
+from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 from lightfield.dataset.splits import SPLITS
 from lightfield.dataset.view_store import VARIABLE, ViewStore
 from lightfield.geometry.lenses.cube_map import CUBE_FACES

@@ -4,6 +4,7 @@ import logging
 from snakemake_interface_logger_plugins.common import LogEvent
 
 from lightfield.core.files import read_json, set_aside, sha256, write_json_if_changed
+from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
 
 # What shards of other bounds have made is nobody's any more.
 SHARD_RECORDS = {file for d in DATASETS.values() for file in d.all_records}
@@ -178,7 +179,8 @@ def history_of(job):
     """Return the files of a job that only grow: a shard's logs, and what the job took."""
     files = [str(job.benchmark)] if job.benchmark else []
     for output in map(Path, job.output):
-        files += map(str, output.parent.glob(f"{output.stem}.*.jsonl"))
+        # By name: a folder of thousands of shards takes long to list.
+        files += [str(output.with_suffix(s)) for s in (JOURNAL_SUFFIX, LOG_SUFFIX)]
     return files
 
 
@@ -191,25 +193,39 @@ class JobNotes(logging.Handler):
     def __init__(self, jobs):
         super().__init__()
         self.unfinished = {job.jobid: job for job in jobs if job.output}
+        # The jobs of a group are not announced one by one.
+        self.grouped = {n for n, job in self.unfinished.items() if job.group}
+        # Of those that were announced.
         self.inputs = {}
+        self.next_sending = 0.0
 
     def emit(self, record):
         if getattr(record, "event", None) is not LogEvent.JOB_STARTED:
             return
-        self.note_finished()
+        self.note_finished({*self.inputs, *self.grouped})
         for number in record.jobs:
             if number in self.unfinished:
                 self.inputs[number] = read_stamps(self.unfinished[number])
 
-    def note_finished(self):
-        finished = [n for n, job in self.unfinished.items() if is_finished(job)]
+    def note_finished(self, numbers):
+        """Note those of these unfinished jobs that have finished since."""
+        finished = [n for n in numbers if is_finished(self.unfinished[n])]
         for number in finished:
             job = self.unfinished.pop(number)
-            # The jobs of a group are not announced one by one.
+            self.grouped.discard(number)
             stamps = self.inputs.pop(number, None) or read_stamps(job)
             finished_work().note(line_of(job, stamps))
-        if finished and STORE:
-            ViewStore(STORE).send(LEDGER)
+        if finished and STORE and time.monotonic() > self.next_sending:
+            self.send()
+
+    def send(self):
+        """Send the ledger to the storage, and not again before 20 times as long has passed.
+
+        It grows with the number of jobs.
+        """
+        began = time.monotonic()
+        ViewStore(STORE).send(LEDGER)
+        self.next_sending = began + 20 * (time.monotonic() - began)
 
 
 def read_stamps(job):
@@ -254,4 +270,6 @@ def begin_notes():
 def end_notes():
     """Note the jobs that have finished last."""
     for notes in NOTES:
-        notes.note_finished()
+        notes.note_finished([*notes.unfinished])
+        if STORE and Path(LEDGER).exists():
+            notes.send()

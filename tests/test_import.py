@@ -13,6 +13,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import second_name, sha256
 from lightfield.core.settings import checked
 from lightfield.dataset.config import Scene
+from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.published import lightfields
 from lightfield.geometry import lenses
 from lightfield.imaging import images
@@ -89,6 +90,24 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
     run("validate.py", *words)
     validation = json.loads((dataset / "validation.json").read_text())
     assert validation["valid"], validation["summary"]
+
+
+@pytest.mark.parametrize(("side", "fewest", "most"), [(64, 1, 1), (2048, 4, 20)])
+def test_a_shard_takes_over_as_many_views_as_are_worth_a_start(
+    published, tmp_path, monkeypatch, side, fewest, most
+):
+    monkeypatch.chdir(tmp_path)
+    path = published / "lightfield.json"
+    content = json.loads(path.read_text())
+    content["resolution"] = [side, side]
+    (frame, *_) = content["frames"]
+    content["frames"] = [frame | {"name": f"view_{number:04}f"} for number in range(400)]
+    path.write_text(json.dumps(content))
+    yaml = tmp_path / "configs/scenes/theirs.yaml"
+    yaml.write_text(YAML.replace("[24, 24]", f"[{side}, {side}]"))
+    (dataset,) = scene_datasets("theirs")
+    # Of 400 views: small ones are done before a second process has started.
+    assert fewest <= len(dataset.shards) <= most
 
 
 @pytest.mark.slow

@@ -31,3 +31,15 @@ def test_a_record_lists_files_that_were_not_looked_at_too(tmp_path: Path) -> Non
     entry = {"bytes": 5, "sha256": sha256(file)}
     assert read_json(path) == {"files": {"exr/a.exr": entry}, "counts": {"views": 1}}
     assert read(path) == {"exr/a.exr": (entry["bytes"], entry["sha256"])}
+
+
+def test_a_view_made_by_other_settings_is_not_looked_for_in_other_logs(tmp_path: Path) -> None:
+    folder = tmp_path / "exr"
+    folder.mkdir()
+    view = folder / "view_0000f.exr"
+    view.write_bytes(b"view")
+    ShardRecord(tmp_path / "render/0-1.json", folder).add(view, "old")
+    # Reading it would be an error.
+    (tmp_path / "render/1-2.sums.jsonl").mkdir()
+    assert not ShardRecord(tmp_path / "render/0-1.json", folder).is_finished(view, "new")
+    assert ShardRecord(tmp_path / "render/0-1.json", folder).is_finished(view, "old")

@@ -40,9 +40,21 @@ def failing_nodes(record, attempt):
     In the first attempt, in which there may be thousands of shards, of the others' alone.
     """
     folder = Path(record).parent
-    own = Path(record).with_suffix(".journal.jsonl") if attempt > 1 else None
-    journals = {path: journal.read(path) for path in folder.glob("*.journal.jsonl")}
-    return journal.avoided(journals.pop(own, []), journals.values())
+    own = Path(record).with_suffix(JOURNAL_SUFFIX)
+    others = {**journals(folder, time.monotonic() // JOURNALS_AGE)}
+    others.pop(own, None)
+    shard = journal.read(own) if attempt > 1 and own.exists() else []
+    return journal.avoided(shard, others.values())
+
+
+# Seconds: where a thousand shards fail at once, not each of them reads all journals.
+JOURNALS_AGE = 60
+
+
+@lru_cache(maxsize=8)
+def journals(folder, _period):
+    """Return the runs in each journal of a folder, as they were some time in a period."""
+    return {path: journal.read(path) for path in folder.glob(journal.JOURNALS)}
 
 
 @of_each_shard

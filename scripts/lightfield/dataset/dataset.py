@@ -47,6 +47,9 @@ from lightfield.geometry.rigs.split import PARTS
 # one pixel, and start-up (bpy, the scene, and Cycles' acceleration structures).
 SECONDS_PER_SAMPLE = 6e-6
 START_UP_SECONDS = 3.0
+# The same of views that are taken over: reading a pixel, and one that it is reprojected to. Of EXR
+# with depth, in batches of 16 views of 2048², by benchmarks/reprojection.py.
+READ_SECONDS, REPROJECTION_SECONDS = 4e-8, 1.5e-7
 # A pixel's samples where a target error is given instead of them: an estimate for planning.
 GUESSED_SAMPLES = 256
 # Start-up is kept under this part of a shard's time.
@@ -485,7 +488,11 @@ class Dataset:
 
     @property
     def planned_view_seconds(self) -> float:
-        """Estimate of how long one core path-traces one view."""
+        """Estimate of how long one core path-traces one view, or takes over and reprojects one."""
+        if self.imported:
+            targets = sum(self._reprojected_pixels(name) for name in self.reprojections)
+            read = self._pixels * (1 + len(self.reprojections))
+            return read * READ_SECONDS + targets * REPROJECTION_SECONDS
         return self._pixels * self.planned_samples * SECONDS_PER_SAMPLE
 
     @property
@@ -507,7 +514,9 @@ class Dataset:
         """
         try:
             rig = Path(self.work_root, self.scene_folder, self.rig_name)
-            probe = json.loads(next(rig.glob("**/probe.json")).read_bytes())
+            # A sequence's lie a folder deeper. The folders of the shards are too full to look into.
+            found = (path for depth in ("", "f*/") for path in rig.glob(f"{depth}probe.json"))
+            probe = json.loads(next(found).read_bytes())
             now = [list(self.rig.camera.resolution), self.render.get("samples", probe["samples"])]
             if probe["device"] == "CPU" and now == [probe["resolution"], probe["samples"]]:
                 return fmean(probe["view_seconds"]), fmean(probe["view_bytes"])
@@ -532,12 +541,14 @@ class Dataset:
         own = self.expected_view[1]
         own += passes.FLOW.bytes * COMPRESSED * self._pixels if self.flow else 0
         return own + sum(
-            math.prod((reprojection.camera or self.rig.camera).resolution)
-            * sizes[reprojection.format]
-            * (reprojection.bits / 8)
-            * len(self.lens_maps(name))
+            self._reprojected_pixels(name) * sizes[reprojection.format] * (reprojection.bits / 8)
             for name, reprojection in self.reprojections.items()
         )
+
+    def _reprojected_pixels(self, name: str) -> int:
+        """Pixels that one view is reprojected to; a cube map has six images of a view."""
+        camera = self.reprojections[name].camera or self.rig.camera
+        return math.prod(camera.resolution) * len(self.lens_maps(name))
 
     @property
     def missing_bytes(self) -> float:

@@ -26,9 +26,10 @@ import psutil
 
 from lightfield.core import memory
 from lightfield.core.files import append_json_line, read_json_lines
+from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 
 # Of all shards in a folder: 0-6.journal.jsonl is of the views from 0 to 5.
-JOURNALS = "[0-9]*-[0-9]*.journal.jsonl"
+JOURNALS = f"[0-9]*-[0-9]*{JOURNAL_SUFFIX}"
 
 # A machine that has failed so often, one time after the other, is avoided.
 MOST_FAILURES = 3

@@ -16,10 +16,9 @@ from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import append_json_line, read_json, read_json_lines, sha256, write_json
+from lightfield.dataset.shard_files import LOG_SUFFIX
 from lightfield.dataset.view_store import ViewStore
 from lightfield.imaging import images
-
-_LOG_SUFFIX = ".sums.jsonl"
 
 
 class ShardRecord:
@@ -45,11 +44,19 @@ class ShardRecord:
             return False
         name, sums = self._name(file), _sums(file)
         entry = (name, key, sums["sha256"])
-        # A view that was made when shards had other bounds is in another shard's log.
-        if entry not in self._logged_here and entry not in self._logged_elsewhere:
+        if entry not in self._logged_here and not self._is_logged_elsewhere(entry):
             return False
         self._finished[name] = sums
         return True
+
+    def _is_logged_elsewhere(self, entry: tuple[Any, Any, Any]) -> bool:
+        """Whether another shard made this file, when shards had other bounds.
+
+        A file that this shard made by other settings is not looked for: thousands of shards would
+        each read the logs of all.
+        """
+        name, _, digest = entry
+        return (name, digest) not in self._made_here and entry in self._logged_elsewhere
 
     def refuse_changed(self, file: Path, key: str) -> None:
         """Raise `UserError` for a file that was last logged for ``key``, but with other bytes."""
@@ -110,9 +117,14 @@ class ShardRecord:
         return _entries([log] if log.exists() else [])
 
     @cached_property
+    def _made_here(self) -> set[tuple[Any, Any]]:
+        """Name and SHA-256 of the files that this shard made, by whatever settings."""
+        return {(name, digest) for name, _, digest in self._logged_here}
+
+    @cached_property
     def _logged_elsewhere(self) -> set[tuple[Any, Any, Any]]:
         assert self._path
-        return _entries(self._path.parent.glob(f"*{_LOG_SUFFIX}"))
+        return _entries(self._path.parent.glob(f"*{LOG_SUFFIX}"))
 
 
 def read(record: Path) -> dict[str, tuple[int, str]]:
@@ -125,7 +137,7 @@ def read(record: Path) -> dict[str, tuple[int, str]]:
 
 
 def _log(record: Path) -> Path:
-    return record.with_name(record.stem + _LOG_SUFFIX)
+    return record.with_name(record.stem + LOG_SUFFIX)
 
 
 def _entries(logs: Iterable[Path]) -> set[tuple[Any, Any, Any]]:

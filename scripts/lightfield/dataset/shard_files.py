@@ -1,9 +1,13 @@
-"""Whether a shard's files are on disk as its record has them, by their sizes alone."""
+"""The files of a shard: what they are called, and whether they have the sizes of its record."""
 
 import json
 import os
 from pathlib import Path
 from stat import S_ISREG
+
+# Of a shard's files beside its record, which have its name: what its processes did, and the
+# checksum of each view from the moment it was finished.
+JOURNAL_SUFFIX, LOG_SUFFIX = ".journal.jsonl", ".sums.jsonl"
 
 
 def recorded(record: Path, folder: str) -> dict[str, int] | None:

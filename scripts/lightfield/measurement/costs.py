@@ -55,6 +55,7 @@ from lightfield.dataset import journal
 from lightfield.dataset.config import AtLeastOne
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, PASSES
+from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 from lightfield.measurement.sampling import DENOISING_SAMPLES, cost_in_samples, standard_error
 
 # The stages that every dataset has, in the order of the work; others come between.
@@ -245,7 +246,7 @@ def costs(
     ``denoise`` of the full dataset, null for those of this one.
     """
     by_shard = {
-        path.name.removesuffix(".journal.jsonl"): journal.read(path)
+        path.name.removesuffix(JOURNAL_SUFFIX): journal.read(path)
         for path in sorted(journals.glob(journal.JOURNALS))
     }
     runs = [run for part in by_shard.values() for run in part]

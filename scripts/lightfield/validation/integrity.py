@@ -25,12 +25,12 @@ from lightfield.core.files import (
 from lightfield.dataset import ledger, records
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
+from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
 from lightfield.dataset.splits import SPLITS
 from lightfield.validation.files import CARD, IMAGES, README, REPORT, SUMS, read_sums
 
 # Made as the work went on, and of it alone: nothing can make them again, and no dataset needs them.
-_HISTORY = (".journal.jsonl", ".tsv")
-_LOG = ".sums.jsonl"
+_HISTORY = (JOURNAL_SUFFIX, ".tsv")
 
 
 @dataclass(frozen=True)
@@ -104,8 +104,8 @@ class Integrity:
 
     def _followers(self, path: Path) -> Iterator[Path]:
         """Yield the file by which the job is known that has made a file, where that is another."""
-        if path.name.endswith(_LOG):
-            yield path.with_name(path.name.replace(_LOG, ".json"))
+        if path.name.endswith(LOG_SUFFIX):
+            yield path.with_name(path.name.replace(LOG_SUFFIX, ".json"))
         is_listed = path in self._published or not self._published
         if is_listed and path not in self._recorded and not self._is_noted(path):
             # An export's file.
@@ -140,7 +140,7 @@ class Integrity:
         for path in map(Path, self._ledger):
             if not (self._is_own(path) and re.fullmatch(r"\d+-\d+\.json", path.name)):
                 continue
-            log = path.with_name(f"{path.stem}{_LOG}")
+            log = path.with_name(f"{path.stem}{LOG_SUFFIX}")
             if self._is_sound(path):
                 sums = {file: digest for file, (_, digest) in records.read(path).items()}
             elif self._is_sound(log):
