@@ -7,7 +7,12 @@ FOLDER = Path(workflow.current_basedir)
 sys.path.insert(0, str(FOLDER / "scripts"))
 
 from lightfield.core.errors import UserError
+from lightfield.core.room import obstacle
 from lightfield.dataset.config import as_written, read_config
+
+# Where Snakemake can note nothing, it ends with a traceback.
+if cause := obstacle(Path(".snakemake")):
+    sys.exit(f"error: .snakemake: cannot be written: {cause}")
 
 # What the command line says, or the workflow whose module this is; config.yaml fills in the rest.
 GIVEN = set(config)
@@ -70,8 +75,7 @@ include: "rules/learn.smk"
 
 onstart:
     try:
-        check_device()
-        check_room()
+        check_start()
         if STORE:
             ViewStore(STORE).check()
         keep_shards()

@@ -57,6 +57,8 @@ OWN_PYTHON = (
 # signal that ended its program.
 shell.prefix(
     f"set -euo pipefail; export {VARIABLE}={shlex.quote(STORE)};{OWN_PYTHON}"
+    # A signal that ends the whole group shall not end the shell first.
+    " trap : TERM;"
     ' python() {{ command python "$@" || {{ local status=$?; if ((status > 128)); then'
     ' echo "error: killed by SIG$(kill -l $status)" >&2; fi; return $status; }}; }}; '
 )
@@ -135,6 +137,9 @@ RENDER = rule_name("render")
 RENDER_PANORAMA = rule_name("render_panorama")
 CALIBRATE = rule_name("calibrate")
 CHECK_GPU = rule_name("check_gpu")
+CHECK_BLEND = rule_name("check_blend")
+INVENTORY = rule_name("inventory")
+IMPORT_VIEWS = rule_name("import_views")
 
 
 def log_of(job):

@@ -158,6 +158,7 @@ def print_forecast():
     if not is_planned_dry_run():
         return
     announce_damage()
+    announce_refusals()
     works = {}
     for job in needed_jobs():
         views, seconds = rendering(job)

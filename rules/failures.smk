@@ -1,6 +1,4 @@
 # Why jobs failed, for the end of a run.
-
-
 # What the executor said of a job or group that failed.
 SAID = {}
 
@@ -8,6 +6,12 @@ SAID = {}
 def note_failures():
     """Note what the executor says of jobs that fail, such as that they were refused."""
     hear_executor(SAID.__setitem__)
+
+
+def full_cause(log):
+    """Return why a job failed by its log, or by the disk that took no more of the log."""
+    why = cause(log)
+    return why if why and why.startswith("error: ") else obstacle(log) or why
 
 
 def failed_jobs(failed):
@@ -31,12 +35,16 @@ def failed_jobs(failed):
         for _, log in logs if STORE else ():
             name = os.path.relpath(log, stored(WORK))
             ViewStore(STORE).bring(f"{WORK}/{name}")
-        spoke = [(name, cause(log), log) for name, log in logs if is_newer(log, start)]
+        spoke = [
+            (name, full_cause(log), log) for name, log in logs if is_newer(log, start)
+        ]
         spoke = [(name, why, log) for name, why, log in spoke if why]
         if logs and not spoke:
             name, log = min(logs)
             batch = batch_log(one.name, start)
             why = batch and cause(batch) or first_sentence(SAID.get(one) or "")
-            spoke = [(name, why or "it said nothing", batch or log)]
+            # Where no log can be written, nothing can be said in one.
+            why = why or obstacle(log) or "it said nothing"
+            spoke = [(name, why, batch or log)]
         found += spoke
     return sorted(found)

@@ -202,7 +202,11 @@ class JobNotes(logging.Handler):
     def emit(self, record):
         if getattr(record, "event", None) is not LogEvent.JOB_STARTED:
             return
-        self.note_finished({*self.inputs, *self.grouped})
+        try:
+            self.note_finished({*self.inputs, *self.grouped})
+        except UserError as error:
+            # What is not noted is made again.
+            print(f"warning: {error}", file=sys.stderr)
         for number in record.jobs:
             if number in self.unfinished:
                 self.inputs[number] = read_stamps(self.unfinished[number])
@@ -270,6 +274,9 @@ def begin_notes():
 def end_notes():
     """Note the jobs that have finished last."""
     for notes in NOTES:
-        notes.note_finished([*notes.unfinished])
-        if STORE and Path(LEDGER).exists():
-            notes.send()
+        try:
+            notes.note_finished([*notes.unfinished])
+            if STORE and Path(LEDGER).exists():
+                notes.send()
+        except UserError as error:
+            print(f"warning: {error}", file=sys.stderr)

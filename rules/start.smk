@@ -1,4 +1,12 @@
 # What is checked, noted and cleared before the first job.
+import functools
+import resource
+
+from lightfield.dataset.config import expected_blend
+from lightfield.dataset.dataset import check_external_files, check_imported
+
+# Bytes of a process in which bpy can be imported; with less it crashes, or no thread starts.
+LEAST_ADDRESS_SPACE = 1.5e9
 
 
 def check_device():
@@ -19,22 +27,86 @@ def check_device():
             raise UserError(problem.removeprefix("error: "))
 
 
+def check_memory():
+    """Refuse a limit with which Blender cannot even start; raises `UserError`."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if RUNS_HERE and 0 <= limit < LEAST_ADDRESS_SPACE:
+        raise UserError(
+            f"memory: a process may have {room.gigabytes(limit)} here, and Blender needs at least "
+            f"{room.gigabytes(LEAST_ADDRESS_SPACE)}: raise the limit (ulimit -v unlimited)"
+        )
+
+
 def check_room():
     """Compare the room on the disks with what this run writes, and warn; raises `UserError`."""
-    jobs = [job for job in needed_jobs() if job.rule.name == RENDER]
-    datasets = {d.folder: d for d in (dataset_of(job.wildcards) for job in jobs)}
-    needs = [(Path(RESULTS), d.missing_bytes) for d in datasets.values()]
+    jobs = [job for job in needed_jobs() if job.output]
+    renders = [job for job in jobs if job.rule.name == RENDER]
+    datasets = {d.folder: d for d in (dataset_of(job.wildcards) for job in renders)}
+    needs = [
+        room.Need(Path(RESULTS), d.missing_bytes, d.missing_views)
+        for d in datasets.values()
+    ]
     # A built scene, at most.
-    needs += [(Path(WORK), 1e8) for _ in {d.scene_name for d in datasets.values()}]
-    if jobs and RUNS_HERE:
+    needs += [
+        room.Need(Path(WORK), 1e8) for _ in {d.scene_name for d in datasets.values()}
+    ]
+    for folder in (RESULTS, WORK):
+        outputs = [unstored(file) for job in jobs for file in job.output]
+        files = sum(Path(output).is_relative_to(folder) for output in outputs)
+        if files:
+            needs.append(room.Need(Path(folder), 0, files))
+    if jobs:
+        # A log each.
+        needs.append(room.Need(Path(WORK), 0, len(jobs)))
+    if renders and RUNS_HERE:
         # What renders at once writes each its view as Cycles has it: in memory if there is room.
         pixels = max(math.prod(d.rig.camera.resolution) for d in datasets.values())
-        at_once = min(len(jobs), max(1, workflow.cores // jobs[0].threads))
+        at_once = min(len(renders), max(1, workflow.cores // renders[0].threads))
         size = at_once * pixels * memory.PASSES_PIXEL_BYTES
         if not room.fast_folder(size):
-            needs.append((Path(tempfile.gettempdir()), size))
+            needs.append(room.Need(Path(tempfile.gettempdir()), size))
     for warning in room.check(needs):
         print(f"warning: {warning}", file=sys.stderr)
+
+
+def explain_full_disk():
+    """Say that Snakemake can note nothing: it may have ended with words of its own for that."""
+    if problem := obstacle(Path(".snakemake")):
+        print(f"error: .snakemake: cannot be written: {problem}", file=sys.stderr)
+
+
+def check_start():
+    """Refuse what cannot work before the first job; raises `UserError`."""
+    atexit.register(explain_full_disk)
+    check_device()
+    check_memory()
+    check_room()
+
+
+def check_input(job):
+    """Refuse the user's own files that a job would refuse; raises `UserError`."""
+    if job.rule.name == CHECK_BLEND and not SETTINGS.accept_blend:
+        blend = Path(scene_of(job.wildcards).source.blend)
+        if blend.is_file():
+            expected_blend(job.wildcards.name, blend, sha256(blend))
+    elif job.rule.name == INVENTORY:
+        check_external_files(scene_of(job.wildcards))
+    elif job.rule.name == IMPORT_VIEWS:
+        check_imported(dataset_of(job.wildcards))
+
+
+def announce_refusals():
+    """Say in a dry run what the run would refuse."""
+    checks = [check_device, check_memory, check_room]
+    checks += [functools.partial(check_input, job) for job in needed_jobs()]
+    problems = {}
+    for check in checks:
+        try:
+            check()
+        except UserError as error:
+            problems[str(error)] = None
+    for problem in problems:
+        print(f"would be refused: {problem}", file=sys.stderr)
 
 
 def keep_shards():

@@ -27,19 +27,8 @@ def main() -> None:
         raise UserError(f"--scene {arguments.scene}: is made of no .blend")
     status = arguments.blend.stat()
     found = sha256(arguments.blend)
-    expected, origin = config.blend_sha256(arguments.scene, source)
-    if expected is None:
-        config.record_blend(arguments.blend, found, origin)
-    elif found != expected:
-        remedy = (
-            "write the new one there"
-            if origin.suffix == ".yaml"
-            else "snakemake with --config accept_blend=true takes it as it is now"
-        )
-        raise UserError(
-            f"{arguments.blend}: its sha256 is {found}, but {origin} says {expected}; if it was "
-            f"edited on purpose, {remedy}"
-        )
+    if lock := config.expected_blend(arguments.scene, arguments.blend, found):
+        config.record_blend(arguments.blend, found, lock)
     write_json(
         arguments.output,
         {

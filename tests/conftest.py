@@ -57,6 +57,23 @@ def run_program():
     return run
 
 
+def mount_disk(folder, options):
+    """Mount a small file system at a folder; return False where that is not allowed."""
+    words = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", folder]
+    return subprocess.run(words, capture_output=True, check=False).returncode == 0
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A small file system of its own where that may be mounted, else a plain folder."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mounted = mount_disk(folder, "size=1m")
+    yield folder, mounted
+    if mounted:
+        subprocess.run(["umount", folder], check=True)
+
+
 @pytest.fixture
 def nobody():
     """A folder of its own for a test that has not the rights of root."""

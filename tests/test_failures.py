@@ -310,6 +310,49 @@ def test_a_signal_is_named_with_what_to_lower(failing, signal, advice):
 
 
 @pytest.mark.slow
+def test_a_signal_to_a_job_and_its_shell_is_named(failing):
+    """As `timeout`, a CI and a batch system send it: to each process of a run."""
+    program = failing.folder / "scripts/render_shard.py"
+    program.write_text(
+        "import os, signal\n"
+        "for process in (os.getppid(), os.getpid()): os.kill(process, signal.SIGTERM)\n"
+    )
+    try:
+        *_, why, _ = failing.fail("render").splitlines()
+    finally:
+        program.write_text(FAILING)
+    assert why.startswith("render failed: error: killed by SIGTERM: it was cancelled")
+
+
+@pytest.mark.slow
+def test_a_job_whose_log_takes_nothing_more_is_explained_by_its_disk(failing, small_disk):
+    disk, mounted = small_disk
+    logs = failing.folder / "work/logs"
+    shutil.rmtree(logs, ignore_errors=True)
+    logs.symlink_to(disk)
+    program = failing.folder / "scripts/render_shard.py"
+    # It fills the disk, and cannot say why it fails.
+    program.write_text(f"""
+import errno, sys
+with open({str(disk / "filler")!r}, "wb", buffering=0) as file:
+    size = 2**16
+    while size and {mounted}:
+        try:
+            file.write(bytes(size))
+        except OSError:
+            size //= 2
+sys.exit({"'error: no log has it'" if mounted else "1"})
+""")
+    try:
+        *_, why, _ = failing.fail("render").splitlines()
+    finally:
+        program.write_text(FAILING)
+        logs.unlink()
+    assert why.startswith("render failed: ")
+    assert why.endswith("is full: make room" if mounted else "it said nothing"), why
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rule", "config", "said"),
     [

@@ -3,7 +3,6 @@
 import os
 import re
 import resource
-import subprocess
 from contextlib import contextmanager, nullcontext
 
 import numpy as np
@@ -20,7 +19,6 @@ from lightfield.report import page
 from lightfield.reprojection import lens_map
 
 BLOCK = os.sysconf("SC_PAGE_SIZE")
-DISK_BLOCKS = 256
 FISHEYE = Equidistant(width=24, height=24, fov=3.0)
 
 
@@ -105,19 +103,6 @@ def largest_file(size):
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-
-@pytest.fixture
-def small_disk(tmp_path):
-    """A small file system of its own where that may be mounted, else a plain folder."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    size = f"size={DISK_BLOCKS * BLOCK}"
-    mount = ["mount", "-t", "tmpfs", "-o", size, "tmpfs", folder]
-    mounted = subprocess.run(mount, capture_output=True, check=False).returncode == 0
-    yield folder, mounted
-    if mounted:
-        subprocess.run(["umount", folder], check=True)
 
 
 @contextmanager

@@ -7,12 +7,14 @@ import subprocess
 import sys
 import time
 from collections import namedtuple
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from checkouts import checkout, snakemake
-from conftest import SCRIPTS
+from conftest import SCRIPTS, mount_disk
+from sphere import write_views
 
 from lightfield.core import files, leftovers, room
 from lightfield.core.errors import UserError
@@ -27,6 +29,16 @@ rigs:
     type: plane
     cameras: [1000, 1000]
     camera: {lens: rectilinear, fov: 60, resolution: [16384, 16384]}
+"""
+
+ONE = """
+scene: {builder: room}
+render: {samples: 1}
+rigs:
+  LFPlane:
+    type: plane
+    cameras: [2, 1]
+    camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
 """
 
 KEEPER = """
@@ -112,6 +124,102 @@ def test_a_run_that_cannot_fit_ends_before_its_first_job(tmp_path):
     # The plan writes the settings of its jobs, and nothing else.
     written = [path for path in (folder / "work").rglob("*") if path.is_file()]
     assert all("settings" in path.parts for path in written)
+
+
+@pytest.mark.parametrize(
+    ("options", "causes"),
+    [
+        ("ro", ["the disk of ", "is read-only: mount its disk for writing"]),
+        ("size=1m,nr_inodes=8", ["its inodes are used up): remove some files"]),
+        ("size=64k", ["GB are free on its disk, and this run writes some", "is full: make room"]),
+    ],
+)
+@pytest.mark.parametrize("name", ["work", "results"])
+@pytest.mark.slow
+def test_a_disk_that_takes_nothing_ends_a_run_with_one_line(name, options, causes, tmp_path):
+    folder = checkout(tmp_path, one=ONE)
+    disk = folder / name
+    disk.mkdir()
+    mounted = mount_disk(disk, options)
+    if not mounted:
+        # Without the right to mount, nobody may write there.
+        disk.chmod(0o500)
+        causes = ["you may not write in"]
+    try:
+        result = snakemake(folder, "--config", "scenes=one", "rigs=all", "preset=full")
+    finally:
+        if mounted:
+            subprocess.run(["umount", disk], check=True)
+    said = result.stderr.splitlines()
+    assert result.returncode != 0
+    assert "Traceback" not in result.stderr
+    assert said[-1].startswith(f"error: {name}"), said[-1]
+    assert any(cause in said[-1] for cause in causes), said[-1]
+
+
+@pytest.mark.slow
+def test_a_full_disk_below_snakemake_itself_is_one_line(tmp_path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if not mount_disk(disk, "size=40m"):
+        pytest.skip("needs the right to mount a file system")
+    try:
+        folder = checkout(disk / "checkout", one=ONE)
+        with (folder / "filler").open("wb", buffering=0) as file, suppress(OSError):
+            while file.write(bytes(4096)):
+                pass
+        result = snakemake(folder, "--config", "scenes=one", "rigs=all", "preset=full")
+    finally:
+        subprocess.run(["umount", disk], check=True)
+    assert result.stderr.splitlines()[-1].startswith("error: .snakemake: cannot be written: the d")
+    assert "Traceback" not in result.stderr
+
+
+@pytest.mark.slow
+def test_a_limit_of_memory_in_which_blender_cannot_start_is_one_line(tmp_path):
+    folder = checkout(tmp_path, one=ONE)
+    words = [Path(sys.executable).with_name("snakemake"), "--cores", "1", "--config", "scenes=one"]
+    result = subprocess.run(
+        ["bash", "-c", 'ulimit -v 600000; exec "$@"', "bash", *words, "rigs=all", "preset=full"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    said = "error: memory: a process may have 0.61 GB here, and Blender needs at least 1.50 GB: "
+    assert result.stderr.splitlines()[-1].startswith(said)
+    assert "Traceback" not in result.stderr
+
+
+@pytest.mark.slow
+def test_a_dry_run_names_all_that_the_run_would_refuse(tmp_path):
+    folder = checkout(
+        tmp_path,
+        huge=HUGE,
+        other=ONE.replace("builder: room", f"blend: other.blend, sha256: '{'0' * 64}'"),
+        textured=ONE.replace("builder: room", "blend: textured.blend"),
+        theirs="scene: {dataset: theirs}",
+    )
+    for name in ("other", "textured"):
+        (folder / f"{name}.blend").write_bytes(b"a scene")
+    inventory = folder / "work/textured/inventory.json"
+    gone = {"path": "textures/gone.png", "bytes": 7, "mtime_ns": 7}
+    files.write_json(inventory, {"external_files": [gone]})
+    camera = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
+    write_views(folder / "theirs/dataset", camera, {"type": "plane", "cameras": [2, 1]})
+    missing = next((folder / "theirs/dataset/exr").iterdir())
+    missing.unlink()
+    scenes = "scenes=[huge,other,textured,theirs]"
+    words = ("--dry-run", "--config", scenes, "rigs=all", "preset=full")
+    result = snakemake(folder, *words)
+    refused = [line for line in result.stderr.splitlines() if line.startswith("would be refused")]
+    assert result.returncode == 0, result.stderr
+    assert len(refused) == 4, refused
+    told = "\n".join(refused)
+    assert re.search(r": results: .* GB are free on its disk, and this run writes some", told)
+    assert f": other.blend: its sha256 is {files.sha256(folder / 'other.blend')}, but" in told
+    assert ": textured.blend: files that it shows are missing: textures/gone.png; put them" in told
+    assert f"theirs/dataset/exr: {missing.name}: no such file" in told
 
 
 def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path, monkeypatch):

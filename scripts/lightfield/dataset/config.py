@@ -802,6 +802,25 @@ def blend_sha256(scene: str, source: Source) -> tuple[str | None, Path]:
         ) from None
 
 
+def expected_blend(scene: str, blend: Path, digest: str) -> Path | None:
+    """Check that a .blend has the SHA-256 that is meant.
+
+    Returns None, or the lock file that shall say so where no one knows it yet. Raises `UserError`.
+    """
+    expected, origin = blend_sha256(scene, load_scene(scene).scene)
+    if expected in (None, digest):
+        return origin if expected is None else None
+    remedy = (
+        "write the new one there"
+        if origin.suffix == ".yaml"
+        else "snakemake with --config accept_blend=true takes it as it is now"
+    )
+    raise UserError(
+        f"{blend}: its sha256 is {digest}, but {origin} says {expected}; if it was edited on "
+        f"purpose, {remedy}"
+    )
+
+
 def accept_blend(scene: str) -> None:
     """Record a scene's .blend as it is now as the one that is meant.
 

@@ -553,8 +553,13 @@ class Dataset:
     @property
     def missing_bytes(self) -> float:
         """Estimate of what the views take that are not there yet, and what is made of them."""
+        return self.missing_views * self.expected_view_bytes
+
+    @property
+    def missing_views(self) -> int:
+        """How many views are not there yet."""
         there = sum(entry.name.endswith(".exr") for entry in _entries(self.folder, "exr"))
-        return max(0, self.view_count - there) * self.expected_view_bytes
+        return max(0, self.view_count - there)
 
     def memory_bytes(self, pixels: int) -> int:
         """Estimate of what a process takes that renders views of so many pixels.
@@ -780,6 +785,48 @@ def check_presence(dataset: Dataset) -> None:
         raise UserError(
             f"{config.OWN_SCENES}/{dataset.scene_name}.yaml: scene.blend: "
             f"there is no file {source.blend}; {page}put it there"
+        )
+
+
+def check_external_files(dataset: Dataset) -> None:
+    """Check that the files are there which the user's .blend read when it was last listed.
+
+    Raises `UserError`. Of a .blend that was never listed nothing is known.
+    """
+    source = dataset.source
+    if not source.blend or source.allow_missing:
+        return
+    try:
+        listed = json.loads(Path(str(dataset.inventory)).read_bytes())["external_files"]
+        home = Path(source.blend).parent
+        paths = [Path(os.path.normpath(home / file["path"])) for file in listed]
+    except (OSError, ValueError, LookupError, TypeError):
+        return
+    missing = [str(path) for path in paths if not path.exists()]
+    if missing:
+        more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
+        raise UserError(
+            f"{source.blend}: files that it shows are missing: {', '.join(missing[:8])}{more}; put "
+            "them back, or render without them: scene: {allow_missing: true}"
+        )
+
+
+def check_imported(dataset: Dataset) -> None:
+    """Check that the views of a dataset to import are where its lightfield.json is.
+
+    Raises `UserError`.
+    """
+    folder = Path(str(dataset.imported), "exr")
+    missing = [
+        f"{pose.name}.exr"
+        for pose in dataset.rig.poses()
+        if not (folder / f"{pose.name}.exr").is_file()
+    ]
+    if missing:
+        more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
+        raise UserError(
+            f"{folder}: {', '.join(missing[:8])}{more}: no such file, but the dataset's "
+            "lightfield.json has the view"
         )
 
 
