@@ -176,7 +176,7 @@ def transparent(tmp_path):
 
 
 def compared(source, path, background):
-    """Return the errors of a render before a background, and what is wrong with its own."""
+    """Return the errors of a render over a background, and what is wrong with its own."""
     view = next(view for view in source.lightfield.views if path.stem.endswith(view.name))
     shown = evaluation.rendered(path, source, background)
     true = evaluation.truth(source, view, path, background)
@@ -186,14 +186,14 @@ def compared(source, path, background):
 
 
 def on(background, alpha):
-    """The wall's sRGB colour, 0 to 255, before a background in sRGB, 0 to 1, as trainers blend."""
+    """The wall's sRGB colour, 0 to 255, over a background in sRGB, 0 to 1, as trainers blend."""
     wall = 0.5371  # 0.25 of light, by IEC 61966-2-1
     alpha = alpha[..., None].astype(np.float64)
     return np.rint(255 * (alpha * wall + (1 - alpha) * background)).astype(np.uint8)
 
 
 @pytest.mark.parametrize("background", [BLACK, WHITE, np.array([1, 0.5, 0])])
-def test_renders_without_alpha_are_compared_before_their_background(
+def test_renders_without_alpha_are_compared_over_their_background(
     transparent, tmp_path, background
 ):
     alpha = images.read_image(transparent.path(transparent.lightfield.views[1])).channels["A"]
@@ -209,7 +209,7 @@ def test_renders_without_alpha_are_compared_before_their_background(
     assert f"has no alpha, and is {code} where the truth is transparent" in problem
 
 
-def test_linear_renders_are_before_their_background_as_light_is(transparent, tmp_path):
+def test_linear_renders_are_composited_as_light(transparent, tmp_path):
     alpha = images.read_image(transparent.path(transparent.lightfield.views[1])).channels["A"]
     path = tmp_path / "view_0001f.exr"
     images.write_exr(path, dict.fromkeys("RGB", (np.float32(0.25) * alpha + 1 - alpha)))
@@ -219,7 +219,9 @@ def test_linear_renders_are_before_their_background_as_light_is(transparent, tmp
 
 
 @pytest.mark.parametrize("background", [BLACK, WHITE])
-def test_renders_with_alpha_are_put_before_the_background_too(transparent, tmp_path, background):
+def test_renders_with_alpha_are_composited_over_the_background_too(
+    transparent, tmp_path, background
+):
     view = transparent.lightfield.views[1]
     for path in (tmp_path / f"{view.name}.png", transparent.path(view)):
         if path.suffix == ".png":
@@ -254,7 +256,7 @@ def test_white_renders_are_warned_of_until_their_background_is_given(
     words = [tmp_path / "renders", "--dataset", transparent.dataset, "--output", tmp_path / "page"]
     result = run_program("evaluate.py", *words)
     assert f"spiral_{TESTS[0]}.png: has no alpha, and is #ffffff where" in result.stderr
-    assert "give --background" in result.stderr
+    assert "--background" in result.stderr
     assert "(and 1 more of 2)" in result.stderr
     assert "#ffffff" in (tmp_path / "page" / "index.html").read_text()
     result = run_program("evaluate.py", *words, "--background", "white")

@@ -75,8 +75,9 @@ def model(source: Source, count: int) -> "Model":
     """
     points = lift(source, count=count)
     seen = observations(source, points)
-    views = zip(source.lightfield.views, seen, strict=True)
-    missing_points = lift_one_each(source, [view for view, own in views if not len(own.indices)])
+    views = source.lightfield.views
+    blind_views = [view for view, o in zip(views, seen, strict=True) if not len(o.indices)]
+    missing_points = lift_one_each(source, blind_views)
     if len(missing_points.positions):
         points = joined([points, missing_points])
         seen = observations(source, points)

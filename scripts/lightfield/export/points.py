@@ -62,12 +62,12 @@ def lift(source: Source, count: int | None = None, voxel: float | None = None) -
 
 def lift_one_each(source: Source, views: Sequence[View]) -> Points:
     """Lift one point from each of the ``views`` whose depth is finite anywhere in the frame."""
-    found = [Points(np.empty((0, 3)), np.empty((0, 3), np.uint8), np.empty((0, 3)))]
+    parts = [Points(np.empty((0, 3)), np.empty((0, 3), np.uint8), np.empty((0, 3)))]
     for view, surface in source.surfaces(views):
         points = _points_of(source, view, surface, step=1)
         middle = len(points.positions) // 2
-        found.append(points.chosen(np.s_[middle : middle + 1]))
-    return joined(found)
+        parts.append(points.chosen(np.s_[middle : middle + 1]))
+    return joined(parts)
 
 
 def _points_of(source: Source, view: View, surface: Surface, step: int) -> Points:

@@ -3,8 +3,8 @@
 A render is ``<view>.png``, sRGB, or ``<view>.exr``, linear, whose channel Z is depth as the
 dataset's; normals are ``normal/<view>.exr``, as the dataset's pass of that name. Each may have the
 rig's name before the view's, as exports of several rigs have: ``spiral_view_0000f.png``. What is
-compared is the developed picture; one with alpha is put before a background. LPIPS is not among
-the metrics: no package of this environment holds the weights of its network.
+compared is the developed picture, and one with alpha is composited over a background. LPIPS is not
+among the metrics: no package of this environment holds the weights of its network.
 """
 
 import math
@@ -40,7 +40,7 @@ ALPHA_PART = 0.01
 class Pictures:
     """What one view is compared by: sRGB-encoded colour (h, w, 3), depth (h, w), normals.
 
-    The colour is before the background; ``alpha`` (h, w) is how much of a pixel is not background.
+    The colour is composited over the background; ``alpha`` (h, w) is how much of a pixel covers it.
     """
 
     colour: Floats
@@ -94,7 +94,7 @@ def mask(path: Path, source: Source) -> Bools:
 
 
 def truth(source: Source, view: View, like: Path, background: Floats) -> Pictures:
-    """Return a dataset's own view before a background (3,) in sRGB, 0 to 1.
+    """Return a dataset's own view over a background (3,) in sRGB, 0 to 1.
 
     It is as coarse as a PNG if what it is compared with is ``like``.
     """
@@ -104,6 +104,7 @@ def truth(source: Source, view: View, like: Path, background: Floats) -> Picture
         colour = _on_background(source.colour(view) / 255, alpha, background, 255)
     else:
         image = images.read_image(source.path(view))
+        check_size(source.path(view), source.lightfield, image.channels["R"])
         # Of views that are not transparent it says where another lens saw nothing.
         alpha = _alpha(image) if transparent else None
         colour = _developed(image, alpha, source, background)
@@ -117,7 +118,7 @@ def truth(source: Source, view: View, like: Path, background: Floats) -> Picture
 
 
 def rendered(path: Path, source: Source, background: Floats) -> Pictures:
-    """Return somebody's view before a background (3,) in sRGB, 0 to 1.
+    """Return somebody's view over a background (3,) in sRGB, 0 to 1.
 
     Raises `UserError` where it has no colour, or another size than the dataset's.
     """
@@ -137,13 +138,14 @@ def _alpha(image: images.Image) -> Floats | None:
     alpha = image.channels.get("A")
     if alpha is None:
         return None
-    return alpha / (np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1.0)
+    largest = np.iinfo(alpha.dtype).max if alpha.dtype.kind == "u" else 1
+    return alpha.astype(np.float64) / largest
 
 
 def _developed(
     image: images.Image, alpha: Floats | None, source: Source, background: Floats
 ) -> Floats:
-    """Return a picture's sRGB colour (h, w, 3) before a background.
+    """Return a picture's sRGB colour (h, w, 3) over a background.
 
     An EXR's colour is multiplied by alpha, and the background is added as light. A PNG's is not,
     and sRGB values are blended, as trainers blend those of RGBA pictures.
@@ -183,11 +185,11 @@ def background_problem(
         if np.abs(colour - background).max() <= ALPHA_STEP:
             return None
         return (
-            f"has no alpha, and is {hexadecimal(colour)} where the truth is transparent; "
-            f"give --background, which is {hexadecimal(background)}"
+            f"has no alpha, and is {hexadecimal(colour)} where the truth is transparent, instead "
+            f"of {hexadecimal(background)}; give its background by --background"
         )
-    alphas = [np.ones(counted.shape) if one.alpha is None else one.alpha for one in (shown, true)]
-    part = float((np.abs(alphas[0] - alphas[1])[counted] > ALPHA_STEP).mean())
+    true_alpha = np.ones(counted.shape) if true.alpha is None else true.alpha
+    part = float((np.abs(shown.alpha - true_alpha)[counted] > ALPHA_STEP).mean())
     if part <= ALPHA_PART:
         return None
     return f"has another alpha than the truth in {part:.0%} of its pixels"

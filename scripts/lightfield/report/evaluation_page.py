@@ -31,7 +31,7 @@ def write(
 ) -> dict[str, Any]:
     """Write the table, the page and the pictures of the views to test with; return all's means.
 
-    What has alpha is compared before a ``background`` (3,) in sRGB, 0 to 1. Warns of renders whose
+    What has alpha is composited over ``background`` (3,) in sRGB, 0 to 1. Warns of renders whose
     alpha or background is another than the truth's. Raises `UserError` for one that the folder
     ``renders`` lacks, or that cannot be compared.
     """
