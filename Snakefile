@@ -45,11 +45,14 @@ for written in (read_config(FOLDER / "config.yaml"), OWN):
 report: "captions/workflow.rst"
 
 
-# For --software-deployment-method apptainer: each job runs in the image of envs/plenoforge.def.
-container: f"{FOLDER}/envs/plenoforge.sif"
-
-
 include: "rules/internals.smk"
+
+
+# For --software-deployment-method apptainer: each job runs in the image of envs/plenoforge.def.
+# Snakemake refuses a path with blanks also where it uses no container.
+container: f"{FOLDER}/envs/plenoforge.sif" if USES_CONTAINERS else "plenoforge.sif"
+
+
 include: "rules/common.smk"
 include: "rules/storage.smk"
 include: "rules/ledger.smk"
