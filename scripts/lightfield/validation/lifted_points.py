@@ -71,5 +71,6 @@ def on_pixel_rays(points: NDArray[Any], lens: Lens, matrices: Floats) -> NDArray
 
 def resolved(points: NDArray[Any]) -> Floats:
     """Return by how many metres (n,) the numbers of points (n, 3) may be off."""
-    limit: Floats = FLOAT32 * (1 + np.abs(points.astype(np.float64)).max(axis=1, initial=0))
+    with np.errstate(invalid="ignore"):
+        limit: Floats = FLOAT32 * (1 + np.abs(points.astype(np.float64)).max(axis=1, initial=0))
     return limit
