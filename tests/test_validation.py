@@ -272,6 +272,49 @@ def test_right_dataset_is_valid_with_margin(case: str, tmp_path: Path) -> None:
             assert abs(figures[f"{what}_scale_error"]) < geometry.SCALE_LIMIT / 2
 
 
+def two_views_of_a_ball(folder: Path, fov: float, angle: float, recorded_fov: float) -> Result:
+    """Validate two views of 64², 4 m from a ball of 1 m, their axes at ``angle`` degrees."""
+    angle = math.radians(angle)
+    places = [[0, -4, 0], [4 * math.sin(angle), -4 * math.cos(angle), 0]]
+    rig = {"type": "path", "count": 2, "keys": [{"position": place} for place in places]}
+    camera = {"lens": "rectilinear", "fov": fov, "resolution": [64, 64]}
+    seen = LightField.from_rig({**rig, "look_at": [0, 0, 0]}, lenses.from_camera(camera), depth="z")
+    for view in seen.views:
+        rays = seen.lens.pixel_rays()
+        half = rays @ view.matrix[:3, :3].T @ view.matrix[:3, 3]
+        with np.errstate(invalid="ignore"):
+            distance = -half - np.sqrt(half**2 - 15)
+        z = np.where(np.isnan(distance), np.inf, distance * -rays[..., 2]).astype(np.float32)
+        light = np.where(np.isinf(z), 0.1, z / 8).astype(np.float16)
+        images.write_exr(
+            folder / "exr" / f"{view.name}.exr",
+            {**dict.fromkeys("RGB", light), "Z": z},
+            {images.NAN_ATTRIBUTE: 0, images.CLAMPED_ATTRIBUTE: 0, images.DEPTH_ATTRIBUTE: "z"},
+        )
+    recorded = lenses.from_camera({**camera, "fov": recorded_fov})
+    seen.changed(lens=recorded, views=seen.views, depth="z").write(folder / NAME)
+    return validate(folder)
+
+
+@pytest.mark.parametrize(("fov", "angle"), [(50, 40), (35, 60), (35, 20)])
+def test_two_small_views_of_a_ball_are_not_called_scaled(
+    fov: float, angle: float, tmp_path: Path
+) -> None:
+    result = two_views_of_a_ball(tmp_path, fov, angle, fov)
+    assert failed(result) == []
+    figures = check(result, "geometry").figures
+    assert figures["agree"] == 1
+    assert abs(figures["angle_scale_error"]) < geometry.SCALE_LIMIT / 5
+    assert abs(figures["depth_scale_error"]) < geometry.SCALE_LIMIT / 5
+
+
+@pytest.mark.parametrize("recorded_fov", [34.6, 35.5])
+def test_two_small_views_of_a_ball_through_another_lens_fail(
+    recorded_fov: float, tmp_path: Path
+) -> None:
+    assert not check(two_views_of_a_ball(tmp_path, 35, 20, recorded_fov), "geometry").passed
+
+
 # ---- wrong geometry fails -------------------------------------------------------------------
 
 Spoil = Callable[[Path], None]

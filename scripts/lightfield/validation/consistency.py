@@ -99,7 +99,9 @@ class Patches:
     points (n, 3): the centres; normals (n, 3): unit, towards the camera; spread (n,): standard
     deviation of the nine points from their plane; footprint (n,): the width of a pixel, or of the
     grain if that is coarser, at that distance, across the ray; error (n,): how far the plane may
-    lie off the surface by the grain and by what the file's number format resolves.
+    lie off the surface by the grain and by what the file's number format resolves; curvature
+    (n, 3): second derivatives of the surface's height above the plane, per pixel squared: along
+    columns, along rows, and mixed.
     """
 
     points: Array
@@ -107,12 +109,24 @@ class Patches:
     spread: Array
     footprint: Array
     error: Array
+    curvature: Array
 
     def __len__(self) -> int:
         return len(self.points)
 
     def __getitem__(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> "Patches":
         return Patches(*(getattr(self, each.name)[which] for each in fields(self)))
+
+    def height(self, columns: Array | float = 0.0, rows: Array | float = 0.0) -> Array:
+        """Return how far the curved surface lies in front of the plane, (n,) in metres.
+
+        ``columns`` and ``rows`` (n,) say where, in pixels from the middle pixel's centre. The plane
+        goes through the mean of the nine points, so a bulging surface lies in front of it.
+        """
+        along_columns, along_rows, mixed = self.curvature.T
+        bend = along_columns * (columns**2 / 2 - 1 / 3) + along_rows * (rows**2 / 2 - 1 / 3)
+        height: Array = bend + mixed * columns * rows
+        return height
 
 
 def _patches(
@@ -150,9 +164,22 @@ def _patches(
             & (spread < SMOOTH_SPREAD * footprint + precision)
             & (np.abs(cosine) > GRAZING_COSINE)
         )
+        curvature = _curvature(np.einsum("nij,nj->ni", around, normals))
     # Where pixels have no points there is no plane, and what they say has no extent of its own.
     footprint[~finite] = error[~finite] = 0.0
-    return Patches(centres, normals, spread, footprint, error), smooth
+    return Patches(centres, normals, spread, footprint, error, curvature), smooth
+
+
+def _curvature(heights: Array) -> Array:
+    """Return `Patches.curvature` (n, 3) of nine points' heights (n, 9) above their plane.
+
+    They are the least squares fit of a quadratic surface, from which the plane takes nothing.
+    """
+    square = heights.reshape(-1, 3, 3)
+    along_columns = (square[:, :, 0] - 2 * square[:, :, 1] + square[:, :, 2]).mean(axis=1)
+    along_rows = (square[:, 0] - 2 * square[:, 1] + square[:, 2]).mean(axis=1)
+    mixed = (square[:, 0, 0] - square[:, 0, 2] - square[:, 2, 0] + square[:, 2, 2]) / 4
+    return np.stack([along_columns, along_rows, mixed], axis=1)
 
 
 def sample(camera: Camera, depth: NDArray[Any], rays: int) -> Patches:
@@ -188,7 +215,9 @@ class Comparison:
     the answer is a smooth patch too, ``fine`` is true, ``asked`` and ``found`` are the patches, and
     ``residual`` (n,) is how far the one's centre lies in front of the other's plane, in units of
     ``footprint`` (n,), metres; ``expected`` (n,) is the standard deviation of that, in the same
-    units, by how well the planes fit and what the files resolve.
+    units, by how well the planes fit and what the files resolve. ``curved_residual`` (n,) is the
+    residual between curved surfaces. It is noisier, but a plane through nine pixels lies inside a
+    ball, and deeper where the ball is seen at an angle.
     """
 
     verdict: NDArray[np.int64]
@@ -198,6 +227,7 @@ class Comparison:
     residual: Array
     footprint: Array
     expected: Array
+    curved_residual: Array
 
     def measuring(self) -> "Comparison | None":
         """Return the part that says how far the surfaces are apart; None if it is too small."""
@@ -226,9 +256,12 @@ def compare(asked: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison:
     """
     looked_for, where = _looks_for(asked, camera)
     asked = asked[looked_for]
-    columns, rows = np.floor(where[looked_for]).astype(np.int64).T
+    where = where[looked_for]
+    columns, rows = np.floor(where).astype(np.int64).T
     found, smooth = _patches(camera, depth, columns, rows)
     residual = np.einsum("ij,ij->i", found.normals, asked.points - found.points)
+    aside = where - np.floor(where) - 0.5
+    curved_residual = residual + asked.height() - found.height(aside[:, 0], aside[:, 1])
     # The centre of nine jittered points, and the plane of nine a pixel's half diagonal off centre.
     deviation = np.sqrt(asked.spread**2 / 9 + found.spread**2 * (1 / 9 + 0.5 / 6))
     footprint = np.maximum(asked.footprint, found.footprint)
@@ -254,7 +287,16 @@ def compare(asked: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison:
     finest = TOLERANCE_FOOTPRINTS * footprint / TOLERANCE_DEVIATIONS
     expected = np.sqrt(deviation**2 + finest**2 + resolved)
     unit = np.maximum(footprint, np.finfo(np.float64).tiny)
-    return Comparison(verdict, smooth, asked, found, residual / unit, footprint, expected / unit)
+    return Comparison(
+        verdict,
+        smooth,
+        asked,
+        found,
+        residual / unit,
+        footprint,
+        expected / unit,
+        curved_residual / unit,
+    )
 
 
 def _recorded_range(
@@ -318,8 +360,9 @@ def scale_moments(measured: Comparison, asking: Camera, answering: Camera) -> Ar
     grows = np.stack(
         [np.einsum("ij,ij->i", found.normals, by_angle), found.normals @ by_depth], axis=1
     )
-    columns = np.column_stack([grows / measured.footprint[:, np.newaxis], -measured.residual])
-    moments: Array = (columns * _huber(measured.residual)[:, np.newaxis]).T @ columns
+    residual = measured.curved_residual
+    columns = np.column_stack([grows / measured.footprint[:, np.newaxis], -residual])
+    moments: Array = (columns * _huber(residual)[:, np.newaxis]).T @ columns
     return moments
 
 
