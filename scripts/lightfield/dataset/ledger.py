@@ -19,7 +19,7 @@ import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -149,7 +149,7 @@ class Ledger:
             if name in self.sums:
                 if self.sums[name] != stamp.sha256:
                     return name
-            elif not stamp.is_current(name) and self._has_changed(name, stamp):
+            elif not stamp.is_current(name) and _has_changed(name, stamp):
                 return name
         return None
 
@@ -159,13 +159,6 @@ class Ledger:
             if name in inputs and inputs[name].sha256 == digest:
                 return inputs[name].modified_ns
         return None
-
-    @staticmethod
-    def _has_changed(name: str, stamp: Stamp) -> bool:
-        try:
-            return sha256(name) != stamp.sha256
-        except OSError:
-            return False
 
     def input_stamps(self, names: Iterable[str]) -> dict[str, Stamp]:
         """Return the stamps of the files that a job is about to read, those that exist."""
@@ -225,6 +218,21 @@ def forget(path: Path, name: str) -> None:
             kept.append(job._replace(history=history))
         with atomic_path(path) as temporary:
             temporary.write_bytes(b"".join(map(_line, reversed(kept))))
+
+
+def _has_changed(name: str, stamp: Stamp) -> bool:
+    """Return whether a file has other bytes than its stamp; one that is gone has not."""
+    try:
+        status = os.stat(name)  # noqa: PTH116, as above
+        return _digest(name, status.st_mtime_ns, status.st_ctime_ns) != stamp.sha256
+    except OSError:
+        return False
+
+
+@lru_cache(maxsize=64)
+def _digest(name: str, _modified_ns: int, _changed_ns: int) -> str:
+    """Return the SHA-256 of a file: thousands of shards are made from one large .blend."""
+    return sha256(name)
 
 
 def _problem(name: str, stamp: Stamp) -> str | None:

@@ -1,0 +1,25 @@
+"""The ledger with many jobs: what they have in common is looked at once."""
+
+import os
+
+from lightfield.core.files import sha256
+from lightfield.dataset import ledger
+from lightfield.dataset.ledger import Job, Ledger, Stamp
+
+
+def test_a_touched_file_is_read_once_for_all_that_was_made_from_it(tmp_path, monkeypatch):
+    scene = tmp_path / "scene.blend"
+    scene.write_bytes(b"scene")
+    made = Ledger(tmp_path / "ledger.txt")
+    outputs = [str(tmp_path / f"{number}.json") for number in range(20)]
+    for output in outputs:
+        made.note(Job([output], {}, {}, {str(scene): Stamp.of(scene)}))
+    os.utime(scene)
+    reads = []
+    monkeypatch.setattr(ledger, "sha256", lambda path: reads.append(path) or sha256(path))
+    planned = Ledger(tmp_path / "ledger.txt")
+    assert [planned.changed_input(output) for output in outputs] == [None] * 20
+    assert len(reads) == 1
+    # Other bytes are seen in the same process, too.
+    scene.write_bytes(b"another")
+    assert {planned.changed_input(output) for output in outputs} == {str(scene)}
