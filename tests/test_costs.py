@@ -252,7 +252,7 @@ def test_a_processes_peak_memory_is_in_bytes(tmp_path):
         ({"watts": -5}, "energy.watts: is -5; must be a number at least 0"),
         ({"watt": 65}, "energy.watt: unknown key; did you mean watts?"),
         ({"cores": 0}, "energy.cores: is 0; must be auto or a whole number at least 1"),
-        ({"currency": 3}, "energy.currency: is 3; must be a text"),
+        ({"currency": 3}, "energy.currency: is 3; must be a text: put it in quotes"),
     ],
 )
 def test_a_wrong_tariff_is_told(energy, expected):

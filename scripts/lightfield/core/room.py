@@ -78,9 +78,8 @@ def write_problem(path: Path, error: OSError) -> str:
     if cause := obstacle(path):
         return cause
     free = gigabytes(shutil.disk_usage(nearest_folder(path)).free)
-    remedy = REMEDIES.get(error.errno or 0)
-    advice = f": {remedy}" if remedy else ""
-    return f"{error.strerror or error}; {free} are free on its disk{advice}"
+    remedy = REMEDIES.get(error.errno or 0, "look for a quota, or a limit of files' sizes")
+    return f"{error.strerror or error}; {free} are free on its disk: {remedy}"
 
 
 def fast_folder(size: float) -> Path | None:
