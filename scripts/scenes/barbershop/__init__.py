@@ -7,7 +7,18 @@ the front wall (+Y) the shop window and the door, the back wall (−Y) the recep
 
 from functools import partial
 
-from scenes.barbershop import cloth, fittings, furniture, lamps, plants, prints, room, stations
+from scenes.barbershop import (
+    cloth,
+    fittings,
+    furniture,
+    lamps,
+    plants,
+    prints,
+    reception,
+    room,
+    seats,
+    stations,
+)
 from scenes.barbershop.goods import bottles, pots
 from scenes.barbershop.materials import palette
 from scenes.barbershop.openings import OPENINGS, street, valance
@@ -17,7 +28,7 @@ from scenes.library.scene import Scene, fill
 # What text alone draws (see `plan.furnish`).
 DRAWN = (
     *(room.WALLS, room.ON_THE_FLOOR, OPENINGS, lamps.LAMPS, stations.STATION),
-    *(furniture.FURNITURE, furniture.STOOL, cloth.RACK, fittings.FITTINGS, plants.HANGER),
+    *(cloth.RACK, fittings.FITTINGS, plants.HANGER),
 )
 
 
@@ -32,8 +43,26 @@ ELEMENTS = (
     *(partial(furnish, text=text) for text in DRAWN),
     *(lamps.lights, room.tiles, room.medallion, room.rug, room.hair_clippings),
     *(room.metro_tiles, room.wainscot, room.ceiling, valance, street),
-    *(furniture.barber_chairs, furniture.waiting_bench),
-    *(furniture.desk_things, furniture.magazines, stations.mirrors, cloth.towel_shelves),
+    reception.reception_desk,
+    reception.till,
+    reception.desk_bell,
+    reception.telephone,
+    reception.card_box,
+    reception.desk_things,
+    seats.stool,
+    seats.barber_chairs,
+    seats.waiting_bench,
+    furniture.low_table,
+    furniture.ashtray,
+    furniture.magazines,
+    furniture.trolley,
+    furniture.display_cabinet,
+    furniture.hat_box,
+    furniture.back_cupboard,
+    furniture.radio,
+    furniture.towel_steamer,
+    stations.mirrors,
+    cloth.towel_shelves,
     *(cloth.coats, prints.pictures, fittings.clock, fittings.barber_pole),
     *(fittings.broom_and_bins, stocked),
 )
