@@ -27,7 +27,7 @@ from scenes.library.scene import Scene, fill
 
 # What text alone draws (see `plan.furnish`).
 DRAWN = (
-    *(room.WALLS, room.ON_THE_FLOOR, OPENINGS, lamps.LAMPS, stations.STATION),
+    *(room.WALLS, room.ON_THE_FLOOR, OPENINGS, lamps.LAMPS),
     *(cloth.RACK, fittings.FITTINGS, plants.HANGER),
 )
 
@@ -61,6 +61,15 @@ ELEMENTS = (
     furniture.back_cupboard,
     furniture.radio,
     furniture.towel_steamer,
+    stations.counter_drawers,
+    stations.counter_doors,
+    stations.counter_top,
+    stations.bulb_strip,
+    stations.mirror_tube,
+    stations.basin,
+    stations.tap,
+    stations.tool_mat,
+    stations.towel_rail,
     stations.mirrors,
     cloth.towel_shelves,
     *(cloth.coats, prints.pictures, fittings.clock, fittings.barber_pole),
