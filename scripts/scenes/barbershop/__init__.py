@@ -26,10 +26,7 @@ from scenes.barbershop.plan import furnish
 from scenes.library.scene import Scene, fill
 
 # What text alone draws (see `plan.furnish`).
-DRAWN = (
-    *(room.WALLS, room.ON_THE_FLOOR, OPENINGS, lamps.LAMPS),
-    *(cloth.RACK, fittings.FITTINGS, plants.HANGER),
-)
+DRAWN = (*(room.WALLS, room.ON_THE_FLOOR, OPENINGS),)
 
 
 def stocked(scene: Scene) -> None:
@@ -41,6 +38,10 @@ def stocked(scene: Scene) -> None:
 
 ELEMENTS = (
     *(partial(furnish, text=text) for text in DRAWN),
+    lamps.pendant_lamp,
+    lamps.fan_motor,
+    lamps.fan_blade,
+    lamps.wall_lamp,
     *(lamps.lights, room.tiles, room.medallion, room.rug, room.hair_clippings),
     *(room.metro_tiles, room.wainscot, room.ceiling, valance, street),
     reception.reception_desk,
@@ -72,7 +73,24 @@ ELEMENTS = (
     stations.towel_rail,
     stations.mirrors,
     cloth.towel_shelves,
-    *(cloth.coats, prints.pictures, fittings.clock, fittings.barber_pole),
-    *(fittings.broom_and_bins, stocked),
+    cloth.coat_rack,
+    cloth.umbrella_stand,
+    cloth.fedora,
+    cloth.bowler_hat,
+    cloth.coats,
+    cloth.umbrellas,
+    prints.pictures,
+    fittings.radiator_section,
+    fittings.radiator_pipes,
+    fittings.switch,
+    fittings.vent,
+    fittings.dustpan,
+    fittings.clock,
+    fittings.barber_pole,
+    fittings.broom,
+    fittings.waste_bins,
+    plants.plant_cord,
+    plants.plant_hook,
+    stocked,
 )
 build = partial(fill, palette, ELEMENTS)
