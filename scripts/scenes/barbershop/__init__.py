@@ -12,6 +12,7 @@ from scenes.barbershop import (
     fittings,
     furniture,
     lamps,
+    openings,
     plants,
     prints,
     reception,
@@ -21,12 +22,11 @@ from scenes.barbershop import (
 )
 from scenes.barbershop.goods import bottles, pots
 from scenes.barbershop.materials import palette
-from scenes.barbershop.openings import OPENINGS, street, valance
 from scenes.barbershop.plan import furnish
 from scenes.library.scene import Scene, fill
 
 # What text alone draws (see `plan.furnish`).
-DRAWN = (*(room.WALLS, room.ON_THE_FLOOR, OPENINGS),)
+DRAWN = (*(room.WALLS, room.ON_THE_FLOOR),)
 
 
 def stocked(scene: Scene) -> None:
@@ -43,7 +43,22 @@ ELEMENTS = (
     lamps.fan_blade,
     lamps.wall_lamp,
     *(lamps.lights, room.tiles, room.medallion, room.rug, room.hair_clippings),
-    *(room.metro_tiles, room.wainscot, room.ceiling, valance, street),
+    *(room.metro_tiles, room.wainscot, room.ceiling),
+    openings.window_frame,
+    openings.window_pane,
+    openings.window_letters,
+    openings.door_frame,
+    openings.door,
+    openings.door_pane,
+    openings.transom_pane,
+    openings.door_sign,
+    openings.door_bell,
+    openings.house_number,
+    openings.staff_door_frame,
+    openings.staff_door,
+    openings.street_lamp,
+    openings.valance,
+    openings.street,
     reception.reception_desk,
     reception.till,
     reception.desk_bell,
