@@ -7,18 +7,26 @@ the front wall (+Y) the shop window and the door, the back wall (−Y) the recep
 
 from functools import partial
 
-from scenes.barbershop import cloth, fittings, furniture, lamps, plants, prints, room, stations
+from scenes.barbershop import (
+    cloth,
+    fittings,
+    furniture,
+    lamps,
+    openings,
+    plants,
+    prints,
+    reception,
+    room,
+    seats,
+    stations,
+)
 from scenes.barbershop.goods import bottles, pots
 from scenes.barbershop.materials import palette
-from scenes.barbershop.openings import OPENINGS, street, valance
 from scenes.barbershop.plan import furnish
 from scenes.library.scene import Scene, fill
 
 # What text alone draws (see `plan.furnish`).
-DRAWN = (
-    *(room.WALLS, room.ON_THE_FLOOR, OPENINGS, lamps.LAMPS, stations.STATION),
-    *(furniture.FURNITURE, furniture.STOOL, cloth.RACK, fittings.FITTINGS, plants.HANGER),
-)
+DRAWN = (*(room.WALLS, room.ON_THE_FLOOR),)
 
 
 def stocked(scene: Scene) -> None:
@@ -30,11 +38,74 @@ def stocked(scene: Scene) -> None:
 
 ELEMENTS = (
     *(partial(furnish, text=text) for text in DRAWN),
+    lamps.pendant_lamp,
+    lamps.fan_motor,
+    lamps.fan_blade,
+    lamps.wall_lamp,
     *(lamps.lights, room.tiles, room.medallion, room.rug, room.hair_clippings),
-    *(room.metro_tiles, room.wainscot, room.ceiling, valance, street),
-    *(furniture.barber_chairs, furniture.waiting_bench),
-    *(furniture.desk_things, furniture.magazines, stations.mirrors, cloth.towel_shelves),
-    *(cloth.coats, prints.pictures, fittings.clock, fittings.barber_pole),
-    *(fittings.broom_and_bins, stocked),
+    *(room.metro_tiles, room.wainscot, room.ceiling),
+    openings.window_frame,
+    openings.window_pane,
+    openings.window_letters,
+    openings.door_frame,
+    openings.door,
+    openings.door_pane,
+    openings.transom_pane,
+    openings.door_sign,
+    openings.door_bell,
+    openings.house_number,
+    openings.staff_door_frame,
+    openings.staff_door,
+    openings.street_lamp,
+    openings.valance,
+    openings.street,
+    reception.reception_desk,
+    reception.till,
+    reception.desk_bell,
+    reception.telephone,
+    reception.card_box,
+    reception.desk_things,
+    seats.stool,
+    seats.barber_chairs,
+    seats.waiting_bench,
+    furniture.low_table,
+    furniture.ashtray,
+    furniture.magazines,
+    furniture.trolley,
+    furniture.display_cabinet,
+    furniture.hat_box,
+    furniture.back_cupboard,
+    furniture.radio,
+    furniture.towel_steamer,
+    stations.counter_drawers,
+    stations.counter_doors,
+    stations.counter_top,
+    stations.bulb_strip,
+    stations.mirror_tube,
+    stations.basin,
+    stations.tap,
+    stations.tool_mat,
+    stations.towel_rail,
+    stations.mirrors,
+    cloth.towel_shelves,
+    cloth.coat_rack,
+    cloth.umbrella_stand,
+    cloth.fedora,
+    cloth.bowler_hat,
+    cloth.coats,
+    cloth.umbrellas,
+    prints.pictures,
+    fittings.radiator_section,
+    fittings.radiator_pipes,
+    fittings.switch,
+    fittings.vent,
+    fittings.dustpan,
+    fittings.clock,
+    fittings.barber_pole,
+    fittings.broom,
+    fittings.waste_bins,
+    plants.plant_cord,
+    plants.plant_hook,
+    stocked,
 )
 build = partial(fill, palette, ELEMENTS)

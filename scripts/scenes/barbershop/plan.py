@@ -6,6 +6,7 @@ as the viewer sees it and faces +Z; on a wall it hangs upright.
 
 import re
 from collections.abc import Sequence
+from typing import Literal
 
 import bpy
 import numpy as np
@@ -25,7 +26,39 @@ WINDOW_MIDDLE = (-0.75, 1.725)  # x and z; it is 2.6 m wide and 1.45 m high
 
 TOWELS = ("White towel", "Red towel", "Blue towel", "Sand towel")
 INKS = ("Red", "Navy", "Teal", "Ochre", "Black", "Green")
+Wall = Literal["left", "right", "front", "back"]
 HAIR = ("Brown hair", "Fair hair", "Black hair")
+
+
+def standing(x: float = 0, y: float = 0, z: float = 0, turned: float = 0) -> Matrix:
+    """A frame in the room, turned about Z by degrees."""
+    return transform((x, y, z)) @ transform(rotation=(0, 0, np.radians(turned)))
+
+
+def against(
+    wall: Wall, along: float = 0, away: float = 0, z: float = 0, turned: float = 0
+) -> Matrix:
+    """A frame with its back to a wall, turned about Z by degrees.
+
+    along: the room's y at the left and right wall, its x at the front and back. away: metres from
+    the wall. The frame's y points into the room, its x to its own left.
+    """
+    return _at_wall(wall, along, away, z) @ transform(rotation=(0, 0, np.radians(turned)))
+
+
+def hanging(wall: Wall, along: float = 0, away: float = 0, z: float = 0) -> Matrix:
+    """A frame for what is flat and hangs on a wall: its z points into the room, its y upwards."""
+    return _at_wall(wall, along, away, z) @ transform(rotation=(np.pi / 2, 0, np.pi))
+
+
+def _at_wall(wall: Wall, along: float, away: float, z: float) -> Matrix:
+    (x, y), degrees = {
+        "left": ((away - HALF_X, along), -90),
+        "right": ((HALF_X - away, along), 90),
+        "front": ((along, HALF_Y - away), 180),
+        "back": ((along, away - HALF_Y), 0),
+    }[wall]
+    return transform((x, y, z), (0, 0, np.radians(degrees)))
 
 
 def spots(text: str) -> list[Matrix]:
@@ -71,11 +104,15 @@ def furnish(scene: Scene, text: str) -> None:
 
 def put(
     data: bpy.types.Mesh,
-    where: Matrix | str,
+    where: Matrix | Sequence[Matrix] | str,
     at: Sequence[float] = (0, 0, 0),
     degrees: Sequence[float] = (0, 0, 0),
     scale: float | Sequence[float] = 1.0,
 ) -> None:
-    """Instances of a mesh in a frame or at a text's `spots`, scaled, turned by XYZ Euler, moved."""
-    for frame in spots(where) if isinstance(where, str) else [where]:
+    """Instances of a mesh in one frame or in each of several, scaled, turned, and moved there.
+
+    degrees: XYZ Euler angles.
+    """
+    where = spots(where) if isinstance(where, str) else where
+    for frame in [where] if isinstance(where, Matrix) else where:
         place(data.name, data, frame @ transform(at, np.radians(degrees), scale))

@@ -4,21 +4,32 @@ import bpy
 import numpy as np
 
 from scenes.barbershop.goods import Goods, stock
-from scenes.barbershop.plan import put
-from scenes.library.points import polar, xyz
+from scenes.barbershop.plan import against, put, standing
+from scenes.library.points import evenly, polar, xyz
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import Shape, sheet
 
 POTTED = {"Fern": ("Terracotta", 44), "Snake plant": ("Navy", 16), "Rubber tree": ("Brass", 26)}
-POT = """{clay}: lathe 0.09 0, 0.10 0.01, 0.125 0.17, 0.14 0.17, 0.14 0.21, 0.125 0.21, 0.118 0.18
-        0 0.18
-    Soil: lathe 0.117 0.18, 0.117 0.186, 0 0.19"""
-HANGER = """
-Plant cord | room -2.24 3.42 1.62 0..240*3
-    Brass: tube 0.003, 0.105 0 0.165, 0 0 0.78; bend 0.003, 0.105 0 0.165, 0.084 0 0, 0 0 -0.01
-Plant hook | room -2.24 3.42 1.62
-    Brass: tube 0.003, 0 0 0.77, 0 0 1.38
-"""
+
+
+def plant_cord(scene: Scene) -> None:
+    """The cords of the hanging plant."""
+    cord = Model(scene)
+    cord.tube(radius=0.003, path=[(0.105, 0, 0.165), (0, 0, 0.78)], material="Brass")
+    cord.bend(
+        radius=0.003, path=[(0.105, 0, 0.165), (0.084, 0, 0), (0, 0, -0.01)], material="Brass"
+    )
+    put(
+        cord.mesh(name="Plant cord"),
+        where=[standing(x=-2.24, y=3.42, z=1.62, turned=turn) for turn in evenly(0, 240, 3)],
+    )
+
+
+def plant_hook(scene: Scene) -> None:
+    """The rod that they hang from."""
+    hook = Model(scene)
+    hook.tube(radius=0.003, path=[(0, 0, 0.77), (0, 0, 1.38)], material="Brass")
+    put(hook.mesh(name="Plant hook"), where=standing(x=-2.24, y=3.42, z=1.62))
 
 
 def leaf(scene: Scene, length: float, width: float, droop: float) -> Shape:
@@ -34,7 +45,21 @@ def leaf(scene: Scene, length: float, width: float, droop: float) -> Shape:
 def plant(scene: Scene, kind: str) -> bpy.types.Mesh:
     """A plant about 0.6 m tall with its pot."""
     random, (clay, count) = scene.random(kind), POTTED[kind]
-    model = Model(scene, POT.format(clay=clay))
+    model = Model(scene)
+    model.lathe(
+        profile=[
+            (0.09, 0),
+            (0.1, 0.01),
+            (0.125, 0.17),
+            (0.14, 0.17),
+            (0.14, 0.21),
+            (0.125, 0.21),
+            (0.118, 0.18),
+            (0, 0.18),
+        ],
+        material=clay,
+    )
+    model.lathe(profile=[(0.117, 0.18), (0.117, 0.186), (0, 0.19)], material="Soil")
     for k in range(scene.segments(count, 6)):
         turn = k * 137.508 + random.uniform(-15, 15)
         if kind == "Fern":
@@ -48,7 +73,9 @@ def plant(scene: Scene, kind: str) -> bpy.types.Mesh:
             blade = leaf(scene, random.uniform(0.16, 0.24), 0.10, 0.9)
         model.add(blade, f"Leaf {k % 3}", at, (0, -rise, turn))
     if kind == "Rubber tree":
-        model.draw("Soil: bend 0.009, 0 0 0.18, 0.01 0 0.4, 0 0.01 0.75")
+        model.bend(
+            radius=0.009, path=[(0, 0, 0.18), (0.01, 0, 0.4), (0, 0.01, 0.75)], material="Soil"
+        )
     return model.mesh(kind)
 
 
@@ -58,9 +85,14 @@ def plants(scene: Scene, bottles: Goods, pots: Goods) -> None:
     fern, snake, rubber = (plant(scene, kind) for kind in POTTED)
     for x, data in ((-1.8, fern), (-0.95, snake), (-0.3, fern), (0.35, rubber)):
         turn = (0, 0, random.uniform(0, 360))
-        put(data, f"front {x} 0.08 1", degrees=turn, scale=random.uniform(0.5, 0.6))
+        put(
+            data,
+            against("front", along=x, away=0.08, z=1),
+            degrees=turn,
+            scale=random.uniform(0.5, 0.6),
+        )
     for x in (-1.4, -0.63, 0.03):
-        stock(scene, random, bottles, f"front {x} 0.05 1", 0.34, 0.12)
-    put(rubber, "room 2.18 3.38 0 40", scale=1.5)
-    put(snake, "room -2.22 3.46 0 10", scale=1.3)
-    put(fern, "room -2.24 3.42 1.62 200", scale=0.8)
+        stock(scene, random, bottles, against("front", along=x, away=0.05, z=1), 0.34, 0.12)
+    put(rubber, standing(x=2.18, y=3.38, turned=40), scale=1.5)
+    put(snake, standing(x=-2.22, y=3.46, turned=10), scale=1.3)
+    put(fern, standing(x=-2.24, y=3.42, z=1.62, turned=200), scale=0.8)

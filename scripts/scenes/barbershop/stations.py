@@ -5,81 +5,294 @@ import numpy as np
 
 from scenes.barbershop.cloth import folded_towel, rolled_towel
 from scenes.barbershop.goods import Goods, shelf, stock
-from scenes.barbershop.plan import COUNTER_TOP, STATIONS, TOWELS, drawings, put, spots
-from scenes.library.points import circle, points, polar, xyz
+from scenes.barbershop.plan import COUNTER_TOP, STATIONS, TOWELS, against, hanging, put
+from scenes.library.points import circle, evenly, lattice, mirrored, polar, xyz
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import box, copies, prism, sheet, transform, tube
 
-BLADE = "prism 0.0018, -0.005 -0.01, 0.006 -0.01, 0.007 0.02, 0.001 0.10, -0.002 0.10"
-TOOLS = f"""
-Scissors |
-    Steel: {BLADE} at 0 0 0.002 turned 0 0 -11; {BLADE} at 0 0 0.004 turned 0 0 11;
-        tube 0.003, 0 -0.008 0.004, 0.016 -0.05 0.004;
-        tube 0.003, 0 -0.008 0.004, -0.016 -0.05 0.004; ring 0.014 0.003 at ±0.02 -0.064 0.004
-    Brass: lathe 0.004 0, 0.004 0.007, 0 0.0075
-Razor |
-    Ebony: box 0.014 0.14 0.008 0.003 at 0 0 0.004
-    Chrome: prism 0.0025, 0 0, 0.02 0.004, 0.02 0.075, 0.004 0.08, 0 0.07
-        at 0.003 0.068 0.003 turned 0 0 -55
-    Brass: lathe 0.004 0, 0.004 0.010, 0 0.011 at 0 0.062 0
-Hair dryer |
-    Chrome: lathe 0.02 -0.07, 0.038 -0.05, 0.04 0.02, 0.026 0.05, 0.024 0.13
-        0.028 0.135 at 0 0 0.041 turned 90 0 0
-    Black: box 0.12 0.034 0.03 0.012 3 at 0.085 0.02 0.036 turned 0 4 -10
-    Red: ring 0.03 0.003 at 0 -0.02 0.041 turned 90 0 0
-"""
-CLIPPERS = """Black: box 0.048 0.14 0.036 0.014 3 at 0 0 0.019
-    Steel: box 0.044 0.03 0.006 at 0 0.082 0.026 turned 20 0 0;
-        box 0.0015 0.012 0.003 at -0.02..0.02*14 0.101 0.032 turned 20 0 0
-    Gilt: box 0.03 0.06 0.003 0.001 at 0 -0.005 0.037"""
-PANEL = "-0.05 0.004, -0.03 0.018, 0 0.02, 0.015 0.006, 0.02 0"  # round a cabinet's panel
-KNOB = "Brass: lathe 0.008 0, 0.008 0.014, 0.017 0.02, 0.014 0.03, 0 0.032"
-CABINET = """Mahogany: box 0.64 0.41 0.73 at 0 0.205 0.455;
-        box 0.05 0.02 0.73 0.006 at ±0.32 0.41 0.455; Ebony: box 0.64 0.35 0.09 at 0 0.175 0.045
-    """
-STATION = f"""
-Counter drawers | left -2.88..2.24*5
-    {CABINET}
-    Mahogany: frame 0.50 0.11, {PANEL} at 0 0.41 0.18..0.705*4 turned 90 0 180
-    {KNOB} at ±0.15 0.412 0.18..0.705*4 turned -90 0 0
-Counter doors | left -2.24..2.88*5
-    {CABINET}
-    Mahogany: frame 0.23 0.60, {PANEL} at ±0.15 0.41 0.45 turned 90 0 180
-    {KNOB} at ±0.0375 0.412 0.55 turned -90 0 0
-Counter top | left 0 0 0.86
-    Marble: box 6.44 0.44 0.04 0.012 3 at 0 0.22 -0.02; box 6.44 0.022 0.09 0.006 at 0 0.023 0.045
-Bulb strip | on left -2.625..1.375*3 0.012 1.62, on left -1.375..2.625*3 0.012 1.62
-    Brass: box 0.07 1.1 0.03 0.008 2 at 0 0 0.015;
-        lathe 0.028 0, 0.024 0.016, 0.018 0.02 at 0 -0.42..0.42*4 0.03
-    Bulb: ball 0.036 at 0 -0.42..0.42*4 0.075
-Mirror tube | on left -2..2*3 0 2.41
-    Chrome: box 0.98 0.07 0.05 0.012 2 at 0 0 0.025
-    Lamp tube: tube 0.019, -0.46 0 0.075, 0.46 0 0.075
-    Chrome: tube 0.026, -0.02 0 0, 0.02 0 0 at ±0.47 0 0.075; box 0.03 0.04 0.06 at ±0.47 0 0.05
-Basin | left -2..2*3 0.24 0.86
-    Porcelain: lathe 0.09 0, 0.14 0.02, 0.185 0.08, 0.20 0.13, 0.205 0.14, 0.19 0.135, 0.17 0.08
-        0.12 0.03, 0.02 0.02, 0 0.02 scaled 1.15 0.85 1
-    Chrome: lathe 0.026 0.021, 0.026 0.026, 0 0.026
-Tap | left -2..2*3 0.06 0.86
-    Chrome: lathe 0.028 0, 0.028 0.012, 0.014 0.03;
-        bend 0.011, 0 0 0.02, 0 0 0.2, 0 0.03 0.26, 0 0.09 0.27, 0 0.13 0.22;
-        lathe 0.018 0, 0.01 0.02, 0.01 0.05, 0 0.052 at ±0.07 0 0;
-        tube 0.006, -0.026 0 0.045, 0.026 0 0.045 at ±0.07 0 0;
-        tube 0.006, 0 -0.026 0.045, 0 0.026 0.045 at ±0.07 0 0
-Tool mat | left -2.44..1.56*3 0.26 0.86
-    White towel: box 0.30 0.20 0.006 0.002 at 0 0 0.003
-Towel rail | left ±1 0.43 0.72
-    Brass: bend 0.007, -0.18 0 0, -0.18 0.06 0, -0.16 0.07 0, 0 0.07 0, 0.16 0.07 0, 0.18 0.06 0
-        0.18 0 0
-"""
-MIRROR = """Mirror: plane 0.92 1.1 at 0 0 0.026
-    Gilt: frame 0.92 1.1, -0.006 0.02, -0.006 0.034, 0.008 0.04, 0.03 0.03, 0.06 0.05, 0.085 0.05
-        0.095 0.03, 0.095 0; ball 0.04 at 0 0.675 0.04 scaled 1 1 0.5"""
+# Round the panel of a cabinet's door or drawer.
+PANEL = [
+    (-0.05, 0.004),
+    (-0.03, 0.018),
+    (0, 0.02),
+    (0.015, 0.006),
+    (0.02, 0),
+]
+KNOB = [(0.008, 0), (0.008, 0.014), (0.017, 0.02), (0.014, 0.03), (0, 0.032)]
+BLADE = [(-0.005, -0.01), (0.006, -0.01), (0.007, 0.02), (0.001, 0.1), (-0.002, 0.1)]  # of scissors
+
+
+def _cabinet(model: Model) -> None:
+    """Add a cabinet's body on its plinth."""
+    model.box(size=(0.64, 0.41, 0.73), at=(0, 0.205, 0.455), material="Mahogany")
+    model.box(
+        size=(0.05, 0.02, 0.73),
+        bevel=0.006,
+        at=mirrored(x=0.32, y=0.41, z=0.455),
+        material="Mahogany",
+    )
+    model.box(size=(0.64, 0.35, 0.09), at=(0, 0.175, 0.045), material="Ebony")
+
+
+def counter_drawers(scene: Scene) -> None:
+    """Cabinets of four drawers."""
+    drawers = Model(scene)
+    _cabinet(drawers)
+    drawers.frame(
+        size=(0.5, 0.11),
+        profile=PANEL,
+        at=lattice(y=0.41, z=evenly(0.18, 0.705, 4)),
+        turned=(90, 0, 180),
+        material="Mahogany",
+    )
+    drawers.lathe(
+        profile=KNOB,
+        at=lattice(x=(-0.15, 0.15), y=0.412, z=evenly(0.18, 0.705, 4)),
+        turned=(-90, 0, 0),
+        material="Brass",
+    )
+    put(
+        drawers.mesh(name="Counter drawers"),
+        where=[against("left", along=y) for y in evenly(-2.88, 2.24, 5)],
+    )
+
+
+def counter_doors(scene: Scene) -> None:
+    """Cabinets of two doors."""
+    doors = Model(scene)
+    _cabinet(doors)
+    doors.frame(
+        size=(0.23, 0.6),
+        profile=PANEL,
+        at=mirrored(x=0.15, y=0.41, z=0.45),
+        turned=(90, 0, 180),
+        material="Mahogany",
+    )
+    doors.lathe(
+        profile=KNOB, at=mirrored(x=0.0375, y=0.412, z=0.55), turned=(-90, 0, 0), material="Brass"
+    )
+    put(
+        doors.mesh(name="Counter doors"),
+        where=[against("left", along=y) for y in evenly(-2.24, 2.88, 5)],
+    )
+
+
+def counter_top(scene: Scene) -> None:
+    """One marble top over all cabinets, with a ledge at the wall."""
+    top = Model(scene)
+    top.box(
+        size=(6.44, 0.44, 0.04), bevel=0.012, segments=3, at=(0, 0.22, -0.02), material="Marble"
+    )
+    top.box(size=(6.44, 0.022, 0.09), bevel=0.006, at=(0, 0.023, 0.045), material="Marble")
+    put(top.mesh(name="Counter top"), where=against("left", z=COUNTER_TOP))
+
+
+def bulb_strip(scene: Scene) -> None:
+    """Strips of round bulbs beside the mirrors."""
+    strip = Model(scene)
+    strip.box(size=(0.07, 1.1, 0.03), bevel=0.008, segments=2, at=(0, 0, 0.015), material="Brass")
+    strip.lathe(
+        profile=[(0.028, 0), (0.024, 0.016), (0.018, 0.02)],
+        at=lattice(y=evenly(-0.42, 0.42, 4), z=0.03),
+        material="Brass",
+    )
+    strip.ball(radius=0.036, at=lattice(y=evenly(-0.42, 0.42, 4), z=0.075), material="Bulb")
+    put(
+        strip.mesh(name="Bulb strip"),
+        where=[
+            *[hanging("left", along=y, away=0.012, z=1.62) for y in evenly(-2.625, 1.375, 3)],
+            *[hanging("left", along=y, away=0.012, z=1.62) for y in evenly(-1.375, 2.625, 3)],
+        ],
+    )
+
+
+def mirror_tube(scene: Scene) -> None:
+    """A lamp above each mirror."""
+    lamp = Model(scene)
+    lamp.box(size=(0.98, 0.07, 0.05), bevel=0.012, segments=2, at=(0, 0, 0.025), material="Chrome")
+    lamp.tube(radius=0.019, path=[(-0.46, 0, 0.075), (0.46, 0, 0.075)], material="Lamp tube")
+    lamp.tube(
+        radius=0.026,
+        path=[(-0.02, 0, 0), (0.02, 0, 0)],
+        at=mirrored(x=0.47, z=0.075),
+        material="Chrome",
+    )
+    lamp.box(size=(0.03, 0.04, 0.06), at=mirrored(x=0.47, z=0.05), material="Chrome")
+    put(lamp.mesh(name="Mirror tube"), where=[hanging("left", along=y, z=2.41) for y in STATIONS])
+
+
+def basin(scene: Scene) -> None:
+    model = Model(scene)
+    model.lathe(
+        profile=[
+            (0.09, 0),
+            (0.14, 0.02),
+            (0.185, 0.08),
+            (0.2, 0.13),
+            (0.205, 0.14),
+            (0.19, 0.135),
+            (0.17, 0.08),
+            (0.12, 0.03),
+            (0.02, 0.02),
+            (0, 0.02),
+        ],
+        scaled=(1.15, 0.85, 1),
+        material="Porcelain",
+    )
+    model.lathe(profile=[(0.026, 0.021), (0.026, 0.026), (0, 0.026)], material="Chrome")
+    put(
+        model.mesh(name="Basin"),
+        where=[against("left", along=y, away=0.24, z=COUNTER_TOP) for y in STATIONS],
+    )
+
+
+def tap(scene: Scene) -> None:
+    model = Model(scene)
+    model.lathe(profile=[(0.028, 0), (0.028, 0.012), (0.014, 0.03)], material="Chrome")
+    model.bend(
+        radius=0.011,
+        path=[(0, 0, 0.02), (0, 0, 0.2), (0, 0.03, 0.26), (0, 0.09, 0.27), (0, 0.13, 0.22)],
+        material="Chrome",
+    )
+    model.lathe(
+        profile=[(0.018, 0), (0.01, 0.02), (0.01, 0.05), (0, 0.052)],
+        at=mirrored(x=0.07),
+        material="Chrome",
+    )
+    model.tube(
+        radius=0.006,
+        path=[(-0.026, 0, 0.045), (0.026, 0, 0.045)],
+        at=mirrored(x=0.07),
+        material="Chrome",
+    )
+    model.tube(
+        radius=0.006,
+        path=[(0, -0.026, 0.045), (0, 0.026, 0.045)],
+        at=mirrored(x=0.07),
+        material="Chrome",
+    )
+    put(
+        model.mesh(name="Tap"),
+        where=[against("left", along=y, away=0.06, z=COUNTER_TOP) for y in STATIONS],
+    )
+
+
+def tool_mat(scene: Scene) -> None:
+    mat = Model(scene)
+    mat.box(size=(0.3, 0.2, 0.006), bevel=0.002, at=(0, 0, 0.003), material="White towel")
+    put(
+        mat.mesh(name="Tool mat"),
+        where=[against("left", along=y, away=0.26, z=COUNTER_TOP) for y in evenly(-2.44, 1.56, 3)],
+    )
+
+
+def towel_rail(scene: Scene) -> None:
+    """Rails at the counter's front."""
+    rail = Model(scene)
+    rail.bend(
+        radius=0.007,
+        path=[
+            (-0.18, 0, 0),
+            (-0.18, 0.06, 0),
+            (-0.16, 0.07, 0),
+            (0, 0.07, 0),
+            (0.16, 0.07, 0),
+            (0.18, 0.06, 0),
+            (0.18, 0, 0),
+        ],
+        material="Brass",
+    )
+    put(
+        rail.mesh(name="Towel rail"),
+        where=[against("left", along=y, away=0.43, z=0.72) for y in (-1, 1)],
+    )
+
+
+def scissors(scene: Scene) -> bpy.types.Mesh:
+    """Open scissors."""
+    model = Model(scene)
+    model.prism(
+        height=0.0018, outline=BLADE, at=(0, 0, 0.002), turned=(0, 0, -11), material="Steel"
+    )
+    model.prism(height=0.0018, outline=BLADE, at=(0, 0, 0.004), turned=(0, 0, 11), material="Steel")
+    model.tube(radius=0.003, path=[(0, -0.008, 0.004), (0.016, -0.05, 0.004)], material="Steel")
+    model.tube(radius=0.003, path=[(0, -0.008, 0.004), (-0.016, -0.05, 0.004)], material="Steel")
+    model.ring(
+        radius=0.014, thickness=0.003, at=mirrored(x=0.02, y=-0.064, z=0.004), material="Steel"
+    )
+    model.lathe(profile=[(0.004, 0), (0.004, 0.007), (0, 0.0075)], material="Brass")
+    return model.mesh("Scissors")
+
+
+def razor(scene: Scene) -> bpy.types.Mesh:
+    """A razor, half open."""
+    model = Model(scene)
+    model.box(size=(0.014, 0.14, 0.008), bevel=0.003, at=(0, 0, 0.004), material="Ebony")
+    model.prism(
+        height=0.0025,
+        outline=[(0, 0), (0.02, 0.004), (0.02, 0.075), (0.004, 0.08), (0, 0.07)],
+        at=(0.003, 0.068, 0.003),
+        turned=(0, 0, -55),
+        material="Chrome",
+    )
+    model.lathe(profile=[(0.004, 0), (0.004, 0.01), (0, 0.011)], at=(0, 0.062, 0), material="Brass")
+    return model.mesh("Razor")
+
+
+def hair_dryer(scene: Scene) -> bpy.types.Mesh:
+    """A chromed hair dryer."""
+    dryer = Model(scene)
+    dryer.lathe(
+        profile=[
+            (0.02, -0.07),
+            (0.038, -0.05),
+            (0.04, 0.02),
+            (0.026, 0.05),
+            (0.024, 0.13),
+            (0.028, 0.135),
+        ],
+        at=(0, 0, 0.041),
+        turned=(90, 0, 0),
+        material="Chrome",
+    )
+    dryer.box(
+        size=(0.12, 0.034, 0.03),
+        bevel=0.012,
+        segments=3,
+        at=(0.085, 0.02, 0.036),
+        turned=(0, 4, -10),
+        material="Black",
+    )
+    dryer.ring(
+        radius=0.03, thickness=0.003, at=(0, -0.02, 0.041), turned=(90, 0, 0), material="Red"
+    )
+    return dryer.mesh("Hair dryer")
+
+
+def clippers(scene: Scene) -> bpy.types.Mesh:
+    """Electric clippers on their coiled cord."""
+    model = Model(scene)
+    model.box(
+        size=(0.048, 0.14, 0.036), bevel=0.014, segments=3, at=(0, 0, 0.019), material="Black"
+    )
+    model.box(size=(0.044, 0.03, 0.006), at=(0, 0.082, 0.026), turned=(20, 0, 0), material="Steel")
+    model.box(
+        size=(0.0015, 0.012, 0.003),
+        at=lattice(x=evenly(-0.02, 0.02, 14), y=0.101, z=0.032),
+        turned=(20, 0, 0),
+        material="Steel",
+    )
+    model.box(size=(0.03, 0.06, 0.003), bevel=0.001, at=(0, -0.005, 0.037), material="Gilt")
+    s = np.linspace(0, 1, scene.segments(140, 16))
+    cord = xyz(0.012 * np.cos(70 * s) + 0.1 * s, -0.08 - 0.13 * s, 0.014 + 0.01 * np.sin(70 * s))
+    model.add(scene.tube(cord, 0.0022, 5), "Black")
+    return model.mesh("Clippers")
 
 
 def comb(scene: Scene, material: str) -> bpy.types.Mesh:
     """A comb with fine teeth on one half and coarse ones on the other."""
-    model = Model(scene, f"{material}: box 0.17 0.01 0.004 0.0015 at 0 0.012 0.002")
+    model = Model(scene)
+    model.box(size=(0.17, 0.01, 0.004), bevel=0.0015, at=(0, 0.012, 0.002), material=material)
     x = np.linspace(-0.083, 0.083, scene.count(46, 8))
     x = np.concatenate([x[: len(x) // 2], x[len(x) // 2 :: 2]])
     model.add(box((0.0018, 0.024, 0.0026)), material, xyz(x, -0.004, 0.002))
@@ -88,23 +301,46 @@ def comb(scene: Scene, material: str) -> bpy.types.Mesh:
 
 def hair_brush(scene: Scene) -> bpy.types.Mesh:
     """A round-backed brush, its bristles up."""
-    model = Model(scene, "Oak: box 0.055 0.10 0.014 0.006 3 at 0 0.05 0.007")
-    handle = scene.tube("0 0 0.007, 0 -0.04 0.007, 0 -0.10 0.007", (0.007, 0.010, 0.007), 12)
+    model = Model(scene)
+    model.box(
+        size=(0.055, 0.1, 0.014), bevel=0.006, segments=3, at=(0, 0.05, 0.007), material="Oak"
+    )
+    handle = scene.tube(
+        [(0, 0, 0.007), (0, -0.04, 0.007), (0, -0.10, 0.007)], (0.007, 0.010, 0.007), 12
+    )
     model.add(handle, "Oak")
     columns, rows = scene.segments(6, 2), scene.segments(11, 3)
-    roots = points(f"-0.02..0.02*{columns} 0.01..0.09*{rows} 0.013")
+    roots = lattice(x=evenly(-0.02, 0.02, columns), y=evenly(0.01, 0.09, rows), z=0.013)
     upwards = roots * (6.7, 0, 0) + xyz(0, 0, 1)
-    hairs = copies(tube("0 0 0, 0 0.015 0", 0.0016, 4), roots, forward=upwards, up=(0, 1, 0))
+    hairs = copies(
+        tube([(0, 0, 0), (0, 0.015, 0)], 0.0016, 4), roots, forward=upwards, up=(0, 1, 0)
+    )
     model.add(hairs, "Bristle")
     return model.mesh("Hair brush")
 
 
 def mirrors(scene: Scene) -> None:
     """A mirror at each station in a gilt frame with beads, a crest and scrolls."""
-    model = Model(scene, MIRROR)
+    model = Model(scene)
+    model.plane(size=(0.92, 1.1), at=(0, 0, 0.026), material="Mirror")
+    model.frame(
+        size=(0.92, 1.1),
+        profile=[
+            (-0.006, 0.02),
+            (-0.006, 0.034),
+            (0.008, 0.04),
+            (0.03, 0.03),
+            (0.06, 0.05),
+            (0.085, 0.05),
+            (0.095, 0.03),
+            (0.095, 0),
+        ],
+        material="Gilt",
+    )
+    model.ball(radius=0.04, at=(0, 0.675, 0.04), scaled=(1, 1, 0.5), material="Gilt")
     bead, count = scene.ball(0.008, 8), scene.segments(44)
-    model.add(bead, "Gilt", f"-0.46..0.46*{count} ±0.58 0.034")
-    model.add(bead, "Gilt", f"±0.49 -0.55..0.55*{count} 0.034")
+    model.add(bead, "Gilt", lattice(x=evenly(-0.46, 0.46, count), y=(-0.58, 0.58), z=0.034))
+    model.add(bead, "Gilt", lattice(x=(-0.49, 0.49), y=evenly(-0.55, 0.55, count), z=0.034))
     crest = circle(0.2, scene.segments(24, 8), np.radians(20), np.radians(160)) * (1.6, 0.6)
     model.add(prism(crest, 0.03), "Gilt", (0, 0.595, 0.012))
     k = np.arange(12)
@@ -112,25 +348,24 @@ def mirrors(scene: Scene) -> None:
     spiral += xyz(0.10, 0.67, 0.045)
     for side in (-1, 1):
         model.add(scene.bend(spiral * (side, 1, 1), 0.008, 30), "Gilt")
-    put(model.mesh("Station mirror"), "on left -2..2*3 0.012 1.62")
+    put(
+        model.mesh("Station mirror"),
+        [hanging("left", along=y, away=0.012, z=1.62) for y in STATIONS],
+    )
 
 
 def station_goods(scene: Scene, bottles: Goods, pots: Goods) -> None:
     """The tools, bottles and pots of the three stations."""
     random = scene.random("station goods")
-    tools = {name: Model(scene, parts).mesh(name) for name, _, parts in drawings(TOOLS)}
-    model, s = Model(scene, CLIPPERS), np.linspace(0, 1, scene.segments(140, 16))
-    cord = xyz(0.012 * np.cos(70 * s) + 0.1 * s, -0.08 - 0.13 * s, 0.014 + 0.01 * np.sin(70 * s))
-    model.add(scene.tube(cord, 0.0022, 5), "Black")
-    clippers = model.mesh("Clippers")
-    kit = [tools["Scissors"], comb(scene, "Black"), comb(scene, "Oak"), hair_brush(scene)]
-    kit += [tools["Razor"], tools["Scissors"]]
+    cutter, clipper, dryer = scissors(scene), clippers(scene), hair_dryer(scene)
+    kit = [cutter, comb(scene, "Black"), comb(scene, "Oak"), hair_brush(scene)]
+    kit += [razor(scene), cutter]
     for y in STATIONS:
-        where = spots(f"left {y} 0 {COUNTER_TOP}")[0]
+        where = against("left", along=y, z=COUNTER_TOP)
         for k, tool in enumerate(kit):
             put(tool, where, (0.33 + 0.045 * k, 0.26, 0.0065), (0, 0, random.uniform(-7, 7)))
-        put(clippers, where, (-0.36, 0.27, 0), (0, 0, random.uniform(-15, 15)))
-        put(tools["Hair dryer"], where, (-0.52, 0.28, 0), (0, 0, random.uniform(60, 85)))
+        put(clipper, where, (-0.36, 0.27, 0), (0, 0, random.uniform(-15, 15)))
+        put(dryer, where, (-0.52, 0.28, 0), (0, 0, random.uniform(60, 85)))
         for x, some in ((-0.42, bottles[:9]), (0.42, bottles[9:])):
             strip = where @ transform((x, 0.04, 0))
             stock(scene, random, [*pots, *some], strip, 0.42, 0.14)
@@ -143,10 +378,10 @@ def racks(scene: Scene, bottles: Goods, pots: Goods) -> None:
     rolled = [rolled_towel(scene, towel) for towel in TOWELS[:2]]
     for y in (-3, -1, 1, 3):
         for z, goods in ((1.24, 1), (1.58, 1), (1.92, 1), (2.26, 0)):
-            rack = f"left {y} 0.012 {z}"
+            rack = against("left", along=y, away=0.012, z=z)
             put(board, rack)
             stock(scene, random, [*bottles, *pots] if goods else bottles, rack, 0.54, 0.125)
-        side = f"left {y} 0.04 {COUNTER_TOP}"
+        side = against("left", along=y, away=0.04, z=COUNTER_TOP)
         stock(scene, random, pots, side, 0.72, 0.14)
         for k in range(3):
             turn = (0, 0, random.uniform(-4, 4))
@@ -160,4 +395,4 @@ def racks(scene: Scene, bottles: Goods, pots: Goods) -> None:
     draped = sheet(xyz(x, y, 0.022 * np.cos(bow) - np.maximum(np.abs(s) - 0.0345, 0)))
     for along, color in ((-1, "red"), (1, "blue")):
         towel = scene.mesh(f"Draped {color} towel", draped, f"{color.capitalize()} towel")
-        put(towel, f"left {along} 0.5 0.706")
+        put(towel, against("left", along=along, away=0.5, z=0.706))

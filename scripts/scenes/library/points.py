@@ -1,5 +1,6 @@
 """Points as numpy arrays, read from text or made of coordinates; outlines, paths, and noise."""
 
+from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
@@ -32,6 +33,25 @@ def _values(text: str) -> list[float]:
         ends, count = text.split("*")
         return np.linspace(*map(float, ends.split("..")), int(count)).tolist()
     return [float(text)]
+
+
+def evenly(start: float, stop: float, count: int) -> list[float]:
+    """Values from start to stop, both included, at even steps."""
+    return np.linspace(start, stop, count).tolist()
+
+
+def lattice(
+    x: float | Sequence[float] = 0.0,
+    y: float | Sequence[float] = 0.0,
+    z: float | Sequence[float] = 0.0,
+) -> Array:
+    """Places (n, 3) at all combinations of the coordinates, each one value or several."""
+    return np.array(list(product(*(np.atleast_1d(values).tolist() for values in (x, y, z)))))
+
+
+def mirrored(x: float, y: float = 0.0, z: float = 0.0) -> Array:
+    """Two places (2, 3), left and right of the plane x = 0."""
+    return lattice((-x, x), y, z)
 
 
 def xyz(x: ArrayLike, y: ArrayLike, z: ArrayLike = 0.0) -> Array:

@@ -4,7 +4,7 @@ import re
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import bpy
 import numpy as np
@@ -142,8 +142,23 @@ def animate(owner: bpy.types.bpy_struct, path: str, per_frame: float, index: int
             key.interpolation = "LINEAR"
 
 
+class Placement(TypedDict, total=False):
+    """Where a part of a model is; each key may be left out.
+
+    at: a place (3,), or places (n, 3) of n copies. turned: XYZ Euler angles in degrees. scaled: one
+    factor, or one for each axis. A part is scaled first, then turned, then moved.
+    """
+
+    at: Points
+    turned: Sequence[float]
+    scaled: float | Sequence[float]
+
+
 class Model:
-    """Shapes, each with the name of its material, that become one mesh."""
+    """Shapes, each with the name of its material, that become one mesh.
+
+    Lengths are in metres. The scene's detail sets how many segments a round part has.
+    """
 
     def __init__(self, scene: Scene, parts: str = "") -> None:
         """A model that is empty, or of the parts that a text lists (see `draw`)."""
@@ -169,6 +184,95 @@ class Model:
         painted = shape.painted(self.materials.index(material))
         for where in np.atleast_2d(points(at)):
             self.parts.append(painted.transformed(transform(where, np.radians(degrees), scale)))
+
+    def box(
+        self,
+        *,
+        size: Sequence[float],
+        material: str,
+        bevel: float = 0.0,
+        segments: int = 1,
+        **placement: Unpack[Placement],
+    ) -> None:
+        """Add a box of a size (3,) about the origin; `segments` round its bevelled edges."""
+        self._put(box(tuple(size), bevel, segments), material, placement)
+
+    def ball(self, *, radius: float, material: str, **placement: Unpack[Placement]) -> None:
+        """Add a ball about the origin."""
+        self._put(self.scene.ball(radius, _segments(radius)), material, placement)
+
+    def ring(
+        self, *, radius: float, thickness: float, material: str, **placement: Unpack[Placement]
+    ) -> None:
+        """Add a torus about Z: the radius of its middle, and `thickness`, its tube's radius."""
+        ring = self.scene.ring(radius, thickness, _segments(radius))
+        self._put(ring, material, placement)
+
+    def lathe(self, *, profile: Points, material: str, **placement: Unpack[Placement]) -> None:
+        """Add a solid of revolution about Z; profile (n, 2) is radius and height, upwards."""
+        radius = points(profile)[:, 0].max()
+        self._put(self.scene.lathe(profile, _segments(radius)), material, placement)
+
+    def pipe(self, *, profile: Points, material: str, **placement: Unpack[Placement]) -> None:
+        """Add what `lathe` does, but open at both ends."""
+        radius = points(profile)[:, 0].max()
+        pipe = self.scene.lathe(profile, _segments(radius), capped=False)
+        self._put(pipe, material, placement)
+
+    def tube(
+        self, *, radius: float, path: Points, material: str, **placement: Unpack[Placement]
+    ) -> None:
+        """Add a tube along straight lines through the places (n, 3) of a path."""
+        self._put(self.scene.tube(path, radius, _sides(radius)), material, placement)
+
+    def bend(
+        self, *, radius: float, path: Points, material: str, **placement: Unpack[Placement]
+    ) -> None:
+        """Add a tube along a smooth curve through the places (n, 3) of a path."""
+        steps = 7 * (len(points(path)) - 1)
+        self._put(self.scene.bend(path, radius, steps, _sides(radius)), material, placement)
+
+    def prism(
+        self, *, outline: Points, height: float, material: str, **placement: Unpack[Placement]
+    ) -> None:
+        """Add an outline (n, 2), counter-clockwise in x and y, extruded upwards from z = 0."""
+        self._put(prism(outline, height), material, placement)
+
+    def frame(
+        self,
+        *,
+        size: tuple[float, float],
+        profile: Points,
+        material: str,
+        **placement: Unpack[Placement],
+    ) -> None:
+        """Add a flat mitred frame round an opening of a size (see `architecture.frame`)."""
+        self._put(frame(*size, profile), material, placement)
+
+    def plane(
+        self, *, size: tuple[float, float], material: str, **placement: Unpack[Placement]
+    ) -> None:
+        """Add a rectangle about the origin that faces +Z."""
+        corners = rectangle(*size)[[0, 1, 3, 2]]
+        self._put(sheet(xyz(*corners.T).reshape(2, 2, 3)), material, placement)
+
+    def word(
+        self,
+        *,
+        letters: str,
+        size: float,
+        depth: float,
+        material: str,
+        **placement: Unpack[Placement],
+    ) -> None:
+        """Add flat letters about the origin, `size` high and `depth` thick, that face +Z."""
+        word = lettering(letters, depth).scaled(size, size, 1)
+        self._put(word, material, placement)
+
+    def _put(self, shape: Shape, material: str, placement: Placement) -> None:
+        at = placement.get("at", (0, 0, 0))
+        turned = placement.get("turned", (0, 0, 0))
+        self.add(shape, material, at, turned, placement.get("scaled", 1.0))
 
     def draw(self, parts: str) -> None:
         """Add parts that a text lists, a semicolon or the line's end after each.
@@ -236,3 +340,8 @@ class Model:
 def _segments(radius: float) -> float:
     """Segments of something round at detail 1: 16 for 2 cm, 37 for 20 cm."""
     return 6 + 70 * radius**0.5
+
+
+def _sides(radius: float) -> float:
+    """Sides of a tube at detail 1: 8 for 5 mm, 12 for 2 cm."""
+    return 4 + 60 * radius**0.5
