@@ -35,8 +35,11 @@ if Path("config.yaml").exists() and Path.cwd() != FOLDER:
     configfile: "config.yaml"
 
 
-# Snakemake reads no file for a module that is given its configuration, and takes 12:30 for 750.
-for written in (read_config(FOLDER / "config.yaml"), OWN):
+# Snakemake reads no file for a module that is given its configuration, and takes 12:30 for 750. So
+# our own reading replaces its own, and adds the defaults that it did not read.
+DEFAULTS = read_config(FOLDER / "config.yaml")
+OWN_READ = {key: value for key, value in OWN.items() if key in config}
+for written in (DEFAULTS, OWN_READ):
     as_written(
         config, {key: value for key, value in written.items() if key not in GIVEN}
     )
