@@ -506,6 +506,33 @@ def test_a_file_that_its_consumer_cannot_open_is_named(name, kind, file, dataset
 
 
 @pytest.mark.parametrize(
+    ("name", "kind", "file", "keys", "said"),
+    [
+        ("wide", "nerfstudio", "transforms.json", FRAME, "transforms.json: frames[3]: "),
+        ("split", "nerfstudio", "transforms.json", (*FRAME, 1, 1), "transforms.json: frames[3]: "),
+        ("half", "opendibr", "cameras.json", (*CAMERA, "Position"), "cameras.json: cameras[4]: "),
+        ("half", "miv", "sequence.json", (*CAMERA, "Rotation"), "sequence.json: cameras[4]: "),
+    ],
+)
+def test_a_view_without_the_numbers_that_it_needs_is_named(name, kind, file, keys, said, dataset):
+    path = home(dataset, name) / "exports" / kind / file
+    right = path.read_bytes()
+    content = json.loads(right)
+    *parents, last = keys
+    parent = content
+    for key in parents:
+        parent = parent[key]
+    for value in ([1, 2], None, "many", float("nan")):
+        parent[last] = value
+        path.write_text(json.dumps(content))
+        try:
+            found = problems(dataset, name, kind)
+        finally:
+            path.write_bytes(right)
+        assert any(said in line for line in found), found
+
+
+@pytest.mark.parametrize(
     ("name", "kind", "file", "old", "new", "said"),
     [
         ("perspective", "instant_ngp", "", "view_0003f.exr", "view_0002f.exr", "lacks view_0003f"),

@@ -55,7 +55,7 @@ class Expected:
         self.dataset = dataset
         self.image_set = image_set
         self.path = f"{image_set.prefix}{NAME}"
-        self.own = image_set.numbers
+        self.numbers = image_set.numbers
 
     @cached_property
     def others(self) -> dict[str, View]:
@@ -88,7 +88,7 @@ class Expected:
     @cached_property
     def parts(self) -> Mapping[str, set[str]]:
         """The names of the views of each part: by the scene's split, or every eighth to test."""
-        views = dict(zip(self.own, self.image_set.lightfield.views, strict=True))
+        views = dict(zip(self.numbers, self.image_set.lightfield.views, strict=True))
         if self.has_split:
             views |= self.others
             parts = {
@@ -109,8 +109,8 @@ class Expected:
 
     def view(self, name: str) -> View | None:
         """Return the view of a name that an export has; None if it is not here."""
-        if name in self.own:
-            return self.image_set.lightfield.views[self.own[name]]
+        if name in self.numbers:
+            return self.image_set.lightfield.views[self.numbers[name]]
         return self.others.get(name)
 
 
@@ -267,8 +267,8 @@ def _name_faults(exported: Exported, expected: Expected) -> Iterator[str]:
     """Yield the views that a file lacks, has twice, or that it must not have."""
     first = exported.views[0]
     if first.name is None:
-        if len(exported.views) != len(expected.own):
-            counts = f"{len(exported.views)} views, but {expected.path} {len(expected.own)}"
+        if len(exported.views) != len(expected.numbers):
+            counts = f"{len(exported.views)} views, but {expected.path} {len(expected.numbers)}"
             yield f"{first.file}: has {counts}"
         return
     names = [view.name or "" for view in exported.views]
@@ -277,7 +277,7 @@ def _name_faults(exported: Exported, expected: Expected) -> Iterator[str]:
             yield f"{part.place}: has {name}, which is none of its views"
     # The lists of NeRF's synthetic scenes are compared as parts of the split.
     if all(view.file == first.file for view in exported.views):
-        wanted = set(expected.own)
+        wanted = set(expected.numbers)
         if exported.views_of and expected.has_split:
             wanted = wanted & expected.parts[exported.views_of]
         yield from _different_names(str(first.file), names, wanted, expected)
@@ -293,7 +293,7 @@ def _different_names(
     for name in sorted(set(wanted).difference(names)):
         yield f"{place}: lacks {name} of {expected.path}"
     for name in sorted(set(names).difference(wanted)):
-        if name in expected.own:
+        if name in expected.numbers:
             yield f"{place}: has {name}, which is for something else by {expected.path}"
         elif expected.view(name) is None and not expected.lacks_rigs:
             yield f"{place}: has {name}, but {expected.path} has no such view"

@@ -179,7 +179,7 @@ def _binary_cameras(path: Path) -> dict[int, Camera]:
     for _ in range(struct.unpack_from("<Q", content)[0]):
         number, model, width, height = struct.unpack_from("<iiQQ", content, place)
         if model not in MODELS:
-            raise ValueError(f"camera {number}: its model is {model}, not {[*MODELS]}")
+            raise ValueError(f"camera {number}: its model is {model}, not 1 or 5")
         count = MODELS[model][2]
         parameters = numbers(np.frombuffer(content, "<f8", count, place + 24), (count,))
         cameras[number] = _camera(model, width, height, parameters)
@@ -231,43 +231,52 @@ def _require_end(content: bytes, place: int) -> None:
 # ---- text -----------------------------------------------------------------------------------
 
 
-def _lines(path: Path) -> Iterator[str]:
+def _lines(path: Path) -> Iterator[tuple[str, str]]:
+    """Yield where each line stands, and the line; comments are left out."""
     with path.open(encoding="utf-8") as file:
-        yield from (line for line in file if not line.startswith("#"))
+        for number, line in enumerate(file, 1):
+            if not line.startswith("#"):
+                yield f"{path}: line {number}", line
 
 
 def _text_cameras(path: Path) -> dict[int, Camera]:
     cameras = {}
-    for line in _lines(path):
-        number, model, width, height, *parameters = line.split()
-        if model not in NAMES:
-            raise ValueError(f"camera {number}: its model is {model}, not {[*NAMES]}")
-        cameras[int(number)] = _camera(
-            NAMES[model], int(width), int(height), from_texts(parameters)
-        )
+    for place, line in _lines(path):
+        with reading(place, "camera"):
+            number, model, width, height, *parameters = line.split()
+            if model not in NAMES:
+                raise ValueError(f"its model is {model}, not {' or '.join(NAMES)}")
+            cameras[int(number)] = _camera(
+                NAMES[model], int(width), int(height), from_texts(parameters)
+            )
     return cameras
 
 
 def _text_images(path: Path) -> list[Image]:
     images = []
     lines = _lines(path)
-    for line in lines:
-        number, *texts, camera, name = line.split()
-        pose = numbers(from_texts(texts), (7,))
-        seen = np.array(next(lines).split(), np.float64).reshape(-1, 3)
-        turn = _turn(pose[:4])
-        points = _whole(seen[:, 2])
-        images.append(Image(int(number), name, int(camera), turn, pose[4:], seen[:, :2], points))
+    for place, line in lines:
+        with reading(place, "image"):
+            number, *texts, camera, name = line.split()
+            pose = numbers(from_texts(texts), (7,))
+            turn = _turn(pose[:4])
+            _, body = next(lines, ("", ""))
+            seen = np.array(body.split(), np.float64).reshape(-1, 3)
+            points_seen = _whole(seen[:, 2])
+            images.append(
+                Image(int(number), name, int(camera), turn, pose[4:], seen[:, :2], points_seen)
+            )
     return images
 
 
 def _text_points(path: Path) -> Points:
     heads = []
     tracks = [np.empty((0, 2), np.int64)]
-    for line in _lines(path):
-        number, x, y, z, _, _, _, error, *track = line.split()
-        heads.append((int(number), *map(float, (x, y, z, error)), len(track) // 2))
-        tracks.append(np.array(track, np.int64).reshape(-1, 2))
+    for place, line in _lines(path):
+        with reading(place, "point"):
+            number, x, y, z, _, _, _, error, *track = line.split()
+            heads.append((int(number), *map(float, (x, y, z, error)), len(track) // 2))
+            tracks.append(np.array(track, np.int64).reshape(-1, 2))
     return _points(heads, np.concatenate(tracks))
 
 

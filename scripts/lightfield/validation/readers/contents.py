@@ -1,5 +1,6 @@
 """What an export says of a dataset, in the axes and metres of lightfield.json."""
 
+import math
 import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -144,27 +145,27 @@ def same(found: Any, expected: Any) -> bool:
     if expected is None or isinstance(expected, str | bytes | bool):
         return type(found) is type(expected) and bool(found == expected)
     try:
-        one, other = np.array(found, np.float64), np.array(expected, np.float64)
+        right = np.array(expected, np.float64)
+        difference = numbers(found, right.shape) - right
     except (TypeError, ValueError, OverflowError):
         return False
-    if one.shape != other.shape:
-        return False
-    limit = FLOAT32 * np.abs(other).max(initial=0)
-    return bool((np.abs(one - other) <= limit).all())
+    return bool((np.abs(difference) <= FLOAT32 * np.abs(right).max(initial=0)).all())
 
 
 def numbers(value: ArrayLike, shape: tuple[int, ...] = ()) -> Floats:
     """Return finite numbers as an array of a shape; raises ValueError for anything else."""
     array = np.array(value)
     if array.shape != shape or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
-        size = " × ".join(map(str, shape)) or "one"
-        raise ValueError(f"must be {size} finite numbers, not {value!r}")
+        size = " × ".join(map(str, shape))
+        raise ValueError(f"must be {size} finite numbers")
     return array.astype(np.float64)
 
 
 def number(value: Any) -> float:
     """Return a finite number; raises ValueError for anything else."""
-    return float(numbers(value))
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError(f"must be a finite number, not {value!r}")
+    return float(value)
 
 
 def from_texts(texts: Sequence[str]) -> Floats:
@@ -173,15 +174,15 @@ def from_texts(texts: Sequence[str]) -> Floats:
 
 
 @contextmanager
-def reading(path: Path, kind: str) -> Iterator[None]:
-    """Turn whatever keeps a file from being read as its ``kind`` into a `UserError`."""
+def reading(place: Path | str, kind: str) -> Iterator[None]:
+    """Turn whatever keeps a file, or a place in one, from being its ``kind`` into a `UserError`."""
     try:
         yield
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {error.strerror}") from None
+        raise UserError(f"{place}: cannot be read: {error.strerror}") from None
     except KeyError as error:
-        raise UserError(f"{path}: {error.args[0]}: is missing") from None
+        raise UserError(f"{place}: {error.args[0]}: is missing") from None
     except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
-        raise UserError(f"{path}: is no {kind}: {error}") from None
+        raise UserError(f"{place}: is no {kind}: {error}") from None
     except struct.error:
-        raise UserError(f"{path}: is no {kind}: it is cut short") from None
+        raise UserError(f"{place}: is no {kind}: it is cut short") from None

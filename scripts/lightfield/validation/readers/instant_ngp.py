@@ -40,12 +40,13 @@ def read(path: Path) -> Exported:
         from_loader[:3, :3] = WORLD.T
         for index, frame in enumerate(content["frames"]):
             place = f"frames[{index}]"
-            matrix = from_loader @ numbers(frame["transform_matrix"], (4, 4))
-            name = Path(str(frame["file_path"])).stem
-            exported.views.append(ExportedView(path, place, name, matrix))
-            if "depth_path" in frame:
-                picture = path.parent / str(frame["depth_path"])
-                exported.expect_picture(f"{path}: {place}: depth_path", picture, name, "{}.png")
+            with reading(f"{path}: {place}", "frame"):
+                matrix = from_loader @ numbers(frame["transform_matrix"], (4, 4))
+                name = Path(str(frame["file_path"])).stem
+                exported.views.append(ExportedView(path, place, name, matrix))
+                if "depth_path" in frame:
+                    picture = path.parent / str(frame["depth_path"])
+                    exported.expect_picture(f"{path}: {place}: depth_path", picture, name, "{}.png")
         options = dict(content["options"])
         _compare_options(path, content, options, exported)
         is_given = options["scale"] is not None

@@ -40,12 +40,13 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
         exported.expect(f"{path}: lengthsInMeters", content["lengthsInMeters"], True)
         for index, camera in enumerate(content["cameras"]):
             place = f"cameras[{index}]"
-            where = f"{path}: {place} ({names[index]})"
-            exported.views.append(ExportedView(path, place, names[index], _matrix(camera)))
-            exported.cameras.append(ExportedCamera(where, lens_of(camera)))
-            exported.ranges.append(depth_range_of(where, names[index], camera))
-            exported.expect(f"{where}: HasInvalidDepth", camera["HasInvalidDepth"], True)
-            _check_videos(where, listing.parent, camera, content["Frames_number"], exported)
+            with reading(f"{path}: {place}", "camera"):
+                where = f"{path}: {place} ({names[index]})"
+                exported.views.append(ExportedView(path, place, names[index], _matrix(camera)))
+                exported.cameras.append(ExportedCamera(where, lens_of(camera)))
+                exported.ranges.append(depth_range_of(where, names[index], camera))
+                exported.expect(f"{where}: HasInvalidDepth", camera["HasInvalidDepth"], True)
+                _check_videos(where, listing.parent, camera, content["Frames_number"], exported)
         middle = np.mean([view.matrix[:3, 3] for view in exported.views], axis=0)
         center = content["BoundingBox_center"]
         exported.expect(f"{path}: BoundingBox_center", center, middle.tolist())

@@ -35,10 +35,12 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
             exported.cameras.append(ExportedCamera(f"{path}: camera_angle_x", camera))
             for index, frame in enumerate(content["frames"]):
                 place = f"frames[{index}]"
-                picture = listing.parent / f"{frame['file_path']}.png"
-                names.append(picture.stem)
-                exported.expect_picture(f"{path}: {place}: file_path", picture, names[-1], "{}.png")
-                matrix = numbers(frame["transform_matrix"], (4, 4))
-                exported.views.append(ExportedView(path, place, names[-1], matrix))
+                with reading(f"{path}: {place}", "frame"):
+                    picture = listing.parent / f"{frame['file_path']}.png"
+                    view = picture.stem
+                    names.append(view)
+                    exported.expect_picture(f"{path}: {place}: file_path", picture, view, "{}.png")
+                    matrix = numbers(frame["transform_matrix"], (4, 4))
+                    exported.views.append(ExportedView(path, place, view, matrix))
         exported.parts.append(Part(str(path), name, names))
     return exported

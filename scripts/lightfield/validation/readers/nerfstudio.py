@@ -39,13 +39,14 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
         frames = content["frames"]
         for index, frame in enumerate(frames):
             place = f"frames[{index}]"
-            name = Path(str(frame["file_path"])).stem
-            matrix = undone @ numbers(frame["transform_matrix"], (4, 4))
-            exported.views.append(ExportedView(path, place, name, matrix))
-            for key in ("file_path", "mask_path", "depth_file_path"):
-                if key in frame:
-                    picture = folder / str(frame[key])
-                    exported.expect_picture(f"{path}: {place}: {key}", picture, name, "{}.png")
+            with reading(f"{path}: {place}", "frame"):
+                name = Path(str(frame["file_path"])).stem
+                matrix = undone @ numbers(frame["transform_matrix"], (4, 4))
+                exported.views.append(ExportedView(path, place, name, matrix))
+                for key in ("file_path", "mask_path", "depth_file_path"):
+                    if key in frame:
+                        picture = folder / str(frame[key])
+                        exported.expect_picture(f"{path}: {place}: {key}", picture, name, "{}.png")
         for key, all_or_none in (("mask_path", None), ("depth_file_path", options["depth"])):
             count = sum(key in frame for frame in frames)
             wanted = bool(count) if all_or_none is None else all_or_none

@@ -29,30 +29,40 @@ PICTURES = {"png": (".png", 8, 16), "h265": (".mp4", 10, 12)}
 
 def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Exported:
     """Read the cameras.json of an export."""
-    folder = listing.parent
-    path = folder / "cameras.json"
+    path = listing.parent / "cameras.json"
     exported = Exported()
     with reading(path, "list of OpenDIBR's cameras"):
         content = read_json(path)
         exported.expect(f"{path}: Axial_system", content["Axial_system"], "OPENGL")
-        suffix, colour_bits, depth_bits = PICTURES[options["format"]]
+        pictures = PICTURES[options["format"]]
         viewport, *cameras = content["cameras"]
         for index, camera in enumerate(cameras, 1):
-            place = f"cameras[{index}]"
-            name = str(camera["NameColor"]).removesuffix(f"_texture{suffix}")
-            for key, kind in (("NameColor", "texture"), ("NameDepth", "depth")):
-                picture = folder / str(camera[key])
-                exported.expect_picture(
-                    f"{path}: {place}: {key}", picture, name, f"{{}}_{kind}{suffix}"
-                )
-            for key, bits in (("BitDepthColor", colour_bits), ("BitDepthDepth", depth_bits)):
-                exported.expect(f"{path}: {place} ({name}): {key}", camera[key], bits)
-            where = f"{path}: {place} ({name})"
-            exported.views.append(ExportedView(path, place, name, _matrix(camera)))
-            exported.cameras.append(ExportedCamera(where, lens_of(camera)))
-            exported.ranges.append(depth_range_of(where, name, camera))
-        _check_viewport(f"{path}: cameras[0]", viewport, exported)
+            with reading(f"{path}: cameras[{index}]", "camera"):
+                _read_camera(path, f"cameras[{index}]", camera, pictures, exported)
+        with reading(f"{path}: cameras[0]", "camera"):
+            _check_viewport(f"{path}: cameras[0]", viewport, exported)
     return exported
+
+
+def _read_camera(
+    path: Path,
+    place: str,
+    camera: dict[str, Any],
+    pictures: tuple[str, int, int],
+    exported: Exported,
+) -> None:
+    """Read a view's camera, with the suffix and the bits of colour and depth of its pictures."""
+    suffix, colour_bits, depth_bits = pictures
+    name = str(camera["NameColor"]).removesuffix(f"_texture{suffix}")
+    for key, kind in (("NameColor", "texture"), ("NameDepth", "depth")):
+        picture = path.parent / str(camera[key])
+        exported.expect_picture(f"{path}: {place}: {key}", picture, name, f"{{}}_{kind}{suffix}")
+    where = f"{path}: {place} ({name})"
+    for key, bits in (("BitDepthColor", colour_bits), ("BitDepthDepth", depth_bits)):
+        exported.expect(f"{where}: {key}", camera[key], bits)
+    exported.views.append(ExportedView(path, place, name, _matrix(camera)))
+    exported.cameras.append(ExportedCamera(where, lens_of(camera)))
+    exported.ranges.append(depth_range_of(where, name, camera))
 
 
 def _matrix(camera: dict[str, Any]) -> Floats:

@@ -21,9 +21,10 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
         if header != HEADER:
             raise ValueError(f"its first row is not {','.join(HEADER)}")
         for index, (name, *texts) in enumerate(rows, 2):
-            values = from_texts(texts)
-            matrix = np.eye(4)
-            matrix[:3, :3] = euler_to_matrix(values[3:6])
-            matrix[:3, 3] = values[:3]
+            with reading(f"{path}: row {index}", "pose"):
+                values = from_texts(texts)
+                matrix = np.eye(4)
+                matrix[:3, :3] = euler_to_matrix(values[3:6])
+                matrix[:3, 3] = values[:3]
             exported.views.append(ExportedView(path, f"row {index}", name, matrix))
     return exported
