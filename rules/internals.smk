@@ -2,6 +2,7 @@
 # each piece says why.
 import inspect
 
+from snakemake.io import _IOFile
 from snakemake_interface_executor_plugins.executors.base import SubmittedJobInfo
 
 from lightfield.core import processors
@@ -73,6 +74,19 @@ def rerun(outputs):
     --forcerun is the public way, but what it names becomes a target, too.
     """
     workflow.dag.forcefiles.update(map(stored, outputs))
+
+
+def take_as_missing(is_damaged):
+    """Have Snakemake take damaged files as missing: they are set aside before the first job.
+
+    It refuses to plan with a link that leads nowhere, or to replace a file without permissions.
+    """
+    exists_local = _IOFile.exists_local
+
+    async def exists_and_is_sound(file):
+        return not is_damaged(unstored(file)) and await exists_local(file)
+
+    _IOFile.exists_local = exists_and_is_sound
 
 
 def is_ancient(file):

@@ -3,7 +3,13 @@ import logging
 
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from lightfield.core.files import read_json, set_aside, sha256, write_json_if_changed
+from lightfield.core.files import (
+    read_json,
+    set_aside,
+    sha256,
+    unreadable,
+    write_json_if_changed,
+)
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
 
 # What shards of other bounds have made is nobody's any more.
@@ -29,8 +35,10 @@ def settings_file(path, content):
     try:
         if STORE:
             store_settings(path, content)
-        elif write_json_if_changed(Path(path), content):
-            restore_time(path)
+        else:
+            clear_folder(path)
+            if write_json_if_changed(Path(path), content):
+                restore_time(path)
     except UserError as error:
         sys.exit(f"error: {error}")
     return path
@@ -46,6 +54,12 @@ def store_settings(path, content):
     changed = write_json_if_changed(Path(path), content)
     if IS_MAIN_PROCESS and (changed or not in_storage):
         store.send(path)
+
+
+def clear_folder(path):
+    """Move a folder aside that lies where a file is to be written."""
+    if os.path.isdir(path):
+        set_aside(Path(path), Path(REMOVED))
 
 
 def restore_time(path):
@@ -83,6 +97,7 @@ def scene_settings_of(stage, content):
 
 # By the path of each damaged file: what is wrong with it, and the outputs of the jobs that mend it.
 DAMAGED = {}
+take_as_missing(DAMAGED.__contains__)
 
 
 @cache
@@ -118,13 +133,22 @@ def is_outdated(path):
 
 
 def damage_to_mend():
-    """Return what is wrong with the damaged files that this run makes again, by path."""
-    made = {unstored(file) for job in needed_jobs() for file in job.output}
-    return {
+    """Return what is wrong with the damaged files that this run makes again, by path.
+
+    Among them are the ledger, and each job's log and benchmark, where they cannot be written.
+    """
+    jobs = needed_jobs()
+    made = {unstored(file) for job in jobs for file in job.output}
+    damage = {
         path: problem
-        for path, (problem, outputs) in sorted(DAMAGED.items())
+        for path, (problem, outputs) in DAMAGED.items()
         if not made.isdisjoint(outputs)
     }
+    written = [file for job in jobs for file in (*job.log, job.benchmark) if file]
+    for path in (LEDGER, *written):
+        if problem := unreadable(path):
+            damage[str(path)] = problem
+    return dict(sorted(damage.items()))
 
 
 def announce_damage():
@@ -138,6 +162,7 @@ def set_damage_aside():
     for path in damage_to_mend():
         if os.path.lexists(path):
             set_aside(Path(path), Path(REMOVED))
+        DAMAGED.pop(path, None)
 
 
 def listed_files(job):

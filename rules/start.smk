@@ -115,6 +115,7 @@ def keep_shards():
     datasets = {d.name: d for d in (dataset_of(job.wildcards) for job in jobs)}
     counts = {name: (d.view_count, len(d.shards)) for name, d in datasets.items()}
     if counts:
+        clear_folder(SHARDS)
         shard_counts.note(WORK, counts)
         if STORE:
             ViewStore(STORE).send(SHARDS)

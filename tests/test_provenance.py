@@ -12,7 +12,7 @@ import subprocess
 import sys
 
 import pytest
-from checkouts import assert_same_bytes, checkout, planned, rendered, snakemake
+from checkouts import checkout, planned, snakemake
 
 pytestmark = pytest.mark.slow
 CUBOID = "LFCuboid_1x1x1"
@@ -225,44 +225,3 @@ def test_damage_gets_no_checksum_of_its_own(folder):
     (failed,) = [check for check in result["checks"] if check["name"] == "checksums"]
     assert not result["valid"]
     assert failed["problems"][0].startswith("perspective/transforms.json: has the sha256 ")
-
-
-FAULTS = {
-    "a digit of a transforms.json": "results/smoke/{}/perspective/transforms.json",
-    "a lens map": "work/smoke/{}/perspective/lens_map.npy",
-    "a record": "work/smoke/{}/render/0-6.json",
-    "a reprojected lightfield.json": "results/smoke/{}/perspective/lightfield.json",
-    "an export's list": "results/smoke/{}/perspective_hdr/exports/colmap/export.json",
-    "an export's picture": "results/smoke/{}/perspective_hdr/exports/colmap/images/view_r0000f.png",
-    "the panorama": "work/smoke/{}/panorama/exr/view_0000f.exr",
-    "a view": "results/smoke/{}/exr/view_b0000f.exr",
-    "the splits": "results/smoke/splits.json",
-    "the scene": "work/smoke/scene.blend",
-    "the page": "results/smoke/{}/report/index.html",
-}
-
-
-def test_one_plain_run_mends_all_damage_that_has_another_time(smoke, folder):
-    for name in FAULTS.values():
-        path = folder / name.format(CUBOID)
-        content = bytearray(path.read_bytes())
-        content[len(content) // 2] ^= 1
-        status = path.stat()
-        path.write_bytes(content)
-        # Programs can set this time back, but not the one at which a file was changed.
-        os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
-    images = [folder / f"results/smoke/{CUBOID}/perspective/view_{side}0000f.png" for side in "lr"]
-    one, other = (path.read_bytes() for path in images)
-    images[0].write_bytes(other)
-    images[1].write_bytes(one)
-    before = rendered(folder)
-    result = snakemake(folder, "--cores", "2", "smoke")
-    assert result.returncode == 0, result.stderr
-    for name in FAULTS.values():
-        assert f"{name.format(CUBOID)}: " in result.stderr
-    assert (rendered(folder) - before).keys() == {
-        (folder / f"work/smoke/{CUBOID}/render", "view_b0000f")
-    }
-    assert_same_bytes(smoke, folder)
-    again = snakemake(folder, "--dry-run", "smoke")
-    assert "Nothing to be done" in again.stdout + again.stderr

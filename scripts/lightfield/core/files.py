@@ -154,13 +154,24 @@ def read_json_lines(path: Path) -> list[dict[str, Any]]:
     return entries
 
 
+def unreadable(path: Path | str) -> str | None:
+    """Say why what lies at a path cannot be read as a file; None if it can, or nothing is there."""
+    if os.path.isdir(path):  # noqa: PTH112, a `Path` for each of a hundred thousand is slow
+        return "is a folder"
+    if os.path.lexists(path) and not os.access(path, os.R_OK):
+        if not os.path.exists(path):  # noqa: PTH110
+            return "is a link that leads to no file"
+        return "cannot be read: Permission denied"
+    return None
+
+
 def broken(path: Path) -> str | None:
     """Say what is wrong with a file that a program wrote; None if nothing is, or it is not there.
 
     Every JSON of a dataset is a mapping.
     """
-    if path.is_dir():
-        return "is a folder"
+    if (problem := unreadable(path)) is not None:
+        return problem
     try:
         if not path.stat().st_size:
             return "is empty"

@@ -12,7 +12,7 @@ from statistics import fmean
 from typing import Any, Literal, Self
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys
+from lightfield.core.files import read_keys, unreadable
 from lightfield.dataset import (
     blend,
     config,
@@ -443,17 +443,13 @@ class Dataset:
         return False
 
     def broken(self) -> Iterator[tuple[str, str]]:
-        """Yield each view and journal that is no file at all, and what it is."""
+        """Yield each view and journal that cannot be read as a file, and why."""
         views = (view for name in self.image_folders for view in _entries(self.folder, name))
         journals = (journal for stage in self.stages for journal in _entries(self.work, stage))
         for entry in (*views, *journals):
-            if not entry.name.endswith((".exr", ".png", ".jsonl")):
-                continue
-            if entry.is_symlink():
-                if not Path(entry.path).exists():
-                    yield entry.path, "is a link that leads to no file"
-            elif entry.is_dir():
-                yield entry.path, "is a folder"
+            is_own = entry.name.endswith((".exr", ".png", ".jsonl"))
+            if is_own and (problem := unreadable(entry.path)):
+                yield entry.path, problem
 
     def external_changed(self, store: ViewStore | None) -> bool:
         """Whether a file that the user's .blend reads is no longer the one in its inventory.

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, broken, read_problem, sha256, writing
+from lightfield.core.files import atomic_path, broken, read_problem, sha256, unreadable, writing
 
 NAME = "ledger.txt"
 # The ledger is written anew when more than this part of its lines counts no more.
@@ -186,7 +186,7 @@ class Ledger:
 
 
 def jobs(path: Path) -> Iterator[Job]:
-    """Yield the jobs of a ledger, the latest first; none where there is no ledger.
+    """Yield the jobs of a ledger, the latest first; none where there is no ledger to read.
 
     Lines that are damaged are left out.
     """
@@ -249,10 +249,10 @@ def _problem(name: str, stamp: Stamp) -> str | None:
 
 
 def _lines(path: Path) -> list[bytes]:
+    if unreadable(path) or not path.exists():
+        return []
     try:
         return path.read_bytes().splitlines()
-    except FileNotFoundError:
-        return []
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
 

@@ -1,0 +1,415 @@
+"""Faults of every kind in files of every kind: each is found, mended, and never published.
+
+A build of the smoke scene is damaged in every kind of file at once, each with another fault. In as
+many batches as there are faults every kind of file gets every fault.
+"""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import simulated
+from checkouts import assert_same_bytes, checkout, rendered
+
+from lightfield.core.files import broken, set_aside
+from lightfield.dataset import ledger
+from lightfield.dataset.dataset import scene_datasets
+from lightfield.imaging import images
+from lightfield.validation.integrity import Integrity
+
+CUBOID, PLANE, LATTICE = (
+    f"smoke/{rig}" for rig in ("LFCuboid_1x1x1", "LFPlane_3x2_equisolid", "LFLattice_2panos")
+)
+HDR = f"results/{CUBOID}/perspective_hdr"
+
+# By kind of file: one of the build, and another that it may be swapped with.
+KINDS = {
+    "scene": ("work/smoke/scene.blend", f"results/{LATTICE}/report/noise.png"),
+    "inventory": ("work/smoke/inventory.json", f"results/{LATTICE}/report/costs.json"),
+    "light field": (f"results/{CUBOID}/lightfield.json", f"results/{LATTICE}/lightfield.json"),
+    "reprojected light field": (
+        f"results/{PLANE}/perspective/lightfield.json",
+        f"results/{LATTICE}/perspective/lightfield.json",
+    ),
+    "lens map": (
+        f"work/{CUBOID}/perspective/lens_map.npy",
+        f"work/{LATTICE}/perspective/lens_map.npy",
+    ),
+    "record of views": (f"work/{CUBOID}/render/0-6.json", f"work/{LATTICE}/render/0-2.json"),
+    "record of a reprojection": (
+        f"work/{PLANE}/perspective/0-6.json",
+        f"work/{LATTICE}/perspective/0-2.json",
+    ),
+    "log of checksums": (
+        f"work/{PLANE}/render/0-6.sums.jsonl",
+        f"work/{LATTICE}/render/0-2.sums.jsonl",
+    ),
+    "journal": (
+        f"work/{PLANE}/render/0-6.journal.jsonl",
+        f"work/{LATTICE}/render/0-2.journal.jsonl",
+    ),
+    "view": (f"results/{CUBOID}/exr/view_b0000f.exr", f"results/{CUBOID}/exr/view_f0000f.exr"),
+    "reprojected PNG": (
+        f"results/{CUBOID}/perspective/view_l0000f.png",
+        f"results/{CUBOID}/perspective/view_r0000f.png",
+    ),
+    "reprojected EXR": (f"{HDR}/view_u0000f.exr", f"{HDR}/view_d0000f.exr"),
+    "panorama's light field": (
+        f"work/{CUBOID}/panorama/lightfield.json",
+        f"work/{LATTICE}/panorama/lightfield.json",
+    ),
+    "panorama": (
+        f"work/{CUBOID}/panorama/exr/view_0000f.exr",
+        f"work/{LATTICE}/panorama/exr/view_0000f.exr",
+    ),
+    "clearance of cameras": (f"work/{PLANE}/cameras.json", f"work/{LATTICE}/cameras.json"),
+    "transforms": (
+        f"results/{CUBOID}/perspective/transforms.json",
+        f"results/{LATTICE}/perspective/transforms.json",
+    ),
+    "transforms of a split": (
+        f"results/{PLANE}/perspective/transforms_train.json",
+        f"results/{PLANE}/perspective/transforms_test.json",
+    ),
+    "picture of instant-ngp": (
+        f"{HDR}/instant_ngp/view_b0000f.exr",
+        f"{HDR}/instant_ngp/view_f0000f.exr",
+    ),
+    "list of an export": (
+        f"{HDR}/exports/colmap/export.json",
+        f"{HDR}/exports/nerfstudio/export.json",
+    ),
+    "picture of an export": (
+        f"{HDR}/exports/colmap/images/view_r0000f.png",
+        f"{HDR}/exports/colmap/images/view_l0000f.png",
+    ),
+    "points": (
+        f"{HDR}/exports/point_cloud/points.ply",
+        f"{HDR}/exports/nerfstudio/points.ply",
+    ),
+    "validation": (f"results/{CUBOID}/validation.json", f"results/{LATTICE}/validation.json"),
+    "sums of work": (f"work/{PLANE}/checksums.txt", f"work/{LATTICE}/checksums.txt"),
+    "published sums": (f"results/{CUBOID}/sha256sums.txt", f"results/{LATTICE}/sha256sums.txt"),
+    "splits": ("results/smoke/splits.json", f"results/{PLANE}/validation.json"),
+    "picture of a report": (
+        f"results/{CUBOID}/report/rig.png",
+        f"results/{LATTICE}/report/rig.png",
+    ),
+    "costs": (f"results/{CUBOID}/report/costs.json", f"results/{PLANE}/report/costs.json"),
+    "page": (f"results/{PLANE}/report/index.html", f"results/{LATTICE}/report/index.html"),
+    "settings": (
+        f"work/{CUBOID}/settings/lightfield.json",
+        f"work/{LATTICE}/settings/lightfield.json",
+    ),
+    "note of shards": ("work/shards.json", f"results/{LATTICE}/report/rig.svg"),
+    "benchmark": (
+        f"work/benchmarks/{PLANE}/render/0-6.tsv",
+        f"work/benchmarks/{LATTICE}/render/0-2.tsv",
+    ),
+    "log": (f"work/logs/{PLANE}/render/0-6.log", f"work/logs/{LATTICE}/render/0-2.log"),
+}
+# These tell of work that is over, and no job can make them again: a run finds only what it cannot
+# read, `snakemake verify` finds the rest.
+HISTORY = {"log of checksums", "journal", "benchmark"}
+# A job's log has no checksum.
+WITHOUT_CHECKSUM = {"log"}
+# Each plan writes settings, and each run that renders notes the shards.
+REWRITTEN = {"settings", "note of shards"}
+
+
+def flip(path, _):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def digit(path, _):
+    """Change the first digit of the second half; a file may have none."""
+    content = bytearray(path.read_bytes())
+    middle = len(content) // 2
+    places = [place for place in range(middle, len(content)) if chr(content[place]).isdecimal()]
+    content[(places or [middle])[0]] ^= 1
+    path.write_bytes(content)
+
+
+def truncate(path, _):
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def empty(path, _):
+    path.write_bytes(b"")
+
+
+def delete(path, _):
+    path.unlink()
+
+
+def replace(path, _):
+    """Put another file there that is as valid."""
+    pixels = np.full((4, 4), 100, np.uint8)
+    match path.suffix:
+        case ".exr":
+            images.write_exr(path, {"R": pixels.astype(np.float16)})
+        case ".png":
+            images.write_png(path, pixels)
+        case ".npy":
+            np.save(path, np.zeros_like(np.load(path)))
+        case ".json":
+            path.write_text(json.dumps(json.loads(path.read_text()) | {"other": 1}))
+        case _:
+            path.write_bytes(path.read_bytes() + b"\n")
+
+
+def swap(path, sibling):
+    beside = path.with_name("beside")
+    path.rename(beside)
+    sibling.rename(path)
+    beside.rename(sibling)
+
+
+def folder(path, _):
+    path.unlink()
+    (path / "inside").mkdir(parents=True)
+
+
+def link(path, _):
+    path.unlink()
+    path.symlink_to("nowhere")
+
+
+def unreadable(path, _):
+    path.chmod(0)
+
+
+# By fault: how it is done, and whether it also sets the time back.
+FAULTS = {
+    "a bit": (flip, False),
+    "a bit, at the old time": (flip, True),
+    "a digit": (digit, True),
+    "cut short": (truncate, True),
+    "emptied": (empty, True),
+    "deleted": (delete, False),
+    "another valid file": (replace, True),
+    "swapped": (swap, False),
+    "a folder": (folder, False),
+    "a link to nowhere": (link, False),
+    "unreadable": (unreadable, False),
+}
+
+
+def spoil(root, kind, fault):
+    """Do a fault to a kind of file; return the files that are damaged now."""
+    path, sibling = (root / name for name in KINDS[kind])
+    apply, sets_time_back = FAULTS[fault]
+    status = path.stat()
+    apply(path, sibling)
+    if sets_time_back:
+        os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    return KINDS[kind] if fault == "swapped" else KINDS[kind][:1]
+
+
+BATCHES = range(len(FAULTS))
+OBSTACLES = {"a folder", "a link to nowhere", "unreadable"}
+
+
+class Damaged:
+    """A copy of a build in which each kind of file has the fault that a batch has for it.
+
+    Without a batch there is no fault.
+    """
+
+    def __init__(self, build, root, batch):
+        self.root = checkout(root / "plenoforge")
+        for name in ("results", "work"):
+            shutil.copytree(build / name, self.root / name)
+        faults = list(FAULTS)
+        # By path: kind of file and fault.
+        self.files = {
+            path: (kind, fault)
+            for number, kind in enumerate(KINDS if batch is not None else ())
+            for fault in [faults[(number + batch) % len(faults)]]
+            for path in spoil(self.root, kind, fault)
+        }
+
+    def run(self, *words):
+        """Run Snakemake as a user whom permissions hold, which is not so of root."""
+        may_not = ["--bounding-set=-dac_override,-dac_read_search"]
+        held = [] if os.geteuid() else ["setpriv", *may_not, "--inh-caps=-all"]
+        return subprocess.run(
+            [*held, Path(sys.executable).with_name("snakemake"), "--cores", "2", *words],
+            cwd=self.root,
+            capture_output=True,
+            text=True,
+            env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
+        )
+
+    def said_and_made(self, result):
+        """Return the files that a run says are damaged, and those that it makes."""
+        named = set(re.findall(r"^([^:\n]+): .*; it is made anew$", result.stderr, re.M))
+        jobs = [json.loads(line) for line in result.stderr.splitlines() if line.startswith("{")]
+        return named, {file for job in jobs for file in job["output"]}
+
+    def verified(self, monkeypatch):
+        """Return the files in which `snakemake verify` finds a fault."""
+        monkeypatch.chdir(self.root)
+        folders = [Path(dataset.folder) for dataset in scene_datasets("smoke")]
+        return {str(f.path) for path in folders for f in Integrity(path, Path("work")).faults()}
+
+
+def has_same_bytes(one, other, path):
+    return (one / path).read_bytes() == (other / path).read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("batch", BATCHES)
+def test_every_fault_in_every_kind_of_file_is_found(smoke, tmp_path, batch, monkeypatch):
+    damaged = Damaged(smoke, tmp_path, batch)
+    result = damaged.run("--dry-run", "--logger", "jobs", "--", "smoke")
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "Traceback" not in result.stderr
+    named, made = damaged.said_and_made(result)
+    verified = damaged.verified(monkeypatch)
+    for path, (kind, fault) in damaged.files.items():
+        is_obstacle = fault in OBSTACLES
+        if kind == "settings":
+            assert has_same_bytes(damaged.root, smoke, path)
+        elif kind in HISTORY and not is_obstacle:
+            assert path in verified, (kind, fault)
+        elif kind not in REWRITTEN | WITHOUT_CHECKSUM or (kind == "log" and is_obstacle):
+            is_planned_as_missing = fault == "deleted" and path in made
+            assert path in named or is_planned_as_missing, (kind, fault)
+    # No sound file is called damaged.
+    assert named | verified <= damaged.files.keys()
+
+
+# Every kind of obstacle is in these: they alone need Snakemake to see what is not there.
+@pytest.mark.slow
+@pytest.mark.parametrize("batch", [4, 10])
+def test_one_plain_run_mends_every_kind_of_file(smoke, tmp_path, batch, monkeypatch):
+    damaged = Damaged(smoke, tmp_path, batch)
+    journals = f"work/{CUBOID}/render"
+    before = rendered(damaged.root)
+    result = damaged.run("smoke")
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "Traceback" not in result.stderr
+    assert_same_bytes(smoke, damaged.root)
+    for kind in REWRITTEN:
+        assert has_same_bytes(damaged.root, smoke, KINDS[kind][0])
+    assert not damaged.verified(monkeypatch)
+    assert "Nothing to be done" in damaged.run("--dry-run", "smoke").stderr
+    # Views whose own file is sound are not rendered again, although their scene was damaged.
+    again = (rendered(damaged.root) - before).items()
+    assert {key[1]: n for key, n in again if key[0] == damaged.root / journals} == {
+        "view_b0000f": 1
+    }
+
+
+# ---- the ledger itself ----------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", ["a bit", "emptied", "deleted", *sorted(OBSTACLES)])
+def test_with_a_damaged_ledger_a_run_makes_again_what_it_no_longer_knows(smoke, tmp_path, fault):
+    damaged = Damaged(smoke, tmp_path, None)
+    FAULTS[fault][0](damaged.root / "work/ledger.txt", None)
+    result = damaged.run("--dry-run", "--logger", "jobs", "--", "smoke")
+    assert result.returncode == 0, result.stdout + result.stderr
+    named, made = damaged.said_and_made(result)
+    assert made
+    assert named == ({"work/ledger.txt"} if fault in OBSTACLES else set())
+    # What a run notes, the next one knows.
+    lens_map = KINDS["lens map"][1]
+    result = damaged.run("--allowed-rules", "lens_map", "--", lens_map)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert lens_map in ledger.read(damaged.root / "work/ledger.txt")
+
+
+def note(path, *files):
+    """Write into a ledger that a job made these files."""
+    stamps = {str(file): ledger.Stamp.of(file) for file in files}
+    ledger.Ledger(path).note(ledger.Job([str(files[0])], stamps, {}, {}))
+
+
+@pytest.mark.parametrize("fault", FAULTS.keys() - {"deleted"})
+def test_the_ledger_names_the_damaged_file_and_what_to_make_again(nobody, fault):
+    path, sound, sibling = (nobody / name for name in ("a.json", "b.json", "c.json"))
+    for number, file in enumerate((path, sound, sibling)):
+        file.write_text(json.dumps({"number": [number] * 10}))
+    note(nobody / "ledger.txt", path, sound)
+    FAULTS[fault][0](path, sibling)
+    (damaged,) = ledger.Ledger(nobody / "ledger.txt").damage.items()
+    assert damaged[0] == str(path) and damaged[1][1] == [str(path)]
+    assert "\n" not in damaged[1][0]
+
+
+# ---- what is said, and where damaged files go -----------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (b'{"half": [', "is not JSON: "),
+        (b"[1, 2]", "is a list, not a mapping"),
+        (b'{"\xff": 1}', "is no text in UTF-8"),
+        (b"", "is empty"),
+        (b"null", "is a NoneType, not a mapping"),
+        (b"{}", None),
+    ],
+)
+def test_what_is_wrong_with_a_json_is_said(content, problem, tmp_path):
+    path = tmp_path / "a.json"
+    assert broken(path) is None
+    path.write_bytes(content)
+    said = broken(path)
+    assert said is problem is None or said.startswith(problem)
+
+
+def test_nothing_that_was_set_aside_is_lost(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for content in "ab":
+        Path("results").mkdir(exist_ok=True)
+        Path("results/a.json").write_text(content)
+        set_aside(Path("results/a.json"), Path("work/removed"))
+    assert Path("work/removed/results/a.json").read_text() == "a"
+    assert Path("work/removed/results/a.json.2").read_text() == "b"
+    assert not Path("results/a.json").exists()
+
+
+def test_what_lies_elsewhere_is_set_aside_where_all_else_is(tmp_path, monkeypatch):
+    (tmp_path / "own").mkdir()
+    monkeypatch.chdir(tmp_path / "own")
+    inside = Path("work/removed") / (tmp_path / "a.json").relative_to("/")
+    for path, name in ((tmp_path / "a.json", inside.name), (Path("../a.json"), "a.json.2")):
+        (tmp_path / "a.json").touch()
+        assert set_aside(path, Path("work/removed")) == inside.with_name(name)
+        assert inside.with_name(name).is_file()
+
+
+def test_a_folder_is_set_aside_where_a_link_that_leads_nowhere_was(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("a.exr").symlink_to("a.exr")
+    set_aside(Path("a.exr"), Path("removed"))
+    Path("a.exr/inside").mkdir(parents=True)
+    assert set_aside(Path("a.exr"), Path("removed")) == Path("removed/a.exr.2")
+    assert Path("removed/a.exr").is_symlink()
+    assert Path("removed/a.exr.2/inside").is_dir()
+
+
+@pytest.mark.slow
+def test_a_dataset_named_alone_notices_a_changed_yaml_and_what_is_broken(tmp_path):
+    folder = checkout(tmp_path)
+    one, two, _ = simulated.build(folder)
+    targets = [f"{one.folder}/sha256sums.txt", two.package]
+    assert not simulated.planned(folder, targets[0])
+    path = folder / "configs/scenes/smoke.yaml"
+    path.write_text(re.sub(r"samples: \d+", "samples: 3", path.read_text(), count=1))
+    (folder / two.costs).write_text("{")
+    os.utime(folder / two.costs, (simulated.WHEN, simulated.WHEN))
+    expected = {f"{d.folder}/lightfield.json" for d in (one, two)} | {two.costs}
+    assert expected <= simulated.planned(folder, *targets)
