@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 
-from scenes.barbershop.plan import HAIR, INKS, drawings, put
+from scenes.barbershop.plan import HAIR, INKS, drawings, hanging, put
 from scenes.library.points import circle, points
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import Shape, prism, transform
@@ -174,7 +174,7 @@ def pictures(scene: Scene) -> None:
         made[name] = model.mesh(f"Picture {name}")
     for row in HUNG.replace("\n", ",").split(","):
         name, side, along, z = row.split()
-        put(made[name], f"on {side} {along} 0.001 {z}")
+        put(made[name], hanging(side, along=float(along), away=0.001, z=float(z)))
 
 
 def magazine(scene: Scene, number: int) -> bpy.types.Mesh:
