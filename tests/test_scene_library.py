@@ -88,39 +88,6 @@ def test_places_are_made_of_all_combinations_of_coordinates():
 
 
 @pytest.mark.parametrize(
-    ("part", "expected"),
-    [
-        ("Oak: box 1 2 3", 6.0),
-        ("Oak: box 1 1 1 at ±5 0 0 turned 0 90 0 scaled 1 2 3", 12.0),
-        ("Oak: ball 1", 4 * np.pi / 3),
-        ("Oak: box 1 1 1; box 1 2 3;\n box 1 1 1", 8.0),
-        ("Oak: ring 1 0.25", 2 * np.pi * 8**0.5 / 16),  # a tube of 8 sides
-        ("Oak: lathe 0.5 0\n 0.5 2\n at 1 1 1", np.pi / 2),
-        ("Oak: tube 0.5, 0 0 0, 1 0 0, 2 0 0", np.pi / 2),
-        ("Oak: bend 0.5, 0 0 0, 1 0 0, 2 0 0", np.pi / 2),
-        ("Oak: prism 2, 0 0, 2 0, 2 1, 1 0.5, 0 1\nOak: box 1 1 1", 4.0),
-        ("Oak: frame 1 1, 0 0, 0 1, 1 1, 1 0, 0 0", 8.0),
-    ],
-)
-def test_parts_are_drawn_from_text(part, expected):
-    model = Model(SCENE, part)
-    assert model.materials == ["Oak"]
-    assert volume(join(model.parts)) == pytest.approx(expected, rel=0.02)
-
-
-def test_words_planes_and_pipes_are_drawn_from_text():
-    word, plane, pipe = (
-        Model(SCENE, part).parts[0].vertices
-        for part in ("Ink: word 2 0.01 I at 0 0 1", "Ink: plane 2 4", "Ink: pipe 1 0, 1 3")
-    )
-    assert np.ptp(word[:, 2]) == pytest.approx(0.01) and 1.0 < np.ptp(word[:, 1]) < 2.0
-    assert np.ptp(plane, axis=0).tolist() == [2.0, 4.0, 0.0]
-    assert np.hypot(*pipe[:, :2].T) == pytest.approx(1.0) and np.ptp(pipe[:, 2]) == 3.0
-    with pytest.raises(ValueError, match="cone"):
-        Model(SCENE, "Oak: cone 1 2")
-
-
-@pytest.mark.parametrize(
     ("shape", "expected"),
     [
         (box((1, 2, 3)), 6.0),

@@ -4,7 +4,6 @@ A mesh that stands has z up and its front towards +Y. A flat one (a poster, a cl
 as the viewer sees it and faces +Z; on a wall it hangs upright.
 """
 
-import re
 from collections.abc import Sequence
 from typing import Literal
 
@@ -58,12 +57,6 @@ def _at_wall(wall: Wall, along: float, away: float, z: float) -> Matrix:
         "back": ((along, away - HALF_Y), 0),
     }[wall]
     return transform((x, y, z), (0, 0, np.radians(degrees)))
-
-
-def drawings(text: str) -> list[tuple[str, str, str]]:
-    """What a text draws under lines "name | looks": the name, looks and parts of each."""
-    rows = re.split(r"^(.+) \|(.*)\n", text, flags=re.MULTILINE)[1:]
-    return list(zip(rows[::3], rows[1::3], rows[2::3], strict=True))
 
 
 def put(

@@ -213,16 +213,16 @@ def portrait(model: Model) -> None:
     model.add(moustache(scene, 0), hair, (0, -0.018, 4), scale=(0.07, 0.07, 1))
 
 
-PICTURES = (  # what is on it, the frame's material, the size
-    (masters, "Ebony", (0.6, 0.8)),
-    (moustaches, "Gilt", (0.5, 0.7)),
-    (prices, "Oak", (0.7, 1.0)),
-    (haircuts, "Ebony", (0.7, 0.5)),
-    (pole, "Mahogany", (0.4, 0.7)),
-    (deco, "Gilt", (0.5, 0.7)),
-    (landscape, "Gilt", (0.62, 0.42)),
-    (certificate, "Ebony", (0.44, 0.32)),
-    (portrait, "Gilt", (0.26, 0.34)),
+PICTURES = (  # what is on it, its name, the frame's material, the size
+    (masters, "Picture masters", "Ebony", (0.6, 0.8)),
+    (moustaches, "Picture moustaches", "Gilt", (0.5, 0.7)),
+    (prices, "Picture prices", "Oak", (0.7, 1.0)),
+    (haircuts, "Picture haircuts", "Ebony", (0.7, 0.5)),
+    (pole, "Picture pole", "Mahogany", (0.4, 0.7)),
+    (deco, "Picture deco", "Gilt", (0.5, 0.7)),
+    (landscape, "Picture landscape", "Gilt", (0.62, 0.42)),
+    (certificate, "Picture certificate", "Ebony", (0.44, 0.32)),
+    (portrait, "Picture portrait", "Gilt", (0.26, 0.34)),
 )
 HUNG: tuple[tuple[Picture, Wall, float, float], ...] = (  # picture, wall, along it, height
     (masters, "right", -0.45, 1.68),
@@ -281,12 +281,12 @@ def _frame(model: Model, border: str, size: tuple[float, float]) -> None:
 def pictures(scene: Scene) -> None:
     """The framed prints, hung where the walls were bare."""
     made = {}
-    for picture, border, size in PICTURES:
+    for picture, name, border, size in PICTURES:
         model = Model(scene)
         picture(model)
         printed(model, 0.011)
         _frame(model, border, size)
-        made[picture] = model.mesh(f"Picture {picture.__name__}")
+        made[picture] = model.mesh(name)
     for picture, wall, along, z in HUNG:
         put(made[picture], hanging(wall, along=along, away=0.001, z=z))
 
