@@ -8,7 +8,7 @@ import pytest
 from lightfield.dataset import config, keys
 from lightfield.dataset.config import Source
 from scenes.library.architecture import cut
-from scenes.library.points import noise, points, polar, smoothstep
+from scenes.library.points import evenly, lattice, mirrored, noise, points, polar, smoothstep
 from scenes.library.scene import Model, Scene
 from scenes.library.shapes import box, copies, facets, frames, icosphere, join, lathe, prism, tube
 
@@ -35,37 +35,56 @@ def test_a_number_in_text_may_stand_for_several():
     assert points("-1..2*3 ±4").tolist() == [[x, y] for x in (-1.0, 0.5, 2.0) for y in (-4.0, 4.0)]
 
 
+OAK = {"material": "Oak"}
+SLANTED = [(0, 0), (2, 0), (2, 1), (1, 0.5), (0, 1)]
+LINE = [(0, 0, 0), (1, 0, 0), (2, 0, 0)]
+SQUARE = [(0, 0), (0, 1), (1, 1), (1, 0), (0, 0)]
+
+
 @pytest.mark.parametrize(
-    ("part", "expected"),
+    ("kind", "measures", "expected"),
     [
-        ("Oak: box 1 2 3", 6.0),
-        ("Oak: box 1 1 1 at ±5 0 0 turned 0 90 0 scaled 1 2 3", 12.0),
-        ("Oak: ball 1", 4 * np.pi / 3),
-        ("Oak: box 1 1 1; box 1 2 3;\n box 1 1 1", 8.0),
-        ("Oak: ring 1 0.25", 2 * np.pi * 8**0.5 / 16),  # a tube of 8 sides
-        ("Oak: lathe 0.5 0\n 0.5 2\n at 1 1 1", np.pi / 2),
-        ("Oak: tube 0.5, 0 0 0, 1 0 0, 2 0 0", np.pi / 2),
-        ("Oak: bend 0.5, 0 0 0, 1 0 0, 2 0 0", np.pi / 2),
-        ("Oak: prism 2, 0 0, 2 0, 2 1, 1 0.5, 0 1\nOak: box 1 1 1", 4.0),
-        ("Oak: frame 1 1, 0 0, 0 1, 1 1, 1 0, 0 0", 8.0),
+        ("box", {"size": (1, 2, 3)}, 6.0),
+        ("box", {"size": (1, 1, 1), "at": mirrored(x=5), "scaled": (1, 2, 3)}, 12.0),
+        ("ball", {"radius": 1}, 4 * np.pi / 3),
+        ("ring", {"radius": 1, "thickness": 0.25}, 2 * np.pi * 8**0.5 / 16),  # 8 sides
+        ("lathe", {"profile": [(0.5, 0), (0.5, 2)], "at": (1, 1, 1)}, np.pi / 2),
+        ("tube", {"radius": 0.5, "path": LINE}, np.pi / 2),
+        ("bend", {"radius": 0.5, "path": LINE}, np.pi / 2),
+        ("prism", {"height": 2, "outline": SLANTED}, 3.0),
+        ("frame", {"size": (1, 1), "profile": SQUARE}, 8.0),
     ],
 )
-def test_parts_are_drawn_from_text(part, expected):
-    model = Model(SCENE, part)
+def test_a_part_of_a_model_has_its_volume(kind, measures, expected):
+    model = Model(SCENE)
+    getattr(model, kind)(**measures, **OAK)
     assert model.materials == ["Oak"]
     assert volume(join(model.parts)) == pytest.approx(expected, rel=0.02)
 
 
-def test_words_planes_and_pipes_are_drawn_from_text():
-    word, plane, pipe = (
-        Model(SCENE, part).parts[0].vertices
-        for part in ("Ink: word 2 0.01 I at 0 0 1", "Ink: plane 2 4", "Ink: pipe 1 0, 1 3")
-    )
-    assert np.ptp(word[:, 2]) == pytest.approx(0.01) and 1.0 < np.ptp(word[:, 1]) < 2.0
-    assert np.ptp(plane, axis=0).tolist() == [2.0, 4.0, 0.0]
-    assert np.hypot(*pipe[:, :2].T) == pytest.approx(1.0) and np.ptp(pipe[:, 2]) == 3.0
-    with pytest.raises(ValueError, match="cone"):
-        Model(SCENE, "Oak: cone 1 2")
+def test_a_part_is_scaled_then_turned_then_moved():
+    model = Model(SCENE)
+    model.box(size=(1, 1, 1), at=(5, 0, 0), turned=(0, 0, 90), scaled=(4, 2, 1), **OAK)
+    (part,) = model.parts
+    assert part.vertices.min(axis=0) == pytest.approx([4, -2, -0.5])
+    assert part.vertices.max(axis=0) == pytest.approx([6, 2, 0.5])
+
+
+def test_words_planes_and_pipes_have_the_size_that_they_are_given():
+    word, plane, pipe = Model(SCENE), Model(SCENE), Model(SCENE)
+    word.word(letters="I", size=2, depth=0.01, at=(0, 0, 1), **OAK)
+    plane.plane(size=(2, 4), **OAK)
+    pipe.pipe(profile=[(1, 0), (1, 3)], **OAK)
+    letters, corners, wall = (model.parts[0].vertices for model in (word, plane, pipe))
+    assert np.ptp(letters[:, 2]) == pytest.approx(0.01) and 1.0 < np.ptp(letters[:, 1]) < 2.0
+    assert np.ptp(corners, axis=0).tolist() == [2.0, 4.0, 0.0]
+    assert np.hypot(*wall[:, :2].T) == pytest.approx(1.0) and np.ptp(wall[:, 2]) == 3.0
+
+
+def test_places_are_made_of_all_combinations_of_coordinates():
+    expected = [[x, y, 3.0] for x in (-1.0, 0.5, 2.0) for y in (-4.0, 4.0)]
+    assert lattice(x=evenly(-1, 2, 3), y=(-4, 4), z=3).tolist() == expected
+    assert mirrored(x=1, y=2).tolist() == [[-1.0, 2.0, 0.0], [1.0, 2.0, 0.0]]
 
 
 @pytest.mark.parametrize(

@@ -22,11 +22,7 @@ from scenes.barbershop import (
 )
 from scenes.barbershop.goods import bottles, pots
 from scenes.barbershop.materials import palette
-from scenes.barbershop.plan import furnish
 from scenes.library.scene import Scene, fill
-
-# What text alone draws (see `plan.furnish`).
-DRAWN = (*(room.WALLS, room.ON_THE_FLOOR),)
 
 
 def stocked(scene: Scene) -> None:
@@ -37,13 +33,26 @@ def stocked(scene: Scene) -> None:
 
 
 ELEMENTS = (
-    *(partial(furnish, text=text) for text in DRAWN),
+    room.walls,
+    room.wall_lettering,
+    room.grout,
+    room.beam,
+    room.picture_rail,
+    room.palmette,
+    room.entrance_mat,
+    room.floor_drain,
     lamps.pendant_lamp,
     lamps.fan_motor,
     lamps.fan_blade,
     lamps.wall_lamp,
-    *(lamps.lights, room.tiles, room.medallion, room.rug, room.hair_clippings),
-    *(room.metro_tiles, room.wainscot, room.ceiling),
+    lamps.lights,
+    room.tiles,
+    room.medallion,
+    room.rug,
+    room.hair_clippings,
+    room.metro_tiles,
+    room.wainscot,
+    room.ceiling,
     openings.window_frame,
     openings.window_pane,
     openings.window_letters,

@@ -300,7 +300,7 @@ def shelf(scene: Scene, width: float, depth: float) -> bpy.types.Mesh:
 
 
 def stock(
-    scene: Scene, random: Generator, goods: Goods, where: Matrix | str, width: float, depth: float
+    scene: Scene, random: Generator, goods: Goods, where: Matrix, width: float, depth: float
 ) -> None:
     """Stand goods side by side along x on z = 0 of a frame, in two rows where it is deep enough."""
     radii = [np.hypot(*mesh_shape(item).vertices[:, :2].T).max() for item in goods]

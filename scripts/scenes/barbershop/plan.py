@@ -4,7 +4,6 @@ A mesh that stands has z up and its front towards +Y. A flat one (a poster, a cl
 as the viewer sees it and faces +Z; on a wall it hangs upright.
 """
 
-import re
 from collections.abc import Sequence
 from typing import Literal
 
@@ -12,8 +11,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from scenes.library.points import points
-from scenes.library.scene import Model, Scene, place
+from scenes.library.scene import place
 from scenes.library.shapes import transform
 
 TAU = 2 * np.pi
@@ -61,50 +59,9 @@ def _at_wall(wall: Wall, along: float, away: float, z: float) -> Matrix:
     return transform((x, y, z), (0, 0, np.radians(degrees)))
 
 
-def spots(text: str) -> list[Matrix]:
-    """Frames of text, a comma after each; numbers that are 0 may be left out at its end.
-
-    "room 1 2 0 90" is at (1, 2, 0), turned by 90°. "left 2 0.1 1.5" has its back to the left wall,
-    y into the room and x to its own left: y (x at the front and back), distance from the wall, z,
-    and degrees. "on left 2 0.1 1.5" is for what hangs there. A number may stand for several (see
-    `points`).
-    """
-    frames = []
-    for row in text.split(","):
-        hangs, side, numbers = re.fullmatch(r"(on )?(\w+)(.*)", row.strip()).groups()
-        for given in points(numbers or "0"):
-            a, b, z, turn = (*given, *(0,) * (4 - len(given)))
-            (x, y), faces = {
-                "room": ((a, b), 0),
-                "left": ((b - HALF_X, a), -90),
-                "right": ((HALF_X - b, a), 90),
-                "front": ((a, HALF_Y - b), 180),
-                "back": ((a, b - HALF_Y), 0),
-            }[side]
-            where = transform((x, y, z), (0, 0, np.radians(faces)))
-            degrees = (90, 0, 180) if hangs else (0, 0, turn)
-            frames.append(where @ transform(rotation=np.radians(degrees)))
-    return frames
-
-
-def drawings(text: str) -> list[tuple[str, str, str]]:
-    """What a text draws under lines "name | looks": the name, looks and parts of each."""
-    rows = re.split(r"^(.+) \|(.*)\n", text, flags=re.MULTILINE)[1:]
-    return list(zip(rows[::3], rows[1::3], rows[2::3], strict=True))
-
-
-def furnish(scene: Scene, text: str) -> None:
-    """Make each model of a text and put it at its spots.
-
-    A line "name | spot, spot, …" begins a model (see `spots`); its parts follow (`Model.draw`).
-    """
-    for name, where, parts in drawings(text):
-        put(Model(scene, parts).mesh(name), where)
-
-
 def put(
     data: bpy.types.Mesh,
-    where: Matrix | Sequence[Matrix] | str,
+    where: Matrix | Sequence[Matrix],
     at: Sequence[float] = (0, 0, 0),
     degrees: Sequence[float] = (0, 0, 0),
     scale: float | Sequence[float] = 1.0,
@@ -113,6 +70,5 @@ def put(
 
     degrees: XYZ Euler angles.
     """
-    where = spots(where) if isinstance(where, str) else where
     for frame in [where] if isinstance(where, Matrix) else where:
         place(data.name, data, frame @ transform(at, np.radians(degrees), scale))

@@ -1,6 +1,5 @@
 """`Scene`, which every element of a scene is a function of; `Model`, a mesh of several shapes."""
 
-import re
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -160,12 +159,10 @@ class Model:
     Lengths are in metres. The scene's detail sets how many segments a round part has.
     """
 
-    def __init__(self, scene: Scene, parts: str = "") -> None:
-        """A model that is empty, or of the parts that a text lists (see `draw`)."""
+    def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.parts: list[Shape] = []
         self.materials: list[str] = []
-        self.draw(parts)
 
     def add(
         self,
@@ -273,64 +270,6 @@ class Model:
         at = placement.get("at", (0, 0, 0))
         turned = placement.get("turned", (0, 0, 0))
         self.add(shape, material, at, turned, placement.get("scaled", 1.0))
-
-    def draw(self, parts: str) -> None:
-        """Add parts that a text lists, a semicolon or the line's end after each.
-
-        A part that names no material is of the last one's; a line without a colon goes on with it.
-
-        "Brass: ball 0.1; lathe 0.04 0, 0 0.02 at ±0.3 0 1 turned 90 0 0 scaled 1 2 1" is a ball and
-        a cone at two places, turned by degrees and scaled; what follows the shape may be left out.
-        Shapes:
-
-            box      width depth height [bevel [segments]]
-            ball     radius
-            ring     radius thickness
-            lathe    profile                    (radius and height; `pipe` is one without caps)
-            tube     radius, path               (`bend` makes the path a smooth curve)
-            prism    height, outline
-            frame    width height, profile      (see `architecture.frame`)
-            plane    width height
-            word     size depth letters
-        """
-        material, text = "", re.sub(r"\n(?=[^:\n]*(\n|$))", ",", parts).replace("\n", ";")
-        for part in filter(None, (part.strip(" ,") for part in text.split(";"))):
-            named, _, drawn = part.rpartition(": ")
-            material = named or material
-            kind, data = drawn.split(maxsplit=1)
-            data, *rest = re.split(r",?\s+(at|turned|scaled)\s", data)
-            placed = dict(zip(rest[::2], rest[1::2], strict=True))
-            turned, scaled = placed.get("turned", "0 0 0"), placed.get("scaled", "1 1 1")
-            turn, size = points(turned)[0], points(scaled)[0]
-            self.add(self._shape(kind, data), material, placed.get("at", "0 0 0"), turn, size)
-
-    def _shape(self, kind: str, data: str) -> Shape:
-        scene = self.scene
-        if kind == "word":
-            size, depth, letters = data.split(maxsplit=2)
-            return lettering(letters, float(depth)).scaled(float(size), float(size), 1)
-        if kind in ("lathe", "pipe"):
-            profile = points(data)
-            return scene.lathe(profile, _segments(profile[:, 0].max()), capped=kind == "lathe")
-        head, _, rest = data.partition(",")
-        numbers = points(head)[0].tolist()
-        match kind:
-            case "box":
-                width, depth, height, bevel, segments = *numbers, *(0, 1)[len(numbers) - 3 :]
-                return box((width, depth, height), bevel, int(segments))
-            case "ball" | "ring":
-                return getattr(scene, kind)(*numbers, _segments(numbers[0]))
-            case "tube":
-                return scene.tube(rest, *numbers, 4 + 60 * numbers[0] ** 0.5)
-            case "bend":
-                return scene.bend(rest, *numbers, 7 * rest.count(","), 4 + 60 * numbers[0] ** 0.5)
-            case "prism":
-                return prism(rest, *numbers)
-            case "frame":
-                return frame(*numbers, rest)
-            case "plane":
-                return sheet(xyz(*rectangle(*numbers)[[0, 1, 3, 2]].T).reshape(2, 2, 3))
-        raise ValueError(f"no such shape: {kind}")
 
     def mesh(self, name: str, smooth: bool | float = SHARP) -> bpy.types.Mesh:
         """The mesh of all that was added; `place` puts it into the scene."""

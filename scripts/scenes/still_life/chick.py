@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 
-from scenes.library.points import points, unit
+from scenes.library.points import mirrored, points, unit
 from scenes.library.scene import Model, Scene, place
 from scenes.library.shapes import transform
 
@@ -15,9 +15,6 @@ PARTS = (
     ((-0.031, 0.008, 0.047), (0.010, 0.025, 0.019), 1800, 0.0105),
     ((0, 0.043, 0.055), (0.012, 0.014, 0.011), 900, 0.0125),
 )
-FACE = """Beak: lathe 0.0052 0, 0.0044 0.005, 0.0018 0.0105, 0.0003 0.0135
-    at 0 -0.0452 0.089 turned 98 0 0 scaled 1 0.75 1
-    Eye: ball 0.0037 at ±0.0128 -0.0415 0.0975"""
 # Of the right foot: leg and middle toe, and the toes beside it; with their radii.
 FOOT = (
     ("0.014 -0.004 0.014, 0.015 -0.008 0.005, 0.0155 -0.018 0.0018, 0.016 -0.028 0.0015", 0.0019),
@@ -31,7 +28,15 @@ STEPS = 6
 def chick(scene: Scene) -> None:
     """Its hairs point outwards, backwards and down, each a little curled."""
     matrix = transform((-0.105, -0.145, 0), (0, 0, np.radians(-22)))
-    model, found, t = Model(scene, FACE), [], np.linspace(0, 1, STEPS)[:, None]
+    model, found, t = Model(scene), [], np.linspace(0, 1, STEPS)[:, None]
+    model.lathe(
+        profile=[(0.0052, 0), (0.0044, 0.005), (0.0018, 0.0105), (0.0003, 0.0135)],
+        at=(0, -0.0452, 0.089),
+        turned=(98, 0, 0),
+        scaled=(1, 0.75, 1),
+        material="Beak",
+    )
+    model.ball(radius=0.0037, at=mirrored(x=0.0128, y=-0.0415, z=0.0975), material="Eye")
     for path, radius in FOOT:
         for side in (-1, 1):
             model.add(scene.bend(points(path) * (side, 1, 1), radius, 14, 10), "Beak")
