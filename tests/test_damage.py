@@ -336,7 +336,7 @@ def note(path, *files):
     ledger.Ledger(path).note(ledger.Job([str(files[0])], stamps, {}, {}))
 
 
-@pytest.mark.parametrize("fault", FAULTS.keys() - {"deleted"})
+@pytest.mark.parametrize("fault", sorted(FAULTS.keys() - {"deleted"}))
 def test_the_ledger_names_the_damaged_file_and_what_to_make_again(nobody, fault):
     path, sound, sibling = (nobody / name for name in ("a.json", "b.json", "c.json"))
     for number, file in enumerate((path, sound, sibling)):
