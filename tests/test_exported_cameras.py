@@ -532,6 +532,19 @@ def test_a_view_without_the_numbers_that_it_needs_is_named(name, kind, file, key
         assert any(said in line for line in found), found
 
 
+@pytest.mark.parametrize("value", ["nan", "1e999", "a few"])
+@pytest.mark.parametrize("key", ["focal_length_mm", "baseline_mm", "center_cam_rx_rad", "disp_max"])
+def test_parameters_that_are_no_numbers_are_named(key, value, dataset):
+    path = dataset / "perspective" / "exports" / "hci" / "parameters.cfg"
+    right = path.read_text()
+    path.write_text(re.sub(rf"{key} = .*", f"{key} = {value}", right))
+    try:
+        found = problems(dataset, "perspective", "hci")
+    finally:
+        path.write_text(right)
+    assert f"parameters.cfg: {key}: " in found[0]
+
+
 @pytest.mark.parametrize(
     ("name", "kind", "file", "old", "new", "said"),
     [

@@ -7,6 +7,8 @@ the one in the middle, whose pose is there. Disparity is b f (1 / Z − 1 / F). 
 
 import configparser
 import math
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from lightfield.validation.readers.contents import (
     Exported,
     ExportedCamera,
     ExportedView,
+    number,
     reading,
 )
 
@@ -37,39 +40,44 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
             config.read_string(path.read_text(encoding="utf-8"))
         except configparser.Error as error:
             raise ValueError(" ".join(str(error).split())) from None
-        intrinsics, extrinsics, meta = (
-            config[name] for name in ("intrinsics", "extrinsics", "meta")
+        value = partial(
+            _number, path, {**config["intrinsics"], **config["extrinsics"], **config["meta"]}
         )
-        width, height = (int(intrinsics[f"image_resolution_{axis}_px"]) for axis in "xy")
+        width, height = (int(value(f"image_resolution_{axis}_px")) for axis in "xy")
         # The sensor's longer side.
-        focal = float(intrinsics["focal_length_mm"]) / float(intrinsics["sensor_size_mm"])
+        focal = value("focal_length_mm") / value("sensor_size_mm")
         focal *= max(width, height)
         camera = Pinhole(width, height, focal, focal, width / 2, height / 2)
         exported.cameras.append(ExportedCamera(f"{path}: intrinsics", camera))
-        columns, rows = (int(extrinsics[f"num_cams_{axis}"]) for axis in "xy")
+        columns, rows = (int(value(f"num_cams_{axis}")) for axis in "xy")
         if columns * rows != len([*folder.glob("input_Cam*.png")]):
             raise ValueError(f"num_cams_x, num_cams_y: there are no {columns} × {rows} pictures")
-        baseline = float(extrinsics["baseline_mm"]) / 1000
+        baseline = value("baseline_mm") / 1000
         middle = np.eye(4)
-        angles = [float(extrinsics[f"center_cam_r{axis}_rad"]) for axis in "xyz"]
+        angles = [value(f"center_cam_r{axis}_rad") for axis in "xyz"]
         middle[:3, :3] = euler_to_matrix(np.array(angles))
-        middle[:3, 3] = [float(extrinsics[f"center_cam_{axis}_m"]) for axis in "xyz"]
+        middle[:3, 3] = [value(f"center_cam_{axis}_m") for axis in "xyz"]
         for index in range(columns * rows):
             right, down = index % columns - columns // 2, index // columns - rows // 2
             matrix = middle.copy()
             matrix[:3, 3] += baseline * (right * middle[:3, 0] - down * middle[:3, 1])
             exported.views.append(ExportedView(path, f"Cam{index:03}", None, matrix))
             _check_files(folder, f"_Cam{index:03}", (width, height), exported)
-        exported.expect(f"{path}: offset", float(extrinsics["offset"]), 0.0)
-        exported.expect(f"{path}: depth_map_scale", float(meta["depth_map_scale"]), 1.0)
+        exported.expect(f"{path}: offset", value("offset"), 0.0)
+        exported.expect(f"{path}: depth_map_scale", value("depth_map_scale"), 1.0)
         # Cameras that look in parallel focus at infinity: d = b f / Z, and 0 where nothing is hit.
-        focus = float(extrinsics["focus_distance_m"])
+        focus = value("focus_distance_m")
         exported.expect(f"{path}: focus_distance_m", focus, INFINITY)
-        far, near = (_depth(baseline * focal, float(meta[f"disp_{end}"])) for end in ("min", "max"))
+        far, near = (_depth(baseline * focal, value(f"disp_{end}")) for end in ("min", "max"))
         place = f"{path}: disp_min, disp_max"
         exported.ranges.append(DepthRange(place, None, near, far, "z", math.inf))
     _check_files(folder, "", (width, height), exported)
     return exported
+
+
+def _number(path: Path, texts: Mapping[str, str], key: str) -> float:
+    with reading(f"{path}: {key}", "number"):
+        return number(float(texts[key]))
 
 
 def _depth(unit: float, disparity: float) -> float:
