@@ -108,6 +108,11 @@ def needed_jobs():
     return own_jobs(workflow.dag.needrun_jobs(exclude_finished=False))
 
 
+def all_jobs():
+    """Return the jobs of these rules that lead to the targets, also those with nothing to do."""
+    return own_jobs(workflow.dag.jobs)
+
+
 def all_outputs():
     """Return the outputs of all jobs that lead to the targets, also of those with nothing to do."""
     return {str(file) for job in workflow.dag.jobs for file in job.output}

@@ -110,8 +110,8 @@ def announce_refusals():
 
 
 def keep_shards():
-    """Note the shards of the datasets of which this run renders some: they keep these."""
-    jobs = [job for job in needed_jobs() if job.rule.name == RENDER]
+    """Note the shards of the planned datasets: they keep these."""
+    jobs = [job for job in all_jobs() if job.rule.name == RENDER]
     datasets = {d.name: d for d in (dataset_of(job.wildcards) for job in jobs)}
     counts = {name: (d.view_count, len(d.shards)) for name, d in datasets.items()}
     if counts:

@@ -119,7 +119,7 @@ KINDS = {
 HISTORY = {"log of checksums", "journal", "benchmark"}
 # A job's log has no checksum.
 WITHOUT_CHECKSUM = {"log"}
-# Each plan writes settings, and each run that renders notes the shards.
+# Each plan writes settings, and each run notes the shards.
 REWRITTEN = {"settings", "note of shards"}
 
 
