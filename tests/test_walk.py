@@ -179,13 +179,13 @@ def test_it_begins_where_the_cameras_look(tmp_path, show, rig):
     middle = shown[HEIGHT // 2, WIDTH // 2]
     assert middle[0] > 0.5
     assert middle[0] > 2 * middle[1]
-    assert opened.evaluate("room(walk.at)") > -1e-6
+    assert opened.evaluate("metresToEdge(walk.at)") > -1e-6
 
 
 def test_nobody_leaves_the_volume(tab):
     opened = tab()
     opened.evaluate("moved(5, 0, 0)")
-    assert -1e-6 < opened.evaluate("room(walk.at)") < 0.01
+    assert -1e-6 < opened.evaluate("metresToEdge(walk.at)") < 0.01
     assert "m to the edge" in opened.locator("#walk-readout").inner_text()
 
 
@@ -226,7 +226,7 @@ def test_a_place_that_is_none_is_the_start(tab):
         assert opened.evaluate(go, place) == home
     # Nobody leaves the volume so, either.
     opened.evaluate(go, "walk=9,0,0,0.5,0.2,1")
-    assert -1e-6 < opened.evaluate("room(walk.at)") < 0.01
+    assert -1e-6 < opened.evaluate("metresToEdge(walk.at)") < 0.01
     assert opened.evaluate("[walk.yaw, walk.pitch, walk.mode]") == [0.5, 0.2, 1]
 
 

@@ -1,6 +1,6 @@
 """Light and depth in the 8-bit pixels of a web page's pictures, with more range than a display has.
 
-A page decodes them in the browser (templates/page.js), so that exposure and depth can be
+A page decodes them in the browser (templates/page/packing.js), so that exposure and depth can be
 looked at there. Both are logarithmic, so that every stop, near or far, has as many steps.
 """
 

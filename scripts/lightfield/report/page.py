@@ -11,6 +11,7 @@ from markupsafe import Markup
 from lightfield.core.files import write_text
 from lightfield.core.progress import duration
 from lightfield.imaging import images, pictures
+from lightfield.report import scripts
 from lightfield.report.packing import data_uri, webp
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
@@ -31,9 +32,14 @@ def write(output: Path, template: str, **content: Any) -> None:
     )
     environment.filters |= {"number": number, "cell": cell, "measure": measure, "named": title}
     # These are the project's own files, not somebody's text.
-    for name in ("page.css", "page.js", "walk.js"):
-        own = Markup((TEMPLATES / name).read_text("utf-8"))
-        environment.globals[name.replace(".", "_")] = own
+    page_modules = scripts.modules(TEMPLATES / "page/main.js")
+    walk_modules = scripts.modules(TEMPLATES / "walk/main.js")
+    only_of_walk = [module for module in walk_modules if module not in page_modules]
+    environment.globals |= {
+        "page_css": Markup((TEMPLATES / "page.css").read_text("utf-8")),
+        "page_js": Markup(scripts.joined(page_modules)),
+        "walk_js": Markup(scripts.joined(only_of_walk)),
+    }
     write_text(output, environment.get_template(template).render(**content))
 
 

@@ -1,7 +1,7 @@
 """What the page's walk inside a light field needs beside the views: their rays, and their room.
 
 How views are chosen, drawn and blended is that of `synthesis.view`, once more in a browser
-(templates/walk.js): its constants are handed over here.
+(templates/walk/): its constants are handed over here.
 """
 
 from typing import Any

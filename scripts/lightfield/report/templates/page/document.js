@@ -1,0 +1,41 @@
+// The page's elements, canvases and colours.
+
+export const element = (id) => document.getElementById(id);
+export const themed = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+// Give a canvas as many pixels as the screen has for it; return its context, in CSS pixels.
+export function fitted(canvas) {
+  const ratio = window.devicePixelRatio || 1;
+  const width = Math.max(1, Math.round(canvas.clientWidth * ratio));
+  const height = Math.max(1, Math.round(canvas.clientHeight * ratio));
+  if (canvas.width !== width || canvas.height !== height) {
+    canvas.width = width;
+    canvas.height = height;
+  }
+  const context = canvas.getContext("2d");
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, canvas.clientWidth, canvas.clientHeight);
+  return context;
+}
+
+// At most once a frame, however often it is asked for.
+export function onceAFrame(draw) {
+  let asked = false;
+  return () => {
+    if (asked) return;
+    asked = true;
+    requestAnimationFrame(() => {
+      asked = false;
+      draw();
+    });
+  };
+}
+
+export function pressed(chosen, other) {
+  chosen.setAttribute("aria-pressed", "true");
+  other.setAttribute("aria-pressed", "false");
+}
+
+export function polyline(context, points) {
+  points.forEach(([x, y], place) => (place ? context.lineTo(x, y) : context.moveTo(x, y)));
+}

@@ -1,0 +1,71 @@
+// Light and depth out of their codes. How pictures are packed is said in report/packing.py.
+
+import { DATA, MISS } from "./data.js";
+import { clamp } from "./vectors.js";
+
+export const LIGHT = Float64Array.from({ length: 256 }, (_, code) =>
+  code ? 2 ** (DATA.light[0] + ((code - 1) / 254) * (DATA.light[1] - DATA.light[0])) : 0);
+
+function encodeSrgb(linear) {
+  const value = clamp(linear, 0, 1);
+  return value <= 0.0031308 ? 12.92 * value : 1.055 * value ** (1 / 2.4) - 0.055;
+}
+
+// Reinhard et al. 2002, equation 4, as the contact sheet is developed.
+export function developed(exposure) {
+  return Uint8ClampedArray.from(LIGHT, (light) => {
+    const value = light * 2 ** exposure;
+    return 255 * encodeSrgb((value * (1 + value / DATA.white ** 2)) / (1 + value));
+  });
+}
+
+export const depthCode = (pixels, at) => ((pixels[at] << 8) | pixels[at + 1]) >> 4;
+
+export function depthOf(code, [low, high]) {
+  if (code === 0) return NaN;
+  return code === MISS ? Infinity : 2 ** (low + ((code - 1) / (MISS - 2)) * (high - low));
+}
+
+export const bytesOf = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+
+// One colour (r, g, b) for each depth code, for codes that span `range`.
+export function depthColours(range) {
+  const bytes = bytesOf(DATA.depth.colours);
+  const [near, far] = DATA.depth.shown;
+  const table = new Uint8ClampedArray(3 * DATA.depth.steps);
+  for (let code = 1; code < MISS; code++) {
+    const part = (Math.log2(depthOf(code, range)) - near) / (far - near);
+    const colour = 3 * clamp(Math.round(255 * part), 0, 255);
+    table.set(bytes.subarray(colour, colour + 3), 3 * code);
+  }
+  table.fill(176, 3 * MISS);
+  return table;
+}
+
+export async function decoded(uri) {
+  const image = new Image();
+  image.src = uri;
+  await image.decode();
+  const canvas = document.createElement("canvas");
+  canvas.width = image.naturalWidth;
+  canvas.height = image.naturalHeight;
+  const context = canvas.getContext("2d", { willReadFrequently: true });
+  context.drawImage(image, 0, 0);
+  return context.getImageData(0, 0, canvas.width, canvas.height).data;
+}
+
+// Fill `target` from packed pixels, from the pixel `first` on; where `depth` is 0, leave it clear.
+export function paint(target, light, depth, first, table, colours) {
+  for (let pixel = 0; pixel < target.length; pixel += 4) {
+    const source = 4 * first + pixel;
+    const code = depth ? depthCode(depth, source) : MISS;
+    for (let channel = 0; channel < 3; channel++) {
+      target[pixel + channel] = colours ? colours[3 * code + channel] : table[light[source + channel]];
+    }
+    target[pixel + 3] = depth && code === 0 ? 0 : 255;
+  }
+}
+
+export function metres(value) {
+  return value === Infinity ? "nothing there" : `${value.toPrecision(value < 1 ? 2 : 3)} m`;
+}

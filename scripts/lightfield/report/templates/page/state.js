@@ -1,0 +1,36 @@
+// What is open, pointed at and turned in each figure of the page.
+
+import { DATA } from "./data.js";
+import { element } from "./document.js";
+
+export const viewer = {
+  canvas: element("viewer"),
+  current: 0,
+  exposure: DATA.exposure,
+  depth: false,
+  cache: new Map(),
+  pixels: null,
+  pointed: null,
+};
+
+// How the rig is turned at first: radians around the vertical, radians above the level, and its size.
+export const HOME = { turn: 0.55, rise: 0.4, zoom: 1 };
+
+export const rig = {
+  canvas: element("rig"),
+  ...HOME,
+  hover: null,
+  screen: [],
+  pointers: new Map(),
+  moved: 0,
+  points: [],
+  showsPoints: true,
+};
+
+export const lines = {
+  canvas: element("epi"),
+  tilt: 0,
+  depth: false,
+  pixels: null,
+  pointed: null,
+};

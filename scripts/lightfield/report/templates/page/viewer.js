@@ -1,0 +1,209 @@
+// The viewer: one view, its exposure, its depth, and the way to its neighbours.
+
+import { DATA } from "./data.js";
+import { element, onceAFrame, pressed } from "./document.js";
+import { drawLines } from "./epipolar_drawing.js";
+import { LIGHT, bytesOf, decoded, depthCode, depthColours, depthOf, developed, metres, paint } from "./packing.js";
+import { drawRig } from "./rig_drawing.js";
+import { rig, viewer } from "./state.js";
+import { clamp, dot, minus } from "./vectors.js";
+
+async function pixelsOf(number) {
+  if (!viewer.cache.has(number)) {
+    const entry = DATA.embedded[number];
+    viewer.cache.set(number, Promise.all([decoded(entry.light), entry.depth ? decoded(entry.depth) : null]));
+    // Some tens of views are kept, so that stepping back and forth is quick.
+    if (viewer.cache.size > 32) viewer.cache.delete(viewer.cache.keys().next().value);
+  }
+  return viewer.cache.get(number);
+}
+
+async function open(number) {
+  viewer.current = number;
+  const view = DATA.views[DATA.embedded[number].view];
+  element("view-slider").value = number;
+  element("view-name").textContent = view.name;
+  for (const button of document.querySelectorAll("[data-step]")) {
+    button.disabled = neighbour(button.dataset.step) === null;
+  }
+  drawRig();
+  const pixels = await pixelsOf(number);
+  if (viewer.current !== number) return;
+  viewer.pixels = pixels;
+  drawView();
+}
+
+const drawView = onceAFrame(() => {
+  if (!viewer.pixels) return;
+  const [width, height] = DATA.size;
+  const [light, depth] = viewer.pixels;
+  const context = viewer.canvas.getContext("2d");
+  const image = context.createImageData(width, height);
+  const colours = viewer.depth ? viewer.colours : null;
+  paint(image.data, light, depth, 0, developed(viewer.exposure), colours);
+  context.putImageData(image, 0, 0);
+  readOut();
+});
+
+function readOut() {
+  if (!viewer.pointed || !viewer.pixels) return;
+  const [width, height] = DATA.size;
+  const [x, y] = viewer.pointed;
+  const at = 4 * (y * width + x);
+  const [light, depth] = viewer.pixels;
+  const place = [
+    Math.floor(((x + 0.5) * DATA.resolution[0]) / width),
+    Math.floor(((y + 0.5) * DATA.resolution[1]) / height),
+  ];
+  const radiance = [0, 1, 2].map((channel) => LIGHT[light[at + channel]].toPrecision(2));
+  const parts = [["pixel", place.join(", ")], ["radiance R G B", radiance.join("  ")]];
+  if (depth) {
+    const value = depthOf(depthCode(depth, at), DATA.depth.range);
+    const name = DATA.depth.meaning === "z" ? "Z-depth" : "distance";
+    parts.push([name, Number.isNaN(value) ? "outside the lens" : metres(value)]);
+  }
+  const line = element("readout");
+  line.replaceChildren();
+  for (const [title, value] of parts) {
+    const number = document.createElement("b");
+    number.textContent = value;
+    line.append(`${title} `, number, "   ");
+  }
+}
+
+// The nearest camera in a direction of the open view's own axes; at an edge, the nearest that is
+// turned that way.
+function neighbour(direction) {
+  const from = DATA.views[DATA.embedded[viewer.current].view];
+  const sign = direction === "left" || direction === "down" ? -1 : 1;
+  const axis = direction === "left" || direction === "right" ? from.right : from.up;
+  const wanted = axis.map((value) => sign * value);
+  let best = null;
+  let turned = null;
+  DATA.embedded.forEach((entry, number) => {
+    if (number === viewer.current) return;
+    const other = DATA.views[entry.view];
+    const way = minus(other.at, from.at);
+    const length = Math.hypot(...way);
+    const towards = length > 1e-6 ? dot(way, wanted) / length : 0;
+    // Within 60 degrees; straight ahead counts for more than near.
+    if (towards > 0.5 && dot(other.ahead, from.ahead) > -0.2) {
+      const cost = length / towards ** 2;
+      if (!best || cost < best.cost) best = { cost, number };
+    }
+    if (dot(other.ahead, wanted) > 0.5 && (!turned || length < turned.length)) turned = { length, number };
+  });
+  const nearest = best || turned;
+  return nearest ? nearest.number : null;
+}
+
+function step(direction) {
+  const next = neighbour(direction);
+  if (next !== null) open(next);
+}
+
+// Open a camera's view or, where it is not in the page, that of the one most like it.
+export function openView(view) {
+  const wanted = DATA.views[view];
+  let best = { cost: Infinity, number: 0 };
+  DATA.embedded.forEach((entry, number) => {
+    const other = DATA.views[entry.view];
+    const cost = Math.hypot(...minus(other.at, wanted.at)) + rig.extent * (1 - dot(other.ahead, wanted.ahead));
+    if (entry.view === view || cost < best.cost) best = { cost: entry.view === view ? -1 : cost, number };
+  });
+  open(best.number);
+}
+
+function pointAtView(event) {
+  const frame = viewer.canvas.getBoundingClientRect();
+  const [width, height] = DATA.size;
+  viewer.pointed = [
+    clamp(Math.floor(((event.clientX - frame.left) / frame.width) * width), 0, width - 1),
+    clamp(Math.floor(((event.clientY - frame.top) / frame.height) * height), 0, height - 1),
+  ];
+  readOut();
+}
+
+function showExposure() {
+  const stops = viewer.exposure - DATA.exposure;
+  element("exposure-value").textContent = `${stops < 0 ? "−" : "+"}${Math.abs(stops).toFixed(1)} stops`;
+}
+
+function startExposure() {
+  const slider = element("exposure");
+  slider.addEventListener("input", () => {
+    viewer.exposure = DATA.exposure + Number(slider.value);
+    showExposure();
+    drawView();
+    drawLines();
+  });
+  showExposure();
+}
+
+function startDepthButton() {
+  const [light, depth] = [element("show-light"), element("show-depth")];
+  if (!DATA.depth) {
+    depth.disabled = true;
+    depth.title = "These views have no depth";
+    return;
+  }
+  viewer.colours = depthColours(DATA.depth.range);
+  startDepthScale();
+  const show = (isDepth) => {
+    viewer.depth = isDepth;
+    pressed(isDepth ? depth : light, isDepth ? light : depth);
+    element("depth-scale").hidden = !isDepth;
+    drawView();
+  };
+  light.addEventListener("click", () => show(false));
+  depth.addEventListener("click", () => show(true));
+}
+
+function startSteps() {
+  for (const button of document.querySelectorAll("[data-step]")) {
+    button.addEventListener("click", () => step(button.dataset.step));
+  }
+  const keys = { ArrowLeft: "left", ArrowRight: "right", ArrowUp: "up", ArrowDown: "down" };
+  for (const canvas of [viewer.canvas, element("rig")]) {
+    canvas.addEventListener("keydown", (event) => {
+      if (!(event.key in keys)) return;
+      event.preventDefault();
+      step(keys[event.key]);
+    });
+  }
+}
+
+function startDepthScale() {
+  const [near, far] = DATA.depth.shown;
+  const context = element("depth-bar").getContext("2d");
+  const image = context.createImageData(256, 1);
+  const bytes = bytesOf(DATA.depth.colours);
+  for (let place = 0; place < 256; place++) {
+    for (let channel = 0; channel < 3; channel++) {
+      image.data[4 * place + channel] = bytes[3 * place + channel];
+    }
+    image.data[4 * place + 3] = 255;
+  }
+  context.putImageData(image, 0, 0);
+  for (let tick = 0; tick < 5; tick++) {
+    const label = document.createElement("span");
+    label.textContent = metres(2 ** (near + (tick / 4) * (far - near)));
+    element("depth-ticks").append(label);
+  }
+}
+
+export function startViewer() {
+  const [width, height] = DATA.size;
+  viewer.canvas.width = width;
+  viewer.canvas.height = height;
+  viewer.canvas.style.aspectRatio = `${width} / ${height}`;
+  viewer.canvas.addEventListener("pointermove", pointAtView);
+  viewer.canvas.addEventListener("pointerdown", pointAtView);
+  const slider = element("view-slider");
+  slider.max = DATA.embedded.length - 1;
+  slider.addEventListener("input", () => open(Number(slider.value)));
+  startExposure();
+  startDepthButton();
+  startSteps();
+  open(DATA.first);
+}

@@ -1,0 +1,90 @@
+// What the walk's buttons, keys and pointers do.
+
+import { element } from "../page/document.js";
+import { drawWalkSoon } from "./drawing.js";
+import { WIDE } from "./eye.js";
+import { listenForHeadset } from "./headset.js";
+import { goHome, placeHash, showMode } from "./home.js";
+import { TURNING, WALKING, moved, turned, walkOn } from "./motion.js";
+import { MODES, walk } from "./state.js";
+
+// One finger looks around, two walk.
+function listenToPointers(overlay) {
+  const pointers = new Map();
+  overlay.addEventListener("pointerdown", (event) => {
+    overlay.setPointerCapture(event.pointerId);
+    pointers.set(event.pointerId, [event.clientX, event.clientY]);
+    overlay.focus({ preventScroll: true });
+  });
+  overlay.addEventListener("pointermove", (event) => {
+    const last = pointers.get(event.pointerId);
+    if (!last) return;
+    const way = [event.clientX - last[0], event.clientY - last[1]];
+    pointers.set(event.pointerId, [event.clientX, event.clientY]);
+    const side = Math.max(overlay.clientWidth, overlay.clientHeight);
+    if (pointers.size === 1) turned(...way.map((value) => (-value * WIDE) / side));
+    else moved((0.5 * way[1]) / side, (-0.5 * way[0]) / side, 0);
+  });
+  for (const name of ["pointerup", "pointercancel"]) {
+    overlay.addEventListener(name, (event) => pointers.delete(event.pointerId));
+  }
+  const towards = (event) => {
+    event.preventDefault();
+    moved(-0.0005 * event.deltaY, 0, 0);
+  };
+  overlay.addEventListener("wheel", towards, { passive: false });
+}
+
+const keyOf = (event) => (event.key.length === 1 ? event.key.toLowerCase() : event.key);
+
+function listenToKeys(overlay) {
+  overlay.addEventListener("keydown", (event) => {
+    const key = keyOf(event);
+    if (!(key in WALKING || key in TURNING)) return;
+    event.preventDefault();
+    if (!walk.keys.size) walkOn(performance.now());
+    walk.keys.add(key);
+  });
+  overlay.addEventListener("keyup", (event) => walk.keys.delete(keyOf(event)));
+  overlay.addEventListener("blur", () => walk.keys.clear());
+}
+
+function listenToButtons() {
+  MODES.forEach((name, mode) => element(`walk-${name}`).addEventListener("click", () => showMode(mode)));
+  element("walk-cameras").addEventListener("click", (event) => {
+    walk.showsCameras = !walk.showsCameras;
+    event.currentTarget.setAttribute("aria-pressed", walk.showsCameras);
+    drawWalkSoon();
+  });
+  element("walk-home").addEventListener("click", goHome);
+  element("exposure").addEventListener("input", drawWalkSoon);
+}
+
+// The frames of a sequence: each is a page of its own.
+function listenToFrames() {
+  const slider = element("walk-frame");
+  if (!slider) return;
+  const name = () => slider.dataset.frames.split(" ")[Number(slider.value)];
+  slider.addEventListener("input", () => {
+    slider.nextElementSibling.textContent = name();
+  });
+  slider.addEventListener("change", () => {
+    location.href = `../../${name()}/report/index.html${placeHash()}`;
+  });
+}
+
+function followSize() {
+  const ratio = Math.min(window.devicePixelRatio || 1, 1.5);
+  walk.canvas.width = Math.max(2, Math.round(walk.canvas.clientWidth * ratio));
+  walk.canvas.height = Math.max(2, Math.round(walk.canvas.clientHeight * ratio));
+  drawWalkSoon();
+}
+
+export function listen() {
+  listenToPointers(walk.overlay);
+  listenToKeys(walk.overlay);
+  listenToButtons();
+  listenToFrames();
+  new ResizeObserver(followSize).observe(walk.canvas);
+  listenForHeadset();
+}

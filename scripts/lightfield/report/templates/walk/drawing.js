@@ -1,0 +1,97 @@
+// When the walk is drawn, of how many sources, and what lies over it.
+
+import { DATA } from "../page/data.js";
+import { element, fitted, onceAFrame, polyline } from "../page/document.js";
+import { dot, minus } from "../page/vectors.js";
+import { choose, missing } from "./choice.js";
+import { NEAR, axes, metresToEdge, scales } from "./eye.js";
+import { drawEye } from "./layers.js";
+import { MOST_SOURCES, walk } from "./state.js";
+
+// Where a whole picture takes more milliseconds than this, one in motion is made of few sources.
+const SLOW = 100;
+export const FEW = Math.min(2, MOST_SOURCES);
+// So many milliseconds after the last motion it stands.
+const REST = 200;
+
+// Draw once, from where the eye is, of so many sources.
+function drawWalk(count = walk.sources) {
+  const { canvas } = walk;
+  const eyeAxes = axes();
+  const spread = scales(canvas.width, canvas.height);
+  choose(count, eyeAxes, spread);
+  const eye = { at: walk.at, axes: eyeAxes, lens: [...spread, 0, 0], sources: walk.chosen };
+  drawEye(eye, null, [0, 0], canvas.width, canvas.height);
+  drawOverlay(eyeAxes, spread);
+  walk.frames += 1;
+}
+
+// Where a point of the world falls on the overlay; null behind the eye.
+function overlayProjection([right, up, back], [spreadX, spreadY]) {
+  const [width, height] = [walk.overlay.clientWidth, walk.overlay.clientHeight];
+  return (point) => {
+    const way = minus(point, walk.at);
+    const depth = -dot(way, back);
+    if (depth < NEAR) return null;
+    const [x, y] = [(spreadX * dot(way, right)) / depth, (spreadY * dot(way, up)) / depth];
+    return [(width / 2) * (1 + x), (height / 2) * (1 - y)];
+  };
+}
+
+function drawVolume(context, project) {
+  context.strokeStyle = "rgb(255 255 255 / 35%)";
+  context.beginPath();
+  for (const line of DATA.outline) {
+    let before = null;
+    for (const point of line.map(project)) {
+      if (before && point) polyline(context, [before, point]);
+      before = point;
+    }
+  }
+  context.stroke();
+}
+
+function drawCameras(context, project) {
+  for (const source of walk.order) {
+    const point = project(source.view.at);
+    if (!point) continue;
+    const isUsed = walk.chosen.includes(source);
+    const side = isUsed ? 6 : 4;
+    context.fillStyle = isUsed ? "#e69f00" : "rgb(255 255 255 / 60%)";
+    context.fillRect(point[0] - 2, point[1] - 2, side, side);
+  }
+}
+
+// Over the picture: the edge of the volume, and the cameras; those in use are marked.
+function drawOverlay(eyeAxes, spread) {
+  const context = fitted(walk.overlay);
+  if (walk.showsCameras) {
+    const project = overlayProjection(eyeAxes, spread);
+    drawVolume(context, project);
+    drawCameras(context, project);
+  }
+  // Adding 0 turns −0 into 0.
+  const place = walk.at.map((value) => (Math.round(100 * value) / 100 + 0).toFixed(2));
+  element("walk-readout").textContent = [
+    `${place.join(", ")} m`,
+    `${metresToEdge(walk.at).toFixed(2)} m to the edge`,
+    `${walk.chosen.length} of ${walk.order.length} views`,
+  ].join(" · ");
+}
+
+export const drawWalkSoon = onceAFrame(() => {
+  if (!walk.ready) return;
+  drawWalk(walk.slow ? FEW : walk.sources);
+  clearTimeout(walk.rest);
+  if (walk.slow) walk.rest = setTimeout(drawAllSources, REST);
+});
+
+// Draw of all sources, and see how long that takes: it is done when a pixel can be read.
+function drawAllSources() {
+  if (missing()) return;
+  const { gl } = walk;
+  const start = performance.now();
+  drawWalk();
+  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+  walk.slow = performance.now() - start > SLOW;
+}

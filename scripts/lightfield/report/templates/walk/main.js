@@ -1,0 +1,89 @@
+// A walk inside the light field: the views near the eye, drawn as surfaces that tear where depth jumps, and blended
+// where they show the same. It is synthesis/view.py once more, on the graphics card.
+
+import { DATA } from "../page/data.js";
+import { element } from "../page/document.js";
+import { bytesOf, decoded, depthOf } from "../page/packing.js";
+import { minus } from "../page/vectors.js";
+import { bestViews, missing } from "./choice.js";
+import { listen } from "./controls.js";
+import { FEW, drawWalkSoon } from "./drawing.js";
+import { axes, scales } from "./eye.js";
+import { goHome, goWhereItWas } from "./home.js";
+import blendedShader from "./shaders/blended.glsl";
+import drawnShader from "./shaders/drawn.glsl";
+import pixelsShader from "./shaders/pixels.glsl";
+import placeShader from "./shaders/place.glsl";
+import surfaceShader from "./shaders/surface.glsl";
+import wholePictureShader from "./shaders/whole_picture.glsl";
+import { unfolded, upload } from "./sources.js";
+import { WALK, walk } from "./state.js";
+import { program, texture } from "./webgl.js";
+
+// Bring in all sources one after the other, those first that the eye wants; `begin` as soon as
+// a few are there.
+async function bringSources(begin) {
+  for (let number = 0; number < walk.order.length; number++) {
+    const source = missing() || walk.order.find((other) => !other.isThere);
+    const { light, depth } = source.entry;
+    upload(source, ...(await Promise.all([decoded(light), decoded(depth)])));
+    if (number + 1 === Math.min(FEW, walk.order.length)) begin();
+    if (walk.wanted.includes(source) && !missing()) drawWalkSoon();
+  }
+}
+
+// The unit ray of each pixel in the camera's axes, x, y, z and a fourth number for upload to mark.
+function unpackedRays() {
+  const codes = new Uint16Array(bytesOf(WALK.rays).buffer);
+  const rays = new Float32Array(2 * codes.length);
+  for (let pixel = 0; pixel < codes.length / 2; pixel++) {
+    rays.set(unfolded(codes[2 * pixel] / 65535, codes[2 * pixel + 1] / 65535), 4 * pixel);
+  }
+  return rays;
+}
+
+function paletteTexture(gl) {
+  const colours = new Uint8Array(256 * 4).fill(255);
+  bytesOf(DATA.depth.colours).forEach((value, place) => {
+    colours[4 * Math.floor(place / 3) + (place % 3)] = value;
+  });
+  return texture(gl, gl.TEXTURE_2D, gl.RGBA8, 256, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, colours);
+}
+
+function prepareDrawing(gl) {
+  walk.gl = gl;
+  walk.surface = program(gl, placeShader + surfaceShader, drawnShader);
+  walk.pixels = program(gl, placeShader + pixelsShader, drawnShader);
+  walk.blended = program(gl, wholePictureShader, blendedShader);
+  walk.palette = paletteTexture(gl);
+}
+
+function prepareSources() {
+  walk.rays = unpackedRays();
+  walk.sight = bytesOf(WALK.sight);
+  walk.inverses = Float32Array.from({ length: DATA.depth.steps }, (_, code) => 1 / depthOf(code, DATA.depth.range));
+  walk.order = DATA.embedded.map((entry) => ({ entry, view: DATA.views[entry.view] }));
+  const places = walk.order.map(({ view }) => view.at);
+  walk.extent = Math.max(...places.map((at) => Math.hypot(...minus(at, places[0])))) || 1;
+}
+
+async function startWalk() {
+  if (!WALK) return;
+  const gl = walk.canvas.getContext("webgl2", { antialias: false, alpha: false, preserveDrawingBuffer: true });
+  if (!gl || !gl.getExtension("EXT_color_buffer_float")) {
+    element("walk-section").hidden = true;
+    return;
+  }
+  prepareDrawing(gl);
+  prepareSources();
+  goHome();
+  goWhereItWas();
+  const fieldOfView = scales(walk.canvas.clientWidth, walk.canvas.clientHeight);
+  walk.wanted = bestViews(walk.order, walk.sources, walk.at, axes(), fieldOfView);
+  await bringSources(() => {
+    walk.ready = true;
+    listen();
+  });
+}
+
+startWalk();

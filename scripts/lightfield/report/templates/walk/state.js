@@ -1,0 +1,25 @@
+// Where the eye of the walk is, and what is drawn of it. report/walk.py says what `DATA.walk` holds.
+
+import { DATA } from "../page/data.js";
+import { element } from "../page/document.js";
+
+export const WALK = DATA.walk;
+export const MOST_SOURCES = WALK ? WALK.best : 0;
+export const MODES = ["colour", "depth", "holes", "sources"];
+
+export const walk = {
+  canvas: element("walk"),
+  overlay: element("walk-overlay"),
+  at: null,
+  fadeFrom: 0,
+  yaw: 0,
+  pitch: 0,
+  mode: 0,
+  sources: MOST_SOURCES,
+  showsCameras: true,
+  keys: new Set(),
+  frames: 0,
+  slow: true,
+  wanted: [],
+  chosen: [],
+};

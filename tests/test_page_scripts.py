@@ -1,0 +1,45 @@
+"""A page's modules become one script: each name means one thing, and each import is an export."""
+
+import re
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from lightfield.report import page, scripts
+
+MODULES = sorted(page.TEMPLATES.glob("*/*.js"))
+DECLARED = re.compile(r"^(export )?(?:async function|function|const|let) (\w+)", re.MULTILINE)
+IMPORTED = re.compile(r'^import {(.+)} from "(.+)";', re.MULTILINE)
+
+
+def test_modules_share_a_scope_without_giving_a_name_twice():
+    names = Counter(
+        name for module in MODULES for _, name in DECLARED.findall(module.read_text("utf-8"))
+    )
+    assert [name for name, count in names.items() if count > 1] == []
+
+
+@pytest.mark.parametrize(
+    "module", MODULES, ids=lambda module: f"{module.parent.name}/{module.name}"
+)
+def test_what_is_imported_is_exported(module):
+    for names, path in IMPORTED.findall(module.read_text("utf-8")):
+        imported = (module.parent / path).read_text("utf-8")
+        exported = {name for export, name in DECLARED.findall(imported) if export}
+        assert {name.strip() for name in names.split(",")} <= exported
+
+
+def test_every_module_is_in_the_page():
+    entries = [page.TEMPLATES / "page/main.js", page.TEMPLATES / "walk/main.js"]
+    assert {module for entry in entries for module in scripts.modules(entry)} == set(MODULES)
+
+
+def test_a_module_follows_what_it_imports_and_holds_its_shaders(tmp_path: Path):
+    (tmp_path / "main.js").write_text('import { one } from "./one.js";\nsay(one, text);\n')
+    (tmp_path / "one.js").write_text('import text from "./a.glsl";\nexport const one = 1;\n')
+    (tmp_path / "a.glsl").write_text('say "this";\n')
+    script = scripts.joined(scripts.modules(tmp_path / "main.js"))
+    assert script.splitlines()[1:3] == [r'const text = "say \"this\";\n";', "const one = 1;"]
+    assert "say(one, text);" in script.splitlines()[-1]
+    assert "import" not in script
