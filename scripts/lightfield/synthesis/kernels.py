@@ -1,7 +1,7 @@
 """The loops of view synthesis: where a surface tears, how it is drawn, how drawings are blended.
 
 A view is a surface: a vertex at each pixel's centre, a triangle between neighbours that belong
-together. Pixels beside a tear are drawn one by one, too. ``inverse`` is 1 / distance in 1/m: 0
+together. Pixels beside a tear are drawn one by one, too, as large as they are. ``inverse`` is 1 / distance in 1/m: 0
 where nothing was hit, NaN where there is no ray.
 """
 
@@ -19,6 +19,8 @@ from lightfield.geometry.lenses import Array
 EVEN = np.float32(0.5)
 # Drawings at one pixel are of one surface if their inverse distances differ by less than this part.
 SAME = np.float32(0.03)
+# Added to roots of colours before they are inverted, so that black has an inverse.
+DARK = np.float32(0.03)
 # What is this small, in 1/m, is as far as the sky.
 FAR = np.float32(1e-4)
 # A triangle that is larger than this part of the picture is an artefact at a lens's rim.
@@ -185,33 +187,183 @@ def draw_pixels(pixels: Array, values: Array, wraps: bool, inverse: Array, drawn
 
 
 @kernel
-def blend(inverses: Array, drawn: Array, colour: Array, inverse: Array, holes: Array) -> None:
-    """Blend drawings (k, H, W) of which the nearest surface counts, by their weights.
+def sharpen(root: Array, right: Array, down: Array, amount: np.float32, sharp: Array) -> None:
+    """Subtract from each colour (h, w, 3) ``amount`` / 4 of its neighbours' differences from it.
 
-    ``colour`` (H, W, 3) and ``inverse`` (H, W) become NaN where no drawing has anything: there are
-    ``holes`` (H, W).
+    Only neighbours on one surface count, as `link` marks them.
     """
-    number, height, width = inverses.shape
+    height, width = right.shape
+    part = amount / np.float32(4)
     for i in range(height):
         for j in range(width):
-            nearest = np.float32(-1)
-            for k in range(number):
-                nearest = max(nearest, inverses[k, i, j])
-            holes[i, j] = nearest < 0
-            if holes[i, j]:
-                colour[i, j], inverse[i, j] = np.nan, np.nan
+            for c in range(3):
+                here = root[i, j, c]
+                apart = np.float32(0)
+                if right[i, j]:
+                    apart += root[i, j + 1, c] - here
+                if j > 0 and right[i, j - 1]:
+                    apart += root[i, j - 1, c] - here
+                if down[i, j]:
+                    apart += root[i + 1, j, c] - here
+                if i > 0 and down[i - 1, j]:
+                    apart += root[i - 1, j, c] - here
+                sharp[i, j, c] = max(here - part * apart, np.float32(0))
+
+
+@kernel
+def add(inverse: Array, drawn: Array, sums: Array, depths: Array) -> None:
+    """Add a drawing (H, W) to the ``sums`` (H, W, 4) of inverse colours, and of weights.
+
+    A weight is that of the drawing, divided by the squared distance: what is near hides what is
+    far, but no view alone decides what is near. Colours are summed as the inverses of their roots:
+    a highlight that one view sees counts little.
+    ``depths`` (H, W, 2) has the sums of weights, and of weighted inverse distances, of the nearest
+    surface. ``inverse`` and ``drawn`` are as in `draw`; they are made empty again.
+    """
+    height, width = inverse.shape
+    one = np.float32(1)
+    for i in range(height):
+        for j in range(width):
+            near = inverse[i, j]
+            if near < 0:
                 continue
-            total = mean = red = green = blue = np.float32(0)
-            for k in range(number):
-                if inverses[k, i, j] < nearest - max(SAME * nearest, FAR):
-                    continue
-                weight = drawn[k, i, j, 3]
+            inverse[i, j] = -one
+            weight = drawn[i, j, 3]
+            here = depths[i, j, 1] / depths[i, j, 0] if depths[i, j, 0] > 0 else -one
+            slack = max(SAME * max(near, here), FAR)
+            if near > here + slack:
+                depths[i, j, 0] = weight
+                depths[i, j, 1] = weight * near
+            elif near >= here - slack:
+                depths[i, j, 0] += weight
+                depths[i, j, 1] += weight * near
+            weight *= max(near, FAR) * max(near, FAR)
+            for c in range(3):
+                sums[i, j, c] += weight / (drawn[i, j, c] + DARK)
+            sums[i, j, 3] += weight
+
+
+@kernel
+def _second(a: Any, b: Any, c: Any, d: Any) -> Any:
+    """Return the second largest of four numbers."""
+    return max(min(max(a, b), max(c, d)), min(a, b), min(c, d))
+
+
+@kernel
+def resolve(sums: Array, depths: Array, colour: Array, inverse: Array, seen: Array) -> None:
+    """Average 2 × 2 samples to a pixel: ``colour`` (h, w, 3), ``inverse`` (h, w).
+
+    ``sums`` (2h, 2w, 4) and ``depths`` (2h, 2w, 2) are as in `add`. ``seen`` (h, w) is the part of
+    a pixel's samples that have anything. Distances are not blended across an edge: those count
+    that are of one surface with the second nearest sample.
+    """
+    height, width = seen.shape
+    one, quarter = np.float32(1), np.float32(0.25)
+    nears = np.empty(4, np.float32)
+    for i in range(height):
+        for j in range(width):
+            count = 0
+            red = green = blue = np.float32(0)
+            for k in range(4):
+                row, column = 2 * i + k // 2, 2 * j + k % 2
+                weight = sums[row, column, 3]
+                nears[k] = -one
+                if weight > 0:
+                    count += 1
+                    nears[k] = depths[row, column, 1] / depths[row, column, 0]
+                    red += (weight / sums[row, column, 0] - DARK) ** 2
+                    green += (weight / sums[row, column, 1] - DARK) ** 2
+                    blue += (weight / sums[row, column, 2] - DARK) ** 2
+            seen[i, j] = quarter * count
+            if count == 0:
+                colour[i, j] = inverse[i, j] = np.nan
+                continue
+            colour[i, j, 0] = red / count
+            colour[i, j, 1] = green / count
+            colour[i, j, 2] = blue / count
+            second = _second(nears[0], nears[1], nears[2], nears[3])
+            middle = second if second >= 0 else max(nears.max(), np.float32(0))
+            mean, number = np.float32(0), 0
+            for k in range(4):
+                if nears[k] >= 0 and abs(nears[k] - middle) <= max(SAME * middle, FAR):
+                    mean += nears[k]
+                    number += 1
+            inverse[i, j] = mean / number
+
+
+@kernel
+def shrink(
+    colour: Array, inverse: Array, seen: Array, small: Array, small_inverse: Array, small_seen: Array
+) -> None:
+    """Average 2 × 2 pixels to one of the next coarser level: what is behind counts most.
+
+    ``seen`` (h, w) is how much is known of a pixel, from 0 to 1.
+    """
+    height, width = seen.shape
+    for i in range(small_seen.shape[0]):
+        for j in range(small_seen.shape[1]):
+            behind = np.float32(np.inf)
+            for row in range(2 * i, min(2 * i + 2, height)):
+                for column in range(2 * j, min(2 * j + 2, width)):
+                    if seen[row, column] > 0:
+                        behind = min(behind, inverse[row, column] + FAR)
+            total = parts = near = red = green = blue = np.float32(0)
+            for row in range(2 * i, min(2 * i + 2, height)):
+                for column in range(2 * j, min(2 * j + 2, width)):
+                    if seen[row, column] > 0:
+                        weight = seen[row, column] * (behind / (inverse[row, column] + FAR)) ** 2
+                        total += weight
+                        parts += seen[row, column]
+                        near += weight * inverse[row, column]
+                        red += weight * colour[row, column, 0]
+                        green += weight * colour[row, column, 1]
+                        blue += weight * colour[row, column, 2]
+            small_seen[i, j] = min(parts, np.float32(1))
+            if total > 0:
+                small_inverse[i, j] = near / total
+                small[i, j, 0] = red / total
+                small[i, j, 1] = green / total
+                small[i, j, 2] = blue / total
+
+
+@kernel
+def enlarge(
+    small: Array, small_inverse: Array, wraps: bool, colour: Array, inverse: Array, seen: Array
+) -> None:
+    """Fill pixels of which not all is known from the next coarser level, which is full.
+
+    Of the four nearest coarse pixels, what is behind counts most, as in `shrink`.
+    """
+    height, width = seen.shape
+    rows, columns = small_inverse.shape
+    one, near_part, far_part = np.float32(1), np.float32(0.75), np.float32(0.25)
+    for i in range(height):
+        for j in range(width):
+            known = seen[i, j]
+            if known >= one:
+                continue
+            row, column = i // 2, j // 2
+            other_row = min(max(row + 2 * (i % 2) - 1, 0), rows - 1)
+            other_column = column + 2 * (j % 2) - 1
+            if wraps:
+                other_column %= columns
+            other_column = min(max(other_column, 0), columns - 1)
+            total = near = red = green = blue = np.float32(0)
+            for k in range(4):
+                y = other_row if k // 2 else row
+                x = other_column if k % 2 else column
+                weight = (far_part if k // 2 else near_part) * (far_part if k % 2 else near_part)
+                weight /= (small_inverse[y, x] + FAR) ** 2
                 total += weight
-                red += weight * drawn[k, i, j, 0]
-                green += weight * drawn[k, i, j, 1]
-                blue += weight * drawn[k, i, j, 2]
-                mean += weight * inverses[k, i, j]
-            inverse[i, j] = mean / total
-            colour[i, j, 0] = red / total
-            colour[i, j, 1] = green / total
-            colour[i, j, 2] = blue / total
+                near += weight * small_inverse[y, x]
+                red += weight * small[y, x, 0]
+                green += weight * small[y, x, 1]
+                blue += weight * small[y, x, 2]
+            rest = one - known
+            if known == 0:
+                colour[i, j] = inverse[i, j] = np.float32(0)
+            inverse[i, j] = known * inverse[i, j] + rest * near / total
+            colour[i, j, 0] = known * colour[i, j, 0] + rest * red / total
+            colour[i, j, 1] = known * colour[i, j, 1] + rest * green / total
+            colour[i, j, 2] = known * colour[i, j, 2] + rest * blue / total
+            seen[i, j] = one
