@@ -28,7 +28,8 @@ def collect(lens: Lens, places: Array, distances: Array) -> dict[str, Any]:
     ``distances`` (m, h, w) are what embedded views see, in metres.
     ``rays`` are those of the pixels, row by row, octahedral in two times 16 bits; ``sight`` has a
     byte for each direction of an octahedral map, 1 where the lens sees it; ``planes`` (m, 4) bound
-    the volume between the cameras: n · p + c ≤ 0. ``nearest`` is how near to a camera, in metres,
+    the volume between the cameras: n · p + c ≤ 0. ``toRim`` has a byte for each pixel, 255 where it
+    is far from the edge of what the lens sees; ``pixel`` is one's angle in radians. ``nearest`` is how near to a camera, in metres,
     its surroundings are, but for the nearest hundredth of them.
     """
     steps = (np.arange(SIGHT) + 0.5) / SIGHT
@@ -43,6 +44,8 @@ def collect(lens: Lens, places: Array, distances: Array) -> dict[str, Any]:
         "sight": packed_bytes(sees.astype(np.uint8).tobytes()),
         "side": SIGHT,
         "planes": np.round(_bounds(places), 6).tolist(),
+        "toRim": packed_bytes(np.round(255 * synthesis.to_rim(lens)).astype(np.uint8).tobytes()),
+        "pixel": synthesis.pixel_angle(lens),
         "steepest": float(synthesis.steepest(lens)),
         "distances": synthesis.typical(1 / seen).tolist() if seen.size else [1.0, 1.0],
         "nearest": float(np.percentile(hit, 1)) if hit.size else 1.0,
@@ -51,6 +54,8 @@ def collect(lens: Lens, places: Array, distances: Array) -> dict[str, Any]:
         "distance": synthesis.DISTANCE,
         "sharp": synthesis.SHARP,
         "torn": synthesis.TORN_WEIGHT,
+        "sharpened": synthesis.SHARPENED,
+        "dark": float(kernels.DARK),
         "even": float(kernels.EVEN),
         "same": float(kernels.SAME),
         "far": float(kernels.FAR),

@@ -159,10 +159,7 @@ class Sources:
 
     @cached_property
     def _to_rim(self) -> Array:
-        """How near to the edge of what the lens sees each pixel (h, w) is: 1 if not near."""
-        seen = np.pad(np.isfinite(self.rays[..., 0]), 1, constant_values=_wraps(self.lens))
-        pixels: Array = distance_transform_cdt(seen)[1:-1, 1:-1]
-        return (pixels / RIM).clip(max=1)
+        return to_rim(self.lens)
 
     def best(self, target: Array, lens: Lens, count: int) -> list[int]:
         """Return the ``count`` views that together see best what a ``target`` (4, 4) looks at.
@@ -284,10 +281,24 @@ def _turn(matrix: Array) -> Array:
     return np.asarray(matrix[:3, :3].T, np.float32)
 
 
+def to_rim(lens: Lens) -> Array:
+    """Return how far each pixel (h, w) is from the edge of what a lens sees: 0 to 1, in `RIM`."""
+    seen = np.pad(np.isfinite(lens.pixel_rays()[..., 0]), 1, constant_values=_wraps(lens))
+    pixels: Array = distance_transform_cdt(seen)[1:-1, 1:-1] if not seen.all() else np.full(
+        (lens.height, lens.width), RIM
+    )
+    return (pixels / RIM).clip(max=1)
+
+
+def pixel_angle(lens: Lens) -> float:
+    """Return the angle in radians between the rays of two pixels in the middle of a picture."""
+    here, there = lens.rays(lens.center[0] + np.array([0.0, 1.0]), np.array(lens.center[1]))
+    return float(np.linalg.norm(there - here))
+
+
 def steepest(lens: Lens) -> np.float32:
     """Return the part by which a surface's distances may differ from one pixel to the next."""
-    here, there = lens.rays(lens.center[0] + np.array([0.0, 1.0]), np.array(lens.center[1]))
-    return np.float32(STEEPEST * np.linalg.norm(there - here))
+    return np.float32(STEEPEST * pixel_angle(lens))
 
 
 def penalty(seen: Array, source: Array) -> Array:

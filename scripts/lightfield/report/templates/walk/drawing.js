@@ -3,7 +3,7 @@
 import { DATA } from "../page/data.js";
 import { element, fitted, onceAFrame, polyline } from "../page/document.js";
 import { dot, minus } from "../page/vectors.js";
-import { choose, missing } from "./choice.js";
+import { IN_MOTION, choose, missing } from "./choice.js";
 import { NEAR, axes, metresToEdge, scales } from "./eye.js";
 import { drawEye } from "./layers.js";
 import { MOST_SOURCES, walk } from "./state.js";
@@ -11,17 +11,19 @@ import { MOST_SOURCES, walk } from "./state.js";
 // Where a whole picture takes more milliseconds than this, one in motion is made of few sources.
 const SLOW = 100;
 export const FEW = Math.min(2, MOST_SOURCES);
+// Samples across and down a pixel: of a picture that stands, and of one in motion.
+const [FINE, COARSE] = [2, 0.5];
 // So many milliseconds after the last motion it stands.
 const REST = 200;
 
-// Draw once, from where the eye is, of so many sources.
-function drawWalk(count = walk.sources) {
+// Draw once, from where the eye is: as well as it can be, or quickly.
+function drawWalk(isInMotion = false) {
   const { canvas } = walk;
   const eyeAxes = axes();
   const spread = scales(canvas.width, canvas.height);
-  choose(count, eyeAxes, spread);
+  choose(isInMotion ? FEW : walk.sources, eyeAxes, spread, isInMotion ? IN_MOTION : 0);
   const eye = { at: walk.at, axes: eyeAxes, lens: [...spread, 0, 0], sources: walk.chosen };
-  drawEye(eye, null, [0, 0], canvas.width, canvas.height);
+  drawEye(eye, null, [0, 0], [canvas.width, canvas.height], isInMotion ? COARSE : FINE);
   drawOverlay(eyeAxes, spread);
   walk.frames += 1;
 }
@@ -81,7 +83,7 @@ function drawOverlay(eyeAxes, spread) {
 
 export const drawWalkSoon = onceAFrame(() => {
   if (!walk.ready) return;
-  drawWalk(walk.slow ? FEW : walk.sources);
+  drawWalk(walk.slow);
   clearTimeout(walk.rest);
   if (walk.slow) walk.rest = setTimeout(drawAllSources, REST);
 });

@@ -19,7 +19,11 @@ export const walk = {
   showsCameras: true,
   keys: new Set(),
   frames: 0,
+  stages: [],
+  zoom: 1,
   slow: true,
   wanted: [],
   chosen: [],
+  choices: 0,
+  lastChoice: null,
 };

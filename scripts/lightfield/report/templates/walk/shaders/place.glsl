@@ -5,22 +5,17 @@ precision highp float;
 precision highp int;
 precision highp sampler2D;
 uniform sampler2D rays, inverses;
+// The roots of colours, and how much a pixel counts.
 uniform sampler2D light;
 uniform int stride;
 uniform mat3 turn, back;
 uniform vec3 offset;
 uniform vec4 lens;
-uniform vec2 stops;
-uniform float near, spread, sharp, tornWeight;
+uniform float near, spread, sharp;
 out vec4 shade;
 out float nearness;
 
-vec3 decoded(vec3 code) {
-  vec3 linear = exp2(stops.x + (code * 255.0 - 1.0) / 254.0 * (stops.y - stops.x));
-  return mix(vec3(0.0), linear, step(vec3(0.5 / 255.0), code));
-}
-
-void place(ivec2 pixel, vec3 ray, float weight) {
+void place(ivec2 pixel, vec3 ray) {
   float inverse = texelFetch(inverses, pixel, 0).r;
   vec3 direction = turn * ray;
   vec3 seen = direction + inverse * offset;
@@ -29,7 +24,8 @@ void place(ivec2 pixel, vec3 ray, float weight) {
   float here = length(seen);
   float angle = length(seen / here - direction);
   float penalty = angle + spread * max(1.0 / here - 1.0, 0.0) + sharp;
-  shade = vec4(decoded(texelFetch(light, pixel, 0).rgb), weight / (penalty * penalty));
+  vec4 colour = texelFetch(light, pixel, 0);
+  shade = vec4(colour.rgb, colour.a / (penalty * penalty));
   nearness = inverse / here;
 }
 
