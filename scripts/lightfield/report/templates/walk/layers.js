@@ -89,8 +89,8 @@ function stageOf(width, height, samples) {
   return stage;
 }
 
-// Draw one part of a source, its surface or its torn pixels, into the layer that is bound.
-function drawPart({ linked, uniforms }, { vertices, count }, source, eye) {
+// Draw one part of a source, its surface or its torn pixels, into the layer that is bound, which is so wide.
+function drawPart({ linked, uniforms }, { vertices, count }, source, eye, width, kind = walk.gl.TRIANGLES) {
   const { gl } = walk;
   const { view } = source;
   const [right, up, back] = eye.axes;
@@ -110,10 +110,11 @@ function drawPart({ linked, uniforms }, { vertices, count }, source, eye) {
   gl.uniform1f(uniforms.spread, WALK.distance);
   gl.uniform1f(uniforms.sharp, WALK.sharp);
   gl.bindVertexArray(vertices);
-  gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
+  gl.uniform1f(uniforms.pointSize, (eye.lens[0] * width * WALK.pixel) / 2);
+  gl.drawElements(kind, count, gl.UNSIGNED_INT, 0);
 }
 
-function drawSources(layers, eye) {
+function drawSources(layers, eye, isCoarse) {
   const { gl } = walk;
   gl.viewport(0, 0, layers.width, layers.height);
   gl.enable(gl.DEPTH_TEST);
@@ -125,8 +126,13 @@ function drawSources(layers, eye) {
     gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
     gl.clearBufferfv(gl.COLOR, 1, [-1, 0, 0, 0]);
     gl.clearBufferfv(gl.DEPTH, 0, [1]);
-    drawPart(walk.surface, source.surface, source, eye);
-    drawPart(walk.pixels, source.pixels, source, eye);
+    if (isCoarse) {
+      drawPart(walk.coarse, source.coarse, source, eye, layers.width);
+      drawPart(walk.surface, source.points, source, eye, layers.width, gl.POINTS);
+    } else {
+      drawPart(walk.surface, source.surface, source, eye, layers.width);
+      drawPart(walk.pixels, source.pixels, source, eye, layers.width);
+    }
   });
   gl.bindVertexArray(null);
   gl.disable(gl.DEPTH_TEST);
@@ -208,11 +214,12 @@ function showPicture({ levels }, eye, target, corner, size) {
 
 // Draw what an eye sees into `target`, from its `corner` on. Of the eye: where it is (`at`), its `axes`, its
 // `lens` (scales across and up, and shifts), and the `sources` that it is drawn from. `samples` are those across
-// and down a pixel; below 1, the picture is drawn smaller and enlarged.
+// and down a pixel; below 1, the picture is drawn smaller, of fewer triangles, and
+// enlarged.
 export function drawEye(eye, target, corner, size, samples) {
   const scale = Math.min(samples, 1);
   const stage = stageOf(...size.map((side) => Math.max(1, Math.round(scale * side))), Math.max(samples, 1));
-  drawSources(stage.layers, eye);
+  drawSources(stage.layers, eye, samples < 1);
   blendLayers(stage, eye.sources.length);
   fillHoles(stage);
   showPicture(stage, eye, target, corner, size);

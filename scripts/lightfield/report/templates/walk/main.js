@@ -11,6 +11,7 @@ import { FEW, drawWalkSoon } from "./drawing.js";
 import { axes, scales } from "./eye.js";
 import { goHome, goWhereItWas } from "./home.js";
 import blendedShader from "./shaders/blended.glsl";
+import coarseShader from "./shaders/coarse.glsl";
 import drawnShader from "./shaders/drawn.glsl";
 import enlargedShader from "./shaders/enlarged.glsl";
 import pixelsShader from "./shaders/pixels.glsl";
@@ -56,6 +57,7 @@ function paletteTexture(gl) {
 function prepareDrawing(gl) {
   walk.gl = gl;
   walk.surface = program(gl, placeShader + surfaceShader, drawnShader);
+  walk.coarse = program(gl, placeShader + surfaceShader, coarseShader);
   walk.pixels = program(gl, placeShader + pixelsShader, drawnShader);
   walk.blended = program(gl, wholePictureShader, blendedShader);
   walk.shrunk = program(gl, wholePictureShader, shrunkShader);

@@ -9,6 +9,11 @@ import { texture, triangles } from "./webgl.js";
 // without a graphics card keeps a vertex by its number modulo 64, where the one below would drop it.
 export const APART = 32;
 
+// The largest block of pixels, along a side, that is drawn as two triangles in motion, and the part of its inverse
+// distance by which it may be bent.
+const LARGEST_BLOCK = 8;
+const FLAT = 0.03;
+
 const ROOTS = LIGHT.map(Math.sqrt);
 
 // Of the unit square's point, the unit vector (Cigolle et al. 2014).
@@ -81,6 +86,52 @@ function surfaceTriangles({ right, down }) {
   return corners.subarray(0, count);
 }
 
+// Whether all quads of a block are of one surface, and the block is flat enough to be drawn as two triangles.
+function isFlat(inverses, isWhole, first, side) {
+  const width = DATA.size[0];
+  for (let line = 0; line < side; line++) {
+    for (let column = 0; column < side; column++) if (!isWhole(first + line * width + column)) return false;
+  }
+  // Two triangles of a quad in place of eight: nobody sees that in motion.
+  if (side === 2) return true;
+  const corner = (i, j) => inverses[first + i * side * width + j * side];
+  for (let i = 0; i <= 2; i++) {
+    for (let j = 0; j <= 2; j++) {
+      const expected =
+        ((2 - i) * ((2 - j) * corner(0, 0) + j * corner(0, 1)) + i * ((2 - j) * corner(1, 0) + j * corner(1, 1))) / 4;
+      const here = inverses[first + ((i * side) / 2) * width + (j * side) / 2];
+      if (Math.abs(here - expected) > Math.max(FLAT * here, WALK.far)) return false;
+    }
+  }
+  return true;
+}
+
+// The corners of fewer triangles, for pictures in motion: flat blocks of 8, 4 or 2 pixels have two.
+function coarseTriangles(inverses, { right, down }) {
+  const [width, height] = DATA.size;
+  const corners = [];
+  const upper = (pixel) => right[pixel] && down[pixel];
+  const lower = (pixel) => right[pixel + width] && down[pixel + 1];
+  const isWhole = (pixel) => upper(pixel) && lower(pixel);
+  const addBlock = (i, j, side) => {
+    if (i + 1 >= height || j + 1 >= width) return;
+    const pixel = i * width + j;
+    const fits = i + side < height && j + side < width;
+    if (side > 1 && !(fits && isFlat(inverses, isWhole, pixel, side))) {
+      const half = side / 2;
+      for (const [line, column] of [[0, 0], [0, half], [half, 0], [half, half]]) addBlock(i + line, j + column, half);
+      return;
+    }
+    const [next, below, diagonal] = [vertexOf(i, j + side), vertexOf(i + side, j), vertexOf(i + side, j + side)];
+    if (side > 1 || upper(pixel)) corners.push(vertexOf(i, j), next, below);
+    if (side > 1 || lower(pixel)) corners.push(next, diagonal, below);
+  };
+  for (let i = 0; i < height; i += LARGEST_BLOCK) {
+    for (let j = 0; j < width; j += LARGEST_BLOCK) addBlock(i, j, LARGEST_BLOCK);
+  }
+  return Uint32Array.from(corners);
+}
+
 // The pixels that lack a triangle for which the picture has room: they are drawn one by one.
 function tornPixels(inverses, { right, down }) {
   const [width, height] = DATA.size;
@@ -144,11 +195,16 @@ export function upload(source, light, depth) {
   const marked = inverses.map((value) => (Number.isNaN(value) ? -1 : value));
   const image = (format, layout, values) =>
     texture(gl, gl.TEXTURE_2D, format, ...DATA.size, 0, layout, gl.FLOAT, values);
+  const roots = image(gl.RGBA16F, gl.RGBA, sharpRoots(light, joined, torn));
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
   Object.assign(source, {
-    light: image(gl.RGBA16F, gl.RGBA, sharpRoots(light, joined, torn)),
+    light: roots,
     inverses: image(gl.R32F, gl.RED, marked),
     surface: triangles(gl, surfaceTriangles(joined)),
+    coarse: triangles(gl, coarseTriangles(inverses, joined)),
     pixels: triangles(gl, pixelTriangles(torn)),
+    points: triangles(gl, Uint32Array.from(torn, (pixel) => vertexOf(Math.floor(pixel / DATA.size[0]), pixel % DATA.size[0]))),
     isThere: true,
   });
 }

@@ -12,7 +12,11 @@ uniform mat3 turn, back;
 uniform vec3 offset;
 uniform vec4 lens;
 uniform float near, spread, sharp;
+// How many pixels wide a source's pixel is at the distance 1.
+uniform float pointSize;
 out vec4 shade;
+out vec2 spot;
+out float towards;
 out float nearness;
 
 void place(ivec2 pixel, vec3 ray) {
@@ -21,11 +25,14 @@ void place(ivec2 pixel, vec3 ray) {
   vec3 seen = direction + inverse * offset;
   vec3 eye = back * seen;
   gl_Position = vec4(lens.x * eye.x + lens.z * eye.z, lens.y * eye.y + lens.w * eye.z, -eye.z - 2.0 * near * inverse, -eye.z);
+  gl_PointSize = clamp(pointSize / max(-eye.z, 1e-3), 1.0, 16.0);
   float here = length(seen);
   float angle = length(seen / here - direction);
   float penalty = angle + spread * max(1.0 / here - 1.0, 0.0) + sharp;
   vec4 colour = texelFetch(light, pixel, 0);
   shade = vec4(colour.rgb, colour.a / (penalty * penalty));
   nearness = inverse / here;
+  spot = (vec2(pixel) + 0.5) / vec2(textureSize(rays, 0));
+  towards = 1.0 / (penalty * penalty);
 }
 
