@@ -1,7 +1,8 @@
 """Synthesise views from anywhere in a dataset, from the nearest of its views and their depth.
 
 OUTPUT gets lightfield.json, exr/<view>.exr (R, G, B, A, and Z as a dataset has it) and
-png/<view>.png. What no view of the dataset sees is a hole: black, alpha 0, Z NaN.
+png/<view>.png. What no view of the dataset sees is a hole: its colour is that of what
+is around and behind it, its alpha 0 in the EXR, and its Z NaN. PNGs show it as it is filled.
 
 Examples:
 
@@ -76,7 +77,7 @@ def main() -> None:
                 arguments.output / "exr" / f"{view.name}.exr", made.channels(depth, rays)
             )
             picture = pictures.develop(np.nan_to_num(made.colour), exposure)
-            opaque = np.where(made.holes, 0, 255).astype(np.uint8)
+            opaque = np.where(np.isfinite(made.colour[..., 0]), 255, 0).astype(np.uint8)
             images.write_png(
                 arguments.output / "png" / f"{view.name}.png", np.dstack([picture, opaque])
             )

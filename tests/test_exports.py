@@ -438,6 +438,13 @@ def test_pixels_without_a_source_and_misses_are_none_and_far_to_miv():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("depths", [[[np.inf, np.inf]], [[2.0, np.inf]], [[5000.0, 3000.0]]])
+def test_no_far_limit_is_read_as_infinity(depths):
+    # MPEG's Reference View Synthesizer takes 1000 m and more for infinity.
+    near, far = disparity.depth_range(np.array(depths))
+    assert 0 < near < far < 1000
+
+
 def test_opendibr_takes_lossless_h265_where_there_is_ffmpeg(dataset, tmp_path, monkeypatch):
     lens = LightField.read(dataset / "perspective" / "lightfield.json").lens
     settings = settings_of("opendibr").model_validate({"sources": ["views"], "format": "h265"})

@@ -25,7 +25,7 @@ VIEWS = "views"
 # Written last into an export's folder: its files.
 MANIFEST = "export.json"
 
-FARTHEST = 1000.0
+FARTHEST = 999.9
 """Metres: in disparity, where nothing is hit, and what is farther, is taken to be here."""
 BOUNDS_VIEWS, BOUNDS_PIXELS = 64, 64
 """So many views, and pixels along the longer side of each, tell how far a scene reaches."""

@@ -7,7 +7,10 @@ import numpy as np
 
 # Of views that were held out, synthesised from the others.
 COLUMNS = ("truth", "variant", "value")
-MEANS = ("psnr", "ssim", "flip", "holes", "source_bytes")
+MEANS = (
+    *("psnr", "psnr_black", "ws_psnr", "iv_psnr", "ssim", "flip", "flip_black"),
+    *("holes", "source_bytes"),
+)
 # Of all that is between the middle of the cameras and the edge of their interpolation volume, so
 # much is inside, the rest towards the edge, and what is farther out beyond.
 PLACES = {"inside": 0.5, "edge": 1.0, "beyond": np.inf}

@@ -115,19 +115,22 @@ def compare(
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for each region of each of the ``views`` of the ``truth``.
 
-    A row has psnr in decibel, ssim, flip and the part of holes; ``part`` is the region's of the
-    picture. Holes are black in it and count as what they are. ``to_edge`` is how far the view is
+    A row has psnr, ws_psnr and iv_psnr in decibel, ssim, flip and the part of holes; ``part`` is
+    the region's of the picture. Holes count as they are filled; psnr_black and flip_black are those
+    of the picture whose holes are black. ``to_edge`` is how far the view is
     from the middle of the views ``around`` it, as a part of what it is to the edge of their volume.
     """
     inside = np.isfinite(truth.lens.pixel_rays()[..., 0])
+    angles = metrics.solid_angles(truth.lens)
     cameras, eyes = (np.array([view.matrix for view in some]) for some in (around, views))
     parts = parts_to_edge(cameras, variant.sources.lens, eyes[:, :3, 3])
     for view, to_edge in zip(views, parts.tolist(), strict=True):
         made = variant.sources.synthesise(view.matrix, truth.lens, variant.best)
         true = images.read_image(truth.path(view), "RGB").colour
         one, other = (_developed(colour, exposure, inside) for colour in (true, made.colour))
-        errors, similar = (one - other) ** 2, metrics.ssim_map(one, other)
-        flips = metrics.flip_map(one, other)
+        black = np.where(made.holes[..., None], 0, other)
+        similar = metrics.ssim_map(one, other)
+        flips, black_flips = metrics.flip_map(one, other), metrics.flip_map(one, black)
         for region, pixels in regions(truth, view, inside).items():
             yield {
                 "variant": variant.name,
@@ -138,9 +141,13 @@ def compare(
                 "place": next(name for name, most in PLACES.items() if to_edge <= most),
                 "region": region,
                 "part": float(pixels[inside].mean()),
-                "psnr": -10 * float(np.log10(max(errors[pixels].mean(), 1e-10))),
+                "psnr": metrics.ws_psnr(one, other, pixels),
+                "psnr_black": metrics.ws_psnr(one, black, pixels),
+                "ws_psnr": metrics.ws_psnr(one, other, np.where(pixels, angles, 0)),
+                "iv_psnr": metrics.iv_psnr(one, other, pixels),
                 "ssim": float(similar[pixels].mean()),
                 "flip": float(flips[pixels].mean()),
+                "flip_black": float(black_flips[pixels].mean()),
                 "holes": float(made.holes[pixels].mean()),
                 "source_bytes": variant.size,
             }

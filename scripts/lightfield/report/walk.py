@@ -29,8 +29,9 @@ def collect(lens: Lens, places: Array, distances: Array) -> dict[str, Any]:
     ``rays`` are those of the pixels, row by row, octahedral in two times 16 bits; ``sight`` has a
     byte for each direction of an octahedral map, 1 where the lens sees it; ``planes`` (m, 4) bound
     the volume between the cameras: n · p + c ≤ 0. ``toRim`` has a byte for each pixel, 255 where it
-    is far from the edge of what the lens sees; ``pixel`` is one's angle in radians. ``nearest`` is how near to a camera, in metres,
-    its surroundings are, but for the nearest hundredth of them.
+    is far from the edge of what the lens sees; ``pixel`` is one's angle in radians.
+    ``nearest`` is how near to a camera, in metres, its surroundings are, but for the nearest
+    hundredth of them.
     """
     steps = (np.arange(SIGHT) + 0.5) / SIGHT
     x, y = np.meshgrid(steps, steps)

@@ -1,8 +1,8 @@
 """The loops of view synthesis: where a surface tears, how it is drawn, how drawings are blended.
 
 A view is a surface: a vertex at each pixel's centre, a triangle between neighbours that belong
-together. Pixels beside a tear are drawn one by one, too, as large as they are. ``inverse`` is 1 / distance in 1/m: 0
-where nothing was hit, NaN where there is no ray.
+together. Pixels beside a tear are drawn one by one, too, as large as they are. ``inverse`` is
+1 / distance in 1/m: 0 where nothing was hit, NaN where there is no ray.
 """
 
 import math
@@ -281,8 +281,9 @@ def resolve(sums: Array, depths: Array, colour: Array, inverse: Array, seen: Arr
             colour[i, j, 0] = red / count
             colour[i, j, 1] = green / count
             colour[i, j, 2] = blue / count
-            second = _second(nears[0], nears[1], nears[2], nears[3])
-            middle = second if second >= 0 else max(nears.max(), np.float32(0))
+            middle = _second(nears[0], nears[1], nears[2], nears[3])
+            if middle < 0:
+                middle = max(nears[0], nears[1], nears[2], nears[3])
             mean, number = np.float32(0), 0
             for k in range(4):
                 if nears[k] >= 0 and abs(nears[k] - middle) <= max(SAME * middle, FAR):
@@ -293,7 +294,12 @@ def resolve(sums: Array, depths: Array, colour: Array, inverse: Array, seen: Arr
 
 @kernel
 def shrink(
-    colour: Array, inverse: Array, seen: Array, small: Array, small_inverse: Array, small_seen: Array
+    colour: Array,
+    inverse: Array,
+    seen: Array,
+    small: Array,
+    small_inverse: Array,
+    small_seen: Array,
 ) -> None:
     """Average 2 × 2 pixels to one of the next coarser level: what is behind counts most.
 

@@ -284,8 +284,10 @@ def _turn(matrix: Array) -> Array:
 def to_rim(lens: Lens) -> Array:
     """Return how far each pixel (h, w) is from the edge of what a lens sees: 0 to 1, in `RIM`."""
     seen = np.pad(np.isfinite(lens.pixel_rays()[..., 0]), 1, constant_values=_wraps(lens))
-    pixels: Array = distance_transform_cdt(seen)[1:-1, 1:-1] if not seen.all() else np.full(
-        (lens.height, lens.width), RIM
+    pixels: Array = (
+        distance_transform_cdt(seen)[1:-1, 1:-1]
+        if not seen.all()
+        else np.full((lens.height, lens.width), RIM)
     )
     return (pixels / RIM).clip(max=1)
 
