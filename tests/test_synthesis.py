@@ -89,7 +89,9 @@ def test_a_view_at_a_source_is_that_source(times):
     made = field.blended(field.matrices[3], field.lens, [3] * times)
     colour, distance = look_at_ball(field.lens, field.matrices[3])
     torn = binary_dilation(field.surface(3).torn, np.ones((3, 3)))
-    amid = ~torn & ~made.holes
+    # Of a pixel at the rim, not all samples are seen.
+    inside = binary_erosion(np.isfinite(field.rays[..., 0]), np.ones((3, 3)))
+    amid = inside & ~torn & ~made.holes
     assert amid.mean() > 0.6
     # Not half an 8-bit step apart.
     difference = encode_srgb(made.colour[amid]) - encode_srgb(colour[amid])
@@ -117,7 +119,7 @@ def test_a_single_pixel_before_a_wall_leaves_no_gap_around_it():
     assert not made.holes[28:62, 28:62].any()
 
 
-def test_holes_are_filled_with_what_is_behind():
+def test_holes_are_filled_with_what_is_around_and_behind():
     def see(lens, matrix):
         """A wall that is blue, and before its middle a red strip."""
         x = np.linspace(-1, 1, lens.width)
@@ -133,25 +135,27 @@ def test_holes_are_filled_with_what_is_behind():
     middle = made.holes[32]
     assert middle[:48].sum() > 4
     row = made.colour[32, :48][middle[:48]]
-    assert (row[:, 2] > 5 * row[:, 0]).mean() > 0.7
+    # Between strip and wall, and more of the wall than of the strip.
+    assert row[:, 2].mean() > 1.5 * row[:, 0].mean()
+    assert row[-1, 2] > 5 * row[-1, 0] or row[0, 2] > 5 * row[0, 0]
     channels = made.channels("z", field.rays)
     assert (channels["A"][32][middle] == 0).all()
     assert np.isnan(channels["Z"][32][middle]).all()
 
 
 def test_a_highlight_that_one_view_sees_counts_little():
-    field = sources(look)
-    plain = field.blended(EYE, lenses.from_camera(EYES["perspective"]), [3, 9, 20])
-    brightest = field.views[9]
+    rig = {"type": "plane", "cameras": [3, 1], "size": 0.2}
 
     def see(lens, matrix):
         colour, distance = look(lens, matrix)
-        return (50 * colour if np.array_equal(matrix, brightest.matrix) else colour), distance
+        return (50 * colour if matrix[0, 3] < -0.05 else colour), distance
 
-    bright = sources(see).blended(EYE, lenses.from_camera(EYES["perspective"]), [3, 9, 20])
-    others = ~plain.holes & ~bright.holes
-    # The mean would be more than 10 times as bright where all three see.
-    assert np.median(bright.colour[others] / plain.colour[others]) < 4
+    target = sources(look, FISHEYE, rig).matrices[1]
+    lens = lenses.from_camera(EYES["perspective"])
+    made = sources(see, FISHEYE, rig).blended(target, lens, [0, 1, 2])
+    colour, _ = look(lens, target)
+    # In the mean it would be ten times as bright.
+    assert np.median(made.colour / colour) < 2
 
 
 def test_a_slanted_plane_does_not_tear():

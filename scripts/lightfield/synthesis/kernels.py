@@ -365,9 +365,9 @@ def enlarge(
                 red += weight * small[y, x, 0]
                 green += weight * small[y, x, 1]
                 blue += weight * small[y, x, 2]
-            rest = one - known
             if known == 0:
                 colour[i, j] = inverse[i, j] = np.float32(0)
+            rest = one - known
             inverse[i, j] = known * inverse[i, j] + rest * near / total
             colour[i, j, 0] = known * colour[i, j, 0] + rest * red / total
             colour[i, j, 1] = known * colour[i, j, 1] + rest * green / total
