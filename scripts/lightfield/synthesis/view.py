@@ -295,7 +295,7 @@ def to_rim(lens: Lens) -> Array:
 def pixel_angle(lens: Lens) -> float:
     """Return the angle in radians between the rays of two pixels in the middle of a picture."""
     here, there = lens.rays(lens.center[0] + np.array([0.0, 1.0]), np.array(lens.center[1]))
-    return float(np.linalg.norm(there - here))
+    return float(2 * np.arcsin(np.linalg.norm(there - here) / 2))
 
 
 def steepest(lens: Lens) -> np.float32:
