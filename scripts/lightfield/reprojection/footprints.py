@@ -41,6 +41,31 @@ def extent(step: Array, counts: Array) -> int:
     return int(np.ceil(most / 2))
 
 
+@inline
+def _fill_footprint(jacobian: Array, widest: float, steps: Array, counts: Array) -> int:
+    """Fill the ``steps`` (2, 2) between samples and their ``counts`` (2,); return the larger count.
+
+    A pixel is a mean over its area, in the source too, so what is missing to a target pixel that
+    spans s source pixels is a box of width √(s² − 1), by the variances. n samples at distance d
+    have the variance of a box of width d √(n² − 1), so that gives d; n is as small as the bicubic
+    kernel, under which d may exceed a pixel, allows. Where s is little above 1 or below it, one
+    sample is all: magnifying does not blur.
+    """
+    most = 1
+    for way in range(2):
+        squared = jacobian[0, way] ** 2 + jacobian[1, way] ** 2
+        box = min(math.sqrt(max(squared - 1, 0.0)), widest)
+        counts[way] = 1
+        if box > 0.5:
+            count = int(min(max(math.ceil(0.75 * box), 2), _MOST_SAMPLES))
+            scale = box / math.sqrt(squared) / math.sqrt(count * count - 1)
+            counts[way] = count
+            steps[0, way] = jacobian[0, way] * scale
+            steps[1, way] = jacobian[1, way] * scale
+            most = max(most, count)
+    return most
+
+
 @kernel
 def measure(
     middle: Array,
@@ -63,22 +88,17 @@ def measure(
     empty it fills, for the adaptive filter, ``counts``, how many samples a pixel takes each way,
     and ``footprints``, which are zeros, with the steps between them; returns the largest count.
     No box is wider than ``widest``, in source pixels.
-
-    A pixel is a mean over its area, in the source too, so what is missing to a target pixel that
-    spans s source pixels is a box of width √(s² − 1), by the variances. n samples at distance d
-    have the variance of a box of width d √(n² − 1), so that gives d; n is as small as the bicubic
-    kernel, under which d may exceed a pixel, allows. Where s is little above 1 or below it, one
-    sample is all: magnifying does not blur.
     """
     jacobian = np.empty((2, 2))
-    covers, most = len(counts) > 0, 1
+    fills_footprints = len(counts) > 0
+    most = 1
     for i in range(middle.shape[0]):
         for j in range(middle.shape[1]):
             x, y = middle[i, j, 0], middle[i, j, 1]
             if not (0 <= x <= size[0] and 0 <= y <= size[1]):
                 centers[i, j] = np.nan
                 magnification[i, j] = np.nan
-                if covers:
+                if fills_footprints:
                     counts[i, j] = 1
                 continue
             centers[i, j, 0] = x
@@ -90,18 +110,9 @@ def measure(
                 jacobian[c, 1] = _difference(above[i, j, c], center, below[i, j, c], span)
             area = abs(jacobian[0, 0] * jacobian[1, 1] - jacobian[0, 1] * jacobian[1, 0])
             magnification[i, j] = 1 / math.sqrt(area)
-            if covers:
-                for way in range(2):
-                    squared = jacobian[0, way] ** 2 + jacobian[1, way] ** 2
-                    box = min(math.sqrt(max(squared - 1, 0.0)), widest)
-                    counts[i, j, way] = 1
-                    if box > 0.5:
-                        count = int(min(max(math.ceil(0.75 * box), 2), _MOST_SAMPLES))
-                        scale = box / math.sqrt(squared) / math.sqrt(count * count - 1)
-                        counts[i, j, way] = count
-                        footprints[i, j, 0, way] = jacobian[0, way] * scale
-                        footprints[i, j, 1, way] = jacobian[1, way] * scale
-                        most = max(most, count)
+            if fills_footprints:
+                count = _fill_footprint(jacobian, widest, footprints[i, j], counts[i, j])
+                most = max(most, count)
     return most
 
 

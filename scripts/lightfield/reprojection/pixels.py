@@ -1,6 +1,7 @@
 """A view's pixels in and out: read as linear light, resampled, and written as asked for."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,8 @@ from lightfield.reprojection.depth import resample_depth
 from lightfield.reprojection.job import Job, SourceView
 from lightfield.reprojection.lens_arguments import Target
 from lightfield.reprojection.lens_map import LensMap
+
+Attributes = Mapping[str, Attribute]
 
 # A seventh of the time that zlib's own level and the choice of a filter for each row take, and
 # files as small: level 4, and libpng's PNG_FILTER_AVG for every row.
@@ -109,16 +112,59 @@ def write(
     key: str,
 ) -> None:
     """Resample a view through one lens map and write its files."""
-    arguments = job.arguments
-    as_z = target.lens.has_z_depth
-    transparent = job.lightfield.transparent
-    if transparent and not source.has_alpha:
+    if job.lightfield.transparent and not source.has_alpha:
         raise UserError("has no channel A, although --input-cfg says that it is transparent")
-    strips, depth = _resampled(job, made, source, as_z)
+    image = _developed(job, target, made, source, outputs)
+    attributes = {KEY_ATTRIBUTE: key} | {
+        f"plenoforge:{name}": str(value) for name, value in job.settings.items()
+    }
+    if "exr" in outputs and image.depth is not None:
+        attributes[DEPTH_ATTRIBUTE] = "z" if target.lens.has_z_depth else "distance"
+    for kind, path in outputs.items():
+        match kind:
+            case "exr":
+                _write_exr(path, image, attributes)
+            case "png":
+                _write_png(path, image, {**attributes, **PNG_OPTIONS})
+            case "depth":
+                _write_depth(path, image, job.arguments.depth_png, key)
+            case "mask":
+                mask = np.where(image.empty, 255, 0).astype(np.uint8)
+                write_png(path, mask, {KEY_ATTRIBUTE: key})
+        job.record.add(path, key)
+
+
+@dataclass(frozen=True)
+class _Image:
+    """A resampled view, as its files hold it.
+
+    ``half`` (3, h, w) is float16 R G B for an EXR, ``pixels`` (h, w, 3) sRGB for a PNG, ``alpha``
+    (h, w) float32 what is covered, and ``depth`` (h, w) metres. What has no source is ``empty``.
+    """
+
+    half: Array
+    pixels: Array
+    alpha: Array
+    depth: Array | None
+    empty: Array
+    transparent: bool
+
+    @property
+    def has_empty(self) -> bool:
+        return bool(self.empty.any())
+
+
+def _developed(
+    job: Job, target: Target, made: LensMap, source: Source, outputs: Mapping[str, Path]
+) -> _Image:
+    """Resample a view, and develop its colour for those ``outputs`` that hold it."""
+    arguments = job.arguments
+    transparent = job.lightfield.transparent
+    encode = to_8_bit if arguments.bits == 8 else to_16_bit
+    strips, depth = _resampled(job, made, source, target.lens.has_z_depth)
     size = made.target_cos.shape
     empty = np.empty(size, bool)
     half = np.empty((3, *size), np.float16)
-    encode = to_8_bit if arguments.bits == 8 else to_16_bit
     pixels = np.empty((*size, 3), f"uint{arguments.bits}")
     covered = np.empty(size, np.float32)
     for rows, strip in strips:
@@ -131,48 +177,48 @@ def write(
         if source.has_alpha:
             with np.errstate(invalid="ignore", divide="ignore"):
                 strip[:, :, :3] /= alpha
-        strip = tone_map(strip[:, :, :3], arguments.exposure, arguments.reinhard)
+        colour = tone_map(strip[:, :, :3], arguments.exposure, arguments.reinhard)
         if "png" in outputs:
-            pixels[rows] = encode(strip)
+            pixels[rows] = encode(colour)
         if "exr" in outputs:
-            half[:, rows] = narrow(strip * alpha if transparent else strip, 3)
-    marked = bool(empty.any())
-    covered[empty] = 0
-    if marked:
+            half[:, rows] = narrow(colour * alpha if transparent else colour, 3)
+    if empty.any():
+        covered[empty] = 0
         half[:, empty] = 0
         if depth is not None:
             depth[empty] = np.nan
-    attributes = {KEY_ATTRIBUTE: key} | {
-        f"plenoforge:{name}": str(value) for name, value in job.settings.items()
-    }
-    for kind, path in outputs.items():
-        match kind:
-            case "exr":
-                channels = dict(zip("RGB", half, strict=True))
-                if depth is not None:
-                    channels["Z"] = depth
-                    attributes = attributes | {DEPTH_ATTRIBUTE: "z" if as_z else "distance"}
-                if transparent:
-                    channels["A"] = covered.astype(np.float16)
-                elif marked and depth is None:
-                    channels["A"] = (~empty).astype(np.float16)
-                write_exr(path, channels, attributes)
-            case "png":
-                if marked or transparent:
-                    opacity = covered if transparent else (~empty).astype(np.float32)
-                    opacity = np.rint(opacity * np.iinfo(pixels.dtype).max)
-                    pixels = np.dstack([pixels, opacity.astype(pixels.dtype)])
-                write_png(path, pixels, {**attributes, **PNG_OPTIONS})
-            case "depth":
-                if depth is None:
-                    raise UserError("--depth-png: the image has no channel Z")
-                scaled = np.rint(depth.astype(np.float64) * arguments.depth_png)
-                # Comparisons with NaN are false.
-                known = (scaled > 0) & (scaled <= 65535)
-                write_png(path, np.where(known, scaled, 0).astype(np.uint16), {KEY_ATTRIBUTE: key})
-            case "mask":
-                write_png(path, np.where(empty, 255, 0).astype(np.uint8), {KEY_ATTRIBUTE: key})
-        job.record.add(path, key)
+    return _Image(half, pixels, covered, depth, empty, transparent)
+
+
+def _write_exr(path: Path, image: _Image, attributes: Attributes) -> None:
+    """Write R G B and Z, and A where the view is transparent or no Z tells what is empty."""
+    channels = dict(zip("RGB", image.half, strict=True))
+    if image.depth is not None:
+        channels["Z"] = image.depth
+    if image.transparent:
+        channels["A"] = image.alpha.astype(np.float16)
+    elif image.depth is None and image.has_empty:
+        channels["A"] = (~image.empty).astype(np.float16)
+    write_exr(path, channels, attributes)
+
+
+def _write_png(path: Path, image: _Image, attributes: Attributes) -> None:
+    pixels = image.pixels
+    if image.transparent or image.has_empty:
+        alpha = image.alpha if image.transparent else (~image.empty).astype(np.float32)
+        alpha = np.rint(alpha * np.iinfo(pixels.dtype).max).astype(pixels.dtype)
+        pixels = np.dstack([pixels, alpha])
+    write_png(path, pixels, attributes)
+
+
+def _write_depth(path: Path, image: _Image, scale: float, key: str) -> None:
+    """Write 16 bits of depth times ``scale``; 0 where there is none, or more than they hold."""
+    if image.depth is None:
+        raise UserError("--depth-png: the image has no channel Z")
+    scaled = np.rint(image.depth.astype(np.float64) * scale)
+    # Comparisons with NaN are false.
+    is_held = (scaled > 0) & (scaled <= 65535)
+    write_png(path, np.where(is_held, scaled, 0).astype(np.uint16), {KEY_ATTRIBUTE: key})
 
 
 def _resampled(
