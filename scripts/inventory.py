@@ -17,7 +17,14 @@ from lightfield.dataset.config import FILE
 from lightfield.dataset.dataset import rendered_frames, scene_datasets
 from lightfield.dataset.view_store import ViewStore
 from lightfield.geometry.rigs import BlendCamera
-from lightfield.rendering import blend_facts, blend_file, external_files, pruning, scene_memory
+from lightfield.rendering import (
+    blend_facts,
+    blend_file,
+    external_files,
+    light,
+    pruning,
+    scene_memory,
+)
 from lightfield.rendering.inventory import FEATURES, inventory
 
 # isort: split
@@ -47,6 +54,11 @@ def main() -> None:
     found |= inventory(frames)
     if found["missing"] and not chosen.get("allow_missing"):
         raise UserError(refusal(arguments.blend, found["missing"]))
+    if not light.may_be_lit():
+        raise UserError(
+            f"{arguments.blend}: has no light, so all views would be black: no lamp shines, no "
+            "material emits, and the world is black; give it one of these, as a world with a colour"
+        )
     if store := ViewStore.configured():
         external_files.put(arguments.blend, found["external_files"], store)
     leave_out = pruning.left_out(found)

@@ -61,11 +61,7 @@ def inventory(frames: Sequence[int]) -> dict[str, Any]:
         pruning.remove_unused()
     pruning.remove_objects(hidden)
     objects = list(bpy.data.objects)
-    materials = sorted(
-        {slot.material for thing in objects for slot in thing.material_slots if slot.material}
-        | set_by_nodes(),
-        key=lambda material: material.name_full,
-    )
+    materials = rendered_materials()
     lights = {thing.data for thing in objects if thing.type == "LIGHT"}
     features: dict[str, set[str]] = {name: set() for name in FEATURES}
     images = set()
@@ -125,6 +121,13 @@ def _triangles(depsgraph: Any) -> dict[str, int]:
         "triangles": sum(meshes.values()),
         "triangles_with_instances": total,
     }
+
+
+def rendered_materials() -> list[Any]:
+    """Return the materials of all objects, by name."""
+    slots = [slot for thing in bpy.data.objects for slot in thing.material_slots]
+    materials = {slot.material for slot in slots if slot.material} | set_by_nodes()
+    return sorted(materials, key=lambda material: str(material.name_full))
 
 
 def set_by_nodes() -> set[Any]:
