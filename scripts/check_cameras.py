@@ -8,7 +8,7 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, write_json
 from lightfield.dataset.lightfield import LightField
-from lightfield.rendering import blend_file, clearance
+from lightfield.rendering import blend_file, clearance, drawings
 from lightfield.rendering.clearance import REACH, TOUCHING
 from lightfield.rendering.limits import warnings
 
@@ -51,7 +51,8 @@ def main() -> None:
             "move the rig or make it smaller (center and size in the scene YAML)"
         )
     write_json(arguments.output, {"views": views})
-    for warning in warnings(positions, distances):
+    camera_type = lightfield.content["camera"]["type"]
+    for warning in (*warnings(positions, distances), *drawings.warnings(camera_type)):
         print(f"warning: {warning}", file=sys.stderr)
     nearest = min(distances)
     away = f"{nearest:.3f} m" if nearest < REACH else f"more than {REACH} m"

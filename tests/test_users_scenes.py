@@ -5,6 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
 from lightfield.imaging import images
 
 
@@ -14,6 +16,68 @@ def folder(run_program, tmp_path_factory):
     folder = tmp_path_factory.mktemp("users")
     run_program(Path(__file__).with_name("users_scenes.py"), folder)
     return folder
+
+
+LENSES = {
+    "flat": {"lens": "rectilinear", "fov": 60, "resolution": [32, 32]},
+    "fisheye": {"lens": "equidistant", "fov": 180, "resolution": [32, 32]},
+}
+
+
+def write_lightfield(path, lens, places, frame=1):
+    """Write a light field of cameras that look along y."""
+    keys = [{"position": place} for place in places]
+    rig = {"type": "path", "count": len(places), "keys": keys, "look_at": [0, 1e6, 0]}
+    render = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0}
+    render |= {"depth_precision": "float", "passes": ["object", "emission"]}
+    made = lenses.from_camera(LENSES[lens])
+    LightField.from_rig(rig, made, depth="z", frame=frame, render=render).write(path)
+
+
+def checked(folder, run_program, blend, places=((0, -4, 0), (0.1, -4, 0)), frame=1):
+    """Return what the check of the cameras says of a .blend, line by line."""
+    write_lightfield(folder / "checked.json", "flat", places, frame)
+    words = ("--blend", folder / f"{blend}.blend", "--lightfield", folder / "checked.json")
+    return run_program("check_cameras.py", *words, "--output", folder / "cameras.json").stderr
+
+
+def rendered(folder, run_program, blend, lens):
+    """Return the channels of a view, and of its pass object."""
+    output = folder / f"{blend}_{lens}"
+    write_lightfield(output / "lightfield.json", lens, [(0, -4, 0), (0.1, -4, 0)])
+    words = ("--blend", folder / f"{blend}.blend", "--lightfield", output / "lightfield.json")
+    run_program("render_shard.py", *words, "--views", "0:1", "--output", output / "exr")
+    view = images.read_image(output / "exr/view_0000f.exr").channels
+    view |= images.read_image(output / "object/view_0000f.exr").channels
+    return {name: pixels.astype(float) for name, pixels in view.items()}
+
+
+def test_grease_pencil_is_left_out_of_a_fisheye(folder, run_program):
+    plain, drawn = (rendered(folder, run_program, each, "fisheye") for each in ("wall", "pencil"))
+    for name, pixels in plain.items():
+        np.testing.assert_array_equal(drawn[name], pixels, err_msg=name)
+
+
+def test_grease_pencil_is_in_the_colour_of_perspective_views_alone(folder, run_program):
+    plain, drawn = (rendered(folder, run_program, each, "flat") for each in ("wall", "pencil"))
+    for name in "ZY":
+        np.testing.assert_array_equal(drawn[name], plain[name], err_msg=name)
+    differs = np.abs(drawn["R"] - plain["R"]) > 0.01
+    assert differs[12:20, 12:20].mean() > 0.5
+    # What is behind the wall would be seen here.
+    assert not differs[:4].any() and not differs[:, :4].any()
+
+
+@pytest.mark.parametrize(
+    ("lens", "said"), [("fisheye", "is left out"), ("flat", "no depth and no pass")]
+)
+def test_what_views_lack_of_grease_pencil_is_said(lens, said, folder, run_program):
+    write_lightfield(folder / "lightfield.json", lens, [(0, -4, 0), (0.1, -4, 0)])
+    words = ("--lightfield", folder / "lightfield.json", "--output", folder / "cameras.json")
+    result = run_program("check_cameras.py", "--blend", folder / "pencil.blend", *words)
+    (warning,) = [line for line in result.stderr.splitlines() if line.startswith("warning: ")]
+    assert said in warning
+    assert "behind, drawing" in warning
 
 
 ASPECT = """
