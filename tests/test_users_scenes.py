@@ -80,6 +80,52 @@ def test_what_views_lack_of_grease_pencil_is_said(lens, said, folder, run_progra
     assert "behind, drawing" in warning
 
 
+def listed(folder, run_program, blend, frame):
+    """Return the warnings of the inventory of a .blend that is rendered at a frame."""
+    scenes = folder / "configs/scenes"
+    scenes.mkdir(parents=True, exist_ok=True)
+    text = SIMULATED.format(blend=blend, frame=frame)
+    (scenes / f"{blend}.yaml").write_text(text)
+    words = ("--scene", blend, "--blend", f"{blend}.blend", "--output", "inventory.json")
+    result = run_program("inventory.py", *words, cwd=folder, check=False)
+    told = [line for line in result.stderr.splitlines() if line.startswith(("warning: ", "error"))]
+    return result.returncode, told
+
+
+SIMULATED = """
+scene: {{blend: {blend}.blend, frame: {frame}}}
+render: {{samples: 1}}
+rigs:
+  View:
+    type: lattice
+    cameras: [2, 1, 1]
+    camera: {{lens: equirectangular, resolution: [16, 8]}}
+"""
+
+
+def test_unbaked_simulations_are_named_with_a_remedy(folder, run_program):
+    status, (warning,) = listed(folder, run_program, "simulations", 20)
+    assert status == 0
+    named = ("flag", "jelly", "stone", "sparks", "crawler")
+    still = ("hidden stone", "rock", "confetti", "grass", "seed")
+    assert [name for name in (*named, *still) if f"{name} (" in warning] == list(named)
+    assert "bake them in Blender" in warning
+
+
+def test_simulations_are_right_without_a_bake_at_their_first_frame(folder, run_program):
+    assert listed(folder, run_program, "simulations", 1) == (0, [])
+
+
+def test_baked_simulations_are_not_warned_of(folder, run_program):
+    assert listed(folder, run_program, "baked", 20) == (0, [])
+
+
+def test_a_fluid_that_is_not_baked_is_refused_by_name(folder, run_program):
+    status, (error,) = listed(folder, run_program, "fluid", 20)
+    assert status == 1
+    assert error.startswith("error: fluid.blend: water: ") and "bake" in error
+
+
 ASPECT = """
 scene: {blend: aspect.blend}
 render: {samples: 1}
@@ -91,7 +137,7 @@ rigs:
 
 
 def test_a_pixel_aspect_is_said_to_be_ignored_and_pixels_are_square(folder, run_program):
-    (folder / "configs/scenes").mkdir(parents=True)
+    (folder / "configs/scenes").mkdir(parents=True, exist_ok=True)
     (folder / "configs/scenes/aspect.yaml").write_text(ASPECT)
     blend = ("--scene", "aspect", "--blend", "aspect.blend")
     run_program("check_blend.py", *blend, "--output", "blend.json", cwd=folder)

@@ -4,6 +4,10 @@ Each is a .blend in FOLDER, saved at frame 1, with a lamp:
 - aspect: a cube of 2 m, 4 m before the file's own camera, whose pixels are twice as wide as high.
 - wall: a wall square to y at 1.9 m.
 - pencil: the same, with a drawing with Grease Pencil of 2 m before it, and one of 10 m behind it.
+- simulations: what an unbaked simulation moves by frame 20, and what none moves: hair, particles
+  without physics, a rigid body that stands still.
+- baked: a rigid body and simulation nodes that move, with the frames up to 20 baked.
+- fluid: a fluid that is not baked.
 """
 
 import sys
@@ -45,8 +49,82 @@ def pencil():
     drawing("behind", location=(0, 4, 0), scale=(5, 5, 5))
 
 
+def falling(name, kind):
+    bpy.ops.mesh.primitive_grid_add(location=(0, 0, 5))
+    bpy.context.object.name = name
+    bpy.context.object.modifiers.new(name, kind)
+    return bpy.context.object
+
+
+def rigid_body(name, kind="ACTIVE"):
+    thing = cube(name, location=(0, 5, 5))
+    bpy.ops.rigidbody.object_add(type=kind)
+    return thing
+
+
+def emitter(name, **settings):
+    """Add an object with particles in the shape of a cube."""
+    thing = falling(name, "PARTICLE_SYSTEM")
+    particles = thing.particle_systems[0].settings
+    particles.render_type, particles.instance_object = "OBJECT", bpy.data.objects["seed"]
+    for key, value in settings.items():
+        setattr(particles, key, value)
+
+
+def simulation_nodes(name):
+    """Add a cube that simulation nodes move by 0.1 m in each frame."""
+    tree = bpy.data.node_groups.new("moves", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Mesh", in_out=direction, socket_type="NodeSocketGeometry")
+    names = ("SimulationInput", "Transform", "SimulationOutput")
+    first, move, last = (tree.nodes.new(f"GeometryNode{name}") for name in names)
+    first.pair_with_output(last)
+    move.inputs["Translation"].default_value = (0.1, 0, 0)
+    tree.links.new(tree.nodes.new("NodeGroupInput").outputs[0], first.inputs["Geometry"])
+    tree.links.new(first.outputs["Geometry"], move.inputs["Geometry"])
+    tree.links.new(move.outputs["Geometry"], last.inputs["Geometry"])
+    tree.links.new(last.outputs["Geometry"], tree.nodes.new("NodeGroupOutput").inputs[0])
+    thing = cube(name)
+    thing.modifiers.new("moves", "NODES").node_group = tree
+    return thing
+
+
+def simulations():
+    falling("flag", "CLOTH")
+    falling("jelly", "SOFT_BODY")
+    rigid_body("stone")
+    rigid_body("rock", "PASSIVE")
+    rigid_body("hidden stone").hide_render = True
+    cube("seed", location=(9, 9, 9))
+    emitter("sparks")
+    emitter("confetti", physics_type="NO")
+    emitter("grass", type="HAIR")
+    simulation_nodes("crawler")
+
+
+def baked():
+    rigid_body("stone")
+    bpy.context.scene.rigidbody_world.point_cache.frame_end = 20
+    simulation_nodes("crawler")
+    bpy.context.scene.frame_end = 20
+    blend_file.save_scene(FOLDER / "baked.blend")
+    blend_file.open_scene(FOLDER / "baked.blend")
+    bpy.ops.ptcache.bake_all(bake=True)
+    crawler = bpy.data.objects["crawler"]
+    modifier = crawler.modifiers[0]
+    bpy.ops.object.geometry_node_bake_single(
+        session_uid=crawler.session_uid,
+        modifier_name=modifier.name,
+        bake_id=modifier.bakes[0].bake_id,
+    )
+
+
+def fluid():
+    falling("water", "FLUID").modifiers[0].fluid_type = "DOMAIN"
+
+
 def main():
-    for make in (aspect, wall, pencil):
+    for make in (aspect, wall, pencil, simulations, baked, fluid):
         blend_file.new_scene()
         bpy.ops.object.light_add(type="SUN", rotation=(1.2, 0, 0))
         make()
