@@ -34,7 +34,8 @@ def main() -> None:
     bpy.context.scene.frame_set(lightfield.frame)
     clearance.show_what_is_rendered()
     distances = clearance.clearances(positions)
-    inside = clearance.enclosing_objects(positions)
+    open_meshes = clearance.open_meshes(positions)
+    inside = clearance.enclosing_objects(positions, open_meshes)
     views = {
         name: {
             "distance": None if np.isinf(distance) else round(float(distance), 6),
@@ -52,7 +53,11 @@ def main() -> None:
         )
     write_json(arguments.output, {"views": views})
     camera_type = lightfield.content["camera"]["type"]
-    for warning in (*warnings(positions, distances), *drawings.warnings(camera_type)):
+    for warning in (
+        *clearance.open_mesh_warnings(open_meshes),
+        *warnings(positions, distances),
+        *drawings.warnings(camera_type),
+    ):
         print(f"warning: {warning}", file=sys.stderr)
     nearest = min(distances)
     away = f"{nearest:.3f} m" if nearest < REACH else f"more than {REACH} m"

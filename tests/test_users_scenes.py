@@ -24,21 +24,23 @@ LENSES = {
 }
 
 
-def write_lightfield(path, lens, places, frame=1):
+def write_lightfield(path, lens, places):
     """Write a light field of cameras that look along y."""
     keys = [{"position": place} for place in places]
     rig = {"type": "path", "count": len(places), "keys": keys, "look_at": [0, 1e6, 0]}
     render = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0}
     render |= {"depth_precision": "float", "passes": ["object", "emission"]}
     made = lenses.from_camera(LENSES[lens])
-    LightField.from_rig(rig, made, depth="z", frame=frame, render=render).write(path)
+    LightField.from_rig(rig, made, depth="z", frame=1, render=render).write(path)
 
 
-def checked(folder, run_program, blend, places=((0, -4, 0), (0.1, -4, 0)), frame=1):
-    """Return what the check of the cameras says of a .blend, line by line."""
-    write_lightfield(folder / "checked.json", "flat", places, frame)
+def checked(folder, run_program, blend, places):
+    """Return the status of the check of cameras, and its warnings or error."""
+    write_lightfield(folder / "checked.json", "flat", places)
     words = ("--blend", folder / f"{blend}.blend", "--lightfield", folder / "checked.json")
-    return run_program("check_cameras.py", *words, "--output", folder / "cameras.json").stderr
+    output = ("--output", folder / "cameras.json")
+    result = run_program("check_cameras.py", *words, *output, check=False)
+    return result.returncode, result.stderr.splitlines()
 
 
 def rendered(folder, run_program, blend, lens):
@@ -78,6 +80,37 @@ def test_what_views_lack_of_grease_pencil_is_said(lens, said, folder, run_progra
     (warning,) = [line for line in result.stderr.splitlines() if line.startswith("warning: ")]
     assert said in warning
     assert "behind, drawing" in warning
+
+
+BOTH_INSIDE = [(0, 0, 0), (0.2, 0, 0)]
+ONE_INSIDE = [(0, 0, 0), (0, 30, 30)]
+
+
+@pytest.mark.parametrize(
+    ("blend", "places", "said"),
+    [
+        ("open_box", ONE_INSIDE, "1 of 2 cameras are inside an open mesh: box: "),
+        ("open_box", BOTH_INSIDE, "2 of 2 cameras are inside an open mesh: box: "),
+        ("backdrop", BOTH_INSIDE, "2 of 2 cameras are inside an open mesh: backdrop: "),
+        ("dome", BOTH_INSIDE, "2 of 2 cameras are inside an open mesh: dome: "),
+    ],
+)
+def test_cameras_inside_an_open_mesh_are_said(blend, places, said, folder, run_program):
+    status, (warning,) = checked(folder, run_program, blend, places)
+    assert status == 0
+    assert warning.startswith(f"warning: {said}")
+
+
+@pytest.mark.parametrize("blend", ["box", "split_box"])
+def test_a_camera_inside_a_closed_mesh_is_refused(blend, folder, run_program):
+    status, (error,) = checked(folder, run_program, blend, ONE_INSIDE)
+    assert status == 1
+    assert "1 of 2 cameras are inside box: view_0000f;" in error
+
+
+@pytest.mark.parametrize("blend", ["open_room", "leaves", "floor"])
+def test_cameras_that_see_fronts_or_a_plane_are_not_said_to_be_inside(blend, folder, run_program):
+    assert checked(folder, run_program, blend, BOTH_INSIDE) == (0, [])
 
 
 def listed(folder, run_program, blend, frame):

@@ -8,12 +8,21 @@ Each is a .blend in FOLDER, saved at frame 1, with a lamp:
   without physics, a rigid body that stands still.
 - baked: a rigid body and simulation nodes that move, with the frames up to 20 baked.
 - fluid: a fluid that is not baked.
+- box: a closed box of 2 m about the origin. split_box: the same of faces that are not joined.
+  open_box: that without its side towards x. open_room: that with its normals inwards.
+- leaves: a ball of leaves about the origin, one mesh, half of which show their backs.
+- dome: a hemisphere of 5 m over a floor. backdrop: a floor and a wall behind it, whose normals face
+  away. floor: a plane of 20 m at 1 m below the origin, whose normal faces down.
 """
 
+import math
 import sys
 from pathlib import Path
 
 import bpy
+
+# isort: split
+import bmesh
 
 from lightfield.rendering import blend_file
 
@@ -123,8 +132,65 @@ def fluid():
     falling("water", "FLUID").modifiers[0].fluid_type = "DOMAIN"
 
 
+def box():
+    cube("box")
+
+
+def edit(remove):
+    """Remove the faces of the active mesh of which ``remove`` is true, and split all others."""
+    mesh = bmesh.new()
+    mesh.from_mesh(bpy.context.object.data)
+    faces = [face for face in mesh.faces if remove(face)]
+    bmesh.ops.delete(mesh, geom=faces, context="FACES")
+    bmesh.ops.split_edges(mesh, edges=mesh.edges)
+    mesh.to_mesh(bpy.context.object.data)
+
+
+def open_box():
+    cube("box")
+    edit(lambda face: face.normal.x > 0.9)
+
+
+def open_room():
+    open_box()
+    bpy.context.object.data.flip_normals()
+
+
+def split_box():
+    cube("box")
+    edit(lambda face: False)
+
+
+def leaves():
+    """Split a ball into its faces, and turn every other one round."""
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=3)
+    edit(lambda face: face.calc_center_median().z > 2)
+    for face in list(bpy.context.object.data.polygons)[::2]:
+        face.flip()
+
+
+def floor():
+    bpy.ops.mesh.primitive_plane_add(size=20, location=(0, 0, -1), rotation=(math.pi, 0, 0))
+
+
+def dome():
+    floor()
+    bpy.context.object.rotation_euler.x = 0
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=5, location=(0, 0, -1))
+    bpy.context.object.name = "dome"
+    edit(lambda face: face.calc_center_median().z < 0)
+
+
+def backdrop():
+    bpy.ops.mesh.primitive_cube_add(size=8, location=(0, 0, 3))
+    bpy.context.object.name = "backdrop"
+    edit(lambda face: max(face.normal.z, abs(face.normal.x), -face.normal.y) > 0.9)
+
+
 def main():
-    for make in (aspect, wall, pencil, simulations, baked, fluid):
+    physics = (simulations, baked, fluid)
+    meshes = (box, split_box, open_box, open_room, leaves, dome, backdrop, floor)
+    for make in (aspect, wall, pencil, *physics, *meshes):
         blend_file.new_scene()
         bpy.ops.object.light_add(type="SUN", rotation=(1.2, 0, 0))
         make()

@@ -1,8 +1,8 @@
 """How near each camera is to geometry, and which objects it stands inside of."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Collection, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -27,6 +27,8 @@ TOUCHING = 0.001
 # How many places each camera of a random rig tries, and how many say what the box is inside of.
 _TRIES = 100
 _SAMPLES = 64
+# How many rays from a camera say what it is inside of.
+_RAYS = len(icosphere(1))
 
 
 def show_what_is_rendered() -> None:
@@ -92,14 +94,32 @@ def instances() -> Iterator[tuple[Any, Any, Floats, Floats]]:
         yield thing.data, matrix, corners.min(axis=0), corners.max(axis=0)
 
 
-def enclosing_objects(positions: Floats) -> Sequence[str | None]:
-    """Return for each camera the name of the object that it is inside of, or None.
+def enclosing_objects(
+    positions: Floats, open_meshes: Collection[str | None]
+) -> Sequence[str | None]:
+    """Return for each camera the name of the closed object that it is inside of, or None.
 
-    What has the whole rig inside it is a room, not an obstacle.
+    What has the whole rig inside it is a room, not an obstacle. One of the `open_meshes` may be
+    either.
     """
     found = enclosures(positions)
     rooms = {name for name in found if name and found.count(name) == len(found)}
+    rooms.update(name for name in open_meshes if name)
     return [None if name in rooms else name for name in found]
+
+
+def open_mesh_warnings(open_meshes: Collection[str | None]) -> Iterator[str]:
+    """Yield a line if cameras are inside open meshes, given for each camera."""
+    meshes = [name for name in open_meshes if name]
+    if not meshes:
+        return
+    names = sorted(set(meshes))
+    yield (
+        f"{len(meshes)} of {len(open_meshes)} cameras are inside an open mesh: "
+        f"{', '.join(names[:8])}{' …' if len(names) > 8 else ''}: they see the backs of its faces, "
+        "and it cannot be told whether it is a room or an obstacle; turn its normals inwards if "
+        "it is a room, or move the rig"
+    )
 
 
 def free_places(rig: Random) -> Floats:
@@ -135,17 +155,64 @@ def enclosures(positions: Floats) -> list[str | None]:
 
     A camera is inside an object if most rays from it first meet that object's back.
     """
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    directions = [Vector(vertex).normalized() for vertex in icosphere(1)]
-    found: list[str | None] = []
+    names: list[str | None] = []
     for position in positions:
-        backs: Counter[str] = Counter()
-        for direction in directions:
-            hit, _, normal, _, thing, _ = bpy.context.scene.ray_cast(
-                depsgraph, Vector(position), direction
-            )
-            if hit and normal.dot(direction) > 0:
-                backs[thing.name] += 1
+        hits = _first_hits(position)
+        backs = Counter(hit.thing.name for hit in hits if hit.is_back)
         name, count = backs.most_common(1)[0] if backs else ("", 0)
-        found.append(name if count > len(directions) / 2 else None)
-    return found
+        names.append(name if count > _RAYS / 2 else None)
+    return names
+
+
+def open_meshes(positions: Floats) -> list[str | None]:
+    """Return for each camera the name of the open mesh that it is inside of, or None.
+
+    Examples are a room without a wall, a dome and a backdrop. A third of all rays first meet the
+    mesh's backs, and few meet its fronts; leaves would show both. The camera is in the mesh's
+    bounding box, which for a plane has no room. Some ray leads out.
+    """
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    names: list[str | None] = []
+    for position in positions:
+        hits = _first_hits(position)
+        backs = Counter(hit.thing.name for hit in hits if hit.is_back)
+        name, count = backs.most_common(1)[0] if backs else ("", 0)
+        of_mesh = [hit for hit in hits if hit.thing.name == name]
+        is_inside = count >= _RAYS / 3 and count >= 0.75 * len(of_mesh)
+        is_open = is_inside and _is_within_open(position, of_mesh[0], depsgraph)
+        names.append(name if is_open else None)
+    return names
+
+
+class _Hit(NamedTuple):
+    """What a ray meets first: an object, or an instance of it, at its world matrix."""
+
+    thing: Any
+    matrix: Any
+    is_back: bool
+
+
+def _first_hits(position: Floats) -> list[_Hit]:
+    """Return what `_RAYS` rays from a camera, in all directions, meet first."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    hits = []
+    for vertex in icosphere(1):
+        direction = Vector(vertex).normalized()
+        hit, _, normal, _, thing, matrix = bpy.context.scene.ray_cast(
+            depsgraph, Vector(position), direction
+        )
+        if hit:
+            hits.append(_Hit(thing, matrix, normal.dot(direction) > 0))
+    return hits
+
+
+def _is_within_open(position: Floats, hit: _Hit, depsgraph: Any) -> bool:
+    """Return whether a camera is in an object's bounding box, and some ray does not meet it."""
+    thing = hit.thing.evaluated_get(depsgraph)
+    inverse = hit.matrix.inverted_safe()
+    local = inverse @ Vector(position)
+    corners = np.array(thing.bound_box)
+    if not np.all(np.abs(np.array(local) - corners.mean(axis=0)) < np.ptp(corners, axis=0) / 2):
+        return False
+    directions = (inverse.to_3x3() @ Vector(vertex) for vertex in icosphere(2))
+    return any(not thing.ray_cast(local, direction)[0] for direction in directions)
