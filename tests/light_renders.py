@@ -169,6 +169,82 @@ def glowing_fog():
     painted("ShaderNodeVolumePrincipled", "Volume", Emission_Strength=1.0)
 
 
+def picture():
+    """Make a picture of one colour, packed into the .blend."""
+    image = bpy.data.images.new("picture", 4, 4)
+    image.pixels = [0.5, 0.4, 0.3, 1] * 16
+    image.pack()
+    return image
+
+
+def world_of_a_picture():
+    tree = world(colour=(0, 0, 0, 1)).node_tree
+    node = tree.nodes.new("ShaderNodeTexEnvironment")
+    node.image = picture()
+    tree.links.new(node.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+
+
+def emission_of_a_picture():
+    tree, emission = painted("ShaderNodeEmission", Color=(0, 0, 0, 1))
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image = picture()
+    tree.links.new(node.outputs["Color"], emission.inputs["Color"])
+
+
+def emission_that_keyframes_turn_on():
+    _, emission = painted("ShaderNodeEmission")
+    for frame, strength in ((1, 0), (FRAME, 1)):
+        emission.inputs["Strength"].default_value = strength
+        emission.inputs["Strength"].keyframe_insert("default_value", frame=frame)
+
+
+def emission_that_a_modifier_gives():
+    """Let geometry nodes take the cube's material from an input of their modifier."""
+    painted("ShaderNodeEmission")
+    cube = bpy.data.objects["cube"]
+    cube.data.materials.clear()
+    tree = bpy.data.node_groups.new("paints", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Mesh", in_out=direction, socket_type="NodeSocketGeometry")
+    paint = tree.interface.new_socket("Paint", in_out="INPUT", socket_type="NodeSocketMaterial")
+    first, give, last = (
+        tree.nodes.new(name)
+        for name in ("NodeGroupInput", "GeometryNodeSetMaterial", "NodeGroupOutput")
+    )
+    tree.links.new(first.outputs["Mesh"], give.inputs["Geometry"])
+    tree.links.new(first.outputs["Paint"], give.inputs["Material"])
+    tree.links.new(give.outputs[0], last.inputs[0])
+    modifier = cube.modifiers.new("paints", "NODES")
+    modifier.node_group = tree
+    # Blender 5.2 has the inputs in a place of their own.
+    inputs = getattr(modifier, "properties", None)
+    if inputs:
+        getattr(inputs.inputs, paint.identifier).value = bpy.data.materials["paint"]
+    else:
+        modifier[paint.identifier] = bpy.data.materials["paint"]
+
+
+def lamp_of_a_light_group():
+    bpy.context.view_layer.lightgroups.add(name="key light")
+    lamp().lightgroup = "key light"
+
+
+def lamp_of_a_library():
+    """Link the only lamp from another .blend, within an instance of a collection."""
+    library = FOLDER / "library.blend"
+    collection = bpy.data.collections.new("lamps")
+    thing = lamp()
+    collection.objects.link(thing)
+    bpy.data.libraries.write(str(library), {collection})
+    for block in (thing, thing.data, collection):
+        bpy.data.batch_remove([block])
+    with bpy.data.libraries.load(str(library), link=True) as (_, wanted):
+        wanted.collections = ["lamps"]
+    instance = bpy.data.objects.new("lamps", None)
+    instance.instance_type, instance.instance_collection = "COLLECTION", wanted.collections[0]
+    bpy.context.scene.collection.objects.link(instance)
+
+
 CASES = {
     False: [
         *(nothing, black_world, world_without_strength, world_without_nodes, lamp_without_power),
@@ -179,6 +255,8 @@ CASES = {
         *(shining_lamp, lamp_that_keyframes_turn_on, lamp_that_keyframes_show, blue_world),
         *(world_that_a_driver_lights, world_of_a_colour_without_shader, emission),
         *(emission_in_a_group, emission_of_the_principled_shader, fire, glowing_fog),
+        *(world_of_a_picture, emission_of_a_picture, emission_that_keyframes_turn_on),
+        *(emission_that_a_modifier_gives, lamp_of_a_light_group, lamp_of_a_library),
     ],
 }
 

@@ -31,6 +31,12 @@ LIT = [
     "emission_of_the_principled_shader",
     "fire",
     "glowing_fog",
+    "world_of_a_picture",
+    "emission_of_a_picture",
+    "emission_that_keyframes_turn_on",
+    "emission_that_a_modifier_gives",
+    "lamp_of_a_light_group",
+    "lamp_of_a_library",
 ]
 
 

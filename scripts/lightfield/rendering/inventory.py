@@ -131,10 +131,10 @@ def rendered_materials() -> list[Any]:
 
 
 def set_by_nodes() -> set[Any]:
-    """Return the materials that geometry nodes give to what they make."""
+    """Return the materials that geometry nodes, or their modifiers' inputs, give to objects."""
     users = bpy.data.user_map(subset=list(bpy.data.materials))
-    kind = bpy.types.GeometryNodeTree
-    return {material for material in users if any(isinstance(u, kind) for u in users[material])}
+    kinds = (bpy.types.GeometryNodeTree, bpy.types.Object)
+    return {material for material in users if any(isinstance(u, kinds) for u in users[material])}
 
 
 def surface_features(shader: Any) -> Iterator[tuple[str | None, Any]]:
