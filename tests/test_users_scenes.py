@@ -8,6 +8,7 @@ import pytest
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
+from lightfield.validation.validate import validate
 
 
 @pytest.fixture(scope="module")
@@ -24,12 +25,13 @@ LENSES = {
 }
 
 
-def write_lightfield(path, lens, places):
+def write_lightfield(path, lens, places, **more):
     """Write a light field of cameras that look along y."""
     keys = [{"position": place} for place in places]
     rig = {"type": "path", "count": len(places), "keys": keys, "look_at": [0, 1e6, 0]}
     render = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0}
     render |= {"depth_precision": "float", "passes": ["object", "emission"]}
+    render |= more
     made = lenses.from_camera(LENSES[lens])
     LightField.from_rig(rig, made, depth="z", frame=1, render=render).write(path)
 
@@ -157,6 +159,24 @@ def test_a_fluid_that_is_not_baked_is_refused_by_name(folder, run_program):
     status, (error,) = listed(folder, run_program, "fluid", 20)
     assert status == 1
     assert error.startswith("error: fluid.blend: water: ") and "bake" in error
+
+
+@pytest.mark.parametrize("lens", LENSES)
+def test_a_transparent_view_of_nothing_is_valid(lens, folder, run_program):
+    output = folder / f"nothing_{lens}"
+    # The box lies behind the first camera and before the second.
+    places = [(0, 5, 0), (0, -5, 0)]
+    more = {"passes": [], "transparent": True}
+    write_lightfield(output / "lightfield.json", lens, places, **more)
+    words = ("--blend", folder / "box.blend", "--lightfield", output / "lightfield.json")
+    run_program("render_shard.py", *words, "--output", output / "exr")
+    covered = [
+        images.read_image(output / f"exr/view_{view}f.exr").channels["A"][16, 16]
+        for view in ("0000", "0001")
+    ]
+    assert covered == [0, 1]
+    faults = [check.name for check in validate(output).checks if check.passed is False]
+    assert faults == []
 
 
 ASPECT = """
