@@ -34,8 +34,8 @@ def main() -> None:
     bpy.context.scene.frame_set(lightfield.frame)
     clearance.show_what_is_rendered()
     distances = clearance.clearances(positions)
-    open_meshes = clearance.open_meshes(positions)
-    inside = clearance.enclosing_objects(positions, open_meshes)
+    enclosures = clearance.enclosures(positions)
+    inside = clearance.enclosing_objects(enclosures)
     views = {
         name: {
             "distance": None if np.isinf(distance) else round(float(distance), 6),
@@ -54,7 +54,7 @@ def main() -> None:
     write_json(arguments.output, {"views": views})
     camera_type = lightfield.content["camera"]["type"]
     for warning in (
-        *clearance.open_mesh_warnings(open_meshes),
+        *clearance.open_mesh_warnings(enclosures),
         *warnings(positions, distances),
         *drawings.warnings(camera_type),
     ):
