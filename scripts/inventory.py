@@ -6,6 +6,7 @@ What is missing or cannot be read is an error here, before anything is rendered 
 
 import argparse
 import os.path
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,15 @@ from lightfield.dataset.config import FILE
 from lightfield.dataset.dataset import rendered_frames, scene_datasets
 from lightfield.dataset.view_store import ViewStore
 from lightfield.geometry.rigs import BlendCamera
-from lightfield.rendering import blend_facts, blend_file, external_files, pruning, scene_memory
+from lightfield.rendering import (
+    blend_facts,
+    blend_file,
+    external_files,
+    light,
+    pruning,
+    scene_memory,
+    simulations,
+)
 from lightfield.rendering.inventory import FEATURES, inventory
 
 # isort: split
@@ -44,17 +53,26 @@ def main() -> None:
         found = {"blend": blend_facts.facts(camera_frames) | {"layers": layers}}
     if written and written.render and written.render.motion_blur is not None:
         bpy.context.scene.render.use_motion_blur = written.render.motion_blur
+    refuse_fluids(arguments.blend)
     found |= inventory(frames)
     if found["missing"] and not chosen.get("allow_missing"):
         raise UserError(refusal(arguments.blend, found["missing"]))
+    if not light.may_be_lit():
+        raise UserError(
+            f"{arguments.blend}: has no light, so all views would be black: no lamp shines, no "
+            "material emits, and the world is black; give it one of these, as a world with a colour"
+        )
     if store := ViewStore.configured():
         external_files.put(arguments.blend, found["external_files"], store)
+    warnings = list(simulations.warnings(frames))
     leave_out = pruning.left_out(found)
     found["left_out"] = leave_out
     # Of what is open here nothing is left, for it to be rendered in the same memory.
     blend_file.new_scene()
     found["memory_bytes"] = scene_memory.measure(arguments.blend, found, chosen)
     write_json(arguments.output, found)
+    for warning in warnings:
+        print(f"warning: {warning}", file=sys.stderr)
     if chosen.get("blend"):
         resolved = [dataset.resolved(arguments.output) for dataset in datasets]
         shown = sorted({dataset.source.frame for dataset in resolved})
@@ -67,6 +85,17 @@ def main() -> None:
     )
     for name in leave_out:
         print(f"left out: {name}: {pruning.REASONS[name]}")
+
+
+def refuse_fluids(path: Path) -> None:
+    """Raise `UserError` where the open .blend shows fluids that are not baked."""
+    if fluids := simulations.unbaked_fluids():
+        # Blender aborts when it exits with one of them open.
+        blend_file.new_scene()
+        raise UserError(
+            f"{path}: {', '.join(fluids[:8])}{' …' if len(fluids) > 8 else ''}: fluids that are "
+            "not baked cannot be simulated here; bake them in Blender and save the .blend"
+        )
 
 
 def refusal(path: Path, problems: list[dict[str, str]]) -> str:

@@ -333,6 +333,7 @@ for name in ("library", "main"):
         with bpy.data.libraries.load(sys.argv[1] + "/library.blend", link=True) as (_, wanted):
             wanted.objects = ["thing"]
         bpy.context.collection.objects.link(wanted.objects[0])
+        bpy.ops.object.light_add(type="SUN")
     bpy.ops.wm.save_as_mainfile(filepath=f"{sys.argv[1]}/{name}.blend", compress=False)
 """
 

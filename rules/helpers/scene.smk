@@ -7,7 +7,7 @@ def inventory_settings(dataset):
     datasets = scene_datasets(dataset.scene_name)
     return {
         # Raised when the program lists something else.
-        "version": 3,
+        "version": 4,
         "scene_name": written.scene.scene_name,
         "view_layers": written.scene.view_layers,
         "allow_missing": written.scene.allow_missing,

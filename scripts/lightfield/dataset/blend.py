@@ -127,6 +127,9 @@ def taken(
         words.append("film transparent ON")
     elif blend["film_transparent"]:
         words.append("film transparent on, ignored")
+    # An inventory from before this was looked at has none.
+    if blend.get("pixel_aspect", 1) != 1:
+        words.append(f"pixel aspect {blend['pixel_aspect']:g} ignored, pixels are square")
     for name, title in (
         ("border", "render border"),
         ("stereoscopy", "stereoscopy"),

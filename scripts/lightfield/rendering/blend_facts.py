@@ -40,6 +40,7 @@ def facts(frames: Iterable[int | None]) -> dict[str, Any]:
         "exposure": round(view.exposure, 4),
         "gamma": round(view.gamma, 4),
         "curves": bool(view.use_curve_mapping),
+        "pixel_aspect": round(render.pixel_aspect_x / render.pixel_aspect_y, 4),
         "border": bool(render.use_border),
         "stereoscopy": bool(render.use_multiview),
         "freestyle": bool(render.use_freestyle),

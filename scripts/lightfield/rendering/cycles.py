@@ -12,7 +12,7 @@ from lightfield.core.machine import describe
 from lightfield.dataset.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.dataset.passes import Pass
 from lightfield.geometry.rigs.rig import EYES
-from lightfield.rendering import animation, blend_file, ids, instances, pruning, volumes
+from lightfield.rendering import animation, blend_file, drawings, ids, instances, pruning, volumes
 
 # In the order in which `auto` tries them.
 GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
@@ -68,6 +68,7 @@ def set_up(
     _set_passes(scene, passes)
     _use_device(scene, device)
     _set_camera(scene, lightfield.content)
+    drawings.set_up(view_layer(scene), scene.camera.data.type)
     volumes.alone.cache_clear()
     volumes.alone()
     if "instance" in numbered:

@@ -98,6 +98,8 @@ def _geometry_settings(wanted: Iterable[str]) -> Iterator[None]:
     with ExitStack() as stack:
         for name, value in _SAMPLING.items():
             stack.enter_context(changed(scene.cycles, name, value))
+        # Blender's drawings would change all depths a little, and have none of the other passes.
+        stack.enter_context(changed(layer, "use_grease_pencil", False))
         stack.enter_context(changed(scene.render, "use_motion_blur", False))
         stack.enter_context(changed(scene.camera.data.dof, "use_dof", False))
         for name in wanted:
