@@ -250,18 +250,18 @@ DAMAGE = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, R
 
 
 @contextmanager
-def reading(path: Path | str, kind: str) -> Iterator[None]:
-    """Raise a `UserError` with the file's name where the file cannot be read as its ``kind``."""
+def reading(place: Path | str, kind: str) -> Iterator[None]:
+    """Raise a `UserError` where a file, or a place in one, cannot be read as its ``kind``."""
     try:
         yield
     except OSError as error:
-        raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
+        raise UserError(f"{place}: cannot be read: {read_problem(error)}") from None
     except KeyError as error:
-        raise UserError(f"{path}: {error.args[0]}: is missing") from None
+        raise UserError(f"{place}: {error.args[0]}: is missing") from None
     except DAMAGE as error:
-        raise UserError(f"{path}: is no {kind}: {error}") from None
+        raise UserError(f"{place}: is no {kind}: {error}") from None
     except struct.error:
-        raise UserError(f"{path}: is no {kind}: it is cut short") from None
+        raise UserError(f"{place}: is no {kind}: it is cut short") from None
 
 
 def read_json(path: Path | str) -> Any:
