@@ -160,7 +160,7 @@ class Configuration(Settings):
             ),
         ],
         Preset,
-    ]
+    ] = Field(min_length=1)
     results: Folder = Field("results", description="Folder of the datasets.")
     work: Folder = Field(
         "work",
@@ -529,7 +529,7 @@ def _bracketed(reprojections: dict[str, Reprojection]) -> dict[str, Reprojection
         for stops in reprojection.exposure:
             key = f"{name}_ev{stops:g}"
             if key in found or key in reprojections:
-                raise ValueError(f"must not name {key} twice")
+                raise ValueError(f"{name}.exposure: must not name {key} twice")
             found[key] = reprojection.model_copy(update={"exposure": stops})
     return found
 
