@@ -1,40 +1,68 @@
 """Files that damage or another program has changed: each is read, or refused in one line.
 
-Every kind of file that a program reads back is spoiled in some hundred ways, by a seed. Outcomes
-are two: what the file now says, or a `UserError`. Sums that a file holds of itself are made right
-again in half of the cases: else they would hide what lies behind them.
+A seed spoils every kind of file that a program reads. Each file is read, or a `UserError` of one
+line names it. Sums that a file holds of itself are made right again in two of three files: else
+they would hide what lies behind them.
 """
 
+import contextlib
 import copy
 import hashlib
+import itertools
 import json
+import os
 import random
+import re
+import struct
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
+from pydantic import TypeAdapter
+from sphere import write_views
 
+from lightfield import export
 from lightfield.core.errors import UserError
-from lightfield.dataset import config, journal, ledger, records, shard_counts, shard_files
+from lightfield.dataset import (
+    config,
+    journal,
+    ledger,
+    published,
+    records,
+    shard_counts,
+    shard_files,
+)
 from lightfield.dataset.dataset import check_external_files, scene_datasets
+from lightfield.dataset.exports import settings_of
 from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.splits import listed
 from lightfield.export import MANIFESTS
+from lightfield.export.source import Source
 from lightfield.geometry import lenses
+from lightfield.geometry.rigs import from_settings
+from lightfield.imaging import images
 from lightfield.measurement import plan
 from lightfield.measurement.sampling import calibrated
 from lightfield.reprojection import lens_map
 from lightfield.validation import readers, splits
 
-# Of each kind of file.
-COUNT = 600
+TIMES = itertools.count(10**18, 10**6)
+# Files of each kind. The few take seconds, and belong to each run of the tests.
+COUNTS = [pytest.param(40, id="few"), pytest.param(600, id="many", marks=pytest.mark.slow)]
 
 HOSTILE = [
     *(None, True, False, 0, -1, 1, 2**31, 10**30, -(10**400), 0.5, -0.0, 1e308, 5e-324),
     *(float("nan"), float("inf"), -float("inf")),
     *("", "a", "0", "nan", "\0", "../..", "/dev/zero", "x" * 5000, "ä\ud800", "f:/\\"),
     *([], {}, [[]], [None], {"": None}, [0] * 1000, [[0] * 4] * 4, {"a": {"a": {"a": 1}}}),
+]
+
+WORDS = [
+    *(b"", b"0", b"-1", b"1e400", b"nan", b"inf", b"9" * 5000, b"1" * 20, b"18446744073709551615"),
+    *(b"x", b'"', b"\0", b"\n", b"\xff", b"\xed\xa0\x80", b"[" * 5000, b"a b c d e f g h i j"),
 ]
 
 
@@ -74,6 +102,14 @@ def spoiled(content, rng):
         else:
             above[path[-1]] = copy.deepcopy(rng.choice(HOSTILE))
     return content
+
+
+def reworded(data, rng):
+    """Return a text's bytes with one to three of its words replaced."""
+    words = re.split(rb"([\s,:]+)", data)
+    for _ in range(rng.randint(1, 3)):
+        words[rng.randrange(0, len(words), 2)] = rng.choice(WORDS)
+    return b"".join(words)
 
 
 def damaged(data, rng):
@@ -314,6 +350,68 @@ def read_lens_map(path, _):
     lens_map.warnings(lens_map.load(path))
 
 
+def scene(_):
+    camera = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
+    flat = {"lens": "rectilinear", "focal_length": 18, "resolution": [16, 16]}
+    return {
+        "scene": {"builder": "room", "parameters": {"seed": 1}, "frame": 3},
+        "render": {"samples": 4, "passes": ["normal"], "denoise": True},
+        "rigs": {"LFPlane": {**PLANE, "size": 0.5, "camera": camera}},
+        "reprojections": {"flat": {"rigs": ["LFPlane"], "camera": flat, "format": "exr"}},
+        "flow": {"pairs": "neighbours"},
+        "exports": {"colmap": {"sources": ["flat"], "points": 100}},
+    }
+
+
+def read_scene(path, _):
+    config.read_scene(path)
+    scene_datasets(path.stem)
+
+
+def configuration(_):
+    return {
+        "scenes": ["room"],
+        "rigs": "all",
+        "preset": "full",
+        "presets": {"full": {}, "small": {"samples": 4, "views": 3}},
+        "results": "results",
+        "work": "work",
+        "device": "cpu",
+        "views_per_shard": 8,
+        "energy": {"watts": 65, "cores": "auto"},
+    }
+
+
+def read_configuration(path, _):
+    # Snakemake reads the YAML itself.
+    with contextlib.suppress(yaml.YAMLError, UnicodeDecodeError, RecursionError, ValueError):
+        content = yaml.safe_load(path.read_bytes())
+        config.load_config(content if isinstance(content, dict) else {})
+
+
+def lock(_):
+    return {"blend": "own.blend", "sha256": "0" * 64}
+
+
+def read_lock(_, dataset):
+    scene_datasets("own")
+    config.expected_blend(dataset.scene_name, Path(dataset.source.blend), "0" * 64)
+
+
+def read_published(path, _):
+    published.rigs(str(path.parent))
+
+
+def poses(rng):
+    if rng.random() < 0.5:
+        return transforms(rng)
+    return lightfield(rng)
+
+
+def read_poses(path, _):
+    from_settings({"type": "poses", "file": str(path)}).poses()
+
+
 # By kind: the file's path in work/own, a sample's content, and what reads it.
 KINDS = {
     "lightfield": ("View/lightfield.json", lightfield, read_lightfield),
@@ -328,6 +426,11 @@ KINDS = {
     "calibration": ("calibration.json", calibration, read_calibration),
     "probe": ("View/probe.json", probe, read_probe),
     "shards": ("shards.json", shards, read_shards),
+    "scene": ("../../other.yaml", scene, read_scene),
+    "configuration": ("../../config.yaml", configuration, read_configuration),
+    "lock": ("../../own.lock.json", lock, read_lock),
+    "published": ("../../published/lightfield.json", lightfield, read_published),
+    "poses": ("../../poses.json", poses, read_poses),
 }
 
 OWN = """
@@ -367,30 +470,47 @@ def home(tmp_path, monkeypatch):
     return tmp_path
 
 
-def assert_read_or_refused(read, path, dataset, data):
+# Some spoiled files are sound lists of what is missing, or sound inventories of other .blends.
+LISTED = {
+    "export": "exports/",
+    "transforms": "View/",
+    "inventory": "own.blend: files that it shows",
+}
+
+
+def assert_read_or_refused(read, path, dataset, data, listed=None):
+    """``listed`` is what a message may name instead of the file: one that it lists."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(data)
+    # Programs keep what they have read of a file until its time changes.
+    changed = next(TIMES)
+    os.utime(path, ns=(changed, changed))
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
         try:
             read(path, dataset)
         except UserError as error:
             assert str(error).isprintable()
+            assert path.name in str(error) or (listed and listed in str(error))
         except Exception as error:
             pytest.fail(f"{type(error).__name__}: {error}: {data[:2000]!r}")
 
 
+@pytest.mark.parametrize("count", COUNTS)
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_spoiled_file_is_read_or_refused(kind, home):
+def test_a_spoiled_file_is_read_or_refused(kind, count, home):
     name, sample, read = KINDS[kind]
     rng = random.Random(f"{kind} 7")
-    for number in range(COUNT):
+    for number in range(count):
         content = sample(rng)
         data = text_of(kind, spoiled(content, rng))
         if number % 3 == 2:
             data = damaged(text_of(kind, content), rng)
         (dataset,) = scene_datasets("own")
-        assert_read_or_refused(read, home / "work/own" / name, dataset, data)
+        path = home / "work/own" / name
+        assert_read_or_refused(read, path, dataset, data, LISTED.get(kind))
+        # The next sample's dataset is that of the settings alone.
+        path.unlink()
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -409,14 +529,15 @@ def test_a_sound_file_is_read(kind, home):
     read(path, dataset)
 
 
-def test_a_spoiled_lens_map_is_read_or_refused(tmp_path):
+@pytest.mark.parametrize("count", COUNTS)
+def test_a_spoiled_lens_map_is_read_or_refused(count, tmp_path):
     rng = random.Random("lens map 7")
     path = tmp_path / "lens_map.npy"
     saved_lens_map(path)
     read_lens_map(path, None)
     sound = path.read_bytes()
     header = sound.index(b"\n") + 1
-    for number in range(COUNT):
+    for number in range(count):
         data = damaged(sound, rng)
         if number % 3 == 0:
             # In what says how the rest is read.
@@ -426,3 +547,105 @@ def test_a_spoiled_lens_map_is_read_or_refused(tmp_path):
             end = sound.index(b"}\0" if b"}\0" in sound[description:] else b"}", description)
             data = sound[:description] + damaged(sound[description:end], rng) + sound[end:]
         assert_read_or_refused(read_lens_map, path, None, data)
+
+
+def pose_table(path):
+    rows = [f"view_{number},{number},0,1,0.1,0,0.2" for number in range(5)]
+    path.write_text("\n".join(["name,x,y,z,rx,ry,rz", *rows]) + "\n")
+
+
+def image_list(path):
+    lines = [f"{number} 1 0 0 0 0 {number} 0 1 view_{number}.png\n\n" for number in range(5)]
+    path.write_text("# images\n" + "".join(lines))
+
+
+def binary_image_list(path):
+    image = struct.pack("<i7di", 1, 1, 0, 0, 0, 0, 2, 0, 1) + b"view.png\0" + struct.pack("<Q", 0)
+    path.write_bytes(struct.pack("<Q", 2) + image + image.replace(b"view", b"look"))
+
+
+def view(path):
+    pixels = np.random.default_rng(1).random((16, 24), np.float32)
+    channels = {"R": pixels, "G": pixels, "B": pixels.astype(np.float16), "Z": pixels}
+    images.write_exr(path, channels, {"plenoforge:key": "a"})
+
+
+def read_view(path, _):
+    images.read_header(path)
+    images.is_finished(path, "a")
+    images.read_image(path, ["R", "Z"], (2, 5))
+    images.read_image(path)
+
+
+def picture(path):
+    images.write_png(path, np.arange(24 * 16 * 3, dtype=np.uint8).reshape(24, 16, 3))
+
+
+def read_picture(path, _):
+    images.read_header(path)
+    images.read_image(path).srgb  # noqa: B018
+
+
+# By a file's name: what writes it, and what reads it.
+FILES = {
+    "poses.csv": (pose_table, read_poses),
+    "images.txt": (image_list, read_poses),
+    "images.bin": (binary_image_list, read_poses),
+    "view.exr": (view, read_view),
+    "view.png": (picture, read_picture),
+}
+
+
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("name", FILES)
+def test_a_damaged_file_is_read_or_refused(name, count, tmp_path):
+    write, read = FILES[name]
+    path = tmp_path / name
+    write(path)
+    read(path, None)
+    sound = path.read_bytes()
+    rng = random.Random(f"{name} 7")
+    for number in range(count):
+        is_reworded = path.suffix in (".csv", ".txt") and number % 2
+        data = (reworded if is_reworded else damaged)(sound, rng)
+        assert_read_or_refused(read, path, None, data)
+
+
+EXPORTS = {
+    "colmap": {"points": 20, "depth": True},
+    "nerfstudio": {"points": 20, "depth": True},
+    "nerf_synthetic": {},
+    "opendibr": {},
+    "miv": {},
+    "hci": {},
+    "poses_csv": {},
+    "point_cloud": {"voxel": 0.1},
+}
+PICTURES = {".png", ".exr", ".yuv", ".mp4"}
+
+
+@pytest.mark.parametrize("count", COUNTS)
+@pytest.mark.parametrize("kind", EXPORTS)
+def test_a_damaged_export_is_read_or_refused(kind, count, tmp_path):
+    source = tmp_path / "dataset"
+    camera = {"lens": "rectilinear", "fov": 60, "resolution": [16, 16]}
+    write_views(source, camera, {"type": "plane", "cameras": [2, 2], "size": 0.2})
+    settings = TypeAdapter(settings_of(kind)).validate_python(
+        {"sources": ["views"]} | EXPORTS[kind]
+    )
+    folder = tmp_path / "export"
+    export.run(kind, Source(source, "", ".exr", {}), settings, folder)
+    listed = folder / "export.json"
+
+    def read(path, _):
+        readers.read(listed, (16, 16))
+
+    read(None, None)
+    files = [path for path in folder.rglob("*") if path.is_file() and path.suffix not in PICTURES]
+    rng = random.Random(f"{kind} 7")
+    for _ in range(count):
+        path = rng.choice(files)
+        sound = path.read_bytes()
+        data = (reworded if b"\0" not in sound and rng.random() < 0.5 else damaged)(sound, rng)
+        assert_read_or_refused(read, path, None, data, str(folder))
+        path.write_bytes(sound)
