@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import pytest
 import yaml
+from checkouts import checkout, snakemake
 from test_config import RIGHT, SNAKEMAKE, changed
 
 from lightfield.core.errors import UserError
@@ -516,3 +517,28 @@ def test_a_hostile_plan_ends_with_one_line_and_little_memory(text, own, argument
     # In KiB, but for macOS.
     assert int(largest) * (1 if sys.platform == "darwin" else 1024) < 500e6
     assert not (tmp_path / "results").exists() and not (tmp_path / "work").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        (b"scenes: [garden]\n\tpreset: full\n", "line 2, column 1: is indented with a tab"),
+        (b"scenes: [garden\n", "line 2, column 1"),
+        (b"- garden\n", "must be a mapping"),
+        (b"", "must be a mapping"),
+        (b"\xff\xfe", "cannot be read as YAML"),
+        (None, "cannot be read as YAML"),
+    ],
+)
+def test_what_is_wrong_with_the_checkouts_own_config_is_one_line(text, problem, tmp_path):
+    folder = checkout(tmp_path)
+    if text is None:
+        (folder / "config.yaml").unlink()
+    else:
+        (folder / "config.yaml").write_bytes(text)
+    run = snakemake(folder, "--dry-run")
+    said = (run.stdout + run.stderr).splitlines()
+    assert run.returncode != 0
+    assert said[-1].startswith("error: ") and "config.yaml: " in said[-1] and problem in said[-1]
+    assert len(said) <= 2
