@@ -92,6 +92,7 @@ onstart:
                 accept_blend(name)
         begin_display()
         begin_notes()
+        announce_stop()
     except UserError as error:
         sys.exit(f"error: {error}")
 
@@ -108,7 +109,7 @@ onerror:
     # Snakemake has something to say after this, too: what failed is repeated when it has.
     atexit.register(
         print,
-        failure_report(failed_jobs(failed_entries())),
+        failure_report(failed_jobs(failed_entries())) or UNFINISHED,
         file=sys.stderr,
         flush=True,
     )

@@ -467,7 +467,7 @@ def building(request, tmp_path):
         folder = own
     else:
         words = ("--directory", folder, *BUILD)
-    process = start_snakemake(tmp_path / "checkout", *words)
+    process = start_snakemake(tmp_path / "checkout", *words, stderr=subprocess.PIPE, text=True)
     wait_until((folder / "started").exists, process)
 
     def run(*more, target=None):
@@ -519,6 +519,23 @@ def test_after_a_kill_the_next_run_goes_on_by_itself(with_its_jobs, building):
     assert following.returncode == 0, following.stderr
     assert ("waiting for jobs that a killed run has left" in following.stderr) != with_its_jobs
     assert (folder / "work/one/scene.blend").read_text() == "a scene"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("building", ["checkout"], indirect=True)
+def test_a_run_that_is_stopped_says_so_and_the_next_one_goes_on(building):
+    folder, process, run = building
+    process.terminate()
+    said = process.stderr.readline()
+    while "stopping after SIGTERM" not in said:
+        said = process.stderr.readline()
+        assert said, "it ended without a word"
+    (folder / "go").touch()
+    *_, last = process.stderr.read().splitlines()
+    assert process.wait() != 0
+    assert last.startswith("error: the run was stopped") and last.endswith("goes on")
+    assert (folder / "work/one/scene.blend").read_text() == "a scene"
+    assert run().returncode == 0
 
 
 @pytest.mark.slow
