@@ -98,7 +98,7 @@ def refusal(others: list[Run]) -> str:
         )
     return (
         f"another run makes these files, process {run.pid}: wait for it, or end it "
-        f"(kill {run.pid}); snakemake --nolock status says how far it is"
+        f"(kill {run.pid}); snakemake status says how far it is"
     )
 
 
