@@ -1,9 +1,12 @@
 """Reads the inventory of a scene, which scripts/inventory.py writes."""
 
 from pathlib import Path
-from typing import Annotated, Any, TypedDict
+from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, TypeAdapter
+
+# That of Python 3.11 is not enough for pydantic.
+from typing_extensions import TypedDict
 
 from lightfield.core.files import read_keys
 from lightfield.core.settings import checked
