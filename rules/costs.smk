@@ -52,7 +52,7 @@ rule costs:
         " {params.reprojections} {params.inventory} --output {output} > {log} 2>&1"
 
 
-# Without input and output, so that it can be asked at any time; with --nolock while a build runs.
+# Without input and output, so that it can be asked at any time, also while a build runs.
 rule status:
     log:
         log_of("status"),

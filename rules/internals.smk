@@ -89,6 +89,48 @@ def take_as_missing(is_damaged):
     _IOFile.exists_local = exists_and_is_sound
 
 
+def before_lock(take_folder):
+    """Call ``take_folder`` when a real run is planned, before Snakemake locks its files.
+
+    Snakemake's hooks come later: where a killed run has left locks, it ends before `onstart`.
+    """
+    build_dag = workflow._build_dag
+
+    def build_dag_and_take_folder():
+        build_dag()
+        if workflow.executor_plugin is None or not workflow.execution_settings.lock:
+            return
+        if workflow.dryrun:
+            # It would warn of another run, also of one that was killed, and locks nothing.
+            workflow.persistence.lock = workflow.persistence.noop
+        else:
+            take_folder()
+
+    workflow._build_dag = build_dag_and_take_folder
+
+
+def remove_locks():
+    """Remove all locks of the folder, as --unlock does."""
+    workflow.persistence.cleanup_locks()
+
+
+def files_are_locked():
+    """Return whether another run has locked files that this one reads or makes."""
+    return workflow.persistence.locked
+
+
+def keep_locks_of_others():
+    """Have Snakemake remove its own locks in the end: it removes those of all runs that live."""
+    persistence = workflow.persistence
+
+    def unlock():
+        for file in getattr(persistence, "_lockfile", {}).values():
+            Path(file).unlink(missing_ok=True)
+
+    if hasattr(persistence, "_lockfile"):
+        persistence.unlock = unlock
+
+
 def is_ancient(file):
     """Return whether an input is declared as ``ancient``, so that its content does not matter."""
     return file.is_ancient

@@ -2,6 +2,7 @@
 import functools
 import resource
 
+from lightfield.core import live_runs
 from lightfield.dataset.config import expected_blend
 from lightfield.dataset.dataset import check_external_files, check_imported
 
@@ -67,6 +68,18 @@ def check_room():
             needs.append(room.Need(Path(tempfile.gettempdir()), size))
     for warning in room.check(needs):
         print(f"warning: {warning}", file=sys.stderr)
+
+
+def take_folder():
+    """Go on where a killed run has left its locks; refuse files that another run makes."""
+    others = live_runs.enter(Path(".snakemake/locks"), not RUNS_HERE, remove_locks)
+    if files_are_locked():
+        sys.exit(f"error: {live_runs.refusal(others)}")
+    keep_locks_of_others()
+
+
+if IS_MAIN_PROCESS:
+    before_lock(take_folder)
 
 
 def explain_full_disk():

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys, write_json
+from lightfield.core.files import write_json
+from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.lightfield import LightField
 from lightfield.rendering import blend_file, clearance, drawings
 from lightfield.rendering.clearance import REACH, TOUCHING
@@ -29,7 +30,7 @@ def main() -> None:
     names = [view.name for view in lightfield.views]
     positions = np.array([view.position for view in lightfield.views])
     path = arguments.inventory
-    inventory = path and read_keys(path, "inventory.py", "external_files")
+    inventory = path and read_inventory(path, "external_files")
     blend_file.open_scene(arguments.blend, lightfield.content.get("scene", {}), inventory)
     bpy.context.scene.frame_set(lightfield.frame)
     clearance.show_what_is_rendered()

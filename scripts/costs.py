@@ -6,9 +6,10 @@ from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys, write_json
+from lightfield.core.files import write_json
 from lightfield.core.settings import checked
 from lightfield.dataset.config import FILE, Energy
+from lightfield.dataset.inventory import read_inventory
 from lightfield.measurement import costs
 
 # isort: split
@@ -53,7 +54,7 @@ def main() -> None:
     if full["samples"] == FILE:
         if arguments.inventory is None:
             raise UserError("--inventory: is missing; it has the samples of the .blend")
-        said = read_keys(arguments.inventory, "inventory.py", "blend")["blend"]
+        said = read_inventory(arguments.inventory, "blend")["blend"]
         full["samples"] = said["samples"]
     found = costs.costs(
         arguments.dataset,

@@ -37,7 +37,7 @@ def main() -> None:
         raise UserError("the views of all chosen datasets are there already: nothing is rendered")
     text = plan.table(
         [
-            (name, counted("--dataset", frames), read_keys(probe, "probe.py", *plan.PROBED))
+            (name, counted("--dataset", frames), plan.read_probe(probe))
             for name, frames, probe in arguments.dataset
         ],
         {

@@ -279,6 +279,12 @@ def test_every_mistake_names_file_key_value_and_what_is_right(name, tmp_path):
         ("render: {samples: 12:30:45}\n", 'render.samples: is "12:30:45"; must be a whole number'),
         ("render: {samples: 010}\n", 'render.samples: is "010"; must be a whole number'),
         ("render: {samples: 0b11}\n", 'render.samples: is "0b11"; must be a whole number'),
+        (
+            "scene: {builder: room}\n"
+            "render: {samples: 1}\n"
+            "reprojections: {flat: {camera: {lens: rectilinear, focal_length: 1e-300}}}\n",
+            "flat.camera.focal_length: is 1e-300; must be a number at least 0.001",
+        ),
         ("render: {clamp_indirect: 1:30.5}\n", 'clamp_indirect: is "1:30.5"; must be a number'),
         ("scene: !!python/object/apply:os.getcwd []\n", "could not determine a constructor"),
     ],
@@ -351,7 +357,14 @@ def test_flow_of_a_rig_that_a_preset_leaves_one_place_is_refused(tmp_path, monke
 def test_numbers_of_yaml_1_1_that_look_like_numbers_stay_numbers(tmp_path):
     file = tmp_path / "numbers.yaml"
     numbers = {"7": 7, "-7": -7, "0": 0, "1_000": 1000, "0x1F": 31, "+1.5": 1.5, ".5": 0.5}
-    numbers |= {"2.": 2.0, "1.0e-3": 0.001, "-.inf": -float("inf"), "-0.0": 0.0}
+    numbers |= {
+        "2.": 2.0,
+        "1.0e-3": 0.001,
+        "1e-3": 0.001,
+        "-2E3": -2000.0,
+        "-.inf": -float("inf"),
+        "-0.0": 0.0,
+    }
     file.write_text("".join(f"{key!r}: {key}\n" for key in numbers))
     assert config.read_yaml(file, "numbers") == numbers
 

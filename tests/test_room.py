@@ -3,8 +3,12 @@
 import errno
 import os
 import re
+import shutil
+import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 from collections import namedtuple
 from contextlib import suppress
@@ -12,11 +16,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from checkouts import checkout, snakemake
+from checkouts import checkout, snakemake, start_snakemake, wait_until
 from conftest import SCRIPTS, mount_disk
 from sphere import write_views
 
-from lightfield.core import files, leftovers, room
+from lightfield.core import files, leftovers, live_runs, room
 from lightfield.core.errors import UserError
 
 Usage = namedtuple("Usage", "free")
@@ -39,6 +43,28 @@ rigs:
     type: plane
     cameras: [2, 1]
     camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
+"""
+
+# In place of the program that builds a scene: it waits to be let go.
+WAITING = """
+import sys, time
+from pathlib import Path
+Path("started").touch()
+while not Path("go").exists():
+    time.sleep(0.05)
+Path(sys.argv[sys.argv.index("--output") + 1]).write_text("a scene")
+"""
+BUILD = ("--config", "scenes=one", "rigs=all", "preset=full", "--", "work/one/scene.blend")
+
+# A run that lives until it is killed, and one of its jobs.
+RUN = """
+import subprocess, sys, time
+from pathlib import Path
+from lightfield.core import live_runs
+live_runs.enter(Path(sys.argv[1]), sys.argv[2] == "cluster", lambda: None)
+job = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+print(job.pid, flush=True)
+time.sleep(60)
 """
 
 KEEPER = """
@@ -296,3 +322,233 @@ def test_a_name_that_is_no_files_is_refused(tmp_path, monkeypatch):
     with pytest.raises(UserError, match="cannot be written"):
         files.write_text("", "text")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture
+def start_run(tmp_path):
+    """Start runs that note themselves in a folder; return the process and its job's number."""
+    runs = []
+
+    def start(place="here"):
+        words = [sys.executable, "-c", RUN, tmp_path / "locks", place]
+        run = subprocess.Popen(
+            words, stdout=subprocess.PIPE, text=True, env={"PYTHONPATH": str(SCRIPTS)}
+        )
+        runs.append((run, int(run.stdout.readline())))
+        return runs[-1]
+
+    yield start
+    for run, job in runs:
+        run.kill()
+        run.wait()
+        with suppress(ProcessLookupError):
+            os.kill(job, signal.SIGKILL)
+
+
+ENTER = """
+import sys
+from pathlib import Path
+from lightfield.core import live_runs
+others = live_runs.enter(Path(sys.argv[1]), False, lambda: print("locks are removed"))
+print(*[run.pid for run in others])
+print(live_runs.refusal(others))
+"""
+
+
+def start_entering(folder):
+    """Start a process that enters a folder."""
+    return subprocess.Popen(
+        [sys.executable, "-c", ENTER, folder],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={"PYTHONPATH": str(SCRIPTS)},
+    )
+
+
+def outcome(process):
+    """Return the runs that may live, whether locks were removed, and what would be said."""
+    told, problem = process.communicate()
+    assert process.returncode == 0, problem
+    *removed, pids, refusal = told.splitlines()
+    return list(map(int, pids.split())), removed == ["locks are removed"], refusal
+
+
+def entered(folder):
+    return outcome(start_entering(folder))
+
+
+def test_a_run_that_lives_is_named_and_one_that_was_killed_leaves_nothing(start_run, tmp_path):
+    folder = tmp_path / "locks"
+    assert entered(folder)[:2] == ([], False)
+    assert not list(folder.iterdir())
+    run, job = start_run()
+    alive, removed, refusal = entered(folder)
+    assert (alive, removed) == ([run.pid], False)
+    assert f"process {run.pid}: wait for it, or end it (kill {run.pid})" in refusal
+    os.kill(job, signal.SIGKILL)
+    run.kill()
+    run.wait()
+    assert entered(folder)[:2] == ([], True)
+    assert not list(folder.iterdir())
+
+
+def test_locks_of_a_killed_run_stay_while_another_run_lives(start_run, tmp_path):
+    (run, _), (killed, job) = start_run(), start_run()
+    os.kill(job, signal.SIGKILL)
+    killed.kill()
+    killed.wait()
+    assert entered(tmp_path / "locks")[:2] == ([run.pid], False)
+
+
+@pytest.mark.parametrize(
+    ("place", "host", "advice"),
+    [
+        (
+            "here",
+            "elsewhere",
+            "on elsewhere: wait for it; where it no longer runs: snakemake",
+        ),
+        (
+            "cluster",
+            None,
+            "jobs on the cluster: wait for them or cancel them, then: snakemake",
+        ),
+    ],
+)
+def test_what_may_live_elsewhere_keeps_its_locks(place, host, advice, start_run, tmp_path):
+    run, job = start_run(place)
+    os.kill(job, signal.SIGKILL)
+    run.kill()
+    run.wait()
+    (note,) = (tmp_path / "locks").iterdir()
+    if host:
+        note.rename(note.with_name(note.name.replace(socket.gethostname(), host)))
+    alive, removed, refusal = entered(tmp_path / "locks")
+    assert (alive, removed) == ([run.pid], False)
+    assert advice in refusal
+
+
+def test_jobs_that_outlive_their_run_are_waited_for(start_run, tmp_path):
+    run, job = start_run()
+    run.kill()
+    run.wait()
+    entering = start_entering(tmp_path / "locks")
+    told = entering.stderr.readline()
+    assert told.startswith(f"waiting for jobs that a killed run has left, processes {job} (kill")
+    os.kill(job, signal.SIGKILL)
+    assert outcome(entering)[:2] == ([], True)
+
+
+def test_a_folder_without_locks_of_files_is_left_to_snakemake(tmp_path, monkeypatch, capsys):
+    def flock(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(live_runs.fcntl, "flock", flock)
+    folder = tmp_path / "locks"
+    folder.mkdir()
+    (folder / f"7.0123abcd@{socket.gethostname()}.here").touch()
+    others = live_runs.enter(folder, False, lambda: pytest.fail("removed the locks"))
+    assert others == []
+    assert len(list(folder.iterdir())) == 1
+
+
+@pytest.fixture(params=["checkout", "own folder"])
+def building(request, tmp_path):
+    """A folder in which a run waits for its job to be let go, and the run's process."""
+    folder, words = checkout(tmp_path / "checkout", one=ONE), BUILD
+    (folder / "scripts/build_scene.py").write_text(WAITING)
+    if request.param == "own folder":
+        own = tmp_path / "own"
+        (own / "configs").mkdir(parents=True)
+        (folder / "configs/scenes").rename(own / "configs/scenes")
+        shutil.copytree(own / "configs/scenes", folder / "configs/scenes")
+        words = ("--snakefile", folder / "Snakefile", "--directory", own, *BUILD)
+        folder = own
+    else:
+        words = ("--directory", folder, *BUILD)
+    process = start_snakemake(tmp_path / "checkout", *words, stderr=subprocess.PIPE, text=True)
+    wait_until((folder / "started").exists, process)
+
+    def run(*more, target=None):
+        given = (*words[:-1], target) if target else words
+        return snakemake(tmp_path / "checkout", *more, *given)
+
+    yield folder, process, run
+    (folder / "go").touch()
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def last_line(run):
+    return (run.stdout + run.stderr).splitlines()[-1]
+
+
+@pytest.mark.slow
+def test_a_second_live_build_is_refused_whatever_else_looks_at_the_folder(building):
+    folder, process, run = building
+    refusal = f"error: another run makes these files, process {process.pid}: wait for it, or end"
+    second = run()
+    assert second.returncode != 0
+    assert last_line(second).startswith(refusal)
+    assert "Traceback" not in second.stdout + second.stderr
+    assert "locked" not in (dry := run("--dry-run")).stderr and dry.returncode == 0
+    # What makes no files leaves the build its locks when it ends.
+    for options in ((), ("--nolock",)):
+        status = run(*options, target="status")
+        assert status.returncode == 0, status.stderr
+    assert last_line(run()).startswith(refusal)
+    (folder / "go").touch()
+    assert process.wait() == 0
+    assert run().returncode == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("with_its_jobs", [True, False])
+def test_after_a_kill_the_next_run_goes_on_by_itself(with_its_jobs, building):
+    folder, process, run = building
+    if with_its_jobs:
+        os.killpg(process.pid, signal.SIGKILL)
+        (folder / "go").touch()
+    else:
+        process.kill()
+        threading.Timer(10, (folder / "go").touch).start()
+    process.wait()
+    following = run()
+    assert following.returncode == 0, following.stderr
+    assert ("waiting for jobs that a killed run has left" in following.stderr) != with_its_jobs
+    assert (folder / "work/one/scene.blend").read_text() == "a scene"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("building", ["checkout"], indirect=True)
+def test_a_run_that_is_stopped_says_so_and_the_next_one_goes_on(building):
+    folder, process, run = building
+    process.terminate()
+    said = process.stderr.readline()
+    while "stopping after SIGTERM" not in said:
+        said = process.stderr.readline()
+        assert said, "it ended without a word"
+    (folder / "go").touch()
+    *_, last = process.stderr.read().splitlines()
+    assert process.wait() != 0
+    assert last.startswith("error: the run was stopped") and last.endswith("goes on")
+    assert (folder / "work/one/scene.blend").read_text() == "a scene"
+    assert run().returncode == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("building", ["checkout"], indirect=True)
+def test_the_locks_of_another_machine_are_left_to_the_user(building):
+    folder, process, run = building
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    (folder / "go").touch()
+    (note,) = (folder / ".snakemake/locks").glob("*.here")
+    note.rename(note.with_name(note.name.replace(socket.gethostname(), "elsewhere")))
+    refused = run()
+    assert refused.returncode != 0
+    assert last_line(refused).endswith("where it no longer runs: snakemake --unlock")
+    assert run("--unlock").returncode == 0
+    assert run().returncode == 0

@@ -864,7 +864,7 @@ def test_of_a_scene_with_volumes_the_misses_are_counted(
         many = validate(small_dataset, inventory=tmp_path / "inventory.json")
         assert check(many, "depth").warnings[0].endswith(end)
     write_json(tmp_path / "inventory.json", [])
-    with pytest.raises(UserError, match=r"inventory\.json: volumes: must be a list of names"):
+    with pytest.raises(UserError, match=r"inventory\.json: volumes: is missing"):
         validate(small_dataset, inventory=tmp_path / "inventory.json")
     write_json(tmp_path / "inventory.json", {"volumes": []})
     clear = validate(small_dataset, inventory=tmp_path / "inventory.json")

@@ -5,6 +5,7 @@ import hashlib
 import json
 import os
 import shutil
+import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -242,6 +243,25 @@ def read_keys(path: Path | str, program: str, *keys: str) -> dict[str, Any]:
             raise UserError(f"{path}: {key}: is missing; scripts/{program} writes it")
     found: dict[str, Any] = content
     return found
+
+
+# The exceptions that the content of a damaged file may raise in the program that uses it.
+DAMAGE = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError)
+
+
+@contextmanager
+def reading(place: Path | str, kind: str) -> Iterator[None]:
+    """Raise a `UserError` where a file, or a place in one, cannot be read as its ``kind``."""
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"{place}: cannot be read: {read_problem(error)}") from None
+    except KeyError as error:
+        raise UserError(f"{place}: {error.args[0]}: is missing") from None
+    except DAMAGE as error:
+        raise UserError(f"{place}: is no {kind}: {error}") from None
+    except struct.error:
+        raise UserError(f"{place}: is no {kind}: it is cut short") from None
 
 
 def read_json(path: Path | str) -> Any:

@@ -130,17 +130,22 @@ def _first(errors: list[ErrorDetails], content: Any) -> str:
             name = context["discriminator"] if "discriminator" in context else error["loc"][-1]
             return f"{prefix}is missing the key {str(name).strip(chr(39))}"
         case "union_tag_invalid":
-            kind = ".".join(filter(None, [key, context["discriminator"].strip("'")]))
+            name = context["discriminator"].strip("'")
+            kind = ".".join(filter(None, [key, name]))
             known = context["expected_tags"].replace("'", "")
-            return f'{kind}: is "{context["tag"]}"; must be one of {known}'
+            return f"{kind}: is {_shown(value[name])}; must be one of {known}"
     if error["loc"][-1:] == ("[key]",):
         # Not of the path: rigs that are somebody else's folders are not in the content.
         *above, name, _ = error["loc"]
         return f"{'.'.join(map(str, above))}: {name!r} is no name; must {_allowed(error)}"
-    text = json.dumps(value, default=str)
-    text = text if len(text) <= 60 else f"{text[:57]}..."
     allowed = dict.fromkeys(_allowed(error) for _, error in same)
-    return f"{prefix}is {text}; must {' or '.join(allowed).replace(' or be ', ' or ')}"
+    return f"{prefix}is {_shown(value)}; must {' or '.join(allowed).replace(' or be ', ' or ')}"
+
+
+def _shown(value: Any) -> str:
+    """Return a value as JSON, shortened where it is long."""
+    text = json.dumps(value, default=str)
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _find(error: ErrorDetails, content: Any) -> tuple[tuple[int | str, ...], Any]:
@@ -162,6 +167,8 @@ def _allowed(error: ErrorDetails) -> str:
     match error["type"]:
         case "value_error":
             return str(error["ctx"]["error"]).removeprefix("must ")
+        case "missing":
+            return f"have the key {error['loc'][-1]}"
         case "model_type" | "model_attributes_type" | "dict_type":
             return "be a mapping of keys to values"
         case "int_type" | "int_from_float":
@@ -184,6 +191,6 @@ def _allowed(error: ErrorDetails) -> str:
             bound = error["ctx"][name]
             if isinstance(bound, int):
                 return f"be a whole number {words} {bound}"
-            return f"be a number {words} {bound:g}"
+            return f"be a number {words} {bound:.10g}"
     text = re.sub(r"^\w+ should ", "", error["msg"])
     return re.sub(r" after validation, not .*", "", text)

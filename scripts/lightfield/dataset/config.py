@@ -160,7 +160,7 @@ class Configuration(Settings):
             ),
         ],
         Preset,
-    ]
+    ] = Field(min_length=1)
     results: Folder = Field("results", description="Folder of the datasets.")
     work: Folder = Field(
         "work",
@@ -529,7 +529,7 @@ def _bracketed(reprojections: dict[str, Reprojection]) -> dict[str, Reprojection
         for stops in reprojection.exposure:
             key = f"{name}_ev{stops:g}"
             if key in found or key in reprojections:
-                raise ValueError(f"must not name {key} twice")
+                raise ValueError(f"{name}.exposure: must not name {key} twice")
             found[key] = reprojection.model_copy(update={"exposure": stops})
     return found
 
@@ -867,7 +867,7 @@ class _UniqueKeyLoader(yaml.SafeLoader):
 
 
 # YAML 1.1 takes 12:30 for 750, 0123 for 83 and 0b11 for 3. Here they stay the texts that they look
-# like, which messages show as they were written.
+# like, which messages show as they were written. It takes 1e-3 for a text; here it is a number.
 _UniqueKeyLoader.yaml_implicit_resolvers = {
     first: [(tag, form) for tag, form in resolvers if not tag.endswith((":int", ":float"))]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
@@ -881,6 +881,7 @@ _UniqueKeyLoader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
     re.compile(
         r"[-+]?(?:[0-9][0-9_]*\.[0-9_]*|\.[0-9][0-9_]*)(?:[eE][-+][0-9]+)?$"
+        r"|[-+]?[0-9]+[eE][-+]?[0-9]+$"
         r"|[-+]?\.(?:inf|Inf|INF)$|\.(?:nan|NaN|NAN)$"
     ),
     list("-+0123456789."),

@@ -12,7 +12,7 @@ from statistics import fmean
 from typing import Any, Literal, Self
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys, unreadable
+from lightfield.core.files import DAMAGE, reading, unreadable
 from lightfield.dataset import (
     blend,
     config,
@@ -32,6 +32,7 @@ from lightfield.dataset.config import (
     TargetError,
 )
 from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
+from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.keys import scene_fingerprint
 from lightfield.dataset.lightfield import OMNIDIRECTIONAL
 from lightfield.dataset.splits import SPLITS
@@ -115,28 +116,29 @@ class Dataset:
         """
         if not self.source.blend:
             return self
-        found = read_keys(inventory, "inventory.py", "blend", "external_files")
-        said = found["blend"]
-        frame = int(said["frame"] if self.source.frame == FILE else self.source.frame)
-        render, rig = dict(self.render), self.rig
-        if render.get("samples") == FILE:
-            most = render.pop("most_samples", said["samples"])
-            render["samples"] = min(said["samples"], most)
-        if render.get("depth_of_field"):
-            blend.camera_of(said)
-        if isinstance(rig, BlendCamera):
-            blend.camera_of(said)
-            rig = rig.placed(inventory, frame)
-        if rig.camera.lens == FILE:
-            camera = blend.lens_of(said, rig.camera.resolution)
-            rig = rig.model_copy(update={"camera": camera})
-        return replace(
-            self,
-            source=self.source.model_copy(update={"frame": frame}),
-            render=render,
-            rig=rig,
-            external_files=[(file["path"], file["sha256"]) for file in found["external_files"]],
-        )
+        found = read_inventory(inventory, "blend", "external_files")
+        with reading(inventory, "inventory"):
+            said = found["blend"]
+            frame = int(said["frame"] if self.source.frame == FILE else self.source.frame)
+            render, rig = dict(self.render), self.rig
+            if render.get("samples") == FILE:
+                most = render.pop("most_samples", said["samples"])
+                render["samples"] = min(said["samples"], most)
+            if render.get("depth_of_field"):
+                blend.camera_of(said)
+            if isinstance(rig, BlendCamera):
+                blend.camera_of(said)
+                rig = rig.placed(inventory, frame)
+            if rig.camera.lens == FILE:
+                camera = blend.lens_of(said, rig.camera.resolution)
+                rig = rig.model_copy(update={"camera": camera})
+            return replace(
+                self,
+                source=self.source.model_copy(update={"frame": frame}),
+                render=render,
+                rig=rig,
+                external_files=[(file["path"], file["sha256"]) for file in found["external_files"]],
+            )
 
     @property
     def scene_folder(self) -> str:
@@ -467,7 +469,7 @@ class Dataset:
             )
         except FileNotFoundError:
             return False
-        except (OSError, ValueError, LookupError, TypeError):
+        except (OSError, *DAMAGE):
             return True
 
     # What it will take.
@@ -498,7 +500,7 @@ class Dataset:
             return self.planned_samples
         try:
             return float(json.loads(Path(self.calibration).read_bytes())["cost_samples"])
-        except (OSError, ValueError, LookupError, TypeError):
+        except (OSError, *DAMAGE):
             # Not there yet, or broken, and then it is made anew.
             return self.planned_samples
 
@@ -515,8 +517,9 @@ class Dataset:
             probe = json.loads(next(found).read_bytes())
             now = [list(self.rig.camera.resolution), self.render.get("samples", probe["samples"])]
             if probe["device"] == "CPU" and now == [probe["resolution"], probe["samples"]]:
-                return fmean(probe["view_seconds"]), fmean(probe["view_bytes"])
-        except (OSError, ValueError, LookupError, TypeError, StopIteration):
+                seconds, size = fmean(probe["view_seconds"]), fmean(probe["view_bytes"])
+                return (seconds, size) if 0 < seconds < 1e9 and 0 < size < 1e12 else None
+        except (OSError, StopIteration, *DAMAGE):
             pass
         return None
 
@@ -615,7 +618,7 @@ def _scene_memory(inventory: Path, _changed: int) -> int:
     """Return what a scene's inventory says that it takes, and a fifth more."""
     try:
         return int(1.2 * json.loads(inventory.read_bytes())["memory_bytes"])
-    except (OSError, ValueError, LookupError, TypeError):
+    except (OSError, *DAMAGE):
         return memory.UNKNOWN_SCENE
 
 
@@ -795,10 +798,15 @@ def check_external_files(dataset: Dataset) -> None:
     try:
         listed = json.loads(Path(str(dataset.inventory)).read_bytes())["external_files"]
         home = Path(source.blend).parent
-        paths = [Path(os.path.normpath(home / file["path"])) for file in listed]
-    except (OSError, ValueError, LookupError, TypeError):
+        paths = [
+            Path(os.path.normpath(home / file["path"]))
+            for file in listed
+            if file["bytes"] is not None
+        ]
+    except (OSError, *DAMAGE):
         return
-    missing = [str(path) for path in paths if not path.exists()]
+    # Path.exists() raises for a path that is too long; os.path.exists() does not.
+    missing = [str(path) for path in paths if not os.path.exists(path)]  # noqa: PTH110
     if missing:
         more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
         raise UserError(

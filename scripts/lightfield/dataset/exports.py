@@ -103,6 +103,10 @@ class InstantNgp(Export):
             raise ValueError("bounds: goes without scale, which it would find")
         if self.scale is None and "offset" in self.model_fields_set:
             raise ValueError("offset: goes with scale; without it both are fitted")
+        if self.render_aabb:
+            lowest, highest = self.render_aabb
+            if any(low >= high for low, high in zip(lowest, highest, strict=True)):
+                raise ValueError("render_aabb: must have the corner of smaller numbers first")
         return self
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:

@@ -24,7 +24,15 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, broken, read_problem, sha256, unreadable, writing
+from lightfield.core.files import (
+    DAMAGE,
+    atomic_path,
+    broken,
+    read_problem,
+    sha256,
+    unreadable,
+    writing,
+)
 
 NAME = "ledger.txt"
 # The ledger is written anew when more than this part of its lines counts no more.
@@ -261,17 +269,31 @@ def _parse(line: bytes) -> Job | None:
     digest, _, text = line.partition(b" ")
     if digest.decode(errors="replace") != hashlib.sha256(text).hexdigest():
         return None
-    content = json.loads(text)
-    return Job(
-        content["outputs"],
-        _stamps(content["files"]),
-        _stamps(content["history"]),
-        _stamps(content["inputs"]),
-    )
+    try:
+        content = json.loads(text)
+        return Job(
+            [_checked(name, str) for name in _checked(content["outputs"], list)],
+            _stamps(content["files"]),
+            _stamps(content["history"]),
+            _stamps(content["inputs"]),
+        )
+    except DAMAGE:
+        return None
 
 
 def _stamps(entries: Mapping[str, Any]) -> dict[str, Stamp]:
-    return {name: Stamp(*entry) for name, entry in entries.items()}
+    return {name: _stamp(*entry) for name, entry in entries.items()}
+
+
+def _stamp(digest: Any, *numbers: Any) -> Stamp:
+    return Stamp(_checked(digest, str), *(_checked(number, int) for number in numbers))
+
+
+def _checked(value: Any, kind: type) -> Any:
+    """Return a value of a kind; raises TypeError for any other."""
+    if not isinstance(value, kind):
+        raise TypeError(f"is no {kind.__name__}")
+    return value
 
 
 def _line(job: Job) -> bytes:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
+from lightfield.core.settings import FARTHEST
 from lightfield.dataset import passes
 from lightfield.dataset.passes import PASSES, Pass
 from lightfield.geometry import lenses, rotations
@@ -310,7 +311,14 @@ def _numbers(where: str, value: Any, shape: tuple[int, ...]) -> Floats:
         array = np.array(value)
     except ValueError:  # rows of different lengths
         array = np.empty(0)
-    if array.shape != shape or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+    # NaN fails the comparison, too.
+    if (
+        array.shape != shape
+        or array.dtype.kind not in "iuf"
+        or not (np.abs(array.astype(np.float64)) <= FARTHEST).all()
+    ):
         size = " × ".join(map(str, shape))
-        raise UserError(f"{where}: must be {size} finite numbers")
+        raise UserError(
+            f"{where}: must be {size} finite numbers, from -{FARTHEST:g} to {FARTHEST:g}"
+        )
     return array.astype(np.float64)

@@ -9,7 +9,7 @@ Where machines see no common folder, the view store takes the log's place.
 """
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -108,7 +108,7 @@ class ShardRecord:
         """The last line of the log on each file."""
         assert self._path
         log = _log(self._path)
-        return {line.get("file"): line for line in read_json_lines(log)} if log.exists() else {}
+        return {line["file"]: line for line in _lines(log)} if log.exists() else {}
 
     @cached_property
     def _logged_here(self) -> set[tuple[Any, Any, Any]]:
@@ -142,11 +142,14 @@ def _log(record: Path) -> Path:
 
 def _entries(logs: Iterable[Path]) -> set[tuple[Any, Any, Any]]:
     """Return file, key and SHA-256 of every line of the logs."""
-    return {
-        (entry.get("file"), entry.get("key"), entry.get("sha256"))
-        for log in logs
-        for entry in read_json_lines(log)
-    }
+    return {(line["file"], line["key"], line["sha256"]) for log in logs for line in _lines(log)}
+
+
+def _lines(log: Path) -> Iterator[dict[str, Any]]:
+    """Yield the complete lines of a log. A damaged line does not count."""
+    for line in read_json_lines(log):
+        if all(isinstance(line.get(key), str) for key in ("file", "key", "sha256")):
+            yield line
 
 
 def _sums(file: Path) -> dict[str, Any]:

@@ -5,6 +5,8 @@ import os
 from pathlib import Path
 from stat import S_ISREG
 
+from lightfield.core.files import DAMAGE
+
 # Of a shard's files beside its record, which have its name: what its processes did, and the
 # checksum of each view from the moment it was finished.
 JOURNAL_SUFFIX, LOG_SUFFIX = ".journal.jsonl", ".sums.jsonl"
@@ -21,7 +23,7 @@ def recorded(record: Path, folder: str) -> dict[str, int] | None:
         sizes: dict[str, int] = {name: entry["bytes"] for name, entry in files.items()}
     except FileNotFoundError:
         raise
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+    except (OSError, *DAMAGE):
         return None
     try:
         for name, size in sizes.items():

@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from statistics import fmean
 from typing import Any
 
 from scipy.stats import linregress
 
 from lightfield.core import processors
+from lightfield.core.files import read_keys, reading
 from lightfield.measurement import metrics
 from lightfield.measurement.forecast import figure
 from lightfield.measurement.sampling import DENOISED, TRACED, standard_error
@@ -21,6 +23,22 @@ PROBED = ("views", "resolution", "samples", "device", "view_seconds", "view_byte
 TARGET_ERROR = 0.01
 # Times as long as plain path tracing.
 OUT_OF_REACH = 1e4
+
+
+def read_probe(path: Path | str) -> dict[str, Any]:
+    """Return what scripts/probe.py has measured. Raises `UserError` if the file is damaged."""
+    probe = read_keys(path, "probe.py", *PROBED)
+    with reading(path, "probe"):
+        width, height = probe["resolution"]
+        numbers = [*probe["view_seconds"], *probe["view_bytes"]]
+        counts = [probe["views"], probe["samples"], width, height]
+        if not all(0 <= number < 1e18 for number in [*numbers, *counts]):
+            raise ValueError("a number is below 0, or far too large")
+        if not all(isinstance(count, int) and count < 2**31 for count in counts):
+            raise ValueError("a count is no whole number")
+        if not (probe["view_seconds"] and probe["view_bytes"]):
+            raise ValueError("no view was measured")
+    return probe
 
 
 def table(datasets: list[tuple[str, int, dict[str, Any]]], advice: Mapping[str, Any]) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lightfield.core.files import read_keys
+from lightfield.core.files import read_keys, reading
 
 # What a `render` block with a target error says of its calibration, and not of rendering: the
 # target, and a preset's limits.
@@ -46,7 +46,9 @@ def calibrated(render: Mapping[str, Any], path: Path) -> dict[str, Any]:
     Raises `UserError` where the file at ``path`` is no such choice.
     """
     record = read_keys(path, "calibrate.py", "target_error", "choice")
-    return {**without_target(render), "target_error": record["target_error"], **record["choice"]}
+    with reading(path, "calibration"):
+        target = {"target_error": record["target_error"]}
+        return {**without_target(render), **target, **record["choice"]}
 
 
 def without_target(render: Mapping[str, Any]) -> dict[str, Any]:

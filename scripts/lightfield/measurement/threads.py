@@ -9,11 +9,11 @@ from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_MEMORY
-from lightfield.core.files import read_keys
 from lightfield.core.leftovers import temporary_folder
 from lightfield.core.memory import available
 from lightfield.core.progress import Progress
 from lightfield.dataset import memory
+from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.lightfield import LightField
 from lightfield.rendering import probe
 
@@ -37,7 +37,7 @@ def tried(
     render = {**lightfield.render, "samples": SAMPLES, "adaptive_threshold": 0}
     views = lightfield.views[:: max(1, len(lightfield.views) // VIEWS)][:VIEWS]
     probes = lightfield.changed(lens=small, views=views, render=render)
-    scene = read_keys(inventory, "inventory.py", "memory_bytes")["memory_bytes"]
+    scene = read_inventory(inventory, "memory_bytes")["memory_bytes"]
     need = memory.needed(scene, small.width * small.height, render["denoise"])
     fewest = memory.threads(cores, cores, need, available())
     counts = [n for n in range(fewest, cores + 1) if cores % n == 0]

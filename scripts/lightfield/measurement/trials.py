@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from lightfield.core import processors
 from lightfield.core.cli import positive
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys
 from lightfield.dataset import keys, passes
+from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
@@ -141,7 +141,7 @@ class Trials:
     @cached_property
     def inventory(self) -> Any:
         """What the scene contains, and how its .blend traces paths."""
-        return read_keys(self._inventory, "inventory.py", "left_out", "sampling", "volumes")
+        return read_inventory(self._inventory, "left_out", "sampling", "volumes")
 
     @property
     def has_volumes(self) -> bool:

@@ -21,10 +21,11 @@ import psutil
 from lightfield.core import leftovers, processors
 from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys, write_json
+from lightfield.core.files import write_json
 from lightfield.core.memory import available
 from lightfield.core.progress import Progress
 from lightfield.dataset import keys, memory, passes
+from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.journal import Journal, is_suspect
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.passes import Pass
@@ -85,7 +86,7 @@ def render(
     label = f"render {folder.parent}" + (f" {views}" if views != ":" else "")
     progress = Progress(len(missing), label, already=len(chosen) - len(missing))
     if missing or nameless:
-        found = read_keys(inventory, "inventory.py", "left_out") if inventory else None
+        found = read_inventory(inventory, "left_out") if inventory else None
         _refuse_what_does_not_fit(blend, found or {}, lightfield)
         threads = threads or processors.available()
         # Only now, because it takes a second and a shard that is finished does not need it.

@@ -12,12 +12,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from statistics import fmean
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, read_problem
+from lightfield.core.files import DAMAGE, atomic_path, read_problem
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.reprojection.filters import DEFAULT_FILTER, FILTERS
@@ -256,7 +257,7 @@ def load(path: Path | str) -> LensMap:
         )
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
-    except (EOFError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+    except (EOFError, SyntaxError, TokenError, *DAMAGE) as error:
         raise UserError(f"{path}: is not a lens map that can be read: {error}") from None
 
 

@@ -22,8 +22,9 @@ import OpenImageIO as oiio
 
 from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_MEMORY
-from lightfield.core.files import read_json, sha256
+from lightfield.core.files import sha256
 from lightfield.core.progress import Progress
+from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.records import read as read_record
 from lightfield.validation import (
     depth_questions,
@@ -66,7 +67,7 @@ def validate(
     wrong with the dataset is in the result.
     """
     dataset = dataset.resolve()
-    volumes = _volumes(inventory) if inventory else []
+    volumes = read_inventory(inventory, "volumes")["volumes"] if inventory else []
     sets, checks = files.read_sets(dataset, reprojections)
     views, presence = files.of_views(dataset, sets)
     passes, missing = files.of_passes(dataset, sets)
@@ -117,13 +118,6 @@ def validate(
         checks,
         digests,
     )
-
-
-def _volumes(inventory: Path) -> list[str]:
-    try:
-        return [str(name) for name in read_json(inventory)["volumes"]]
-    except (LookupError, TypeError):
-        raise UserError(f"{inventory}: volumes: must be a list of names") from None
 
 
 Mapped = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]

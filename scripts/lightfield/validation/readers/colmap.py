@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lightfield.core.files import reading
 from lightfield.validation.readers.cameras import Camera, OpenCVFisheye, Pinhole
 from lightfield.validation.readers.contents import (
     FLOAT32,
@@ -25,7 +26,6 @@ from lightfield.validation.readers.contents import (
     Part,
     from_texts,
     numbers,
-    reading,
 )
 
 Ints = NDArray[np.int64]

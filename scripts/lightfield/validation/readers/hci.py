@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.core.files import reading
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.validation.readers.cameras import Pinhole
 from lightfield.validation.readers.contents import (
@@ -22,7 +23,6 @@ from lightfield.validation.readers.contents import (
     ExportedCamera,
     ExportedView,
     number,
-    reading,
 )
 
 INFINITY = 1e9

@@ -1,0 +1,178 @@
+"""Which runs work in a folder: each leaves a note there, locked as long as its process lives.
+
+A process that is killed, and a machine that loses its power, leave the note without the lock. So
+the next run tells a run that lives from one that was killed, of which Snakemake's own locks say
+nothing. The note's name says all that is to be known: a power cut may leave its content empty.
+"""
+
+import atexit
+import fcntl
+import os
+import re
+import socket
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+# Jobs inherit it, and live on where only their run is killed.
+VARIABLE = "PLENOFORGE_RUN"
+_NAME = re.compile(r"(?P<pid>\d+)\.[0-9a-f]{8}@(?P<host>.+)\.(?P<place>here|cluster)")
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run by its note: its process, the host's name, and whether its jobs run elsewhere."""
+
+    note: Path
+    pid: int
+    host: str
+    on_cluster: bool
+
+    @property
+    def is_killed(self) -> bool:
+        """Whether it is known that the run, and with it its jobs, have ended.
+
+        Another machine's processes, and a cluster's jobs, may live.
+        """
+        return self.host == socket.gethostname() and not self.on_cluster and _is_free(self.note)
+
+    @property
+    def jobs(self) -> list[int]:
+        """The processes of its jobs on this machine."""
+        name = str(self.note.absolute())
+        return sorted(
+            process.pid
+            for process in psutil.process_iter(["environ"])
+            if (process.info["environ"] or {}).get(VARIABLE) == name and process.pid != os.getpid()
+        )
+
+
+def enter(folder: Path, on_cluster: bool, remove_locks: Callable[[], None]) -> list[Run]:
+    """Note that this run works in a folder; return the other runs there that may live.
+
+    Where all of them were killed, ``remove_locks`` removes what they left. Jobs that have outlived
+    their run are waited for. Without locks of files, as on some networks' file systems, nothing
+    is noted and nothing is removed.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    _wait_for_jobs(folder)
+    try:
+        with _guarded(folder.parent):
+            others = _runs(folder)
+            alive = [run for run in others if not run.is_killed]
+            if others and not alive:
+                remove_locks()
+            for run in others:
+                if run not in alive:
+                    run.note.unlink(missing_ok=True)
+            folder.mkdir(exist_ok=True)
+            _leave_note(folder, on_cluster)
+    except OSError as error:
+        print(f"warning: {folder}: no locks of files: {error.strerror}", file=sys.stderr)
+        return []
+    return alive
+
+
+def refusal(others: list[Run]) -> str:
+    """Return why a run cannot work on files that are locked, and what to do."""
+    if not others:
+        return (
+            "another run has locked these files and left no note of itself: wait for it; where "
+            "none runs any more: snakemake --unlock"
+        )
+    run = others[0]
+    if run.host != socket.gethostname():
+        return (
+            f"another run makes these files, process {run.pid} on {run.host}: wait for it; where "
+            "it no longer runs: snakemake --unlock"
+        )
+    if _is_free(run.note):
+        return (
+            f"a run that was killed, process {run.pid}, may have left jobs on the cluster: wait "
+            "for them or cancel them, then: snakemake --unlock"
+        )
+    return (
+        f"another run makes these files, process {run.pid}: wait for it, or end it "
+        f"(kill {run.pid}); snakemake status says how far it is"
+    )
+
+
+def _runs(folder: Path) -> list[Run]:
+    """Return the runs that have left a note, but for this one."""
+    runs = []
+    for path in sorted(folder.iterdir()):
+        if (name := _NAME.fullmatch(path.name)) and path not in _OWN:
+            runs.append(Run(path, int(name["pid"]), name["host"], name["place"] == "cluster"))
+    return runs
+
+
+# The notes of this process, with the files that hold their locks.
+_OWN: dict[Path, int] = {}
+
+
+def _leave_note(folder: Path, on_cluster: bool) -> None:
+    place = "cluster" if on_cluster else "here"
+    unique = os.urandom(4).hex()
+    note = folder / f"{os.getpid()}.{unique}@{socket.gethostname()}.{place}"
+    # For writing: NFS locks no others.
+    file = os.open(note, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(file)
+        note.unlink()
+        raise
+    _OWN[note] = file
+    os.environ[VARIABLE] = str(note.absolute())
+    atexit.register(note.absolute().unlink, missing_ok=True)
+
+
+def _is_free(note: Path) -> bool:
+    """Whether no process holds the lock of a note."""
+    try:
+        file = os.open(note, os.O_RDWR)
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return True
+    except OSError:
+        return False
+    finally:
+        os.close(file)
+
+
+def _wait_for_jobs(folder: Path) -> None:
+    """Wait for the jobs of killed runs that live on: they write the same files."""
+    told = False
+    while jobs := [pid for run in _runs(folder) if run.is_killed for pid in run.jobs]:
+        if not told:
+            numbers = " ".join(map(str, jobs))
+            print(
+                f"waiting for jobs that a killed run has left, processes {numbers} "
+                f"(kill {numbers} ends them)",
+                file=sys.stderr,
+                flush=True,
+            )
+        told = True
+        time.sleep(0.5)
+
+
+@contextmanager
+def _guarded(folder: Path) -> Iterator[None]:
+    """Let one process at a time look at the notes and leave its own."""
+    lock = os.open(folder, os.O_RDONLY)
+    try:
+        # Some networks' file systems lock no folders.
+        with suppress(OSError):
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(lock)
