@@ -32,7 +32,8 @@ def main() -> None:
 
     source = Source(arguments.dataset, "", ".exr")
     truths = [Source(folder, "", ".exr") for folder in arguments.truth or [arguments.dataset]]
-    views, held_out = source.lightfield.views, [truth.lightfield.views for truth in truths]
+    views = source.lightfield.views
+    held_out = [truth.lightfield.views for truth in truths]
     if not arguments.truth:
         views, _, tests = splits(source.lightfield)
         held_out = [tests]

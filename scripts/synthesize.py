@@ -56,14 +56,19 @@ def main() -> None:
 
     keep_apart("--output", arguments.output / NAME, arguments.dataset / NAME, arguments.poses)
     source = Source(arguments.dataset, arguments.reprojection, ".exr")
-    views, targets = source.lightfield.views, poses(arguments.poses)
+    views = source.lightfield.views
+    targets = poses(arguments.poses)
     if targets is None:
         parts = splits(source.lightfield)
-        views, targets = parts.train, source.lightfield.changed(views=parts.test)
+        views = parts.train
+        targets = source.lightfield.changed(views=parts.test)
     sources = Sources(source.lens, views, reader(source), most=4 * arguments.best)
-    lens, depth = targets.lens, targets.lens.usual_depth
+    lens = targets.lens
+    depth = targets.lens.usual_depth
     targets.changed(depth=depth).write(arguments.output / NAME)
-    rays, exposure, holes = lens.pixel_rays(), arguments.exposure, []
+    rays = lens.pixel_rays()
+    exposure = arguments.exposure
+    holes = []
     path = arguments.output / "walk.mp4"
     progress = Progress(len(targets.views), "synthesize", "views")
     size = (lens.width, lens.height)

@@ -19,7 +19,8 @@ BLENDERS = "blender_*"
 # The names of `atomic_path`.
 _ON_THE_WAY = re.compile(r"\..+\.\d+\.tmp(\.\w+)?")
 # Seconds: nobody writes one file for so long, or has a Blender with an empty folder.
-FILE_AGE, BLENDER_AGE = 3600.0, 24 * 3600.0
+FILE_AGE = 3600.0
+BLENDER_AGE = 24 * 3600.0
 # Between making a folder and taking it.
 FOLDER_AGE = 60.0
 

@@ -102,8 +102,10 @@ def check(needs: Iterable[Need]) -> Iterator[str]:
     for wanted in disks.values():
         folder = wanted[0].folder
         there = nearest_folder(folder)
-        size, files = sum(need.size for need in wanted), sum(need.files for need in wanted)
-        disk, free = os.statvfs(there), shutil.disk_usage(there).free
+        size = sum(need.size for need in wanted)
+        files = sum(need.files for need in wanted)
+        disk = os.statvfs(there)
+        free = shutil.disk_usage(there).free
         if disk.f_files and files > disk.f_favail:
             raise UserError(
                 f"{folder}: its disk takes {disk.f_favail} more files (inodes), and this run "

@@ -204,7 +204,8 @@ class Configuration(Settings):
                 raise ValueError(f"scenes: {name} is no name for a scene; no dots, and not {taken}")
         for key in ("results", "work"):
             _check_folder(key, getattr(self, key))
-        results, work = Path(self.results).resolve(), Path(self.work).resolve()
+        results = Path(self.results).resolve()
+        work = Path(self.work).resolve()
         if results == work or results in work.parents or work in results.parents:
             raise ValueError(
                 f"work: is {self.work!r}, and results is {self.results!r}; "

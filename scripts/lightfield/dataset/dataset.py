@@ -120,7 +120,8 @@ class Dataset:
         with reading(inventory, "inventory"):
             said = found["blend"]
             frame = int(said["frame"] if self.source.frame == FILE else self.source.frame)
-            render, rig = dict(self.render), self.rig
+            render = dict(self.render)
+            rig = self.rig
             if render.get("samples") == FILE:
                 most = render.pop("most_samples", said["samples"])
                 render["samples"] = min(said["samples"], most)
@@ -905,7 +906,8 @@ def _limited(camera: CameraSettings, limits: Preset) -> CameraSettings:
             (at - side / 2) * scale + size / 2
             for at, side, size in zip(camera.principal_point, camera.resolution, sizes, strict=True)
         )
-    lens, size = camera.make(), camera.sensor_size
+    lens = camera.make()
+    size = camera.sensor_size
     square = isinstance(lens, Rectilinear) and lens.has_square_pixels
     if square and isinstance(size, tuple):
         # Pixels stay square where a side is rounded.

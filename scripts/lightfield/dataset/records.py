@@ -42,7 +42,8 @@ class ShardRecord:
             self._take(file, key)
         if not file.is_file():
             return False
-        name, sums = self._name(file), _sums(file)
+        name = self._name(file)
+        sums = _sums(file)
         entry = (name, key, sums["sha256"])
         if entry not in self._logged_here and not self._is_logged_elsewhere(entry):
             return False
@@ -73,7 +74,8 @@ class ShardRecord:
         """Log a file that has just been finished; a kill before that makes it once more."""
         if self._path is None:
             return
-        name, sums = self._name(file), _sums(file)
+        name = self._name(file)
+        sums = _sums(file)
         if self._store:
             self._store.put_view(file, name, key, sums["sha256"])
         append_json_line(_log(self._path), {"file": name, "key": key, **sums})

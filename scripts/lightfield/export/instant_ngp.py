@@ -213,7 +213,8 @@ class _Writer:
         step = max(1, max(self.lens.width, self.lens.height) // BOUNDS_PIXELS)
         part = np.s_[step // 2 :: step, step // 2 :: step]
         for index in np.unique(np.linspace(0, len(views) - 1, BOUNDS_VIEWS).round().astype(int)):
-            view, distance = views[index], self.depth(views[index], "distance")[part]
+            view = views[index]
+            distance = self.depth(views[index], "distance")[part]
             points = (self.rays[part] * distance[..., None])[np.isfinite(distance)]
             yield points @ view.matrix[:3, :3].T + view.matrix[:3, 3]
 
@@ -385,7 +386,8 @@ def fitted_to_rig(cameras: Floats, axes: Floats) -> tuple[float, list[float]]:
     half = (cameras.max(axis=0) - cameras.min(axis=0)) / 2 / RIG_PART
     point = looked_at(cameras, axes)
     if point is not None:
-        center, half = point, np.abs(cameras - point).max(axis=0)
+        center = point
+        half = np.abs(cameras - point).max(axis=0)
     return fitted(center - half, center + half)
 
 
@@ -436,7 +438,9 @@ def _ftheta(lens: Lens) -> list[float]:
     across, down = _angles(lens, nodes)
     # The centre of a lens whose angle there is not 0 looks up, which no pixel beside it does.
     known = np.isfinite(across) & ((nodes > 0) | (down == 0))
-    nodes, across, down = nodes[known], across[known], down[known]
+    nodes = nodes[known]
+    across = across[known]
+    down = down[known]
     for degree in (1, 4):
         fit = Polynomial.fit(  # type: ignore[no-untyped-call, unused-ignore]
             nodes, across, degree, domain=[0, seen[-1]], window=[0, 1]

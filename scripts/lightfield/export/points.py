@@ -138,7 +138,8 @@ def _one_a_voxel(positions: Floats, voxel: float) -> NDArray[np.intp]:
 
 def _voxel_for(positions: Floats, count: int) -> float:
     """Return the side of voxels of which at most ``count`` hold points, to a percent."""
-    low, high = 0.0, float(np.max(positions.max(axis=0) - positions.min(axis=0)))
+    low = 0.0
+    high = float(np.max(positions.max(axis=0) - positions.min(axis=0)))
     while high - low > 0.01 * high:
         middle = (low + high) / 2
         if len(_one_a_voxel(positions, middle)) > count:

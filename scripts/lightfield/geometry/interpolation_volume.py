@@ -181,7 +181,8 @@ def cone_sides(lens: Lens) -> Floats | None:
     azimuths = np.unique(np.concatenate([azimuths, np.mod(corners, 2 * math.pi)]))
     if not _seen(lens, _directions(np.zeros(1), azimuths[:1])).all():
         return None
-    low, high = np.zeros_like(azimuths), np.full_like(azimuths, math.pi / 2)
+    low = np.zeros_like(azimuths)
+    high = np.full_like(azimuths, math.pi / 2)
     whole = _seen(lens, _directions(high, azimuths))
     if whole.all():
         return np.array([[0.0, 0.0, -1.0]])

@@ -234,7 +234,8 @@ def _check_png(path: Path) -> None:
     OpenImageIO reports no error of its last steps: small files may be empty, large ones cut short.
     """
     content = memoryview(path.read_bytes())
-    place, kind = 8, b""
+    place = 8
+    kind = b""
     try:
         while kind != b"IEND":
             length, kind = struct.unpack_from(">I4s", content, place)
@@ -361,7 +362,8 @@ def _attributes(spec: Any) -> dict[str, Attribute]:
     found: dict[str, Attribute] = {}
     for parameter in spec.extra_attribs:
         try:
-            name, value = parameter.name, parameter.value
+            name = parameter.name
+            value = parameter.value
         except UnicodeDecodeError:
             continue  # damaged: none of ours, which are ASCII
         if isinstance(value, str | int | float):

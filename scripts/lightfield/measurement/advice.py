@@ -149,7 +149,8 @@ class Probes:
 
     def figures(self, settings: Mapping[str, Any]) -> dict[str, list[Figures]]:
         """Return the figures of each seed's renders, by stratum and of whole views."""
-        renders, found = self.of(settings), {}
+        renders = self.of(settings)
+        found = {}
 
         def error(places: Mapping[int, metrics.Reference], seed: int, left_out: float) -> float:
             return fmean(
@@ -185,7 +186,8 @@ class Probes:
 
         A stratum is left out where renders are no worse than their references.
         """
-        changed, base = self.figures(one.settings), [self.figures(w) for w in BASES[one.of]]
+        changed = self.figures(one.settings)
+        base = [self.figures(w) for w in BASES[one.of]]
         apart = self._apart(one)
         found = {}
         for stratum, figures in changed.items():
@@ -206,7 +208,8 @@ class Probes:
 
     def _apart(self, one: Try) -> dict[str, dict[str, float]]:
         """Return bias, noise and light of a change, as `Saving` has them."""
-        changed, unchanged = self.of(one.settings), self.of(BASES[one.of][1])
+        changed = self.of(one.settings)
+        unchanged = self.of(BASES[one.of][1])
         found = {}
         for stratum, places in self.parts.items():
             biases, noises, lights = [], [], []

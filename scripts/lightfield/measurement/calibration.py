@@ -76,7 +76,9 @@ class Bench:
         target: float,
         exposure: float | None = None,
     ) -> None:
-        self.maker, self.windows, self.seed = maker, windows, seed
+        self.maker = maker
+        self.windows = windows
+        self.seed = seed
         self.seeds = FEWEST_SEEDS
         while True:
             self.references = metrics.exposed_alike(self._references(), exposure)
@@ -126,7 +128,9 @@ class Search:
     def __init__(
         self, bench: Bench, target: float, most: int | None = None, denoise: bool | None = None
     ) -> None:
-        self.bench, self.target, self.denoise = bench, target, denoise
+        self.bench = bench
+        self.target = target
+        self.denoise = denoise
         self.limit = math.inf if most is None else most
         self.measured = [self._measure("plain", {"samples": n}) for n in PLAIN_SAMPLES]
         self._needed = self.plain_samples(target)
@@ -218,7 +222,8 @@ class Search:
             if len(points) > 1 and now.samples == points[-2][1].samples:
                 break
             if len(points) > 2:
-                before, doublings = points[-2][1].error, 0.0
+                before = points[-2][1].error
+                doublings = 0.0
                 if before <= now.error:
                     doublings = math.inf
                 elif now.error > self.target:

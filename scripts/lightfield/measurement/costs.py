@@ -59,7 +59,8 @@ from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 from lightfield.measurement.sampling import DENOISING_SAMPLES, cost_in_samples, standard_error
 
 # The stages that every dataset has, in the order of the work; others come between.
-FIRST_STAGES, LAST_STAGES = ("scene", "cameras", "render"), ("export", "validate", "report")
+FIRST_STAGES = ("scene", "cameras", "render")
+LAST_STAGES = ("export", "validate", "report")
 # What a stage made, where that is not the folder of its name.
 MADE = {
     "cameras": ("lightfield.json",),

@@ -30,8 +30,12 @@ from lightfield.measurement.sampling import standard_error
 from lightfield.measurement.summaries import strata_table
 from lightfield.measurement.trials import Trial, Trials, Window, both_see, nearest_view
 
-PLAIN, ADAPTIVE, DENOISED = "plain", "adaptive", "denoised"
-BOTH, GUIDED, OWN = "adaptive + denoised", "path guiding", "this scene's settings"
+PLAIN = "plain"
+ADAPTIVE = "adaptive"
+DENOISED = "denoised"
+BOTH = "adaptive + denoised"
+GUIDED = "path guiding"
+OWN = "this scene's settings"
 
 # Above 0.2, the fewest samples that adaptive sampling takes decide.
 THRESHOLDS = (0.2, 0.1, 0.05, 0.02, 0.01)
@@ -298,7 +302,8 @@ def evaluated(points: Sequence[Point], own: float) -> dict[str, Any]:
         method: fitted([point for point in seen if point.method == method])
         for method in dict.fromkeys(point.method for point in points)
     }
-    plain, saved = lines[PLAIN], []
+    plain = lines[PLAIN]
+    saved = []
     if plain:
         saved = [
             {

@@ -207,7 +207,8 @@ def regions(source: Source, view: View, counted: Bools, depth: Floats | None) ->
     angle; with ``depth``, as the dataset has it, ``edges`` are where the distance jumps, and
     ``background`` is where nothing was hit.
     """
-    valid, rays = source.valid(view), source.lens.pixel_rays()
+    valid = source.valid(view)
+    rays = source.lens.pixel_rays()
     every = counted & valid
     angle = np.arccos(np.clip(-rays[..., 2], -1, 1))
     inner = angle < np.nanmax(angle) / 2
@@ -233,7 +234,8 @@ def errors(
     "all" is black to both pictures.
     """
     every = parts["all"][..., np.newaxis]
-    one, other = np.where(every, true.colour, 0), np.where(every, shown.colour, 0)
+    one = np.where(every, true.colour, 0)
+    other = np.where(every, shown.colour, 0)
     squares = ((one - other) ** 2).mean(axis=-1)
     similarity = metrics.ssim_map(one, other)
     flip = metrics.flip_map(one, other)

@@ -19,7 +19,9 @@ from lightfield.measurement.sampling import (
 
 # Measured in the courtyard: how many renders a calibration's search makes of each window, how many
 # of the samples that the target needs, and what a render of a window takes beside its samples.
-SEARCH_RENDERS, SEARCH_PART, WINDOW_SECONDS = 9, 2.5, 0.07
+SEARCH_RENDERS = 9
+SEARCH_PART = 2.5
+WINDOW_SECONDS = 0.07
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,8 @@ def calibration_seconds(target: float, size: int, most: int | None = None) -> fl
     Path tracing of N samples a pixel has an error of about 1 / N (0.4 / N in the courtyard, 1.4 / N
     in the barbershop, 2.6 / N in the garden), and a preset may allow no more than ``most`` samples.
     """
-    needed, seeds = 1 / target, FEWEST_SEEDS
+    needed = 1 / target
+    seeds = FEWEST_SEEDS
     while seeds < MOST_SEEDS and seeds * REFERENCE_SAMPLES * REFERENCE_PART < needed:
         seeds *= 2
     # References for the windows and for those held out, plain path tracing, and what else is tried.

@@ -102,7 +102,8 @@ def make_reference(
     stack = np.stack(colours).astype(np.float64)
     with np.errstate(invalid="ignore"):
         depth = np.median(np.stack(depths), axis=0).astype(np.float64) if depths else None
-    mean, variance = stack.mean(axis=0), stack.var(axis=0, ddof=1) / len(stack)
+    mean = stack.mean(axis=0)
+    variance = stack.var(axis=0, ddof=1) / len(stack)
     return Reference(mean, variance, depth, mask, exposure_for(mean[mask]))
 
 
@@ -312,7 +313,9 @@ def pareto(cost: Sequence[float], error: Sequence[float], same_cost: float = 0.0
     In order of their costs; the first of those that are the same. Costs are as good where they
     differ by the part ``same_cost``, errors by a millionth.
     """
-    costs, errors, order = np.array(cost), np.array(error), np.arange(len(cost))
+    costs = np.array(cost)
+    errors = np.array(error)
+    order = np.arange(len(cost))
     own_cost, own_error = costs[:, np.newaxis], errors[:, np.newaxis]
     better = errors < own_error * (1 - 1e-6), costs < own_cost * (1 - same_cost)
     as_good = errors <= own_error * (1 + 1e-6), costs <= own_cost * (1 + same_cost)

@@ -47,7 +47,10 @@ def table(datasets: list[tuple[str, int, dict[str, Any]]], advice: Mapping[str, 
     ``advice`` is what `lightfield.measurement.advice` has found of datasets, by their names.
     """
     lines = ["# What it will take", "", HEAD, "| --- " + "| ---: " * (HEAD.count("|") - 2) + "|"]
-    total_views, total_hours, total_bytes, variance = 0, 0.0, 0.0, 0.0
+    total_views = 0
+    total_hours = 0.0
+    total_bytes = 0.0
+    variance = 0.0
     cheaper: list[list[float | None]] = []
     for name, frames, probe in datasets:
         views = probe["views"] * frames

@@ -29,7 +29,10 @@ OF_VOLUME = 0.25
 NONE = -1
 
 # The pilot: views, pixels of their longer side, samples of a pixel, renders of each.
-VIEWS, SIZE, SAMPLES, SEEDS = 8, 96, 4, 2
+VIEWS = 8
+SIZE = 96
+SAMPLES = 4
+SEEDS = 2
 # A stratum has at least this part of the pilot's pixels, and of all pixels measured so many.
 SMALLEST_AREA, FEWEST_PIXELS = 0.0005, 64
 

@@ -40,7 +40,8 @@ class Variant:
 
 def variants(source: Source, views: Sequence[View]) -> Iterator[Variant]:
     """Yield the variants and controls of the ``views`` of a dataset, the plain one first."""
-    lens, read = source.lens, reader(source)
+    lens = source.lens
+    read = reader(source)
     sizes = {view.name: source.path(view).stat().st_size for view in views}
     size = sum(sizes.values())
     whole = Sources(lens, views, read)
@@ -126,7 +127,8 @@ def compare(
         made = variant.sources.synthesise(view.matrix, truth.lens, variant.best)
         true = images.read_image(truth.path(view), "RGB").colour
         one, other = (_developed(colour, exposure, inside) for colour in (true, made.colour))
-        errors, similar = (one - other) ** 2, metrics.ssim_map(one, other)
+        errors = (one - other) ** 2
+        similar = metrics.ssim_map(one, other)
         flips = metrics.flip_map(one, other)
         for region, pixels in regions(truth, view, inside).items():
             yield {

@@ -112,7 +112,9 @@ class Trials:
             render["passes"] = [*passes.PARTS_OF_LIGHT, "material"]
         self.lightfield = lightfield.changed(render=render)
         self._blend, self._inventory = blend, inventory
-        self._device, self._threads, self._cache = device, threads, cache
+        self._device = device
+        self._threads = threads
+        self._cache = cache
         self._started = False
 
     @classmethod
@@ -213,10 +215,8 @@ class Trials:
                 # Roberts' R2 sequence, which fills a square evenly.
                 point += 1
                 across, down = (point * step % 1 for step in R2)
-                x, y = (
-                    round(across * (self.lens.width - size)),
-                    round(down * (self.lens.height - size)),
-                )
+                x = round(across * (self.lens.width - size))
+                y = round(down * (self.lens.height - size))
                 window = Window(view, x, y, size, size)
                 tried.append((float(self.mask(window).mean()), window))
             found.append(max(tried, key=lambda one: one[0])[1])

@@ -15,8 +15,11 @@ def facts(frames: Iterable[int | None]) -> dict[str, Any]:
     Raises `UserError` where the camera has not the same lens at all of them.
     """
     scene = bpy.context.scene
-    layer, render, cycles = view_layer(scene), scene.render, scene.cycles
-    view, frame = scene.view_settings, scene.frame_current
+    layer = view_layer(scene)
+    render = scene.render
+    cycles = scene.cycles
+    view = scene.view_settings
+    frame = scene.frame_current
     nodes = scene.compositing_node_group
     camera = _camera([frame if number is None else number for number in frames] or [frame])
     scene.frame_set(frame)
@@ -66,7 +69,10 @@ def _camera(frames: list[int]) -> dict[str, Any] | None:
     None where the scene has no camera. A marker may change the camera with the frame.
     """
     scene = bpy.context.scene
-    lenses, matrices, names, clips = [], {}, [], []
+    lenses = []
+    matrices = {}
+    names = []
+    clips = []
     for frame in sorted(set(frames)):
         scene.frame_set(frame)
         if scene.camera is None:

@@ -182,9 +182,12 @@ def set_window(x: int, y: int, width: int, height: int) -> None:
     """Let every view that follows consist of these pixels alone, (0, 0) being the top left one."""
     render = bpy.context.scene.render
     render.use_border = render.use_crop_to_border = True
-    across, down = render.resolution_x, render.resolution_y
-    render.border_min_x, render.border_max_x = x / across, (x + width) / across
-    render.border_min_y, render.border_max_y = 1 - (y + height) / down, 1 - y / down
+    across = render.resolution_x
+    down = render.resolution_y
+    render.border_min_x = x / across
+    render.border_max_x = (x + width) / across
+    render.border_min_y = 1 - (y + height) / down
+    render.border_max_y = 1 - y / down
 
 
 def gpu(device: str) -> str | None:
@@ -272,7 +275,8 @@ def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
         side = width if sensor_width >= sensor_height else height
         across, up = (side, side) if intrinsics["type"] == "PERSP" else (width, height)
         x, y = intrinsics["principal_point"]
-        camera.shift_x, camera.shift_y = (width / 2 - x) / across, (y - height / 2) / up
+        camera.shift_x = (width / 2 - x) / across
+        camera.shift_y = (y - height / 2) / up
     # Cycles clips a perspective view between these; nothing of a scene shall be cut away.
     camera.clip_start, camera.clip_end = 1e-4, 1e9
     if intrinsics["type"] == "PERSP":
@@ -290,11 +294,14 @@ def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
 
 def _set_eyes(scene: Any, distance: float) -> None:
     """Let the camera be a pair of eyes that go round its place, metres apart."""
-    scene.render.use_multiview, scene.render.views_format = True, "STEREO_3D"
+    scene.render.use_multiview = True
+    scene.render.views_format = "STEREO_3D"
     scene.render.views["right"].use = False
     eyes = scene.camera.data.stereo
     eyes.use_spherical_stereo, eyes.use_pole_merge = True, False
-    eyes.interocular_distance, eyes.convergence_mode, eyes.pivot = distance, "PARALLEL", "CENTER"
+    eyes.interocular_distance = distance
+    eyes.convergence_mode = "PARALLEL"
+    eyes.pivot = "CENTER"
 
 
 def choose_eye(name: str) -> None:

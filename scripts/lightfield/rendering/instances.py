@@ -52,32 +52,35 @@ def set_up(layer: Any) -> None:
             material.node_tree.nodes.new("ShaderNodeGroup").node_tree = group
     for name, channels in CYCLES_PASSES.items():
         aov = layer.aovs.add()
-        aov.name, aov.type = name, "VALUE" if channels == "X" else "COLOR"
+        aov.name = name
+        aov.type = "VALUE" if channels == "X" else "COLOR"
 
 
 def _node_group() -> Any:
     """Return nodes that write the number into the channel of the layer that the ray has come to."""
     tree = bpy.data.node_groups.new("plenoforge_instance", "ShaderNodeTree")
-    nodes, link = tree.nodes, tree.links.new
+    nodes = tree.nodes
+    link = tree.links.new
     random = nodes.new("ShaderNodeObjectInfo").outputs["Random"]
     depth = nodes.new("ShaderNodeLightPath").outputs["Transparent Depth"]
     for first, name in enumerate(_COLOURS):
-        output, colour = nodes.new("ShaderNodeOutputAOV"), nodes.new("ShaderNodeCombineXYZ")
+        output = nodes.new("ShaderNodeOutputAOV")
+        colour = nodes.new("ShaderNodeCombineXYZ")
         output.aov_name = name
         link(colour.outputs[0], output.inputs["Color"])
         for place in range(3):
-            is_here, number = nodes.new("ShaderNodeMath"), nodes.new("ShaderNodeMath")
+            is_here = nodes.new("ShaderNodeMath")
+            number = nodes.new("ShaderNodeMath")
             is_here.operation, number.operation = "COMPARE", "MULTIPLY"
             link(depth, is_here.inputs[0])
-            is_here.inputs[1].default_value, is_here.inputs[2].default_value = (
-                3 * first + place,
-                0.5,
-            )
+            is_here.inputs[1].default_value = 3 * first + place
+            is_here.inputs[2].default_value = 0.5
             link(is_here.outputs[0], number.inputs[0])
             link(random, number.inputs[1])
             link(number.outputs[0], colour.inputs[place])
     count = nodes.new("ShaderNodeOutputAOV")
-    count.aov_name, count.inputs["Value"].default_value = _COUNT, 1
+    count.aov_name = _COUNT
+    count.inputs["Value"].default_value = 1
     return tree
 
 
@@ -102,7 +105,8 @@ def _entries(depsgraph: Any) -> dict[str, tuple[int, int, bool]]:
         thing = entry.object.original
         if has_no_surface(thing):
             continue
-        name, number = str(thing.name_full), int(thing.pass_index)
+        name = str(thing.name_full)
+        number = int(thing.pass_index)
         if entry.is_instance:
             places = [str(place) for place in entry.persistent_id if place != _NO_INDEX]
             name = f"{entry.parent.name_full} > {name} {' '.join(places)}"

@@ -65,7 +65,8 @@ def render(
     cannot be written.
     """
     images.check_codec(lightfield.render.get("compression", "zip"))
-    log, sums = Journal(journal), ShardRecord(record, folder)
+    log = Journal(journal)
+    sums = ShardRecord(record, folder)
     # On the machine that renders: what was killed there may fill its memory.
     leftovers.remove()
     chosen = lightfield.views[view_slice(views, len(lightfield.views))]
@@ -180,7 +181,8 @@ def _render_views(
     for view in views:
         # The system's own timer: what hangs need not run any Python.
         signal.alarm(stall)
-        began, began_cpu = time.perf_counter(), time.process_time()
+        began = time.perf_counter()
+        began_cpu = time.process_time()
         choose_eye(view.name)
         # Of the same pose one after the other: Cycles keeps the scene as it is.
         geometry = (

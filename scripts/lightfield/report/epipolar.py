@@ -70,7 +70,9 @@ def find_row(rig: Rig, matrices: Array) -> Row | None:
         return None
     along = along / length
     if along @ matrices[views[0], :3, 0] < 0:
-        along, views, places = -along, views[::-1], places[::-1]
+        along = -along
+        views = views[::-1]
+        places = places[::-1]
     forward = -matrices[views[0], :3, 2]
     forward = forward - (forward @ along) * along
     forward = forward / np.linalg.norm(forward)

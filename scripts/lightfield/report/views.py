@@ -80,7 +80,8 @@ def collect(
     be ``unreadable`` are black; raises `UserError` for any other that cannot be read.
     """
     names = [view.name for view in lightfield.views]
-    lens, meaning = lightfield.lens, lightfield.depth
+    lens = lightfield.lens
+    meaning = lightfield.depth
 
     def load(number: int, small: Lens) -> View:
         if names[number] in unreadable:

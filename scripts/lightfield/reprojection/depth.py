@@ -56,13 +56,20 @@ def _cell(
     within = row >= 1 and row < height - 2 and column >= 1 and column < width - 2
     if within:
         # Unsigned, so that no index is checked for counting from the end.
-        one, two, i, j = np.uint64(1), np.uint64(2), np.uint64(row), np.uint64(column)
-        a0, a1 = inverse[i, j - one], inverse[i, j]
+        one = np.uint64(1)
+        two = np.uint64(2)
+        i = np.uint64(row)
+        j = np.uint64(column)
+        a0 = inverse[i, j - one]
+        a1 = inverse[i, j]
         a2, a3 = inverse[i, j + one], inverse[i, j + two]
-        b0, b1 = inverse[i + one, j - one], inverse[i + one, j]
+        b0 = inverse[i + one, j - one]
+        b1 = inverse[i + one, j]
         b2, b3 = inverse[i + one, j + one], inverse[i + one, j + two]
-        c1, c2 = inverse[i - one, j], inverse[i - one, j + one]
-        d1, d2 = inverse[i + two, j], inverse[i + two, j + one]
+        c1 = inverse[i - one, j]
+        c2 = inverse[i - one, j + one]
+        d1 = inverse[i + two, j]
+        d2 = inverse[i + two, j + one]
     else:
         a0 = _value(inverse, row, column - 1, topology)
         a1 = _value(inverse, row, column, topology)

@@ -51,12 +51,15 @@ def lanczos_weights(t: Any) -> tuple[Any, ...]:
 
     sinc(u) sinc(u / 3) (Turkowski 1990), made to sum to one.
     """
-    zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
+    zero = np.float32(0)
+    half = np.float32(0.5)
+    one = np.float32(1)
     if t < np.float32(1e-5):
         return zero, zero, one, zero, zero, zero
     # sin(π u / 3) at u = t + 2, t + 1, …, t − 3, by the addition theorem.
     third = np.float32(np.pi / 3) * t
-    a, b = half * np.sin(third), np.float32(math.sqrt(0.75)) * np.cos(third)
+    a = half * np.sin(third)
+    b = np.float32(math.sqrt(0.75)) * np.cos(third)
     w0 = (b - a) / ((t + 2) * (t + 2))
     w1 = -(b + a) / ((t + 1) * (t + 1))
     w2 = 2 * a / (t * t)
@@ -77,9 +80,11 @@ def source_index(
     if wraps:
         # Beyond a pole lies the same row, half a turn away.
         if row < 0 and top:
-            row, column = -1 - row, column + width // 2
+            row = -1 - row
+            column = column + width // 2
         elif row >= height and bottom:
-            row, column = 2 * height - 1 - row, column + width // 2
+            row = 2 * height - 1 - row
+            column = column + width // 2
         column %= width
     if row < 0 or row >= height or column < 0 or column >= width:
         return -1, 0
@@ -284,7 +289,10 @@ def covering(weights: Weights) -> Callable[..., None]:
                                 source, valid, row, column, fy, fx, wy, wx, topology, result
                             ):
                                 continue
-                            s0, s1, s2, s3 = result[0, 0], result[0, 1], result[0, 2], result[0, 3]
+                            s0 = result[0, 0]
+                            s1 = result[0, 1]
+                            s2 = result[0, 2]
+                            s3 = result[0, 3]
                         found += 1
                         a0 += s0
                         a1 += s1
@@ -329,13 +337,16 @@ def continue_faces(source: Array, strip: Array, out: Array) -> None:
     border = (side - size) // 2
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
-            row, column = i - border, j % side - border
+            row = i - border
+            column = j % side - border
             if 0 <= row < size and 0 <= column < size:
                 out[i, j] = source[row, j // side * size + column]
                 continue
-            x, y = strip[i, j, 0] - np.float32(0.5), strip[i, j, 1] - np.float32(0.5)
+            x = strip[i, j, 0] - np.float32(0.5)
+            y = strip[i, j, 1] - np.float32(0.5)
             column, row = int(np.floor(x)), int(np.floor(y))
-            wx, wy = cubic_weights(x - np.float32(column)), cubic_weights(y - np.float32(row))
+            wx = cubic_weights(x - np.float32(column))
+            wy = cubic_weights(y - np.float32(row))
             first = int(strip[i, j, 0]) // size * size
             for c in range(4):
                 total = darkest = np.float32(0)

@@ -166,7 +166,8 @@ def _targets(arguments: argparse.Namespace, source: Lens) -> list[Target]:
     if arguments.output_resolution:
         width, height = _size(arguments.output_resolution, "--output-resolution")
     else:
-        width, height = int(source.width * arguments.scale), int(source.height * arguments.scale)
+        width = int(source.width * arguments.scale)
+        height = int(source.height * arguments.scale)
         if min(width, height) < 1:
             raise UserError(f"--scale {arguments.scale:g}: leaves no pixel")
         if max(width, height) > MOST_PIXELS:

@@ -37,7 +37,9 @@ def rotation_matrix(pan: float, pitch: float, roll: float) -> Array:
     down, which are −pitch and −roll where y points up. So a positive pan turns the target
     camera to the left, a positive pitch down, and a positive roll clockwise.
     """
-    pan, pitch, roll = math.radians(pan), math.radians(-pitch), math.radians(-roll)
+    pan = math.radians(pan)
+    pitch = math.radians(-pitch)
+    roll = math.radians(-roll)
     about_x = [
         [1, 0, 0],
         [0, math.cos(pitch), -math.sin(pitch)],
@@ -126,7 +128,8 @@ def compute(
         raise UserError(
             f"samples: the {filter_name} filter covers the whole pixel already; leave 1"
         )
-    reach, covers = FILTERS[filter_name].reach, FILTERS[filter_name].cover is not None
+    reach = FILTERS[filter_name].reach
+    covers = FILTERS[filter_name].cover is not None
     wraps, _, _ = _topology(source)
     # A cube map's faces continue only so far.
     widest = float(source.height) if isinstance(source, CubeMap) else math.inf
@@ -138,7 +141,8 @@ def compute(
     # Zeros take no memory as long as nothing else is written.
     footprints = np.zeros((height, width, 2, 2) if covers else (0, 0, 2, 2), np.float32)
     counts = np.zeros((height, width, 2) if covers else (0, 0, 2), np.uint16)
-    most, areas = 1, []
+    most = 1
+    areas = []
     for rows in _strips(height, width):
         # One pixel more on every side, for central differences at the border too.
         x = np.arange(-1, width + 1) + 0.5
@@ -174,7 +178,8 @@ def compute(
         points = _on_strip(points, source, border)
         strip = _strip_with_borders(source, border)
         source_cos = _face_cosines(source, border)
-        window, corner = (0, source.height, 0, source.width), (0, 0)
+        window = (0, source.height, 0, source.width)
+        corner = (0, 0)
     else:
         window = _window(areas, fine_fold, source, wraps)
         source_cos = _cosines(source, window)
@@ -184,7 +189,8 @@ def compute(
     del points, fine
     target_cos = fold.unfolded(target_cos)
     if most > 1:
-        footprints, counts = fold.steps(footprints), fold.unfolded(counts)
+        footprints = fold.steps(footprints)
+        counts = fold.unfolded(counts)
     else:
         footprints, counts = footprints[:0], counts[:0]
     distance = np.empty(source_cos.shape, np.int32)
@@ -399,7 +405,8 @@ def _samples(
 
     In float32 from the start: they are n² times as many as the pixels.
     """
-    height, width = target.height * samples, target.width * samples
+    height = target.height * samples
+    width = target.width * samples
     fine = np.empty((height, width, 2), np.float32)
     x = (np.arange(width) + 0.5) / samples
     none = np.zeros((0, 0, 2, 2), np.float32), np.zeros((0, 0, 2), np.uint16)
@@ -456,7 +463,8 @@ def _window(areas: list[Any], fold: Fold, source: Lens, wraps: bool) -> tuple[in
     ``areas`` are those of the fold's part. All columns if the source ``wraps`` around.
     """
     found = np.array([area[:4] for area in areas])
-    low, high = found[:, :2].min(axis=0), found[:, 2:].max(axis=0)
+    low = found[:, :2].min(axis=0)
+    high = found[:, 2:].max(axis=0)
     if np.isinf(low).any():
         return 0, 1, 0, 1
     size = np.array([source.width, source.height])
@@ -465,5 +473,6 @@ def _window(areas: list[Any], fold: Fold, source: Lens, wraps: bool) -> tuple[in
     left, top = (int(start) for start in np.clip(np.floor(low), 0, size - 1))
     right, bottom = (int(end) for end in np.clip(np.ceil(high), 1, size))
     if wraps:
-        left, right = 0, source.width
+        left = 0
+        right = source.width
     return top, bottom, left, right

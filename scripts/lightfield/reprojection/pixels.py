@@ -40,8 +40,10 @@ class Source:
     def __init__(
         self, job: Job, view: SourceView, windows: list[tuple[int, int, int, int]]
     ) -> None:
-        low, high = np.min(windows, axis=0), np.max(windows, axis=0)
-        self.rows, self.columns = (int(low[0]), int(high[1])), (int(low[2]), int(high[3]))
+        low = np.min(windows, axis=0)
+        high = np.max(windows, axis=0)
+        self.rows = (int(low[0]), int(high[1]))
+        self.columns = (int(low[2]), int(high[3]))
         faces = [self._read(job, path) for path in view.paths]
         self.colour = _side_by_side([face[0] for face in faces])
         depths = [face[1] for face in faces if face[1] is not None]

@@ -67,9 +67,11 @@ def link(inverse: Array, steepest: np.float32, right: Array, down: Array) -> Non
 def _draw_pole(top: Any, bottom: Any, values: Array, inverse: Array, drawn: Array) -> None:
     """Draw a triangle around a panorama's pole where nothing is drawn yet, in one colour."""
     height, width = inverse.shape
-    first, end = 0, min(int(bottom + np.float32(0.5)), height)
+    first = 0
+    end = min(int(bottom + np.float32(0.5)), height)
     if top + bottom > height:
-        first, end = max(int(top), 0), height
+        first = max(int(top), 0)
+        end = height
     for i in range(first, end):
         for j in range(width):
             if inverse[i, j] < 0:
@@ -110,7 +112,8 @@ def _draw_triangle(
     first = math.ceil(left - half)
     last = math.floor(right - half)
     if not wraps:
-        first, last = max(first, 0), min(last, width - 1)
+        first = max(first, 0)
+        last = min(last, width - 1)
     for i in range(max(math.ceil(top - half), 0), min(int(bottom - half), height - 1) + 1):
         y = np.float32(i) + half
         for column in range(first, last + 1):
@@ -148,7 +151,8 @@ def draw(
     picture's left edge continues its right one.
     """
     height, width = pixels.shape[:2]
-    corners, corner_values = np.empty((3, 2), np.float32), np.empty((3, 5), np.float32)
+    corners = np.empty((3, 2), np.float32)
+    corner_values = np.empty((3, 5), np.float32)
     for i in range(height - 1):
         for j in range(width - 1):
             for lower in range(2):
@@ -174,7 +178,8 @@ def draw_pixels(pixels: Array, values: Array, wraps: bool, inverse: Array, drawn
 
     ``values`` (n, 5) and the others are as in `draw`.
     """
-    corners, corner_values = np.empty((3, 2), np.float32), np.empty((3, 5), np.float32)
+    corners = np.empty((3, 2), np.float32)
+    corner_values = np.empty((3, 5), np.float32)
     for n in range(len(pixels)):
         corner_values[:] = values[n]
         for second in range(2):

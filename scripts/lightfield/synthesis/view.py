@@ -129,7 +129,8 @@ class Sources:
         with np.errstate(divide="ignore", invalid="ignore"):
             inverse = np.where(distance > 0, 1 / distance, np.nan).astype(np.float32)
         inverse[~np.isfinite(colour).all(axis=-1)] = np.nan
-        right, down = np.empty(inverse.shape, bool), np.empty(inverse.shape, bool)
+        right = np.empty(inverse.shape, bool)
+        down = np.empty(inverse.shape, bool)
         kernels.link(inverse, steepest(self.lens), right, down)
         torn = np.isfinite(inverse) & ~_is_amid(right, down)
         row, column = np.nonzero(torn)
@@ -177,7 +178,8 @@ class Sources:
         for place, index in enumerate(chosen):
             surface = self.surface(index)
             self._draw(surface, self.matrices[index], target, lens, inverses[place], drawn[place])
-        colour, inverse = np.empty((*shape, 3), np.float32), np.empty(shape, np.float32)
+        colour = np.empty((*shape, 3), np.float32)
+        inverse = np.empty(shape, np.float32)
         holes = np.empty(shape, bool)
         kernels.blend(inverses, drawn, colour, inverse, holes)
         outside = np.isnan(lens.pixel_rays()[..., 0])
@@ -244,7 +246,8 @@ def penalty(seen: Array, source: Array) -> Array:
 
     ``seen`` (..., 3) is from the target's camera to the point, in the same unit.
     """
-    here, there = np.linalg.norm(seen, axis=-1), np.linalg.norm(source, axis=-1)
+    here = np.linalg.norm(seen, axis=-1)
+    there = np.linalg.norm(source, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         angle = np.linalg.norm(seen / here[..., None] - source / there[..., None], axis=-1)
         farther: Array = np.maximum(there / here - 1, 0)

@@ -56,7 +56,10 @@ DECIMALS = 6
 # Residuals beyond this many footprints are another surface, not a slightly wrong view.
 SAME_SURFACE = 1.0
 
-UNKNOWN, AGREE, OCCLUDED, CONTRADICT = 0, 1, 2, 3
+UNKNOWN = 0
+AGREE = 1
+OCCLUDED = 2
+CONTRADICT = 3
 
 
 @dataclass(frozen=True)
@@ -133,7 +136,8 @@ def _patches(
     camera: Camera, depth: NDArray[Any], columns: NDArray[np.int64], rows: NDArray[np.int64]
 ) -> tuple[Patches, NDArray[np.bool_]]:
     """Fit planes to 3 × 3 pixels about inner pixels; also say which of them are smooth surfaces."""
-    columns, rows = columns[:, np.newaxis] + _COLUMNS, rows[:, np.newaxis] + _ROWS
+    columns = columns[:, np.newaxis] + _COLUMNS
+    rows = rows[:, np.newaxis] + _ROWS
     values = depth[rows, columns]
     with np.errstate(invalid="ignore", over="ignore"):
         points = camera.lift(values.astype(np.float64), columns, rows)
@@ -303,7 +307,8 @@ def _recorded_range(
     camera: Camera, depth: NDArray[Any], columns: NDArray[np.int64], rows: NDArray[np.int64]
 ) -> tuple[Array, Array]:
     """Return the least and largest distance in 3 × 3 pixels; NaN where one has no source."""
-    columns, rows = columns[:, np.newaxis] + _COLUMNS, rows[:, np.newaxis] + _ROWS
+    columns = columns[:, np.newaxis] + _COLUMNS
+    rows = rows[:, np.newaxis] + _ROWS
     nine = depth[rows, columns].astype(np.float64)
     points = camera.lift(nine, columns, rows)
     with np.errstate(invalid="ignore"):
@@ -320,7 +325,8 @@ def displacement(measured: Comparison, camera: Camera) -> tuple[float, float]:
     directions that they determine; its root mean square over the points, in pixel footprints. The
     second value is the root mean square that residuals as large as expected lead to.
     """
-    residual, footprint = measured.residual, measured.footprint
+    residual = measured.residual
+    footprint = measured.footprint
     arms = (measured.asked.points - camera.position) / footprint[:, np.newaxis]
     # Unknowns of like size: both in pixels, the rotation as seen at the median distance.
     arms /= np.median(np.linalg.norm(arms, axis=1))
@@ -353,7 +359,8 @@ def scale_moments(measured: Comparison, asking: Camera, answering: Camera) -> Ar
     They are the weighted sums of products of how the residual grows with the scale of all angles,
     how with that of all depths, and minus the residual itself.
     """
-    asked, found = measured.asked, measured.found
+    asked = measured.asked
+    found = measured.found
     # Where the two surfaces go when every angle from the axis, or every depth, grows.
     by_angle = _outwards(asking, asked.points) - _outwards(answering, found.points)
     by_depth = answering.position - asking.position
@@ -477,7 +484,8 @@ def scales(answers: Answer) -> tuple[Array, Array]:
 
     Two arrays (2,): angle and depth. A deviation is inf where the residuals do not determine it.
     """
-    squares, products = answers.moments[:2, :2], answers.moments[:2, 2]
+    squares = answers.moments[:2, :2]
+    products = answers.moments[:2, 2]
     if answers.measured < FEWEST_POINTS or np.linalg.cond(squares) > 1e9:
         return np.zeros(2), np.full(2, np.inf)
     inverse = np.linalg.inv(squares)

@@ -265,7 +265,8 @@ def of_exports(
     others: list[str] = []
     problems: list[str] = []
     for number, image_set in enumerate(sets):
-        folders, patterns = {image_set.folder}, [BESIDE]
+        folders = {image_set.folder}
+        patterns = [BESIDE]
         for manifest in manifests:
             taken = lists_of(dataset, image_set, manifest, wanted)
             patterns += manifest.beside if taken or wanted is None else ()
@@ -429,7 +430,8 @@ def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:
         elif around[view][1]:
             faults[f"{IMAGES}/{view}.exr"] = "its camera is inside geometry"
     nearest = min((around[view][0] for view in views if view in around), default=math.inf)
-    detail, figures = "nothing is near a camera", {}
+    detail = "nothing is near a camera"
+    figures = {}
     if math.isfinite(nearest):
         detail = f"nothing is nearer to a camera than {nearest:.3g} m"
         figures = {"nearest_metres": round(nearest, 4)}

@@ -42,7 +42,8 @@ def check(
         return Check(name, None, "the views have no depth")
     if len(seen) < 2:
         return Check(name, None, f"{len(seen)} views with depth have no neighbours")
-    files, patches = list(seen), list(seen.values())
+    files = list(seen)
+    patches = list(seen.values())
     pairs = consistency.view_pairs([image_set.camera(file.view) for file in files], patches)
     asking: dict[int, list[int]] = {}
     for one, other in pairs:
@@ -67,7 +68,8 @@ def _judged(
     """Turn what the views of each pair say of each other into a check that names the wrong ones."""
     limit, scale_limit = DISPLACEMENT_LIMIT, SCALE_LIMIT
     if image_set.grain:
-        limit, scale_limit = REPROJECTED_DISPLACEMENT_LIMIT, REPROJECTED_SCALE_LIMIT
+        limit = REPROJECTED_DISPLACEMENT_LIMIT
+        scale_limit = REPROJECTED_SCALE_LIMIT
     contradictions: dict[int, float] = {}
     displacements: dict[int, tuple[float, float]] = {}
     of_view: dict[int, list[Answer]] = defaultdict(list)

@@ -229,7 +229,8 @@ class Integrity:
 
     def _contents(self, expected: Mapping[Path, tuple[str, str]]) -> Iterator[Fault]:
         """Check that the files of sums, validation and views agree on what there is."""
-        sums, validation = self.dataset / SUMS, self.dataset / "validation.json"
+        sums = self.dataset / SUMS
+        validation = self.dataset / "validation.json"
         if self._ledger and not self._published:
             return  # an unfinished build, or both files of sums are damaged, which has been said
         if not self._published:

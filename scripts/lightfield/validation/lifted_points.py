@@ -25,8 +25,10 @@ def likely_views(points: NDArray[Any], lens: Lens, matrices: Floats) -> tuple[In
     tried with all views; those on whose pixels' rays it lies bound the views of the points before
     and after it, and so on in both halves. A point may be in no pair, or in several.
     """
-    low, high = np.array([0]), np.array([len(points)])
-    first, last = np.array([0]), np.array([len(matrices) - 1])
+    low = np.array([0])
+    high = np.array([len(points)])
+    first = np.array([0])
+    last = np.array([len(matrices) - 1])
     pairs = [(np.empty(0, np.int64), np.empty(0, np.int64))]
     while True:
         settled = first == last
@@ -47,9 +49,12 @@ def likely_views(points: NDArray[Any], lens: Lens, matrices: Floats) -> tuple[In
         np.minimum.at(least, which, view)
         np.maximum.at(most, which, view)
         unknown = most < least
-        least, most = np.where(unknown, first, least), np.where(unknown, last, most)
-        low, high = np.concatenate([low, middle + 1]), np.concatenate([middle, high])
-        first, last = np.concatenate([first, least]), np.concatenate([most, last])
+        least = np.where(unknown, first, least)
+        most = np.where(unknown, last, most)
+        low = np.concatenate([low, middle + 1])
+        high = np.concatenate([middle, high])
+        first = np.concatenate([first, least])
+        last = np.concatenate([most, last])
     found_points, found_views = zip(*pairs, strict=True)
     return np.concatenate(found_points), np.concatenate(found_views)
 

@@ -106,7 +106,8 @@ class Examiner:
             else:
                 self._examine_view(file, image, facts)
                 if question and "Z" in image.channels:
-                    camera, depth = image_set.camera(file.view), image.channels["Z"]
+                    camera = image_set.camera(file.view)
+                    depth = image.channels["Z"]
                     facts.of_depth = depth_questions.answer(question, camera, depth)
         return facts
 
@@ -254,7 +255,8 @@ class Examiner:
         else:
             marked = np.zeros(without.shape, bool)
         facts.marked = True
-        missing, wrong = int((without & ~marked).sum()), int((with_source & marked).sum())
+        missing = int((without & ~marked).sum())
+        wrong = int((with_source & marked).sum())
         if target.transparent and "Z" not in image.channels:
             wrong = 0  # nothing is there
         facts.fault("marks", f"{missing} pixels without a source are not marked", missing)
@@ -274,7 +276,8 @@ class Examiner:
 
         None: the dataset has no such view.
         """
-        target, source = self.sets[file.set], rendered(self.sets)
+        target = self.sets[file.set]
+        source = rendered(self.sets)
         number = source_view(source, target.views[file.view])
         if source is None or number is None:
             return None

@@ -86,7 +86,8 @@ def _limit(cube: UnitCube) -> float:
 
 def _rig_in_middle(cameras: Floats, limit: float) -> bool:
     """Return whether cameras (n, 3) are a fifth of the cube, in its middle."""
-    low, high = cameras.min(axis=0), cameras.max(axis=0)
+    low = cameras.min(axis=0)
+    high = cameras.max(axis=0)
     beside = np.abs((low + high) / 2 - MIDDLE).max()
     larger = np.abs(np.max(high - low) - RIG_PART)
     return bool(beside <= limit and larger <= limit)

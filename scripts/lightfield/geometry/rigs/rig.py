@@ -253,7 +253,9 @@ class Rig(Settings):
         Raises `UserError` for a pose file that cannot be read.
         """
         unit = self.unit_poses()
-        names, numbers, rotations = unit.names, unit.numbers, unit.rotations
+        names = unit.names
+        numbers = unit.numbers
+        rotations = unit.rotations
         positions = self.to_world(unit.positions)
         turn = self.turn
         if self.look_at is not None:
