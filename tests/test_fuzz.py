@@ -474,7 +474,7 @@ def home(tmp_path, monkeypatch):
 LISTED = {
     "export": "exports/",
     "transforms": "View/",
-    "inventory": "own.blend: files that it shows",
+    "inventory": ".blend",
 }
 
 
