@@ -46,6 +46,23 @@ from snakemake.cli import main
 main(sys.argv[1:])
 """
 
+# Runs Snakemake, then writes how many timers it had at most at one time.
+TIMING = """
+import atexit, json, sys, threading
+waiting = most = 0
+class Timer(threading.Timer):
+    def run(self):
+        global waiting, most
+        waiting += 1
+        most = max(most, waiting)
+        super().run()
+        waiting -= 1
+threading.Timer = Timer
+atexit.register(lambda: json.dump(most, open("timers.json", "w")))
+from snakemake.cli import main
+main(sys.argv[1:])
+"""
+
 
 @pytest.fixture
 def published(tmp_path):
@@ -169,6 +186,15 @@ def test_a_run_lists_no_folder_once_a_shard(published, tmp_path):
         for folder in (*roots, ".snakemake"):
             shutil.rmtree(tmp_path / folder)
     assert of_views_and_records[0] == of_views_and_records[1]
+
+
+@pytest.mark.slow
+def test_waiting_for_jobs_takes_no_more_the_more_have_finished(published, tmp_path):
+    """A timer for each job of hundreds keeps Snakemake looking for jobs without a pause."""
+    command = [sys.executable, "-c", TIMING, "--cores", "1", "--snakefile", ROOT / "Snakefile"]
+    command += ["--config", "scenes=theirs", "preset=full", "views_per_shard=1"]
+    subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
+    assert json.loads((tmp_path / "timers.json").read_text()) <= 2
 
 
 def test_linked_folders_are_rigs_by_the_names_of_their_links(published, tmp_path, monkeypatch):
