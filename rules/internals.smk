@@ -1,8 +1,10 @@
 # What no public interface of Snakemake gives. This is the only file that reaches inside Snakemake;
 # each piece says why.
 import inspect
+import threading
 
 from snakemake.io import _IOFile
+from snakemake.scheduling.job_scheduler import JobScheduler
 from snakemake_interface_executor_plugins.executors.base import SubmittedJobInfo
 
 from lightfield.core import processors
@@ -129,6 +131,29 @@ def keep_locks_of_others():
 
     if hasattr(persistence, "_lockfile"):
         persistence.unlock = unlock
+
+
+def look_for_jobs_once_a_second():
+    """Let Snakemake's scheduler have one timer at a time for its next look at the ready jobs.
+
+    It looks when a job has finished, and a second after each look. Each of these looks starts a
+    timer of its own. After some dozen jobs Snakemake would look without a pause, and take a core
+    from the jobs until the run ends.
+    """
+    is_waiting = threading.Lock()
+
+    def look_later(scheduler, seconds):
+        def look():
+            is_waiting.release()
+            scheduler._open_jobs.release()
+
+        if is_waiting.acquire(blocking=False):
+            threading.Timer(seconds, look).start()
+
+    JobScheduler._schedule_reevalutation = look_later
+
+
+look_for_jobs_once_a_second()
 
 
 def is_ancient(file):

@@ -188,12 +188,12 @@ def listed_files(job):
 
 
 def beside_transforms(output, content):
-    """Return the files that the export for instant-ngp wrote beside its transforms.json."""
+    """Return the files that the export for instant-ngp may have written beside transforms.json."""
     folder = output.parent
     yield from folder.glob("transforms_*.json")
     for frame in content["frames"]:
         image = folder / frame["file_path"]
-        yield from image.parent.glob(f"dynamic_mask_{image.stem}.png")
+        yield image.with_name(f"dynamic_mask_{image.stem}.png")
         if image.parent.name == "instant_ngp":
             yield image
         if "depth_path" in frame:

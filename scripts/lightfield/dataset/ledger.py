@@ -173,7 +173,7 @@ class Ledger:
         stamps = {}
         for name in names:
             if Path(name).is_file():
-                stamps[name] = Stamp.of(name, self._trusted_sum(name))
+                stamps[name] = Stamp.of(name, self._trusted_sum(name) or _digest_now(name))
         return stamps
 
     def _trusted_sum(self, name: str) -> str | None:
@@ -231,15 +231,19 @@ def forget(path: Path, name: str) -> None:
 def _has_changed(name: str, stamp: Stamp) -> bool:
     """Return whether a file has other bytes than its stamp; one that is gone has not."""
     try:
-        status = os.stat(name)  # noqa: PTH116, as above
-        return _digest(name, status.st_mtime_ns, status.st_ctime_ns) != stamp.sha256
+        return _digest_now(name) != stamp.sha256
     except OSError:
         return False
 
 
+def _digest_now(name: str) -> str:
+    """Return the SHA-256 of a file, read once: thousands of shards are made from one .blend."""
+    status = os.stat(name)  # noqa: PTH116, as above
+    return _digest(name, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+
+
 @lru_cache(maxsize=64)
-def _digest(name: str, _modified_ns: int, _changed_ns: int) -> str:
-    """Return the SHA-256 of a file: thousands of shards are made from one large .blend."""
+def _digest(name: str, _bytes: int, _modified_ns: int, _changed_ns: int) -> str:
     return sha256(name)
 
 
