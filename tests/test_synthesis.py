@@ -12,7 +12,7 @@ from scipy.ndimage import binary_dilation
 from sphere import look, look_at_ball, write_views
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
 from lightfield.geometry import lenses
 from lightfield.imaging import images
@@ -71,6 +71,33 @@ def test_it_tears_where_depth_jumps():
     between = (made.distance > 2.0) & (made.distance < 2.4)
     assert not between.any()
     assert np.median(np.abs(colour)) < 0.005
+
+
+def panel_before_wall(lens, matrix):
+    """What cameras along +Y see of a red panel at y = 2, of which the wall is 0.3 m behind."""
+    rays = lens.pixel_rays() @ matrix[:3, :3].T
+    panel = 2.0 - matrix[1, 3]
+    plane = panel if panel > 0 else panel + 0.3
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = np.where(rays[..., 1] > 0, plane / rays[..., 1], np.inf)
+    colour = np.zeros((*distance.shape, 3)) + ([0.8, 0, 0] if panel > 0 else [0, 0.8, 0])
+    return colour, np.where(np.isnan(rays[..., 0]), np.nan, distance)
+
+
+def test_a_wall_does_not_shine_through_a_panel_close_before_it():
+    lens = lenses.from_camera(FISHEYE | {"fov": 120})
+    # The second camera stands between the panel and the wall, and sees the wall alone.
+    views = []
+    for number, y in enumerate((0.0, 2.1)):
+        matrix = EYE.copy()
+        matrix[:3, 3] = (0, y, 0)
+        views.append(View.placed(f"view_{number:04}f", matrix))
+    field = Sources(lens, views, lambda view: panel_before_wall(lens, view.matrix))
+    target = lenses.from_camera({"lens": "rectilinear", "fov": 30, "resolution": [48, 48]})
+    made = field.blended(field.matrices[0], target, [0, 1])
+    assert not made.holes.any()
+    np.testing.assert_allclose(made.colour, np.broadcast_to([0.8, 0, 0], (48, 48, 3)), atol=1e-3)
+    np.testing.assert_allclose(made.distance * -target.pixel_rays()[..., 2], 2, rtol=1e-3)
 
 
 def test_what_no_view_sees_is_a_hole():
