@@ -131,8 +131,11 @@ def test_a_file_that_changed_meanwhile_is_fetched_anew(server, tmp_path):
     with pytest.raises(UserError):
         download.fetch(server.url, target, None, "the test")
     server.content = CONTENT[::-1]
+    server.asked.clear()
     download.fetch(server.url, target, None, "the test")
     assert target.read_bytes() == CONTENT[::-1]
+    # The server compares the versions itself, and sends the new file at once.
+    assert server.asked == ["bytes=1000000-"]
 
 
 def test_versions_are_not_mixed_by_a_kill(server, tmp_path, monkeypatch):
