@@ -1,6 +1,7 @@
 """Files and logs are on the disk, whole, before anybody relies on them: a power cut loses none."""
 
 import os
+from pathlib import Path
 
 import pytest
 
@@ -17,7 +18,7 @@ def flushed(monkeypatch):
 
     def flush(file):
         fsync(file)
-        path = os.readlink(f"/proc/self/fd/{file}")
+        path = str(Path(f"/proc/self/fd/{file}").readlink())
         seen.append((os.fstat(file).st_size, path))
 
     monkeypatch.setattr(os, "fsync", flush)
