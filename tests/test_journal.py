@@ -36,6 +36,8 @@ def runs(*hosts):
         # Thrice, by other shards, of which the last run may still be at work.
         ([], [["a!", "a!", "a!", "b"]], ["a"]),
         ([], [["a!", "a!", "b"], ["a!"]], []),
+        # Whatever ended there before.
+        ([], [["a", "a!", "a!", "a!", "b"]], ["a"]),
         # Not one after the other.
         ([], [["a!", "a!", "a", "a!", "b"]], []),
         (["c!"], [["a!", "a!", "a!", "b"]], ["a", "c"]),
