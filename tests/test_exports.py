@@ -811,6 +811,15 @@ def test_points_are_lifted_from_views_that_see_the_sky_too():
     np.testing.assert_allclose(np.linalg.norm(points, axis=1), 3)
 
 
+def test_points_are_as_dense_at_the_origin_as_elsewhere():
+    line = np.linspace(-1, 1, 2001)
+    for axis in range(3):
+        positions = np.full((len(line), 3), 0.5)
+        positions[:, axis] = line
+        gaps = np.diff(line[evenly(positions, 40)])
+        assert gaps.max() < 1.5 * np.median(gaps)
+
+
 def test_points_that_several_views_see_alike_are_kept_once():
     points = np.random.default_rng(1).normal(size=(50, 3))
     assert evenly(np.repeat(points, 4, axis=0), 100).tolist() == list(range(0, 200, 4))

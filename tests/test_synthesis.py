@@ -84,14 +84,57 @@ def panel_before_wall(lens, matrix):
     return colour, np.where(np.isnan(rays[..., 0]), np.nan, distance)
 
 
-def test_a_wall_does_not_shine_through_a_panel_close_before_it():
-    lens = lenses.from_camera(FISHEYE | {"fov": 120})
-    # The second camera stands between the panel and the wall, and sees the wall alone.
+def views_along_y(places):
+    """Return views that look along +Y, from places on that axis."""
     views = []
-    for number, y in enumerate((0.0, 2.1)):
+    for number, y in enumerate(places):
         matrix = EYE.copy()
         matrix[:3, 3] = (0, y, 0)
         views.append(View.placed(f"view_{number:04}f", matrix))
+    return views
+
+
+def test_of_views_in_one_line_the_nearer_to_the_surface_counts():
+    lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [48, 48]})
+    views = views_along_y([0.0, -6.0])
+
+    def wall(view):
+        """What a view sees of a wall at y = 2: the first one calls it red, the other green."""
+        distance = (2 - view.matrix[1, 3]) / -lens.pixel_rays()[..., 2]
+        return np.full((48, 48, 3), [0.8, 0, 0] if view is views[0] else [0, 0.8, 0]), distance
+
+    field = Sources(lens, views, wall)
+    (target,) = (view.matrix for view in views_along_y([-2.0]))
+    made = field.blended(target, lenses.from_camera(EYES["perspective"] | {"fov": 20}), [0, 1])
+    middle = made.colour[30:34, 38:42]
+    assert (middle[..., 0] > 10 * middle[..., 1]).all()
+
+
+def test_the_colour_of_an_edge_counts_where_no_other_view_sees_the_surface():
+    lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [48, 48]})
+    views = views_along_y([0.0, 0.0])
+    green_column = 23
+
+    def edge(view):
+        """One view sees a red wall; to the other it ends, and its last pixels are green."""
+        depth = np.full((48, 48), 2.0)
+        colour = np.full((48, 48, 3), [0.8, 0, 0])
+        if view is views[0]:
+            depth[:, green_column + 1 :] = 4
+            colour[:, green_column] = [0, 0.8, 0]
+        return colour, depth / -lens.pixel_rays()[..., 2]
+
+    field = Sources(lens, views, edge)
+    alone = field.blended(views[0].matrix, lens, [0]).colour[8:40, green_column]
+    np.testing.assert_allclose(alone, np.broadcast_to([0, 0.8, 0], alone.shape), atol=0.05)
+    both = field.blended(views[0].matrix, lens, [0, 1]).colour[8:40, green_column]
+    np.testing.assert_allclose(both, np.broadcast_to([0.8, 0, 0], both.shape), atol=0.01)
+
+
+def test_a_wall_does_not_shine_through_a_panel_close_before_it():
+    lens = lenses.from_camera(FISHEYE | {"fov": 120})
+    # The second camera stands between the panel and the wall, and sees the wall alone.
+    views = views_along_y([0.0, 2.1])
     field = Sources(lens, views, lambda view: panel_before_wall(lens, view.matrix))
     target = lenses.from_camera({"lens": "rectilinear", "fov": 30, "resolution": [48, 48]})
     made = field.blended(field.matrices[0], target, [0, 1])
