@@ -209,13 +209,14 @@ def test_renders_without_alpha_are_compared_over_their_background(
     assert f"has no alpha, and is {code} where the truth is transparent" in problem
 
 
-def test_linear_renders_are_composited_as_light(transparent, tmp_path):
+# The light of a grey of sRGB's 0.5, by IEC 61966-2-1.
+@pytest.mark.parametrize(("background", "light"), [(0, 0), (0.5, 0.2140411), (1, 1)])
+def test_linear_renders_are_composited_as_light(background, light, transparent, tmp_path):
     alpha = images.read_image(transparent.path(transparent.lightfield.views[1])).channels["A"]
     path = tmp_path / "view_0001f.exr"
-    images.write_exr(path, dict.fromkeys("RGB", (np.float32(0.25) * alpha + 1 - alpha)))
-    assert compared(transparent, path, WHITE)[0]["psnr"] > 100
-    images.write_exr(path, dict.fromkeys("RGB", np.float32(0.25) * alpha))
-    assert compared(transparent, path, BLACK)[0]["psnr"] > 100
+    colour = np.float32(0.25) * alpha + np.float32(light) * (1 - alpha)
+    images.write_exr(path, dict.fromkeys("RGB", colour))
+    assert compared(transparent, path, np.full(3, float(background)))[0]["psnr"] > 100
 
 
 @pytest.mark.parametrize("background", [BLACK, WHITE])

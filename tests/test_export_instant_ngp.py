@@ -339,6 +339,26 @@ def test_exr_views_become_files_that_the_loader_accepts(dataset: Dataset) -> Non
     assert len(list(elsewhere.iterdir())) == 6
 
 
+def test_exr_pixels_without_a_source_are_hidden(dataset: Dataset) -> None:
+    content = dataset.write(PERSPECTIVE, depth="z")
+    dataset.render(content, PERSPECTIVE, "z", 2.0)
+    path = dataset.folder / "view_0000f.exr"
+    channels = images.read_image(path).channels
+    without_source = np.zeros((48, 64), bool)
+    without_source[:5, :7] = True
+    channels = {
+        name: np.where(without_source, np.nan if name == "Z" else 0, pixels).astype(pixels.dtype)
+        for name, pixels in channels.items()
+    }
+    images.write_exr(path, channels, {images.DEPTH_ATTRIBUTE: "z"})
+    frames = dataset.export("--image-suffix", ".exr")["frames"]
+    first, second = (images.read_image(dataset.folder / f["file_path"]) for f in frames[:2])
+    for name in "RGB":
+        expected = np.where(without_source, -1, 0.25)
+        np.testing.assert_array_equal(first.channels[name], expected)
+        np.testing.assert_array_equal(second.channels[name], 0.25)
+
+
 def test_a_depth_map_counts_millimetres_and_is_0_where_there_is_none() -> None:
     depth = np.array([2.0, 0.001, 0.0004, 65.535, 65.5361, np.inf, np.nan])
     assert millimetres(depth).tolist() == [2000, 1, 0, 65535, 0, 0, 0]
@@ -411,6 +431,24 @@ def test_fitted_to_depth_the_scene_is_within_the_cube(dataset: Dataset) -> None:
     assert transforms["scale"] == pytest.approx(1 / (2 * 0.9 * 4.0), rel=0.05)
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     assert in_unit_cube(loader, [1, -2, 3] + 0.85 * 4.0 * corners)
+
+
+def test_a_wall_straight_ahead_puts_the_rig_in_the_middle_of_the_cubes_sides(
+    dataset: Dataset,
+) -> None:
+    # Of three by three pixels the bounds take the one in the middle, whose ray goes through its
+    # centre: to the left and to the right they reach equally far.
+    camera = {"lens": "rectilinear", "fov": 90, "resolution": [192, 192]}
+    rig = {"type": "plane", "cameras": [2, 2], "size": 0.5}
+    content = dataset.write(camera, rig, depth="z")
+    for frame in content["frames"]:
+        pixels = {name: np.full((192, 192), 4, np.float32) for name in "RGBZ"}
+        attributes = {images.DEPTH_ATTRIBUTE: "z"}
+        images.write_exr(dataset.folder / f"{frame['name']}.exr", pixels, attributes)
+    loader = Loader(dataset.export("--depth-bounds"))
+    left, right = (loader.position(silvr_orientation([x, 0, 0])) for x in (-0.25, 0.25))
+    np.testing.assert_allclose((left + right)[:2] / 2, 0.5, atol=1e-6)
+    assert np.abs(right - left).max() == pytest.approx(0.5 * loader.scale, abs=1e-6)
 
 
 def test_split_gives_odd_sequence_numbers_to_the_test_file(

@@ -669,6 +669,18 @@ def test_an_unpacked_dataset_may_have_views_of_rigs_that_are_not_here(scene, tmp
     assert problems(tmp_path / "scene_along", "views", "instant_ngp") == []
 
 
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+def test_a_rig_of_another_size_in_the_middle_of_the_unit_cube_is_found(factor, tmp_path):
+    folder = tmp_path / "dataset"
+    write_views(folder, LENSES["perspective"], RIG, see=look_at_ball)
+    write_instant_ngp(folder, "views", [])
+    content = read_json(folder / "transforms.json")
+    content["scale"] *= factor
+    content["offset"] = [0.5 - factor * (0.5 - value) for value in content["offset"]]
+    write_json(folder / "transforms.json", content)
+    assert "scale, offset" in problems(folder, "views", "instant_ngp")[0]
+
+
 def test_a_rig_that_looks_inward_fills_the_unit_cube(tmp_path):
     rig = {"type": "sphere", "subdivisions": 1, "size": 1.7, "face_inside": True}
     write_views(tmp_path / "dataset", LENSES["perspective"], rig, see=look_at_ball)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 from scipy.spatial.transform import Rotation
-from sphere import LENSES, RADIUS, colour_of, write_views
+from sphere import LENSES, RADIUS, colour_of, look, write_views
 
 from lightfield import export
 from lightfield.core.errors import UserError
@@ -262,6 +262,21 @@ def test_colmap_depth_maps_are_z_in_metres(dataset, tmp_path, source):
         assert len(row) > 1000
         local = model.lift(np.stack([column, row], axis=-1) + 0.5, z[row, column])
         on_sphere((local - shift) @ turn, 1e-5)
+
+
+def test_colmap_depth_maps_are_0_where_a_view_sees_the_sky(tmp_path):
+    def open_above(lens, matrix):
+        colour, distance = look(lens, matrix)
+        distance[: lens.height // 2] = np.inf
+        return colour, distance
+
+    folder = tmp_path / "dataset"
+    write_views(folder, LENSES["perspective"], RIG, see=open_above)
+    made = exported(folder, "colmap", "views", tmp_path, depth=True, points=50)
+    for path in sorted((made / "stereo/depth_maps").iterdir()):
+        z = np.frombuffer(path.read_bytes().removeprefix(b"64&48&1&"), "<f4").reshape(48, 64)
+        assert (z[:24] == 0).all()
+        assert ((z[24:] > 0.5) & (z[24:] < 2 * RADIUS)).all()
 
 
 def nerfstudio_rays(content):
@@ -794,6 +809,15 @@ def test_points_are_lifted_from_views_that_see_the_sky_too():
         points, normals = surface.points(1)
     assert points.shape == normals.shape == (16, 3)
     np.testing.assert_allclose(np.linalg.norm(points, axis=1), 3)
+
+
+def test_points_are_as_dense_at_the_origin_as_elsewhere():
+    line = np.linspace(-1, 1, 2001)
+    for axis in range(3):
+        positions = np.full((len(line), 3), 0.5)
+        positions[:, axis] = line
+        gaps = np.diff(line[evenly(positions, 40)])
+        assert gaps.max() < 1.5 * np.median(gaps)
 
 
 def test_points_that_several_views_see_alike_are_kept_once():

@@ -155,6 +155,17 @@ def test_cameras_are_checked_against_what_their_frame_shows(name, folder, run_pr
     assert "1 of 2 cameras are inside late: view_0000f" in inside.stderr
 
 
+def test_a_camera_that_touches_the_floor_is_refused(room, run_program, tmp_path):
+    rig = {"type": "lattice", "cameras": [1, 1, 2], "size": 1, "center": [0.2, 0.1, 0.5005]}
+    lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
+    LightField.from_rig(rig, lens, depth="distance", frame=1).write(tmp_path / "lightfield.json")
+    words = ("--blend", room, "--lightfield", tmp_path / "lightfield.json")
+    output = ("--output", tmp_path / "cameras.json")
+    result = run_program("check_cameras.py", *words, *output, check=False)
+    assert result.returncode == 1
+    assert "1 of 2 cameras are inside a surface" in result.stderr
+
+
 def test_cameras_are_checked_against_what_particles_place(folder, run_program, tmp_path):
     # The first camera is where the emitter is at frame 5. Each grain is hidden itself.
     write_lightfield(tmp_path / "lightfield.json", 5, center=[1.5, 1, 1.05])

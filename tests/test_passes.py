@@ -100,6 +100,13 @@ def test_motion_across_the_seam_of_a_panorama_is_the_short_one():
     assert [plane.item() for plane in channels.values()] == [-4, 1, 2.5, 2]
 
 
+def test_light_beyond_what_halves_hold_is_clamped_and_counted():
+    colour = np.array([[[70_000, -70_000, 65_504], [1, -1, 0]]], np.float32)
+    channels, attributes = shard.colour_channels(colour)
+    assert attributes[images.CLAMPED_ATTRIBUTE] == 2
+    assert [channels[name][0, 0] for name in "RGB"] == [65_504, -65_504, 65_504]
+
+
 def test_what_is_not_a_number_is_counted_and_becomes_0():
     wrong = np.array([[[np.nan, np.nan, np.nan], [0, 0, 1]]], np.float32)
     lens = lenses.from_camera(LENSES["panorama"])

@@ -161,6 +161,8 @@ def test_pixels_without_a_source_are_marked(dataset, run):
     assert set(np.unique(rgba["A"])) == {0, 255}
     assert not any(rgba[c][missing].any() for c in "RGB")
     assert np.array_equal(np.isnan(depth.channels["Z"]), missing)
+    # Depth says it: no second mark beside it.
+    assert depth.channels.keys() == {*"RGBZ"}
     assert not depth.channels["G"][missing].any()
     mask = read_image(out / "dynamic_mask_view_0000f.png").channels["Y"]
     assert np.array_equal(mask, np.where(missing, 255, 0))
@@ -168,6 +170,16 @@ def test_pixels_without_a_source_are_marked(dataset, run):
     assert integers.dtype == np.uint16 and not integers[missing].any()
     z = depth.channels["Z"][~missing].astype(float)
     assert np.abs(integers[~missing] - z * 1000).max() <= 0.5
+
+
+def test_what_is_too_far_for_a_depth_png_has_no_depth_there(dataset, run):
+    run(*PERSPECTIVE, "--exr", "--depth-png", "40000")
+    z = read_image(dataset / "out" / "view_0000f.exr").channels["Z"].astype(float)
+    integers = read_image(dataset / "out" / "view_0000f_depth.png").channels["Y"]
+    # 16 bits end at 1.638 m.
+    assert 0.1 < (z < 1.638).mean() < 0.9
+    assert np.abs(integers - z * 40000)[z < 1.638].max() <= 0.5
+    assert not integers[z > 1.639].any()
 
 
 def test_a_copy_has_no_depth_below_zero_in_a_png_and_no_pixel_that_is_no_number(dataset, run):

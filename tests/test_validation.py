@@ -474,6 +474,14 @@ def test_two_views_that_disagree_are_both_named(tmp_path: Path) -> None:
     assert check(validate(dataset), "geometry").views == names(dataset)
 
 
+def test_of_three_views_the_one_that_disagrees_with_both_others_is_named(
+    small_dataset: Path,
+) -> None:
+    # Each of the others disagrees with one of its two neighbours, which is not its own fault.
+    relist(small_dataset, move(0, (0, 0.1, 0)))
+    assert check(validate(small_dataset), "geometry").views == names(small_dataset)[:1]
+
+
 # ---- what cannot be checked is said ---------------------------------------------------------
 
 UNCHECKED = {

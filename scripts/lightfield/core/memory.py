@@ -6,7 +6,9 @@ from pathlib import Path
 
 import psutil
 
-_CGROUPS = Path("/sys/fs/cgroup")
+# Where the control groups are, and in which of them this process is.
+CONTROL_GROUPS = Path("/sys/fs/cgroup")
+OWN_GROUPS = Path("/proc/self/cgroup")
 
 
 def available() -> int:
@@ -25,12 +27,11 @@ def available() -> int:
 def _limit_files() -> list[Path]:
     """Return the files of version 1 and 2 of control groups that may hold a limit."""
     found = []
-    own = Path("/proc/self/cgroup")
-    for line in own.read_text().splitlines() if own.exists() else ():
+    for line in OWN_GROUPS.read_text().splitlines() if OWN_GROUPS.exists() else ():
         _, controllers, path = line.split(":", 2)
         if controllers in ("", "memory"):
             name = "memory.limit_in_bytes" if controllers else "memory.max"
-            root = _CGROUPS / controllers
+            root = CONTROL_GROUPS / controllers
             group = root / path.lstrip("/")
             found += [folder / name for folder in (group, *group.parents)]
     return [file for file in found if file.is_file()]

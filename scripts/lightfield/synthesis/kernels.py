@@ -23,6 +23,8 @@ SAME = np.float32(0.03)
 FAR = np.float32(1e-4)
 # A triangle that is larger than this part of the picture is an artefact at a lens's rim.
 LARGEST = np.float32(0.25)
+# Of a triangle's width times its height: rounding moves its edges by no more.
+ROUNDING = np.float32(1e-6)
 
 
 @kernel
@@ -89,7 +91,7 @@ def _draw_triangle(
     ``corners`` (3, 2) are pixels, ``values`` (3, 5) inverse distance, R, G, B and weight.
     """
     height, width = inverse.shape
-    half = np.float32(0.5)
+    zero, half = np.float32(0), np.float32(0.5)
     x0, y0 = corners[0, 0], corners[0, 1]
     x1, y1 = corners[1, 0], corners[1, 1]
     x2, y2 = corners[2, 0], corners[2, 1]
@@ -109,6 +111,8 @@ def _draw_triangle(
     top, bottom = min(y0, y1, y2), max(y0, y1, y2)
     if right - left > LARGEST * width or bottom - top > LARGEST * height:
         return
+    # A pixel's centre on an edge that two triangles share must be in one of them.
+    rounding = ROUNDING * (right - left) * (bottom - top)
     first = math.ceil(left - half)
     last = math.floor(right - half)
     if not wraps:
@@ -121,9 +125,11 @@ def _draw_triangle(
             w0 = (x1 - x) * (y2 - y) - (x2 - x) * (y1 - y)
             w1 = (x2 - x) * (y0 - y) - (x0 - x) * (y2 - y)
             w2 = area - w0 - w1
-            if w0 < 0 or w1 < 0 or w2 < 0:
+            if min(w0, w1, w2) < -rounding:
                 continue
-            w0, w1, w2 = w0 / area, w1 / area, w2 / area
+            w0, w1, w2 = max(w0, zero), max(w1, zero), max(w2, zero)
+            total = w0 + w1 + w2
+            w0, w1, w2 = w0 / total, w1 / total, w2 / total
             j = column % width if wraps else column
             near = w0 * values[0, 0] + w1 * values[1, 0] + w2 * values[2, 0]
             if near > inverse[i, j]:
