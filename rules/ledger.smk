@@ -117,10 +117,10 @@ def mark_stale_files(name):
     dataset = DATASETS[name]
     files = [*dataset.files, *dataset.intermediates]
     rerun(filter(is_outdated, files))
-    rerun(dataset.outgrown_records())
-    if dataset.external_changed(ViewStore(STORE) if STORE else None):
+    rerun(presence.outgrown_records(dataset))
+    if presence.external_changed(dataset, ViewStore(STORE) if STORE else None):
         rerun([dataset.inventory])
-    for path, problem in dataset.broken():
+    for path, problem in presence.broken_files(dataset):
         DAMAGED.setdefault(path, (problem, files))
 
 

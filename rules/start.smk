@@ -4,7 +4,6 @@ import resource
 
 from lightfield.core import live_runs
 from lightfield.dataset.config import expected_blend
-from lightfield.dataset.dataset import check_external_files, check_imported
 
 # Bytes of a process in which bpy can be imported; with less it crashes, or no thread starts.
 LEAST_ADDRESS_SPACE = 1.5e9
@@ -43,10 +42,11 @@ def check_room():
     jobs = [job for job in needed_jobs() if job.output]
     renders = [job for job in jobs if job.rule.name == RENDER]
     datasets = {d.folder: d for d in (dataset_of(job.wildcards) for job in renders)}
-    needs = [
-        room.Need(Path(RESULTS), d.missing_bytes, d.missing_views)
-        for d in datasets.values()
-    ]
+    needs = []
+    for dataset in datasets.values():
+        views = presence.missing_views(dataset)
+        size = views * dataset.estimate.all_view_bytes
+        needs.append(room.Need(Path(RESULTS), size, views))
     # A built scene, at most.
     needs += [
         room.Need(Path(WORK), 1e8) for _ in {d.scene_name for d in datasets.values()}
@@ -103,9 +103,9 @@ def check_input(job):
         if blend.is_file():
             expected_blend(job.wildcards.name, blend, sha256(blend))
     elif job.rule.name == INVENTORY:
-        check_external_files(scene_of(job.wildcards))
+        presence.check_external_files(scene_of(job.wildcards))
     elif job.rule.name == IMPORT_VIEWS:
-        check_imported(dataset_of(job.wildcards))
+        presence.check_imported(dataset_of(job.wildcards))
 
 
 def announce_refusals():

@@ -13,8 +13,9 @@ from checkouts import snakemake
 
 from lightfield.core.files import sha256, write_json, write_text
 from lightfield.dataset import ledger, records
-from lightfield.dataset.dataset import Dataset, scene_datasets
+from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import scene_datasets
 from lightfield.dataset.records import ShardRecord
 from lightfield.imaging import images
 

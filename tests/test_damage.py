@@ -19,7 +19,7 @@ from checkouts import assert_same_bytes, checkout, rendered
 
 from lightfield.core.files import broken, set_aside
 from lightfield.dataset import ledger
-from lightfield.dataset.dataset import scene_datasets
+from lightfield.dataset.loading import scene_datasets
 from lightfield.imaging import images
 from lightfield.validation.integrity import Integrity
 

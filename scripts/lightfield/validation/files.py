@@ -14,7 +14,7 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, set_aside, sha256, write_text
-from lightfield.dataset.dataset import REPORT_FILES
+from lightfield.dataset.dataset_paths import REPORT_FILES
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, NAMES, Pass
 from lightfield.geometry import rotations
