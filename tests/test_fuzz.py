@@ -202,8 +202,8 @@ def record(_):
 
 
 def read_record(path, _):
-    records.read(path)
-    shard_files.recorded(path, str(path.parent))
+    shard_files.read_record(path)
+    shard_files.recorded_sizes(path, str(path.parent))
 
 
 def log_of_sums(_):

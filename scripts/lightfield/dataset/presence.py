@@ -39,11 +39,10 @@ def outgrown_records(dataset: Dataset) -> list[str]:
 
 
 def _is_outgrown(dataset: Dataset, record: Path) -> bool:
-    try:
-        sizes = shard_files.recorded(record, dataset.folder) or {}
-        taken = record.stat().st_mtime_ns
-    except FileNotFoundError:
+    sizes = shard_files.recorded_sizes(record, dataset.folder)
+    if not sizes:
         return False
+    taken = record.stat().st_mtime_ns
     for name, size in sizes.items():
         source_size, changed = _size_and_time(Path(str(dataset.imported), name))
         if changed and (source_size != size or changed > taken):

@@ -438,14 +438,6 @@ def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:
     return Check.of_files("cameras", faults, detail, figures=figures)
 
 
-def remove_leftovers(dataset: Path) -> None:
-    """Remove what killed programs left half-written, and the sums of an earlier validation."""
-    (dataset / SUMS).unlink(missing_ok=True)
-    for leftover in dataset.rglob(".*.tmp.*"):
-        if leftover.relative_to(dataset).parts[0] != REPORT:
-            leftover.unlink()
-
-
 def read_sums(path: Path) -> dict[str, str]:
     """Return the SHA-256 of each file that a sha256sums.txt names, and that is below its folder."""
     lines = path.read_text(encoding="utf-8").splitlines()
