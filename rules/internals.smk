@@ -76,6 +76,22 @@ def rerun(outputs):
     workflow.dag.forcefiles.update(map(stored, outputs))
 
 
+def before_jobs_are_chosen(mark):
+    """Call ``mark`` once all jobs are known, and so all settings written, and none is chosen yet.
+
+    An input function runs while those of other jobs have still to write their settings.
+    """
+    dag = workflow.dag
+    choose = dag.update_needrun
+
+    async def mark_and_choose(*arguments, **options):
+        dag.update_needrun = choose
+        mark()
+        await choose(*arguments, **options)
+
+    dag.update_needrun = mark_and_choose
+
+
 def take_as_missing(is_damaged):
     """Have Snakemake take damaged files as missing: they are set aside before the first job.
 

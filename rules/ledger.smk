@@ -101,35 +101,32 @@ take_as_missing(DAMAGED.__contains__)
 
 
 @cache
-def mark_damaged_files():
-    """Mark the files that no longer have the bytes that their jobs wrote."""
+def mark_noted_files():
+    """Mark the files of the ledger that are damaged, or were made from something else."""
     DAMAGED.update(finished_work().damage)
     for _, outputs in DAMAGED.values():
         rerun(outputs)
+    before_jobs_are_chosen(lambda: rerun(finished_work().outdated_outputs()))
 
 
 @cache
 def mark_stale_files(name):
-    """Mark the dataset's damaged or outdated files, so that Snakemake rebuilds them."""
+    """Mark damaged and outdated files, so that Snakemake rebuilds them.
+
+    Of the dataset those are among them of which nobody knows from what they were made.
+    """
     if not IS_MAIN_PROCESS:
         return
-    mark_damaged_files()
+    mark_noted_files()
     dataset = DATASETS[name]
     files = [*dataset.files, *dataset.intermediates]
-    rerun(filter(is_outdated, files))
+    known = finished_work()
+    rerun(file for file in files if file not in known and os.path.lexists(file))
     rerun(dataset.outgrown_records())
     if dataset.external_changed(ViewStore(STORE) if STORE else None):
         rerun([dataset.inventory])
     for path, problem in dataset.broken():
         DAMAGED.setdefault(path, (problem, files))
-
-
-def is_outdated(path):
-    """Return whether a file was made from something else, or nobody knows from what."""
-    jobs = finished_work()
-    if path in jobs:
-        return jobs.changed_input(path) is not None
-    return os.path.lexists(path)
 
 
 def damage_to_mend():

@@ -140,6 +140,10 @@ class Ledger:
                 }
                 _append(self._path, job._replace(files=files))
 
+    def outdated_outputs(self) -> Iterator[str]:
+        """Yield the outputs that were made from something else than their jobs would read now."""
+        return (output for output in self._inputs if self.changed_input(output) is not None)
+
     def changed_input(self, output: str) -> str | None:
         """Return an input that is no longer the one from which an output was made; None if none.
 
