@@ -290,7 +290,7 @@ def test_every_fault_in_every_kind_of_file_is_found(smoke, tmp_path, batch, monk
 
 # Every kind of obstacle is in these: they alone need Snakemake to see what is not there.
 @pytest.mark.slow
-@pytest.mark.parametrize("batch", [4, 10])
+@pytest.mark.parametrize("batch", [4, 9])
 def test_one_plain_run_mends_every_kind_of_file(smoke, tmp_path, batch, monkeypatch):
     damaged = Damaged(smoke, tmp_path, batch)
     journals = f"work/{CUBOID}/render"
