@@ -106,7 +106,18 @@ def mark_noted_files():
     DAMAGED.update(finished_work().damage)
     for _, outputs in DAMAGED.values():
         rerun(outputs)
-    before_jobs_are_chosen(lambda: rerun(finished_work().outdated_outputs()))
+    before_jobs_are_chosen(mark_outdated_files)
+
+
+def mark_outdated_files():
+    """Mark the files that were made from other files, or from other bytes of them, than now."""
+    known = finished_work()
+    rerun(known.outdated_outputs())
+    for job in all_jobs():
+        for output in map(unstored, job.output):
+            # From a storage a job's inputs need not lie here when they are noted.
+            if known.has_other_inputs(output, {*read_files(job)}, may_lack=bool(STORE)):
+                rerun([output])
 
 
 @cache
@@ -254,10 +265,14 @@ class JobNotes(logging.Handler):
         self.next_sending = began + 20 * (time.monotonic() - began)
 
 
+def read_files(job):
+    """Return the paths of the files that a job reads."""
+    return [unstored(file) for file in job.input if not is_ancient(file)]
+
+
 def read_stamps(job):
-    """Return the stamps of the files that a job reads, but for those whose content is not read."""
-    names = [unstored(file) for file in job.input if not is_ancient(file)]
-    return finished_work().input_stamps(names)
+    """Return the stamps of the files that a job reads."""
+    return finished_work().input_stamps(read_files(job))
 
 
 def stamps(digests):
