@@ -23,6 +23,7 @@ class LogHandler(LogHandlerBase):
             return
         job = {"rule": record.rule_name, "reason": record.reason, "cpus": record.threads}
         job |= {name: [str(file) for file in getattr(record, name)] for name in FILES}
+        job["command"] = record.shellcmd
         for name in ("mem_mb", "runtime", "gpu"):
             job[name] = record.resources.get(name)
         print(json.dumps(job), file=sys.stderr)
