@@ -342,7 +342,11 @@ ROUNDS = {
     "a reprojection to faces no longer": {
         "built": ("cube_map: true", "cube_map: false", {"cubes reprojected_lightfield"}),
     },
-    "no .blend": {"scene.blend": (None, None, {"fetch_brought"})},
+    # One that is gone is fetched again when a job needs it.
+    "a .blend to be fetched": {
+        "brought": (f"{0:064}", f"{1:064}", {"check_blend"}),
+        "scene.blend": (None, None, {"fetch_brought"}),
+    },
     "no panorama": {"built": ("panorama: true", "panorama: false", {"figures"})},
     "motion blur": {
         "built": ("samples: 4", "samples: 4, motion_blur: true", {"inventory"} | CAMERAS)
@@ -358,7 +362,9 @@ ROUNDS = {
     "another builder": {
         "built": ("builder: room", "builder: still_life", {"build_scene"} | CAMERAS)
     },
-    "another text of the builder": {ROOM: ('"""', '""" ', {"build_scene"} | CAMERAS)},
+    "another text of the builder": {
+        ROOM: ('"""', '""" ', {f"built {rule}" for rule in {"build_scene"} | CAMERAS}),
+    },
     "the resolution": {"built": ("[16, 16]", "[32, 32]", OF_PLANE | {"check_gpu"})},
     "a sequence": {
         "built": (
