@@ -110,20 +110,19 @@ def test_the_matrix_looks_where_the_rig_points() -> None:
 
 
 @pytest.mark.parametrize(
-    ("lens", "absent", "cycles", "impossible"),
+    ("lens", "absent", "impossible"),
     [
-        (FISHEYE, "z", "distance", "Z"),
-        (PERSPECTIVE, "z", "z", "none"),
-        (WIDE, "distance", "distance", "z"),
-        (PANORAMA, "distance", "distance", "z"),
+        (FISHEYE, "z", "Z"),
+        (PERSPECTIVE, "z", "none"),
+        (WIDE, "distance", "z"),
+        (PANORAMA, "distance", "z"),
     ],
 )
 def test_what_depth_means_follows_from_the_key_and_the_lens(
-    lens: lenses.Lens, absent: str, cycles: str, impossible: str
+    lens: lenses.Lens, absent: str, impossible: str
 ) -> None:
     rig = {"type": "plane", "cameras": [1, 1]}
     assert LightField.from_rig(rig, lens).depth == absent
-    assert LightField.from_rig(rig, lens).cycles_depth == cycles
     for depth in {absent, "distance", None}:
         assert LightField.from_rig(rig, lens, depth=depth).depth == depth
     with pytest.raises(UserError, match=f"^lightfield.json: depth: is '{impossible}'"):

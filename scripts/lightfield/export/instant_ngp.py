@@ -37,6 +37,7 @@ from lightfield.dataset.exports import BOUNDS_PIXELS, BOUNDS_VIEWS
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.view_store import ViewStore
 from lightfield.export.source import DEPTH_UNIT, Floats, check_size, depth_of, millimetres
+from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -223,7 +224,7 @@ class _Writer:
         progress = Progress(len(self.lightfield.views), "export")
         # The loader scales a depth by its ray's length, which is 1 along the axis for perspective
         # rays, and 1 itself for all others. A depth of 0 is none to it.
-        meaning = "z" if isinstance(self.lens, Rectilinear) else "distance"
+        meaning = conventional_depth(self.lens)
         frames = {}
         missing = []
         for view in self.lightfield.views:

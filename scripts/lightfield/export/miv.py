@@ -18,7 +18,7 @@ from lightfield.export import yuv
 from lightfield.export.disparity import depth_range, levels
 from lightfield.export.opendibr import projection
 from lightfield.export.source import Floats, Source
-from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.rotations import matrix_to_euler
 
 COLOUR_BITS, DEPTH_BITS = 10, 16
@@ -30,7 +30,7 @@ FROM_OMAF = np.array([[0.0, -1, 0], [0, 0, 1], [-1, 0, 0]])
 def export(source: Source, settings: Miv, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     lens = source.lens
-    meaning = "z" if isinstance(lens, Rectilinear) else "distance"
+    meaning = conventional_depth(lens)
     size = f"{lens.width}x{lens.height}"
     views = source.lightfield.views
     found = []

@@ -19,6 +19,7 @@ from lightfield.export import cameras
 from lightfield.export.points import lift, write_ply
 from lightfield.export.source import Source, millimetres
 from lightfield.export.splits import splits
+from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -30,7 +31,7 @@ POINT_CLOUD = "points.ply"
 def export(source: Source, settings: Nerfstudio, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     views = source.lightfield.views
-    meaning = "z" if isinstance(source.lens, Rectilinear) else "distance"
+    meaning = conventional_depth(source.lens)
     masked = any(not source.valid(view).all() for view in views)
     frames = []
     progress = Progress(len(views), "nerfstudio", "views")

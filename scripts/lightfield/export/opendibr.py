@@ -17,6 +17,7 @@ from lightfield.dataset.exports import FARTHEST, OpenDibr
 from lightfield.export import cameras, yuv
 from lightfield.export.disparity import depth_range, levels
 from lightfield.export.source import Floats, Source
+from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -31,7 +32,7 @@ BITS = {"png": (8, 16), "h265": (10, 12)}
 def export(source: Source, settings: OpenDibr, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     lens = source.lens
-    meaning = "z" if isinstance(lens, Rectilinear) else "distance"
+    meaning = conventional_depth(lens)
     colour_bits, depth_bits = BITS[settings.format]
     suffix = ".png" if settings.format == "png" else ".mp4"
     views = source.lightfield.views

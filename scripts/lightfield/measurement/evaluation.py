@@ -21,7 +21,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import whole
 from lightfield.dataset.lightfield import View
 from lightfield.export.source import Bools, Floats, Source, check_size
-from lightfield.geometry.depth import distance_from_z
+from lightfield.geometry.depth import stored_distance
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import decode_srgb, encode_srgb, tone_map
 from lightfield.measurement import metrics
@@ -215,7 +215,7 @@ def regions(source: Source, view: View, counted: Bools, depth: Floats | None) ->
     found = {"all": every, "centre": every & inner, "rim": every & ~inner}
     if depth is not None:
         # Towards the rim of a wide lens Z falls on any surface.
-        distance = distance_from_z(depth, rays) if source.lightfield.depth == "z" else depth
+        distance = stored_distance(depth, rays, source.lightfield.depth)
         known = np.where(np.isfinite(distance), distance, 1e9)
         near = minimum_filter(np.where(valid, known, np.inf), EDGE_PIXELS)
         far = maximum_filter(np.where(valid, known, 0), EDGE_PIXELS)

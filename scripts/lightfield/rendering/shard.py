@@ -238,7 +238,7 @@ def _render_views(
 
 def depth_rays(lightfield: LightField) -> Array | None:
     """Return the unit rays that turn Cycles' depth into the dataset's, or None if it is that."""
-    if lightfield.depth in (None, lightfield.cycles_depth):
+    if lightfield.depth in (None, depth.conventional_depth(lightfield.lens)):
         return None
     return lightfield.lens.pixel_rays()
 

@@ -121,7 +121,7 @@ def write(
         f"plenoforge:{name}": str(value) for name, value in job.settings.items()
     }
     if "exr" in outputs and image.depth is not None:
-        attributes[DEPTH_ATTRIBUTE] = "z" if target.lens.has_z_depth else "distance"
+        attributes[DEPTH_ATTRIBUTE] = target.lens.usual_depth
     for kind, path in outputs.items():
         match kind:
             case "exr":

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.geometry import depth as depth_conversion
+from lightfield.geometry.depth import stored_distance
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.nearest import Cameras
 
@@ -83,10 +83,9 @@ class Camera:
     def lift(self, depth: Array, columns: NDArray[np.int64], rows: NDArray[np.int64]) -> Array:
         """Return the world points (..., 3) that ``depth`` puts on the rays of the pixel centres."""
         rays = self.lens.rays(columns + 0.5, rows + 0.5)
-        if self.depth == "z":
-            depth = depth_conversion.distance_from_z(depth, rays)
+        distance = stored_distance(depth, rays, self.depth)
         with np.errstate(invalid="ignore"):
-            arms = rays * depth[..., np.newaxis]
+            arms = rays * distance[..., np.newaxis]
             points: Array = arms @ self.world_matrix[:3, :3].T + self.position
         return points
 
