@@ -18,7 +18,7 @@ from pathlib import Path
 SCRIPTS = shlex.quote(os.path.relpath(FOLDER / "scripts"))
 BENCHMARKS = shlex.quote(os.path.relpath(FOLDER / "benchmarks"))
 
-from lightfield.core import leftovers, room
+from lightfield.core import disk_space, leftovers
 from lightfield.core.failures import (
     batch_log,
     cause,

@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from lightfield.core.disk_space import write_problem
 from lightfield.core.errors import UserError
-from lightfield.core.room import write_problem
 
 
 @contextmanager

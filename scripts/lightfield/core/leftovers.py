@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from lightfield.core.room import SHARED_MEMORY
+from lightfield.core.disk_space import SHARED_MEMORY
 
 # Nobody calls a folder of his own so: it would be removed.
 PREFIX = "plenoforge-temporary-"

@@ -169,7 +169,7 @@ def enclosures(positions: Floats) -> list[Enclosure | None]:
 
     A camera is inside an object if most rays from it first meet that object's back. It is inside an
     open mesh if a third of the rays do and few meet its fronts; leaves would show both. It is then
-    in the mesh's bounding box, which for a plane has no room, and some ray leads out.
+    in the mesh's bounding box, which for a plane is flat, and some ray leads out.
     """
     depsgraph = bpy.context.evaluated_depsgraph_get()
     around_each: list[Enclosure | None] = []

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
+from lightfield.core.disk_space import gigabytes
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, read_problem, read_text
-from lightfield.core.room import gigabytes
 from lightfield.core.settings import FARTHEST, pattern
 from lightfield.geometry import colmap
 from lightfield.geometry.rigs.rig import Rig, UnitPoses
