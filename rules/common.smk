@@ -42,7 +42,7 @@ from lightfield.dataset.dataset import (
 )
 from lightfield.dataset.exports import MANIFEST, VIEWS
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
-from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.splits_file import SPLITS
 from lightfield.dataset.view_store import VARIABLE, ViewStore
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import Poses

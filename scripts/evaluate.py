@@ -13,7 +13,7 @@ from lightfield.core.cli import run, stops, white
 from lightfield.core.leftovers import temporary_folder
 from lightfield.dataset.exports import VIEWS
 from lightfield.export.source import Source
-from lightfield.export.splits import splits
+from lightfield.export.trainer_splits import splits
 from lightfield.report import evaluation_page
 
 # isort: split

@@ -13,7 +13,7 @@ from lightfield.core.cli import positive, run
 from lightfield.core.files import write_csv
 from lightfield.core.progress import Progress
 from lightfield.export.source import Source
-from lightfield.export.splits import splits
+from lightfield.export.trainer_splits import splits
 from lightfield.imaging import images, pictures
 from lightfield.measurement import summaries, synthesis_quality
 

@@ -23,7 +23,7 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.config import read_yaml
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.export.source import Source
-from lightfield.export.splits import splits
+from lightfield.export.trainer_splits import splits
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images, pictures
 from lightfield.imaging.video import video

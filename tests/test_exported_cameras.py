@@ -19,7 +19,7 @@ from lightfield import export
 from lightfield.core.files import read_json, write_json
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.splits import listed
+from lightfield.dataset.splits_file import splits_content
 from lightfield.export import MANIFESTS, instant_ngp
 from lightfield.export.source import Source
 from lightfield.validation import exported_cameras
@@ -641,7 +641,7 @@ def scene(tmp_path_factory):
     trained = folder / "around" / "transforms.json"
     write_instant_ngp(folder / "along", "views", ["--placed-as", str(trained)])
     lightfields = {n: LightField.read(folder / n / "lightfield.json") for n in ("around", "along")}
-    write_json(folder / "splits.json", listed(lightfields))
+    write_json(folder / "splits.json", splits_content(lightfields))
     return folder
 
 

@@ -38,7 +38,7 @@ from lightfield.dataset.dataset import check_external_files, scene_datasets
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.splits import listed
+from lightfield.dataset.splits_file import splits_content
 from lightfield.export import MANIFESTS
 from lightfield.export.source import Source
 from lightfield.geometry import lenses
@@ -47,7 +47,7 @@ from lightfield.imaging import images
 from lightfield.measurement import plan
 from lightfield.measurement.sampling import calibrated
 from lightfield.reprojection import lens_map
-from lightfield.validation import readers, splits
+from lightfield.validation import readers, splits_check
 
 TIMES = itertools.count(10**18, 10**6)
 # Files of each kind. The few take seconds, and belong to each run of the tests.
@@ -296,7 +296,7 @@ def read_export_list(path, _):
 
 def splits_of(_):
     camera = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [4, 4]})
-    return listed({"LFPlane": LightField.from_rig({**PLANE, "split": "train"}, camera)})
+    return splits_content({"LFPlane": LightField.from_rig({**PLANE, "split": "train"}, camera)})
 
 
 def read_splits(path, _):
@@ -304,7 +304,7 @@ def read_splits(path, _):
     folder.mkdir(exist_ok=True)
     camera = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [4, 4]})
     LightField.from_rig({**PLANE, "split": "train"}, camera).write(folder / "lightfield.json")
-    splits.check(path, folder, [])
+    splits_check.check(path, folder, [])
 
 
 def calibration(_):

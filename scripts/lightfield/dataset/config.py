@@ -42,7 +42,7 @@ from lightfield.geometry.lenses.cube_map import CubeMap
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
 from lightfield.geometry.rigs.rig import Frame
-from lightfield.geometry.rigs.split import PARTS, Chosen
+from lightfield.geometry.rigs.split_setting import PARTS, Chosen
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENES = ROOT / "configs" / "scenes"

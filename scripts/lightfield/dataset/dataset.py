@@ -35,14 +35,14 @@ from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
 from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.keys import scene_fingerprint
 from lightfield.dataset.lightfield import OMNIDIRECTIONAL
-from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.splits_file import SPLITS
 from lightfield.dataset.view_store import ViewStore
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.overview import sees_all_round
 from lightfield.geometry.rigs import BlendCamera, Poses, Random, Rig
-from lightfield.geometry.rigs.split import PARTS
+from lightfield.geometry.rigs.split_setting import PARTS
 
 # For planning only, measured on one core of a 2-core x86-64 machine: path tracing of one sample of
 # one pixel, and start-up (bpy, the scene, and Cycles' acceleration structures).

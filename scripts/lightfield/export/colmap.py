@@ -31,7 +31,7 @@ from lightfield.export.points import (
     observations,
 )
 from lightfield.export.source import Source
-from lightfield.export.splits import splits
+from lightfield.export.trainer_splits import splits
 from lightfield.geometry.colmap import pose
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear

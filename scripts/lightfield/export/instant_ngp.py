@@ -41,7 +41,7 @@ from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
-from lightfield.geometry.rigs.split import PARTS
+from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.imaging import images
 from lightfield.validation.files import Manifest

@@ -16,7 +16,7 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.exports import NerfSynthetic
 from lightfield.export import cameras
 from lightfield.export.source import Source
-from lightfield.export.splits import splits
+from lightfield.export.trainer_splits import splits
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
 

@@ -18,7 +18,7 @@ from lightfield.dataset.exports import Nerfstudio
 from lightfield.export import cameras
 from lightfield.export.points import lift, write_ply
 from lightfield.export.source import Source, millimetres
-from lightfield.export.splits import splits
+from lightfield.export.trainer_splits import splits
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular

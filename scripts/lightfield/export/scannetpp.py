@@ -15,7 +15,7 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.exports import ScanNetPP
 from lightfield.export.colmap import model
 from lightfield.export.source import Source
-from lightfield.export.splits import splits
+from lightfield.export.trainer_splits import splits
 from lightfield.imaging import images
 
 IMAGES = "image_undistorted_fisheye"

@@ -12,7 +12,7 @@ from lightfield.core.files import whole
 from lightfield.dataset import blend
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW
-from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.splits_file import SPLITS
 from lightfield.export import transforms
 from lightfield.geometry import rigs
 from lightfield.geometry.lenses import Lens

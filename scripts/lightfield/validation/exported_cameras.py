@@ -16,10 +16,10 @@ from numpy.polynomial import Polynomial
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import NAME, LightField, View
-from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.splits_file import SPLITS
 from lightfield.geometry import rotations
 from lightfield.geometry.lenses import Lens
-from lightfield.geometry.rigs.split import PARTS
+from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.validation import unit_cube
 from lightfield.validation.files import ImageSet, Manifest, lists_of
 from lightfield.validation.readers import read

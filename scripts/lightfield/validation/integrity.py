@@ -26,7 +26,7 @@ from lightfield.dataset import ledger, records
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
-from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.splits_file import SPLITS
 from lightfield.validation.files import CARD, IMAGES, README, REPORT, SUMS, read_sums
 
 # Made as the work went on, and of it alone: nothing can make them again, and no dataset needs them.

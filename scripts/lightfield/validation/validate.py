@@ -33,8 +33,8 @@ from lightfield.validation import (
     geometry,
     machines,
     pixels,
+    splits_check,
 )
-from lightfield.validation import splits as validation_splits
 from lightfield.validation.consistency import Answer
 from lightfield.validation.depth_questions import Question
 from lightfield.validation.exported_depth import ExportedDepth
@@ -75,7 +75,7 @@ def validate(
     # What does not follow from the images comes first: a wrong file of it costs no hours.
     written = [sums for record in records for sums in read_record(record).items()]
     cameras = files.clearance(clearance, sets)
-    split = [validation_splits.check(splits, dataset, sets)] if splits else []
+    split = [splits_check.check(splits, dataset, sets)] if splits else []
     of_cameras, exported = exported_cameras.check(dataset, sets, manifests, wanted)
     checks += of_cameras
     exported_depth = ExportedDepth(dataset, sets, exported)
