@@ -21,7 +21,7 @@ from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.splits_file import splits_content
 from lightfield.export import MANIFESTS, instant_ngp
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.validation import exported_cameras
 from lightfield.validation.exported_depth import ExportedDepth
 from lightfield.validation.files import File, read_sets
@@ -103,7 +103,7 @@ def home(folder, name):
 
 def write_export(folder, name, kind, options, beside=None):
     settings = TypeAdapter(settings_of(kind)).validate_python({"sources": [name], **options})
-    source = Source(folder, "" if name == "views" else name, ".exr", beside or {})
+    source = SourceDataset(folder, "" if name == "views" else name, ".exr", beside or {})
     export.run(kind, source, settings, home(folder, name) / "exports" / kind)
 
 

@@ -40,7 +40,7 @@ from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.splits_file import splits_content
 from lightfield.export import MANIFESTS
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.geometry import lenses
 from lightfield.geometry.rigs import from_settings
 from lightfield.imaging import images
@@ -634,7 +634,7 @@ def test_a_damaged_export_is_read_or_refused(kind, count, tmp_path):
         {"sources": ["views"]} | EXPORTS[kind]
     )
     folder = tmp_path / "export"
-    export.run(kind, Source(source, "", ".exr", {}), settings, folder)
+    export.run(kind, SourceDataset(source, "", ".exr", {}), settings, folder)
     listed = folder / "export.json"
 
     def read(path, _):

@@ -18,7 +18,7 @@ from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.splits_file import splits_content
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
 from lightfield.geometry import rigs
 from lightfield.validation import splits_check
@@ -134,7 +134,7 @@ def scene(tmp_path_factory):
 def exported(scene, name, folder, **options):
     settings = TypeAdapter(settings_of(name)).validate_python({"sources": ["small"], **options})
     beside = {rig: scene / rig for rig in ("near", "along")}
-    export.run(name, Source(scene / "around", "small", ".exr", beside), settings, folder)
+    export.run(name, SourceDataset(scene / "around", "small", ".exr", beside), settings, folder)
     return folder
 
 
@@ -178,7 +178,7 @@ def test_points_come_from_the_views_to_train_on_alone(scene, tmp_path):
 
 def test_points_of_a_rig_that_only_tests_come_from_all_its_views(scene, tmp_path):
     settings = settings_of("point_cloud")(sources=["small"], voxel=0.1)
-    export.run("point_cloud", Source(scene / "along", "small", ".exr"), settings, tmp_path)
+    export.run("point_cloud", SourceDataset(scene / "along", "small", ".exr"), settings, tmp_path)
     assert len(ply(tmp_path / "points.ply")[0])
 
 

@@ -28,7 +28,7 @@ from lightfield.dataset.config import (
     Configuration,
     Preset,
     Render,
-    Source,
+    SceneSource,
     TargetError,
 )
 from lightfield.dataset.exports import MANIFEST, VIEWS, Exports
@@ -87,7 +87,7 @@ class Dataset:
     preset: str
     rig_name: str
     rig_folder: str
-    source: Source
+    source: SceneSource
     render: dict[str, Any]
     rig: Rig
     reprojections: dict[str, config.Reprojection]

@@ -30,7 +30,7 @@ from lightfield.export.points import (
     lift_one_each,
     observations,
 )
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
 from lightfield.geometry.colmap import pose
 from lightfield.geometry.lenses import Lens
@@ -44,7 +44,7 @@ PINHOLE, OPENCV_FISHEYE = (1, "PINHOLE"), (5, "OPENCV_FISHEYE")
 TESTS = "test.txt"
 
 
-def export(source: Source, settings: Colmap, folder: Path) -> None:
+def export(source: SourceDataset, settings: Colmap, folder: Path) -> None:
     """Write the model of a source's views into ``folder``."""
     if problem := cameras.misreading(source.lens):
         print(f"warning: {source.lightfield.path}: camera: {problem}", file=sys.stderr)
@@ -67,7 +67,7 @@ def export(source: Source, settings: Colmap, folder: Path) -> None:
         progress.done()
 
 
-def model(source: Source, count: int) -> "Model":
+def model(source: SourceDataset, count: int) -> "Model":
     """Lift ``count`` points, and return them with the views that see each; print how many.
 
     A view that sees none of them gets one more of its own surface, for gsplat's depth loss ends in
@@ -103,7 +103,7 @@ class Model:
 
     def __init__(
         self,
-        source: Source,
+        source: SourceDataset,
         points: Points,
         seen: Sequence[Observations],
         kept: NDArray[np.intp],
@@ -194,7 +194,7 @@ def _write(path: Path, parts: Iterable[bytes]) -> None:
         file.writelines(parts)
 
 
-def _write_depth(path: Path, source: Source, view: View) -> None:
+def _write_depth(path: Path, source: SourceDataset, view: View) -> None:
     depth = source.depth(view, "z")
     known = np.where(np.isfinite(depth), depth, 0).astype("<f4")
     height, width = known.shape

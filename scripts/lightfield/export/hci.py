@@ -18,13 +18,13 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.exports import Hci
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.export import cameras
-from lightfield.export.source import Floats, Source
+from lightfield.export.source import Floats, SourceDataset
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 FOCUS = 1e9  # metres
 
 
-def export(source: Source, settings: Hci, folder: Path) -> None:
+def export(source: SourceDataset, settings: Hci, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     views, columns, baseline = grid(source.lightfield)
     lens = source.lens
@@ -75,7 +75,11 @@ def grid(lightfield: LightField) -> tuple[list[View], int, float]:
 
 
 def parameters(
-    source: Source, middle: View, size: tuple[int, int], baseline: float, disparities: list[float]
+    source: SourceDataset,
+    middle: View,
+    size: tuple[int, int],
+    baseline: float,
+    disparities: list[float],
 ) -> str:
     """Return the text of parameters.cfg; ``baseline`` is in metres."""
     lens = source.lens

@@ -17,7 +17,7 @@ from lightfield.dataset.exports import Miv
 from lightfield.export import yuv
 from lightfield.export.disparity import depth_range, levels
 from lightfield.export.opendibr import projection
-from lightfield.export.source import Floats, Source
+from lightfield.export.source import Floats, SourceDataset
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.rotations import matrix_to_euler
 
@@ -27,7 +27,7 @@ COLOUR_BITS, DEPTH_BITS = 10, 16
 FROM_OMAF = np.array([[0.0, -1, 0], [0, 0, 1], [-1, 0, 0]])
 
 
-def export(source: Source, settings: Miv, folder: Path) -> None:
+def export(source: SourceDataset, settings: Miv, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     lens = source.lens
     meaning = conventional_depth(lens)

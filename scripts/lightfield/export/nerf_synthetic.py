@@ -15,13 +15,13 @@ from lightfield.core.files import write_json
 from lightfield.core.progress import Progress
 from lightfield.dataset.exports import NerfSynthetic
 from lightfield.export import cameras
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
 
 
-def export(source: Source, settings: NerfSynthetic, folder: Path) -> None:
+def export(source: SourceDataset, settings: NerfSynthetic, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     lens = source.lens
     assert isinstance(lens, Rectilinear)

@@ -17,7 +17,7 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.exports import Nerfstudio
 from lightfield.export import cameras
 from lightfield.export.points import lift, write_ply
-from lightfield.export.source import Source, millimetres
+from lightfield.export.source import SourceDataset, millimetres
 from lightfield.export.trainer_splits import splits
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
@@ -28,7 +28,7 @@ from lightfield.imaging import images
 POINT_CLOUD = "points.ply"
 
 
-def export(source: Source, settings: Nerfstudio, folder: Path) -> None:
+def export(source: SourceDataset, settings: Nerfstudio, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     views = source.lightfield.views
     meaning = conventional_depth(source.lens)

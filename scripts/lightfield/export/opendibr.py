@@ -16,7 +16,7 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.exports import FARTHEST, OpenDibr
 from lightfield.export import cameras, yuv
 from lightfield.export.disparity import depth_range, levels
-from lightfield.export.source import Floats, Source
+from lightfield.export.source import Floats, SourceDataset
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
@@ -29,7 +29,7 @@ TO_OPENGL = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 BITS = {"png": (8, 16), "h265": (10, 12)}
 
 
-def export(source: Source, settings: OpenDibr, folder: Path) -> None:
+def export(source: SourceDataset, settings: OpenDibr, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     lens = source.lens
     meaning = conventional_depth(lens)

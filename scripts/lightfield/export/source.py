@@ -29,7 +29,7 @@ DEPTH_UNIT = 0.001
 
 
 @dataclass(frozen=True)
-class Source:
+class SourceDataset:
     """The views of a dataset folder: the rendered ones (``name`` "") or those of a reprojection.
 
     ``beside`` are the folders of the rigs whose views test what is trained on these, by the rigs'

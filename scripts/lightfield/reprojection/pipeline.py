@@ -16,7 +16,7 @@ from lightfield.reprojection import lens_map
 from lightfield.reprojection.job import Job, SourceView
 from lightfield.reprojection.lens_arguments import Target
 from lightfield.reprojection.passes import write_pass
-from lightfield.reprojection.pixels import Source, write
+from lightfield.reprojection.pixels import SourcePixels, write
 
 
 def run(job: Job) -> None:
@@ -96,7 +96,7 @@ def reproject_view(job: Job, view: SourceView) -> list[Path]:
             todo.append((index, target, key))
     if todo:
         _check(job, view)
-        source = Source(job, view, [job.maps[index].window for index, *_ in todo])
+        source = SourcePixels(job, view, [job.maps[index].window for index, *_ in todo])
         for index, target, key in todo:
             write(job, target, job.maps[index], source, job.outputs(view, target), key)
             for wanted, path in job.pass_outputs(view, target).items():
