@@ -1,8 +1,8 @@
 """The files with which each consumer opens a dataset: one module a format.
 
 Each module has ``export(source, settings, folder)``, which writes the views of a
-`source.SourceDataset` into ``folder``. Its settings are in `lightfield.dataset.exports`. `run` calls
-the module of a name, and lists the files in the folder's export.json, which validation checks.
+`source.SourceDataset` into ``folder``. Its settings are in `lightfield.dataset.exports`. `run`
+calls the module, and lists its files in the folder's export.json, which validation checks.
 instant-ngp's files lie beside the views, and have a program of their own.
 """
 
