@@ -58,8 +58,7 @@ def validate(
     """Check a dataset's files, and what its pixels must satisfy.
 
     - ``reprojections``: folders in the dataset.
-    - ``records``: JSON files of what was rendered (``files``: relative path: ``bytes``,
-      ``sha256``).
+    - ``records``: JSON files of what was rendered (``files``: path: ``bytes``, ``sha256``).
     - ``clearance``: a JSON file of what surrounds each camera (``views``: name: ``distance`` in
       metres, ``inside``).
     - ``inventory``: a JSON file of what the scene contains.
@@ -76,8 +75,7 @@ def validate(
     views, presence_checks = files.of_views(dataset, sets)
     passes, missing_passes = files.of_passes(dataset, sets)
     extras, export_files, exports_check = files.of_exports(dataset, sets, views, manifests, wanted)
-    # These need no images. They come first, so that a wrong file stops the run before hours of
-    # reading.
+    # What needs no images comes first: a wrong file stops the run before hours of reading.
     recorded_sums = _recorded_sums(records)
     cameras_check = files.clearance(clearance, sets)
     splits_checks = [splits_check.check(splits, dataset, sets)] if splits else []
@@ -95,13 +93,12 @@ def validate(
     if passes or missing_passes:
         checks.append(pixels.of_passes({file: facts[file] for file in passes}, missing_passes))
     checks.append(pixels.with_extras(exports_check, {file: facts[file] for file in extras}))
-    digests, files_check, sums_check = _check_files(
+    digests, files_checks = _check_files(
         dataset, sets, facts, export_files, recorded_sums, noted or {}
     )
     if len(sets) <= len(reprojections):
-        reason = "a lightfield.json that cannot be understood lists no files"
-        files_check = Check("files", None, reason)
-    checks += [files_check, sums_check, cameras_check, *splits_checks]
+        files_checks[0] = UNLISTED
+    checks += [*files_checks, cameras_check, *splits_checks]
     rendered = files.rendered(sets)
     return Result(
         f"{dataset.parent.name}/{dataset.name}",
@@ -114,6 +111,10 @@ def validate(
 Mapped = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
 Sums = dict[str, tuple[int, str]]
 """The size in bytes and the SHA-256 of files, by their paths in the dataset."""
+
+
+# Of a dataset whose sets could not all be read.
+UNLISTED = Check("files", None, "a lightfield.json that cannot be understood lists no files")
 
 
 def _recorded_sums(records: Sequence[Path]) -> Sums | None:
@@ -155,7 +156,7 @@ def _check_files(
     export_files: Sequence[str],
     recorded_sums: Sums | None,
     noted: Mapping[str, str],
-) -> tuple[dict[str, str], Check, Check]:
+) -> tuple[dict[str, str], list[Check]]:
     """Return the SHA-256 of each published file, and the checks of the files and of their sums."""
     sums = {file.path: (fact.bytes, fact.checksum) for file, fact in facts.items()}
     sums |= _sums_of_names(dataset, sets)
@@ -164,7 +165,7 @@ def _check_files(
         path: sums[path][1] if path in sums else sha256(dataset / path) for path in published
     }
     altered = files.altered(digests, noted)
-    return digests, files_check, files.checksums(recorded_sums, sums, sets, altered)
+    return digests, [files_check, files.checksums(recorded_sums, sums, sets, altered)]
 
 
 def _sums_of_names(dataset: Path, sets: Sequence[ImageSet]) -> Sums:
