@@ -5,7 +5,7 @@ from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import whole, write_json
+from lightfield.core.files import absolute_path, write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.splits_file import splits_content
 
@@ -16,11 +16,11 @@ def main() -> None:
     parser.add_argument("--output", type=Path, required=True, help="splits.json to write")
     arguments = parser.parse_args()
 
-    scene = whole(arguments.output).parent
+    scene = absolute_path(arguments.output).parent
     lightfields: dict[str, LightField] = {}
     for path in arguments.lightfields:
         lightfield = LightField.read(path)
-        folder = whole(path).parent
+        folder = absolute_path(path).parent
         if not folder.is_relative_to(scene):
             raise UserError(f"{lightfield.path}: must be in {scene}, where --output is")
         lightfields[folder.relative_to(scene).as_posix()] = lightfield

@@ -51,8 +51,8 @@ def main() -> None:
     if arguments.output:
         remove_leftovers(arguments.dataset)
     elif not arguments.reprojection:
-        found = sorted(arguments.dataset.glob(f"*/{NAME}"))
-        arguments.reprojection = [path.parent.name for path in found]
+        lightfields = sorted(arguments.dataset.glob(f"*/{NAME}"))
+        arguments.reprojection = [path.parent.name for path in lightfields]
     wanted = arguments.exports and [path.resolve() for path in arguments.exports]
     if arguments.removed:
         count = remove_strays(

@@ -71,5 +71,5 @@ def batch_log(name: str, since: float) -> Path | None:
     """
     folder = Path(".snakemake")
     logs = [*folder.glob(f"slurm_logs/*_{name}/**/*.log"), *folder.glob(f"{name}-*.log")]
-    found = [log for log in logs if is_newer(log, since)]
-    return max(found, key=lambda log: log.stat().st_mtime, default=None)
+    new_logs = [log for log in logs if is_newer(log, since)]
+    return max(new_logs, key=lambda log: log.stat().st_mtime, default=None)

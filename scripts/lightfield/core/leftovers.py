@@ -48,21 +48,21 @@ def remove(folders: Iterable[Path] = ()) -> list[Path]:
 
     That is files on their way in ``folders`` and below, and temporary folders of this machine.
     """
-    found = [path for folder in folders for path in _files(folder)]
-    for path in found:
+    removed = [path for folder in folders for path in _files(folder)]
+    for path in removed:
         path.unlink(missing_ok=True)
     for parent in {Path(tempfile.gettempdir()), SHARED_MEMORY}:
         for path in parent.glob(f"{PREFIX}*"):
             if path.is_dir() and _is_old(path, FOLDER_AGE) and not _is_in_use(path):
                 shutil.rmtree(path, ignore_errors=True)
-                found.append(path)
+                removed.append(path)
         for path in parent.glob(BLENDERS):
             if path.is_dir() and _is_old(path, BLENDER_AGE):
                 # One that is not empty stays.
                 with suppress(OSError):
                     path.rmdir()
-                    found.append(path)
-    return found
+                    removed.append(path)
+    return removed
 
 
 def _files(folder: Path) -> Iterator[Path]:

@@ -52,8 +52,8 @@ def export(source: SourceDataset, settings: Colmap, folder: Path) -> None:
     if any(view.split for view in views):
         tests = [f"{view.name}.png\n".encode() for view in splits(source.lightfield).test]
         _write(folder / "sparse" / "0" / TESTS, tests)
-    found = model(source, settings.points)
-    write = found.write_binary if settings.format == "binary" else found.write_text
+    colmap_model = model(source, settings.points)
+    write = colmap_model.write_binary if settings.format == "binary" else colmap_model.write_text
     write(folder / "sparse" / "0")
     progress = Progress(len(views), "colmap", "views")
     for view in views:
@@ -113,11 +113,11 @@ class Model:
         self.points = points.chosen(kept)
         number = np.zeros(len(points.positions), np.int64)
         number[kept] = np.arange(1, len(kept) + 1)
-        self.seen = [
-            Observations(number[o.indices][known], o.pixels[known])
-            for o in seen
-            for known in [number[o.indices] > 0]
-        ]
+        self.seen = []
+        for observations in seen:
+            numbers = number[observations.indices]
+            is_kept = numbers > 0
+            self.seen.append(Observations(numbers[is_kept], observations.pixels[is_kept]))
 
     def tracks(self) -> Iterator[list[tuple[int, int]]]:
         """Yield each point's (image, index among the image's points)."""

@@ -36,7 +36,7 @@ def export(source: SourceDataset, settings: OpenDibr, folder: Path) -> None:
     colour_bits, depth_bits = BITS[settings.format]
     suffix = ".png" if settings.format == "png" else ".mp4"
     views = source.lightfield.views
-    found: list[dict[str, Any]] = [viewport(source.lightfield.matrices)]
+    camera_entries: list[dict[str, Any]] = [viewport(source.lightfield.matrices)]
     progress = Progress(len(views), "opendibr", "views")
     for view in views:
         depth = source.depth(view, meaning)
@@ -52,7 +52,7 @@ def export(source: SourceDataset, settings: OpenDibr, folder: Path) -> None:
             frame = yuv.of_colour(source.encoded(view), colour_bits)
             yuv.write_hevc(texture, frame, size, colour_bits)
             yuv.write_hevc(map_of_depth, yuv.of_levels(disparity, depth_bits), size, depth_bits)
-        found.append(
+        camera_entries.append(
             {
                 "NameColor": names[0],
                 "NameDepth": names[1],
@@ -65,7 +65,7 @@ def export(source: SourceDataset, settings: OpenDibr, folder: Path) -> None:
             }
         )
         progress.done()
-    write_json(folder / "cameras.json", {"Axial_system": "OPENGL", "cameras": found})
+    write_json(folder / "cameras.json", {"Axial_system": "OPENGL", "cameras": camera_entries})
 
 
 def pose(matrix: Floats) -> dict[str, list[float]]:

@@ -50,9 +50,9 @@ def lift(source: SourceDataset, count: int | None = None, voxel: float | None = 
     progress = Progress(len(views), "points", "views")
     kept: Points | None = None
     for view, surface in source.surfaces(views):
-        found = _points_of(source, view, surface, step)
+        points = _points_of(source, view, surface, step)
         # With a voxel, memory stays that of the cloud, however many views there are.
-        kept = joined([kept, found]) if kept else found
+        kept = joined([kept, points]) if kept else points
         if voxel:
             kept = kept.chosen(_one_a_voxel(kept.positions, voxel))
         progress.done()
@@ -81,16 +81,16 @@ def _points_of(source: SourceDataset, view: View, surface: Surface, step: int) -
 
 def observations(source: SourceDataset, points: Points) -> list[Observations]:
     """Return what each view sees of the points: those in its frame that no surface hides."""
-    found = []
+    seen_points = []
     progress = Progress(len(source.lightfield.views), "tracks", "views")
     for view, surface in source.surfaces(source.lightfield.views):
         local = (points.positions - view.matrix[:3, 3]) @ view.matrix[:3, :3]
         column, row, inside = pixel_indices(source.lens, local)
         inside &= source.valid(view)[row, column] & surface.sees(points.positions)
         indices = np.flatnonzero(inside)
-        found.append(Observations(indices, source.lens.pixels(local[indices])))
+        seen_points.append(Observations(indices, source.lens.pixels(local[indices])))
         progress.done()
-    return found
+    return seen_points
 
 
 def write_ply(path: Path, points: Points) -> None:

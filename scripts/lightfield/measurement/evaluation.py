@@ -18,7 +18,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import whole
+from lightfield.core.files import absolute_path
 from lightfield.dataset.lightfield import View
 from lightfield.export.source import Bools, Floats, SourceDataset, check_size
 from lightfield.geometry.depth import stored_distance
@@ -75,7 +75,7 @@ def _rig_names(source: SourceDataset) -> list[str]:
     The folder of a frame lies in the rig's. A package unfolds to <scene>_<rig>, where a preset may
     stand between.
     """
-    folder = whole(source.dataset)
+    folder = absolute_path(source.dataset)
     if re.fullmatch(r"f\d{5,}", folder.name):
         folder = folder.parent
     lightfield = source.lightfield

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.files import whole
+from lightfield.core.files import absolute_path
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
 from lightfield.export.source import SourceDataset
@@ -138,7 +138,7 @@ def compare(
             yield {
                 "variant": variant.name,
                 "value": variant.value,
-                "truth": whole(truth.dataset).name,
+                "truth": absolute_path(truth.dataset).name,
                 "view": view.name,
                 "to_edge": to_edge,
                 "place": next(name for name, most in PLACES.items() if to_edge <= most),

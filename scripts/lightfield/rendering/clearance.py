@@ -149,12 +149,12 @@ def free_places(rig: Random) -> Floats:
     progress = Progress(rig.count, "places", "cameras")
     for number in range(_TRIES):
         left = np.flatnonzero(np.isnan(places[:, 0]))
-        tried = np.array([rig.candidate(int(view), number) for view in left])
-        world = rig.to_world(tried)
+        candidates = np.array([rig.candidate(int(view), number) for view in left])
+        world = rig.to_world(candidates)
         free = clearances(world, rig.clearance) >= rig.clearance
         inside = [name not in {None, *rooms} for name in _objects_around(enclosures(world))]
         free &= ~np.array(inside)
-        places[left[free]] = tried[free]
+        places[left[free]] = candidates[free]
         progress.done(int(free.sum()))
         if free.all():
             return places

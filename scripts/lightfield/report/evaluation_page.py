@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import whole, write_csv
+from lightfield.core.files import absolute_path, write_csv
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import View
 from lightfield.export.source import Floats, SourceDataset
@@ -55,8 +55,8 @@ def write(
     page.write(
         output / "index.html",
         "evaluation.html.j2",
-        name="/".join(whole(source.dataset).parts[-2:]),
-        renders=whole(renders).name,
+        name="/".join(absolute_path(source.dataset).parts[-2:]),
+        renders=absolute_path(renders).name,
         means=means,
         rows=rows,
         background=evaluation.hexadecimal(background),

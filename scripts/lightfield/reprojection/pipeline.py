@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import keep_apart, sha256, whole
+from lightfield.core.files import absolute_path, keep_apart, sha256
 from lightfield.core.progress import Progress
 from lightfield.imaging.images import KEY_ATTRIBUTE, read_header
 from lightfield.reprojection import lens_map
@@ -107,7 +107,7 @@ def reproject_view(job: Job, view: SourceView) -> list[Path]:
 def _check(job: Job, view: SourceView) -> None:
     """Raise `UserError` for a source that is not as the record of those who made it says."""
     for path in job.sources(view):
-        expected = job.source_sums.get(f"{whole(path).parent.name}/{path.name}")
+        expected = job.source_sums.get(f"{absolute_path(path).parent.name}/{path.name}")
         if expected and sha256(path) != expected:
             raise UserError(
                 f"{path}: is not as it was written, {job.arguments.source_record} says; "

@@ -233,9 +233,9 @@ def _of_passes(sets: Sequence[ImageSet]) -> list[File]:
 
 def names(sets: Sequence[ImageSet]) -> list[str]:
     """Return the files in which what is rendered has its numbers."""
-    own = rendered(sets)
-    found = own.lightfield.passes if own else []
-    return [f"{each.name}/{NAMES}" for each in found if each.kind == "id"]
+    rendered_set = rendered(sets)
+    passes = rendered_set.lightfield.passes if rendered_set else []
+    return [f"{each.name}/{NAMES}" for each in passes if each.kind == "id"]
 
 
 def lists_of(
@@ -321,12 +321,12 @@ def _sorted_out(
     dataset: Path, sets: Sequence[ImageSet], known: Iterable[str]
 ) -> tuple[list[str], list[str]]:
     """Return the files that the dataset publishes, and those that are not its own."""
-    own = {*known, *(f"{image_set.prefix}{NAME}" for image_set in sets)}
+    owned = {*known, *(f"{image_set.prefix}{NAME}" for image_set in sets)}
     paths = [path.relative_to(dataset) for path in dataset.rglob("*") if path.is_file()]
     present = sorted(path.as_posix() for path in paths if path.parts[0] != REPORT)
     beside = (*OUTPUTS, README, CARD)
-    strays = [path for path in present if path not in own and path not in beside]
-    return [path for path in present if path in own], strays
+    strays = [path for path in present if path not in owned and path not in beside]
+    return [path for path in present if path in owned], strays
 
 
 def remove_strays(
@@ -386,10 +386,10 @@ def checksums(
         elif digest != found[path][1]:
             faults[path] = f"has the sha256 {found[path][1]}, but its record says {digest}"
     # Masks and pictures for trainers are not the renderer's.
-    own = rendered(sets)
-    views = own.views if own else []
+    rendered_set = rendered(sets)
+    views = rendered_set.views if rendered_set else []
     own_files = [f"{IMAGES}/{view}.exr" for view in views]
-    own_files += [file.path for file in _of_passes(sets[:1])] if own else []
+    own_files += [file.path for file in _of_passes(sets[:1])] if rendered_set else []
     for path in sorted(own_files):
         if path in found and path not in recorded:
             faults[path] = "has no record"
@@ -421,8 +421,8 @@ def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:
         }
     except (LookupError, TypeError, ValueError, AttributeError):
         raise UserError(f"{path}: views: must map names to distance and inside") from None
-    own = rendered(sets)
-    views = own.views if own else []
+    rendered_set = rendered(sets)
+    views = rendered_set.views if rendered_set else []
     faults = {}
     for view in views:
         if view not in around:

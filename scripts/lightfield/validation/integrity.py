@@ -14,13 +14,13 @@ from pathlib import Path
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import (
+    absolute_path,
     broken,
     read_json,
     read_json_lines,
     read_problem,
     set_aside,
     sha256,
-    whole,
 )
 from lightfield.dataset import ledger, records
 from lightfield.dataset.exports import MANIFEST
@@ -52,7 +52,7 @@ class Integrity:
         self.dataset = Path(os.path.relpath(dataset))
         self.work = Path(os.path.relpath(work)) if work else None
         # A sequence's datasets lie a folder deeper, one for each frame.
-        folder = whole(dataset)
+        folder = absolute_path(dataset)
         depth = 3 if re.fullmatch(r"f\d{5,7}", folder.name) else 2
         self._name = "/".join(folder.parts[-depth:])
         self._scene = folder.parts[-depth]
@@ -200,10 +200,10 @@ class Integrity:
         if problem := broken(path):
             return problem
         try:
-            found = sha256(path)
+            actual = sha256(path)
         except OSError as error:
             return f"cannot be read: {read_problem(error)}"
-        return None if found == digest else f"its sha256 is {found}, but {source} says {digest}"
+        return None if actual == digest else f"its sha256 is {actual}, but {source} says {digest}"
 
     def _present(self) -> Iterator[Path]:
         """Yield the dataset's files, those of its report only with the ledger, which has them."""

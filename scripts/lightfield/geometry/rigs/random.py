@@ -53,12 +53,12 @@ class Random(CountedRig):
         if self.file is None:
             places = np.stack([self.candidate(view, 0) for view in range(self.count)])
         else:
-            places = self._found()
+            places = self._places_from_file()
         directions = [self._numbers(view)[0] for view in range(self.count)]
         azimuth = 2 * np.pi * np.array(directions)
         return UnitPoses.of_sides(("", places, stack(np.pi / 2, 0.0, azimuth)))
 
-    def _found(self) -> Floats:
+    def _places_from_file(self) -> Floats:
         places = read_keys(str(self.file), "free_places.py", "box", "places")["places"]
         try:
             found = np.array(places, float)
