@@ -96,9 +96,9 @@ Name = Annotated[
 ]
 
 
-def suggestion(name: str, known: Iterable[str]) -> str:
+def suggestion(name: str, allowed: Iterable[str]) -> str:
     """Return ``; did you mean …?``, or nothing where no name that is known is near."""
-    close = difflib.get_close_matches(name, list(known), n=1)
+    close = difflib.get_close_matches(name, list(allowed), n=1)
     return f"; did you mean {close[0]}?" if close else ""
 
 
@@ -186,11 +186,11 @@ def _allowed(error: ErrorDetails) -> str:
             return "be a list"
         case "literal_error":
             return f"be {error['ctx']['expected']}".replace("'", "")
-    for name, words in _BOUNDS.items():
+    for name, comparison in _BOUNDS.items():
         if name in error.get("ctx", {}):
             bound = error["ctx"][name]
             if isinstance(bound, int):
-                return f"be a whole number {words} {bound}"
-            return f"be a number {words} {bound:.10g}"
+                return f"be a whole number {comparison} {bound}"
+            return f"be a number {comparison} {bound:.10g}"
     text = re.sub(r"^\w+ should ", "", error["msg"])
     return re.sub(r" after validation, not .*", "", text)

@@ -114,10 +114,10 @@ class Model:
         number = np.zeros(len(points.positions), np.int64)
         number[kept] = np.arange(1, len(kept) + 1)
         self.seen = []
-        for observations in seen:
-            numbers = number[observations.indices]
+        for of_view in seen:
+            numbers = number[of_view.indices]
             is_kept = numbers > 0
-            self.seen.append(Observations(numbers[is_kept], observations.pixels[is_kept]))
+            self.seen.append(Observations(numbers[is_kept], of_view.pixels[is_kept]))
 
     def tracks(self) -> Iterator[list[tuple[int, int]]]:
         """Yield each point's (image, index among the image's points)."""
@@ -196,6 +196,6 @@ def _write(path: Path, parts: Iterable[bytes]) -> None:
 
 def _write_depth(path: Path, source: SourceDataset, view: View) -> None:
     depth = source.depth(view, "z")
-    known = np.where(np.isfinite(depth), depth, 0).astype("<f4")
-    height, width = known.shape
-    _write(path, [f"{width}&{height}&1&".encode(), known.tobytes()])
+    finite_depth = np.where(np.isfinite(depth), depth, 0).astype("<f4")
+    height, width = finite_depth.shape
+    _write(path, [f"{width}&{height}&1&".encode(), finite_depth.tobytes()])

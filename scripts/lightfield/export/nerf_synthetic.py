@@ -31,8 +31,8 @@ def export(source: SourceDataset, settings: NerfSynthetic, folder: Path) -> None
     # Without views of its own, val has those of test.
     lists = {"train": parts.train, "test": parts.test, "val": parts.validation}
     frames: dict[str, Any] = {}
-    for part, own in lists.items():
-        for view in own:
+    for part, part_views in lists.items():
+        for view in part_views:
             if view.name in frames:
                 continue
             path = f"{part}/{view.name}"
@@ -43,5 +43,5 @@ def export(source: SourceDataset, settings: NerfSynthetic, folder: Path) -> None
                 "transform_matrix": view.matrix.tolist(),
             }
             progress.done()
-        content = {"camera_angle_x": angle, "frames": [frames[view.name] for view in own]}
+        content = {"camera_angle_x": angle, "frames": [frames[view.name] for view in part_views]}
         write_json(folder / f"transforms_{part}.json", content)

@@ -59,7 +59,10 @@ def export(source: SourceDataset, settings: Nerfstudio, folder: Path) -> None:
         **camera(source.lens),
         "applied_transform": np.eye(4)[:3].tolist(),
         "ply_file_path": POINT_CLOUD,
-        **{f"{part}_filenames": [paths[view.name] for view in own] for part, own in lists.items()},
+        **{
+            f"{part}_filenames": [paths[view.name] for view in part_views]
+            for part, part_views in lists.items()
+        },
         "frames": frames,
     }
     write_json(folder / "transforms.json", content)

@@ -37,5 +37,7 @@ def export(source: SourceDataset, settings: ScanNetPP, folder: Path) -> None:
         progress.done()
     parts = splits(source.lightfield)
     lists = {"train": parts.train, "test": parts.test}
-    content = {part: [f"{view.name}.png" for view in own] for part, own in lists.items()}
+    content = {
+        part: [f"{view.name}.png" for view in part_views] for part, part_views in lists.items()
+    }
     write_json(folder / "train_test_lists.json", {**content, "has_masks": masked})

@@ -102,8 +102,8 @@ def _choose(scene_name: str | None, view_layers: str | Sequence[str] | None) -> 
     window = bpy.context.window
     if scene_name is not None:
         if scene_name not in bpy.data.scenes:
-            known = ", ".join(scene.name for scene in bpy.data.scenes)
-            raise UserError(f"scene_name: is {scene_name!r}; must be one of {known}")
+            names = ", ".join(scene.name for scene in bpy.data.scenes)
+            raise UserError(f"scene_name: is {scene_name!r}; must be one of {names}")
         window.scene = bpy.data.scenes[scene_name]
     all_layers = window.scene.view_layers
     layers = [layer for layer in all_layers if layer.use] or [all_layers[0]]
@@ -112,8 +112,8 @@ def _choose(scene_name: str | None, view_layers: str | Sequence[str] | None) -> 
     elif view_layers != "all":
         for name in view_layers:
             if name not in all_layers:
-                known = ", ".join(layer.name for layer in all_layers)
-                raise UserError(f"view_layers: {name!r} is none of {known}")
+                names = ", ".join(layer.name for layer in all_layers)
+                raise UserError(f"view_layers: {name!r} is none of {names}")
         layers = [all_layers[name] for name in view_layers]
     _join(layers)
     # Keyframes may turn view layers on and off.

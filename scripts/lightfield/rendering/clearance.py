@@ -113,13 +113,13 @@ def enclosing_objects(enclosures: Sequence[Enclosure | None]) -> Sequence[str | 
     """
     names = _objects_around(enclosures)
     rooms = {name for name in names if name and names.count(name) == len(names)}
-    rooms.update(found.name for found in enclosures if found and found.is_open)
+    rooms.update(enclosure.name for enclosure in enclosures if enclosure and enclosure.is_open)
     return [None if name in rooms else name for name in names]
 
 
 def open_mesh_warnings(enclosures: Sequence[Enclosure | None]) -> Iterator[str]:
     """Yield a line if cameras are inside open meshes."""
-    meshes = [found.name for found in enclosures if found and found.is_open]
+    meshes = [enclosure.name for enclosure in enclosures if enclosure and enclosure.is_open]
     if not meshes:
         return
     names = sorted(set(meshes))
@@ -133,7 +133,10 @@ def open_mesh_warnings(enclosures: Sequence[Enclosure | None]) -> Iterator[str]:
 
 def _objects_around(enclosures: Sequence[Enclosure | None]) -> list[str | None]:
     """Return for each camera the name of what most rays from it meet the back of, or None."""
-    return [found.name if found and found.share > 1 / 2 else None for found in enclosures]
+    return [
+        enclosure.name if enclosure and enclosure.share > 1 / 2 else None
+        for enclosure in enclosures
+    ]
 
 
 def free_places(rig: Random) -> Floats:

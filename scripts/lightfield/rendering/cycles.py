@@ -46,7 +46,7 @@ def set_up(
     left_out = inventory["left_out"] if inventory else []
     blend_file.open_scene(blend, lightfield.content.get("scene", {}), inventory)
     passes = lightfield.passes
-    numbered = [found.name for found in passes if found.kind == "id"]
+    numbered = [each.name for each in passes if each.kind == "id"]
     if inventory and "hidden_objects" in left_out:
         pruning.remove_objects(inventory["hidden"])
     elif numbered and not inventory:
@@ -78,7 +78,7 @@ def set_up(
         _set_eyes(scene, lightfield.content[OMNIDIRECTIONAL])
     if focused:
         _set_focus(scene.camera.data, focused)
-    if any(found.kind == "motion" for found in passes):
+    if any(each.kind == "motion" for each in passes):
         left_out = [name for name in left_out if name != "animation"]
     pruning.leave_out(left_out)
     return str(scene.cycles.device)
@@ -133,7 +133,7 @@ def _set_passes(scene: Any, passes: Iterable[Pass]) -> None:
         for name in dir(owner):
             if name.startswith("use_pass_"):
                 setattr(owner, name, False)
-    needed = [name for found in passes for name in found.needed]
+    needed = [name for each in passes for name in each.needed]
     for name in ("Combined", *needed, *(GEOMETRY_PASSES if needed else ())):
         setattr(*pass_property(layer, name), True)
     # Two objects in each of its passes.

@@ -64,8 +64,8 @@ class Integrity:
         expected = self._expected
         if self.work:
             yield from self._ledger_faults(self.work / ledger.NAME)
-        found = {path: self._problem(path, sums) for path, sums in expected.items()}
-        for path, problem in found.items():
+        problems = {path: self._problem(path, sums) for path, sums in expected.items()}
+        for path, problem in problems.items():
             if problem:
                 yield Fault(path, problem)
         # Also where all lists that had a file's checksum are damaged.
@@ -75,7 +75,7 @@ class Integrity:
             yield Fault(path, "is no file of this dataset, or has no checksum")
         for path in sorted(self._views_like(present) - expected.keys() - present):
             yield Fault(path, "is missing")
-        wrong = {path for path, problem in found.items() if problem}
+        wrong = {path for path, problem in problems.items() if problem}
         # Of these, damaged ones say nothing of what there is.
         if wrong.isdisjoint((self.dataset / NAME, self.dataset / "validation.json")):
             yield from (fault for fault in self._contents(expected) if fault.path not in wrong)
@@ -138,7 +138,7 @@ class Integrity:
 
         That is the record, or else the log, in which a file's last line counts.
         """
-        found: dict[Path, str] = {}
+        digests: dict[Path, str] = {}
         for path in map(Path, self._ledger):
             if not (self._is_own(path) and re.fullmatch(r"\d+-\d+\.json", path.name)):
                 continue
@@ -153,8 +153,8 @@ class Integrity:
             for file, digest in sums.items():
                 # A record of shards with other bounds may have views that there were.
                 if not self._published or self.dataset / file in self._published:
-                    found[self.dataset / file] = digest
-        return found
+                    digests[self.dataset / file] = digest
+        return digests
 
     @cached_property
     def _published(self) -> dict[Path, str]:

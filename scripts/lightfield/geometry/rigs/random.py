@@ -59,14 +59,14 @@ class Random(CountedRig):
         return UnitPoses.of_sides(("", places, stack(np.pi / 2, 0.0, azimuth)))
 
     def _places_from_file(self) -> Floats:
-        places = read_keys(str(self.file), "free_places.py", "box", "places")["places"]
+        written = read_keys(str(self.file), "free_places.py", "box", "places")["places"]
         try:
-            found = np.array(places, float)
+            positions = np.array(written, float)
         except (TypeError, ValueError):
-            found = np.empty(0)
-        if found.shape != (self.count, 3):
+            positions = np.empty(0)
+        if positions.shape != (self.count, 3):
             raise UserError(f"{self.file}: places: must be {self.count} of 3 numbers each")
-        return found
+        return positions
 
     def unit_outline(self) -> list[Floats]:
         return box_outline()
