@@ -52,7 +52,7 @@ learn: .venv/complete
 	snakemake --cores $(CORES) learn $(LEARNED)
 	snakemake --cores $(CORES) $(LEARNED)
 
-# Builds that are killed, damaged and left without room.
+# Builds that are killed, damaged and left with full disks.
 soak: .venv/complete
 	python benchmarks/soak.py
 

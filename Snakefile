@@ -7,7 +7,7 @@ FOLDER = Path(workflow.current_basedir)
 sys.path.insert(0, str(FOLDER / "scripts"))
 
 from lightfield.core.errors import UserError
-from lightfield.core.room import obstacle
+from lightfield.core.disk_space import obstacle
 from lightfield.dataset.config import as_written, read_config
 
 # Where Snakemake can note nothing, it ends with a traceback.

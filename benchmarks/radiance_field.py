@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.kernels import kernel, part
+from lightfield.core.compiled import kernel, part
 
 Array = np.ndarray[Any, Any]
 

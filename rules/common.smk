@@ -18,7 +18,7 @@ from pathlib import Path
 SCRIPTS = shlex.quote(os.path.relpath(FOLDER / "scripts"))
 BENCHMARKS = shlex.quote(os.path.relpath(FOLDER / "benchmarks"))
 
-from lightfield.core import leftovers, room
+from lightfield.core import disk_space, leftovers
 from lightfield.core.failures import (
     batch_log,
     cause,
@@ -36,7 +36,7 @@ from lightfield.dataset.estimate import MOST_SHARDS
 from lightfield.dataset.exports import MANIFEST, VIEWS
 from lightfield.dataset.loading import load_datasets, rendered_frames, scene_datasets
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
-from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.splits_file import SPLITS
 from lightfield.dataset.view_store import VARIABLE, ViewStore
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import Poses

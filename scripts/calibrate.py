@@ -11,7 +11,7 @@ from pathlib import Path
 
 from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
-from lightfield.core.files import whole, write_json
+from lightfield.core.files import absolute_path, write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import calibration, sampling, trials
 
@@ -40,11 +40,14 @@ def main() -> None:
     if arguments.seconds:
         write_json(arguments.seconds, seconds)
     reached = (f"{name} {found['error']:.2g}" for name, found in record["strata"].items())
-    target, error, found = (record[k] for k in ("target_error", "probe_error", "held_out_error"))
+    target, error, held_out_error = (
+        record[k] for k in ("target_error", "probe_error", "held_out_error")
+    )
+    dataset_name = absolute_path(arguments.lightfield).parent.name
     print(
-        f"note: {whole(arguments.lightfield).parent.name}: {record['way']}, {record['choice']}: "
+        f"note: {dataset_name}: {record['way']}, {record['choice']}: "
         f"error {error:.3g} on the probe views and "
-        f"{found:.3g} ± {record['held_out_standard_error']:.1g} on others, "
+        f"{held_out_error:.3g} ± {record['held_out_standard_error']:.1g} on others, "
         f"wanted {target:g}; {record['times_fewer_samples']:.1f} times cheaper than plain path "
         "tracing at equal error; the worst thousandth of pixels left out, with which it is "
         f"{record['probe_error_of_all_pixels']:.3g}; by the light that pixels show most of: "
@@ -62,8 +65,8 @@ def main() -> None:
             f"{target:g} is not reached within the preset's {most} samples; "
             f"the best there is has {error:.3g}"
         )
-    elif not record["confirmed"] and found > target:
-        wrong = f"is {target:g}, and views that the choice does not know have {found:.3g}"
+    elif not record["confirmed"] and held_out_error > target:
+        wrong = f"is {target:g}, and views that the choice does not know have {held_out_error:.3g}"
     if wrong:
         print(f"warning: render.target_error: {wrong}", file=sys.stderr)
 

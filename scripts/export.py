@@ -13,7 +13,7 @@ from lightfield import export
 from lightfield.core.cli import run
 from lightfield.core.settings import checked
 from lightfield.dataset.exports import VIEWS, Exports, settings_of
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 
 # isort: split
 from pydantic import TypeAdapter
@@ -48,7 +48,7 @@ def main() -> None:
         key: getattr(settings, key) for key in ("exposure", "reinhard") if hasattr(settings, key)
     }
     beside = {rig: Path(folder) for rig, folder in arguments.tested_by}
-    source = Source(arguments.dataset, name, arguments.suffix, beside, **development)
+    source = SourceDataset(arguments.dataset, name, arguments.suffix, beside, **development)
     files = export.run(arguments.format, source, settings, arguments.output)
     print(f"{arguments.output}: {len(source.lightfield.views)} views in {len(files)} files")
 

@@ -22,8 +22,8 @@ from lightfield.core.files import keep_apart
 from lightfield.core.progress import Progress
 from lightfield.dataset.config import read_yaml
 from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.export.source import Source
-from lightfield.export.splits import splits
+from lightfield.export.source import SourceDataset
+from lightfield.export.trainer_splits import splits
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images, pictures
 from lightfield.imaging.video import video
@@ -55,7 +55,7 @@ def main() -> None:
     arguments = parser.parse_args()
 
     keep_apart("--output", arguments.output / NAME, arguments.dataset / NAME, arguments.poses)
-    source = Source(arguments.dataset, arguments.reprojection, ".exr")
+    source = SourceDataset(arguments.dataset, arguments.reprojection, ".exr")
     views = source.lightfield.views
     targets = poses(arguments.poses)
     if targets is None:

@@ -54,8 +54,8 @@ def main() -> None:
         # The report is made meanwhile.
         leftovers.remove_unfinished(arguments.dataset, age=0, kept=REPORT)
     elif not arguments.reprojection:
-        found = sorted(arguments.dataset.glob(f"*/{NAME}"))
-        arguments.reprojection = [path.parent.name for path in found]
+        lightfields = sorted(arguments.dataset.glob(f"*/{NAME}"))
+        arguments.reprojection = [path.parent.name for path in lightfields]
     wanted = arguments.exports and [path.resolve() for path in arguments.exports]
     if arguments.removed:
         count = remove_strays(

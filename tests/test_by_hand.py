@@ -9,7 +9,7 @@ import pytest
 from conftest import ROOT, SCRIPTS
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, whole, write_json, write_text
+from lightfield.core.files import absolute_path, read_json, write_json, write_text
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
@@ -287,7 +287,7 @@ def test_a_folder_has_its_name_from_within(tmp_path, monkeypatch):
     (tmp_path / "scene/rig/exr").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "scene/rig/exr")
     for path in (Path(".."), Path("../../rig/"), Path("../exr/.."), tmp_path / "scene/rig"):
-        assert whole(path).parts[-2:] == ("scene", "rig")
+        assert absolute_path(path).parts[-2:] == ("scene", "rig")
         assert Integrity(path, tmp_path)._name == "scene/rig"
 
 

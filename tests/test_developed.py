@@ -12,7 +12,7 @@ from lightfield.dataset.config import Scene
 from lightfield.dataset.exports import NerfSynthetic
 from lightfield.dataset.lightfield import LightField
 from lightfield.export import nerf_synthetic
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import decode_srgb, encode_srgb
@@ -101,7 +101,7 @@ def test_alpha_goes_through_a_reprojection_and_is_associated_in_exr_alone(tmp_pa
 
 def test_transparent_views_are_rgba_to_trainers(tmp_path):
     dataset(tmp_path, PERSPECTIVE)
-    source = Source(tmp_path, "", ".exr")
+    source = SourceDataset(tmp_path, "", ".exr")
     folder = tmp_path / "nerf"
     nerf_synthetic.export(source, NerfSynthetic(sources=["views"]), folder)
     found = read(next(folder.rglob("view_0000f.png")))

@@ -19,9 +19,9 @@ from lightfield import export
 from lightfield.core.files import read_json, write_json
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.splits import listed
+from lightfield.dataset.splits_file import splits_content
 from lightfield.export import MANIFESTS, instant_ngp
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.validation import exported_cameras
 from lightfield.validation.exported_depth import ExportedDepth
 from lightfield.validation.files import File, read_sets
@@ -103,7 +103,7 @@ def home(folder, name):
 
 def write_export(folder, name, kind, options, beside=None):
     settings = TypeAdapter(settings_of(kind)).validate_python({"sources": [name], **options})
-    source = Source(folder, "" if name == "views" else name, ".exr", beside or {})
+    source = SourceDataset(folder, "" if name == "views" else name, ".exr", beside or {})
     export.run(kind, source, settings, home(folder, name) / "exports" / kind)
 
 
@@ -641,7 +641,7 @@ def scene(tmp_path_factory):
     trained = folder / "around" / "transforms.json"
     write_instant_ngp(folder / "along", "views", ["--placed-as", str(trained)])
     lightfields = {n: LightField.read(folder / n / "lightfield.json") for n in ("around", "along")}
-    write_json(folder / "splits.json", listed(lightfields))
+    write_json(folder / "splits.json", splits_content(lightfields))
     return folder
 
 

@@ -23,7 +23,7 @@ from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.export import disparity
 from lightfield.export.points import evenly
-from lightfield.export.source import Source, Surface
+from lightfield.export.source import SourceDataset, Surface
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
 from lightfield.validation import files as validation_files
@@ -49,7 +49,7 @@ def exported(dataset, name, source, tmp_path, **options):
     suffix = ".png" if source == "png" else ".exr"
     folder = tmp_path / name / source
     views = "" if source == "views" else source
-    export.run(name, Source(dataset, views, suffix), settings, folder)
+    export.run(name, SourceDataset(dataset, views, suffix), settings, folder)
     return folder
 
 
@@ -667,7 +667,7 @@ def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(da
 
 def test_a_failed_export_leaves_nothing(dataset, tmp_path):
     shutil.copytree(dataset / "perspective", tmp_path / "perspective")
-    source = Source(tmp_path, "perspective", ".exr")
+    source = SourceDataset(tmp_path, "perspective", ".exr")
     last = source.path(source.lightfield.views[-1])
     settings = settings_of("nerf_synthetic")(sources=["perspective"])
     last.unlink()
@@ -765,7 +765,7 @@ def test_what_lies_among_the_files_of_an_earlier_export_is_kept(dataset, tmp_pat
     (folder / "thesis.txt").unlink()
     link = tmp_path / "link"
     link.symlink_to(folder)
-    source = Source(dataset, "perspective", ".png")
+    source = SourceDataset(dataset, "perspective", ".png")
     assert export.run("poses_csv", source, settings_of("poses_csv")(sources=["perspective"]), link)
     assert link.is_symlink()
     assert (folder / "poses.csv").is_file()
@@ -826,6 +826,6 @@ def test_points_that_several_views_see_alike_are_kept_once():
 
 
 def test_views_of_another_lens_do_not_test(dataset):
-    source = Source(dataset / "perspective", "", ".exr", {"other": dataset / "shifted"})
+    source = SourceDataset(dataset / "perspective", "", ".exr", {"other": dataset / "shifted"})
     with pytest.raises(UserError, match="camera: is another than that of"):
         _ = source.lightfield

@@ -294,7 +294,7 @@ def test_the_cause_is_the_last_error_or_else_the_last_line(tmp_path):
 
 @pytest.mark.parametrize(
     ("signal", "advice"),
-    [("KILL", "memory ran out: lower --cores"), ("BUS", "make room in /dev/shm and TMPDIR")],
+    [("KILL", "memory ran out: lower --cores"), ("BUS", "free some space in /dev/shm and TMPDIR")],
 )
 @pytest.mark.slow
 def test_a_signal_is_named_with_what_to_lower(failing, signal, advice):
@@ -349,7 +349,7 @@ sys.exit({"'error: no log has it'" if mounted else "1"})
         program.write_text(FAILING)
         logs.unlink()
     assert why.startswith("render failed: ")
-    assert why.endswith("is full: make room" if mounted else "it said nothing"), why
+    assert why.endswith("is full: free some space" if mounted else "it said nothing"), why
 
 
 @pytest.mark.slow

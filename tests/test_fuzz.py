@@ -39,16 +39,16 @@ from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.loading import scene_datasets
 from lightfield.dataset.presence import check_external_files, external_changed
-from lightfield.dataset.splits import listed
+from lightfield.dataset.splits_file import splits_content
 from lightfield.export import MANIFESTS
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.geometry import lenses
 from lightfield.geometry.rigs import from_settings
 from lightfield.imaging import images
 from lightfield.measurement import plan
 from lightfield.measurement.sampling import calibrated
 from lightfield.reprojection import lens_map
-from lightfield.validation import readers, splits
+from lightfield.validation import readers, splits_check
 
 TIMES = itertools.count(10**18, 10**6)
 # Files of each kind. The few take seconds, and belong to each run of the tests.
@@ -297,7 +297,7 @@ def read_export_list(path, _):
 
 def splits_of(_):
     camera = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [4, 4]})
-    return listed({"LFPlane": LightField.from_rig({**PLANE, "split": "train"}, camera)})
+    return splits_content({"LFPlane": LightField.from_rig({**PLANE, "split": "train"}, camera)})
 
 
 def read_splits(path, _):
@@ -305,7 +305,7 @@ def read_splits(path, _):
     folder.mkdir(exist_ok=True)
     camera = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [4, 4]})
     LightField.from_rig({**PLANE, "split": "train"}, camera).write(folder / "lightfield.json")
-    splits.check(path, folder, [])
+    splits_check.check(path, folder, [])
 
 
 def calibration(_):
@@ -635,7 +635,7 @@ def test_a_damaged_export_is_read_or_refused(kind, count, tmp_path):
         {"sources": ["views"]} | EXPORTS[kind]
     )
     folder = tmp_path / "export"
-    export.run(kind, Source(source, "", ".exr", {}), settings, folder)
+    export.run(kind, SourceDataset(source, "", ".exr", {}), settings, folder)
     listed = folder / "export.json"
 
     def read(path, _):

@@ -13,7 +13,7 @@ from pydantic import TypeAdapter
 from sphere import write_views
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import second_name, sha256
+from lightfield.core.files import link_or_copy, sha256
 from lightfield.core.settings import checked
 from lightfield.dataset.config import Scene
 from lightfield.dataset.loading import scene_datasets
@@ -269,6 +269,6 @@ def test_a_view_that_nobody_may_write_is_taken_over(nobody):
     link = nobody / "deep" / "link.exr"
     link.symlink_to("../published.exr")
     for name in (view, link):
-        second_name(name, taken)
+        link_or_copy(name, taken)
         assert taken.samefile(view)
         assert not taken.is_symlink()

@@ -8,7 +8,7 @@ import learn
 from lightfield import export
 from lightfield.core.progress import Progress
 from lightfield.dataset.exports import settings_of
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from radiance_field import Field, _samples
 
 RIG = {"type": "random", "count": 40, "size": [2, 2, 1]}
@@ -24,7 +24,7 @@ def views(tmp_path_factory):
     found = {}
     for name in KINDS:
         write_views(folder / name / "dataset", LENSES[name], RIG)
-        source = Source(folder / name / "dataset", "", ".exr")
+        source = SourceDataset(folder / name / "dataset", "", ".exr")
         export.run("nerfstudio", source, settings, folder / name / "export")
         found[name] = learn.read(folder / name / "export")
     return found

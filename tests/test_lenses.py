@@ -18,7 +18,7 @@ from pydantic import TypeAdapter
 from scipy.spatial.transform import Rotation
 
 from lightfield.core.errors import UserError
-from lightfield.geometry.depth import z_from_distance
+from lightfield.geometry.depth import conventional_depth, z_from_distance
 from lightfield.geometry.lenses import (
     LENSES,
     CameraSettings,
@@ -163,7 +163,9 @@ def test_cycles_depth_is_z_for_perspective_and_distance_otherwise(
 ) -> None:
     rays, distance = cycles[name + ".rays"], cycles[name + ".distance"]
     seen = np.isfinite(distance)
-    depth = z_from_distance(distance, rays) if name.startswith("perspective") else distance
+    meaning = conventional_depth(CAMERAS[name])
+    assert meaning == ("z" if name.startswith("perspective") else "distance")
+    depth = z_from_distance(distance, rays) if meaning == "z" else distance
     np.testing.assert_allclose(cycles[name + ".depth"][seen], depth[seen], rtol=1e-5)
 
 

@@ -22,7 +22,7 @@ from lightfield.dataset import passes
 from lightfield.dataset.config import Scene
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.rendering import shard
@@ -192,7 +192,7 @@ def test_views_without_a_centre_are_not_reprojected_nor_exported(made, tmp_path,
         assert "omnidirectional_stereo: its views have no centre" in refused.stderr
     assert not list(tmp_path.iterdir())
     with pytest.raises(UserError, match="its views have no centre"):
-        _ = Source(source, "", ".exr").lightfield
+        _ = SourceDataset(source, "", ".exr").lightfield
 
 
 def mattes(folder):

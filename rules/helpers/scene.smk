@@ -14,9 +14,7 @@ def inventory_settings(dataset):
         "motion_blur": written.render.motion_blur,
         "rendered_frames": rendered_frames(datasets),
         # As the program has them: a rig without any changes nothing.
-        "camera_frames": [
-            frame for each in datasets for frame in each.camera_frames
-        ],
+        "camera_frames": [frame for each in datasets for frame in each.camera_frames],
     }
 
 

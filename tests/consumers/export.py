@@ -16,7 +16,7 @@ from sphere import LENSES, enlarged, write_views  # noqa: E402
 
 from lightfield import export  # noqa: E402
 from lightfield.dataset.exports import settings_of  # noqa: E402
-from lightfield.export.source import Source  # noqa: E402
+from lightfield.export.source import SourceDataset  # noqa: E402
 
 RIG = {"type": "plane", "cameras": [3, 2], "size": 1.2, "center": [0.3, -0.2, 0.1]}
 OF = {
@@ -31,7 +31,7 @@ def main() -> None:
     write_views(folder / "dataset", enlarged(LENSES["wide"], 2), RIG)
     for name in sorted({*OF["colmap"], *OF["nerfstudio"]}):
         write_views(folder / "dataset" / name, enlarged(LENSES[name], 2), RIG)
-        source = Source(folder / "dataset", name, ".exr")
+        source = SourceDataset(folder / "dataset", name, ".exr")
         np.savez(
             folder / f"{name}.npz",
             names=[view.name for view in source.lightfield.views],
@@ -43,7 +43,7 @@ def main() -> None:
             settings = settings_of(kind).model_validate(
                 {"sources": [name], "points": 40000, "depth": True}
             )
-            source = Source(folder / "dataset", name, ".exr")
+            source = SourceDataset(folder / "dataset", name, ".exr")
             export.run(kind, source, settings, folder / kind / name)
 
 

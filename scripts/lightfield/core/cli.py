@@ -8,10 +8,10 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from lightfield.core.disk_space import REMEDIES, write_problem
 from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_MEMORY
 from lightfield.core.files import read_problem
-from lightfield.core.room import REMEDIES, write_problem
 
 
 def run(main: Callable[[], None]) -> None:

@@ -14,7 +14,7 @@ _SIGNALS = {
     "SIGKILL": f"most likely memory ran out: {LESS_MEMORY}",
     "SIGABRT": f"most likely memory ran out: {LESS_MEMORY}",
     "SIGSEGV": f"Blender crashed, as it does where it gets no memory: {LESS_MEMORY}",
-    "SIGBUS": "most likely a temporary folder is full: make room in /dev/shm and TMPDIR",
+    "SIGBUS": "most likely a temporary folder is full: free some space in /dev/shm and TMPDIR",
     "SIGALRM": "a view took far longer than expected: it hung",
     "SIGTERM": "it was cancelled, or ran longer than it may",
 }
@@ -71,5 +71,5 @@ def batch_log(name: str, since: float) -> Path | None:
     """
     folder = Path(".snakemake")
     logs = [*folder.glob(f"slurm_logs/*_{name}/**/*.log"), *folder.glob(f"{name}-*.log")]
-    found = [log for log in logs if is_newer(log, since)]
-    return max(found, key=lambda log: log.stat().st_mtime, default=None)
+    new_logs = [log for log in logs if is_newer(log, since)]
+    return max(new_logs, key=lambda log: log.stat().st_mtime, default=None)

@@ -30,19 +30,19 @@ class Gpu:
 
 def visible(environment: Mapping[str, str] = os.environ) -> list[Gpu]:
     """Return the GPUs that this process sees: those that a batch system or user left it, or all."""
-    found = []
+    gpus = []
     for variable, every in ((CUDA, _nvidia), (HIP, _amd)):
-        given = environment.get(variable)
-        ids = every() if given is None else [name.strip() for name in given.split(",")]
-        found += [Gpu(variable, name) for name in ids if name and name != "-1"]
-    return found
+        chosen = environment.get(variable)
+        ids = every() if chosen is None else [name.strip() for name in chosen.split(",")]
+        gpus += [Gpu(variable, name) for name in ids if name and name != "-1"]
+    return gpus
 
 
 def _nvidia() -> list[str]:
     """Return the UUIDs of NVIDIA's GPUs, as their driver lists them."""
     try:
-        words = ["nvidia-smi", "--query-gpu=uuid", "--format=csv,noheader"]
-        output = subprocess.run(words, capture_output=True, text=True, check=True, timeout=30)
+        command = ["nvidia-smi", "--query-gpu=uuid", "--format=csv,noheader"]
+        output = subprocess.run(command, capture_output=True, text=True, check=True, timeout=30)
     except (OSError, subprocess.SubprocessError):
         return []
     return [line for line in output.stdout.split() if line.startswith("GPU-")]

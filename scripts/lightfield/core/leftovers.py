@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from lightfield.core.room import SHARED_MEMORY
+from lightfield.core.disk_space import SHARED_MEMORY
 
 # Nobody calls a folder of his own so: it would be removed.
 PREFIX = "plenoforge-temporary-"
@@ -48,19 +48,19 @@ def remove(folders: Iterable[Path] = ()) -> list[Path]:
 
     That is files on their way in ``folders`` and below, and temporary folders of this machine.
     """
-    found = [path for folder in folders for path in remove_unfinished(folder)]
+    removed = [path for folder in folders for path in remove_unfinished(folder)]
     for parent in {Path(tempfile.gettempdir()), SHARED_MEMORY}:
         for path in parent.glob(f"{PREFIX}*"):
             if path.is_dir() and _is_old(path, FOLDER_AGE) and not _is_in_use(path):
                 shutil.rmtree(path, ignore_errors=True)
-                found.append(path)
+                removed.append(path)
         for path in parent.glob(BLENDERS):
             if path.is_dir() and _is_old(path, BLENDER_AGE):
                 # One that is not empty stays.
                 with suppress(OSError):
                     path.rmdir()
-                    found.append(path)
-    return found
+                    removed.append(path)
+    return removed
 
 
 def remove_unfinished(folder: Path, age: float = FILE_AGE, kept: str = "") -> list[Path]:

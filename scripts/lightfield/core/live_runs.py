@@ -151,9 +151,9 @@ def _is_free(note: Path) -> bool:
 
 def _wait_for_jobs(folder: Path) -> None:
     """Wait for the jobs of killed runs that live on: they write the same files."""
-    told = False
+    has_reported = False
     while jobs := [pid for run in _runs(folder) if run.is_killed for pid in run.jobs]:
-        if not told:
+        if not has_reported:
             numbers = " ".join(map(str, jobs))
             print(
                 f"waiting for jobs that a killed run has left, processes {numbers} "
@@ -161,7 +161,7 @@ def _wait_for_jobs(folder: Path) -> None:
                 file=sys.stderr,
                 flush=True,
             )
-        told = True
+        has_reported = True
         time.sleep(0.5)
 
 

@@ -26,15 +26,15 @@ def available() -> int:
 
 def _limit_files() -> list[Path]:
     """Return the files of version 1 and 2 of control groups that may hold a limit."""
-    found = []
+    files = []
     for line in OWN_GROUPS.read_text().splitlines() if OWN_GROUPS.exists() else ():
         _, controllers, path = line.split(":", 2)
         if controllers in ("", "memory"):
             name = "memory.limit_in_bytes" if controllers else "memory.max"
             root = CONTROL_GROUPS / controllers
             group = root / path.lstrip("/")
-            found += [folder / name for folder in (group, *group.parents)]
-    return [file for file in found if file.is_file()]
+            files += [folder / name for folder in (group, *group.parents)]
+    return [file for file in files if file.is_file()]
 
 
 def peak() -> int:

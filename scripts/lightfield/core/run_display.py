@@ -89,9 +89,9 @@ class Task:
                 content = file.read()
         except OSError:
             return []
-        whole = content[: content.rfind(b"\n") + 1]
-        self.read += len(whole)
-        return whole.decode(errors="replace").splitlines()
+        complete_lines = content[: content.rfind(b"\n") + 1]
+        self.read += len(complete_lines)
+        return complete_lines.decode(errors="replace").splitlines()
 
 
 class RunDisplay:

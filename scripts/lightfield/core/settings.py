@@ -39,10 +39,10 @@ class Settings(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _known_keys(cls, content: Any) -> Any:
-        known = cls.model_fields
+        allowed_keys = cls.model_fields
         for key, value in content.items() if isinstance(content, Mapping) else ():
-            if key not in known:
-                hint = suggestion(key, known) or f"; allowed here: {', '.join(known)}"
+            if key not in allowed_keys:
+                hint = suggestion(key, allowed_keys) or f"; allowed here: {', '.join(allowed_keys)}"
                 raise ValueError(f"{key}: unknown key{hint}")
             if value is None:
                 raise ValueError(f"{key}: is null; must have a value, or be left out")
@@ -96,9 +96,9 @@ Name = Annotated[
 ]
 
 
-def suggestion(name: str, known: Iterable[str]) -> str:
+def suggestion(name: str, allowed: Iterable[str]) -> str:
     """Return ``; did you mean …?``, or nothing where no name that is known is near."""
-    close = difflib.get_close_matches(name, list(known), n=1)
+    close = difflib.get_close_matches(name, list(allowed), n=1)
     return f"; did you mean {close[0]}?" if close else ""
 
 
@@ -112,12 +112,12 @@ def checked(model: TypeAdapter[Model], content: Any, file: str) -> Model:
 
 def _first(errors: list[ErrorDetails], content: Any) -> str:
     """Say in one line what is wrong with the first key that is."""
-    found = [(*_find(error, content), error) for error in errors]
+    located_errors = [(*_find(error, content), error) for error in errors]
     # Of a value that may be of several types, each type has an error, and the deepest knows most.
-    start = found[0][0]
-    path = max((p for p, _, _ in found if p[: len(start)] == start), key=len)
-    same = [(value, error) for p, value, error in found if p == path]
-    value, error = same[0]
+    start = located_errors[0][0]
+    path = max((p for p, _, _ in located_errors if p[: len(start)] == start), key=len)
+    errors_of_key = [(value, error) for p, value, error in located_errors if p == path]
+    value, error = errors_of_key[0]
     key = ".".join(f"[{part}]" if isinstance(part, int) else part for part in path)
     prefix = f"{key}: " if key else ""
     context = error.get("ctx", {})
@@ -132,13 +132,13 @@ def _first(errors: list[ErrorDetails], content: Any) -> str:
         case "union_tag_invalid":
             name = context["discriminator"].strip("'")
             kind = ".".join(filter(None, [key, name]))
-            known = context["expected_tags"].replace("'", "")
-            return f"{kind}: is {_shown(value[name])}; must be one of {known}"
+            allowed_tags = context["expected_tags"].replace("'", "")
+            return f"{kind}: is {_shown(value[name])}; must be one of {allowed_tags}"
     if error["loc"][-1:] == ("[key]",):
         # Not of the path: rigs that are somebody else's folders are not in the content.
         *above, name, _ = error["loc"]
         return f"{'.'.join(map(str, above))}: {name!r} is no name; must {_allowed(error)}"
-    allowed = dict.fromkeys(_allowed(error) for _, error in same)
+    allowed = dict.fromkeys(_allowed(error) for _, error in errors_of_key)
     return f"{prefix}is {_shown(value)}; must {' or '.join(allowed).replace(' or be ', ' or ')}"
 
 
@@ -186,11 +186,11 @@ def _allowed(error: ErrorDetails) -> str:
             return "be a list"
         case "literal_error":
             return f"be {error['ctx']['expected']}".replace("'", "")
-    for name, words in _BOUNDS.items():
+    for name, comparison in _BOUNDS.items():
         if name in error.get("ctx", {}):
             bound = error["ctx"][name]
             if isinstance(bound, int):
-                return f"be a whole number {words} {bound}"
-            return f"be a number {words} {bound:.10g}"
+                return f"be a whole number {comparison} {bound}"
+            return f"be a number {comparison} {bound:.10g}"
     text = re.sub(r"^\w+ should ", "", error["msg"])
     return re.sub(r" after validation, not .*", "", text)

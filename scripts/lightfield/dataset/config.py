@@ -42,7 +42,7 @@ from lightfield.geometry.lenses.cube_map import CubeMap
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
 from lightfield.geometry.rigs.rig import Frame
-from lightfield.geometry.rigs.split import PARTS, Chosen
+from lightfield.geometry.rigs.split_setting import PARTS, Chosen
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENES = ROOT / "configs" / "scenes"
@@ -235,11 +235,11 @@ class Parameters(Settings):
 
 # What a value of the .blend's own is called, wherever the scene YAML may ask for it.
 FILE = "file"
-# Keys of `Source` that a builder does not take.
+# Keys of `SceneSource` that a builder does not take.
 OF_A_BLEND = ("scene_name", "view_layers", "allow_missing", "sha256", "url", "page")
 
 
-class Source(Settings):
+class SceneSource(Settings):
     """Where the scene comes from: a builder, a .blend file, or views that are there already."""
 
     builder: str | None = Field(
@@ -541,7 +541,7 @@ class Scene(Settings):
     description: str | None = Field(None, description="One line about the scene.")
     licence: str | None = Field(None, description="Of the scene, for a package's card.")
     credit: str | None = Field(None, description="How the scene's artist is to be cited.")
-    scene: Source
+    scene: SceneSource
     render: Render | None = Field(None, description="How; scene.dataset alone has none.")
     rigs: dict[Name, AnyRig] = Field(
         {},
@@ -787,7 +787,7 @@ def builders() -> list[str]:
     return sorted(name for name in folders if name != "library")
 
 
-def blend_sha256(scene: str, source: Source) -> tuple[str | None, Path]:
+def blend_sha256(scene: str, source: SceneSource) -> tuple[str | None, Path]:
     """Return the SHA-256 that a scene's .blend must have, or None if no one knows it yet.
 
     The second value is the file that says so, or that shall: the scene YAML or its lock file.

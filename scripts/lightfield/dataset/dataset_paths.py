@@ -6,10 +6,10 @@ from lightfield.dataset import passes
 from lightfield.dataset.config import FILE
 from lightfield.dataset.description import Description
 from lightfield.dataset.exports import MANIFEST, VIEWS
-from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.splits_file import SPLITS
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import BlendCamera, Random, Rig
-from lightfield.geometry.rigs.split import PARTS
+from lightfield.geometry.rigs.split_setting import PARTS
 
 # Pictures of a report, those of them that are plots, which are .svg too, and all its files.
 PICTURES = ("overview", "contact_sheet", "rig", "depth", "noise")

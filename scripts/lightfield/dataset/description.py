@@ -9,7 +9,7 @@ from typing import Any, Literal, Self
 
 from lightfield.core.files import reading
 from lightfield.dataset import blend, config
-from lightfield.dataset.config import FILE, Preset, Source
+from lightfield.dataset.config import FILE, Preset, SceneSource
 from lightfield.dataset.exports import Exports
 from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.keys import scene_fingerprint
@@ -32,7 +32,7 @@ class Description:
     preset: str
     rig_name: str
     rig_folder: str
-    source: Source
+    source: SceneSource
     render: dict[str, Any]
     rig: Rig
     reprojections: dict[str, config.Reprojection]

@@ -6,10 +6,10 @@ import urllib.request
 from pathlib import Path
 from typing import Any
 
+from lightfield.core.disk_space import gigabytes
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, sha256, write_json
 from lightfield.core.progress import Progress
-from lightfield.core.room import gigabytes
 
 _CHUNK = 1 << 20
 _TIMEOUT_SECONDS = 60

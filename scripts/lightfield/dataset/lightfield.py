@@ -24,7 +24,6 @@ from lightfield.dataset.passes import PASSES, Pass
 from lightfield.geometry import lenses, rotations
 from lightfield.geometry.flow import neighbours
 from lightfield.geometry.lenses import Lens
-from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 if TYPE_CHECKING:
     from lightfield.geometry import rigs
@@ -213,11 +212,6 @@ class LightField:
     def folder(self) -> Path:
         """The folder that the file lies in."""
         return self.path.parent
-
-    @property
-    def cycles_depth(self) -> str:
-        """What Cycles' depth pass holds: "z" for a perspective camera, or else "distance"."""
-        return "z" if isinstance(self.lens, Rectilinear) else "distance"
 
     @cached_property
     def matrices(self) -> Floats:

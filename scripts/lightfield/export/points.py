@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lightfield.core.files import write_bytes
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import View
-from lightfield.export.source import Floats, Source, Surface, pixel_indices
+from lightfield.export.source import Floats, SourceDataset, Surface, pixel_indices
 
 # Candidates for each point that is wanted, of which an even selection is taken.
 _CANDIDATES = 8
@@ -36,7 +36,7 @@ class Observations:
     pixels: Floats
 
 
-def lift(source: Source, count: int | None = None, voxel: float | None = None) -> Points:
+def lift(source: SourceDataset, count: int | None = None, voxel: float | None = None) -> Points:
     """Lift points from depth: about ``count``, or one in each ``voxel`` metres.
 
     They come from all views, but with a split from those to train on alone, if there are any. Each
@@ -50,9 +50,9 @@ def lift(source: Source, count: int | None = None, voxel: float | None = None) -
     progress = Progress(len(views), "points", "views")
     kept: Points | None = None
     for view, surface in source.surfaces(views):
-        found = _points_of(source, view, surface, step)
+        points = _points_of(source, view, surface, step)
         # With a voxel, memory stays that of the cloud, however many views there are.
-        kept = joined([kept, found]) if kept else found
+        kept = joined([kept, points]) if kept else points
         if voxel:
             kept = kept.chosen(_one_a_voxel(kept.positions, voxel))
         progress.done()
@@ -60,7 +60,7 @@ def lift(source: Source, count: int | None = None, voxel: float | None = None) -
     return kept.chosen(evenly(kept.positions, count)) if count else kept
 
 
-def lift_one_each(source: Source, views: Sequence[View]) -> Points:
+def lift_one_each(source: SourceDataset, views: Sequence[View]) -> Points:
     """Lift one point from each of the ``views`` whose depth is finite anywhere in the frame."""
     parts = [Points(np.empty((0, 3)), np.empty((0, 3), np.uint8), np.empty((0, 3)))]
     for view, surface in source.surfaces(views):
@@ -70,7 +70,7 @@ def lift_one_each(source: Source, views: Sequence[View]) -> Points:
     return joined(parts)
 
 
-def _points_of(source: Source, view: View, surface: Surface, step: int) -> Points:
+def _points_of(source: SourceDataset, view: View, surface: Surface, step: int) -> Points:
     """Return the points of a surface at every ``step``-th pixel that the ``view`` shows."""
     positions, normals = surface.points(step)
     local = (positions - view.matrix[:3, 3]) @ view.matrix[:3, :3]
@@ -79,18 +79,18 @@ def _points_of(source: Source, view: View, surface: Surface, step: int) -> Point
     return Points(positions, source.colour(view)[row, column], normals).chosen(inside)
 
 
-def observations(source: Source, points: Points) -> list[Observations]:
+def observations(source: SourceDataset, points: Points) -> list[Observations]:
     """Return what each view sees of the points: those in its frame that no surface hides."""
-    found = []
+    seen_points = []
     progress = Progress(len(source.lightfield.views), "tracks", "views")
     for view, surface in source.surfaces(source.lightfield.views):
         local = (points.positions - view.matrix[:3, 3]) @ view.matrix[:3, :3]
         column, row, inside = pixel_indices(source.lens, local)
         inside &= source.valid(view)[row, column] & surface.sees(points.positions)
         indices = np.flatnonzero(inside)
-        found.append(Observations(indices, source.lens.pixels(local[indices])))
+        seen_points.append(Observations(indices, source.lens.pixels(local[indices])))
         progress.done()
-    return found
+    return seen_points
 
 
 def write_ply(path: Path, points: Points) -> None:

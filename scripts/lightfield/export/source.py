@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import second_name
+from lightfield.core.files import link_or_copy
 from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.geometry.depth import distance_from_z, z_from_distance
 from lightfield.geometry.lenses import Lens
@@ -29,7 +29,7 @@ DEPTH_UNIT = 0.001
 
 
 @dataclass(frozen=True)
-class Source:
+class SourceDataset:
     """The views of a dataset folder: the rendered ones (``name`` "") or those of a reprojection.
 
     ``beside`` are the folders of the rigs whose views test what is trained on these, by the rigs'
@@ -55,15 +55,15 @@ class Source:
         return self._read("")
 
     def _read(self, name: str) -> LightField:
-        own = LightField.read(self.dataset / name / NAME)
-        own.require_centre()
-        views = list(own.views)
+        lightfield = LightField.read(self.dataset / name / NAME)
+        lightfield.require_centre()
+        views = list(lightfield.views)
         for rig, folder in self.beside.items():
             other = LightField.read(folder / name / NAME)
-            if other.lens != own.lens:
-                raise UserError(f"{other.path}: camera: is another than that of {own.path}")
+            if other.lens != lightfield.lens:
+                raise UserError(f"{other.path}: camera: is another than that of {lightfield.path}")
             views += [replace(view, name=f"{rig}_{view.name}") for view in other.views]
-        return own.changed(views=views)
+        return lightfield.changed(views=views)
 
     @property
     def lens(self) -> Lens:
@@ -150,7 +150,7 @@ class Source:
         It is RGBA if the views are transparent.
         """
         if self.suffix == ".png" and not self._has_16_bits:
-            second_name(self.path(view), target)
+            link_or_copy(self.path(view), target)
         elif self.lightfield.transparent:
             images.write_png(target, np.dstack([self.colour(view), self.alpha(view)]))
         else:
@@ -215,9 +215,9 @@ class Surface:
         local = (points - self.view.matrix[:3, 3]) @ self.view.matrix[:3, :3]
         expected = np.linalg.norm(local, axis=1)
         column, row, inside = pixel_indices(self.lens, local)
-        found = np.where(inside, self.distance[row, column], np.nan)
+        distance = np.where(inside, self.distance[row, column], np.nan)
         with np.errstate(invalid="ignore"):
-            same: Bools = np.abs(found - expected) < SAME_SURFACE * expected
+            same: Bools = np.abs(distance - expected) < SAME_SURFACE * expected
         return same
 
 

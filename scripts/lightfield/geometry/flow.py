@@ -75,9 +75,9 @@ def shorter(lens: Lens, across: Array) -> Array:
     return np.asarray(across - lens.turn * np.rint(across / lens.turn))
 
 
-def in_frame(lens: Lens, found: Array) -> Array:
+def in_frame(lens: Lens, motion: Array) -> Array:
     """Return where flow (2, h, w) leads to a place in the frame, (h, w), but for rounding."""
-    y, x = np.indices(found.shape[1:]) + 0.5 + found[::-1]
+    y, x = np.indices(motion.shape[1:]) + 0.5 + motion[::-1]
     if isinstance(lens, Equirectangular):
         x %= lens.turn
     rounding = 0.01

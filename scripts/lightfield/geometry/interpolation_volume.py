@@ -118,8 +118,8 @@ def parts_to_edge(matrices: Floats, lens: Lens, places: Floats) -> Floats:
     planes = immersive_planes(mesh, hull, matrices, lens, not outward)
     if planes is None or (planes[:, :3] @ middle + planes[:, 3] >= 0).any():
         return nowhere
-    room = -(planes[:, :3] @ middle + planes[:, 3])
-    parts: Floats = ((places - middle) @ planes[:, :3].T / room).max(axis=1)
+    reach = -(planes[:, :3] @ middle + planes[:, 3])
+    parts: Floats = ((places - middle) @ planes[:, :3].T / reach).max(axis=1)
     return parts
 
 

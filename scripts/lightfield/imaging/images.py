@@ -217,14 +217,14 @@ def _check_exr(path: Path) -> None:
     """
     try:
         file = OpenEXR.InputFile(str(path))
-        whole = file.isComplete()
-        if whole:
+        is_complete = file.isComplete()
+        if is_complete:
             header = file.header()
             last = header["dataWindow"].max.y
             file.channels(list(header["channels"]), scanLine1=last, scanLine2=last)
     except OSError:
-        whole = False
-    if not whole:
+        is_complete = False
+    if not is_complete:
         raise OSError("the file is cut short")
 
 
@@ -317,26 +317,30 @@ def _read_other(
 ) -> tuple[Image, list[str]]:
     """Return any image's channels, those asked for, and the names of all."""
     file = _open(path)
-    found: dict[str, np.ndarray[Any, Any]] = {}
+    planes_by_name: dict[str, np.ndarray[Any, Any]] = {}
     attributes: dict[str, Attribute] = {}
     names: list[str] = []
     subimage = 0
     while file.seek_subimage(subimage, 0):
         spec = file.spec()
         attributes = _attributes(spec) | attributes
-        own = _channel_names(path, spec)
-        wanted = [index for index, name in enumerate(own) if channels is None or name in channels]
+        channel_names = _channel_names(path, spec)
+        wanted = [
+            index
+            for index, name in enumerate(channel_names)
+            if channels is None or name in channels
+        ]
         for first, end, kind in _runs(spec, wanted):
             pixels = file.read_image(subimage, 0, first, end, kind)
             if pixels is None:
                 raise UserError(f"{path}: cannot be read whole: {file.geterror()}")
             pixels = np.asarray(pixels).reshape(spec.height, spec.width, end - first)
             planes = np.moveaxis(pixels[slice(*(rows or (None,)))], -1, 0)
-            found |= dict(zip(own[first:end], planes, strict=True))
-        names += own
+            planes_by_name |= dict(zip(channel_names[first:end], planes, strict=True))
+        names += channel_names
         subimage += 1
     file.close()
-    return Image(found, attributes), names
+    return Image(planes_by_name, attributes), names
 
 
 def _channel_names(path: Path | str, spec: Any) -> list[str]:
@@ -359,7 +363,7 @@ def _runs(spec: Any, wanted: Sequence[int]) -> list[tuple[int, int, str]]:
 
 
 def _attributes(spec: Any) -> dict[str, Attribute]:
-    found: dict[str, Attribute] = {}
+    attributes: dict[str, Attribute] = {}
     for parameter in spec.extra_attribs:
         try:
             name = parameter.name
@@ -367,5 +371,5 @@ def _attributes(spec: Any) -> dict[str, Attribute]:
         except UnicodeDecodeError:
             continue  # damaged: none of ours, which are ASCII
         if isinstance(value, str | int | float):
-            found[name] = value
-    return found
+            attributes[name] = value
+    return attributes

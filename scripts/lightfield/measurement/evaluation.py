@@ -18,10 +18,10 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import whole
+from lightfield.core.files import absolute_path
 from lightfield.dataset.lightfield import View
-from lightfield.export.source import Bools, Floats, Source, check_size
-from lightfield.geometry.depth import distance_from_z
+from lightfield.export.source import Bools, Floats, SourceDataset, check_size
+from lightfield.geometry.depth import stored_distance
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import decode_srgb, encode_srgb, tone_map
 from lightfield.measurement import metrics
@@ -50,7 +50,7 @@ class Pictures:
 
 
 def find(
-    folder: Path, source: Source, view: View, suffixes: Sequence[str] = (".exr", ".png")
+    folder: Path, source: SourceDataset, view: View, suffixes: Sequence[str] = (".exr", ".png")
 ) -> Path:
     """Return the picture of a view in a folder; raises `UserError` where there is none.
 
@@ -69,13 +69,13 @@ def find(
     )
 
 
-def _rig_names(source: Source) -> list[str]:
+def _rig_names(source: SourceDataset) -> list[str]:
     """Return what the rig of a dataset's folder may be called, the whole folder's name first.
 
     The folder of a frame lies in the rig's. A package unfolds to <scene>_<rig>, where a preset may
     stand between.
     """
-    folder = whole(source.dataset)
+    folder = absolute_path(source.dataset)
     if re.fullmatch(r"f\d{5,}", folder.name):
         folder = folder.parent
     lightfield = source.lightfield
@@ -86,14 +86,14 @@ def _rig_names(source: Source) -> list[str]:
     return ["_".join(parts[first:]) for first in range(len(parts))]
 
 
-def mask(path: Path, source: Source) -> Bools:
+def mask(path: Path, source: SourceDataset) -> Bools:
     """Return where a grey picture is not 0; raises `UserError` for one of another size or kind."""
     pixels = images.read_image(path, ["Y"]).channels["Y"]
     check_size(path, source.lightfield, pixels)
     return np.asarray(pixels > 0)
 
 
-def truth(source: Source, view: View, like: Path, background: Floats) -> Pictures:
+def truth(source: SourceDataset, view: View, like: Path, background: Floats) -> Pictures:
     """Return a dataset's own view over a background (3,) in sRGB, 0 to 1.
 
     It is as coarse as a PNG if what it is compared with is ``like``.
@@ -117,7 +117,7 @@ def truth(source: Source, view: View, like: Path, background: Floats) -> Picture
     )
 
 
-def rendered(path: Path, source: Source, background: Floats) -> Pictures:
+def rendered(path: Path, source: SourceDataset, background: Floats) -> Pictures:
     """Return somebody's view over a background (3,) in sRGB, 0 to 1.
 
     Raises `UserError` where it has no colour, or another size than the dataset's.
@@ -143,7 +143,7 @@ def _alpha(image: images.Image) -> Floats | None:
 
 
 def _developed(
-    image: images.Image, alpha: Floats | None, source: Source, background: Floats
+    image: images.Image, alpha: Floats | None, source: SourceDataset, background: Floats
 ) -> Floats:
     """Return a picture's sRGB colour (h, w, 3) over a background.
 
@@ -200,7 +200,9 @@ def hexadecimal(colour: Floats) -> str:
     return "#" + "".join(f"{round(255 * value):02x}" for value in colour.tolist())
 
 
-def regions(source: Source, view: View, counted: Bools, depth: Floats | None) -> dict[str, Bools]:
+def regions(
+    source: SourceDataset, view: View, counted: Bools, depth: Floats | None
+) -> dict[str, Bools]:
     """Return the parts (h, w) of a view in which errors are counted, by their names.
 
     ``counted`` is what a mask leaves. ``centre`` and ``rim`` divide the lens at half its largest
@@ -215,7 +217,7 @@ def regions(source: Source, view: View, counted: Bools, depth: Floats | None) ->
     found = {"all": every, "centre": every & inner, "rim": every & ~inner}
     if depth is not None:
         # Towards the rim of a wide lens Z falls on any surface.
-        distance = distance_from_z(depth, rays) if source.lightfield.depth == "z" else depth
+        distance = stored_distance(depth, rays, source.lightfield.depth)
         known = np.where(np.isfinite(distance), distance, 1e9)
         near = minimum_filter(np.where(valid, known, np.inf), EDGE_PIXELS)
         far = maximum_filter(np.where(valid, known, 0), EDGE_PIXELS)

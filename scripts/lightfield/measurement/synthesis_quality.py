@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.files import whole
+from lightfield.core.files import absolute_path
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.geometry.depth import with_precision
 from lightfield.geometry.interpolation_volume import parts_to_edge
 from lightfield.geometry.lenses import Array, Lens
@@ -38,7 +38,7 @@ class Variant:
     size: int
 
 
-def variants(source: Source, views: Sequence[View]) -> Iterator[Variant]:
+def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[Variant]:
     """Yield the variants and controls of the ``views`` of a dataset, the plain one first."""
     lens = source.lens
     read = reader(source)
@@ -95,7 +95,7 @@ def subsets(lightfield: LightField, views: Sequence[View]) -> Iterator[Sequence[
     yield from some or [views[::step] for step in (2, 4, 8) if len(views[::step]) >= 4]
 
 
-def regions(truth: Source, view: View, inside: Array) -> dict[str, Array]:
+def regions(truth: SourceDataset, view: View, inside: Array) -> dict[str, Array]:
     """Return which pixels (h, w) of a true view are of each region, of those ``inside`` the lens.
 
     The kinds of light are told apart if the view has all of them as passes.
@@ -112,7 +112,11 @@ def regions(truth: Source, view: View, inside: Array) -> dict[str, Array]:
 
 
 def compare(
-    variant: Variant, around: Sequence[View], views: Sequence[View], truth: Source, exposure: float
+    variant: Variant,
+    around: Sequence[View],
+    views: Sequence[View],
+    truth: SourceDataset,
+    exposure: float,
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for each region of each of the ``views`` of the ``truth``.
 
@@ -134,7 +138,7 @@ def compare(
             yield {
                 "variant": variant.name,
                 "value": variant.value,
-                "truth": whole(truth.dataset).name,
+                "truth": absolute_path(truth.dataset).name,
                 "view": view.name,
                 "to_edge": to_edge,
                 "place": next(name for name, most in PLACES.items() if to_edge <= most),

@@ -25,6 +25,7 @@ from lightfield.core.errors import UserError
 from lightfield.dataset import keys, passes
 from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.measurement.metrics import Mask, Reference, make_reference
@@ -196,7 +197,7 @@ class Trials:
 
     def camera(self, view: View) -> Camera:
         """Return where a view looks from, as `lightfield.validation.consistency` wants it."""
-        return Camera(self.lens, view.matrix, self.lightfield.cycles_depth)
+        return Camera(self.lens, view.matrix, conventional_depth(self.lens))
 
     def windows(self, size: int, count: int) -> list[Window]:
         """Choose ``count`` windows of ``size``², spread evenly over the views and the image.

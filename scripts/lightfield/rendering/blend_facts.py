@@ -56,11 +56,16 @@ def facts(frames: Iterable[int | None]) -> dict[str, Any]:
 
 
 def _samples(cycles: Any, layer: Any) -> int:
-    """Return the samples of a pixel; a view layer may have a number, or a bound, of its own."""
-    own, all_layers = int(layer.samples), int(cycles.samples)
-    if not own or cycles.use_layer_samples == "IGNORE":
-        return all_layers
-    return min(own, all_layers) if cycles.use_layer_samples == "BOUNDED" else own
+    """Return the samples of a pixel. A view layer may set another number, or a bound."""
+    layer_samples = int(layer.samples)
+    scene_samples = int(cycles.samples)
+    if not layer_samples or cycles.use_layer_samples == "IGNORE":
+        return scene_samples
+    return (
+        min(layer_samples, scene_samples)
+        if cycles.use_layer_samples == "BOUNDED"
+        else layer_samples
+    )
 
 
 def _camera(frames: list[int]) -> dict[str, Any] | None:

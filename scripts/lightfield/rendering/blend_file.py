@@ -39,12 +39,12 @@ def _check_blend(path: Path) -> None:
     9 bytes, which begin with the number of frames and end with a magic number.
     """
     content = path.read_bytes()
-    whole = content.endswith(b"\xb1\xea\x92\x8f")
-    if whole:
+    is_complete = content.endswith(b"\xb1\xea\x92\x8f")
+    if is_complete:
         count = int.from_bytes(content[-9:-5], "little")
         lengths = struct.unpack(f"<{2 * count}I", content[-9 - 8 * count : -9])[::2]
-        whole = len(content) == sum(lengths) + 8 + 8 * count + 9
-    if not whole:
+        is_complete = len(content) == sum(lengths) + 8 + 8 * count + 9
+    if not is_complete:
         raise OSError("the file is cut short")
 
 
@@ -102,23 +102,23 @@ def _choose(scene_name: str | None, view_layers: str | Sequence[str] | None) -> 
     window = bpy.context.window
     if scene_name is not None:
         if scene_name not in bpy.data.scenes:
-            known = ", ".join(scene.name for scene in bpy.data.scenes)
-            raise UserError(f"scene_name: is {scene_name!r}; must be one of {known}")
+            names = ", ".join(scene.name for scene in bpy.data.scenes)
+            raise UserError(f"scene_name: is {scene_name!r}; must be one of {names}")
         window.scene = bpy.data.scenes[scene_name]
-    found = window.scene.view_layers
-    layers = [layer for layer in found if layer.use] or [found[0]]
+    all_layers = window.scene.view_layers
+    layers = [layer for layer in all_layers if layer.use] or [all_layers[0]]
     if view_layers is None:
         layers = layers[:1]
     elif view_layers != "all":
         for name in view_layers:
-            if name not in found:
-                known = ", ".join(layer.name for layer in found)
-                raise UserError(f"view_layers: {name!r} is none of {known}")
-        layers = [found[name] for name in view_layers]
+            if name not in all_layers:
+                names = ", ".join(layer.name for layer in all_layers)
+                raise UserError(f"view_layers: {name!r} is none of {names}")
+        layers = [all_layers[name] for name in view_layers]
     _join(layers)
     # Keyframes may turn view layers on and off.
     animation.mute(window.scene, ("view_layers[",))
-    for layer in found:
+    for layer in all_layers:
         layer.use = layer == layers[0]
     window.view_layer = layers[0]
     return [layer.name for layer in layers]

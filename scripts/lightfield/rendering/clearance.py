@@ -113,13 +113,13 @@ def enclosing_objects(enclosures: Sequence[Enclosure | None]) -> Sequence[str | 
     """
     names = _objects_around(enclosures)
     rooms = {name for name in names if name and names.count(name) == len(names)}
-    rooms.update(found.name for found in enclosures if found and found.is_open)
+    rooms.update(enclosure.name for enclosure in enclosures if enclosure and enclosure.is_open)
     return [None if name in rooms else name for name in names]
 
 
 def open_mesh_warnings(enclosures: Sequence[Enclosure | None]) -> Iterator[str]:
     """Yield a line if cameras are inside open meshes."""
-    meshes = [found.name for found in enclosures if found and found.is_open]
+    meshes = [enclosure.name for enclosure in enclosures if enclosure and enclosure.is_open]
     if not meshes:
         return
     names = sorted(set(meshes))
@@ -133,7 +133,10 @@ def open_mesh_warnings(enclosures: Sequence[Enclosure | None]) -> Iterator[str]:
 
 def _objects_around(enclosures: Sequence[Enclosure | None]) -> list[str | None]:
     """Return for each camera the name of what most rays from it meet the back of, or None."""
-    return [found.name if found and found.share > 1 / 2 else None for found in enclosures]
+    return [
+        enclosure.name if enclosure and enclosure.share > 1 / 2 else None
+        for enclosure in enclosures
+    ]
 
 
 def free_places(rig: Random) -> Floats:
@@ -149,12 +152,12 @@ def free_places(rig: Random) -> Floats:
     progress = Progress(rig.count, "places", "cameras")
     for number in range(_TRIES):
         left = np.flatnonzero(np.isnan(places[:, 0]))
-        tried = np.array([rig.candidate(int(view), number) for view in left])
-        world = rig.to_world(tried)
+        candidates = np.array([rig.candidate(int(view), number) for view in left])
+        world = rig.to_world(candidates)
         free = clearances(world, rig.clearance) >= rig.clearance
         inside = [name not in {None, *rooms} for name in _objects_around(enclosures(world))]
         free &= ~np.array(inside)
-        places[left[free]] = tried[free]
+        places[left[free]] = candidates[free]
         progress.done(int(free.sum()))
         if free.all():
             return places
@@ -169,7 +172,7 @@ def enclosures(positions: Floats) -> list[Enclosure | None]:
 
     A camera is inside an object if most rays from it first meet that object's back. It is inside an
     open mesh if a third of the rays do and few meet its fronts; leaves would show both. It is then
-    in the mesh's bounding box, which for a plane has no room, and some ray leads out.
+    in the mesh's bounding box, which for a plane is flat, and some ray leads out.
     """
     depsgraph = bpy.context.evaluated_depsgraph_get()
     around_each: list[Enclosure | None] = []

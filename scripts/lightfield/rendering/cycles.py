@@ -46,7 +46,7 @@ def set_up(
     left_out = inventory["left_out"] if inventory else []
     blend_file.open_scene(blend, lightfield.content.get("scene", {}), inventory)
     passes = lightfield.passes
-    numbered = [found.name for found in passes if found.kind == "id"]
+    numbered = [each.name for each in passes if each.kind == "id"]
     if inventory and "hidden_objects" in left_out:
         pruning.remove_objects(inventory["hidden"])
     elif numbered and not inventory:
@@ -78,7 +78,7 @@ def set_up(
         _set_eyes(scene, lightfield.content[OMNIDIRECTIONAL])
     if focused:
         _set_focus(scene.camera.data, focused)
-    if any(found.kind == "motion" for found in passes):
+    if any(each.kind == "motion" for each in passes):
         left_out = [name for name in left_out if name != "animation"]
     pruning.leave_out(left_out)
     return str(scene.cycles.device)
@@ -133,7 +133,7 @@ def _set_passes(scene: Any, passes: Iterable[Pass]) -> None:
         for name in dir(owner):
             if name.startswith("use_pass_"):
                 setattr(owner, name, False)
-    needed = [name for found in passes for name in found.needed]
+    needed = [name for each in passes for name in each.needed]
     for name in ("Combined", *needed, *(GEOMETRY_PASSES if needed else ())):
         setattr(*pass_property(layer, name), True)
     # Two objects in each of its passes.
@@ -198,10 +198,10 @@ def gpu(device: str) -> str | None:
     preferences = bpy.context.preferences.addons["cycles"].preferences
     for name in {"auto": GPU_DEVICES, "gpu": GPU_DEVICES, "cpu": ()}.get(device, (device,)):
         try:
-            found = list(preferences.get_devices_for_type(name.upper()) or ())
+            entries = list(preferences.get_devices_for_type(name.upper()) or ())
         except (TypeError, ValueError):
             continue
-        if any(entry.type == name.upper() for entry in found):
+        if any(entry.type == name.upper() for entry in entries):
             return name.upper()
     if device == "gpu":
         raise UserError(
@@ -313,15 +313,15 @@ def choose_eye(name: str) -> None:
 
 def _set_focus(lens: Any, camera: Any) -> None:
     """Give a camera the aperture and focus of the artist's ``camera`` at the present frame."""
-    own = camera.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    evaluated = camera.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     if lens.type == "PANO":
         # From which Cycles has the aperture's width, and in a panorama nothing else.
-        lens.lens = own.lens
+        lens.lens = evaluated.lens
     for name in ("aperture_fstop", "aperture_blades", "aperture_rotation", "aperture_ratio"):
-        setattr(lens.dof, name, getattr(own.dof, name))
+        setattr(lens.dof, name, getattr(evaluated.dof, name))
     lens.dof.focus_object = camera.data.dof.focus_object
     lens.dof.focus_subtarget = camera.data.dof.focus_subtarget
-    lens.dof.focus_distance = own.dof.focus_distance
+    lens.dof.focus_distance = evaluated.dof.focus_distance
     lens.dof.use_dof = True
 
 

@@ -46,8 +46,8 @@ def external_files() -> list[dict[str, Any]]:
     A file that is not there has None for these: that it has come is noticed, too.
     """
     home = Path(bpy.data.filepath).parent
-    found = {file for block, path in _read() for file in _files(block, path)}
-    return [_entry(file, home) for file in sorted(found)]
+    files = {file for block, path in _read() for file in _files(block, path)}
+    return [_entry(file, home) for file in sorted(files)]
 
 
 def problems(images: Collection[Any]) -> list[dict[str, str]]:
@@ -58,11 +58,11 @@ def problems(images: Collection[Any]) -> list[dict[str, str]]:
     """
     home = Path(bpy.data.filepath).parent
     users = bpy.data.user_map()
-    found = []
+    problem_entries = []
 
     def note(block: Any, kind: str, path: Path, problem: str) -> None:
         name = {"kind": kind, "name": block.name}
-        found.append(name | {"path": _from(home, path), "problem": problem})
+        problem_entries.append(name | {"path": _from(home, path), "problem": problem})
 
     for block, path in _read():
         if not _is_needed(block, images, users):
@@ -75,7 +75,7 @@ def problems(images: Collection[Any]) -> list[dict[str, str]]:
         if block.library and block.is_missing and path_of(block.library).is_file():
             library = path_of(block.library)
             note(block, f"linked {type(block).__name__.lower()}", library, "not in its library")
-    return sorted(found, key=lambda entry: (entry["kind"], entry["path"], entry["name"]))
+    return sorted(problem_entries, key=lambda entry: (entry["kind"], entry["path"], entry["name"]))
 
 
 def put(blend: Path, files: Iterable[Mapping[str, Any]], store: ViewStore) -> None:

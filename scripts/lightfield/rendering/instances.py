@@ -32,15 +32,17 @@ _NO_INDEX = 2**31 - 1
 
 @dataclass(frozen=True)
 class Instances:
-    """What the scene shows: number by name; and these in order, each with its object's index.
+    """What the scene shows at a frame: objects themselves, and instances of them.
 
-    ``own`` are those of the objects that are shown themselves, by their indices, which they are.
+    ``names`` maps the name of each to its number. ``numbers`` (n,) are the same numbers in order,
+    and ``objects`` (n,) the indices of their objects. ``shown_itself`` holds, by the index of an
+    object, the number of the object that is shown itself, or 0.
     """
 
     names: dict[str, int]
     numbers: Array
     objects: Array
-    own: Array
+    shown_itself: Array
 
 
 def set_up(layer: Any) -> None:
@@ -88,14 +90,16 @@ def _node_group() -> Any:
 def shown() -> Instances:
     """Return what the opened scene shows at its frame."""
     entries = in_render(_entries)
-    own = np.zeros(max((thing.pass_index for thing in bpy.data.objects), default=0) + 1, np.uint32)
+    shown_itself = np.zeros(
+        max((thing.pass_index for thing in bpy.data.objects), default=0) + 1, np.uint32
+    )
     for number, index, is_instance in entries.values():
         if not is_instance:
-            own[index] = number
+            shown_itself[index] = number
     names = {name: number for name, (number, *_) in sorted(entries.items())}
     pairs = sorted((number, index) for number, index, _ in entries.values())
     numbers, objects = np.array(pairs, np.int64).reshape(-1, 2).T
-    return Instances(names, numbers, objects, own)
+    return Instances(names, numbers, objects, shown_itself)
 
 
 def _entries(depsgraph: Any) -> dict[str, tuple[int, int, bool]]:
@@ -122,13 +126,13 @@ def decoded(passes: dict[str, Array], objects: Array) -> Array:
     without a material shows is not written, nor beyond the last layer: there it is the object, if
     that is shown itself.
     """
-    found = shown()
+    instances = shown()
     layers = np.concatenate([passes[name] for name in _COLOURS], axis=-1).astype(np.float64)
     last = passes[_COUNT].astype(int).clip(1, LAYERS) - 1
     random = np.take_along_axis(layers, last, axis=-1)[..., 0]
     numbers = np.rint(random * 2.0**32).clip(0, _LARGEST).astype(np.uint32)
     # Only where it is a number of this object.
-    keys = found.numbers * 2**16 + found.objects
+    keys = instances.numbers * 2**16 + instances.objects
     wanted = numbers.astype(np.int64) * 2**16 + objects
     place = np.searchsorted(keys, wanted).clip(0, len(keys) - 1)
-    return np.where(keys[place] == wanted, numbers, found.own[objects])
+    return np.where(keys[place] == wanted, numbers, instances.shown_itself[objects])

@@ -10,7 +10,7 @@ import bpy
 import mathutils
 import numpy as np
 
-from lightfield.core import room
+from lightfield.core import disk_space
 from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_GPU_MEMORY, LESS_MEMORY
 from lightfield.core.leftovers import temporary_folder
@@ -50,7 +50,7 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
         for name, channels in passes.items()
     }
     pixels = scene.render.resolution_x * scene.render.resolution_y
-    with temporary_folder(room.fast_folder(pixels * PASSES_PIXEL_BYTES)) as folder:
+    with temporary_folder(disk_space.fast_folder(pixels * PASSES_PIXEL_BYTES)) as folder:
         scene.render.filepath = str(folder / "view.exr")
         try:
             with quiet():
@@ -70,10 +70,10 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
             channels = [channel for group in names.values() for channel in group]
             image = images.read_image(path, channels)
         except UserError as error:
-            free = room.gigabytes(shutil.disk_usage(folder).free)
-            needed = room.gigabytes(pixels * PASSES_PIXEL_BYTES)
+            free = disk_space.gigabytes(shutil.disk_usage(folder).free)
+            needed = disk_space.gigabytes(pixels * PASSES_PIXEL_BYTES)
             raise UserError(
-                f"{error}; {free} are free there: make room, or set TMPDIR to a folder with "
+                f"{error}; {free} are free there: free some space, or set TMPDIR to a folder with "
                 f"{needed}"
             ) from None
     return Rendered(

@@ -22,10 +22,10 @@ def alone() -> frozenset[str]:
             if now.is_evaluated
         }
 
-    found = {thing: _is_volume(thing) for thing in bpy.data.objects}
+    is_volume = {thing: _is_volume(thing) for thing in bpy.data.objects}
     if by_nodes:
-        found |= in_render(made)
-    return frozenset(str(thing.name_full) for thing in found if found[thing])
+        is_volume |= in_render(made)
+    return frozenset(str(thing.name_full) for thing in is_volume if is_volume[thing])
 
 
 def _parts(geometry: Any) -> Iterator[Any]:

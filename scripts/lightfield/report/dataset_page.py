@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.files import whole
+from lightfield.core.files import absolute_path
 from lightfield.dataset import blend
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW
-from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.splits_file import SPLITS
 from lightfield.export import transforms
 from lightfield.geometry import rigs
 from lightfield.geometry.lenses import Lens
@@ -58,7 +58,7 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
     middle = lightfield.views[middle_view(rig)]
     report = folder / REPORT
     found = origin.measurements
-    own = whole(folder)
+    own = absolute_path(folder)
     measured = {
         "error_vs_time": tables.error_vs_time(found, str(lightfield.scene["name"])),
         "synthesis": tables.synthesis(found, f"{own.parent.name}/{own.name}"),

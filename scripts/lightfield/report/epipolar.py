@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from lightfield.geometry.depth import distance_from_z
+from lightfield.geometry.depth import stored_distance
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.rigs import Rig
 
@@ -128,8 +128,7 @@ def sample(
         column = np.minimum(x[seen].astype(int), width - 1)
         line = np.minimum(y[seen].astype(int), height - 1)
         found = depth[line, column].astype(np.float64)
-        if meaning == "z":
-            found = distance_from_z(found, lens.rays(column + 0.5, line + 0.5))
+        found = stored_distance(found, lens.rays(column + 0.5, line + 0.5), meaning)
         reach[seen] = found / np.linalg.norm(own[seen], axis=-1)
     return light, reach
 

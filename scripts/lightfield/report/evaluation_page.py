@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import whole, write_csv
+from lightfield.core.files import absolute_path, write_csv
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import View
-from lightfield.export.source import Floats, Source
+from lightfield.export.source import Floats, SourceDataset
 from lightfield.imaging import images
 from lightfield.measurement import evaluation, metrics
 from lightfield.report import page
@@ -23,7 +23,7 @@ WIDEST = 1500
 
 def write(
     output: Path,
-    source: Source,
+    source: SourceDataset,
     tests: Sequence[View],
     renders: Path,
     masks: Path | None,
@@ -55,8 +55,8 @@ def write(
     page.write(
         output / "index.html",
         "evaluation.html.j2",
-        name="/".join(whole(source.dataset).parts[-2:]),
-        renders=whole(renders).name,
+        name="/".join(absolute_path(source.dataset).parts[-2:]),
+        renders=absolute_path(renders).name,
         means=means,
         rows=rows,
         background=evaluation.hexadecimal(background),
@@ -72,7 +72,7 @@ def write(
 def _compare(
     view: View,
     path: Path,
-    source: Source,
+    source: SourceDataset,
     mask: Path | None,
     background: Floats,
     picture: Path,

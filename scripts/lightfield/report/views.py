@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lightfield.dataset.lightfield import LightField
 from lightfield.export.points import evenly
-from lightfield.geometry.depth import distance_from_z
+from lightfield.geometry.depth import stored_distance
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
 from lightfield.geometry.rigs import Rig
@@ -167,7 +167,7 @@ def _pictures(
     for entry, depth in zip(packed, depths, strict=True):
         entry["depth"] = webp(pack_depth(depth, reach))
     matrices = lightfield.matrices
-    distances = distance_from_z(depths, rays) if lightfield.depth == "z" else depths
+    distances = stored_distance(depths, rays, lightfield.depth)
     colours = pictures.develop(light, exposure)
     return shown | {
         "points": _points(distances, rays, matrices[embedded], colours),

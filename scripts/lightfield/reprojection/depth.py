@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.kernels import inline, kernel
+from lightfield.core.compiled import inline, kernel
 from lightfield.geometry.lenses import Array
 from lightfield.imaging.halves import to_half
 from lightfield.reprojection.kernels import Topology, source_index

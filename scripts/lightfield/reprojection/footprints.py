@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from lightfield.core.kernels import inline, kernel
+from lightfield.core.compiled import inline, kernel
 from lightfield.geometry.lenses import Array
 from lightfield.reprojection.kernels import CAREFUL, INSIDE, NOTHING
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.kernels import inline, kernel, part
+from lightfield.core.compiled import inline, kernel, part
 from lightfield.geometry.lenses import Array
 
 # What a sample finds in the source.

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import keep_apart, sha256, whole
+from lightfield.core.files import absolute_path, keep_apart, sha256
 from lightfield.core.progress import Progress
 from lightfield.imaging.images import KEY_ATTRIBUTE, read_header
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.job import Job, SourceView
 from lightfield.reprojection.lens_arguments import Target
 from lightfield.reprojection.passes import write_pass
-from lightfield.reprojection.pixels import Source, write
+from lightfield.reprojection.pixels import SourcePixels, write
 
 
 def run(job: Job) -> None:
@@ -96,7 +96,7 @@ def reproject_view(job: Job, view: SourceView) -> list[Path]:
             todo.append((index, target, key))
     if todo:
         _check(job, view)
-        source = Source(job, view, [job.maps[index].window for index, *_ in todo])
+        source = SourcePixels(job, view, [job.maps[index].window for index, *_ in todo])
         for index, target, key in todo:
             write(job, target, job.maps[index], source, job.outputs(view, target), key)
             for wanted, path in job.pass_outputs(view, target).items():
@@ -107,7 +107,7 @@ def reproject_view(job: Job, view: SourceView) -> list[Path]:
 def _check(job: Job, view: SourceView) -> None:
     """Raise `UserError` for a source that is not as the record of those who made it says."""
     for path in job.sources(view):
-        expected = job.source_sums.get(f"{whole(path).parent.name}/{path.name}")
+        expected = job.source_sums.get(f"{absolute_path(path).parent.name}/{path.name}")
         if expected and sha256(path) != expected:
             raise UserError(
                 f"{path}: is not as it was written, {job.arguments.source_record} says; "

@@ -34,7 +34,7 @@ Attributes = Mapping[str, Attribute]
 PNG_OPTIONS = {"png:compressionLevel": 4, "png:filter": 64}
 
 
-class Source:
+class SourcePixels:
     """The part of a view's pixels that its targets need, linear and in float32."""
 
     def __init__(
@@ -109,7 +109,7 @@ def write(
     job: Job,
     target: Target,
     made: LensMap,
-    source: Source,
+    source: SourcePixels,
     outputs: Mapping[str, Path],
     key: str,
 ) -> None:
@@ -121,7 +121,7 @@ def write(
         f"plenoforge:{name}": str(value) for name, value in job.settings.items()
     }
     if "exr" in outputs and image.depth is not None:
-        attributes[DEPTH_ATTRIBUTE] = "z" if target.lens.has_z_depth else "distance"
+        attributes[DEPTH_ATTRIBUTE] = target.lens.usual_depth
     for kind, path in outputs.items():
         match kind:
             case "exr":
@@ -157,7 +157,7 @@ class _Image:
 
 
 def _developed(
-    job: Job, target: Target, made: LensMap, source: Source, outputs: Mapping[str, Path]
+    job: Job, target: Target, made: LensMap, source: SourcePixels, outputs: Mapping[str, Path]
 ) -> _Image:
     """Resample a view, and develop its colour for those ``outputs`` that hold it."""
     arguments = job.arguments
@@ -224,7 +224,7 @@ def _write_depth(path: Path, image: _Image, scale: float, key: str) -> None:
 
 
 def _resampled(
-    job: Job, made: LensMap, source: Source, as_z: bool
+    job: Job, made: LensMap, source: SourcePixels, as_z: bool
 ) -> tuple[Iterable[tuple[slice, Array]], Array | None]:
     """Return the target's colour, in strips, and its depth in the source's precision."""
     colour, depth = source.window(made)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.kernels import kernel
+from lightfield.core.compiled import kernel
 from lightfield.geometry.lenses import Array
 
 # Neighbours that differ in inverse distance more than a surface does that is seen at the steepest

@@ -14,7 +14,7 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import View
-from lightfield.export.source import Source, pixel_indices
+from lightfield.export.source import SourceDataset, pixel_indices
 from lightfield.geometry.depth import z_from_distance
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -78,7 +78,7 @@ class Surface:
 Reader = Callable[[View], tuple[Array, Array]]
 
 
-def reader(source: Source) -> Reader:
+def reader(source: SourceDataset) -> Reader:
     """Return what reads views of a dataset for `Sources`; raises `UserError` without depth."""
     if source.lightfield.depth is None:
         raise UserError(f"{source.lightfield.path}: depth: is null; a synthesis needs it")

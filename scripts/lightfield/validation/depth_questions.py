@@ -50,9 +50,9 @@ def answer(question: Question, camera: Camera, depth: NDArray[Any]) -> Answer:
     has_unknown = False
     if question.meaning:
         values = converted(depth, camera, question.meaning)
-        known = ~np.isnan(values)
-        has_unknown = not known.all()
-        if known.any():
+        is_known = ~np.isnan(values)
+        has_unknown = not is_known.all()
+        if is_known.any():
             nearest = float(np.nanmin(values))
             farthest = float(np.nanmax(values))
     seen = np.empty((0, 3))

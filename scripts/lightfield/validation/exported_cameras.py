@@ -16,10 +16,10 @@ from numpy.polynomial import Polynomial
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import NAME, LightField, View
-from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.splits_file import SPLITS
 from lightfield.geometry import rotations
 from lightfield.geometry.lenses import Lens
-from lightfield.geometry.rigs.split import PARTS
+from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.validation import unit_cube
 from lightfield.validation.files import ImageSet, Manifest, lists_of
 from lightfield.validation.readers import read
@@ -75,8 +75,8 @@ class Expected:
                 rig, *below = self.dataset.relative_to(home).parts
                 folders = {path.parent.name: path.parent for path in home.glob(f"*/{NAME}")}
                 if below:
-                    found = home.glob(f"*/{below[0]}/{NAME}")
-                    folders = {path.parent.parent.name: path.parent for path in found}
+                    frames = home.glob(f"*/{below[0]}/{NAME}")
+                    folders = {path.parent.parent.name: path.parent for path in frames}
                 return {name: folder for name, folder in folders.items() if name != rig}
         return {}
 
@@ -133,7 +133,7 @@ def check(
     ``wanted`` is that of `files.of_exports`.
     """
     checks = []
-    found: list[SetExport] = []
+    set_exports: list[SetExport] = []
     for number, image_set in enumerate(sets):
         expected = Expected(dataset, image_set)
         lens = image_set.lightfield.lens
@@ -153,7 +153,7 @@ def check(
             cube = exported.cube
             if cube and not unit_cube.is_of_rig(cube, image_set, expected.other_rigs):
                 cube = None
-            found.append(SetExport(number, exported, cube is not None and cube.fits_depth))
+            set_exports.append(SetExport(number, exported, cube is not None and cube.fits_depth))
             views += len(exported.views)
             problems += exported.faults
             problems += _faults(exported, expected)
@@ -166,7 +166,7 @@ def check(
                 detail = f"{len(paths)} exports have {views} cameras, not all as {expected.path}"
             name = f"{image_set.prefix}exported_cameras"
             checks.append(Check(name, not problems, detail, problems=shown))
-    return checks, found
+    return checks, set_exports
 
 
 def _faults(exported: Exported, expected: Expected) -> Iterator[str]:

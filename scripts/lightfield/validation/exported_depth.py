@@ -92,9 +92,9 @@ class ExportedDepth:
         return [self._check(number, problems, unread) for number, problems in faults.items()]
 
     def _check(self, number: int, problems: Sequence[str], unread: int) -> Check:
-        own = [index for index, (of, _) in enumerate(self.clouds) if of == number]
-        points = sum(len(self.clouds[index][1].positions) for index in own)
-        compared = sum(self.compared[index] for index in own)
+        cloud_indices = [index for index, (of, _) in enumerate(self.clouds) if of == number]
+        points = sum(len(self.clouds[index][1].positions) for index in cloud_indices)
+        compared = sum(self.compared[index] for index in cloud_indices)
         ranges = sum(len(e.exported.ranges) for e in self.exports if e.number == number)
         name = f"{self.sets[number].prefix}exported_depth"
         if (unread or compared < points) and not problems:
@@ -128,9 +128,9 @@ class ExportedDepth:
             by_view = np.argsort(views, kind="stable")
             bounds = np.searchsorted(views[by_view], np.arange(len(source.views) + 1))
             for view in range(len(source.views)):
-                own = points[by_view[bounds[view] : bounds[view + 1]]]
-                yield _Piece(index, own, view, starts[view])
-                starts[view] += len(own)
+                view_points = points[by_view[bounds[view] : bounds[view + 1]]]
+                yield _Piece(index, view_points, view, starts[view])
+                starts[view] += len(view_points)
 
     def _questions(self) -> dict[Key, Question]:
         points: dict[Key, list[NDArray[Any]]] = {}
@@ -210,8 +210,8 @@ class ExportedDepth:
         apart = np.full(len(cloud.positions), np.inf)
         for piece in self.pieces:
             if piece.cloud == index:
-                found = answers[0, piece.view].apart[piece.rows]
-                apart[piece.points] = np.fmin(apart[piece.points], found)
+                distances = answers[0, piece.view].apart[piece.rows]
+                apart[piece.points] = np.fmin(apart[piece.points], distances)
         limit = resolved(cloud.positions)
         off = np.flatnonzero(~(apart <= limit))
         # They may be another view's than the likely one.
@@ -250,8 +250,8 @@ def _lifting_views(image_set: ImageSet, source: ImageSet) -> Ints:
     """Return the rendered views in the order in which a set's exporters lift points from them."""
     views = image_set.lightfield.views
     training = [view for view in views if view.split in (None, "train")] or views
-    found = [source_view(source, view.name) for view in training]
-    return np.array([view for view in found if view is not None], np.int64)
+    source_views = [source_view(source, view.name) for view in training]
+    return np.array([view for view in source_views if view is not None], np.int64)
 
 
 def _range_fault(given: DepthRange, answers: Sequence[Answer]) -> Iterator[str]:

@@ -198,11 +198,11 @@ def of_views(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[
             for suffix in formats or [".exr"]
             for view, name in enumerate(image_set.views)
         ]
-        own = [File(path, number, view) for view, path in paths if Path(path).name in present]
+        set_files = [File(path, number, view) for view, path in paths if Path(path).name in present]
         missing = {path: "is missing" for _, path in paths if Path(path).name not in present}
-        detail = f"{len(own)} of {len(paths)} images are there"
+        detail = f"{len(set_files)} of {len(paths)} images are there"
         checks.append(Check.of_files(f"{image_set.prefix}views", missing, detail))
-        files += own
+        files += set_files
     return files, checks
 
 
@@ -221,11 +221,11 @@ def of_passes(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], dict
 
 def _of_passes(sets: Sequence[ImageSet]) -> list[File]:
     return [
-        File(found.path(Path(image_set.name), name).as_posix(), number, index, found)
+        File(view_pass.path(Path(image_set.name), name).as_posix(), number, index, view_pass)
         for number, image_set in enumerate(sets)
         for index, view in enumerate(image_set.lightfield.views)
-        for found, name in (
-            *((found, view.name) for found in image_set.lightfield.passes),
+        for view_pass, name in (
+            *((view_pass, view.name) for view_pass in image_set.lightfield.passes),
             *([(FLOW, view.flow)] if view.flow else []),
         )
     ]
@@ -233,9 +233,9 @@ def _of_passes(sets: Sequence[ImageSet]) -> list[File]:
 
 def names(sets: Sequence[ImageSet]) -> list[str]:
     """Return the files in which what is rendered has its numbers."""
-    own = rendered(sets)
-    found = own.lightfield.passes if own else []
-    return [f"{each.name}/{NAMES}" for each in found if each.kind == "id"]
+    rendered_set = rendered(sets)
+    passes = rendered_set.lightfield.passes if rendered_set else []
+    return [f"{each.name}/{NAMES}" for each in passes if each.kind == "id"]
 
 
 def lists_of(
@@ -245,8 +245,8 @@ def lists_of(
     wanted: Collection[Path] | None = None,
 ) -> list[Path]:
     """Return a set's lists of one kind of export; only those ``wanted``, if it is given."""
-    there = sorted((dataset / image_set.name).glob(manifest.lists))
-    return [path for path in there if wanted is None or path.resolve() in wanted]
+    lists = sorted((dataset / image_set.name).glob(manifest.lists))
+    return [path for path in lists if wanted is None or path.resolve() in wanted]
 
 
 def of_exports(
@@ -260,7 +260,7 @@ def of_exports(
 
     Of lists only those ``wanted`` count; without it every one that is there.
     """
-    found: dict[str, File] = {}
+    pictures: dict[str, File] = {}
     lists: list[str] = []
     others: list[str] = []
     problems: list[str] = []
@@ -282,7 +282,7 @@ def of_exports(
                     target = (path.parent / name).resolve()
                     if target.is_file() and target.is_relative_to(dataset):
                         relative = target.relative_to(dataset)
-                        found[relative.as_posix()] = File(relative.as_posix(), number)
+                        pictures[relative.as_posix()] = File(relative.as_posix(), number)
                         folders.add(relative.parent.as_posix())
                     else:
                         problems.append(f"{lists[-1]}: {name} is no file of the dataset")
@@ -299,34 +299,34 @@ def of_exports(
             for view in image_set.views:
                 for name in (pattern.format(view=view) for pattern in patterns):
                     if name in present:
-                        found[f"{folder}/{name}"] = File(f"{folder}/{name}", number)
+                        pictures[f"{folder}/{name}"] = File(f"{folder}/{name}", number)
     for file in views:
-        found.pop(file.path, None)
-    files = [file for _, file in sorted(found.items())]
+        pictures.pop(file.path, None)
+    files = [file for _, file in sorted(pictures.items())]
     passed = not problems if lists or files else None
     detail = f"{len(lists)} lists of frames, {len(files)} pictures beside the views"
     return files, [*lists, *others], Check("exports", passed, detail, problems=problems)
 
 
 def listing(
-    dataset: Path, sets: Sequence[ImageSet], known: Iterable[str]
+    dataset: Path, sets: Sequence[ImageSet], owned: Iterable[str]
 ) -> tuple[list[str], Check]:
     """Return every file that the dataset publishes, and fail on those that are not its own."""
-    published, strays = _sorted_out(dataset, sets, known)
+    published, strays = _sorted_out(dataset, sets, owned)
     problems = [f"{path}: is no file of this dataset" for path in strays]
     return published, Check("files", not strays, f"{len(published)} files", problems=problems)
 
 
 def _sorted_out(
-    dataset: Path, sets: Sequence[ImageSet], known: Iterable[str]
+    dataset: Path, sets: Sequence[ImageSet], owned: Iterable[str]
 ) -> tuple[list[str], list[str]]:
     """Return the files that the dataset publishes, and those that are not its own."""
-    own = {*known, *(f"{image_set.prefix}{NAME}" for image_set in sets)}
+    all_owned = {*owned, *(f"{image_set.prefix}{NAME}" for image_set in sets)}
     paths = [path.relative_to(dataset) for path in dataset.rglob("*") if path.is_file()]
     present = sorted(path.as_posix() for path in paths if path.parts[0] != REPORT)
     beside = (*OUTPUTS, README, CARD)
-    strays = [path for path in present if path not in own and path not in beside]
-    return [path for path in present if path in own], strays
+    strays = [path for path in present if path not in all_owned and path not in beside]
+    return [path for path in present if path in all_owned], strays
 
 
 def remove_strays(
@@ -350,8 +350,8 @@ def remove_strays(
     extras, lists, exports = of_exports(dataset.resolve(), sets, views, manifests, wanted)
     if exports.passed is False:
         return 0
-    known = {*lists, *names(sets), *(file.path for file in [*views, *extras])}
-    _, strays = _sorted_out(dataset, sets, known)
+    owned = {*lists, *names(sets), *(file.path for file in [*views, *extras])}
+    _, strays = _sorted_out(dataset, sets, owned)
     # Hidden is what is being drawn at this moment.
     drawn = {path.name for path in (dataset / REPORT).glob("[!.]*")}
     strays += [f"{REPORT}/{name}" for name in sorted(drawn - {*REPORT_FILES})]
@@ -366,7 +366,7 @@ def remove_strays(
 
 def checksums(
     recorded: Mapping[str, tuple[int, str]] | None,
-    found: Mapping[str, tuple[int, str]],
+    sums: Mapping[str, tuple[int, str]],
     sets: Sequence[ImageSet],
     altered_files: Mapping[str, str],
 ) -> Check:
@@ -379,21 +379,21 @@ def checksums(
     recorded = recorded or {}
     faults = dict(altered_files)
     for path, (size, digest) in sorted(recorded.items()):
-        if path not in found:
+        if path not in sums:
             faults[path] = "is recorded but is no image of this dataset"
-        elif size != found[path][0]:
-            faults[path] = f"has {found[path][0]} bytes, but its record says {size}"
-        elif digest != found[path][1]:
-            faults[path] = f"has the sha256 {found[path][1]}, but its record says {digest}"
+        elif size != sums[path][0]:
+            faults[path] = f"has {sums[path][0]} bytes, but its record says {size}"
+        elif digest != sums[path][1]:
+            faults[path] = f"has the sha256 {sums[path][1]}, but its record says {digest}"
     # Masks and pictures for trainers are not the renderer's.
-    own = rendered(sets)
-    views = own.views if own else []
-    own_files = [f"{IMAGES}/{view}.exr" for view in views]
-    own_files += [file.path for file in _of_passes(sets[:1])] if own else []
-    for path in sorted(own_files):
-        if path in found and path not in recorded:
+    rendered_set = rendered(sets)
+    views = rendered_set.views if rendered_set else []
+    rendered_files = [f"{IMAGES}/{view}.exr" for view in views]
+    rendered_files += [file.path for file in _of_passes(sets[:1])] if rendered_set else []
+    for path in sorted(rendered_files):
+        if path in sums and path not in recorded:
             faults[path] = "has no record"
-    detail = f"{len(recorded)} of {len(found)} images have a record"
+    detail = f"{len(recorded)} of {len(sums)} images have a record"
     return Check.of_files("checksums", faults, detail)
 
 
@@ -421,8 +421,8 @@ def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:
         }
     except (LookupError, TypeError, ValueError, AttributeError):
         raise UserError(f"{path}: views: must map names to distance and inside") from None
-    own = rendered(sets)
-    views = own.views if own else []
+    rendered_set = rendered(sets)
+    views = rendered_set.views if rendered_set else []
     faults = {}
     for view in views:
         if view not in around:

@@ -14,19 +14,19 @@ from pathlib import Path
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import (
+    absolute_path,
     broken,
     read_json,
     read_json_lines,
     read_problem,
     set_aside,
     sha256,
-    whole,
 )
 from lightfield.dataset import ledger, shard_files
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
-from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.splits_file import SPLITS
 from lightfield.validation.files import CARD, IMAGES, README, REPORT, SUMS, read_sums
 
 # Made as the work went on, and of it alone: nothing can make them again, and no dataset needs them.
@@ -52,7 +52,7 @@ class Integrity:
         self.dataset = Path(os.path.relpath(dataset))
         self.work = Path(os.path.relpath(work)) if work else None
         # A sequence's datasets lie a folder deeper, one for each frame.
-        folder = whole(dataset)
+        folder = absolute_path(dataset)
         depth = 3 if re.fullmatch(r"f\d{5,7}", folder.name) else 2
         self._name = "/".join(folder.parts[-depth:])
         self._scene = folder.parts[-depth]
@@ -64,8 +64,8 @@ class Integrity:
         expected = self._expected
         if self.work:
             yield from self._ledger_faults(self.work / ledger.NAME)
-        found = {path: self._problem(path, sums) for path, sums in expected.items()}
-        for path, problem in found.items():
+        problems = {path: self._problem(path, sums) for path, sums in expected.items()}
+        for path, problem in problems.items():
             if problem:
                 yield Fault(path, problem)
         # Also where all lists that had a file's checksum are damaged.
@@ -75,7 +75,7 @@ class Integrity:
             yield Fault(path, "is no file of this dataset, or has no checksum")
         for path in sorted(self._views_like(present) - expected.keys() - present):
             yield Fault(path, "is missing")
-        wrong = {path for path, problem in found.items() if problem}
+        wrong = {path for path, problem in problems.items() if problem}
         # Of these, damaged ones say nothing of what there is.
         if wrong.isdisjoint((self.dataset / NAME, self.dataset / "validation.json")):
             yield from (fault for fault in self._contents(expected) if fault.path not in wrong)
@@ -138,7 +138,7 @@ class Integrity:
 
         That is the record, or else the log, in which a file's last line counts.
         """
-        found: dict[Path, str] = {}
+        digests: dict[Path, str] = {}
         for path in map(Path, self._ledger):
             if not (self._is_own(path) and re.fullmatch(r"\d+-\d+\.json", path.name)):
                 continue
@@ -153,8 +153,8 @@ class Integrity:
             for file, digest in sums.items():
                 # A record of shards with other bounds may have views that there were.
                 if not self._published or self.dataset / file in self._published:
-                    found[self.dataset / file] = digest
-        return found
+                    digests[self.dataset / file] = digest
+        return digests
 
     @cached_property
     def _published(self) -> dict[Path, str]:
@@ -200,10 +200,10 @@ class Integrity:
         if problem := broken(path):
             return problem
         try:
-            found = sha256(path)
+            actual = sha256(path)
         except OSError as error:
             return f"cannot be read: {read_problem(error)}"
-        return None if found == digest else f"its sha256 is {found}, but {source} says {digest}"
+        return None if actual == digest else f"its sha256 is {actual}, but {source} says {digest}"
 
     def _present(self) -> Iterator[Path]:
         """Yield the dataset's files, those of its report only with the ledger, which has them."""

@@ -205,8 +205,8 @@ class Examiner:
             part = pixels[1::2]
             wrong = int(((part < 0) | (np.diff(part, axis=0, append=0) > 0)).any(axis=0).sum())
             facts.fault("passes", f"{wrong} pixels have parts below 0 or not in order", wrong)
-            found = set(np.unique(pixels[::2][part > 0]).tolist())
-            strange = len(found - _hashes(image))
+            hashes = set(np.unique(pixels[::2][part > 0]).tolist())
+            strange = len(hashes - _hashes(image))
             facts.fault("passes", f"has {strange} objects that its manifest does not have", strange)
         if wanted.kind == "flow":
             visible = pixels[2] == 1
@@ -299,15 +299,15 @@ class Examiner:
 
 
 def checks(
-    image_set: ImageSet, own: Mapping[File, Facts], volumes: Sequence[str] = ()
+    image_set: ImageSet, facts: Mapping[File, Facts], volumes: Sequence[str] = ()
 ) -> list[Check]:
     """Return the checks that each image of a set passes or fails by itself.
 
     ``volumes`` are those of the scene, in which depth sees nothing.
     """
-    readable = {file: fact for file, fact in own.items() if "images" not in fact.faults}
+    readable = {file: fact for file, fact in facts.items() if "images" not in fact.faults}
     checks = [
-        _outcome(image_set, "images", own, "are whole, of the right size and channels"),
+        _outcome(image_set, "images", facts, "are whole, of the right size and channels"),
         _outcome(image_set, "colour", readable, "have finite colours, and are not black"),
     ]
     deep = {file: fact for file, fact in readable.items() if fact.patches is not None}
@@ -335,28 +335,30 @@ def checks(
     return [*checks, check]
 
 
-def _outcome(image_set: ImageSet, name: str, own: Mapping[File, Facts], claim: str) -> Check:
+def _outcome(image_set: ImageSet, name: str, facts: Mapping[File, Facts], claim: str) -> Check:
     """Return a check of what the facts say about ``name``."""
-    if not own:
+    if not facts:
         return Check(f"{image_set.prefix}{name}", None, f"no image to see if they {claim}")
     faults = {
-        file.path: ", ".join(fact.faults[name]) for file, fact in own.items() if name in fact.faults
+        file.path: ", ".join(fact.faults[name])
+        for file, fact in facts.items()
+        if name in fact.faults
     }
-    detail = f"{len(own) - len(faults)} of {len(own)} {claim}"
+    detail = f"{len(facts) - len(faults)} of {len(facts)} {claim}"
     return Check.of_files(f"{image_set.prefix}{name}", faults, detail)
 
 
-def of_passes(own: Mapping[File, Facts], missing: Mapping[str, str]) -> Check:
+def of_passes(facts: Mapping[File, Facts], missing: Mapping[str, str]) -> Check:
     """Return the check of the views' passes, some of which may be ``missing``."""
     faults = {**missing}
     faults |= {
-        file.path: ", ".join(fact.faults["passes"]) for file, fact in own.items() if fact.faults
+        file.path: ", ".join(fact.faults["passes"]) for file, fact in facts.items() if fact.faults
     }
-    count = len(own) + len(missing)
+    count = len(facts) + len(missing)
     detail = f"{count - len(faults)} of {count} are there and hold what they must"
     check = Check.of_files("passes", faults, detail)
     lost: Counter[str] = Counter()
-    for file, fact in own.items():
+    for file, fact in facts.items():
         if file.of_pass and fact.nan:
             lost[file.of_pass.name] += fact.nan
     for name, number in lost.items():
@@ -411,26 +413,26 @@ def _shows_nothing(image: images.Image, seen: Bools, is_rendered: bool) -> bool:
 
 def _format_problem(file: File, image_set: ImageSet, image: images.Image) -> str | None:
     """Say which channels a view has and should have, if they differ in name or type."""
-    found = {name: pixels.dtype for name, pixels in image.channels.items()}
+    types = {name: pixels.dtype for name, pixels in image.channels.items()}
     transparent = image_set.lightfield.transparent
-    has_alpha = transparent or ("A" in found and image_set.name)
+    has_alpha = transparent or ("A" in types and image_set.name)
     colour = [*"RGB", *(["A"] if has_alpha else [])]
     if file.path.endswith(".png"):
-        wanted = dict.fromkeys(colour, "uint16" if found.get("R") == "uint16" else "uint8")
+        wanted = dict.fromkeys(colour, "uint16" if types.get("R") == "uint16" else "uint8")
     else:
         wanted = dict.fromkeys(colour, "float16")
         if image_set.lightfield.depth:
-            wanted["Z"] = "float16" if found.get("Z") == "float16" else "float32"
+            wanted["Z"] = "float16" if types.get("Z") == "float16" else "float32"
     return _channels_problem(image, wanted)
 
 
 def _channels_problem(image: images.Image, wanted: Mapping[str, str]) -> str | None:
     """Say which channels an image has and should have, if they differ in name or type."""
-    found = {name: str(pixels.dtype) for name, pixels in image.channels.items()}
-    if found == wanted:
+    types = {name: str(pixels.dtype) for name, pixels in image.channels.items()}
+    if types == wanted:
         return None
     texts = [
         " ".join(f"{name}:{kind}" for name, kind in sorted(channels.items()))
-        for channels in (found, wanted)
+        for channels in (types, wanted)
     ]
     return f"has the channels {texts[0]}; must have {texts[1]}"

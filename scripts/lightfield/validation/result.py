@@ -74,8 +74,8 @@ class Result:
         """Return one line for each thing that is wrong, the first ones of each check."""
         lines = []
         for check in self.checks:
-            found = check.problems[:_LINES_A_CHECK]
-            if len(check.problems) > len(found):
-                found.append(f"… and {len(check.problems) - len(found)} more")
-            lines += [f"{self.dataset}: {check.name}: {line}" for line in found]
+            shown = check.problems[:_LINES_A_CHECK]
+            if len(check.problems) > len(shown):
+                shown.append(f"… and {len(check.problems) - len(shown)} more")
+            lines += [f"{self.dataset}: {check.name}: {line}" for line in shown]
         return lines

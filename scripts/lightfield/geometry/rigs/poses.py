@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
+from lightfield.core.disk_space import gigabytes
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, read_problem, read_text
-from lightfield.core.room import gigabytes
 from lightfield.core.settings import FARTHEST, pattern
 from lightfield.geometry import colmap
 from lightfield.geometry.rigs.rig import Rig, UnitPoses
@@ -293,13 +293,13 @@ def _colmap_text(path: Path) -> Iterator[tuple[str, Sequence[Any], str]]:
         if not line.strip() or line.startswith("#") or (may_be_points and _are_points(line)):
             may_be_points = False
             continue
-        number, *words = line.split(maxsplit=9)
+        number, *fields = line.split(maxsplit=9)
         where = f"image {number}"
-        if len(words) != 9:
+        if len(fields) != 9:
             raise UserError(
                 f"{path}: {where}: must be IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME"
             )
-        yield where, words[:7], words[8]
+        yield where, fields[:7], fields[8]
         may_be_points = True
 
 
@@ -354,11 +354,11 @@ def _keyed(matrix: Floats) -> list[tuple[str, float]]:
 
 def _matrix(path: Path, where: str, key: str, value: Any, rows: int) -> list[tuple[str, Any]]:
     """Return (key, value) of each number of a matrix with four columns."""
-    found = []
+    numbers = []
     for index, (_, row) in enumerate(_numbered(path, f"{where}: {key}", "row", value, rows)):
         row_key = f"{key}[{index}]"
-        found += _numbered(path, f"{where}: {row_key}", row_key, row, 4)
-    return found
+        numbers += _numbered(path, f"{where}: {row_key}", row_key, row, 4)
+    return numbers
 
 
 def _numbered(path: Path, where: str, key: str, values: Any, count: int) -> list[tuple[str, Any]]:

@@ -17,7 +17,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.settings import FARTHEST, Settings, Vector, as_list
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.cube_map import CUBE_FACE_ANGLES
-from lightfield.geometry.rigs.split import Chosen, Part, Split, part_of
+from lightfield.geometry.rigs.split_setting import Chosen, Part, Split, part_of
 from lightfield.geometry.rotations import (
     Floats,
     euler_to_matrix,

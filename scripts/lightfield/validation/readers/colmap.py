@@ -294,10 +294,10 @@ def _points(heads: Sequence[tuple[Any, ...]], tracks: Ints) -> Points:
 def _whole(values: Floats) -> Ints:
     """Return whole numbers that were read as floats; raises ValueError for others."""
     with np.errstate(invalid="ignore"):
-        found = values.astype(np.int64)
-    if not (found == values).all():
+        integers = values.astype(np.int64)
+    if not (integers == values).all():
         raise ValueError("a number of a point is not whole")
-    return found
+    return integers
 
 
 # ---- what the files say twice ---------------------------------------------------------------
@@ -386,8 +386,8 @@ def _places_and_rows(image: Image, model: Model, order: Ints) -> tuple[Ints, Int
     places = np.flatnonzero(image.points != NO_POINT)
     if not len(order):
         return places, np.full(len(places), -1)
-    found = np.searchsorted(model.points.numbers, image.points[places], sorter=order)
-    rows = order[found.clip(max=len(order) - 1)]
+    indices = np.searchsorted(model.points.numbers, image.points[places], sorter=order)
+    rows = order[indices.clip(max=len(order) - 1)]
     return places, np.where(model.points.numbers[rows] == image.points[places], rows, -1)
 
 

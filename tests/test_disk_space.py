@@ -1,4 +1,4 @@
-"""Room before a run, and what killed runs left: refused and removed before anything is made."""
+"""Before a run: disks without space are refused, and leftovers of killed runs are removed."""
 
 import errno
 import os
@@ -20,7 +20,7 @@ from checkouts import checkout, snakemake, start_snakemake, wait_until
 from conftest import SCRIPTS, mount_disk
 from sphere import write_views
 
-from lightfield.core import files, leftovers, live_runs, room
+from lightfield.core import disk_space, files, leftovers, live_runs
 from lightfield.core.errors import UserError
 
 Usage = namedtuple("Usage", "free")
@@ -82,15 +82,17 @@ with temporary_folder(sys.argv[1]) as folder:
     [([40, 40], None), ([50, 45], "warning"), ([150, 45], "warning"), ([150, 55], "error")],
 )
 def test_what_is_written_to_one_disk_is_added_up(sizes, expected, tmp_path, monkeypatch):
-    monkeypatch.setattr(room.shutil, "disk_usage", lambda _: Usage(100e9))
+    monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda _: Usage(100e9))
     folders = [tmp_path / f"not/there/{number}" for number in range(len(sizes))]
-    needs = [room.Need(folder, size * 1e9) for folder, size in zip(folders, sizes, strict=True)]
+    needs = [
+        disk_space.Need(folder, size * 1e9) for folder, size in zip(folders, sizes, strict=True)
+    ]
     text = f"{folders[0]}: 100 GB are free on its disk, and this run writes some {sum(sizes)} GB"
     if expected == "error":
         with pytest.raises(UserError, match=text):
-            list(room.check(needs))
+            list(disk_space.check(needs))
         return
-    warnings = list(room.check(needs))
+    warnings = list(disk_space.check(needs))
     assert [warning.startswith(text) for warning in warnings] == [True] * (expected == "warning")
 
 
@@ -99,7 +101,7 @@ def test_what_is_written_to_one_disk_is_added_up(sizes, expected, tmp_path, monk
     [(0, "0 GB"), (4096, "less than 0.01 GB"), (5.4e8, "0.54 GB"), (12638171136, "13 GB")],
 )
 def test_sizes_are_gigabytes(size, text):
-    assert room.gigabytes(size) == text
+    assert disk_space.gigabytes(size) == text
 
 
 DISK = {"f_flag": 0, "f_frsize": 4096, "f_files": 10**6, "f_favail": 10**5}
@@ -113,27 +115,27 @@ DISK |= dict.fromkeys(("f_blocks", "f_bfree", "f_bavail"), 10**9)
         ({"f_favail": 50}, 60, "takes 50 more files (inodes), and this run writes some 60"),
         ({"f_favail": 0}, 0, "takes no more files (its inodes are used up): remove some files"),
         ({"f_files": 0, "f_favail": 0}, 60, None),
-        ({"f_bavail": 0}, 0, "is full: make room"),
+        ({"f_bavail": 0}, 0, "is full: free some space"),
         ({"f_flag": os.ST_RDONLY}, 0, "is read-only: mount its disk for writing, or write else"),
     ],
 )
 def test_a_disk_that_takes_nothing_more_is_refused_with_the_cause(
     state, files, cause, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(room.os, "statvfs", lambda _: SimpleNamespace(**DISK | state))
-    needs = [room.Need(tmp_path / "results", 1, files)]
+    monkeypatch.setattr(disk_space.os, "statvfs", lambda _: SimpleNamespace(**DISK | state))
+    needs = [disk_space.Need(tmp_path / "results", 1, files)]
     if cause is None:
-        assert list(room.check(needs)) == []
+        assert list(disk_space.check(needs)) == []
         return
     with pytest.raises(UserError, match=re.escape(cause)) as caught:
-        list(room.check(needs))
+        list(disk_space.check(needs))
     assert str(caught.value).startswith(f"{tmp_path / 'results'}: ")
 
 
 def test_a_folder_of_somebody_else_is_refused_with_the_cause(nobody):
     nobody.chmod(0o500)
     with pytest.raises(UserError, match=r"you may not write in .*: change its permissions"):
-        list(room.check([room.Need(nobody / "results", 1)]))
+        list(disk_space.check([disk_space.Need(nobody / "results", 1)]))
     with pytest.raises(UserError, match=r"cannot be written: you may not write in .*: change"):
         files.write_text(nobody / "results/names.json", "text")
 
@@ -157,7 +159,10 @@ def test_a_run_that_cannot_fit_ends_before_its_first_job(tmp_path):
     [
         ("ro", ["the disk of ", "is read-only: mount its disk for writing"]),
         ("size=1m,nr_inodes=8", ["its inodes are used up): remove some files"]),
-        ("size=64k", ["GB are free on its disk, and this run writes some", "is full: make room"]),
+        (
+            "size=64k",
+            ["GB are free on its disk, and this run writes some", "is full: free some space"],
+        ),
     ],
 )
 @pytest.mark.parametrize("name", ["work", "results"])
