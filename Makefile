@@ -39,10 +39,11 @@ consumers: .venv/complete .venv-consumers/complete
 	python tests/consumers/export.py work/consumers
 	.venv-consumers/bin/python -W ignore tests/consumers/check.py work/consumers
 
-.venv-consumers/complete: .venv/complete envs/requirements-consumers.txt
+# Several GB: on Linux the package index has torch with CUDA alone.
+.venv-consumers/complete: .venv/complete envs/requirements-consumers.txt envs/requirements-nerfstudio.txt
 	.venv/bin/python -m venv --clear .venv-consumers
-	.venv-consumers/bin/pip -q install -r envs/requirements-consumers.txt
-	.venv-consumers/bin/pip -q install --no-deps nerfstudio==1.1.5
+	.venv-consumers/bin/pip -q install --require-hashes -r envs/requirements-consumers.txt
+	.venv-consumers/bin/pip -q install --require-hashes --no-deps -r envs/requirements-nerfstudio.txt
 	@touch $@
 
 # Twice, for a page shows the measurements that are there when it is planned.
@@ -100,4 +101,6 @@ locks:
 		done; \
 	done
 	echo uv | $(LOCK) --universal - -o envs/requirements-uv.txt
+	$(LOCK) --universal --python-version 3.11 envs/requirements-consumers.in -o envs/requirements-consumers.txt
+	echo nerfstudio==1.1.5 | $(LOCK) --universal --no-deps --python-version 3.11 - -o envs/requirements-nerfstudio.txt
 	echo 'moto[server]' | $(LOCK) --universal --python-version 3.11 - -o envs/requirements-s3-server.txt
