@@ -1,7 +1,7 @@
 # `make` sets up the environment and builds the default dataset; `make test` sets up and runs the tests,
 # and `make test-other` those that are not slow, with the other of the two Pythons and its own lock.
 # `make consumers` reads exports with the consumers' own code, in an environment of theirs; `make learn`
-# learns radiance fields from exported files.
+# learns radiance fields from exported files, in the same environment.
 
 CORES ?= $(shell getconf _NPROCESSORS_ONLN)
 
@@ -49,7 +49,7 @@ consumers: .venv/complete .venv-consumers/complete
 # Twice, for a page shows the measurements that are there when it is planned.
 LEARNED = --config scenes='[garden_learn, object_learn]' rigs=all preset=full
 
-learn: .venv/complete
+learn: .venv/complete .venv-consumers/complete
 	snakemake --cores $(CORES) learn $(LEARNED)
 	snakemake --cores $(CORES) $(LEARNED)
 

@@ -94,6 +94,7 @@ def check_start():
     check_device()
     check_memory()
     check_room()
+    check_consumers()
 
 
 def check_input(job):
@@ -110,7 +111,7 @@ def check_input(job):
 
 def announce_refusals():
     """Say in a dry run what the run would refuse."""
-    checks = [check_device, check_memory, check_room]
+    checks = [check_device, check_memory, check_room, check_consumers]
     checks += [functools.partial(check_input, job) for job in needed_jobs()]
     problems = {}
     for check in checks:
