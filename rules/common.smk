@@ -134,6 +134,7 @@ CHECK_GPU = rule_name("check_gpu")
 CHECK_BLEND = rule_name("check_blend")
 INVENTORY = rule_name("inventory")
 IMPORT_VIEWS = rule_name("import_views")
+MEASURE_LEARNING = rule_name("measure_learning")
 
 
 def log_of(job):

@@ -96,6 +96,7 @@ def check_start():
     check_device()
     check_memory()
     check_disk_space()
+    check_consumers()
 
 
 def check_input(job):
@@ -112,7 +113,7 @@ def check_input(job):
 
 def announce_refusals():
     """Say in a dry run what the run would refuse."""
-    checks = [check_device, check_memory, check_disk_space]
+    checks = [check_device, check_memory, check_disk_space, check_consumers]
     checks += [functools.partial(check_input, job) for job in needed_jobs()]
     problems = {}
     for check in checks:
