@@ -5,7 +5,6 @@ from pathlib import Path
 
 from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import error_vs_time, trials
 
 
@@ -38,9 +37,7 @@ def main() -> None:
     if arguments.seeds < 2:
         raise UserError(f"--seeds {arguments.seeds}: must be at least 2")
 
-    lightfield = LightField.read(arguments.lightfield)
-    lightfield = lightfield.changed(render=trials.own_settings(arguments, lightfield))
-    maker = trials.Trials.of(arguments, lightfield)
+    lightfield, maker = trials.read_arguments(arguments)
     content = error_vs_time.measure(
         maker,
         lightfield.render,

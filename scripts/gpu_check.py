@@ -9,7 +9,6 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
 from lightfield.core.settings import checked
-from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import gpu_check, trials
 from lightfield.measurement.costs import FullSize
 
@@ -39,10 +38,8 @@ def main() -> None:
     device = {"auto": "gpu"}.get(arguments.device, arguments.device)
     if not cycles.gpu(device):
         raise UserError("device: is cpu; gpu_check wants auto, or the name of a GPU's kind")
-    lightfield = LightField.read(arguments.lightfield)
-    render = trials.own_settings(arguments, lightfield)
-    maker = trials.Trials.of(arguments, lightfield)
-    found = gpu_check.check(maker, device, render, sizes)
+    lightfield, maker = trials.read_arguments(arguments)
+    found = gpu_check.check(maker, device, lightfield.render, sizes)
     name = arguments.output.name
     text = gpu_check.table(name, found)
     print(text)

@@ -57,6 +57,12 @@ def classes(pilot: Trials, window: Window) -> tuple[Classes, NDArray[Any]]:
     return np.where(pilot.mask(window), kinds, NONE), noise
 
 
+def classes_of(maker: Trials, windows: Sequence[Window]) -> list[Classes]:
+    """Return the stratum of each pixel of some windows, (h, w) each, by a pilot of ``maker``."""
+    pilot = maker.pilot()
+    return [classes(pilot, window)[0] for window in windows]
+
+
 def choose(maker: Trials, size: int, count: int) -> tuple[list[Window], dict[str, float]]:
     """Choose ``count`` windows of ``size``² pixels for each stratum, and return its part of all.
 

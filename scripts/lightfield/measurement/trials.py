@@ -310,25 +310,28 @@ def add_arguments(parser: argparse.ArgumentParser, lightfield: str) -> None:
 
 
 def add_calibration(parser: argparse.ArgumentParser) -> None:
-    """Add what `own_settings` reads."""
+    """Add the argument that `read_arguments` reads beside those of `add_arguments`."""
     parser.add_argument(
         "--calibration", type=Path, help="what scripts/calibrate.py chose for a target error"
     )
 
 
-def own_settings(arguments: argparse.Namespace, lightfield: LightField) -> Mapping[str, Any]:
-    """Return a dataset's ``render`` block, with what was chosen for its target error.
+def read_arguments(arguments: argparse.Namespace) -> tuple[LightField, Trials]:
+    """Return the dataset, with the ``render`` settings that its views get, and its trials.
 
-    Raises `UserError` where it has one, and nothing says what was.
+    Settings that calibrate.py chose replace a target error. Raises `UserError` if the dataset has a
+    target error, and ``arguments`` name no calibration.
     """
+    lightfield = LightField.read(arguments.lightfield)
     if arguments.calibration:
-        return calibrated(lightfield.render, arguments.calibration)
-    if "samples" not in lightfield.render:
+        render = calibrated(lightfield.render, arguments.calibration)
+        lightfield = lightfield.changed(render=render)
+    elif "samples" not in lightfield.render:
         raise UserError(
             f"{arguments.lightfield}: render has a target error and no samples; "
             "give --calibration, what scripts/calibrate.py chose for it"
         )
-    return lightfield.render
+    return lightfield, Trials.of(arguments, lightfield)
 
 
 def nearest_view(views: Sequence[View], view: View) -> View | None:
