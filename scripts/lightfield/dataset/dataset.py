@@ -55,6 +55,10 @@ READ_SECONDS, REPROJECTION_SECONDS = 4e-8, 1.5e-7
 GUESSED_SAMPLES = 256
 # Start-up is kept under this part of a shard's time.
 START_UP_PART = 0.05
+# More jobs would make the plan long, and no more render at once; a cluster may take more.
+USUAL_SHARDS = 64
+# On a cluster no job is expected to render longer than this.
+CLUSTER_JOB_MINUTES = 20
 # A longer plan would take longer than it is worth.
 MOST_SHARDS = 10_000
 # Of the bytes of half-float colour and of depth, what an EXR takes: measured in the three scenes.
@@ -73,6 +77,14 @@ PICTURES = ("overview", "contact_sheet", "rig", "depth", "noise")
 PLOTS = ("rig", "depth", "noise")
 PICTURE_FILES = (*(f"{name}.png" for name in PICTURES), *(f"{name}.svg" for name in PLOTS))
 REPORT_FILES = (*PICTURE_FILES, "costs.json", "index.html")
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A cluster that renders: how many jobs run at once, and the cores of each job."""
+
+    jobs: int
+    cores: int
 
 
 @dataclass(frozen=True)
@@ -103,9 +115,8 @@ class Dataset:
     results_root: str = "results"
     work_root: str = "work"
     views_per_shard: int | Literal["auto"] = "auto"
-    most_shards: int = 64
-    # Of one core; longer ones are cut, however many that makes.
-    shard_minutes: float = math.inf
+    # None where this machine renders.
+    cluster: Cluster | None = None
     # Path and SHA-256 of each file that a .blend reads, once its inventory is known.
     external_files: Sequence[tuple[str, str | None]] = ()
 
@@ -592,9 +603,8 @@ class Dataset:
     def shards(self) -> list[tuple[int, int]]:
         """The views in runs (first, end) of nearly equal length, as many as there were before.
 
-        Automatically, a run is as short as it can be without start-up taking more than its part:
-        the shorter, the more processes can work at once. More than ``most_shards`` would only make
-        the plan long, because no more are rendered at once; unless they are long.
+        With ``views_per_shard`` auto, a run is as short as it can be while start-up takes only its
+        small part of the time: the shorter the runs, the more processes can work at once.
         """
         if self.views_per_shard == "auto":
             count = shard_counts.noted(self.work_root, self.name, self.view_count)
@@ -609,8 +619,11 @@ class Dataset:
         """How many shards a dataset gets of which none has been rendered."""
         seconds = self._probed_view[0] if self._probed_view else self.planned_view_seconds
         shortest = math.ceil(START_UP_SECONDS / START_UP_PART / max(seconds, 1e-6))
-        needed = math.ceil(self.view_count * seconds / (60 * self.shard_minutes))
-        most = min(max(self.most_shards, needed), MOST_SHARDS)
+        most = USUAL_SHARDS
+        if self.cluster:
+            job_seconds = 60 * CLUSTER_JOB_MINUTES * self.cluster.cores
+            short_jobs = math.ceil(self.view_count * seconds / job_seconds)
+            most = min(max(most, self.cluster.jobs, short_jobs), MOST_SHARDS)
         return min(math.ceil(self.view_count / shortest), most)
 
 
@@ -645,9 +658,10 @@ def _entries(folder: str, name: str) -> list[os.DirEntry[str]]:
         return []
 
 
-def load_datasets(settings: Configuration) -> list[Dataset]:
+def load_datasets(settings: Configuration, cluster: Cluster | None = None) -> list[Dataset]:
     """Read the scene YAMLs that a configuration chooses and resolve their datasets.
 
+    ``cluster`` is the one that renders them, if any.
     Raises `UserError` for a scene that is not there, not right, or without the rigs asked for, and
     for one whose folder another scene has under another preset.
     """
@@ -663,7 +677,7 @@ def load_datasets(settings: Configuration) -> list[Dataset]:
                 f"preset={preset} and {folder}; give one of these scene YAMLs another name"
             )
         limits = settings.presets[settings.preset]
-        found += scene_datasets(scene, settings.preset, limits, settings)
+        found += scene_datasets(scene, settings.preset, limits, settings, cluster)
     if settings.rigs == "all":
         return found
     known = {dataset.rig_name for dataset in found}
@@ -689,10 +703,11 @@ def scene_datasets(
     preset: str = "full",
     limits: Preset | None = None,
     settings: Configuration | None = None,
+    cluster: Cluster | None = None,
 ) -> list[Dataset]:
     """Resolve every dataset of one scene YAML under the ``limits`` of a preset.
 
-    Of the ``settings``, folders and length of shards count.
+    Of the ``settings``, folders and length of shards count. ``cluster`` is the one that renders.
     """
     limits = limits or Preset()
     written = config.load_scene(scene)
@@ -707,8 +722,6 @@ def scene_datasets(
             "results_root": settings.results,
             "work_root": settings.work,
             "views_per_shard": settings.views_per_shard,
-            "most_shards": settings.most_shards,
-            "shard_minutes": settings.shard_minutes or math.inf,
         }
     testing = [name for name, rig in written.rigs.items() if rig.split in TESTED_WITH]
     training = next((name for name, rig in written.rigs.items() if rig.split == "train"), None)
@@ -763,6 +776,7 @@ def scene_datasets(
                     else (),
                     trained_by=f"{training}{below}" if rig.split in TESTED_WITH else None,
                     **folders,
+                    cluster=cluster,
                 )
             )
     return found
