@@ -129,6 +129,8 @@ def test_the_table_adds_up_what_the_probes_measured():
     assert "| garden/LFCuboid_8panos | 8 | 4096 × 2048 | 256 | 90 ± 0 | 0 | — | — | 0.1 |" in text
     assert "| all | 308 | | | | 3 ± 0 | — | — | 3 |" in text
     assert "Hours of one processor core" in text
+    # Under the table: 300 × 36 / 3600 = 3.
+    assert "hours = views × s a view / 3600" in text.split("| all |")[1]
     assert "Hours of the graphics card." in plan.table(
         [("a/b", 1, fisheye | {"device": "GPU"})], {}
     )
