@@ -1,4 +1,4 @@
-"""Check that a GPU renders what the processor does, and say how long full datasets take on it."""
+"""Check that a GPU renders what the processor renders, and estimate the full datasets' hours."""
 
 import argparse
 import json
@@ -31,7 +31,7 @@ def main() -> None:
 
     full = checked(TypeAdapter(dict[str, FullSize]), arguments.full, "--full")
     sizes = {name: size.model_dump() for name, size in full.items()}
-    # Where there is none, nothing is rendered.
+    # Without a GPU, nothing is rendered.
     with processors.only(arguments.threads):
         from lightfield.rendering import cycles
 
