@@ -39,22 +39,22 @@ def main() -> None:
     if not cycles.gpu(device):
         raise UserError("device: is cpu; gpu_check wants auto, or the name of a GPU's kind")
     lightfield, maker = trials.read_arguments(arguments)
-    found = gpu_check.check(maker, device, lightfield.render, sizes)
+    content = gpu_check.check(maker, device, lightfield.render, sizes)
     name = arguments.output.name
-    text = gpu_check.table(name, found)
+    text = gpu_check.table(name, content)
     print(text)
-    if not found["same"]:
+    if not content["same"]:
         raise UserError(
             f"{name}: the GPU renders another picture than the processor: colours differ by "
-            f"{found['colour']:.2f} of what noise makes, all light by {found['light']:.1f} "
-            f"standard errors, and {found['depth']:.2%} of the depths; try another driver, or "
+            f"{content['colour']:.2f} of what noise makes, all light by {content['light']:.1f} "
+            f"standard errors, and {content['depth']:.2%} of the depths; try another driver, or "
             "render with device=cpu"
         )
     write_text(arguments.output.with_suffix(".md"), text)
-    write_json(arguments.output.with_suffix(".json"), found)
+    write_json(arguments.output.with_suffix(".json"), content)
     print(
         f"note: {name}: the GPU renders the same picture; all datasets at full size take "
-        f"{sum(found['hours'].values()):.3g} hours of it"
+        f"{sum(content['hours'].values()):.3g} hours of it"
     )
 
 

@@ -174,12 +174,12 @@ def measure(
     changes = changes_to_try({**inventory["sampling"], **render}, experiment.device == "CPU")
     unchanged = [method for methods in UNCHANGED.values() for method in methods]
     experiment.run([*unchanged, *(change.method for change in changes)], SEEDS, title)
-    tried = [(change, savings(experiment, change)) for change in changes]
-    advised = advised_changes(tried)
+    measured = [(change, savings(experiment, change)) for change in changes]
+    advised = advised_changes(measured)
     combined = combination([change for change in advised if change.compared_with == TRACED])
     if combined:
         experiment.run([combined.method], SEEDS, title)
-        tried.append((combined, savings(experiment, combined)))
+        measured.append((combined, savings(experiment, combined)))
     return {
         **experiment.described(),
         "seeds": len(SEEDS),
@@ -200,7 +200,7 @@ def measure(
                     for stratum, saving in by_stratum.items()
                 },
             }
-            for change, by_stratum in tried
+            for change, by_stratum in measured
         ],
         "yaml": {key: value for change in advised for key, value in change.change.items()},
         "costly": {"lights": inventory["lights"]}
@@ -208,11 +208,11 @@ def measure(
     }
 
 
-def advised_changes(tried: Sequence[tuple[Change, Mapping[str, Saving]]]) -> list[Change]:
+def advised_changes(measured: Sequence[tuple[Change, Mapping[str, Saving]]]) -> list[Change]:
     """Return the advised changes; of several values of one key, the one that saves most."""
     good = [
         (saved[WHOLE_VIEWS].times, change)
-        for change, saved in tried
+        for change, saved in measured
         if is_advised(change, saved.get(WHOLE_VIEWS))
     ]
     good.sort(key=lambda pair: pair[0])

@@ -154,8 +154,8 @@ class Search:
         self._plain_samples_needed = self.plain_samples(target)
         _print_progress(f"plain path tracing needs {self._plain_samples_needed:.3g} samples")
         # The error of all pixels of plain path tracing is inversely proportional to its samples.
-        whole = fmean(entry.whole_error * entry.samples for entry in self.measured)
-        self.most_whole_error = MOST_OF_PLAIN * whole / self._plain_samples_needed
+        error_of_one_sample = fmean(e.whole_error * e.samples for e in self.measured)
+        self.most_whole_error = MOST_OF_PLAIN * error_of_one_sample / self._plain_samples_needed
         if denoise in (None, True):
             self._climb("denoised", _with_samples, {"denoise": True}, 1, self.limit)
             self._climb_thresholds("adaptive, denoised", {"denoise": True})

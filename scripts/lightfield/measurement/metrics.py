@@ -84,8 +84,8 @@ class Reference:
     @property
     def own_error(self) -> float:
         """Expected relative mean squared error of the reference itself."""
-        own = (self.variance[self.counted] * self.weights).mean(axis=-1)
-        return float(own[_inliers(own)].mean())
+        variance = (self.variance[self.counted] * self.weights).mean(axis=-1)
+        return float(variance[_inliers(variance)].mean())
 
 
 def _weights(truth: Array, exposure: float) -> Array:
@@ -196,9 +196,9 @@ def relative_mse(
     ``left_out`` is the part of the pixels that does not count, those with the largest errors.
     """
     errors = (_squares(colour, reference) * reference.weights).mean(axis=-1)
-    own = (reference.variance[reference.counted] * reference.weights).mean(axis=-1)
+    reference_error = (reference.variance[reference.counted] * reference.weights).mean(axis=-1)
     kept = _inliers(errors, left_out)
-    return float((errors - own)[kept].mean())
+    return float((errors - reference_error)[kept].mean())
 
 
 def bias_and_variance(
@@ -362,7 +362,7 @@ def disagreement(
         for image, truth, where in zip(images, truths, seen, strict=True)
     ]
     weights = _weights(truths[0], references[0].exposure)
-    own = sum(
+    reference_errors = sum(
         r.variance.reshape(-1, 3)[where] * weights
         for r, where in zip(references, seen, strict=True)
     )
@@ -374,9 +374,9 @@ def disagreement(
         float(value[kept].mean())
         for value in (
             (apart + between) ** 2 * weights,
-            between**2 * weights - own,
-            apart**2 * weights - own,
-            both - own,
+            between**2 * weights - reference_errors,
+            apart**2 * weights - reference_errors,
+            both - reference_errors,
         )
     )
     return Disagreement(

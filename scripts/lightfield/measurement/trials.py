@@ -368,19 +368,19 @@ def both_see(
     second one's depth hides are left out. Both references need depth.
     """
     first, second = cameras
-    here, there = windows
+    window, other_window = windows
     depths = references[0].depth, references[1].depth
     assert depths[0] is not None and depths[1] is not None
     rows, columns = np.nonzero(references[0].mask & np.isfinite(depths[0]))
-    points = first.lift(depths[0][rows, columns], columns + here.x, rows + here.y)
-    x, y = (second.pixels(points) - (there.x, there.y)).T
+    points = first.lift(depths[0][rows, columns], columns + window.x, rows + window.y)
+    x, y = (second.pixels(points) - (other_window.x, other_window.y)).T
     with np.errstate(invalid="ignore"):
-        inside = (x >= 0) & (x < there.width) & (y >= 0) & (y < there.height)
+        inside = (x >= 0) & (x < other_window.width) & (y >= 0) & (y < other_window.height)
     across, down = (np.where(inside, value, 0).astype(np.int64) for value in (x, y))
     inside &= references[1].mask[down, across]
-    seen = second.lift(depths[1][down, across], across + there.x, down + there.y)
+    seen = second.lift(depths[1][down, across], across + other_window.x, down + other_window.y)
     with np.errstate(invalid="ignore"):
         distance = np.linalg.norm(points - second.position, axis=1)
         seen_distance = np.linalg.norm(seen - second.position, axis=1)
         same = inside & (np.abs(seen_distance / distance - 1) < SAME_DEPTH)
-    return (rows * here.width + columns)[same], (down * there.width + across)[same]
+    return (rows * window.width + columns)[same], (down * other_window.width + across)[same]
