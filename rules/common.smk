@@ -31,8 +31,7 @@ from lightfield.core.memory import available
 from lightfield.dataset import journal, ledger, memory, presence, shard_counts
 from lightfield.dataset.config import accept_blend, load_config, load_scene, scene_path
 from lightfield.dataset.dataset_paths import PICTURES, PLOTS
-from lightfield.dataset.description import SOURCE_KEYS
-from lightfield.dataset.estimate import MOST_SHARDS
+from lightfield.dataset.description import SOURCE_KEYS, Cluster
 from lightfield.dataset.exports import MANIFEST, VIEWS
 from lightfield.dataset.loading import load_datasets, rendered_frames, scene_datasets
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
@@ -62,19 +61,17 @@ NAMING = GIVEN if "scenes" in GIVEN else OWN
 if "scenes" in NAMING and "rigs" not in {*GIVEN, *NAMING}:
     config["rigs"] = "all"
 
-# On a cluster at least one for each job that runs at once, and none waits long for the last.
-if NODES:
-    config.setdefault("most_shards", max(64, min(NODES, MOST_SHARDS)))
-    config.setdefault("shard_minutes", 20 * (CORES or 1))
+# On a cluster no job waits long for the last shard.
+CLUSTER = Cluster(jobs=NODES, cores=CORES or 1) if NODES else None
 
 try:
     SETTINGS = load_config(config)
-    CHOSEN = load_datasets(SETTINGS)
+    CHOSEN = load_datasets(SETTINGS, CLUSTER)
     if IS_MAIN_PROCESS:
         for dataset in CHOSEN:
             presence.check_presence(dataset)
-    WHOLE = load_datasets(SETTINGS.model_copy(update={"rigs": "all"}))
-    SMOKE = scene_datasets("smoke", settings=SETTINGS)
+    WHOLE = load_datasets(SETTINGS.model_copy(update={"rigs": "all"}), CLUSTER)
+    SMOKE = scene_datasets("smoke", settings=SETTINGS, cluster=CLUSTER)
 except UserError as error:
     sys.exit(f"error: {error}")
 

@@ -54,9 +54,8 @@ def main() -> None:
     if full["samples"] == FILE:
         if arguments.inventory is None:
             raise UserError("--inventory: is missing; it has the samples of the .blend")
-        said = read_inventory(arguments.inventory, "blend")["blend"]
-        full["samples"] = said["samples"]
-    found = costs.costs(
+        full["samples"] = read_inventory(arguments.inventory, "blend")["blend"]["samples"]
+    content = costs.costs(
         arguments.dataset,
         arguments.blend,
         arguments.journals,
@@ -66,7 +65,7 @@ def main() -> None:
         full,
         arguments.reprojection,
     )
-    write_json(arguments.output, found)
+    write_json(arguments.output, content)
 
 
 if __name__ == "__main__":

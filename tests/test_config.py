@@ -566,6 +566,13 @@ def test_snakemake_ends_with_one_line_and_no_job(arguments, expected, tmp_path):
     assert "rule " not in result.stdout + result.stderr
 
 
+@pytest.mark.parametrize("key", ["most_shards", "shard_minutes"])
+def test_a_removed_key_names_the_key_that_answers_its_question(key):
+    content = {"scenes": ["garden"], "preset": "full", "presets": {"full": {}}, key: 100}
+    with pytest.raises(UserError, match=f"config.yaml: {key}: .*views_per_shard"):
+        config.load_config(content)
+
+
 def test_no_two_scenes_have_one_folder(tmp_path, monkeypatch):
     monkeypatch.setattr(config, "SCENES", tmp_path)
     for name in ("room", "room_tiny"):

@@ -344,8 +344,6 @@ SETTINGS = [
             ("samples", 2**31),
         )
     ),
-    *({"most_shards": value} for value in (0, -1, 1.5, "64", HUGE, True)),
-    *({"shard_minutes": value} for value in (0, -1, float("nan"), "20", 1e7)),
     *({"views_per_shard": value} for value in (0, 1.5, "all", "10", True)),
     *({"package_gigabytes": value} for value in (0, -1, "2", float("inf"))),
     *({"accept_blend": value} for value in ("yes", 1, None)),

@@ -4,7 +4,7 @@ import difflib
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -36,11 +36,16 @@ class Settings(BaseModel):
         extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True
     )
 
+    # Keys that earlier versions had, and what to do instead.
+    removed_keys: ClassVar[Mapping[str, str]] = {}
+
     @model_validator(mode="before")
     @classmethod
     def _known_keys(cls, content: Any) -> Any:
         allowed_keys = cls.model_fields
         for key, value in content.items() if isinstance(content, Mapping) else ():
+            if key in cls.removed_keys:
+                raise ValueError(f"{key}: is no longer a key; {cls.removed_keys[key]}")
             if key not in allowed_keys:
                 hint = suggestion(key, allowed_keys) or f"; allowed here: {', '.join(allowed_keys)}"
                 raise ValueError(f"{key}: unknown key{hint}")

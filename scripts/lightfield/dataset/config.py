@@ -12,7 +12,7 @@ import shlex
 from collections.abc import Mapping
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import yaml
 from pydantic import (
@@ -141,8 +141,18 @@ class Energy(Settings):
     currency: str = Field("EUR", max_length=20)
 
 
+_SHARDS_ARE_AUTOMATIC = (
+    "leave it out, or set views_per_shard to the number of views that one render job makes"
+)
+
+
 class Configuration(Settings):
     """Which scenes to build, how well, and where."""
+
+    removed_keys: ClassVar[Mapping[str, str]] = {
+        "most_shards": _SHARDS_ARE_AUTOMATIC,
+        "shard_minutes": _SHARDS_ARE_AUTOMATIC,
+    }
 
     scenes: Names = Field(description="Names of files in configs/scenes/, without .yaml.")
     rigs: Literal["all"] | Names = Field(
@@ -170,18 +180,10 @@ class Configuration(Settings):
         "auto", description="What Cycles renders on."
     )
     views_per_shard: Auto | AtLeastOne = Field(
-        "auto", description="auto, or how many views one render job makes."
-    )
-    most_shards: AtLeastOne = Field(
-        64,
-        description="With views_per_shard: auto, the most render jobs of one dataset, unless they "
-        "are long; without it 64, or as many as Snakemake runs at once (--jobs).",
-    )
-    shard_minutes: Annotated[float, Field(gt=0, le=1e6)] | None = Field(
-        None,
-        description="With views_per_shard: auto, a render job that is expected to take longer than "
-        "so many minutes of one core is cut; without it 20 minutes of a cluster's job. A dataset "
-        "that was begun keeps its jobs.",
+        "auto",
+        description="How many views one render job makes. With auto, the number follows from the "
+        "expected time of a view, and on a cluster from the jobs that run at once (--jobs). A "
+        "dataset that was begun with auto keeps its jobs.",
     )
     accept_blend: Annotated[bool, BeforeValidator(_switch)] = Field(
         False,

@@ -21,6 +21,14 @@ SOURCE_KEYS = {"builder", "parameters", "scene_name", "view_layers", "frame"}
 
 
 @dataclass(frozen=True)
+class Cluster:
+    """A cluster that renders: how many jobs run at once, and the cores of each job."""
+
+    jobs: int
+    cores: int
+
+
+@dataclass(frozen=True)
 class Description:
     """One scene seen by one rig, with every default filled in and the preset applied.
 
@@ -48,9 +56,8 @@ class Description:
     results_root: str = "results"
     work_root: str = "work"
     views_per_shard: int | Literal["auto"] = "auto"
-    most_shards: int = 64
-    # Of one core; longer ones are cut, however many that makes.
-    shard_minutes: float = math.inf
+    # None where this machine renders.
+    cluster: Cluster | None = None
     # Path and SHA-256 of each file that a .blend reads, once its inventory is known.
     external_files: Sequence[tuple[str, str | None]] = ()
 

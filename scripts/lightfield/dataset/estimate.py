@@ -23,6 +23,10 @@ REPROJECTION_SECONDS = 1.5e-7
 GUESSED_SAMPLES = 256
 # Start-up is kept under this part of a shard's time.
 START_UP_PART = 0.05
+# More jobs would make the plan long, and no more render at once; a cluster may take more.
+USUAL_SHARDS = 64
+# On a cluster no job is expected to render longer than this.
+CLUSTER_JOB_MINUTES = 20
 # A longer plan would take longer than it is worth.
 MOST_SHARDS = 10_000
 # Of the bytes of half-float colour and of depth, what an EXR takes: measured in the three scenes.
@@ -95,14 +99,16 @@ class Estimate:
         """How many shards a dataset gets of which none has been rendered.
 
         A shard is as short as it can be while start-up stays a small part of its time: the
-        shorter, the more processes can work at once. More than ``most_shards`` only make the plan
-        long, unless they would each take longer than ``shard_minutes``.
+        shorter, the more processes can work at once.
         """
         dataset = self.dataset
         seconds = self._probe[0] if self._probe else self._planned_view_seconds
         shortest = math.ceil(START_UP_SECONDS / START_UP_PART / max(seconds, 1e-6))
-        needed = math.ceil(dataset.view_count * seconds / (60 * dataset.shard_minutes))
-        most = min(max(dataset.most_shards, needed), MOST_SHARDS)
+        most = USUAL_SHARDS
+        if dataset.cluster:
+            job_seconds = 60 * CLUSTER_JOB_MINUTES * dataset.cluster.cores
+            short_jobs = math.ceil(dataset.view_count * seconds / job_seconds)
+            most = min(max(most, dataset.cluster.jobs, short_jobs), MOST_SHARDS)
         return min(math.ceil(dataset.view_count / shortest), most)
 
     @property

@@ -1,6 +1,5 @@
 """The datasets that a configuration and its scene YAMLs describe, within a preset's limits."""
 
-import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Literal
@@ -16,6 +15,7 @@ from lightfield.dataset.config import (
     TargetError,
 )
 from lightfield.dataset.dataset import Dataset
+from lightfield.dataset.description import Cluster
 from lightfield.dataset.exports import VIEWS, Exports
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -26,9 +26,10 @@ from lightfield.geometry.rigs import Poses, Rig
 TESTED_WITH = ("validation", "test")
 
 
-def load_datasets(settings: Configuration) -> list[Dataset]:
+def load_datasets(settings: Configuration, cluster: Cluster | None = None) -> list[Dataset]:
     """Read the scene YAMLs that a configuration chooses and resolve their datasets.
 
+    ``cluster`` is the one that renders them, if any.
     Raises `UserError` for a scene that is not there, not right, or without the rigs asked for, and
     for one whose folder another scene has under another preset.
     """
@@ -44,7 +45,7 @@ def load_datasets(settings: Configuration) -> list[Dataset]:
                 f"preset={preset} and {folder}; give one of these scene YAMLs another name"
             )
         limits = settings.presets[settings.preset]
-        found += scene_datasets(scene, settings.preset, limits, settings)
+        found += scene_datasets(scene, settings.preset, limits, settings, cluster)
     if settings.rigs == "all":
         return found
     known = {dataset.rig_name for dataset in found}
@@ -70,10 +71,11 @@ def scene_datasets(
     preset: str = "full",
     limits: Preset | None = None,
     settings: Configuration | None = None,
+    cluster: Cluster | None = None,
 ) -> list[Dataset]:
     """Resolve every dataset of one scene YAML under the ``limits`` of a preset.
 
-    Of the ``settings``, folders and length of shards count.
+    Of the ``settings``, folders and length of shards count. ``cluster`` is the one that renders.
     """
     limits = limits or Preset()
     written = config.load_scene(scene)
@@ -100,6 +102,7 @@ def scene_datasets(
                 limits=limits,
                 **_split_partners(rig, written, folder.removeprefix(name)),
                 **_where_and_how_long(settings),
+                cluster=cluster,
             )
             datasets.append(dataset)
     return datasets
@@ -173,8 +176,6 @@ def _where_and_how_long(settings: Configuration | None) -> dict[str, Any]:
         "results_root": settings.results,
         "work_root": settings.work,
         "views_per_shard": settings.views_per_shard,
-        "most_shards": settings.most_shards,
-        "shard_minutes": settings.shard_minutes or math.inf,
     }
 
 
