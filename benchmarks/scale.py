@@ -25,8 +25,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
 from lightfield.core.files import read_json, sha256, write_json, write_text
 from lightfield.dataset import config, keys, ledger
-from lightfield.dataset.dataset import Dataset, load_datasets
+from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import load_datasets
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
 from lightfield.imaging import images
 from lightfield.measurement.costs import job_times

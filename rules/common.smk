@@ -28,19 +28,13 @@ from lightfield.core.failures import (
 )
 from lightfield.core.gpus import visible
 from lightfield.core.memory import available
-from lightfield.dataset import journal, ledger, memory, shard_counts
+from lightfield.dataset import journal, ledger, memory, presence, shard_counts
 from lightfield.dataset.config import accept_blend, load_config, load_scene, scene_path
-from lightfield.dataset.dataset import (
-    MOST_SHARDS,
-    PICTURES,
-    PLOTS,
-    SOURCE_KEYS,
-    check_presence,
-    load_datasets,
-    rendered_frames,
-    scene_datasets,
-)
+from lightfield.dataset.dataset_paths import PICTURES, PLOTS
+from lightfield.dataset.description import SOURCE_KEYS
+from lightfield.dataset.estimate import MOST_SHARDS
 from lightfield.dataset.exports import MANIFEST, VIEWS
+from lightfield.dataset.loading import load_datasets, rendered_frames, scene_datasets
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 from lightfield.dataset.splits_file import SPLITS
 from lightfield.dataset.view_store import VARIABLE, ViewStore
@@ -78,7 +72,7 @@ try:
     CHOSEN = load_datasets(SETTINGS)
     if IS_MAIN_PROCESS:
         for dataset in CHOSEN:
-            check_presence(dataset)
+            presence.check_presence(dataset)
     WHOLE = load_datasets(SETTINGS.model_copy(update={"rigs": "all"}))
     SMOKE = scene_datasets("smoke", settings=SETTINGS)
 except UserError as error:
@@ -140,6 +134,7 @@ CHECK_GPU = rule_name("check_gpu")
 CHECK_BLEND = rule_name("check_blend")
 INVENTORY = rule_name("inventory")
 IMPORT_VIEWS = rule_name("import_views")
+MEASURE_LEARNING = rule_name("measure_learning")
 
 
 def log_of(job):

@@ -1,5 +1,6 @@
 # What no public interface of Snakemake gives. This is the only file that reaches inside Snakemake;
 # each piece says why.
+import functools
 import inspect
 import threading
 
@@ -76,6 +77,48 @@ def rerun(outputs):
     --forcerun is the public way, but what it names becomes a target, too.
     """
     workflow.dag.forcefiles.update(map(stored, outputs))
+
+
+def before_jobs_are_chosen(mark):
+    """Call ``mark`` once all jobs are known, and so all settings written, and none is chosen yet.
+
+    An input function runs while those of other jobs have still to write their settings.
+    """
+    dag = workflow.dag
+    choose = dag.update_needrun
+    search = dag.bfs
+    mark_once = functools.cache(mark)
+
+    def readers_of_content(_, *jobs):
+        return search(ReadersOfContent(dag.depending), *jobs)
+
+    async def mark_and_choose(*arguments, **options):
+        mark_once()
+        dag.bfs = readers_of_content
+        try:
+            await choose(*arguments, **options)
+        finally:
+            dag.bfs = search
+
+    dag.update_needrun = mark_and_choose
+
+
+class ReadersOfContent:
+    """By job: the jobs that read what it makes, without those for which it need only be there.
+
+    Snakemake looks for no reason in what follows from a job that runs, and so overlooks those jobs:
+    they follow from it, but do not run because of it.
+    """
+
+    def __init__(self, depending):
+        self._depending = depending
+
+    def __getitem__(self, job):
+        return {
+            reader: files
+            for reader, files in self._depending[job].items()
+            if not all(map(is_ancient, files))
+        }
 
 
 def take_as_missing(is_damaged):

@@ -4,7 +4,6 @@ import resource
 
 from lightfield.core import live_runs
 from lightfield.dataset.config import expected_blend
-from lightfield.dataset.dataset import check_external_files, check_imported
 
 # Bytes of a process in which bpy can be imported; with less it crashes, or no thread starts.
 LEAST_ADDRESS_SPACE = 1.5e9
@@ -44,10 +43,11 @@ def check_disk_space():
     jobs = [job for job in needed_jobs() if job.output]
     renders = [job for job in jobs if job.rule.name == RENDER]
     datasets = {d.folder: d for d in (dataset_of(job.wildcards) for job in renders)}
-    needs = [
-        disk_space.Need(Path(RESULTS), d.missing_bytes, d.missing_views)
-        for d in datasets.values()
-    ]
+    needs = []
+    for dataset in datasets.values():
+        views = presence.missing_views(dataset)
+        size = views * dataset.estimate.all_view_bytes
+        needs.append(disk_space.Need(Path(RESULTS), size, views))
     # A built scene, at most.
     needs += [
         disk_space.Need(Path(WORK), 1e8)
@@ -96,6 +96,7 @@ def check_start():
     check_device()
     check_memory()
     check_disk_space()
+    check_consumers()
 
 
 def check_input(job):
@@ -105,14 +106,14 @@ def check_input(job):
         if blend.is_file():
             expected_blend(job.wildcards.name, blend, sha256(blend))
     elif job.rule.name == INVENTORY:
-        check_external_files(scene_of(job.wildcards))
+        presence.check_external_files(scene_of(job.wildcards))
     elif job.rule.name == IMPORT_VIEWS:
-        check_imported(dataset_of(job.wildcards))
+        presence.check_imported(dataset_of(job.wildcards))
 
 
 def announce_refusals():
     """Say in a dry run what the run would refuse."""
-    checks = [check_device, check_memory, check_disk_space]
+    checks = [check_device, check_memory, check_disk_space, check_consumers]
     checks += [functools.partial(check_input, job) for job in needed_jobs()]
     problems = {}
     for check in checks:

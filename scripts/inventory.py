@@ -15,7 +15,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import blend, config
 from lightfield.dataset.config import FILE
-from lightfield.dataset.dataset import rendered_frames, scene_datasets
+from lightfield.dataset.loading import rendered_frames, scene_datasets
 from lightfield.dataset.view_store import ViewStore
 from lightfield.geometry.rigs import BlendCamera
 from lightfield.rendering import (

@@ -11,8 +11,9 @@ from lightfield.core.errors import UserError
 from lightfield.core.settings import checked
 from lightfield.dataset import passes
 from lightfield.dataset.config import Preset
-from lightfield.dataset.dataset import Dataset, scene_datasets
+from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.lightfield import MACHINE, LightField
+from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import rigs
 from lightfield.measurement.sampling import calibrated
 

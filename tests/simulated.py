@@ -12,9 +12,10 @@ import numpy as np
 from checkouts import snakemake
 
 from lightfield.core.files import sha256, write_json, write_text
-from lightfield.dataset import ledger, records
-from lightfield.dataset.dataset import Dataset, scene_datasets
+from lightfield.dataset import ledger, shard_files
+from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import scene_datasets
 from lightfield.dataset.records import ShardRecord
 from lightfield.imaging import images
 
@@ -77,7 +78,9 @@ def _note_jobs(folder: Path, datasets: list[Dataset]) -> None:
                 files = {name: ledger.Stamp.of(name)}
                 history = {}
                 if name in dataset.all_records:
-                    listed = [f"{dataset.folder}/{view}" for view in records.read(Path(name))]
+                    listed = [
+                        f"{dataset.folder}/{view}" for view in shard_files.read_record(Path(name))
+                    ]
                     files |= {view: ledger.Stamp.of(view) for view in listed}
                     log = f"{name.removesuffix('.json')}.sums.jsonl"
                     history[log] = ledger.Stamp.of(log)

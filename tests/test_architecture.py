@@ -66,7 +66,7 @@ def test_what_each_run_and_job_reads_the_rules_with_imports_nothing_heavy():
     found = subprocess.run(
         [sys.executable, "-c", program], cwd=LIBRARY.parent, capture_output=True, text=True
     ).stdout.split()
-    assert "lightfield.dataset.dataset" in found
+    assert "lightfield.dataset.loading" in found
     assert not {"numba", "skimage", "scipy", "OpenImageIO", "matplotlib", "bpy"} & set(found)
 
 

@@ -13,7 +13,8 @@ from checkouts import checkout, planned, snakemake
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
 from lightfield.dataset import config, download
-from lightfield.dataset.dataset import check_presence, load_datasets, scene_datasets
+from lightfield.dataset.loading import load_datasets, scene_datasets
+from lightfield.dataset.presence import check_presence
 
 CONTENT = bytes(range(256)) * 12345
 SUM = hashlib.sha256(CONTENT).hexdigest()

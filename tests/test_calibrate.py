@@ -10,8 +10,8 @@ from checkouts import checkout, planned, snakemake
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
 from lightfield.dataset.config import Preset
-from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import lenses
 from lightfield.measurement.calibration import Candidate, Search, effort_for
 from lightfield.measurement.sampling import PLAIN

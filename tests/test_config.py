@@ -16,7 +16,7 @@ import schema
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
 from lightfield.dataset.config import Preset
-from lightfield.dataset.dataset import load_datasets, scene_datasets
+from lightfield.dataset.loading import load_datasets, scene_datasets
 
 RIGHT = {
     "scene": {"builder": "room"},

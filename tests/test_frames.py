@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from lightfield.dataset import config
-from lightfield.dataset.dataset import rendered_frames, scene_datasets
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import rendered_frames, scene_datasets
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 

@@ -34,10 +34,11 @@ from lightfield.dataset import (
     shard_counts,
     shard_files,
 )
-from lightfield.dataset.dataset import check_external_files, scene_datasets
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import scene_datasets
+from lightfield.dataset.presence import check_external_files, external_changed
 from lightfield.dataset.splits_file import splits_content
 from lightfield.export import MANIFESTS
 from lightfield.export.source import SourceDataset
@@ -185,8 +186,8 @@ def inventory(_):
 
 
 def read_scene_inventory(path, dataset):
-    dataset.external_changed(None)
-    dataset.memory_bytes(100)
+    external_changed(dataset, None)
+    dataset.estimate.memory_bytes(100)
     check_external_files(dataset)
     for key in ("left_out", "external_files", "memory_bytes", "volumes", "missing"):
         read_inventory(path, key)
@@ -201,8 +202,8 @@ def record(_):
 
 
 def read_record(path, _):
-    records.read(path)
-    shard_files.recorded(path, str(path.parent))
+    shard_files.read_record(path)
+    shard_files.recorded_sizes(path, str(path.parent))
 
 
 def log_of_sums(_):
@@ -314,7 +315,7 @@ def calibration(_):
 
 def read_calibration(path, dataset):
     calibrated({"target_error": 0.01, "seed": 0}, path)
-    dataset.expected_samples  # noqa: B018
+    dataset.estimate.view_seconds  # noqa: B018
 
 
 def probe(_):
@@ -325,7 +326,7 @@ def probe(_):
 
 
 def read_probe(path, dataset):
-    dataset.expected_view  # noqa: B018
+    dataset.estimate.view_seconds  # noqa: B018
     dataset.shards  # noqa: B018
     plan.table([("a/b", 1, plan.read_probe(path))], {})
 

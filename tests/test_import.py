@@ -16,7 +16,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy, sha256
 from lightfield.core.settings import checked
 from lightfield.dataset.config import Scene
-from lightfield.dataset.dataset import scene_datasets
+from lightfield.dataset.loading import scene_datasets
 from lightfield.dataset.published import lightfields
 from lightfield.geometry import lenses
 from lightfield.imaging import images

@@ -9,8 +9,8 @@ from lightfield.core import memory as machine
 from lightfield.core.errors import UserError
 from lightfield.dataset import memory
 from lightfield.dataset.config import load_config, read_config
-from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import lenses
 from lightfield.rendering import scene_memory, shard
 
@@ -79,12 +79,12 @@ def test_a_job_asks_for_what_the_scene_was_measured_to_take(tmp_path):
     content = read_config(ROOT / "config.yaml") | {"work": str(tmp_path)}
     dataset = scene_datasets("garden", settings=load_config(content))[0]
     pixels = 2048 * 2048 * memory.PIXEL_BYTES
-    assert dataset.view_memory_bytes == memory.UNKNOWN_SCENE + pixels
+    assert dataset.estimate.view_memory_bytes == memory.UNKNOWN_SCENE + pixels
     (tmp_path / "garden").mkdir()
     (tmp_path / "garden/inventory.json").write_text(json.dumps({"memory_bytes": 2 * GB}))
-    assert dataset.view_memory_bytes == 2.4 * GB + pixels
+    assert dataset.estimate.view_memory_bytes == 2.4 * GB + pixels
     # Four pixels for each of a view's, up to 4096 by 2048.
-    assert dataset.memory_bytes(dataset.panorama_width**2 // 2) == 2.4 * GB + 2 * pixels
+    assert dataset.estimate.memory_bytes(dataset.panorama_width**2 // 2) == 2.4 * GB + 2 * pixels
 
 
 def test_a_scene_is_measured_in_a_process_of_its_own(room):

@@ -10,9 +10,9 @@ from checkouts import checkout, planned
 
 from lightfield.core.files import write_json
 from lightfield.dataset import shard_counts
-from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.journal import Journal
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import lenses
 from lightfield.measurement import plan
 from lightfield.rendering import probe as probing

@@ -14,9 +14,9 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.settings import checked
 from lightfield.dataset import config
-from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import scene_datasets
 from lightfield.dataset.splits_file import splits_content
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits

@@ -4,7 +4,7 @@
 def panorama_memory(wildcards, attempt):
     """Ask for the same for the panorama."""
     dataset = dataset_of(wildcards)
-    need = dataset.memory_bytes(dataset.panorama_width**2 // 2)
+    need = dataset.estimate.memory_bytes(dataset.panorama_width**2 // 2)
     return math.ceil(need / 1e6) * attempt
 
 

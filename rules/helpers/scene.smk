@@ -13,7 +13,8 @@ def inventory_settings(dataset):
         "allow_missing": written.scene.allow_missing,
         "motion_blur": written.render.motion_blur,
         "rendered_frames": rendered_frames(datasets),
-        "camera_frames": [each.camera_frames for each in datasets],
+        # As the program has them: a rig without any changes nothing.
+        "camera_frames": [frame for each in datasets for frame in each.camera_frames],
     }
 
 

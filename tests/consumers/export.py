@@ -19,6 +19,8 @@ from lightfield.dataset.exports import settings_of  # noqa: E402
 from lightfield.export.source import SourceDataset  # noqa: E402
 
 RIG = {"type": "plane", "cameras": [3, 2], "size": 1.2, "center": [0.3, -0.2, 0.1]}
+# Views enough for a radiance field to learn from.
+LEARNED_RIG = {"type": "random", "count": 40, "size": [2, 2, 1]}
 OF = {
     "colmap": ("perspective", "shifted", "fisheye", "opencv"),
     "nerfstudio": ("perspective", "shifted", "fisheye", "wide", "panorama"),
@@ -45,6 +47,10 @@ def main() -> None:
             )
             source = SourceDataset(folder / "dataset", name, ".exr")
             export.run(kind, source, settings, folder / kind / name)
+    write_views(folder / "learn" / "dataset", LENSES["panorama"], LEARNED_RIG)
+    source = SourceDataset(folder / "learn" / "dataset", "", ".exr")
+    settings = settings_of("nerfstudio").model_validate({"sources": ["views"], "depth": True})
+    export.run("nerfstudio", source, settings, folder / "learn" / "export")
 
 
 if __name__ == "__main__":

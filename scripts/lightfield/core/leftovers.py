@@ -48,9 +48,7 @@ def remove(folders: Iterable[Path] = ()) -> list[Path]:
 
     These are half-written files in ``folders`` and below, and temporary folders of this machine.
     """
-    removed = [path for folder in folders for path in _files(folder)]
-    for path in removed:
-        path.unlink(missing_ok=True)
+    removed = [path for folder in folders for path in remove_unfinished(folder)]
     for parent in {Path(tempfile.gettempdir()), SHARED_MEMORY}:
         for path in parent.glob(f"{PREFIX}*"):
             if path.is_dir() and _is_old(path, FOLDER_AGE) and not _is_in_use(path):
@@ -65,11 +63,21 @@ def remove(folders: Iterable[Path] = ()) -> list[Path]:
     return removed
 
 
-def _files(folder: Path) -> Iterator[Path]:
-    for parent, _, names in os.walk(folder):
+def remove_unfinished(folder: Path, age: float = FILE_AGE, kept: str = "") -> list[Path]:
+    """Remove the files below a folder that were on their way ``age`` seconds ago; return them.
+
+    Leaves alone what lies in its folder ``kept``.
+    """
+    removed = []
+    for parent, folders, names in os.walk(folder):
+        if Path(parent) == folder and kept in folders:
+            folders.remove(kept)
         for name in names:
-            if _ON_THE_WAY.fullmatch(name) and _is_old(path := Path(parent, name), FILE_AGE):
-                yield path
+            path = Path(parent, name)
+            if _ON_THE_WAY.fullmatch(name) and _is_old(path, age):
+                path.unlink(missing_ok=True)
+                removed.append(path)
+    return removed
 
 
 def _is_old(path: Path, age: float) -> bool:

@@ -148,6 +148,20 @@ class Ledger:
                 }
                 _append(self._path, job._replace(files=files))
 
+    def outdated_outputs(self) -> Iterator[str]:
+        """Yield the outputs that were made from something else than their jobs would read now."""
+        return (output for output in self._inputs if self.changed_input(output) is not None)
+
+    def has_other_inputs(self, output: str, names: set[str], *, may_lack: bool = False) -> bool:
+        """Return whether an output was made from other files than these, whatever they hold.
+
+        With ``may_lack`` the ledger may lack some that were read.
+        """
+        noted = self._inputs.get(output)
+        if noted is None:
+            return False
+        return not noted.keys() <= names if may_lack else noted.keys() != names
+
     def changed_input(self, output: str) -> str | None:
         """Return an input that is no longer the one from which an output was made; None if none.
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import append_json_line, read_json, read_json_lines, sha256, write_json
+from lightfield.core.files import append_json_line, read_json_lines, sha256, write_json
 from lightfield.dataset.shard_files import LOG_SUFFIX
 from lightfield.dataset.view_store import ViewStore
 from lightfield.imaging import images
@@ -127,15 +127,6 @@ class ShardRecord:
     def _logged_elsewhere(self) -> set[tuple[Any, Any, Any]]:
         assert self._path
         return _entries(self._path.parent.glob(f"*{LOG_SUFFIX}"))
-
-
-def read(record: Path) -> dict[str, tuple[int, str]]:
-    """Return each file's bytes and SHA-256 by its path in the dataset; errors name the record."""
-    content = read_json(record)
-    try:
-        return {path: (entry["bytes"], entry["sha256"]) for path, entry in content["files"].items()}
-    except (LookupError, TypeError, AttributeError):
-        raise UserError(f"{record}: files: must map paths to bytes and sha256") from None
 
 
 def _log(record: Path) -> Path:

@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from lightfield.core.files import DAMAGE, write_json
+from lightfield.core.files import DAMAGE, write_json_if_changed
 
 NAME = "shards.json"
 
@@ -39,9 +39,8 @@ def note(work: str, counts: dict[str, tuple[int, int]]) -> None:
     except (OSError, *DAMAGE):
         known = {}
     new = {name: {"views": views, "shards": shards} for name, (views, shards) in counts.items()}
-    if known != known | new:
-        datasets = known | new
-        write_json(path, {"datasets": datasets, "sha256": _digest(datasets)})
+    datasets = dict(sorted((known | new).items()))
+    write_json_if_changed(path, {"datasets": datasets, "sha256": _digest(datasets)})
 
 
 @lru_cache(maxsize=1)

@@ -6,7 +6,7 @@ Every job reads this file with the rules, so it imports nothing that takes long.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lightfield.dataset.dataset import SECONDS_PER_SAMPLE, START_UP_SECONDS
+from lightfield.dataset.estimate import SECONDS_PER_SAMPLE, START_UP_SECONDS
 from lightfield.measurement.sampling import (
     FEWEST_SEEDS,
     MOST_SEEDS,

@@ -13,7 +13,7 @@ import numpy as np
 
 from lightfield.core.cli import above_zero, positive, stops, view_slice, white
 from lightfield.core.errors import UserError
-from lightfield.dataset import lightfield, records
+from lightfield.dataset import lightfield, shard_files
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.passes import PASSES, Pass
 from lightfield.dataset.records import ShardRecord
@@ -109,7 +109,7 @@ class Job:
             self.lightfield.require_centre()
         self.passes = self._passes_wanted(arguments.passes)
         self.record = ShardRecord(arguments.record, arguments.output_dir)
-        given = records.read(arguments.source_record) if arguments.source_record else {}
+        given = shard_files.read_record(arguments.source_record) if arguments.source_record else {}
         # The SHA-256 of each image, by its path in the dataset.
         self.source_sums = {path: digest for path, (_, digest) in given.items()}
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, set_aside, sha256, write_text
-from lightfield.dataset.dataset import REPORT_FILES
+from lightfield.dataset.dataset_paths import REPORT_FILES
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, NAMES, Pass
 from lightfield.geometry import rotations
@@ -438,14 +438,6 @@ def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:
         detail = f"nothing is nearer to a camera than {nearest:.3g} m"
         figures = {"nearest_metres": round(nearest, 4)}
     return Check.of_files("cameras", faults, detail, figures=figures)
-
-
-def remove_leftovers(dataset: Path) -> None:
-    """Remove half-written files of killed programs, and the sums of an earlier validation."""
-    (dataset / SUMS).unlink(missing_ok=True)
-    for leftover in dataset.rglob(".*.tmp.*"):
-        if leftover.relative_to(dataset).parts[0] != REPORT:
-            leftover.unlink()
 
 
 def read_sums(path: Path) -> dict[str, str]:

@@ -22,7 +22,7 @@ from lightfield.core.files import (
     set_aside,
     sha256,
 )
-from lightfield.dataset import ledger, records
+from lightfield.dataset import ledger, shard_files
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
@@ -144,7 +144,7 @@ class Integrity:
                 continue
             log = path.with_name(f"{path.stem}{LOG_SUFFIX}")
             if self._is_sound(path):
-                sums = {file: digest for file, (_, digest) in records.read(path).items()}
+                sums = {file: digest for file, (_, digest) in shard_files.read_record(path).items()}
             elif self._is_sound(log):
                 lines = (line for line in read_json_lines(log) if "file" in line)
                 sums = {line["file"]: line["sha256"] for line in lines}

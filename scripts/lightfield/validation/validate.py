@@ -25,7 +25,7 @@ from lightfield.core.failures import LESS_MEMORY
 from lightfield.core.files import sha256
 from lightfield.core.progress import Progress
 from lightfield.dataset.inventory import read_inventory
-from lightfield.dataset.records import read as read_record
+from lightfield.dataset.shard_files import read_record
 from lightfield.validation import (
     depth_questions,
     exported_cameras,
