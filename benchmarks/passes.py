@@ -32,7 +32,7 @@ from lightfield.dataset import keys
 from lightfield.dataset.journal import read
 from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.dataset.passes import MANIFEST, PARTS_OF_LIGHT, PASSES
-from lightfield.export.source import Source, Surface
+from lightfield.export.source import SourceDataset, Surface
 from lightfield.geometry import lenses
 from lightfield.geometry.flow import flow
 from lightfield.imaging import images
@@ -130,7 +130,7 @@ def _figures(content: LightField, folder: Path) -> dict[str, Any]:
     view, beside = content.views[:2]
     read = {name: _read(folder, name, view.name) for name in PASSES}
     found = {name: pixels for name, (pixels, _) in read.items()}
-    source = Source(folder, "", ".exr")
+    source = SourceDataset(folder, "", ".exr")
     distance = source.depth(view, "distance")
     there = source.depth(beside, "distance")
     colour = images.read_image(source.path(view)).colour.astype(np.float64)

@@ -1,4 +1,4 @@
-"""What killed processes leave behind: temporary folders, and files that were on their way."""
+"""Removes what killed processes leave behind: temporary folders, and half-written files."""
 
 import fcntl
 import os
@@ -12,9 +12,9 @@ from pathlib import Path
 
 from lightfield.core.disk_space import SHARED_MEMORY
 
-# Nobody calls a folder of his own so: it would be removed.
+# No user's folder may have this prefix: it would be removed.
 PREFIX = "plenoforge-temporary-"
-# Blender makes itself such a folder as long as it runs, an artist's Blender, too.
+# Every Blender that runs has such a folder, an artist's, too.
 BLENDERS = "blender_*"
 # The names of `atomic_path`.
 _ON_THE_WAY = re.compile(r"\..+\.\d+\.tmp(\.\w+)?")
@@ -44,9 +44,9 @@ def temporary_folder(parent: Path | str | None = None) -> Iterator[Path]:
 
 
 def remove(folders: Iterable[Path] = ()) -> list[Path]:
-    """Remove what killed processes of this user have left; return what that was.
+    """Remove what killed processes of this user left behind. Return the removed paths.
 
-    That is files on their way in ``folders`` and below, and temporary folders of this machine.
+    These are half-written files in ``folders`` and below, and temporary folders of this machine.
     """
     removed = [path for folder in folders for path in remove_unfinished(folder)]
     for parent in {Path(tempfile.gettempdir()), SHARED_MEMORY}:
@@ -56,7 +56,7 @@ def remove(folders: Iterable[Path] = ()) -> list[Path]:
                 removed.append(path)
         for path in parent.glob(BLENDERS):
             if path.is_dir() and _is_old(path, BLENDER_AGE):
-                # One that is not empty stays.
+                # A folder that is not empty stays.
                 with suppress(OSError):
                     path.rmdir()
                     removed.append(path)
@@ -81,7 +81,7 @@ def remove_unfinished(folder: Path, age: float = FILE_AGE, kept: str = "") -> li
 
 
 def _is_old(path: Path, age: float) -> bool:
-    """Whether a file or folder is this user's and has not been changed for so many seconds."""
+    """Return whether a file or folder is this user's, and unchanged for ``age`` seconds."""
     try:
         status = path.lstat()
     except OSError:
@@ -90,7 +90,7 @@ def _is_old(path: Path, age: float) -> bool:
 
 
 def _is_in_use(folder: Path) -> bool:
-    """Whether the process lives that has made a temporary folder; a link is nobody's to remove."""
+    """Return whether the process that made a temporary folder lives. Links always count as used."""
     try:
         lock = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW)
     except OSError:

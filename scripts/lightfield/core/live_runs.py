@@ -1,8 +1,9 @@
-"""Which runs work in a folder: each leaves a note there, locked as long as its process lives.
+"""Finds out which runs work in a folder, and which of them were killed.
 
-A process that is killed, and a machine that loses its power, leave the note without the lock. So
-the next run tells a run that lives from one that was killed, of which Snakemake's own locks say
-nothing. The note's name says all that is to be known: a power cut may leave its content empty.
+Each run leaves a note in the folder, and locks it as long as its process lives. A killed process
+and a power cut leave the note without the lock. So the next run can tell a live run from a killed
+one, which Snakemake's own locks do not show. The note's name holds all facts, because a power cut
+may leave the file empty.
 """
 
 import atexit
@@ -19,7 +20,7 @@ from pathlib import Path
 
 import psutil
 
-# Jobs inherit it, and live on where only their run is killed.
+# Jobs inherit this variable. They live on if only their run is killed.
 VARIABLE = "PLENOFORGE_RUN"
 _NAME = re.compile(r"(?P<pid>\d+)\.[0-9a-f]{8}@(?P<host>.+)\.(?P<place>here|cluster)")
 
@@ -35,15 +36,15 @@ class Run:
 
     @property
     def is_killed(self) -> bool:
-        """Whether it is known that the run, and with it its jobs, have ended.
+        """Whether the run and its jobs have certainly ended.
 
-        Another machine's processes, and a cluster's jobs, may live.
+        Processes on another machine, and jobs on a cluster, may still live.
         """
         return self.host == socket.gethostname() and not self.on_cluster and _is_free(self.note)
 
     @property
     def jobs(self) -> list[int]:
-        """The processes of its jobs on this machine."""
+        """The numbers of the processes of its jobs on this machine."""
         name = str(self.note.absolute())
         return sorted(
             process.pid
@@ -53,11 +54,11 @@ class Run:
 
 
 def enter(folder: Path, on_cluster: bool, remove_locks: Callable[[], None]) -> list[Run]:
-    """Note that this run works in a folder; return the other runs there that may live.
+    """Note that this run works in a folder. Return the other runs there that may live.
 
-    Where all of them were killed, ``remove_locks`` removes what they left. Jobs that have outlived
-    their run are waited for. Without locks of files, as on some networks' file systems, nothing
-    is noted and nothing is removed.
+    If all of them were killed, ``remove_locks`` removes Snakemake's locks. Waits for jobs that
+    have outlived their run. Some network file systems have no locks: there nothing is noted, and
+    nothing is removed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     _wait_for_jobs(folder)
@@ -103,7 +104,7 @@ def refusal(others: list[Run]) -> str:
 
 
 def _runs(folder: Path) -> list[Run]:
-    """Return the runs that have left a note, but for this one."""
+    """Return the other runs that have left a note."""
     runs = []
     for path in sorted(folder.iterdir()):
         if (name := _NAME.fullmatch(path.name)) and path not in _OWN:
@@ -119,7 +120,7 @@ def _leave_note(folder: Path, on_cluster: bool) -> None:
     place = "cluster" if on_cluster else "here"
     unique = os.urandom(4).hex()
     note = folder / f"{os.getpid()}.{unique}@{socket.gethostname()}.{place}"
-    # For writing: NFS locks no others.
+    # Open it for writing, because NFS locks no other files.
     file = os.open(note, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -133,7 +134,7 @@ def _leave_note(folder: Path, on_cluster: bool) -> None:
 
 
 def _is_free(note: Path) -> bool:
-    """Whether no process holds the lock of a note."""
+    """Return whether no process holds the lock of a note."""
     try:
         file = os.open(note, os.O_RDWR)
     except FileNotFoundError:
@@ -150,7 +151,7 @@ def _is_free(note: Path) -> bool:
 
 
 def _wait_for_jobs(folder: Path) -> None:
-    """Wait for the jobs of killed runs that live on: they write the same files."""
+    """Wait for the jobs of killed runs, because they write the same files."""
     has_reported = False
     while jobs := [pid for run in _runs(folder) if run.is_killed for pid in run.jobs]:
         if not has_reported:
@@ -167,7 +168,7 @@ def _wait_for_jobs(folder: Path) -> None:
 
 @contextmanager
 def _guarded(folder: Path) -> Iterator[None]:
-    """Let one process at a time look at the notes and leave its own."""
+    """Lock the folder of the notes, so that one process at a time reads and writes them."""
     lock = os.open(folder, os.O_RDONLY)
     try:
         # Some networks' file systems lock no folders.

@@ -1,4 +1,4 @@
-"""World points on the surfaces that a dataset's views see, evenly spread, and who sees them."""
+"""World points on the surfaces that views see, evenly spread, and the views that see them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import View
 from lightfield.export.source import Floats, SourceDataset, Surface, pixel_indices
 
-# Candidates for each point that is wanted, of which an even selection is taken.
+# How many points are lifted for each wanted point. An even selection of them is kept.
 _CANDIDATES = 8
 
 
@@ -39,8 +39,8 @@ class Observations:
 def lift(source: SourceDataset, count: int | None = None, voxel: float | None = None) -> Points:
     """Lift points from depth: about ``count``, or one in each ``voxel`` metres.
 
-    They come from all views, but with a split from those to train on alone, if there are any. Each
-    has the colour that the view it was lifted from shows there.
+    Points come from all views, or from the training views if the rig has a split. Each point has
+    the colour that its view shows there.
     """
     every = source.lightfield.views
     views = [view for view in every if view.split in (None, "train")] or every
@@ -51,7 +51,7 @@ def lift(source: SourceDataset, count: int | None = None, voxel: float | None = 
     kept: Points | None = None
     for view, surface in source.surfaces(views):
         points = _points_of(source, view, surface, step)
-        # With a voxel, memory stays that of the cloud, however many views there are.
+        # With a voxel, memory does not grow with the number of views.
         kept = joined([kept, points]) if kept else points
         if voxel:
             kept = kept.chosen(_one_a_voxel(kept.positions, voxel))
@@ -61,7 +61,7 @@ def lift(source: SourceDataset, count: int | None = None, voxel: float | None = 
 
 
 def lift_one_each(source: SourceDataset, views: Sequence[View]) -> Points:
-    """Lift one point from each of the ``views`` whose depth is finite anywhere in the frame."""
+    """Lift one point from each of the ``views`` that has any finite depth."""
     parts = [Points(np.empty((0, 3)), np.empty((0, 3), np.uint8), np.empty((0, 3)))]
     for view, surface in source.surfaces(views):
         points = _points_of(source, view, surface, step=1)
@@ -80,7 +80,7 @@ def _points_of(source: SourceDataset, view: View, surface: Surface, step: int) -
 
 
 def observations(source: SourceDataset, points: Points) -> list[Observations]:
-    """Return what each view sees of the points: those in its frame that no surface hides."""
+    """Return the points that each view sees: those in its frame that no surface hides."""
     seen_points = []
     progress = Progress(len(source.lightfield.views), "tracks", "views")
     for view, surface in source.surfaces(source.lightfield.views):
@@ -123,7 +123,7 @@ def evenly(positions: Floats, count: int) -> NDArray[np.intp]:
     """Return the indices of at most ``count`` of the ``positions`` (n, 3), evenly spread."""
     if len(positions) <= count:
         return np.arange(len(positions))
-    # Views at one place see the same points, of which there may be no more than are wanted.
+    # Views at one place see the same points, so there may be fewer than ``count``.
     different = np.sort(np.unique(positions, axis=0, return_index=True)[1])
     if len(different) <= count:
         return different

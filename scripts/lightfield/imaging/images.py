@@ -34,7 +34,7 @@ NAN_ATTRIBUTE = "plenoforge:nan"
 
 HALF_MAX = 65504.0
 
-# Those of OpenEXR's codecs that keep every bit of halves and floats.
+# OpenEXR's codecs that keep every bit of halves and floats.
 CODECS = {
     "zip": "ZIP_COMPRESSION",
     "zips": "ZIPS_COMPRESSION",
@@ -78,7 +78,7 @@ class Header:
     attributes: dict[str, Attribute]
 
 
-# What libjpeg says of a picture that is whole.
+# What libjpeg says of a complete picture.
 _HARMLESS = re.compile("unknown JFIF revision|Unknown Adobe color|extraneous bytes")
 
 
@@ -132,7 +132,7 @@ def read_image(
 
 
 def attribute(path: Path, name: str) -> Attribute | None:
-    """Return an attribute of a file's header; None if it has no such, or is missing or no image."""
+    """Return an attribute of a file's header, or None without it, or if the file is no image."""
     try:
         return read_header(path).attributes.get(name)
     except UserError:
@@ -140,12 +140,12 @@ def attribute(path: Path, name: str) -> Attribute | None:
 
 
 def has_key(path: Path, key: str) -> bool:
-    """Return, by its header alone, whether a file is there and made by the settings of ``key``."""
+    """Return whether a file exists, and its header says that it was made with ``key``."""
     return attribute(path, KEY_ATTRIBUTE) == key
 
 
 def is_finished(path: Path, key: str) -> bool:
-    """Return whether a file is there, whole, and made by the settings that ``key`` stands for."""
+    """Return whether a file exists, is complete, and was made with the settings of ``key``."""
     try:
         return path.exists() and read_image(path).attributes.get(KEY_ATTRIBUTE) == key
     except UserError:
@@ -153,7 +153,7 @@ def is_finished(path: Path, key: str) -> bool:
 
 
 def check_codec(compression: str) -> None:
-    """Raise `UserError` for one of `CODECS` that the OpenEXR at hand cannot write."""
+    """Raise `UserError` for one of `CODECS` that this OpenEXR cannot write."""
     if not hasattr(OpenEXR, CODECS[compression]):
         able = ", ".join(name for name, codec in CODECS.items() if hasattr(OpenEXR, codec))
         raise UserError(
@@ -211,9 +211,9 @@ def write_png(
 
 
 def _check_exr(path: Path) -> None:
-    """Raise an OSError for an EXR in scan lines that was cut short while it was written.
+    """Raise an OSError for an EXR in scan lines that is cut short.
 
-    OpenEXR reports no error of its last steps: the end of the pixels and the table of the chunks.
+    OpenEXR reports no error when it writes the last pixels and the table of chunks.
     """
     try:
         file = OpenEXR.InputFile(str(path))
@@ -229,9 +229,9 @@ def _check_exr(path: Path) -> None:
 
 
 def _check_png(path: Path) -> None:
-    """Raise an OSError for a PNG whose chunks are not all there, with the checksums they carry.
+    """Raise an OSError for a PNG with missing chunks, or chunks that differ from their checksums.
 
-    OpenImageIO reports no error of its last steps: small files may be empty, large ones cut short.
+    OpenImageIO reports no error when it writes the end: files may be empty or cut short.
     """
     content = memoryview(path.read_bytes())
     place = 8
@@ -283,7 +283,7 @@ def _plain_exr_header(path: Path | str) -> Header | None:
 
 
 def _colour_first(names: Iterable[str]) -> list[str]:
-    """Return an EXR's channels, which it holds by the alphabet, as R, G, B, A and the others."""
+    """Return an EXR's channels in the order R, G, B, A and others. The file sorts them by name."""
     return sorted(names, key=lambda name: ("RGBA".find(name) % 5, name))
 
 
@@ -293,11 +293,11 @@ def _read_plain_exr(
     channels: Sequence[str] | None,
     rows: tuple[int, int] | None,
 ) -> tuple[Image, list[str]]:
-    """Return an EXR's channels, those asked for, and the names of all."""
+    """Return the wanted channels of an EXR, and the names of all its channels."""
     names = [name for name in header.channels if channels is None or name in channels]
     first, end = rows or (0, header.height)
     try:
-        # OpenEXR.File, which is to replace InputFile, reads whole files only.
+        # OpenEXR.File, which will replace InputFile, can only read all rows.
         file = OpenEXR.InputFile(str(path))
         raw = file.header()
         kinds = [np.dtype(_EXR_TYPES[str(raw["channels"][name].type)]) for name in names]
@@ -315,7 +315,7 @@ def _read_plain_exr(
 def _read_other(
     path: Path | str, channels: Sequence[str] | None, rows: tuple[int, int] | None
 ) -> tuple[Image, list[str]]:
-    """Return any image's channels, those asked for, and the names of all."""
+    """Return the wanted channels of any image, and the names of all its channels."""
     file = _open(path)
     planes_by_name: dict[str, np.ndarray[Any, Any]] = {}
     attributes: dict[str, Attribute] = {}

@@ -1,4 +1,4 @@
-"""How near each camera is to geometry, and which objects it stands inside of."""
+"""How near each camera is to geometry, and which objects enclose it."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -20,21 +20,21 @@ from lightfield.rendering.volumes import alone
 
 Floats = NDArray[np.float64]
 
-# Geometry farther than this from a camera, in metres, is not looked for.
+# How far from a camera geometry is looked for, in metres.
 REACH = 0.5
-# Nearer than this it counts as touching.
+# Geometry nearer than this touches the camera.
 TOUCHING = 0.001
-# How many places each camera of a random rig tries, and how many say what the box is inside of.
+# How many places each camera of a random rig tries, and how many samples say what encloses the box.
 _TRIES = 100
 _SAMPLES = 64
-# How many rays from a camera say what it is inside of.
+# How many rays from a camera find out what encloses it.
 _RAYS = len(icosphere(1))
 
 
 def show_what_is_rendered() -> None:
-    """Let the viewport, in which what follows looks, have what a render shows, less its volumes.
+    """Make the viewport show what a render of the current frame shows, without its volumes.
 
-    A render is meant at the present frame.
+    The functions below look for geometry in the viewport.
     """
     shown = in_render(_shown) - alone()
     layer = bpy.context.view_layer
@@ -95,10 +95,10 @@ def instances() -> Iterator[tuple[Any, Any, Floats, Floats]]:
 
 
 class Enclosure(NamedTuple):
-    """An object around a camera, whose backs the camera sees.
+    """An object that encloses a camera, so that the camera sees the backs of its faces.
 
-    ``share`` is the part of all directions in which it sees them first. An open mesh may be a room
-    without a wall, a dome, a backdrop, or an obstacle.
+    ``share`` is the part of all directions in which the camera sees such a back first. An open mesh
+    may be a room without a wall, a dome, a backdrop, or an obstacle.
     """
 
     name: str
@@ -107,9 +107,9 @@ class Enclosure(NamedTuple):
 
 
 def enclosing_objects(enclosures: Sequence[Enclosure | None]) -> Sequence[str | None]:
-    """Return for each camera the name of the closed object that it is inside of, or None.
+    """Return for each camera the name of the closed object that encloses it, or None.
 
-    What has the whole rig inside it is a room, not an obstacle.
+    An object that encloses the whole rig is a room, not an obstacle.
     """
     names = _objects_around(enclosures)
     rooms = {name for name in names if name and names.count(name) == len(names)}
@@ -132,7 +132,7 @@ def open_mesh_warnings(enclosures: Sequence[Enclosure | None]) -> Iterator[str]:
 
 
 def _objects_around(enclosures: Sequence[Enclosure | None]) -> list[str | None]:
-    """Return for each camera the name of what most rays from it meet the back of, or None."""
+    """Return for each camera the name of the object whose back most of its rays meet, or None."""
     return [
         enclosure.name if enclosure and enclosure.share > 1 / 2 else None
         for enclosure in enclosures
@@ -140,10 +140,10 @@ def _objects_around(enclosures: Sequence[Enclosure | None]) -> list[str | None]:
 
 
 def free_places(rig: Random) -> Floats:
-    """Return the first place (n, 3) in the unit box that is free for each camera of a rig.
+    """Return the places (n, 3) in the unit box of a rig's cameras: the first free one of each.
 
-    What has most of the box inside it is a room, not an obstacle. Raises `UserError` where a camera
-    finds no place.
+    An object that encloses most of the box is a room, not an obstacle. Raises `UserError` if a
+    camera finds no free place.
     """
     box = rig.to_world(np.random.default_rng(rig.seed).random((_SAMPLES, 3)) - 0.5)
     around = Counter(_objects_around(enclosures(box)))
@@ -168,11 +168,12 @@ def free_places(rig: Random) -> Floats:
 
 
 def enclosures(positions: Floats) -> list[Enclosure | None]:
-    """Return for each camera the object, or room, that it is inside of, or None.
+    """Return for each camera the object, or room, that encloses it, or None.
 
-    A camera is inside an object if most rays from it first meet that object's back. It is inside an
-    open mesh if a third of the rays do and few meet its fronts; leaves would show both. It is then
-    in the mesh's bounding box, which for a plane is flat, and some ray leads out.
+    An object encloses a camera if most rays from the camera meet the object's back first. For an
+    open mesh a third of the rays suffices, if few others meet its fronts: leaves would show both.
+    The camera must then lie in the mesh's bounding box, which is flat for a plane, and some ray
+    must miss the mesh.
     """
     depsgraph = bpy.context.evaluated_depsgraph_get()
     around_each: list[Enclosure | None] = []
@@ -190,7 +191,7 @@ def enclosures(positions: Floats) -> list[Enclosure | None]:
 
 
 class _Hit(NamedTuple):
-    """What a ray meets first: an object, or an instance of it, at its world matrix."""
+    """What a ray meets first: an object, or an instance of it, with its world matrix."""
 
     thing: Any
     matrix: Any
@@ -198,7 +199,7 @@ class _Hit(NamedTuple):
 
 
 def _first_hits(position: Floats, depsgraph: Any) -> list[_Hit]:
-    """Return what `_RAYS` rays from a camera, in all directions, meet first."""
+    """Return what `_RAYS` rays from a camera in all directions meet first."""
     hits = []
     for vertex in icosphere(1):
         direction = Vector(vertex).normalized()

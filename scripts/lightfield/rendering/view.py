@@ -1,4 +1,4 @@
-"""One render of one view with Cycles, as `lightfield.rendering.cycles` has set it up."""
+"""Renders one view with Cycles, which `lightfield.rendering.cycles` has set up."""
 
 import math
 import shutil
@@ -24,7 +24,7 @@ Array = np.ndarray[Any, Any]
 
 @dataclass(frozen=True)
 class Rendered:
-    """What Cycles made of a view, in float32.
+    """What Cycles rendered of a view, in float32.
 
     ``passes`` are (height, width, channels) by Cycles' names for them, ``attributes`` the header.
     ``render_seconds`` and ``synchronization_seconds`` are Cycles' own.
@@ -56,7 +56,7 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
             with quiet():
                 bpy.ops.render.render(write_still=True)
         except RuntimeError as error:
-            # Cycles' errors are reported by itself, and again at the end of the render.
+            # Cycles prints its errors itself, and Blender again at the end of the render.
             lines = [line.removeprefix("Error:").strip() for line in str(error).splitlines()]
             text = "; ".join(dict.fromkeys(filter(None, lines)))
             on_gpu = scene.cycles.device == "GPU"
@@ -65,7 +65,7 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
                 f"Cycles cannot render the view: {text}{advice if 'memory' in text.lower() else ''}"
             ) from None
         try:
-            # Of one eye of a pair it is view_L.exr or view_R.exr.
+            # One eye of a stereo pair is in view_L.exr or view_R.exr.
             path = next(folder.glob("*.exr"), folder / "view.exr")
             channels = [channel for group in names.values() for channel in group]
             image = images.read_image(path, channels)
@@ -88,7 +88,7 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
 
 
 def _seconds(text: images.Attribute) -> float:
-    """Read a time of the form [hours:]minutes:seconds, as Cycles' header has it."""
+    """Return the seconds of a time in Cycles' header: [hours:]minutes:seconds."""
     return math.fsum(
         float(part) * 60**power for power, part in enumerate(reversed(str(text).split(":")))
     )

@@ -1,7 +1,7 @@
-"""Which views' pixels have exported points been lifted from?
+"""Finds the views from which exported points were lifted.
 
-A point that was lifted from a view lies on the ray of one of its pixels' centres. Exporters lift
-view by view; so the views of some points tell between which the views of the others are.
+A point that was lifted from a view lies on the ray of a pixel's centre. Exporters lift one view
+after the other. So the views of two points bound the views of all points between them.
 """
 
 from typing import Any
@@ -14,12 +14,12 @@ from lightfield.validation.readers.contents import FLOAT32, Floats
 
 Ints = NDArray[np.int64]
 
-# At most so many pairs of a point and a view are tried at once.
+# How many pairs of a point and a view are tried at once, at most.
 MOST_PAIRS = 300_000
 
 
 def likely_views(points: NDArray[Any], lens: Lens, matrices: Floats) -> tuple[Ints, Ints]:
-    """Return pairs, as two arrays of indices: points, and views from which they may be lifted.
+    """Return pairs as two arrays of indices: points, and views from which they may be lifted.
 
     ``points`` (n, 3) are taken to be in the order of their views (m, 4, 4). The middle point is
     tried with all views; those on whose pixels' rays it lies bound the views of the points before

@@ -1,8 +1,8 @@
-"""Does instant-ngp's unit cube lie where a transforms.json says that it was asked to?
+"""Checks that instant-ngp's unit cube lies where the options of a transforms.json want it.
 
-The loader maps a point of its world to ``scale`` times it plus ``offset``. The options say how both
-were found: given, or fitted to the rig or to what the views see. A rig that tests what is trained
-on another is placed as that one.
+The loader maps a point p of its world to ``scale`` · p + ``offset``. The options say whether both
+were given, or fitted to the rig, or fitted to what the views see. A rig that tests what another one
+trains has the cube of that rig.
 """
 
 from collections.abc import Iterator, Mapping
