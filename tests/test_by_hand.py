@@ -340,9 +340,10 @@ def test_an_index_of_no_folder_is_refused(refused, tmp_path):
 
 def test_the_lens_of_no_blend_is_not_made_up(refused, lightfield, tmp_path):
     camera = '{"lens": "file", "resolution": [8, 8]}'
-    words = ["-i", tmp_path, "--input-cfg", lightfield, "--exr", "-o", tmp_path / "made"]
-    said = refused("reproject.py", *words, "--camera", camera)
-    assert said.endswith("lens: is file, which goes with a rig of type blend_camera alone")
+    write_text(tmp_path / "flat.json", f'{{"camera": {camera}, "formats": ["exr"]}}')
+    words = ["-i", tmp_path, "--input-cfg", lightfield, "-o", tmp_path / "made"]
+    said = refused("reproject.py", *words, "--settings", tmp_path / "flat.json")
+    assert said == f"{tmp_path}/flat.json: camera.lens: file goes with a rig of type blend_camera"
     rig = '{"type": "plane", "cameras": [1, 1], "size": 1, "camera": ' + camera + "}"
     write_text(tmp_path / "rig.yaml", rig)
     words = [tmp_path, "--poses", tmp_path / "rig.yaml", "--output", tmp_path / "made"]

@@ -13,8 +13,8 @@ from lightfield.core.files import keep_apart, sha256, whole
 from lightfield.core.progress import Progress
 from lightfield.imaging.images import KEY_ATTRIBUTE, read_header
 from lightfield.reprojection import lens_map
+from lightfield.reprojection.geometry import Target
 from lightfield.reprojection.job import Job, SourceView
-from lightfield.reprojection.lens_arguments import Target
 from lightfield.reprojection.passes import write_pass
 from lightfield.reprojection.pixels import Source, write
 

@@ -23,8 +23,8 @@ from lightfield.imaging.images import (
 from lightfield.imaging.tonemap import decode_srgb, to_8_bit, to_16_bit, tone_map
 from lightfield.reprojection.colour import colour_strips
 from lightfield.reprojection.depth import resample_depth
+from lightfield.reprojection.geometry import Target
 from lightfield.reprojection.job import Job, SourceView
-from lightfield.reprojection.lens_arguments import Target
 from lightfield.reprojection.lens_map import LensMap
 
 Attributes = Mapping[str, Attribute]
@@ -118,7 +118,7 @@ def write(
         raise UserError("has no channel A, although --input-cfg says that it is transparent")
     image = _developed(job, target, made, source, outputs)
     attributes = {KEY_ATTRIBUTE: key} | {
-        f"plenoforge:{name}": str(value) for name, value in job.settings.items()
+        f"plenoforge:{name}": str(value) for name, value in job.settings.published.items()
     }
     if "exr" in outputs and image.depth is not None:
         attributes[DEPTH_ATTRIBUTE] = "z" if target.lens.has_z_depth else "distance"
@@ -129,7 +129,8 @@ def write(
             case "png":
                 _write_png(path, image, {**attributes, **PNG_OPTIONS})
             case "depth":
-                _write_depth(path, image, job.arguments.depth_png, key)
+                assert job.settings.depth_png is not None
+                _write_depth(path, image, job.settings.depth_png, key)
             case "mask":
                 mask = np.where(image.empty, 255, 0).astype(np.uint8)
                 write_png(path, mask, {KEY_ATTRIBUTE: key})
@@ -160,14 +161,14 @@ def _developed(
     job: Job, target: Target, made: LensMap, source: Source, outputs: Mapping[str, Path]
 ) -> _Image:
     """Resample a view, and develop its colour for those ``outputs`` that hold it."""
-    arguments = job.arguments
+    settings = job.settings
     transparent = job.lightfield.transparent
-    encode = to_8_bit if arguments.bits == 8 else to_16_bit
+    encode = to_8_bit if settings.bits == 8 else to_16_bit
     strips, depth = _resampled(job, made, source, target.lens.has_z_depth)
     size = made.target_cos.shape
     empty = np.empty(size, bool)
     half = np.empty((3, *size), np.float16)
-    pixels = np.empty((*size, 3), f"uint{arguments.bits}")
+    pixels = np.empty((*size, 3), f"uint{settings.bits}")
     covered = np.empty(size, np.float32)
     for rows, strip in strips:
         empty[rows] = np.isnan(strip[:, :, 0])
@@ -179,7 +180,7 @@ def _developed(
         if source.has_alpha:
             with np.errstate(invalid="ignore", divide="ignore"):
                 strip[:, :, :3] /= alpha
-        colour = tone_map(strip[:, :, :3], arguments.exposure, arguments.reinhard)
+        colour = tone_map(strip[:, :, :3], settings.exposure, settings.reinhard)
         if "png" in outputs:
             pixels[rows] = encode(colour)
         if "exr" in outputs:
