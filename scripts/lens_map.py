@@ -15,12 +15,11 @@ from lightfield.reprojection.geometry import Geometry
 def main() -> None:
     """Run the program on the command line's arguments."""
     parser = argparse.ArgumentParser(
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        parents=[flags.lens_map_flags()],
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="lens map to write, .npy")
     flags.add_configuration_flags(parser)
+    flags.add_lens_map_flags(parser)
     arguments = parser.parse_args()
     _, source = flags.read_source(arguments)
     geometry = Geometry.of(flags.lens_map_settings(arguments, source), source)

@@ -31,12 +31,11 @@ from lightfield.reprojection import flags, job, pipeline
 def main() -> None:
     """Run the program on the command line's arguments."""
     parser = argparse.ArgumentParser(
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        parents=[flags.reproject_flags()],
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     job.add_flags(parser)
     flags.add_configuration_flags(parser)
+    flags.add_reproject_flags(parser)
     arguments = parser.parse_args()
     lightfield, source = flags.read_source(arguments)
     settings = flags.reproject_settings(arguments, source)

@@ -954,8 +954,9 @@ from lightfield.reprojection.geometry import Geometry
 
 lens = lenses.from_camera({"lens": "halved", "fov": 60, "resolution": [8, 8]})
 assert lenses.from_lightfield(lens.to_lightfield()).fov == math.radians(60)
-parser = argparse.ArgumentParser(parents=[flags.lens_map_flags()])
+parser = argparse.ArgumentParser()
 flags.add_configuration_flags(parser)
+flags.add_lens_map_flags(parser)
 words = ["--no-configs", "8,8", "--i-halved", "1", "--halved", "0.5"]
 arguments = parser.parse_args(words)
 source = flags.read_source(arguments)[1]

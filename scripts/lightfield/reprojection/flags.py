@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import InstanceOf, TypeAdapter
 
-from lightfield.core.cli import above_zero, stops, white
+from lightfield.core.cli import above_zero, refuse_beside_settings, stops, white
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.core.settings import checked, read_settings
@@ -60,9 +60,8 @@ def add_configuration_flags(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def lens_map_flags() -> argparse.ArgumentParser:
-    """Return the flags that stand for the settings of a lens map."""
-    parser = argparse.ArgumentParser(add_help=False)
+def add_lens_map_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that stand for the settings of a lens map."""
     choice = _add_lens_flags(parser, "", "Output lens")
     choice.add_argument(
         "--cubemap", type=int, metavar="SIZE", help="six perspective faces of 90°, SIZE² pixels"
@@ -90,12 +89,11 @@ def lens_map_flags() -> argparse.ArgumentParser:
     kind.add_argument(
         "--filter", choices=FILTERS, help=f"default {DEFAULT_FILTER}, or bicubic with --samples"
     )
-    return parser
 
 
-def reproject_flags() -> argparse.ArgumentParser:
-    """Return the flags that stand for the settings of a reprojection."""
-    parser = argparse.ArgumentParser(add_help=False, parents=[lens_map_flags()])
+def add_reproject_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that stand for the settings of a reprojection."""
+    add_lens_map_flags(parser)
     files = parser.add_argument_group("Files of each view")
     files.add_argument("--exr", action="store_true", help="write EXR: colour and depth")
     files.add_argument("--png", action="store_true", help="write PNG: colour, sRGB")
@@ -123,7 +121,6 @@ def reproject_flags() -> argparse.ArgumentParser:
     colour.add_argument(
         "--reinhard", type=white, default=1.0, help="value that becomes white, default 1: off"
     )
-    return parser
 
 
 def _add_lens_flags(parser: argparse.ArgumentParser, prefix: str, title: str) -> Any:
@@ -164,14 +161,16 @@ def read_source(arguments: argparse.Namespace) -> tuple[LightField, Lens]:
 def lens_map_settings(arguments: argparse.Namespace, source: Lens) -> ReprojectionSettings:
     """Return the settings of a lens map: those of --settings, or those of the flags."""
     if arguments.settings:
-        return _read_settings(arguments, lens_map_flags())
+        refuse_beside_settings(arguments, add_lens_map_flags)
+        return read_settings(ReprojectionSettings, arguments.settings)
     return _of_flags(_lens_map_content(arguments, source))
 
 
 def reproject_settings(arguments: argparse.Namespace, source: Lens) -> ReprojectionSettings:
     """Return the settings of a reprojection: those of --settings, or those of the flags."""
     if arguments.settings:
-        settings = _read_settings(arguments, reproject_flags())
+        refuse_beside_settings(arguments, add_reproject_flags)
+        settings = read_settings(ReprojectionSettings, arguments.settings)
         if not settings.formats:
             raise UserError(f"{arguments.settings}: formats: must be a list of exr, png, or both")
         return settings
@@ -183,16 +182,6 @@ def reproject_settings(arguments: argparse.Namespace, source: Lens) -> Reproject
     names = ("bits", "exposure", "reinhard", "mask", "passes")
     development = {name: getattr(arguments, name) for name in names}
     return _of_flags({**content, "formats": formats, **development, **depth_png})
-
-
-def _read_settings(
-    arguments: argparse.Namespace, flags: argparse.ArgumentParser
-) -> ReprojectionSettings:
-    """Read --settings; raises `UserError` where any of the ``flags`` is given beside it."""
-    for name, default in vars(flags.parse_args([])).items():
-        if getattr(arguments, name) != default:
-            raise UserError(f"--settings: excludes --{name.replace('_', '-')}; put it in the file")
-    return read_settings(ReprojectionSettings, arguments.settings)
 
 
 def _of_flags(content: Mapping[str, Any]) -> ReprojectionSettings:
