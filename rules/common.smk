@@ -40,7 +40,7 @@ from lightfield.dataset.dataset import (
     rendered_frames,
     scene_datasets,
 )
-from lightfield.dataset.exports import MANIFEST, VIEWS
+from lightfield.dataset.exports import MANIFEST, VIEWS, InstantNgp, export_settings_of
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 from lightfield.dataset.splits import SPLITS
 from lightfield.dataset.view_store import VARIABLE, ViewStore
