@@ -97,12 +97,13 @@ def dataset(tmp_path, run_program):
         # A user's copy is of no shard.
         (journals / "kept.journal.jsonl").write_text("{}\n")
         (journals / "0-3.journal.jsonl").write_text("\n".join(map(json.dumps, lines)) + "\n")
+        settings = {"energy": TARIFF, "full": FULL | (full or {}), "reprojections": ["flat"]}
+        (tmp_path / "settings.json").write_text(json.dumps(settings))
         run_program(
             "costs.py",
             *("--dataset", folder, "--journals", journals, "--benchmarks", work / "rig"),
             *("--scene-benchmarks", work / "scene", "--blend", work / "scene.blend"),
-            *("--energy", json.dumps(TARIFF), "--reprojection", "flat"),
-            *("--full", json.dumps(FULL | (full or {}))),
+            *("--settings", tmp_path / "settings.json"),
             *("--output", tmp_path / "costs.json"),
         )
         return json.loads((tmp_path / "costs.json").read_text())
