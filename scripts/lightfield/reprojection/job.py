@@ -67,7 +67,7 @@ class SourceView:
 
 
 class Job:
-    """All that is the same for every view; a `UserError` names the flag or key that is wrong."""
+    """What all views of a run have in common; a `UserError` names the wrong flag or key."""
 
     def __init__(
         self,
@@ -194,7 +194,7 @@ class Job:
         return self.lightfield.changed(lens, views, depth=depth, **changes)
 
     def views(self) -> list[SourceView]:
-        """Return the views that the command line chooses, in the order of their names or frames."""
+        """Return the chosen views, in the order of their names or frames."""
         arguments = self.arguments
         if arguments.single:
             if isinstance(self.source, CubeMap):
@@ -234,7 +234,7 @@ class Job:
         return [SourceView(path.stem, (path,)) for path in paths]
 
     def _passes(self, name: str, suffix: str) -> bool:
-        """Whether a name passes the filters; theirs may have ``suffix`` or not."""
+        """Return whether a name passes the filters, with or without its ``suffix``."""
         end = self.arguments.filter_suffix
         return name.startswith(self.arguments.filter_prefix) and (
             name.endswith(end) or (name + suffix).endswith(end)
@@ -242,7 +242,7 @@ class Job:
 
 
 def _find(folder: Path, name: str, lens: Lens) -> tuple[Path, ...]:
-    """Return the file of a view; one that exists if any does, so that a missing one is named."""
+    """Return the file of a view; of a missing one the name that it would have first."""
     if isinstance(lens, CubeMap):
         return tuple(
             path for face in CUBE_FACES for path in _find(folder, f"{name}_{face}", lens.face)

@@ -78,9 +78,9 @@ class Source:
             depth = depth.astype(np.float32, copy=False)
         return colour, depth, alpha is not None, image.attributes.get(DEPTH_ATTRIBUTE)
 
-    def window(self, made: LensMap) -> tuple[Array, Array | None]:
+    def window(self, lens_map: LensMap) -> tuple[Array, Array | None]:
         """Return the colour and depth that a lens map reads."""
-        row, end_row, column, end_column = made.window
+        row, end_row, column, end_column = lens_map.window
         rows = slice(row - self.rows[0], end_row - self.rows[0])
         columns = slice(column - self.columns[0], end_column - self.columns[0])
         colour = np.ascontiguousarray(self.colour[rows, columns])
@@ -108,7 +108,7 @@ def _linear(planes: list[Array], alpha: Array | None) -> Array:
 def write(
     job: Job,
     target: Target,
-    made: LensMap,
+    lens_map: LensMap,
     source: Source,
     outputs: Mapping[str, Path],
     key: str,
@@ -116,7 +116,7 @@ def write(
     """Resample a view through one lens map and write its files."""
     if job.lightfield.transparent and not source.has_alpha:
         raise UserError("has no channel A, although --input-cfg says that it is transparent")
-    image = _developed(job, target, made, source, outputs)
+    image = _developed(job, target, lens_map, source, outputs)
     attributes = {KEY_ATTRIBUTE: key} | {
         f"plenoforge:{name}": str(value) for name, value in job.settings.published.items()
     }
@@ -158,14 +158,14 @@ class _Image:
 
 
 def _developed(
-    job: Job, target: Target, made: LensMap, source: Source, outputs: Mapping[str, Path]
+    job: Job, target: Target, lens_map: LensMap, source: Source, outputs: Mapping[str, Path]
 ) -> _Image:
     """Resample a view, and develop its colour for those ``outputs`` that hold it."""
     settings = job.settings
     transparent = job.lightfield.transparent
     encode = to_8_bit if settings.bits == 8 else to_16_bit
-    strips, depth = _resampled(job, made, source, target.lens.has_z_depth)
-    size = made.target_cos.shape
+    strips, depth = _resampled(job, lens_map, source, target.lens.has_z_depth)
+    size = lens_map.target_cos.shape
     empty = np.empty(size, bool)
     half = np.empty((3, *size), np.float16)
     pixels = np.empty((*size, 3), f"uint{settings.bits}")
@@ -225,28 +225,28 @@ def _write_depth(path: Path, image: _Image, scale: float, key: str) -> None:
 
 
 def _resampled(
-    job: Job, made: LensMap, source: Source, as_z: bool
+    job: Job, lens_map: LensMap, source: Source, as_z: bool
 ) -> tuple[Iterable[tuple[slice, Array]], Array | None]:
     """Return the target's colour, in strips, and its depth in the source's precision."""
-    colour, depth = source.window(made)
+    colour, depth = source.window(lens_map)
     if job.copies and source.is_z == as_z:
-        row, end_row, column, end_column = made.window
+        row, end_row, column, end_column = lens_map.window
         # A channel that is no number makes a pixel none, as it does where pixels are resampled.
         none = np.isnan(colour).any(axis=-1)
-        none |= np.isnan(made.target_cos[row:end_row, column:end_column])
+        none |= np.isnan(lens_map.target_cos[row:end_row, column:end_column])
         colour = np.where(none[:, :, None], np.float32(np.nan), colour)
-        copy = None if depth is None else _in_frame(depth, made)
-        return [(np.s_[:], _in_frame(colour, made))], copy
+        copy = None if depth is None else _in_frame(depth, lens_map)
+        return [(np.s_[:], _in_frame(colour, lens_map))], copy
     if depth is not None:
-        depth = resample_depth(depth, source.is_z, as_z, made)
+        depth = resample_depth(depth, source.is_z, as_z, lens_map)
         if depth.dtype != np.float16:
             depth = with_precision(depth, job.depth_precision)
-    return colour_strips(colour, made), depth
+    return colour_strips(colour, lens_map), depth
 
 
-def _in_frame(window: Array, made: LensMap) -> Array:
+def _in_frame(window: Array, lens_map: LensMap) -> Array:
     """Return the window's pixels in their place in the whole image, NaN around them."""
-    out = np.full((*made.target_cos.shape, *window.shape[2:]), np.nan, window.dtype)
-    row, end_row, column, end_column = made.window
+    out = np.full((*lens_map.target_cos.shape, *window.shape[2:]), np.nan, window.dtype)
+    row, end_row, column, end_column = lens_map.window
     out[row:end_row, column:end_column] = window
     return out
