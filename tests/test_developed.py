@@ -50,7 +50,7 @@ def dataset(folder, camera=FISHEYE, transparent=True):
 
 
 @pytest.fixture
-def reproject(tmp_path, run_program):
+def reproject(tmp_path, tmp_path_factory, run_program):
     """Make a set of the dataset in tmp_path by a reprojection's YAML; return its folder."""
 
     def run(name, **settings):
@@ -63,9 +63,11 @@ def reproject(tmp_path, run_program):
             }
         ).reprojections[name]
         folder = tmp_path / name
-        write_json(tmp_path / f"{name}.json", content.settings.as_json())
+        # Validation finds any file in the dataset's folder that is not of it.
+        settings = tmp_path_factory.mktemp("settings") / f"{name}.json"
+        write_json(settings, content.settings.as_json())
         run_program(
-            *("reproject.py", "--settings", tmp_path / f"{name}.json"),
+            *("reproject.py", "--settings", settings),
             *("--input-cfg", tmp_path / "lightfield.json"),
             *("--input-dir", tmp_path / "exr", "--output-dir", folder),
             *("--output-cfg", folder / "lightfield.json"),
