@@ -32,7 +32,7 @@ from lightfield.dataset import journal, ledger, memory, presence, shard_counts
 from lightfield.dataset.config import accept_blend, load_config, load_scene, scene_path
 from lightfield.dataset.dataset_paths import PICTURES, PLOTS
 from lightfield.dataset.description import SOURCE_KEYS, Cluster
-from lightfield.dataset.exports import MANIFEST, VIEWS
+from lightfield.dataset.exports import MANIFEST, VIEWS, InstantNgp, export_settings_of
 from lightfield.dataset.loading import load_datasets, rendered_frames, scene_datasets
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 from lightfield.dataset.splits_file import SPLITS
@@ -202,9 +202,3 @@ def optional(*names, **flags):
         )
 
     return words
-
-
-def reprojection_words(wildcards):
-    """Return the words that name a dataset's reprojections."""
-    words = [f"--reprojection {name}" for name in dataset_of(wildcards).reprojections]
-    return " ".join(words)

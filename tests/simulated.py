@@ -104,7 +104,7 @@ def _views(folder: Path, dataset: Dataset) -> None:
     lightfield.write(folder / dataset.folder / "lightfield.json")
     for name, reprojection in dataset.reprojections.items():
         lens = reprojection.camera.make()
-        made = lightfield.changed(lens, reprojection=reprojection.recorded)
+        made = lightfield.changed(lens, reprojection=reprojection.settings.published)
         made.write(folder / dataset.folder / name / "lightfield.json")
     for name in dataset.exported:
         kind = Path(name).parent.name if name.endswith("export.json") else "instant_ngp"

@@ -446,7 +446,8 @@ def test_a_preset_leaves_the_pixels_of_a_perspective_view_square(tmp_path, monke
         assert rig.camera.make().has_square_pixels
     # What is not written stays so.
     cuboid, sphere = scene_datasets("right", limits=Preset(resolution=64))
-    assert "sensor_size" not in cuboid.rig_json + sphere.reprojections["perspective"].optics
+    assert "sensor_size" not in cuboid.rig_json
+    assert "sensor_size" not in sphere.reprojections["perspective"].settings.as_json()["camera"]
 
 
 def test_a_cube_map_has_a_lens_map_and_a_view_a_face(tmp_path, monkeypatch):
@@ -455,7 +456,19 @@ def test_a_cube_map_has_a_lens_map_and_a_view_a_face(tmp_path, monkeypatch):
     (tmp_path / "right.yaml").write_text(yaml.safe_dump(content))
     monkeypatch.setattr(config, "SCENES", tmp_path)
     dataset = scene_datasets("right", limits=config.Preset(resolution=32, views=20))[0]
-    assert dataset.reprojections["faces"].optics == "--cubemap 32 --filter adaptive"
+    assert dataset.reprojections["faces"].settings.as_json() == {
+        "camera": {"lens": "rectilinear", "fov": 90, "resolution": [32, 32]},
+        "cube_map": True,
+        "rotation": [0, 0, 0],
+        "filter": "adaptive",
+        "samples": 1,
+        "formats": ["png"],
+        "bits": 8,
+        "exposure": 0,
+        "reinhard": 1,
+        "mask": False,
+        "passes": [],
+    }
     names = [Path(path).name for path in dataset.lens_maps("faces")]
     assert names == [f"lens_map_{face}.npy" for face in "fblrud"]
     assert set(dataset.lens_maps("faces")) <= set(dataset.intermediates)

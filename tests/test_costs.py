@@ -101,12 +101,13 @@ def dataset(tmp_path, run_program):
         if inventory:
             (work / "inventory.json").write_text(json.dumps(inventory))
             words = ["--inventory", work / "inventory.json"]
+        settings = {"energy": TARIFF, "full": FULL | (full or {}), "reprojections": ["flat"]}
+        (tmp_path / "settings.json").write_text(json.dumps(settings))
         run_program(
             "costs.py",
             *("--dataset", folder, "--journals", journals, "--benchmarks", work / "rig"),
             *("--scene-benchmarks", work / "scene", "--blend", work / "scene.blend"),
-            *("--energy", json.dumps(TARIFF), "--reprojection", "flat"),
-            *("--full", json.dumps(FULL | (full or {}))),
+            *("--settings", tmp_path / "settings.json"),
             *("--output", tmp_path / "costs.json"),
             *words,
         )

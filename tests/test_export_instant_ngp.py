@@ -12,7 +12,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.exports import InstantNgp
+from lightfield.dataset.exports import ExportSettings, InstantNgp
 from lightfield.dataset.lightfield import LightField
 from lightfield.export import instant_ngp
 from lightfield.export.source import millimetres
@@ -495,7 +495,9 @@ def test_the_yaml_asks_for_all_that_the_program_can_do(dataset: Dataset) -> None
     settings = {"sources": ["views"], "bounds": "depth", "aabb_scale": 2, "depth": True}
     box = [[0.1, 0.2, 0.3], [0.7, 0.8, 0.9]]
     model = TypeAdapter(InstantNgp).validate_python(settings | {"render_aabb": box})
-    transforms = dataset.export("--image-suffix", ".exr", *model.words(str(dataset.folder)))
+    file = dataset.folder / "settings.json"
+    file.write_text(json.dumps(ExportSettings(options=model).as_json()))
+    transforms = dataset.export("--settings", file)
     assert transforms["scale"] == dataset.export("--depth-bounds")["scale"]
     assert transforms["options"] == model.recorded
     assert transforms["render_aabb"] == box
@@ -503,10 +505,36 @@ def test_the_yaml_asks_for_all_that_the_program_can_do(dataset: Dataset) -> None
     depth = dataset.folder / transforms["frames"][0]["depth_path"]
     assert depth.parent == dataset.folder / "instant_ngp" / "depth"
     assert images.read_image(depth).channels["Y"].max() == 4000
+    with pytest.raises(UserError, match="--settings: excludes --scale"):
+        dataset.export("--settings", file, "--scale", 1)
     with pytest.raises(ValidationError, match="bounds: goes without scale"):
         TypeAdapter(InstantNgp).validate_python(settings | {"scale": 0.1})
     with pytest.raises(ValidationError, match="offset: goes with scale"):
         TypeAdapter(InstantNgp).validate_python(settings | {"offset": [0, 0, 0]})
+
+
+@pytest.mark.parametrize(
+    ("settings", "problem"),
+    [
+        ({}, "is missing the key options"),
+        ({"options": {"sources": ["views"], "scal": 1}}, "options.scal: unknown key; did you mean"),
+        (
+            {"options": {"sources": ["views"], "scale": -1}},
+            "options.scale: is -1; must be a number",
+        ),
+        ({"options": {"sources": ["views", "flat"]}}, "options.sources: must name one source"),
+        ({"options": {"sources": ["views"]}, "suffix": ".jpg"}, "suffix: is "),
+    ],
+)
+def test_mistakes_in_a_settings_file_are_named(
+    settings: Any, problem: str, dataset: Dataset
+) -> None:
+    dataset.write(FISHEYE)
+    file = dataset.folder / "settings.json"
+    file.write_text(json.dumps(settings))
+    with pytest.raises(UserError) as error:
+        dataset.export("--settings", file)
+    assert str(error.value).startswith(f"{file}: {problem}")
 
 
 @pytest.mark.parametrize(
@@ -565,6 +593,7 @@ def test_what_is_a_polynomial_goes_as_it_is(turned: int, dataset: Dataset) -> No
         (PANORAMA | {"longitude": [-180, 170]}, [], "instant-ngp cannot follow"),
         # A fisheye along both axes of the image, and none between them.
         (HALF_PANORAMA, [], "instant-ngp cannot follow"),
+        (FISHEYE, ["--depth-bounds", "--scale", 1], "bounds: goes without scale"),
         (FISHEYE, ["--offset", 0, 0, 0], "--offset: goes with --scale"),
         (FISHEYE, ["--placed-as", __file__], r"\.py: is not JSON"),
         (FISHEYE, ["--image-suffix", ".exr"], "view_0000f.exr: no such file"),

@@ -786,6 +786,46 @@ def test_what_a_consumer_cannot_take_is_refused_by_hand_too(dataset, tmp_path, n
     assert not [*tmp_path.iterdir()]
 
 
+def by_hand(run_program, dataset, folder, *words):
+    """Export a table of poses by the program; return the names of its views."""
+    words = ["poses_csv", "--dataset", dataset, "--output", folder, *words]
+    run_program("export.py", *words)
+    rows = (folder / "poses.csv").read_text().splitlines()[1:]
+    return [row.split(",")[0] for row in rows]
+
+
+def test_a_settings_file_gives_source_and_rigs_that_test(run_program, dataset, tmp_path):
+    words = ["--source", "perspective", "--suffix", ".exr"]
+    names = by_hand(run_program, dataset, tmp_path / "flags", *words)
+    settings = tmp_path / "settings.json"
+    content = {"options": {"sources": ["perspective"]}, "suffix": ".exr"}
+    settings.write_text(json.dumps(content))
+    assert by_hand(run_program, dataset, tmp_path / "file", "--settings", settings) == names
+    settings.write_text(json.dumps(content | {"tested_by": {"other": str(dataset)}}))
+    both = by_hand(run_program, dataset, tmp_path / "both", "--settings", settings)
+    assert both == [*names, *(f"other_{name}" for name in names)]
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        ({"options": {"sources": ["views"], "point": 5}}, "options.point: unknown key"),
+        ({"options": {"sources": ["views"], "points": 0}}, "options.points: is 0; must be"),
+        ({"options": {"sources": ["views"]}, "tested_by": ["other"]}, "tested_by: is "),
+    ],
+)
+def test_mistakes_in_a_settings_file_are_named(run_program, dataset, tmp_path, content, problem):
+    settings = tmp_path / "settings.json"
+    settings.write_text(json.dumps(content))
+    words = ["--dataset", dataset, "--output", tmp_path / "made", "--settings", settings]
+    refused = run_program("export.py", "colmap", *words, check=False)
+    assert refused.stderr.startswith(f"error: {settings}: {problem}")
+    assert (refused.returncode, refused.stderr.count("\n")) == (1, 1)
+    refused = run_program("export.py", "colmap", *words, "--suffix", ".png", check=False)
+    assert "--settings: excludes --suffix" in refused.stderr
+    assert not (tmp_path / "made").exists()
+
+
 def test_a_model_as_text_may_be_without_points(tmp_path):
     def sky(lens, _):
         shape = (lens.height, lens.width)

@@ -113,8 +113,10 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
     view.write_bytes(content)
     run("import_views.py", *words)
     again = dataset / "perspective"
-    camera = '{"lens": "rectilinear", "fov": 90, "resolution": [24, 24]}'
-    words = ["--exr", "--camera", camera, "--input-cfg", own, "--input-dir", views]
+    camera = {"lens": "rectilinear", "fov": 90, "resolution": [24, 24]}
+    settings = tmp_path / "perspective.json"
+    settings.write_text(json.dumps({"camera": camera, "formats": ["exr"]}))
+    words = ["--settings", settings, "--input-cfg", own, "--input-dir", views]
     run("reproject.py", *words, "--output-dir", again, "--output-cfg", again / "lightfield.json")
     words = ["--input-cfg", again / "lightfield.json", "--image-suffix", ".exr"]
     run("export_instant_ngp.py", *words, "--output", again / "transforms.json")

@@ -951,14 +951,18 @@ def test_rays_of_all_pixel_centres(dtype: type) -> None:
 USE_IT = """
 import argparse, math
 from lightfield.geometry import lenses
-from lightfield.reprojection import lens_arguments
+from lightfield.reprojection import flags
+from lightfield.reprojection.geometry import Geometry
 
 lens = lenses.from_camera({"lens": "halved", "fov": 60, "resolution": [8, 8]})
 assert lenses.from_lightfield(lens.to_lightfield()).fov == math.radians(60)
 parser = argparse.ArgumentParser()
-lens_arguments.add_geometry_flags(parser)
+flags.add_configuration_flags(parser)
+flags.add_lens_map_flags(parser)
 words = ["--no-configs", "8,8", "--i-halved", "1", "--halved", "0.5"]
-geometry = lens_arguments.geometry(parser.parse_args(words))
+arguments = parser.parse_args(words)
+source = flags.read_source(arguments)[1]
+geometry = Geometry.of(flags.lens_map_settings(arguments, source), source)
 assert (geometry.source.fov, geometry.targets[0].lens.description) == (1, "halved fisheye, 28.65°")
 """
 

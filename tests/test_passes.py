@@ -17,7 +17,7 @@ from pass_views import LENSES, RENDER, SIZE, WALL
 from scipy.ndimage import binary_dilation, binary_erosion
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, sha256
+from lightfield.core.files import read_json, sha256, write_json
 from lightfield.dataset import passes
 from lightfield.dataset.config import Scene
 from lightfield.dataset.lightfield import LightField
@@ -401,9 +401,10 @@ def test_reprojected_ids_are_kept_normals_unit_and_light_still_adds_up(made, tmp
     """A perspective view made of the fisheye's, against the one that was rendered."""
     names = [name for name in PASSES if name != "motion"]
     source, target = made / "fisheye", tmp_path / "perspective"
-    camera = json.dumps(LENSES["perspective"])
+    settings = {"camera": LENSES["perspective"], "filter": "bilinear"}
+    write_json(tmp_path / "flat.json", settings | {"formats": ["exr"], "passes": names})
     run_program(
-        *("reproject.py", "--camera", camera, "--exr", "--bl", "--passes", ",".join(names)),
+        *("reproject.py", "--settings", tmp_path / "flat.json"),
         *("--input-cfg", source / "lightfield.json", "--input-dir", source / "exr"),
         *("--output-dir", target, "--output-cfg", target / "lightfield.json"),
         *("--source-record", made / "fisheye.json", "--record", tmp_path / "record.json"),
@@ -496,8 +497,8 @@ def test_passes_that_cannot_be_are_refused(wrong, problem):
 def test_passes_keep_the_tables_order_and_what_asks_for_none_is_as_before():
     content = Scene.model_validate(scene(passes=["emission", "normal"], again=["normal"]))
     assert content.render.passes == ["normal", "emission"]
-    assert "--passes normal" in content.reprojections["other"].development
+    assert content.reprojections["other"].settings.passes == ["normal"]
     bare = Scene.model_validate(scene())
     assert "passes" not in bare.render.model_dump(exclude_none=True)
-    assert "passes" not in bare.reprojections["other"].development
+    assert bare.reprojections["other"].settings.passes == []
     assert passes.without(RENDER).keys() == RENDER.keys() - {"passes"}

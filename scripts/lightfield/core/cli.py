@@ -54,6 +54,18 @@ def _as_value(word: str) -> str:
     return f" {word}" if re.fullmatch(r"-[\d.]+[,:de][\d.,:deg+-]*", word) else word
 
 
+def refuse_beside_settings(
+    arguments: argparse.Namespace, add_flags: Callable[[argparse.ArgumentParser], None]
+) -> None:
+    """Raise `UserError` where a flag of ``add_flags`` is given beside --settings."""
+    parser = argparse.ArgumentParser()
+    add_flags(parser)
+    for name, default in vars(parser.parse_args([])).items():
+        if getattr(arguments, name) != default:
+            flag = name.replace("_", "-")
+            raise UserError(f"--settings: excludes --{flag}; write it into the file")
+
+
 # The following functions are for the ``type`` of an argument.
 
 

@@ -4,6 +4,7 @@ import difflib
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar
 
 from pydantic import (
@@ -20,6 +21,7 @@ from pydantic_core import ErrorDetails
 from typing_extensions import TypeAliasType
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import read_json
 
 Model = TypeVar("Model")
 
@@ -52,6 +54,10 @@ class Settings(BaseModel):
             if value is None:
                 raise ValueError(f"{key}: is null; must have a value, or be left out")
         return content
+
+    def as_json(self, keys: set[str] | None = None) -> dict[str, Any]:
+        """Return the content of a settings file: all keys that have a value, or some ``keys``."""
+        return self.model_dump(mode="json", include=keys, exclude_none=True)
 
 
 def as_list(count: int) -> BeforeValidator:
@@ -113,6 +119,11 @@ def checked(model: TypeAdapter[Model], content: Any, file: str) -> Model:
         return model.validate_python(content)
     except ValidationError as error:
         raise UserError(f"{file}: {_first(error.errors(), content)}") from None
+
+
+def read_settings(model: type[Model], path: Path) -> Model:
+    """Read a settings file; raises `UserError` with file, key, value, and why."""
+    return checked(TypeAdapter(model), read_json(path), str(path))
 
 
 def _first(errors: list[ErrorDetails], content: Any) -> str:

@@ -8,7 +8,6 @@ import difflib
 import math
 import os
 import re
-import shlex
 from collections.abc import Mapping
 from itertools import chain
 from pathlib import Path
@@ -29,7 +28,6 @@ from lightfield.core.settings import (
     AS_WRITTEN,
     Name,
     Settings,
-    Vector,
     checked,
     pattern,
     suggestion,
@@ -37,8 +35,13 @@ from lightfield.core.settings import (
 from lightfield.dataset import published
 from lightfield.dataset.exports import VIEWS, Export, Exports
 from lightfield.dataset.passes import FLOW, PASSES, in_order
-from lightfield.geometry.lenses import LENSES, CameraSettings, Lens
-from lightfield.geometry.lenses.cube_map import CubeMap
+from lightfield.dataset.reprojections import (
+    ReprojectionOptions,
+    ReprojectionSettings,
+    Stops,
+    face_problem,
+)
+from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
 from lightfield.geometry.rigs.rig import Frame
@@ -413,31 +416,15 @@ class Render(Settings):
         return self
 
 
-Stops = Annotated[float, Field(ge=-100, le=100)]
-
-
-class Reprojection(Settings):
+class Reprojection(ReprojectionOptions):
     """The same views through another lens, or as other files."""
 
     rigs: list[str] | None = Field(
         None, min_length=1, description="The rigs it is made for; without it, every one of them."
     )
-    camera: CameraSettings | None = Field(
-        None, description="Without it, the rig's own: the pixels are those of the views."
-    )
-    cube_map: bool = Field(False, description="Six faces of each view, each a 90 degree view.")
-    rotation: Vector = Field((0, 0, 0), description="Pan, pitch and roll in degrees.")
     format: Literal["png", "exr"] = Field("png", description="EXR has depth.")
-    filter: Literal["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp"] = Field(
-        "adaptive", description="How colour is resampled."
-    )
-    samples: int = Field(1, ge=1, le=64, description="n x n samples a pixel.")
-    bits: Literal[8, 16] = Field(8, description="Of a PNG's values.")
     exposure: Stops | Annotated[list[Stops], Field(min_length=1, max_length=32)] = Field(
         0, description="In stops; of a list each makes a folder, as in png_ev-2 and png_ev0."
-    )
-    reinhard: Annotated[float, Field(ge=1e-9, le=1e9)] | None = Field(
-        None, description="Reinhard tone mapping with this maximum."
     )
     passes: PassNames | None = Field(
         None, description="Those of render.passes that are reprojected, too, as EXR."
@@ -457,51 +444,18 @@ class Reprojection(Settings):
         """Of the images' names."""
         return f".{self.format}"
 
-    def lens(self, rendered: CameraSettings) -> Lens:
-        """Return the lens of the images that are made of what a camera has ``rendered``."""
-        camera = self.camera or rendered
-        size = camera.resolution[0]
-        return CubeMap(width=6 * size, height=size).face if self.cube_map else camera.make()
-
     @property
-    def optics(self) -> str:
-        """The words that say to scripts/reproject.py where each pixel comes from."""
-        if self.camera is None:
-            return "--no-reproject"
-        if self.cube_map:
-            words = ["--cubemap", str(self.camera.resolution[0])]
-        else:
-            words = ["--camera", self.camera.model_dump_json(exclude_unset=True)]
-        words += ["--filter", self.filter]
-        if self.samples > 1:
-            words += ["--samples", str(self.samples)]
-        if any(self.rotation):
-            words += ["--rotation", ",".join(map(str, self.rotation))]
-        return shlex.join(words)
-
-    @property
-    def recorded(self) -> dict[str, Any]:
-        """What its lightfield.json says beside the lens: see `lightfield.reprojection.job`."""
-        return {
-            "rotation": list(self.rotation),
-            "filter": self.filter,
-            "samples": self.samples,
-            "exposure": self.exposure,
-            "reinhard": 1 if self.reinhard is None else self.reinhard,
-            **({"bits": self.bits} if self.bits != 8 else {}),
-        }
-
-    @property
-    def development(self) -> str:
-        """The words that say to scripts/reproject.py what to write."""
-        words = [f"--{self.format}", "--exposure", str(self.exposure)]
-        if self.reinhard is not None:
-            words += ["--reinhard", str(self.reinhard)]
-        if self.bits != 8:
-            words += ["--bits", str(self.bits)]
-        if self.passes:
-            words += ["--passes", ",".join(self.passes)]
-        return shlex.join(words)
+    def settings(self) -> ReprojectionSettings:
+        """What scripts/reproject.py is to do."""
+        # `Scene` has made a reprojection of each exposure.
+        assert not isinstance(self.exposure, list)
+        options = self.model_dump(include={*ReprojectionOptions.model_fields}, exclude_none=True)
+        return ReprojectionSettings(
+            **options,
+            formats=[self.format],
+            exposure=self.exposure,
+            passes=self.passes or [],
+        )
 
 
 class Flow(Settings):
@@ -586,14 +540,11 @@ class Scene(Settings):
                 raise ValueError("render.depth_of_field: goes with scene.blend, for its camera")
         for name, reprojection in self.reprojections.items():
             key = f"reprojections.{name}"
-            if reprojection.camera and reprojection.camera.lens == FILE:
-                raise ValueError(f"{key}.camera.lens: file goes with a rig of type blend_camera")
             _check_name(key, name, REPROJECTION_NEIGHBOURS)
             for rig_name in reprojection.rigs or ():
                 if rig_name not in self.rigs:
                     hint = suggestion(rig_name, self.rigs)
                     raise ValueError(f"{key}.rigs: there is no rig {rig_name!r}{hint}")
-            _check_cube_map(key, reprojection)
             for pass_name in reprojection.passes or ():
                 if self.render is None or pass_name not in (self.render.passes or ()):
                     raise ValueError(f"{key}.passes: {pass_name} is not in render.passes")
@@ -716,16 +667,10 @@ def _check_blender_takes(key: str, lens: Lens) -> None:
         raise ValueError(f"{key}.sensor_size: is {lens.sensor[0]:g}; Blender has at least 1 mm")
 
 
-def _check_cube_map(key: str, settings: Rig | Reprojection) -> None:
-    """Check that a camera can be that of a cube map's face, where it has to."""
-    camera = settings.camera
-    if camera is None or not settings.cube_map:
-        return
-    if (camera.lens, getattr(camera, "fov", None)) != ("rectilinear", 90):
-        raise ValueError(f"{key}.camera: must be rectilinear with fov 90 with cube_map")
-    if camera.resolution[0] != camera.resolution[1]:
-        size = list(camera.resolution)
-        raise ValueError(f"{key}.camera.resolution: is {size}; must be square with cube_map")
+def _check_cube_map(key: str, rig: Rig) -> None:
+    """Check that a rig's camera can be that of a cube map's face, where it has to."""
+    if rig.cube_map and (problem := face_problem(rig.camera)):
+        raise ValueError(f"{key}.camera{problem}")
 
 
 def _check_name(key: str, name: str, neighbours: set[str]) -> None:

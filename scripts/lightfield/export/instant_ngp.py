@@ -28,12 +28,20 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
-from lightfield.core.cli import above_zero, finite
+from lightfield.core.cli import above_zero, finite, refuse_beside_settings
 from lightfield.core.errors import UserError
 from lightfield.core.files import keep_apart, read_json, write_json
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import BOUNDS_PIXELS, BOUNDS_VIEWS
+from lightfield.core.settings import checked, read_settings
+from lightfield.dataset.exports import (
+    BOUNDS_PIXELS,
+    BOUNDS_VIEWS,
+    VIEWS,
+    ExportSettings,
+    InstantNgp,
+)
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.view_store import ViewStore
 from lightfield.export.source import DEPTH_UNIT, Floats, check_size, depth_of, millimetres
@@ -72,17 +80,24 @@ MANIFEST = Manifest("transforms*.json", _pictures, (MASK,))
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add this export's flags to a command line."""
+    """Add the flags of this export to a command line."""
     add = parser.add_argument
     add("--input-cfg", type=Path, required=True, help="the lightfield.json")
     add("--output", type=Path, required=True, help="the transforms.json to write")
+    add("--settings", type=Path, metavar="JSON", help="settings file, as for scripts/export.py")
     add("--image-dir", type=Path, help="folder of the views (default: that of --input-cfg)")
-    add("--image-suffix", choices=[".png", ".exr"], default=".png")
     add(
         "--exr-dir",
         type=Path,
         help="folder for the copies of EXR views (default: instant_ngp beside --output)",
     )
+    add_settings_flags(parser)
+
+
+def add_settings_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that stand for the settings."""
+    add = parser.add_argument_group("Instead of --settings").add_argument
+    add("--image-suffix", choices=[".png", ".exr"], default=".png")
     add(
         "--depth-dir",
         type=Path,
@@ -117,34 +132,56 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--placed-as",
-        type=Path,
         metavar="TRANSFORMS",
         help="take scale and offset from there: the transforms.json that these views test",
     )
 
 
-def export(arguments: argparse.Namespace) -> None:
-    """Write a dataset's transforms.json and the files that it names.
-
-    If the views are split, write a transforms.json for each part, too.
-    """
+def settings_from(arguments: argparse.Namespace) -> ExportSettings[InstantNgp]:
+    """Return the settings of --settings, or those of the flags."""
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_settings_flags)
+        return read_settings(ExportSettings[InstantNgp], arguments.settings)
     if arguments.scale is None and arguments.offset is not None:
         raise UserError("--offset: goes with --scale; without it both are fitted")
+    corners = arguments.render_aabb
+    options = {
+        "sources": [VIEWS],
+        "scale": arguments.scale,
+        "offset": arguments.offset,
+        "bounds": "depth" if arguments.depth_bounds else "rig",
+        "aabb_scale": arguments.aabb_scale,
+        "render_aabb": [corners[:3], corners[3:]] if corners else None,
+        "depth": arguments.depth_dir is not None,
+    }
+    content = {
+        "options": {key: value for key, value in options.items() if value is not None},
+        "suffix": arguments.image_suffix,
+    }
+    if arguments.placed_as:
+        content["trained_by"] = arguments.placed_as
+    return checked(TypeAdapter(ExportSettings[InstantNgp]), content, "flags")
+
+
+def export(arguments: argparse.Namespace) -> None:
+    """Write a dataset's transforms.json and what it names, as the command line says."""
+    settings = settings_from(arguments)
+    options = settings.options
     lightfield = LightField.read(arguments.input_cfg)
     lightfield.require_centre()
     view_names = {arguments.output: [view.name for view in lightfield.views]}
     for part in PARTS:
         if names := [view.name for view in lightfield.views if view.split == part]:
             view_names[arguments.output.with_stem(f"{arguments.output.stem}_{part}")] = names
-    writer = _Writer(arguments, lightfield)
+    writer = _Writer(arguments, settings, lightfield)
     scale, offset = writer.placement()
     common = writer.lens_keys | {"scale": scale, "offset": offset}
-    common["options"] = _options(arguments)
-    if arguments.aabb_scale:
-        common["aabb_scale"] = arguments.aabb_scale
-    if arguments.render_aabb:
-        common["render_aabb"] = [arguments.render_aabb[:3], arguments.render_aabb[3:]]
-    if arguments.depth_dir:
+    common["options"] = options.recorded
+    if options.aabb_scale:
+        common["aabb_scale"] = options.aabb_scale
+    if options.render_aabb:
+        common["render_aabb"] = [list(corner) for corner in options.render_aabb]
+    if options.depth:
         common["integer_depth_scale"] = DEPTH_UNIT
     frames = writer.frames()
     for path, names in view_names.items():
@@ -154,26 +191,19 @@ def export(arguments: argparse.Namespace) -> None:
         store.put_list(arguments.output, [*writer.pictures, *list(view_names)[1:]])
 
 
-def _options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return the options of the command line, as a scene YAML names them."""
-    corners = arguments.render_aabb
-    options = {
-        "scale": arguments.scale,
-        "bounds": "depth" if arguments.depth_bounds else "rig",
-        "aabb_scale": arguments.aabb_scale,
-        "render_aabb": [corners[:3], corners[3:]] if corners else None,
-        "depth": arguments.depth_dir is not None,
-    }
-    if arguments.scale is not None:
-        options["offset"] = arguments.offset or [0.5, 0.5, 0.5]
-    return options
-
-
 class _Writer:
     """Writes the files that a transforms.json names, view by view."""
 
-    def __init__(self, arguments: argparse.Namespace, lightfield: LightField) -> None:
-        self.arguments = arguments
+    def __init__(
+        self,
+        arguments: argparse.Namespace,
+        settings: ExportSettings[InstantNgp],
+        lightfield: LightField,
+    ) -> None:
+        self.output: Path = arguments.output
+        self.options = settings.options
+        self.suffix = settings.suffix
+        self.trained_by = Path(settings.trained_by) if settings.trained_by else None
         self.lightfield = lightfield
         self.lens = lightfield.lens
         try:
@@ -185,26 +215,27 @@ class _Writer:
         self.image_dir: Path = arguments.image_dir or lightfield.folder
         # The images written so far.
         self.pictures: list[Path] = []
-        self.exr_dir: Path = arguments.exr_dir or arguments.output.parent / "instant_ngp"
-        keep_apart("--output", arguments.output, arguments.input_cfg, arguments.placed_as)
-        if arguments.image_suffix == ".exr":
+        folder = self.output.parent / "instant_ngp"
+        self.exr_dir: Path = arguments.exr_dir or folder
+        self.depth_dir: Path = arguments.depth_dir or folder / "depth"
+        keep_apart("--output", self.output, arguments.input_cfg, self.trained_by)
+        if self.suffix == ".exr":
             keep_apart("--exr-dir", self.exr_dir, self.image_dir)
-        elif arguments.depth_dir:
-            keep_apart("--depth-dir", arguments.depth_dir, self.image_dir)
+        elif self.options.depth:
+            keep_apart("--depth-dir", self.depth_dir, self.image_dir)
 
     def placement(self) -> tuple[float, list[float]]:
         """Return scale and offset: as given, or fitted to what the views see, or to the rig."""
-        if self.arguments.placed_as:
-            training = read_json(self.arguments.placed_as)
+        if self.trained_by:
+            training = read_json(self.trained_by)
             try:
                 return training["scale"], training["offset"]
             except (LookupError, TypeError):
-                raise UserError(f"{self.arguments.placed_as}: has no scale and offset") from None
+                raise UserError(f"{self.trained_by}: has no scale and offset") from None
         cameras = np.array([view.position for view in self.lightfield.views])
-        if self.arguments.scale is not None:
-            offset = self.arguments.offset or (0.5, 0.5, 0.5)
-            return self.arguments.scale, placed(cameras, self.arguments.scale, offset)
-        if not self.arguments.depth_bounds:
+        if self.options.scale is not None:
+            return self.options.scale, placed(cameras, self.options.scale, self.options.middle)
+        if self.options.bounds == "rig":
             return fitted_to_rig(cameras, -self.lightfield.matrices[:, :3, 2])
         points = np.concatenate(list(self.seen_points()))
         if not len(points):
@@ -231,8 +262,8 @@ class _Writer:
         frames = {}
         missing = []
         for view in self.lightfield.views:
-            image = self.image_dir / f"{view.name}{self.arguments.image_suffix}"
-            if self.arguments.image_suffix == ".exr":
+            image = self.image_dir / f"{view.name}{self.suffix}"
+            if self.suffix == ".exr":
                 image = self.copied_exr(image)
             else:
                 missing += [] if image.is_file() else [image]
@@ -241,8 +272,8 @@ class _Writer:
                 "file_path": self.relative(image),
                 "transform_matrix": transform_matrix(view).tolist(),
             }
-            if self.arguments.depth_dir:
-                path = self.arguments.depth_dir / f"{view.name}.png"
+            if self.options.depth:
+                path = self.depth_dir / f"{view.name}.png"
                 images.write_png(path, millimetres(self.depth(view, meaning)))
                 self.pictures.append(path)
                 frame["depth_path"] = self.relative(path)
@@ -256,8 +287,8 @@ class _Writer:
         return frames
 
     def relative(self, path: Path) -> str:
-        """Return a path relative to the folder of the transforms.json."""
-        start = self.arguments.output.parent.resolve()
+        """Return a path as seen from the transforms.json."""
+        start = self.output.parent.resolve()
         return Path(os.path.relpath(path.resolve(), start)).as_posix()
 
     def depth(self, view: View, meaning: str) -> Floats:

@@ -53,7 +53,7 @@ from pydantic import Field
 
 from lightfield.core.settings import Settings
 from lightfield.dataset import journal
-from lightfield.dataset.config import AtLeastOne
+from lightfield.dataset.config import AtLeastOne, Energy
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, PASSES
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
@@ -90,6 +90,14 @@ class FullSize(Settings):
     resolution: list[AtLeastOne] = Field(min_length=2, max_length=2)
     samples: AtLeastOne | Literal["file"] | None = None
     denoise: bool | None = None
+
+
+class CostSettings(Settings):
+    """The settings of scripts/costs.py: the key `energy` of config.yaml, and the full dataset."""
+
+    energy: Energy
+    full: FullSize
+    reprojections: list[str] = Field([])
 
 
 @dataclass(frozen=True)

@@ -141,10 +141,10 @@ def _pick(
             smooth = top + fy * (bottom - top) + across
             if smooth > 0:
                 low, high = min(min(a, b), min(c, d)), max(max(a, b), max(c, d))
-                found = min(max(smooth, low), high)
+                picked = min(max(smooth, low), high)
             else:
                 nearest = min(int(y), height - 1), min(int(x), width - 1)
-                found = inverse[nearest]
+                picked = inverse[nearest]
                 if valid[nearest] != valid[nearest]:
                     # Beyond the rim of the image circle: the nearest of the four pixels around.
                     shortest = np.float32(4)
@@ -154,11 +154,11 @@ def _pick(
                             away = (fx - p) * (fx - p) + (fy - q) * (fy - q)
                             if k >= 0 and valid[k, m] == valid[k, m] and away < shortest:
                                 shortest = away
-                                found = inverse[k, m]
-            if found == 0:
+                                picked = inverse[k, m]
+            if picked == 0:
                 out[i, j] = np.inf
             else:
-                out[i, j] = (cos[i, j] if as_z else np.float32(1)) / found
+                out[i, j] = (cos[i, j] if as_z else np.float32(1)) / picked
 
 
 def resample_depth(depth: Array, source_is_z: bool, target_is_z: bool, lens_map: LensMap) -> Array:
@@ -181,7 +181,7 @@ def resample_depth(depth: Array, source_is_z: bool, target_is_z: bool, lens_map:
     out = np.empty(lens_map.target_cos.shape, depth.dtype)
     for first in range(0, len(out), _STRIP):
         rows = slice(first, first + _STRIP)
-        found = np.empty(out[rows].shape, np.float32)
+        strip = np.empty(out[rows].shape, np.float32)
         _pick(
             inverse,
             lens_map.source_cos,
@@ -190,7 +190,7 @@ def resample_depth(depth: Array, source_is_z: bool, target_is_z: bool, lens_map:
             target_is_z,
             _SMOOTH[depth.dtype],
             lens_map.topology,
-            found,
+            strip,
         )
-        out[rows] = to_half(found) if out.dtype == np.float16 else found
+        out[rows] = to_half(strip) if out.dtype == np.float16 else strip
     return out

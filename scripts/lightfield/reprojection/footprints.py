@@ -1,4 +1,4 @@
-"""The loops of a lens map: what a target pixel covers in the source, and what needs care there."""
+"""The loops of a lens map: what each target pixel covers, and which samples need care."""
 
 import math
 
@@ -13,7 +13,7 @@ _MOST_SAMPLES = 256  # each way, of a footprint that meets a pole
 
 @inline
 def _difference(before: float, middle: float, after: float, period: float) -> float:
-    """The central difference; one-sided where one neighbour is missing, 0 where both are."""
+    """Return the central difference: one-sided if one neighbour is missing, 0 if both are."""
     backward, forward = middle - before, after - middle
     if period > 0:
         backward -= period * np.rint(backward / period)
@@ -29,7 +29,7 @@ def _difference(before: float, middle: float, after: float, period: float) -> fl
 
 @kernel
 def extent(step: Array, counts: Array) -> int:
-    """How far a pixel's samples lie from its centre at most, in whole source pixels, along x or y.
+    """Return how far a pixel's samples lie from its centre: the most in x or y, in source pixels.
 
     ``step`` is (2, 2) and ``counts`` (2,), as in a lens map.
     """
@@ -81,7 +81,7 @@ def measure(
     footprints: Array,
     counts: Array,
 ) -> int:
-    """Find what target pixels cover, of their coordinates (h, w, 2) and their neighbours'.
+    """Measure what target pixels cover, from their coordinates (h, w, 2) and their neighbours'.
 
     Fills ``centers``, NaN outside the source's ``size``, and ``magnification``, which is 1 / √|det|
     of the Jacobian. ``period`` is the source's width if it wraps around, or else 0. Unless they are
@@ -118,7 +118,7 @@ def measure(
 
 @kernel
 def distance_to_missing(cos: Array, out: Array) -> None:
-    """How many pixels away, in rows or columns, the nearest is that is NaN or outside the image."""
+    """Fill ``out`` with the distance, in rows or columns, to the nearest pixel without a ray."""
     height, width = cos.shape
     for i in range(height):
         for j in range(width):
@@ -166,14 +166,14 @@ def mark(
 def bounds(
     points: Array, margin: int, footprints: Array, counts: Array
 ) -> tuple[float, float, float, float, int]:
-    """The least and the largest x and y that are read around ``points``, and the largest extent.
+    """Return the least and largest x and y that are read around ``points``, and the largest extent.
 
-    ``margin`` is added on each side, and each point's own extent where it has a footprint. The
+    ``margin`` is added on each side, and the extent of each point that has a footprint. The
     bounds are inf and −inf where no point has coordinates.
     """
     left = top = np.inf
     right = bottom = -np.inf
-    most = 0
+    largest_extent = 0
     for i in range(points.shape[0]):
         for j in range(points.shape[1]):
             x, y = points[i, j, 0], points[i, j, 1]
@@ -181,9 +181,9 @@ def bounds(
                 continue
             around = margin
             if len(counts):
-                own = extent(footprints[i, j], counts[i, j])
-                most = max(most, own)
-                around += own
+                point_extent = extent(footprints[i, j], counts[i, j])
+                largest_extent = max(largest_extent, point_extent)
+                around += point_extent
             left, right = min(left, x - around), max(right, x + around)
             top, bottom = min(top, y - around), max(bottom, y + around)
-    return left, top, right, bottom, most
+    return left, top, right, bottom, largest_extent

@@ -23,8 +23,8 @@ from lightfield.imaging.images import (
 from lightfield.imaging.tonemap import decode_srgb, to_8_bit, to_16_bit, tone_map
 from lightfield.reprojection.colour import colour_strips
 from lightfield.reprojection.depth import resample_depth
+from lightfield.reprojection.geometry import Target
 from lightfield.reprojection.job import Job, SourceView
-from lightfield.reprojection.lens_arguments import Target
 from lightfield.reprojection.lens_map import LensMap
 
 Attributes = Mapping[str, Attribute]
@@ -78,9 +78,9 @@ class SourcePixels:
             depth = depth.astype(np.float32, copy=False)
         return colour, depth, alpha is not None, image.attributes.get(DEPTH_ATTRIBUTE)
 
-    def window(self, made: LensMap) -> tuple[Array, Array | None]:
+    def window(self, lens_map: LensMap) -> tuple[Array, Array | None]:
         """Return the colour and depth that a lens map reads."""
-        row, end_row, column, end_column = made.window
+        row, end_row, column, end_column = lens_map.window
         rows = slice(row - self.rows[0], end_row - self.rows[0])
         columns = slice(column - self.columns[0], end_column - self.columns[0])
         colour = np.ascontiguousarray(self.colour[rows, columns])
@@ -108,7 +108,7 @@ def _linear(planes: list[Array], alpha: Array | None) -> Array:
 def write(
     job: Job,
     target: Target,
-    made: LensMap,
+    lens_map: LensMap,
     source: SourcePixels,
     outputs: Mapping[str, Path],
     key: str,
@@ -116,9 +116,9 @@ def write(
     """Resample a view through one lens map and write its files."""
     if job.lightfield.transparent and not source.has_alpha:
         raise UserError("has no channel A, although --input-cfg says that it is transparent")
-    image = _developed(job, target, made, source, outputs)
+    image = _developed(job, target, lens_map, source, outputs)
     attributes = {KEY_ATTRIBUTE: key} | {
-        f"plenoforge:{name}": str(value) for name, value in job.settings.items()
+        f"plenoforge:{name}": str(value) for name, value in job.settings.published.items()
     }
     if "exr" in outputs and image.depth is not None:
         attributes[DEPTH_ATTRIBUTE] = target.lens.usual_depth
@@ -129,7 +129,8 @@ def write(
             case "png":
                 _write_png(path, image, {**attributes, **PNG_OPTIONS})
             case "depth":
-                _write_depth(path, image, job.arguments.depth_png, key)
+                assert job.settings.depth_png is not None
+                _write_depth(path, image, job.settings.depth_png, key)
             case "mask":
                 mask = np.where(image.empty, 255, 0).astype(np.uint8)
                 write_png(path, mask, {KEY_ATTRIBUTE: key})
@@ -157,17 +158,17 @@ class _Image:
 
 
 def _developed(
-    job: Job, target: Target, made: LensMap, source: SourcePixels, outputs: Mapping[str, Path]
+    job: Job, target: Target, lens_map: LensMap, source: SourcePixels, outputs: Mapping[str, Path]
 ) -> _Image:
     """Resample a view, and develop its colour for those ``outputs`` that hold it."""
-    arguments = job.arguments
+    settings = job.settings
     transparent = job.lightfield.transparent
-    encode = to_8_bit if arguments.bits == 8 else to_16_bit
-    strips, depth = _resampled(job, made, source, target.lens.has_z_depth)
-    size = made.target_cos.shape
+    encode = to_8_bit if settings.bits == 8 else to_16_bit
+    strips, depth = _resampled(job, lens_map, source, target.lens.has_z_depth)
+    size = lens_map.target_cos.shape
     empty = np.empty(size, bool)
     half = np.empty((3, *size), np.float16)
-    pixels = np.empty((*size, 3), f"uint{arguments.bits}")
+    pixels = np.empty((*size, 3), f"uint{settings.bits}")
     covered = np.empty(size, np.float32)
     for rows, strip in strips:
         empty[rows] = np.isnan(strip[:, :, 0])
@@ -179,7 +180,7 @@ def _developed(
         if source.has_alpha:
             with np.errstate(invalid="ignore", divide="ignore"):
                 strip[:, :, :3] /= alpha
-        colour = tone_map(strip[:, :, :3], arguments.exposure, arguments.reinhard)
+        colour = tone_map(strip[:, :, :3], settings.exposure, settings.reinhard)
         if "png" in outputs:
             pixels[rows] = encode(colour)
         if "exr" in outputs:
@@ -224,28 +225,28 @@ def _write_depth(path: Path, image: _Image, scale: float, key: str) -> None:
 
 
 def _resampled(
-    job: Job, made: LensMap, source: SourcePixels, as_z: bool
+    job: Job, lens_map: LensMap, source: SourcePixels, as_z: bool
 ) -> tuple[Iterable[tuple[slice, Array]], Array | None]:
     """Return the target's colour, in strips, and its depth in the source's precision."""
-    colour, depth = source.window(made)
+    colour, depth = source.window(lens_map)
     if job.copies and source.is_z == as_z:
-        row, end_row, column, end_column = made.window
+        row, end_row, column, end_column = lens_map.window
         # A channel that is no number makes a pixel none, as it does where pixels are resampled.
         none = np.isnan(colour).any(axis=-1)
-        none |= np.isnan(made.target_cos[row:end_row, column:end_column])
+        none |= np.isnan(lens_map.target_cos[row:end_row, column:end_column])
         colour = np.where(none[:, :, None], np.float32(np.nan), colour)
-        copy = None if depth is None else _in_frame(depth, made)
-        return [(np.s_[:], _in_frame(colour, made))], copy
+        copy = None if depth is None else _in_frame(depth, lens_map)
+        return [(np.s_[:], _in_frame(colour, lens_map))], copy
     if depth is not None:
-        depth = resample_depth(depth, source.is_z, as_z, made)
+        depth = resample_depth(depth, source.is_z, as_z, lens_map)
         if depth.dtype != np.float16:
             depth = with_precision(depth, job.depth_precision)
-    return colour_strips(colour, made), depth
+    return colour_strips(colour, lens_map), depth
 
 
-def _in_frame(window: Array, made: LensMap) -> Array:
+def _in_frame(window: Array, lens_map: LensMap) -> Array:
     """Return the window's pixels in their place in the whole image, NaN around them."""
-    out = np.full((*made.target_cos.shape, *window.shape[2:]), np.nan, window.dtype)
-    row, end_row, column, end_column = made.window
+    out = np.full((*lens_map.target_cos.shape, *window.shape[2:]), np.nan, window.dtype)
+    row, end_row, column, end_column = lens_map.window
     out[row:end_row, column:end_column] = window
     return out
