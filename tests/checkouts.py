@@ -32,6 +32,14 @@ def checkout(folder, **scenes):
     return folder
 
 
+def with_consumers(folder):
+    """Put an environment of the consumers into a checkout whose programs are stand-ins."""
+    environment = folder / ".venv-consumers"
+    (environment / "bin").mkdir(parents=True)
+    (environment / "bin/python").symlink_to(sys.executable)
+    (environment / "complete").touch()
+
+
 def _words(arguments):
     return [Path(sys.executable).with_name("snakemake"), "--cores", "1", *arguments]
 

@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from checkouts import checkout, snakemake
+from checkouts import checkout, snakemake, with_consumers
 from sphere import write_views
 
 from lightfield.dataset import ledger
@@ -116,6 +116,7 @@ class Build:
             stand_in.parent.mkdir(exist_ok=True)
             stand_in.write_text(STAND_IN)
         (folder / "scripts/check_device.py").write_text("")
+        with_consumers(folder)
         self.jobs = self.run()
         shutil.rmtree(folder / ".snakemake")
 
@@ -244,7 +245,8 @@ def assert_made_from_what_is_there(build, jobs):
             continue
         inputs = {name: build.sha256(name) for name in job["input"]}
         words = shlex.split(job["command"])
-        command = words[words.index("python") + 1 : words.index(">")]
+        (python,) = (word for word in words if Path(word).name == "python")
+        command = words[words.index(python) + 1 : words.index(">")]
         for output in job["output"]:
             content = json.loads((build.folder / output).read_text())
             assert content["inputs"] == inputs, output

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from checkouts import checkout
+from checkouts import checkout, with_consumers
 from sphere import write_views
 
 from lightfield.core import files
@@ -89,6 +89,7 @@ class Failing:
             stand_in = self.folder / program.relative_to(ROOT)
             stand_in.parent.mkdir(exist_ok=True)
             stand_in.write_text(FAILING)
+        with_consumers(self.folder)
         # No job's program: it runs before the first one.
         (self.folder / "scripts/check_device.py").write_text("")
         (self.folder / "bin").mkdir()
