@@ -2,6 +2,7 @@
 
 import filecmp
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -62,6 +63,8 @@ def snakemake(folder, *arguments):
         capture_output=True,
         text=True,
         check=False,
+        # For the logger plugin of tests/.
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
     )
 
 
@@ -81,6 +84,16 @@ def planned(folder, *arguments):
     assert result.returncode == 0, result.stdout + result.stderr
     table = (result.stdout + result.stderr).split("Job stats:")[1].split("total")[0]
     return {name: int(count) for name, count in re.findall(r"^(\w+)\s+(\d+)$", table, re.M)}
+
+
+def jobs_on(stderr):
+    """Return the jobs that a plan with ``--logger jobs`` has written."""
+    jobs = [json.loads(line) for line in stderr.splitlines() if line.startswith("{")]
+    for job in jobs:
+        # Whether a page is there is all that `checksums` asks of it.
+        if job["rule"] == "checksums":
+            job["input"] = [name for name in job["input"] if not name.endswith(".html")]
+    return jobs
 
 
 def published(folder, dataset=""):

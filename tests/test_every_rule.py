@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from checkouts import checkout, snakemake, with_consumers
+from checkouts import checkout, jobs_on, snakemake, with_consumers
 from sphere import write_views
 
 from lightfield.dataset import ledger
@@ -140,13 +140,7 @@ class Build:
     def plan(self, *words):
         """Return the jobs that a run would run, by their first output."""
         stderr = self.snakemake("--dry-run", *words, "--logger", "jobs")
-        lines = (line for line in stderr.splitlines() if line.startswith("{"))
-        jobs = [json.loads(line) for line in lines]
-        for job in jobs:
-            # Whether a page is there is all that `checksums` asks of it.
-            if job["rule"] == "checksums":
-                job["input"] = [name for name in job["input"] if not name.endswith(".html")]
-        return {job["output"][0]: job for job in jobs if job["output"]}
+        return {job["output"][0]: job for job in jobs_on(stderr) if job["output"]}
 
     def run(self):
         """Run everything; return all its jobs.
