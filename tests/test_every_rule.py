@@ -387,9 +387,11 @@ ROUNDS = {
         "built": ("size: 0.5", "size: 2", {"LFInner lightfield", "measure_synthesis"}),
     },
 }
-# The first two follow from the programs' versions, the third from where the scene YAML lies. Only
-# instant-ngp places test views as the trained ones, and only a .blend's camera has frames.
-CONSTANT = {"version", "bpy", "command", "camera_frames", "nerfstudio.json trained_by"}
+# The first two follow from the programs' versions, the third from where the scene YAML lies. Only a
+# .blend's camera has frames. For instant-ngp a rig that tests is placed as the trained one is; other
+# formats take its views.
+CONSTANT = {"version", "bpy", "command", "camera_frames"}
+CONSTANT |= {"nerfstudio.json trained_by", "instant_ngp.json tested_by"}
 
 
 def apply(build, changes):
