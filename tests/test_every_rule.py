@@ -388,8 +388,8 @@ ROUNDS = {
     },
 }
 # The first two follow from the programs' versions, the third from where the scene YAML lies. Only a
-# .blend's camera has frames. For instant-ngp a rig that tests is placed as the trained one is; other
-# formats take its views.
+# .blend's camera has frames. For instant-ngp a rig that tests is placed as the trained one is;
+# other formats take its views.
 CONSTANT = {"version", "bpy", "command", "camera_frames"}
 CONSTANT |= {"nerfstudio.json trained_by", "instant_ngp.json tested_by"}
 
