@@ -1,10 +1,7 @@
 # What the pixels must satisfy, and checksums of all that is published.
 
 
-def reprojection_words(wildcards):
-    """Return the words that name a dataset's reprojections."""
-    words = [f"--reprojection {name}" for name in dataset_of(wildcards).reprojections]
-    return " ".join(words)
+include: "helpers/validate.smk"
 
 
 # An invalid dataset is an outcome too: it gets its validation.json and its page, and fails below.

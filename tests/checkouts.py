@@ -57,14 +57,15 @@ def start_snakemake(folder, *arguments, **options):
 
 def snakemake(folder, *arguments):
     """Run Snakemake in a checkout; return its CompletedProcess."""
+    # The logger plugin of tests/ comes after what a test itself has set.
+    folders = [os.environ.get("PYTHONPATH"), str(Path(__file__).parent)]
     return subprocess.run(
         _words(arguments),
         cwd=folder,
         capture_output=True,
         text=True,
         check=False,
-        # For the logger plugin of tests/.
-        env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, folders))},
     )
 
 

@@ -41,7 +41,8 @@ def trained_by(wildcards):
 
 def folder_of_views(wildcards):
     """Return the folder of the views that an export reads."""
-    return f"{dataset_of(wildcards).folder}/{wildcards.source.rstrip('/') or 'exr'}"
+    folder = stage_of(wildcards)
+    return f"{dataset_of(wildcards).folder}/{'exr' if folder == 'render' else folder}"
 
 
 def export_settings(wildcards):
