@@ -195,9 +195,17 @@ def test_a_scene_is_advised_by_the_programs(run_program, room, tmp_path):
     assert fewer["light"] < -0.01 and not fewer["same_picture"]
     tree = tried[json.dumps({"light_tree": not own["light_tree"]})]["whole views"]
     assert 0 < abs(tree["light"]) < 0.02
-    # Each change reaches Cycles: no two make the same pixels.
-    wholes = [saved["whole views"] for change, saved in tried.items() if "clamp" not in change]
+    # Each change reaches Cycles: no two make the same pixels. Only a clamp clamps nothing here, and
+    # the denoiser has the same filter for two qualities on some processors.
+    same = ("clamp_indirect", "denoise_quality")
+    wholes = [
+        saved["whole views"]
+        for change, saved in tried.items()
+        if not any(name in change for name in same)
+    ]
     assert len({(whole["bias"], whole["light"]) for whole in wholes}) == len(wholes)
+    qualities = [saved for change, saved in tried.items() if "denoise_quality" in change]
+    assert any(saved["whole views"] not in wholes for saved in qualities)
     # Two processes of one thread have the scene twice, and one of two has it once.
     single, double = found["threads"]
     assert (single["threads"], single["processes"]) == (1, 2)

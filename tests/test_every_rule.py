@@ -259,6 +259,7 @@ CAMERAS = {"lightfield", "panorama_lightfield", "probe_cameras"}
 OF_PLANE = {"LFPlane lightfield", "LFPlane panorama_lightfield", "probe_cameras"}
 TESTED = {"LFPlane lightfield", "probe_cameras", "LFPlane export", "splits", "check_gpu"}
 CUBES = BUILT[BUILT.index("  cubes:") : BUILT.index("exports:")]
+TO_CUBES = BUILT[BUILT.index("render:") : BUILT.index("  cubes:")]
 INNER = BUILT[BUILT.index("  LFInner:") : BUILT.index("reprojections:")]
 # In each round one change of each scene YAML and of other files: its old and new text, and the
 # jobs whose own settings or inputs change with it, by rule and if need be by folder.
@@ -354,6 +355,29 @@ ROUNDS = {
             {"perspective reproject", "perspective reprojected_lightfield"},
         ),
     },
+    "how pixels are resampled": {
+        "built": (
+            "exposure: -1",
+            "exposure: -1\n    filter: bilinear\n    samples: 2\n    rotation: [0, 9, 0]",
+            {"perspective lens_map", "perspective reprojected_lightfield"},
+        ),
+    },
+    "how light becomes pixels": {
+        "built": (
+            "exposure: -1",
+            "exposure: -1\n    bits: 16\n    reinhard: 4",
+            {"perspective reproject", "perspective reprojected_lightfield"},
+        ),
+    },
+    "another pass": {
+        "built": (
+            TO_CUBES,
+            TO_CUBES.replace("samples: 4", "samples: 4, passes: [normal]").replace(
+                "exposure: -1", "exposure: -1\n    passes: [normal]"
+            ),
+            CAMERAS | {"perspective reproject", "perspective reprojected_lightfield"},
+        ),
+    },
     "distances": {"built": ("samples: 4", "samples: 4, depth: distance", CAMERAS)},
     "another builder": {
         "built": ("builder: room", "builder: still_life", {"build_scene"} | CAMERAS)
@@ -389,8 +413,8 @@ ROUNDS = {
 }
 # The first two follow from the programs' versions, the third from where the scene YAML lies. Only a
 # .blend's camera has frames. For instant-ngp a rig that tests is placed as the trained one is;
-# other formats take its views.
-CONSTANT = {"version", "bpy", "command", "camera_frames"}
+# other formats take its views. No scene YAML asks reproject.py for masks.
+CONSTANT = {"version", "bpy", "command", "camera_frames", "reproject.json mask"}
 CONSTANT |= {"nerfstudio.json trained_by", "instant_ngp.json tested_by"}
 
 
