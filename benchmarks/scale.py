@@ -41,19 +41,13 @@ rigs:
     cameras: [{columns}, {rows}]
     size: [2, 1, 1]
     center: [0, 0, 1.5]
-    camera: {{lens: rectilinear, fov: 60, resolution: [16, 16]}}
+    camera: {{lens: CAMERA}}
 """
+PLANNED_SCENE = SCENE.replace("CAMERA", "rectilinear, fov: 60, resolution: [16, 16]")
 # Of a whole build: fisheye views, which are reprojected and exported as those of the other scenes.
-BUILT_SCENE = """
-scene: {{builder: room}}
-render: {{samples: 1}}
-rigs:
-  LFPlane:
-    type: plane
-    cameras: [{columns}, {rows}]
-    size: [2, 1, 1]
-    center: [0, 0, 1.5]
-    camera: {{lens: equidistant, fov: 180, resolution: [8, 8]}}
+BUILT_SCENE = (
+    SCENE.replace("CAMERA", "equidistant, fov: 180, resolution: [8, 8]")
+    + """
 reprojections:
   perspective:
     camera: {{lens: rectilinear, fov: 90, resolution: [8, 8]}}
@@ -62,6 +56,7 @@ exports:
   instant_ngp:
     sources: [perspective]
 """
+)
 # Of a dataset that is built: its shards.
 BUILT_SHARDS = 20
 
@@ -135,7 +130,7 @@ def a_build(views: int) -> None:
     print(f"{1000 * seconds / count:.0f} ms a view; the page has {page.stat().st_size} bytes")
 
 
-def write_settings(views: int, views_per_shard: int, scene: str = SCENE) -> int:
+def write_settings(views: int, views_per_shard: int, scene: str = PLANNED_SCENE) -> int:
     """Write the scene and the settings of a build into the present folder; return its views.
 
     These are the ``views`` that fill a plane.

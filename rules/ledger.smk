@@ -72,13 +72,18 @@ def restore_time(path):
         os.utime(path, ns=(time, time))
 
 
+def dataset_settings(dataset, stage, content):
+    """Write a dataset's settings of a stage; return their file as an input."""
+    mark_stale_files(dataset.name)
+    return settings_file(f"{dataset.work}/settings/{stage}.json", content)
+
+
 def settings_of(stage, content):
     """Return the input function for a dataset's settings of a stage: ``content`` of the dataset."""
 
     def input_function(wildcards):
         dataset = dataset_of(wildcards)
-        mark_stale_files(dataset.name)
-        return settings_file(f"{dataset.work}/settings/{stage}.json", content(dataset))
+        return dataset_settings(dataset, stage, content(dataset))
 
     return input_function
 

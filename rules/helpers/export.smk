@@ -41,14 +41,13 @@ def trained_by(wildcards):
 
 def folder_of_views(wildcards):
     """Return the folder of the views that an export reads."""
-    folder = stage_of(wildcards)
-    return f"{dataset_of(wildcards).folder}/{'exr' if folder == 'render' else folder}"
+    source = wildcards.source.rstrip("/")
+    return f"{dataset_of(wildcards).folder}/{source or 'exr'}"
 
 
 def export_settings(wildcards):
     """Return the settings file of an export."""
     dataset = dataset_of(wildcards)
-    mark_stale_files(dataset.name)
     source = wildcards.source.rstrip("/") or VIEWS
     reprojection = reprojection_of(wildcards)
     if "format" in wildcards.keys():
@@ -66,5 +65,4 @@ def export_settings(wildcards):
         suffix=reprojection.suffix if reprojection else ".exr",
         **roles,
     )
-    path = f"{dataset.work}/settings/exports/{source}/{name}.json"
-    return settings_file(path, settings.as_json())
+    return dataset_settings(dataset, f"exports/{source}/{name}", settings.as_json())

@@ -12,8 +12,7 @@ def reprojection_settings_of(stage, content):
 
     def input_function(wildcards):
         dataset, name = dataset_of(wildcards), wildcards.reprojection
-        mark_stale_files(dataset.name)
-        path = f"{dataset.work}/settings/{name}/{stage}.json"
-        return settings_file(path, content(reprojection_of(wildcards).settings))
+        settings = content(reprojection_of(wildcards).settings)
+        return dataset_settings(dataset, f"{name}/{stage}", settings)
 
     return input_function

@@ -1,6 +1,7 @@
 """Reads, writes and moves files. A file that is written here is complete or absent, never half."""
 
 import csv
+import fcntl
 import hashlib
 import json
 import os
@@ -186,6 +187,21 @@ def broken(path: Path) -> str | None:
         return f"cannot be read: {read_problem(error)}"
     except UserError as error:
         return str(error).removeprefix(f"{path}: ")
+
+
+def is_locked(path: Path, flags: int) -> bool:
+    """Return whether a process holds the lock of a file or folder, opened with ``flags``.
+
+    Raises OSError if it cannot be opened.
+    """
+    file = os.open(path, flags)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return False
+    except OSError:
+        return True
+    finally:
+        os.close(file)
 
 
 def absolute_path(path: Path) -> Path:

@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from lightfield.core.disk_space import SHARED_MEMORY
+from lightfield.core.files import is_locked
 
 # No user's folder may have this prefix: it would be removed.
 PREFIX = "plenoforge-temporary-"
@@ -92,13 +93,6 @@ def _is_old(path: Path, age: float) -> bool:
 def _is_in_use(folder: Path) -> bool:
     """Return whether the process that made a temporary folder lives. Links always count as used."""
     try:
-        lock = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW)
+        return is_locked(folder, os.O_RDONLY | os.O_NOFOLLOW)
     except OSError:
         return True
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        return False
-    except OSError:
-        return True
-    finally:
-        os.close(lock)

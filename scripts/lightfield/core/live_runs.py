@@ -20,6 +20,8 @@ from pathlib import Path
 
 import psutil
 
+from lightfield.core.files import is_locked
+
 # Jobs inherit this variable. They live on if only their run is killed.
 VARIABLE = "PLENOFORGE_RUN"
 _NAME = re.compile(r"(?P<pid>\d+)\.[0-9a-f]{8}@(?P<host>.+)\.(?P<place>here|cluster)")
@@ -136,18 +138,11 @@ def _leave_note(folder: Path, on_cluster: bool) -> None:
 def _is_free(note: Path) -> bool:
     """Return whether no process holds the lock of a note."""
     try:
-        file = os.open(note, os.O_RDWR)
+        return not is_locked(note, os.O_RDWR)
     except FileNotFoundError:
         return True
     except OSError:
         return False
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        return True
-    except OSError:
-        return False
-    finally:
-        os.close(file)
 
 
 def _wait_for_jobs(folder: Path) -> None:
