@@ -1,7 +1,7 @@
 # `make` sets up the environment and builds the default dataset; `make test` sets up and runs the tests,
 # and `make test-other` those that are not slow, with the other of the two Pythons and its own lock.
 # `make consumers` reads exports with the consumers' own code, in an environment of theirs; `make learn`
-# learns radiance fields from exported files.
+# learns radiance fields from exported files, in the same environment.
 
 CORES ?= $(shell getconf _NPROCESSORS_ONLN)
 
@@ -39,20 +39,21 @@ consumers: .venv/complete .venv-consumers/complete
 	python tests/consumers/export.py work/consumers
 	.venv-consumers/bin/python -W ignore tests/consumers/check.py work/consumers
 
-.venv-consumers/complete: .venv/complete envs/requirements-consumers.txt
+# Several GB: on Linux the package index has torch with CUDA alone.
+.venv-consumers/complete: .venv/complete envs/requirements-consumers.txt envs/requirements-nerfstudio.txt
 	.venv/bin/python -m venv --clear .venv-consumers
-	.venv-consumers/bin/pip -q install -r envs/requirements-consumers.txt
-	.venv-consumers/bin/pip -q install --no-deps nerfstudio==1.1.5
+	.venv-consumers/bin/pip -q install --require-hashes -r envs/requirements-consumers.txt
+	.venv-consumers/bin/pip -q install --require-hashes --no-deps -r envs/requirements-nerfstudio.txt
 	@touch $@
 
 # Twice, for a page shows the measurements that are there when it is planned.
 LEARNED = --config scenes='[garden_learn, object_learn]' rigs=all preset=full
 
-learn: .venv/complete
+learn: .venv/complete .venv-consumers/complete
 	snakemake --cores $(CORES) learn $(LEARNED)
 	snakemake --cores $(CORES) $(LEARNED)
 
-# Builds that are killed, damaged and left without room.
+# Builds that are killed, damaged and left with full disks.
 soak: .venv/complete
 	python benchmarks/soak.py
 
@@ -100,4 +101,6 @@ locks:
 		done; \
 	done
 	echo uv | $(LOCK) --universal - -o envs/requirements-uv.txt
+	$(LOCK) --universal --python-version 3.11 envs/requirements-consumers.in -o envs/requirements-consumers.txt
+	echo nerfstudio==1.1.5 | $(LOCK) --universal --no-deps --python-version 3.11 - -o envs/requirements-nerfstudio.txt
 	echo 'moto[server]' | $(LOCK) --universal --python-version 3.11 - -o envs/requirements-s3-server.txt

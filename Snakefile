@@ -7,7 +7,7 @@ FOLDER = Path(workflow.current_basedir)
 sys.path.insert(0, str(FOLDER / "scripts"))
 
 from lightfield.core.errors import UserError
-from lightfield.core.room import obstacle
+from lightfield.core.disk_space import obstacle
 from lightfield.dataset.config import as_written, read_config
 
 # Where Snakemake can note nothing, it ends with a traceback.
@@ -16,28 +16,27 @@ if cause := obstacle(Path(".snakemake")):
 
 # What the command line says, or the workflow whose module this is; config.yaml fills in the rest.
 GIVEN = set(config)
-# What a user's own folder says.
-OWN = {}
+HAS_OWN_CONFIG = Path("config.yaml").exists() and Path.cwd() != FOLDER
+
+# Snakemake loads both files without a limit, and does not say in which line one is wrong.
+try:
+    # The defaults, and what a user's own folder says instead.
+    DEFAULTS = read_config(FOLDER / "config.yaml")
+    OWN = read_config(Path("config.yaml")) if HAS_OWN_CONFIG else {}
+except UserError as error:
+    sys.exit(f"error: {error}")
 
 
-# The defaults, and what a user's own folder says instead.
 configfile: f"{FOLDER}/config.yaml"
 
 
-if Path("config.yaml").exists() and Path.cwd() != FOLDER:
-
-    # Snakemake loads it without a limit.
-    try:
-        OWN = read_config(Path("config.yaml"))
-    except UserError as error:
-        sys.exit(f"error: {error}")
+if HAS_OWN_CONFIG:
 
     configfile: "config.yaml"
 
 
 # Snakemake reads no file for a module that is given its configuration, and takes 12:30 for 750. So
 # our own reading replaces its own, and adds the defaults that it did not read.
-DEFAULTS = read_config(FOLDER / "config.yaml")
 OWN_READ = {key: value for key, value in OWN.items() if key in config}
 for written in (DEFAULTS, OWN_READ):
     as_written(
@@ -93,6 +92,7 @@ onstart:
                 accept_blend(name)
         begin_display()
         begin_notes()
+        announce_stop()
     except UserError as error:
         sys.exit(f"error: {error}")
 
@@ -109,7 +109,7 @@ onerror:
     # Snakemake has something to say after this, too: what failed is repeated when it has.
     atexit.register(
         print,
-        failure_report(failed_jobs(failed_entries())),
+        failure_report(failed_jobs(failed_entries())) or UNFINISHED,
         file=sys.stderr,
         flush=True,
     )

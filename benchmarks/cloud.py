@@ -210,7 +210,8 @@ def kill(build: Cloud, count: int, seconds: float, rng: random.Random) -> Counte
     """
     killed: Counter[str] = Counter()
     progress = Progress(count, "cloud", "kills")
-    process, disturbed = build.start(), False
+    process = build.start()
+    disturbed = False
     while killed.total() < count:
         progress.done(killed.total() - progress.count)
         time.sleep(rng.uniform(0.1, 1.0) * seconds)
@@ -220,7 +221,8 @@ def kill(build: Cloud, count: int, seconds: float, rng: random.Random) -> Counte
             said, _ = process.communicate()
             if not disturbed:
                 sys.exit(f"error: a build failed that nothing disturbed:\n{said}")
-            process, disturbed = build.start(), False
+            process = build.start()
+            disturbed = False
         elif rng.random() < 0.5 and (running := build.running()):
             kill_group(rng.choice(running))
             killed["a job"] += 1
@@ -231,7 +233,8 @@ def kill(build: Cloud, count: int, seconds: float, rng: random.Random) -> Counte
             process.communicate()
             killed["the run and its jobs"] += 1
             build.run("--unlock")
-            process, disturbed = build.start(), False
+            process = build.start()
+            disturbed = False
     said, _ = process.communicate()
     if process.returncode:
         print(said, file=sys.stderr)
@@ -265,7 +268,8 @@ def main() -> None:
         finally:
             server.terminate()
             server.wait()
-        made, jobs = build.made(), len(list(build.jobs.iterdir()))
+        made = build.made()
+        jobs = len(list(build.jobs.iterdir()))
     for what, times in sorted(killed.items()):
         print(f"killed {what}: {times} times")
     again = made.total() - len(made)

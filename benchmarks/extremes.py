@@ -45,7 +45,8 @@ RENDER = {"adaptive_threshold": 0, "denoise": False, "seed": 0, "clamp_indirect"
 # Half floats have 11 binary digits.
 HALF = 2.0**-11
 # Relative error of a depth at right incidence, and of one that is worth a warning.
-SHARP, COARSE = 2e-6, 10.0**-limits.DIGITS
+SHARP = 2e-6
+COARSE = 10.0**-limits.DIGITS
 
 
 @dataclass(frozen=True)
@@ -171,7 +172,8 @@ def painted(material: Any) -> Any:
 def sun(strength: float, degrees: float) -> None:
     """Shine along +Y."""
     light = bpy.data.lights.new("sun", "SUN")
-    light.energy, light.angle = strength, math.radians(degrees)
+    light.energy = strength
+    light.angle = math.radians(degrees)
     thing = bpy.data.objects.new("sun", light)
     thing.rotation_euler = (math.radians(90), 0, 0)
     bpy.context.scene.collection.objects.link(thing)
@@ -291,7 +293,8 @@ def slid(seen: Seen) -> Mapping[str, float]:
     """The part of the half frame that the shutter is open in which the square is in the way."""
     x = seen.rays[..., 0] / seen.rays[..., 1] * 10
     tall = np.abs(seen.rays[..., 2] / seen.rays[..., 1] * 10) < 1
-    begin, end = np.clip((x - 1) / 4, -0.25, 0.25), np.clip((x + 1) / 4, -0.25, 0.25)
+    begin = np.clip((x - 1) / 4, -0.25, 0.25)
+    end = np.clip((x + 1) / 4, -0.25, 0.25)
     covered = np.where(tall, (end - begin) / 0.5, 0)
     truth = (0.25 + 0.75 * covered)[..., None]
     # Pixels whose centre is on the square's edge are either.
@@ -339,7 +342,8 @@ def lights() -> Iterator[Case]:
 
     def in_sun(seen: Seen) -> Mapping[str, float]:
         away = np.abs(seen.rays / seen.rays[..., 1:2])[..., [0, 2]].max(axis=-1) * 5
-        inside, outside = away < 0.6, away > 1.4
+        inside = away < 0.6
+        outside = away > 1.4
         return {
             "colour": max(largest(seen.colour[inside], 5e-3), largest(seen.colour[outside], 5e4)),
             "depth": max(largest(seen.depth[inside], 5), largest(seen.depth[outside], 10)),
@@ -349,13 +353,15 @@ def lights() -> Iterator[Case]:
     yield Case("a sun 1e7 times the shade", sunny, in_sun, bound, camera=AHEAD)
     for strength in (6.5e4, 1e6, 1e-6):
         bound = {"colour": HALF if strength > 6e-5 else 2.0**-25 / strength, "depth": SHARP}
-        build, truth = partial(screen, 10, strength), of_wall(10, strength)
+        build = partial(screen, 10, strength)
+        truth = of_wall(10, strength)
         yield Case(f"light of {strength:g}", build, truth, bound, camera=AHEAD)
 
 
 def surfaces() -> Iterator[Case]:
     for distance in (0.002, 1e-4, 5e-5):
-        build, truth = partial(screen, distance, size=1), of_wall(distance, 1)
+        build = partial(screen, distance, size=1)
+        truth = of_wall(distance, 1)
         bound = {"colour": HALF, "depth": 2 * SHARP}
         yield Case(f"a surface {distance:g} m ahead", build, truth, bound, camera=AHEAD)
 
@@ -425,7 +431,8 @@ def fogs() -> Iterator[Case]:
             bpy.ops.mesh.primitive_cube_add(size=1, location=(0, 5, 0), scale=(100, 1, 100))
             painted(fog("ShaderNodeVolumeAbsorption", density, 0))
 
-        name, truth = f"fog of optical depth {density:g}", of_wall(10, 1, density, 1)
+        name = f"fog of optical depth {density:g}"
+        truth = of_wall(10, 1, density, 1)
         # In halves light of 6e-6 has steps of 1 %.
         bound = {"colour": 2 * HALF if density < 10 else 0.01, "depth": SHARP}
         yield Case(name, build, truth, bound, "Beer–Lambert", camera=ahead, **sharp)
@@ -437,7 +444,8 @@ def fogs() -> Iterator[Case]:
 
     for density, most in ((0.01, 32), (5.0, 256)):
         name = f"fog that scatters all light, optical depth {2 * density:g}"
-        build, bound = partial(scattering, density, most), {"colour": 0.02}
+        build = partial(scattering, density, most)
+        bound = {"colour": 0.02}
         yield Case(name, build, mean_light(1), bound, "furnace", camera=ahead, samples=64)
 
     def around() -> None:
@@ -452,7 +460,8 @@ def fogs() -> Iterator[Case]:
         tree.links.new(absorbing.outputs[0], tree.nodes["World Output"].inputs["Volume"])
         bpy.context.scene.world = fogged
 
-    truth, bound = of_box(2, 1, density=0.5), {"colour": 4 * HALF, "depth": SHARP}
+    truth = of_box(2, 1, density=0.5)
+    bound = {"colour": 4 * HALF, "depth": SHARP}
     both = {"basis": "Beer–Lambert", "place": (0.1, -0.2, 0.3), **sharp}
     yield Case("poles of a panorama, in fog", around, truth, bound, camera=PANORAMA, **both)
     yield Case("rim of a 360° lens, in fog", around, truth, bound, camera=AROUND, **both)
@@ -482,7 +491,8 @@ def paths() -> Iterator[Case]:
             box(half, surface("ShaderNodeBsdfGlass", IOR=index, Roughness=0.0), (0, 5, 0))
 
     ahead = {**AHEAD, "fov": 15}
-    name, bound = "glass in water in glass", {"colour": 0.01}
+    name = "glass in water in glass"
+    bound = {"colour": 0.01}
     yield Case(name, dielectrics, mean_light(1), bound, "furnace", camera=ahead, samples=64)
     # Blender's Filter Glossy, 1 in a new file, takes smooth glass for rough after a diffuse bounce.
     for degrees, blur, clamp in ((0, 0, 0), (10, 0, 0), (10, 1, 0), (10, 0, 1)):

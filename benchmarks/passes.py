@@ -32,7 +32,7 @@ from lightfield.dataset import keys
 from lightfield.dataset.journal import read
 from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.dataset.passes import MANIFEST, PARTS_OF_LIGHT, PASSES
-from lightfield.export.source import Source, Surface
+from lightfield.export.source import SourceDataset, Surface
 from lightfield.geometry import lenses
 from lightfield.geometry.flow import flow
 from lightfield.imaging import images
@@ -130,8 +130,9 @@ def _figures(content: LightField, folder: Path) -> dict[str, Any]:
     view, beside = content.views[:2]
     read = {name: _read(folder, name, view.name) for name in PASSES}
     found = {name: pixels for name, (pixels, _) in read.items()}
-    source = Source(folder, "", ".exr")
-    distance, there = source.depth(view, "distance"), source.depth(beside, "distance")
+    source = SourceDataset(folder, "", ".exr")
+    distance = source.depth(view, "distance")
+    there = source.depth(beside, "distance")
     colour = images.read_image(source.path(view)).colour.astype(np.float64)
     total = np.sum([found[name].astype(np.float64) for name in PARTS_OF_LIGHT], axis=0)
     rays = content.lens.pixel_rays()
@@ -152,7 +153,8 @@ def _figures(content: LightField, folder: Path) -> dict[str, Any]:
     _, planes = Surface(content.lens, view, rays, distance).points(1)
     hit = np.isfinite(distance) & (distance > 0)
     led, visible = flow(content.lens, view.matrix, beside.matrix, distance, there)
-    albedo, other = found["albedo"], _read(folder, "albedo", beside.name)[0]
+    albedo = found["albedo"]
+    other = _read(folder, "albedo", beside.name)[0]
     paint = _paint(content)
     painted = ((paint > 0.01) & (paint < UNPAINTED / 2 / content.render["samples"])).all(axis=-1)
     row, column = np.nonzero(visible & hit)
@@ -224,10 +226,12 @@ def _angles(one: Array, other: Array) -> list[float]:
 
 def _cast(content: LightField) -> tuple[Array, Array, Array]:
     """Return name (h, w), normal (h, w, 3) and distance (h, w) of the faces in the first view."""
-    view, scene = content.views[0], bpy.context.scene
+    view = content.views[0]
+    scene = bpy.context.scene
     rays = content.lens.pixel_rays() @ view.matrix[:3, :3].T
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    names, normals = np.full(rays.shape[:2], "", dtype=object), np.zeros(rays.shape)
+    names = np.full(rays.shape[:2], "", dtype=object)
+    normals = np.zeros(rays.shape)
     away = np.full(rays.shape[:2], np.inf)
     for pixel in zip(*np.nonzero(np.isfinite(rays[..., 0])), strict=True):
         hit, place, normal, _, thing, _ = scene.ray_cast(

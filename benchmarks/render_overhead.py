@@ -63,7 +63,8 @@ def measure(folder: Path, blend: Path, count: int, samples: int) -> list[dict[st
     rig = {"type": "plane", "cameras": [count + 1, 1], "center": [0, 0, 1.5], "size": 1}
     render = {"samples": samples, "adaptive_threshold": 0, "denoise": False, "seed": 0}
     render |= {"depth_precision": "float"}
-    lightfield, journal = folder / f"{samples}.json", folder / f"{samples}.jsonl"
+    lightfield = folder / f"{samples}.json"
+    journal = folder / f"{samples}.jsonl"
     LightField.from_rig(rig, lens, depth="z", frame=1, render=render).write(lightfield)
     run(
         "render_shard.py",

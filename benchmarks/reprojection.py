@@ -191,7 +191,8 @@ def measure_errors(arguments: argparse.Namespace, folder: Path) -> list[Result]:
         truth = scene.means(lens, max(3, math.ceil(1.2 * spans) + 4))
         io = best_cpu(partial(read_and_write, half, folder / "out.exr", lens), arguments)
         for method, samples, resample in methods(source, lens, pixels):
-            error, cpu = resample() - truth, best_cpu(resample, arguments)
+            error = resample() - truth
+            cpu = best_cpu(resample, arguments)
             results.append(row(name, lens, method, samples, error, cpu, cpu + io))
         if arguments.peer:
             results += peer_rows(arguments, folder, name, lens, truth)
@@ -304,7 +305,8 @@ def pareto_front(results: Sequence[Result]) -> list[Result]:
     front = []
     for name in dict.fromkeys(result.scenario for result in results):
         rows = [result for result in results if result.scenario == name]
-        costs, errors = [row.view_cpu_s for row in rows], [row.rms_error for row in rows]
+        costs = [row.view_cpu_s for row in rows]
+        errors = [row.rms_error for row in rows]
         front += [rows[index] for index in pareto(costs, errors, SAME_TIME)]
     return front
 
@@ -322,7 +324,8 @@ def draw(stem: Path, results: Sequence[Result], front: Sequence[Result]) -> None
 def draw_scenario(panel: Any, rows: Sequence[Result], front: Sequence[Result]) -> None:
     """Draw the results of one scenario, and the front that they have."""
     best = [r for r in front if r in rows]
-    times, errors = [r.view_cpu_s for r in best], [r.rms_error for r in best]
+    times = [r.view_cpu_s for r in best]
+    errors = [r.rms_error for r in best]
     panel.plot(times, errors, color="black", linewidth=1, linestyle=":", label="Pareto front")
     for method, (color, marker) in STYLES.items():
         points = [r for r in rows if r.method == method]
@@ -364,7 +367,8 @@ def draw_scenario(panel: Any, rows: Sequence[Result], front: Sequence[Result]) -
 
 def measure_batches(arguments: argparse.Namespace, folder: Path) -> list[dict[str, Any]]:
     """Return rows of job, program, views, and CPU seconds a view."""
-    size, count = arguments.batch_size, arguments.batch
+    size = arguments.batch_size
+    count = arguments.batch
     write_batch(folder, size, count)
     jobs = {
         "EXR with depth, same size": [*CAMERA, "--exr"],

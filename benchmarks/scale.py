@@ -23,10 +23,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
-from lightfield.core.files import sha256, write_json, write_text
+from lightfield.core.files import read_json, sha256, write_json, write_text
 from lightfield.dataset import config, keys, ledger
-from lightfield.dataset.dataset import Dataset, load_datasets
+from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import load_datasets
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
 from lightfield.imaging import images
 from lightfield.measurement.costs import job_times
@@ -40,8 +41,22 @@ rigs:
     cameras: [{columns}, {rows}]
     size: [2, 1, 1]
     center: [0, 0, 1.5]
-    camera: {{lens: rectilinear, fov: 60, resolution: [{side}, {side}]}}
+    camera: {{lens: CAMERA}}
 """
+PLANNED_SCENE = SCENE.replace("CAMERA", "rectilinear, fov: 60, resolution: [16, 16]")
+# Of a whole build: fisheye views, which are reprojected and exported as those of the other scenes.
+BUILT_SCENE = (
+    SCENE.replace("CAMERA", "equidistant, fov: 180, resolution: [8, 8]")
+    + """
+reprojections:
+  perspective:
+    camera: {{lens: rectilinear, fov: 90, resolution: [8, 8]}}
+    format: png
+exports:
+  instant_ngp:
+    sources: [perspective]
+"""
+)
 # Of a dataset that is built: its shards.
 BUILT_SHARDS = 20
 
@@ -98,25 +113,31 @@ def a_shard(views: int) -> None:
 
 def a_build(views: int) -> None:
     """Measure a build from the scene to the page, and a run that finds it finished."""
-    count = write_settings(views, max(1, views // BUILT_SHARDS), side=8)
+    count = write_settings(views, max(1, views // BUILT_SHARDS), BUILT_SCENE)
     (dataset,) = chosen()
     seconds = row(f"build of {count} views of 8² in {len(dataset.shards)} shards")
-    page = Path(dataset.page)
-    wall, cpu, memory = job_times(Path(f"work/benchmarks/{dataset.name}/report/page.tsv"))
-    print(f"| its page | {wall:.1f} | {cpu:.1f} | {memory / 1e6:.0f} |", flush=True)
     row("run with nothing to do")
     row("plan with nothing to do", "--dry-run")
+    print("| its stage | s | CPU-s | MB |\n| --- | ---: | ---: | ---: |")
+    for stage in read_json(Path(dataset.folder, "report", "costs.json"))["stages"]:
+        print(
+            f"| {stage['stage']}, {stage['jobs']} jobs | {stage['wall_seconds']:.1f} "
+            f"| {stage['cpu_seconds']:.1f} | {stage['peak_memory_bytes'] / 1e6:.0f} |"
+        )
+    wall, cpu, memory = job_times(Path(f"work/benchmarks/{dataset.name}/report/page.tsv"))
+    print(f"| page | {wall:.1f} | {cpu:.1f} | {memory / 1e6:.0f} |")
+    page = Path(dataset.page)
     print(f"{1000 * seconds / count:.0f} ms a view; the page has {page.stat().st_size} bytes")
 
 
-def write_settings(views: int, views_per_shard: int, side: int = 16) -> int:
+def write_settings(views: int, views_per_shard: int, scene: str = PLANNED_SCENE) -> int:
     """Write the scene and the settings of a build into the present folder; return its views.
 
     These are the ``views`` that fill a plane.
     """
     columns = round(views**0.5)
     rows = views // columns
-    write_text("configs/scenes/scale.yaml", SCENE.format(columns=columns, rows=rows, side=side))
+    write_text("configs/scenes/scale.yaml", scene.format(columns=columns, rows=rows))
     settings = {"scenes": ["scale"], "preset": "full", "views_per_shard": views_per_shard}
     write_json("config.yaml", settings | {"rigs": "all", "device": "cpu"})
     return columns * rows

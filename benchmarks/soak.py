@@ -255,7 +255,8 @@ def kill(
     ``seconds`` is what a build takes, ``expected`` what it publishes. After one that finishes
     before it is killed another begins from nothing.
     """
-    row, killed = Row("killed at a random moment"), 0
+    row = Row("killed at a random moment")
+    killed = 0
     progress = Progress(count, "soak", "kills")
     while True:
         before = build.finished()
@@ -327,11 +328,13 @@ def main() -> None:
     parser.add_argument("--faults", type=int, default=300, help="default: 300")
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
-    rng, began = random.Random(arguments.seed), time.monotonic()
+    rng = random.Random(arguments.seed)
+    began = time.monotonic()
     with tempfile.TemporaryDirectory() as name:
         undisturbed, build = (Build(Path(name, part), arguments.views) for part in ("a", "b"))
         undisturbed.finish()
-        expected, seconds = undisturbed.published(), time.monotonic() - began
+        expected = undisturbed.published()
+        seconds = time.monotonic() - began
         rows = [*limit_files(build, arguments.limits)]
         rows.append(kill(build, arguments.kills, seconds, expected, rng))
         same = build.published() == expected

@@ -93,7 +93,8 @@ def rise(lens: Any) -> mpf:
 
 def inverse(coefficients: Sequence[mpf], goal: mpf, end: mpf) -> mpf | None:
     """Return t in [0, end] at which an increasing polynomial is ``goal``."""
-    first, last = coefficients[0], value(coefficients, end)
+    first = coefficients[0]
+    last = value(coefficients, end)
     if first == goal or last == goal:
         return mpf(0) if first == goal else end
     if not first < goal < last:
@@ -189,7 +190,8 @@ def ray_and_excess(lens: Any, x: mpf, y: mpf) -> tuple[Vector | None, mpf]:
         across = cos(latitude)
         ray = (across * sin(longitude), sin(latitude), -across * cos(longitude))
         return ray, abs(latitude) / (pi / 2) - 1
-    u, v = (x - lens.center[0]) * pixel_size(lens)[0], (lens.center[1] - y) * pixel_size(lens)[1]
+    u = (x - lens.center[0]) * pixel_size(lens)[0]
+    v = (lens.center[1] - y) * pixel_size(lens)[1]
     r = hypot(u, v)
     theta = RADIAL[lens.name][0](lens, r)
     excess = r / largest_radius(lens) - 1
@@ -344,9 +346,12 @@ class Point:
     """Exact answers for one point of a lens pair; both dtypes are held against them."""
 
     def __init__(self, source: Lens, target: Lens, pixel: Vector) -> None:
-        self.source, self.target, self.pixel = source, target, pixel
+        self.source = source
+        self.target = target
+        self.pixel = pixel
         self.ray, self.excess = ray_and_excess(source, *pixel)
-        self.answer, self.answer_excess = None, mpf(1)
+        self.answer = None
+        self.answer_excess = mpf(1)
         if self.ray is None:
             return
         self.answer, self.answer_excess = pixel_and_excess(target, self.ray)
@@ -372,7 +377,8 @@ class Point:
 
         Returns the condition number, relative to the image; 0 where only rays were compared.
         """
-        source, target = self.source, self.target
+        source = self.source
+        target = self.target
         bound = ROUNDINGS * eps * self.moves
         moved = ray_moves(target, found)
         within = forward.hold(
@@ -382,7 +388,8 @@ class Point:
         if ray is not None:
             per_eps = pair_moves(target, source, found)
             size = extent(source, self.pixel)
-            before, bound = bound, ROUNDINGS * eps * (per_eps + pixel_moves(source, ray) + size)
+            before = bound
+            bound = ROUNDINGS * eps * (per_eps + pixel_moves(source, ray) + size)
             bound += per_eps / extent(target, found) * before
             if not math.isnan(returned[0]):
                 again = [mpf(float(c)) for c in returned]
@@ -411,7 +418,8 @@ def measure(lenses: dict[str, Lens]) -> Iterator[Case]:
 
 def case(name: str, pixels: Array, exact: Sequence[Point], dtype: type) -> Case:
     eps = mpf(float(np.finfo(dtype).eps))
-    source, target = exact[0].source, exact[0].target
+    source = exact[0].source
+    target = exact[0].target
     answers = target.pixels(source.rays(*pixels.T.astype(dtype)))
     back = source.pixels(target.rays(*answers.T))
     forward, round_trip = Worst(), Worst()
@@ -511,7 +519,8 @@ def places(lens: Lens) -> Array:
     image circle, the seam and the poles of a panorama), just inside the rim, and in between; for
     a lens that turns, at and beside its turning point.
     """
-    width, height = lens.width, lens.height
+    width = lens.width
+    height = lens.height
     x, y = lens.center
     points = [
         (x, y),

@@ -72,6 +72,7 @@ rule render_overhead:
 
 rule check_gpu:
     input:
+        settings=gpu_check_settings,
         check=of_first("blend_check"),
         blend=of_first("blend"),
         inventory=of_first("inventory"),
@@ -91,7 +92,7 @@ rule check_gpu:
         device=SETTINGS.device,
         cache=of_first("trials"),
         calibration=optional("calibration"),
-        full=full_sizes,
+        full=lambda wildcards: json.dumps(full_sizes(wildcards)),
         stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
     message:
         "Comparing what the GPU and the processor make of {wildcards.scene}"

@@ -18,7 +18,7 @@ from pathlib import Path
 SCRIPTS = shlex.quote(os.path.relpath(FOLDER / "scripts"))
 BENCHMARKS = shlex.quote(os.path.relpath(FOLDER / "benchmarks"))
 
-from lightfield.core import leftovers, room
+from lightfield.core import disk_space, leftovers
 from lightfield.core.failures import (
     batch_log,
     cause,
@@ -28,21 +28,14 @@ from lightfield.core.failures import (
 )
 from lightfield.core.gpus import visible
 from lightfield.core.memory import available
-from lightfield.dataset import journal, ledger, memory, shard_counts
+from lightfield.dataset import journal, ledger, memory, presence, shard_counts
 from lightfield.dataset.config import accept_blend, load_config, load_scene, scene_path
-from lightfield.dataset.dataset import (
-    MOST_SHARDS,
-    PICTURES,
-    PLOTS,
-    SOURCE_KEYS,
-    check_presence,
-    load_datasets,
-    rendered_frames,
-    scene_datasets,
-)
-from lightfield.dataset.exports import MANIFEST, VIEWS
+from lightfield.dataset.dataset_paths import PICTURES, PLOTS
+from lightfield.dataset.description import SOURCE_KEYS, Cluster
+from lightfield.dataset.exports import MANIFEST, VIEWS, InstantNgp, export_settings_of
+from lightfield.dataset.loading import load_datasets, rendered_frames, scene_datasets
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
-from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.splits_file import SPLITS
 from lightfield.dataset.view_store import VARIABLE, ViewStore
 from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import Poses
@@ -68,19 +61,17 @@ NAMING = GIVEN if "scenes" in GIVEN else OWN
 if "scenes" in NAMING and "rigs" not in {*GIVEN, *NAMING}:
     config["rigs"] = "all"
 
-# On a cluster at least one for each job that runs at once, and none waits long for the last.
-if NODES:
-    config.setdefault("most_shards", max(64, min(NODES, MOST_SHARDS)))
-    config.setdefault("shard_minutes", 20 * (CORES or 1))
+# On a cluster no job waits long for the last shard.
+CLUSTER = Cluster(jobs=NODES, cores=CORES or 1) if NODES else None
 
 try:
     SETTINGS = load_config(config)
-    CHOSEN = load_datasets(SETTINGS)
+    CHOSEN = load_datasets(SETTINGS, CLUSTER)
     if IS_MAIN_PROCESS:
         for dataset in CHOSEN:
-            check_presence(dataset)
-    WHOLE = load_datasets(SETTINGS.model_copy(update={"rigs": "all"}))
-    SMOKE = scene_datasets("smoke", settings=SETTINGS)
+            presence.check_presence(dataset)
+    WHOLE = load_datasets(SETTINGS.model_copy(update={"rigs": "all"}), CLUSTER)
+    SMOKE = scene_datasets("smoke", settings=SETTINGS, cluster=CLUSTER)
 except UserError as error:
     sys.exit(f"error: {error}")
 
@@ -140,6 +131,7 @@ CHECK_GPU = rule_name("check_gpu")
 CHECK_BLEND = rule_name("check_blend")
 INVENTORY = rule_name("inventory")
 IMPORT_VIEWS = rule_name("import_views")
+MEASURE_LEARNING = rule_name("measure_learning")
 
 
 def log_of(job):
@@ -210,9 +202,3 @@ def optional(*names, **flags):
         )
 
     return words
-
-
-def reprojection_words(wildcards):
-    """Return the words that name a dataset's reprojections."""
-    words = [f"--reprojection {name}" for name in dataset_of(wildcards).reprojections]
-    return " ".join(words)

@@ -38,21 +38,17 @@ rule costs:
             )
         ],
         blend=optional("blend"),
-        energy=SETTINGS.energy.model_dump_json(),
-        full=lambda wildcards: json.dumps(full_size(dataset_of(wildcards))),
         inventory=optional("inventory"),
-        reprojections=reprojection_words,
     message:
         "Adding up what {wildcards.scene}/{wildcards.rig} has cost"
     shell:
         f"{taking('input')}python {SCRIPTS}/costs.py"
         " --dataset {params.dataset} --journals {params.journals}"
         " --benchmarks {params.benchmarks} --scene-benchmarks {params.scene_benchmarks}"
-        " {params.blend} --energy {params.energy:q} --full {params.full:q}"
-        " {params.reprojections} {params.inventory} --output {output} > {log} 2>&1"
+        " {params.blend} --settings {input.settings} {params.inventory} --output {output} > {log} 2>&1"
 
 
-# Without input and output, so that it can be asked at any time; with --nolock while a build runs.
+# Without input and output, so that it can be asked at any time, also while a build runs.
 rule status:
     log:
         log_of("status"),

@@ -3,7 +3,7 @@ import logging
 
 from lightfield.core.progress import duration
 from lightfield.core.run_display import RunDisplay, Task
-from lightfield.dataset.dataset import START_UP_SECONDS
+from lightfield.dataset.estimate import START_UP_SECONDS
 from lightfield.measurement.forecast import Work, calibration_seconds, forecast
 
 # Of more datasets than this the page of all is named instead of each one's own.
@@ -26,10 +26,10 @@ def rendering(job):
     """Return how many views of a dataset a job renders, and for how long, in seconds of a core."""
     if job.rule.name == RENDER:
         views = int(job.wildcards.end) - int(job.wildcards.first)
-        seconds = dataset_of(job.wildcards).expected_view[0]
+        seconds = dataset_of(job.wildcards).estimate.view_seconds
         return views, START_UP_SECONDS + views * seconds
     if job.rule.name == RENDER_PANORAMA:
-        return 0, dataset_of(job.wildcards).panorama_seconds
+        return 0, dataset_of(job.wildcards).estimate.panorama_seconds
     if job.rule.name == CALIBRATE:
         dataset = first_dataset(job.wildcards.scene)
         target, most = map(dataset.render.get, ("target_error", "most_samples"))
@@ -167,7 +167,7 @@ def print_forecast():
             if job.rule.name != CALIBRATE:
                 dataset = dataset_of(job.wildcards)
                 name = f"{dataset.scene_folder}/{dataset.rig_name}"
-                size = views * dataset.expected_view_bytes
+                size = views * dataset.estimate.all_view_bytes
             work = works.get(name, Work(name, 0, 0.0))
             works[name] = Work(
                 name, work.views + views, work.seconds + seconds, work.size + size

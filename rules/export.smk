@@ -18,12 +18,13 @@ rule export_to_instant_ngp:
         times_of("{scene}/{rig}/export/{source}instant_ngp")
     localrule: True
     params:
-        words=instant_ngp_words,
+        views=folder_of_views,
     message:
         "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for instant-ngp"
     shell:
         f"{taking('input.records')}python {SCRIPTS}/export_instant_ngp.py"
-        " --input-cfg {input.lightfield} {params.words} --output {output} > {log} 2>&1"
+        " --settings {input.settings} --input-cfg {input.lightfield} --image-dir {params.views}"
+        " --output {output} > {log} 2>&1"
 
 
 rule export:
@@ -43,11 +44,10 @@ rule export:
         runtime=120,
     params:
         dataset=subpath(input.dataset, parent=True),
-        words=export_words,
         folder=subpath(output[0], parent=True),
     message:
         "Exporting {wildcards.scene}/{wildcards.rig}/{wildcards.source} for {wildcards.format}"
     shell:
         f"{taking('input.views')}python {SCRIPTS}/export.py"
-        " {wildcards.format} --dataset {params.dataset} {params.words}"
+        " {wildcards.format} --settings {input.settings} --dataset {params.dataset}"
         " --output {params.folder} > {log} 2>&1"

@@ -1,6 +1,22 @@
 # Why jobs failed, for the end of a run.
+import signal
+
 # What the executor said of a job or group that failed.
 SAID = {}
+# Where a run ends early, and no job has failed.
+UNFINISHED = "error: the run was stopped before its last job: snakemake again goes on"
+
+
+def announce_stop():
+    """Have a run say what SIGTERM does: Snakemake is quiet while it waits for its jobs."""
+    stop = signal.getsignal(signal.SIGTERM)
+
+    def stop_and_say_so(*arguments):
+        # print() may not be called again while it prints.
+        os.write(2, b"stopping after SIGTERM: the jobs that run are finished first\n")
+        stop(*arguments)
+
+    signal.signal(signal.SIGTERM, stop_and_say_so)
 
 
 def note_failures():

@@ -1,8 +1,11 @@
 # What no public interface of Snakemake gives. This is the only file that reaches inside Snakemake;
 # each piece says why.
+import functools
 import inspect
+import threading
 
 from snakemake.io import _IOFile
+from snakemake.scheduling.job_scheduler import JobScheduler
 from snakemake_interface_executor_plugins.executors.base import SubmittedJobInfo
 
 from lightfield.core import processors
@@ -76,6 +79,48 @@ def rerun(outputs):
     workflow.dag.forcefiles.update(map(stored, outputs))
 
 
+def before_jobs_are_chosen(mark):
+    """Call ``mark`` once all jobs are known, and so all settings written, and none is chosen yet.
+
+    An input function runs while those of other jobs have still to write their settings.
+    """
+    dag = workflow.dag
+    choose = dag.update_needrun
+    search = dag.bfs
+    mark_once = functools.cache(mark)
+
+    def readers_of_content(_, *jobs):
+        return search(ReadersOfContent(dag.depending), *jobs)
+
+    async def mark_and_choose(*arguments, **options):
+        mark_once()
+        dag.bfs = readers_of_content
+        try:
+            await choose(*arguments, **options)
+        finally:
+            dag.bfs = search
+
+    dag.update_needrun = mark_and_choose
+
+
+class ReadersOfContent:
+    """By job: the jobs that read what it makes, without those for which it need only be there.
+
+    Snakemake looks for no reason in what follows from a job that runs, and so overlooks those jobs:
+    they follow from it, but do not run because of it.
+    """
+
+    def __init__(self, depending):
+        self._depending = depending
+
+    def __getitem__(self, job):
+        return {
+            reader: files
+            for reader, files in self._depending[job].items()
+            if not all(map(is_ancient, files))
+        }
+
+
 def take_as_missing(is_damaged):
     """Have Snakemake take damaged files as missing: they are set aside before the first job.
 
@@ -87,6 +132,71 @@ def take_as_missing(is_damaged):
         return not is_damaged(unstored(file)) and await exists_local(file)
 
     _IOFile.exists_local = exists_and_is_sound
+
+
+def before_lock(take_folder):
+    """Call ``take_folder`` when a real run is planned, before Snakemake locks its files.
+
+    Snakemake's hooks come later: where a killed run has left locks, it ends before `onstart`.
+    """
+    build_dag = workflow._build_dag
+
+    def build_dag_and_take_folder():
+        build_dag()
+        if workflow.executor_plugin is None or not workflow.execution_settings.lock:
+            return
+        if workflow.dryrun:
+            # It would warn of another run, also of one that was killed, and locks nothing.
+            workflow.persistence.lock = workflow.persistence.noop
+        else:
+            take_folder()
+
+    workflow._build_dag = build_dag_and_take_folder
+
+
+def remove_locks():
+    """Remove all locks of the folder, as --unlock does."""
+    workflow.persistence.cleanup_locks()
+
+
+def files_are_locked():
+    """Return whether another run has locked files that this one reads or makes."""
+    return workflow.persistence.locked
+
+
+def keep_locks_of_others():
+    """Have Snakemake remove its own locks in the end: it removes those of all runs that live."""
+    persistence = workflow.persistence
+
+    def unlock():
+        for file in getattr(persistence, "_lockfile", {}).values():
+            Path(file).unlink(missing_ok=True)
+
+    if hasattr(persistence, "_lockfile"):
+        persistence.unlock = unlock
+
+
+def look_for_jobs_once_a_second():
+    """Let Snakemake's scheduler have one timer at a time for its next look at the ready jobs.
+
+    It looks when a job has finished, and a second after each look. Each of these looks starts a
+    timer of its own. After some dozen jobs Snakemake would look without a pause, and take a core
+    from the jobs until the run ends.
+    """
+    is_waiting = threading.Lock()
+
+    def look_later(scheduler, seconds):
+        def look():
+            is_waiting.release()
+            scheduler._open_jobs.release()
+
+        if is_waiting.acquire(blocking=False):
+            threading.Timer(seconds, look).start()
+
+    JobScheduler._schedule_reevalutation = look_later
+
+
+look_for_jobs_once_a_second()
 
 
 def is_ancient(file):

@@ -22,7 +22,7 @@ rule measure_learning:
     message:
         "Learning what the exports of {wildcards.scene}/{wildcards.rig} show"
     shell:
-        f"python {BENCHMARKS}/learn.py"
+        f"{CONSUMERS_PYTHON} {BENCHMARKS}/learn.py"
         " {params.folders} --output {params.stem} > {log} 2>&1"
 
 

@@ -72,13 +72,18 @@ def restore_time(path):
         os.utime(path, ns=(time, time))
 
 
+def dataset_settings(dataset, stage, content):
+    """Write a dataset's settings of a stage; return their file as an input."""
+    mark_stale_files(dataset.name)
+    return settings_file(f"{dataset.work}/settings/{stage}.json", content)
+
+
 def settings_of(stage, content):
     """Return the input function for a dataset's settings of a stage: ``content`` of the dataset."""
 
     def input_function(wildcards):
         dataset = dataset_of(wildcards)
-        mark_stale_files(dataset.name)
-        return settings_file(f"{dataset.work}/settings/{stage}.json", content(dataset))
+        return dataset_settings(dataset, stage, content(dataset))
 
     return input_function
 
@@ -101,35 +106,43 @@ take_as_missing(DAMAGED.__contains__)
 
 
 @cache
-def mark_damaged_files():
-    """Mark the files that no longer have the bytes that their jobs wrote."""
+def mark_noted_files():
+    """Mark the files of the ledger that are damaged, or were made from something else."""
     DAMAGED.update(finished_work().damage)
     for _, outputs in DAMAGED.values():
         rerun(outputs)
+    before_jobs_are_chosen(mark_outdated_files)
+
+
+def mark_outdated_files():
+    """Mark the files that were made from other files, or from other bytes of them, than now."""
+    known = finished_work()
+    rerun(known.outdated_outputs())
+    for job in all_jobs():
+        for output in map(unstored, job.output):
+            # From a storage a job's inputs need not lie here when they are noted.
+            if known.has_other_inputs(output, {*read_files(job)}, may_lack=bool(STORE)):
+                rerun([output])
 
 
 @cache
 def mark_stale_files(name):
-    """Mark the dataset's damaged or outdated files, so that Snakemake rebuilds them."""
+    """Mark damaged and outdated files, so that Snakemake rebuilds them.
+
+    Of the dataset those are among them of which nobody knows from what they were made.
+    """
     if not IS_MAIN_PROCESS:
         return
-    mark_damaged_files()
+    mark_noted_files()
     dataset = DATASETS[name]
     files = [*dataset.files, *dataset.intermediates]
-    rerun(filter(is_outdated, files))
-    rerun(dataset.outgrown_records())
-    if dataset.external_changed(ViewStore(STORE) if STORE else None):
-        rerun([dataset.inventory])
-    for path, problem in dataset.broken():
-        DAMAGED.setdefault(path, (problem, files))
-
-
-def is_outdated(path):
-    """Return whether a file was made from something else, or nobody knows from what."""
     jobs = finished_work()
-    if path in jobs:
-        return jobs.changed_input(path) is not None
-    return os.path.lexists(path)
+    rerun(file for file in files if file not in jobs and os.path.lexists(file))
+    rerun(presence.outgrown_records(dataset))
+    if presence.external_changed(dataset, ViewStore(STORE) if STORE else None):
+        rerun([dataset.inventory])
+    for path, problem in presence.broken_files(dataset):
+        DAMAGED.setdefault(path, (problem, files))
 
 
 def damage_to_mend():
@@ -188,12 +201,12 @@ def listed_files(job):
 
 
 def beside_transforms(output, content):
-    """Return the files that the export for instant-ngp wrote beside its transforms.json."""
+    """Return the files that the export for instant-ngp may have written beside transforms.json."""
     folder = output.parent
     yield from folder.glob("transforms_*.json")
     for frame in content["frames"]:
         image = folder / frame["file_path"]
-        yield from image.parent.glob(f"dynamic_mask_{image.stem}.png")
+        yield image.with_name(f"dynamic_mask_{image.stem}.png")
         if image.parent.name == "instant_ngp":
             yield image
         if "depth_path" in frame:
@@ -257,10 +270,14 @@ class JobNotes(logging.Handler):
         self.next_sending = began + 20 * (time.monotonic() - began)
 
 
+def read_files(job):
+    """Return the paths of the files that a job reads."""
+    return [unstored(file) for file in job.input if not is_ancient(file)]
+
+
 def read_stamps(job):
-    """Return the stamps of the files that a job reads, but for those whose content is not read."""
-    names = [unstored(file) for file in job.input if not is_ancient(file)]
-    return finished_work().input_stamps(names)
+    """Return the stamps of the files that a job reads."""
+    return finished_work().input_stamps(read_files(job))
 
 
 def stamps(digests):

@@ -4,22 +4,17 @@
 include: "helpers/reproject.smk"
 
 
-# What to compute, which a lens map holds; and what to write as well.
-optics_settings = reprojection_settings_of(
-    "lens_map", lambda reprojection: {"optics": reprojection.optics}
+lens_map_settings = reprojection_settings_of(
+    "lens_map", lambda settings: settings.lens_map_settings
 )
-reprojection_settings = reprojection_settings_of(
-    "reproject",
-    lambda reprojection: {
-        "optics": reprojection.optics,
-        "development": reprojection.development,
-    },
+reproject_settings = reprojection_settings_of(
+    "reproject", lambda settings: settings.as_json()
 )
 
 
 rule reprojected_lightfield:
     input:
-        settings=reprojection_settings,
+        settings=reproject_settings,
         lightfield=f"{DATASET}/lightfield.json",
     output:
         f"{REPROJECTED}/lightfield.json",
@@ -31,20 +26,18 @@ rule reprojected_lightfield:
     params:
         views=f"{DATASET}/exr",
         folder=REPROJECTED,
-        optics=of_reprojection("optics"),
-        development=of_reprojection("development"),
     message:
         "Writing the lens of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
         f"python {SCRIPTS}/reproject.py"
-        " --dry-run {params.optics} {params.development}"
+        " --dry-run --settings {input.settings}"
         " --input-cfg {input.lightfield} --output-cfg {output} --input-dir {params.views}"
         " --output-dir {params.folder} > {log} 2>&1"
 
 
 rule lens_map:
     input:
-        settings=optics_settings,
+        settings=lens_map_settings,
         lightfield=f"{DATASET}/lightfield.json",
     output:
         LENS_MAP,
@@ -54,13 +47,12 @@ rule lens_map:
         times_of("{scene}/{rig}/{reprojection}/lens_map")
     localrule: True
     params:
-        optics=of_reprojection("optics"),
         file=LENS_MAP,
     message:
         "Computing the lens map of {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
         f"python {SCRIPTS}/lens_map.py"
-        " {params.file} {params.optics} --input-cfg {input.lightfield} > {log} 2>&1"
+        " {params.file} --settings {input.settings} --input-cfg {input.lightfield} > {log} 2>&1"
 
 
 use rule lens_map as lens_maps with:
@@ -77,7 +69,7 @@ rule reproject:
         record=f"{MADE}/render/{{first}}-{{end}}.json",
         lightfield=f"{DATASET}/lightfield.json",
         lens_maps=lens_maps_of,
-        settings=reprojection_settings,
+        settings=reproject_settings,
     output:
         f"{MADE}/{{reprojection}}/{{first}}-{{end}}.json",
     log:
@@ -92,14 +84,12 @@ rule reproject:
         views=f"{DATASET}/exr",
         lens_map=LENS_MAP,
         folder=REPROJECTED,
-        optics=of_reprojection("optics"),
-        development=of_reprojection("development"),
     message:
         "Reprojecting views {wildcards.first} to {wildcards.end} of"
         " {wildcards.scene}/{wildcards.rig}/{wildcards.reprojection}"
     shell:
         f"{taking('input.record')}python {SCRIPTS}/reproject.py"
-        " {params.optics} {params.development}"
+        " --settings {input.settings}"
         " --lens-map {params.lens_map} --input-cfg {input.lightfield} --input-dir {params.views}"
         " --views {wildcards.first}:{wildcards.end} --output-dir {params.folder}"
         " --source-record {input.record} --record {output} > {log} 2>&1"

@@ -2,8 +2,8 @@
 import functools
 import resource
 
+from lightfield.core import live_runs
 from lightfield.dataset.config import expected_blend
-from lightfield.dataset.dataset import check_external_files, check_imported
 
 # Bytes of a process in which bpy can be imported; with less it crashes, or no thread starts.
 LEAST_ADDRESS_SPACE = 1.5e9
@@ -32,41 +32,56 @@ def check_memory():
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if RUNS_HERE and 0 <= limit < LEAST_ADDRESS_SPACE:
         raise UserError(
-            f"memory: a process may have {room.gigabytes(limit)} here, and Blender needs at least "
-            f"{room.gigabytes(LEAST_ADDRESS_SPACE)}: raise the limit (ulimit -v unlimited)"
+            f"memory: a process may have {disk_space.gigabytes(limit)} here, and Blender "
+            f"needs at least {disk_space.gigabytes(LEAST_ADDRESS_SPACE)}: raise the limit "
+            "(ulimit -v unlimited)"
         )
 
 
-def check_room():
-    """Compare the room on the disks with what this run writes, and warn; raises `UserError`."""
+def check_disk_space():
+    """Warn of disks that this run nearly fills. Raises `UserError` for one that is too small."""
     jobs = [job for job in needed_jobs() if job.output]
     renders = [job for job in jobs if job.rule.name == RENDER]
     datasets = {d.folder: d for d in (dataset_of(job.wildcards) for job in renders)}
-    needs = [
-        room.Need(Path(RESULTS), d.missing_bytes, d.missing_views)
-        for d in datasets.values()
-    ]
+    needs = []
+    for dataset in datasets.values():
+        views = presence.missing_views(dataset)
+        size = views * dataset.estimate.all_view_bytes
+        needs.append(disk_space.Need(Path(RESULTS), size, views))
     # A built scene, at most.
     needs += [
-        room.Need(Path(WORK), 1e8) for _ in {d.scene_name for d in datasets.values()}
+        disk_space.Need(Path(WORK), 1e8)
+        for _ in {d.scene_name for d in datasets.values()}
     ]
     for folder in (RESULTS, WORK):
         outputs = [unstored(file) for job in jobs for file in job.output]
         files = sum(Path(output).is_relative_to(folder) for output in outputs)
         if files:
-            needs.append(room.Need(Path(folder), 0, files))
+            needs.append(disk_space.Need(Path(folder), 0, files))
     if jobs:
         # A log each.
-        needs.append(room.Need(Path(WORK), 0, len(jobs)))
+        needs.append(disk_space.Need(Path(WORK), 0, len(jobs)))
     if renders and RUNS_HERE:
-        # What renders at once writes each its view as Cycles has it: in memory if there is room.
+        # Each render job writes the passes of one view to memory, or to TMPDIR if that is too small.
         pixels = max(math.prod(d.rig.camera.resolution) for d in datasets.values())
         at_once = min(len(renders), max(1, workflow.cores // renders[0].threads))
         size = at_once * pixels * memory.PASSES_PIXEL_BYTES
-        if not room.fast_folder(size):
-            needs.append(room.Need(Path(tempfile.gettempdir()), size))
-    for warning in room.check(needs):
+        if not disk_space.fast_folder(size):
+            needs.append(disk_space.Need(Path(tempfile.gettempdir()), size))
+    for warning in disk_space.check(needs):
         print(f"warning: {warning}", file=sys.stderr)
+
+
+def take_folder():
+    """Go on where a killed run has left its locks; refuse files that another run makes."""
+    others = live_runs.enter(Path(".snakemake/locks"), not RUNS_HERE, remove_locks)
+    if files_are_locked():
+        sys.exit(f"error: {live_runs.refusal(others)}")
+    keep_locks_of_others()
+
+
+if IS_MAIN_PROCESS:
+    before_lock(take_folder)
 
 
 def explain_full_disk():
@@ -80,7 +95,8 @@ def check_start():
     atexit.register(explain_full_disk)
     check_device()
     check_memory()
-    check_room()
+    check_disk_space()
+    check_consumers()
 
 
 def check_input(job):
@@ -90,14 +106,14 @@ def check_input(job):
         if blend.is_file():
             expected_blend(job.wildcards.name, blend, sha256(blend))
     elif job.rule.name == INVENTORY:
-        check_external_files(scene_of(job.wildcards))
+        presence.check_external_files(scene_of(job.wildcards))
     elif job.rule.name == IMPORT_VIEWS:
-        check_imported(dataset_of(job.wildcards))
+        presence.check_imported(dataset_of(job.wildcards))
 
 
 def announce_refusals():
     """Say in a dry run what the run would refuse."""
-    checks = [check_device, check_memory, check_room]
+    checks = [check_device, check_memory, check_disk_space, check_consumers]
     checks += [functools.partial(check_input, job) for job in needed_jobs()]
     problems = {}
     for check in checks:

@@ -1,6 +1,9 @@
 # What the pixels must satisfy, and checksums of all that is published.
 
 
+include: "helpers/validate.smk"
+
+
 # An invalid dataset is an outcome too: it gets its validation.json and its page, and fails below.
 rule validate:
     input:

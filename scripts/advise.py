@@ -1,6 +1,6 @@
-"""Say what scenes could be rendered with that is cheaper at equal error.
+"""Print which changes of a scene's settings reach the same error in less time.
 
-Reads what scripts/try_changes.py has measured, and writes a table of each scene beside it.
+Reads what scripts/try_changes.py measured, and writes a table of each scene beside its file.
 """
 
 import argparse
@@ -14,7 +14,9 @@ from lightfield.measurement import advice
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("measured", nargs="*", type=Path, help="JSON of a scene, named after it")
+    parser.add_argument(
+        "measured", nargs="*", type=Path, help="JSON of a scene, with the scene's name"
+    )
     measured = parser.parse_args().measured
     if not measured:
         raise UserError("the views of all chosen scenes are there already: nothing is rendered")

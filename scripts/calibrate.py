@@ -1,17 +1,19 @@
-"""Choose the cheapest way to render that reaches a scene's target error.
+"""Choose the cheapest method that reaches a scene's target error.
 
-Each way (plain, adaptive, denoised, both) is tried on windows of some views with ever more effort
-until it reaches the target, and its effort is then interpolated to meet the target, not to surpass
-it. The cheapest is chosen, and held-out views, the nearest others under other seeds, confirm it.
+Each method (plain, adaptive, denoised, both) renders windows of some views with ever more effort,
+until it reaches the target. Its effort is then interpolated to meet the target, not to surpass it.
+The cheapest method is chosen. Held-out views, the nearest others with another seed, confirm it.
 """
 
 import argparse
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
-from lightfield.core.files import whole, write_json
+from lightfield.core.files import absolute_path, write_json
 from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import calibration, sampling, trials
 
@@ -23,10 +25,10 @@ def main() -> None:
         "--probes",
         type=positive,
         default=sampling.PROBES,
-        help="windows of views, as many held out (default: %(default)s)",
+        help="windows of views; as many are held out (default: %(default)s)",
     )
     parser.add_argument("--output", required=True, type=Path, help="JSON of choice and evidence")
-    parser.add_argument("--seconds", type=Path, help="JSON of the seconds that each way took")
+    parser.add_argument("--seconds", type=Path, help="JSON of the seconds that each method took")
     arguments = parser.parse_args()
 
     lightfield = LightField.read(arguments.lightfield)
@@ -39,33 +41,44 @@ def main() -> None:
     write_json(arguments.output, record)
     if arguments.seconds:
         write_json(arguments.seconds, seconds)
-    reached = (f"{name} {found['error']:.2g}" for name, found in record["strata"].items())
-    target, error, found = (record[k] for k in ("target_error", "probe_error", "held_out_error"))
-    print(
-        f"note: {whole(arguments.lightfield).parent.name}: {record['way']}, {record['choice']}: "
-        f"error {error:.3g} on the probe views and "
-        f"{found:.3g} ± {record['held_out_standard_error']:.1g} on others, "
-        f"wanted {target:g}; {record['times_fewer_samples']:.1f} times cheaper than plain path "
-        "tracing at equal error; the worst thousandth of pixels left out, with which it is "
-        f"{record['probe_error_of_all_pixels']:.3g}; by the light that pixels show most of: "
-        f"{', '.join(reached)}"
+    print(summary(absolute_path(arguments.lightfield).parent.name, record))
+    wrong = problem(record, lightfield.render.get("most_samples"))
+    if wrong:
+        print(f"warning: render.target_error: {wrong}", file=sys.stderr)
+
+
+def summary(name: str, record: Mapping[str, Any]) -> str:
+    """Return the choice and its errors in one line."""
+    reached = (f"{stratum} {part['error']:.2g}" for stratum, part in record["strata"].items())
+    return (
+        f"note: {name}: {record['way']}, {record['choice']}: "
+        f"error {record['probe_error']:.3g} on the probe views and "
+        f"{record['held_out_error']:.3g} ± {record['held_out_standard_error']:.1g} on others, "
+        f"wanted {record['target_error']:g}; {record['times_fewer_samples']:.1f} times cheaper "
+        "than plain path tracing at equal error; the worst thousandth of pixels left out, with "
+        f"which it is {record['probe_error_of_all_pixels']:.3g}; by the light that pixels show "
+        f"most of: {', '.join(reached)}"
     )
-    wrong = None
+
+
+def problem(record: Mapping[str, Any], most_samples: int | None) -> str | None:
+    """Return what is wrong with the choice; None if it reaches the target and is confirmed."""
+    target = record["target_error"]
+    error = record["probe_error"]
+    held_out_error = record["held_out_error"]
     if not record["reached"] and error <= target:
-        wrong = (
+        return (
             f"{target:g} is reached, but the error of all pixels is "
             f"{record['probe_error_of_all_pixels']:.3g}: bright ones are missing"
         )
-    elif not record["reached"]:
-        most = lightfield.render.get("most_samples")
-        wrong = (
-            f"{target:g} is not reached within the preset's {most} samples; "
+    if not record["reached"]:
+        return (
+            f"{target:g} is not reached within the preset's {most_samples} samples; "
             f"the best there is has {error:.3g}"
         )
-    elif not record["confirmed"] and found > target:
-        wrong = f"is {target:g}, and views that the choice does not know have {found:.3g}"
-    if wrong:
-        print(f"warning: render.target_error: {wrong}", file=sys.stderr)
+    if not record["confirmed"] and held_out_error > target:
+        return f"is {target:g}, but held-out views have the error {held_out_error:.3g}"
+    return None
 
 
 if __name__ == "__main__":

@@ -26,13 +26,13 @@ def main() -> None:
     if source.blend is None:
         raise UserError(f"--scene {arguments.scene}: is made of no .blend")
     status = arguments.blend.stat()
-    found = sha256(arguments.blend)
-    if lock := config.expected_blend(arguments.scene, arguments.blend, found):
-        config.record_blend(arguments.blend, found, lock)
+    digest = sha256(arguments.blend)
+    if lock := config.expected_blend(arguments.scene, arguments.blend, digest):
+        config.record_blend(arguments.blend, digest, lock)
     write_json(
         arguments.output,
         {
-            "sha256": found,
+            "sha256": digest,
             "bytes": status.st_size,
             "mtime_ns": status.st_mtime_ns,
             "bpy": version("bpy"),

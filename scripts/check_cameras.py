@@ -6,9 +6,10 @@ from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys, write_json
+from lightfield.core.files import write_json
+from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.lightfield import LightField
-from lightfield.rendering import blend_file, clearance
+from lightfield.rendering import blend_file, clearance, drawings
 from lightfield.rendering.clearance import REACH, TOUCHING
 from lightfield.rendering.limits import warnings
 
@@ -29,12 +30,13 @@ def main() -> None:
     names = [view.name for view in lightfield.views]
     positions = np.array([view.position for view in lightfield.views])
     path = arguments.inventory
-    inventory = path and read_keys(path, "inventory.py", "external_files")
+    inventory = path and read_inventory(path, "external_files")
     blend_file.open_scene(arguments.blend, lightfield.content.get("scene", {}), inventory)
     bpy.context.scene.frame_set(lightfield.frame)
     clearance.show_what_is_rendered()
     distances = clearance.clearances(positions)
-    inside = clearance.enclosing_objects(positions)
+    enclosures = clearance.enclosures(positions)
+    inside = clearance.enclosing_objects(enclosures)
     views = {
         name: {
             "distance": None if np.isinf(distance) else round(float(distance), 6),
@@ -51,7 +53,12 @@ def main() -> None:
             "move the rig or make it smaller (center and size in the scene YAML)"
         )
     write_json(arguments.output, {"views": views})
-    for warning in warnings(positions, distances):
+    camera_type = lightfield.content["camera"]["type"]
+    for warning in (
+        *clearance.open_mesh_warnings(enclosures),
+        *warnings(positions, distances),
+        *drawings.warnings(camera_type),
+    ):
         print(f"warning: {warning}", file=sys.stderr)
     nearest = min(distances)
     away = f"{nearest:.3f} m" if nearest < REACH else f"more than {REACH} m"

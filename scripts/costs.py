@@ -1,18 +1,15 @@
 """Add up what a dataset has cost, and what the full one would: report/costs.json."""
 
 import argparse
-import json
 from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys, write_json
-from lightfield.core.settings import checked
-from lightfield.dataset.config import FILE, Energy
+from lightfield.core.files import write_json
+from lightfield.core.settings import read_settings
+from lightfield.dataset.config import FILE
+from lightfield.dataset.inventory import read_inventory
 from lightfield.measurement import costs
-
-# isort: split
-from pydantic import TypeAdapter
 
 
 def main() -> None:
@@ -31,41 +28,33 @@ def main() -> None:
     )
     parser.add_argument("--blend", type=Path, help="the scene, if there is one")
     parser.add_argument(
-        "--energy",
+        "--settings",
         required=True,
-        type=json.loads,
-        help="JSON: watts, price_per_kwh, currency, and cores (a number, or auto: this machine's)",
-    )
-    parser.add_argument(
-        "--full",
-        required=True,
-        type=json.loads,
-        help="JSON: views, resolution, samples and denoise; null for those of this dataset",
-    )
-    parser.add_argument(
-        "--reprojection", action="append", default=[], help="name of one; given for each"
+        type=Path,
+        metavar="JSON",
+        help="energy (watts, price_per_kwh, currency and cores), full (views and resolution of the "
+        "full dataset, and samples and denoise if they differ), and names of reprojections",
     )
     parser.add_argument("--inventory", type=Path, help="JSON of what the scene's .blend says")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
-    tariff = checked(TypeAdapter(Energy), arguments.energy, "--energy")
-    full = checked(TypeAdapter(costs.FullSize), arguments.full, "--full").model_dump()
+    settings = read_settings(costs.CostSettings, arguments.settings)
+    full = settings.full.model_dump()
     if full["samples"] == FILE:
         if arguments.inventory is None:
             raise UserError("--inventory: is missing; it has the samples of the .blend")
-        said = read_keys(arguments.inventory, "inventory.py", "blend")["blend"]
-        full["samples"] = said["samples"]
-    found = costs.costs(
+        full["samples"] = read_inventory(arguments.inventory, "blend")["blend"]["samples"]
+    content = costs.costs(
         arguments.dataset,
         arguments.blend,
         arguments.journals,
         arguments.benchmarks,
         arguments.scene_benchmarks,
-        costs.Tariff.read(tariff.model_dump()),
+        costs.Tariff.read(settings.energy.model_dump()),
         full,
-        arguments.reprojection,
+        settings.reprojections,
     )
-    write_json(arguments.output, found)
+    write_json(arguments.output, content)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,10 @@
-"""Measure the error of renders against their time: sampling plain, adaptive, guided, denoised."""
+"""Measure the error of renders against their time: plain, adaptive, guided and denoised."""
 
 import argparse
 from pathlib import Path
 
 from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import error_vs_time, trials
 
 
@@ -17,10 +16,13 @@ def main() -> None:
         "--probes",
         type=positive,
         default=1,
-        help="windows of each stratum, beside that of the first one's neighbour (default: 1)",
+        help="windows of each stratum; a neighbouring view has the first one, too (default: 1)",
     )
     parser.add_argument(
-        "--octaves", type=positive, default=8, help="of sample counts, beginning at 1 (default: 8)"
+        "--octaves",
+        type=positive,
+        default=8,
+        help="how often to double the samples, from 1 on (default: 8)",
     )
     parser.add_argument(
         "--reference", type=positive, default=2048, help="samples of a reference (default: 2048)"
@@ -29,7 +31,7 @@ def main() -> None:
         "--seeds",
         type=int,
         default=2,
-        help="renders of each way, 2 or more; more tell bias from variance better (default: 2)",
+        help="renders of each method, 2 or more; more tell bias from variance better (default: 2)",
     )
     parser.add_argument(
         "--output", required=True, type=Path, help="stem of the .csv, .json, .svg and .png to write"
@@ -38,9 +40,7 @@ def main() -> None:
     if arguments.seeds < 2:
         raise UserError(f"--seeds {arguments.seeds}: must be at least 2")
 
-    lightfield = LightField.read(arguments.lightfield)
-    lightfield = lightfield.changed(render=trials.own_settings(arguments, lightfield))
-    maker = trials.Trials.of(arguments, lightfield)
+    lightfield, maker = trials.read_arguments(arguments)
     content = error_vs_time.measure(
         maker,
         lightfield.render,

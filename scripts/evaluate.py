@@ -12,8 +12,8 @@ from pathlib import Path
 from lightfield.core.cli import run, stops, white
 from lightfield.core.leftovers import temporary_folder
 from lightfield.dataset.exports import VIEWS
-from lightfield.export.source import Source
-from lightfield.export.splits import splits
+from lightfield.export.source import SourceDataset
+from lightfield.export.trainer_splits import splits
 from lightfield.report import evaluation_page
 
 # isort: split
@@ -45,7 +45,7 @@ def main() -> None:
 
     name = "" if arguments.source == VIEWS else arguments.source
     development = {"exposure": arguments.exposure, "reinhard": arguments.reinhard}
-    source = Source(arguments.dataset, name, arguments.suffix, **development)
+    source = SourceDataset(arguments.dataset, name, arguments.suffix, **development)
     views = source.lightfield.views
     tests = [view for view in views if view.split == "test"] or splits(source.lightfield).test
     arguments.output.parent.mkdir(parents=True, exist_ok=True)

@@ -1,19 +1,19 @@
 """Export a dataset's views for a consumer: COLMAP, nerfstudio, NeRF-synthetic, and others.
 
-The options are those of the scene YAML's `exports`, as JSON; configs/schema/scene.schema.json
-describes them. An earlier export in the same folder is replaced.
+A settings file is JSON: {"options": {"sources": ["perspective"], "points": 50000}, "suffix":
+".png"}. `options` are the keys of the scene YAML's `exports`, with one source, and `suffix` is that
+of its views, .exr by default. `tested_by` maps the names of rigs, whose views test what is trained
+on these, to the folders of their datasets. An earlier export in the same folder is replaced.
 """
 
 import argparse
-import json
 from pathlib import Path
-from typing import Any
 
 from lightfield import export
-from lightfield.core.cli import run
-from lightfield.core.settings import checked
-from lightfield.dataset.exports import VIEWS, Exports, settings_of
-from lightfield.export.source import Source
+from lightfield.core.cli import refuse_beside_settings, run
+from lightfield.core.settings import checked, read_settings
+from lightfield.dataset.exports import VIEWS, Export, Exports, ExportSettings, export_settings_of
+from lightfield.export.source import SourceDataset
 
 # isort: split
 from pydantic import TypeAdapter
@@ -21,36 +21,44 @@ from pydantic import TypeAdapter
 
 def main() -> None:
     formats = [name for name in Exports.model_fields if name != "instant_ngp"]
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("format", choices=formats)
     parser.add_argument("--dataset", type=Path, required=True, help="the dataset's folder")
-    parser.add_argument("--source", default=VIEWS, help=f"a reprojection's name (default: {VIEWS})")
-    parser.add_argument(
-        "--tested-by",
-        nargs=2,
-        action="append",
-        default=[],
-        metavar=("RIG", "FOLDER"),
-        help="a rig whose views test what is trained on these, and its dataset's folder",
-    )
-    parser.add_argument("--suffix", choices=[".png", ".exr"], default=".exr", help="of the views")
-    parser.add_argument(
-        "--options", type=json.loads, default={}, help="JSON of the export's options"
-    )
+    parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
     parser.add_argument("--output", type=Path, required=True, help="folder to write")
+    add_settings_flags(parser)
     arguments = parser.parse_args()
 
-    options = checked(TypeAdapter(dict[str, Any]), arguments.options, "--options")
-    options = {"sources": [arguments.source], **options}
-    settings = checked(TypeAdapter(settings_of(arguments.format)), options, "--options")
-    name = "" if arguments.source == VIEWS else arguments.source
+    settings = settings_from(arguments)
+    options = settings.options
     development = {
-        key: getattr(settings, key) for key in ("exposure", "reinhard") if hasattr(settings, key)
+        key: getattr(options, key) for key in ("exposure", "reinhard") if hasattr(options, key)
     }
-    beside = {rig: Path(folder) for rig, folder in arguments.tested_by}
-    source = Source(arguments.dataset, name, arguments.suffix, beside, **development)
-    files = export.run(arguments.format, source, settings, arguments.output)
+    beside = {rig: Path(folder) for rig, folder in settings.tested_by.items()}
+    source = SourceDataset(
+        arguments.dataset, settings.source, settings.suffix, beside, **development
+    )
+    files = export.run(arguments.format, source, options, arguments.output)
     print(f"{arguments.output}: {len(source.lightfield.views)} views in {len(files)} files")
+
+
+def add_settings_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that stand for a settings file without other options."""
+    flags = parser.add_argument_group("Instead of --settings, with default options")
+    flags.add_argument("--source", default=VIEWS, help=f"a reprojection (default: {VIEWS})")
+    flags.add_argument("--suffix", choices=[".png", ".exr"], default=".exr", help="of the views")
+
+
+def settings_from(arguments: argparse.Namespace) -> ExportSettings[Export]:
+    """Return the settings of --settings, or those of the flags."""
+    model = export_settings_of(arguments.format)
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_settings_flags)
+        return read_settings(model, arguments.settings)
+    content = {"options": {"sources": [arguments.source]}, "suffix": arguments.suffix}
+    return checked(TypeAdapter(model), content, "flags")
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from lightfield.dataset import keys
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.passes import FLOW
 from lightfield.dataset.records import ShardRecord
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.geometry.flow import flow
 from lightfield.imaging import images
 
@@ -38,7 +38,7 @@ def main() -> None:
     arguments = parser.parse_args()
 
     lightfield = LightField.read(arguments.lightfield)
-    source = Source(lightfield.folder, "", ".exr")
+    source = SourceDataset(lightfield.folder, "", ".exr")
     chosen = lightfield.views[view_slice(arguments.views, len(lightfield.views))]
     named = {view.name: view for view in lightfield.views}
     record = ShardRecord(arguments.record, arguments.output)

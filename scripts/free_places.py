@@ -6,9 +6,10 @@ from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys, write_json
+from lightfield.core.files import write_json
 from lightfield.core.settings import checked
 from lightfield.dataset import config
+from lightfield.dataset.inventory import read_inventory
 from lightfield.geometry import rigs
 from lightfield.geometry.rigs.rig import Frame
 from lightfield.rendering import blend_file, clearance
@@ -33,7 +34,7 @@ def main() -> None:
         raise UserError(f"--rig: type: is {rig.type}; must be random")
     chosen = config.load_scene(arguments.scene).scene.model_dump() if arguments.scene else {}
     path = arguments.inventory
-    inventory = path and read_keys(path, "inventory.py", "external_files")
+    inventory = path and read_inventory(path, "external_files")
     blend_file.open_scene(arguments.blend, chosen, inventory)
     if arguments.frame != config.FILE:
         bpy.context.scene.frame_set(checked(TypeAdapter(Frame), arguments.frame, "--frame"))

@@ -1,4 +1,4 @@
-"""Check that a GPU renders what the processor does, and say how long full datasets take on it."""
+"""Check that a GPU renders what the processor renders, and estimate the full datasets' hours."""
 
 import argparse
 import json
@@ -9,7 +9,6 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
 from lightfield.core.settings import checked
-from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import gpu_check, trials
 from lightfield.measurement.costs import FullSize
 
@@ -32,32 +31,30 @@ def main() -> None:
 
     full = checked(TypeAdapter(dict[str, FullSize]), arguments.full, "--full")
     sizes = {name: size.model_dump() for name, size in full.items()}
-    # Where there is none, nothing is rendered.
+    # Without a GPU, nothing is rendered.
     with processors.only(arguments.threads):
         from lightfield.rendering import cycles
 
     device = {"auto": "gpu"}.get(arguments.device, arguments.device)
     if not cycles.gpu(device):
         raise UserError("device: is cpu; gpu_check wants auto, or the name of a GPU's kind")
-    lightfield = LightField.read(arguments.lightfield)
-    render = trials.own_settings(arguments, lightfield)
-    maker = trials.Trials.of(arguments, lightfield)
-    found = gpu_check.check(maker, device, render, sizes)
+    lightfield, maker = trials.read_arguments(arguments)
+    content = gpu_check.check(maker, device, lightfield.render, sizes)
     name = arguments.output.name
-    text = gpu_check.table(name, found)
+    text = gpu_check.table(name, content)
     print(text)
-    if not found["same"]:
+    if not content["same"]:
         raise UserError(
             f"{name}: the GPU renders another picture than the processor: colours differ by "
-            f"{found['colour']:.2f} of what noise makes, all light by {found['light']:.1f} "
-            f"standard errors, and {found['depth']:.2%} of the depths; try another driver, or "
+            f"{content['colour']:.2f} of what noise makes, all light by {content['light']:.1f} "
+            f"standard errors, and {content['depth']:.2%} of the depths; try another driver, or "
             "render with device=cpu"
         )
     write_text(arguments.output.with_suffix(".md"), text)
-    write_json(arguments.output.with_suffix(".json"), found)
+    write_json(arguments.output.with_suffix(".json"), content)
     print(
         f"note: {name}: the GPU renders the same picture; all datasets at full size take "
-        f"{sum(found['hours'].values()):.3g} hours of it"
+        f"{sum(content['hours'].values()):.3g} hours of it"
     )
 
 

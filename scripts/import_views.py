@@ -5,7 +5,7 @@ from pathlib import Path
 
 from lightfield.core.cli import run, view_slice
 from lightfield.core.errors import UserError
-from lightfield.core.files import second_name
+from lightfield.core.files import link_or_copy
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.records import ShardRecord
@@ -29,7 +29,7 @@ def main() -> None:
         if not path.is_file():
             raise UserError(f"{path}: no such file, but its lightfield.json has the view")
         taken = arguments.output / name
-        second_name(path, taken)
+        link_or_copy(path, taken)
         # An owner who makes a view anew makes another file: what changes in this one is damage.
         key = f"inode-{path.stat().st_ino}"
         if taken.samefile(path):

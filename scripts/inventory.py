@@ -6,6 +6,7 @@ What is missing or cannot be read is an error here, before anything is rendered 
 
 import argparse
 import os.path
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,18 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import blend, config
 from lightfield.dataset.config import FILE
-from lightfield.dataset.dataset import rendered_frames, scene_datasets
+from lightfield.dataset.loading import rendered_frames, scene_datasets
 from lightfield.dataset.view_store import ViewStore
 from lightfield.geometry.rigs import BlendCamera
-from lightfield.rendering import blend_facts, blend_file, external_files, pruning, scene_memory
+from lightfield.rendering import (
+    blend_facts,
+    blend_file,
+    external_files,
+    light,
+    pruning,
+    scene_memory,
+    simulations,
+)
 from lightfield.rendering.inventory import FEATURES, inventory
 
 # isort: split
@@ -38,35 +47,55 @@ def main() -> None:
     saved_frame = bpy.context.scene.frame_current
     wanted = rendered_frames(datasets) or [FILE]
     frames = sorted({saved_frame if frame == FILE else frame for frame in wanted})
-    found: dict[str, Any] = {}
+    contents: dict[str, Any] = {}
     if chosen.get("blend"):
         camera_frames = [frame for dataset in datasets for frame in dataset.camera_frames]
-        found = {"blend": blend_facts.facts(camera_frames) | {"layers": layers}}
+        contents = {"blend": blend_facts.facts(camera_frames) | {"layers": layers}}
     if written and written.render and written.render.motion_blur is not None:
         bpy.context.scene.render.use_motion_blur = written.render.motion_blur
-    found |= inventory(frames)
-    if found["missing"] and not chosen.get("allow_missing"):
-        raise UserError(refusal(arguments.blend, found["missing"]))
+    refuse_fluids(arguments.blend)
+    contents |= inventory(frames)
+    if contents["missing"] and not chosen.get("allow_missing"):
+        raise UserError(refusal(arguments.blend, contents["missing"]))
+    if not light.may_be_lit():
+        raise UserError(
+            f"{arguments.blend}: has no light, so all views would be black: no lamp shines, no "
+            "material emits, and the world is black; give it one of these, as a world with a colour"
+        )
     if store := ViewStore.configured():
-        external_files.put(arguments.blend, found["external_files"], store)
-    leave_out = pruning.left_out(found)
-    found["left_out"] = leave_out
+        external_files.put(arguments.blend, contents["external_files"], store)
+    warnings = list(simulations.warnings(frames))
+    leave_out = pruning.left_out(contents)
+    contents["left_out"] = leave_out
     # Of what is open here nothing is left, for it to be rendered in the same memory.
     blend_file.new_scene()
-    found["memory_bytes"] = scene_memory.measure(arguments.blend, found, chosen)
-    write_json(arguments.output, found)
+    contents["memory_bytes"] = scene_memory.measure(arguments.blend, contents, chosen)
+    write_json(arguments.output, contents)
+    for warning in warnings:
+        print(f"warning: {warning}", file=sys.stderr)
     if chosen.get("blend"):
         resolved = [dataset.resolved(arguments.output) for dataset in datasets]
         shown = sorted({dataset.source.frame for dataset in resolved})
         own_camera = any(isinstance(dataset.rig, BlendCamera) for dataset in datasets)
-        words = blend.taken(found, shown, datasets[0].render, own_camera)
-        print(f"note: {arguments.blend}: {' · '.join(words)}")
+        notes = blend.taken(contents, shown, datasets[0].render, own_camera)
+        print(f"note: {arguments.blend}: {' · '.join(notes)}")
     print(
-        f"{found['objects']} objects, {found['triangles']} triangles, with instances "
-        f"{found['triangles_with_instances']}; {', '.join(n for n in FEATURES if found[n])}"
+        f"{contents['objects']} objects, {contents['triangles']} triangles, with instances "
+        f"{contents['triangles_with_instances']}; {', '.join(n for n in FEATURES if contents[n])}"
     )
     for name in leave_out:
         print(f"left out: {name}: {pruning.REASONS[name]}")
+
+
+def refuse_fluids(path: Path) -> None:
+    """Raise `UserError` where the open .blend shows fluids that are not baked."""
+    if fluids := simulations.unbaked_fluids():
+        # Blender aborts when it exits with one of them open.
+        blend_file.new_scene()
+        raise UserError(
+            f"{path}: {', '.join(fluids[:8])}{' …' if len(fluids) > 8 else ''}: fluids that are "
+            "not baked cannot be simulated here; bake them in Blender and save the .blend"
+        )
 
 
 def refusal(path: Path, problems: list[dict[str, str]]) -> str:

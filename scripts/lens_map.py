@@ -1,15 +1,15 @@
 """Compute a lens map once, for reproject.py --lens-map to apply to every view of a rig.
 
-Takes the same flags for the geometry as reproject.py. With --cubemap it writes a map for each
-face, FILE's name with _f, _b, _l, _r, _u or _d before the suffix.
+Takes the same settings, or the same flags for the geometry, as reproject.py. Of a cube map it
+writes a map for each face, FILE's name with _f, _b, _l, _r, _u or _d before the suffix.
 """
 
 import argparse
 from pathlib import Path
 
 from lightfield.core import cli
-from lightfield.reprojection import lens_map
-from lightfield.reprojection.lens_arguments import add_geometry_flags, geometry
+from lightfield.reprojection import flags, lens_map
+from lightfield.reprojection.geometry import Geometry
 
 
 def main() -> None:
@@ -18,14 +18,16 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="lens map to write, .npy")
-    add_geometry_flags(parser)
+    flags.add_configuration_flags(parser)
+    flags.add_lens_map_flags(parser)
     arguments = parser.parse_args()
-    work = geometry(arguments)
+    _, source = flags.read_source(arguments)
+    geometry = Geometry.of(flags.lens_map_settings(arguments, source), source)
     path: Path = arguments.file
-    maps = [work.compute(target) for target in work.targets]
+    maps = [geometry.compute(target) for target in geometry.targets]
     lens_map.report(maps)
-    for target, made in zip(work.targets, maps, strict=True):
-        lens_map.save(path.with_name(path.stem + target.suffix + path.suffix), made)
+    for target, computed in zip(geometry.targets, maps, strict=True):
+        lens_map.save(path.with_name(path.stem + target.suffix + path.suffix), computed)
 
 
 if __name__ == "__main__":

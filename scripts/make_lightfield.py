@@ -1,4 +1,4 @@
-"""Write a dataset's lightfield.json: its lens once, one pose a view, and how it is rendered."""
+"""Write a dataset's lightfield.json: its lens, the poses of its views, and how it is rendered."""
 
 import argparse
 import json
@@ -11,8 +11,9 @@ from lightfield.core.errors import UserError
 from lightfield.core.settings import checked
 from lightfield.dataset import passes
 from lightfield.dataset.config import Preset
-from lightfield.dataset.dataset import scene_datasets
+from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.lightfield import MACHINE, LightField
+from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import rigs
 from lightfield.measurement.sampling import calibrated
 
@@ -21,11 +22,34 @@ from pydantic import TypeAdapter
 
 
 def main() -> None:
+    arguments = parse()
+    dataset = chosen_dataset(arguments)
+    render = dataset.render
+    if arguments.panorama:
+        dataset = replace(dataset, rig=panorama_rig(dataset.rig, arguments.panorama))
+        render = passes.without(render)
+    elif isinstance(dataset.rig, rigs.Random):
+        if arguments.places is None:
+            raise UserError("--places: is missing; scripts/free_places.py finds them")
+        dataset = replace(dataset, rig=dataset.rig.placed(arguments.places))
+    if arguments.calibration:
+        render = calibrated(render, arguments.calibration)
+    keys = dataset.origin(render)
+    # Imported views were rendered on another machine.
+    if not dataset.imported:
+        keys[MACHINE] = machine.describe(render["denoise"])
+    lightfield = LightField.from_rig(dataset.rig, dataset.rig.camera.make(), **keys)
+    if dataset.flow and not arguments.panorama:
+        lightfield = lightfield.with_flow()
+    lightfield.write(arguments.output)
+
+
+def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scene", required=True, help="name of a file in configs/scenes/")
     parser.add_argument(
         "--rig",
-        help="name of a rig in the scene YAML, with /f00001 behind it for one of its frames "
+        help="name of a rig in the scene YAML; for a frame of a sequence with /f00001 behind it "
         "(default: the first)",
     )
     parser.add_argument(
@@ -52,36 +76,25 @@ def main() -> None:
         "--places", type=Path, help="what scripts/free_places.py found for a random rig"
     )
     parser.add_argument("--output", required=True, type=Path, help="lightfield.json to write")
-    arguments = parser.parse_args()
+    return parser.parse_args()
 
+
+def chosen_dataset(arguments: argparse.Namespace) -> Dataset:
+    """Return the dataset of --scene and --rig, with what the inventory says of a .blend.
+
+    Raises `UserError` for a rig that the scene lacks, and for a .blend without an inventory.
+    """
     limits = checked(TypeAdapter(Preset), arguments.limits, "--limits")
     datasets = scene_datasets(arguments.scene, limits=limits)
     dataset = next((d for d in datasets if arguments.rig in (None, d.rig_folder)), None)
     if dataset is None:
-        known = ", ".join(d.rig_folder for d in datasets)
-        raise UserError(f"--rig: is {arguments.rig!r}; must be one of {known}")
+        rig_names = ", ".join(d.rig_folder for d in datasets)
+        raise UserError(f"--rig: is {arguments.rig!r}; must be one of {rig_names}")
     if arguments.inventory:
-        dataset = dataset.resolved(arguments.inventory)
-    elif dataset.source.blend:
+        return dataset.resolved(arguments.inventory)
+    if dataset.source.blend:
         raise UserError("--inventory: is missing; scripts/inventory.py says what the .blend has")
-    render = dataset.render
-    if arguments.panorama:
-        dataset = replace(dataset, rig=panorama_rig(dataset.rig, arguments.panorama))
-        render = passes.without(render)
-    elif isinstance(dataset.rig, rigs.Random):
-        if arguments.places is None:
-            raise UserError("--places: is missing; scripts/free_places.py finds them")
-        dataset = replace(dataset, rig=dataset.rig.placed(arguments.places))
-    if arguments.calibration:
-        render = calibrated(render, arguments.calibration)
-    keys = dataset.origin(render)
-    # Views that somebody else has rendered were so elsewhere.
-    if not dataset.imported:
-        keys[MACHINE] = machine.describe(render["denoise"])
-    made = LightField.from_rig(dataset.rig, dataset.rig.camera.make(), **keys)
-    if dataset.flow and not arguments.panorama:
-        made = made.with_flow()
-    made.write(arguments.output)
+    return dataset
 
 
 def panorama_rig(rig: rigs.Rig, width: int) -> rigs.Rig:

@@ -1,7 +1,7 @@
-"""Tell what the chosen datasets will take on this machine: views, hours and gigabytes.
+"""Tabulate what the chosen datasets will take on this machine: views, hours and gigabytes.
 
-Reads what scripts/probe.py has measured. Hours are those of one processor core, or of the graphics
-card where that renders; gigabytes are those of the rendered views.
+Reads what scripts/probe.py measured. Hours are those of one processor core, or of the graphics card
+if it renders. Gigabytes are those of the rendered views.
 """
 
 import argparse
@@ -21,7 +21,7 @@ def main() -> None:
         nargs=3,
         default=[],
         metavar=("NAME", "FRAMES", "PROBE"),
-        help="scene/rig, how many frames it has, and its probe's JSON",
+        help="scene/rig, the number of its frames, and its probe's JSON",
     )
     parser.add_argument(
         "--advice",
@@ -29,7 +29,7 @@ def main() -> None:
         nargs=2,
         default=[],
         metavar=("NAME", "JSON"),
-        help="scene/rig, and what scripts/try_changes.py has measured in its scene",
+        help="scene/rig, and the JSON that scripts/try_changes.py wrote for its scene",
     )
     parser.add_argument("--output", required=True, type=Path, help="Markdown to write")
     arguments = parser.parse_args()
@@ -37,7 +37,7 @@ def main() -> None:
         raise UserError("the views of all chosen datasets are there already: nothing is rendered")
     text = plan.table(
         [
-            (name, counted("--dataset", frames), read_keys(probe, "probe.py", *plan.PROBED))
+            (name, counted("--dataset", frames), plan.read_probe(probe))
             for name, frames, probe in arguments.dataset
         ],
         {

@@ -1,4 +1,4 @@
-"""Measure what a dataset's views will cost: a few of them, small, with all their samples."""
+"""Measure the time and size of a dataset's views on a few small ones with all their samples."""
 
 import argparse
 from pathlib import Path
@@ -16,7 +16,7 @@ def main() -> None:
     parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
     parser.add_argument("--views", type=positive, default=3, help="views to render (default: 3)")
     parser.add_argument(
-        "--size", type=positive, default=48, help="of their longer side (default: 48)"
+        "--size", type=positive, default=48, help="pixels of their longer side (default: 48)"
     )
     parser.add_argument("--device", default="auto", help="what Cycles renders on (default: auto)")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")

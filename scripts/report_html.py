@@ -9,7 +9,8 @@ import json
 from pathlib import Path
 
 from lightfield.core.cli import run
-from lightfield.core.files import read_keys, read_text
+from lightfield.core.files import read_text
+from lightfield.dataset.inventory import read_inventory
 from lightfield.geometry import rigs
 from lightfield.report import dataset_page
 
@@ -42,7 +43,7 @@ def main() -> None:
         command=arguments.command,
         has_panorama=bool(arguments.panorama),
         measurements=arguments.measurements,
-        inventory=read_keys(arguments.inventory, "inventory.py", "blend", "missing")
+        inventory=read_inventory(arguments.inventory, "blend", "missing")
         if arguments.inventory
         else None,
     )

@@ -1,9 +1,10 @@
-"""Reproject views from one lens to another, with the flags of SILVR's reprojection tool.
+"""Reproject views from one lens to another, by a settings file or by SILVR's flags.
 
-Lengths are in mm and the angles of lenses in radians, or in degrees as in 120deg; --rotation is in
-degrees. Without a flag for the target lens it is that of the source (--no-reproject). Pixels
-without a source are black, with alpha 0 in a PNG and depth NaN in an EXR. Of a cube map's faces
-those are written of which the source sees anything.
+A settings file is JSON with the keys of a scene YAML's reprojection, but `formats`, a list, in
+place of `format`. With flags, lengths are in mm and the angles of lenses in radians, or in degrees
+as in 120deg; --rotation is in degrees. Without a target lens it is that of the source (the flag
+--no-reproject). Pixels without a source are black, with alpha 0 in a PNG and depth NaN in an EXR.
+Of a cube map, only the faces of which the source sees anything are written.
 
 Examples, of the views in garden/exr with garden/lightfield.json beside:
 
@@ -13,6 +14,9 @@ Examples, of the views in garden/exr with garden/lightfield.json beside:
   # the middle 120 degrees of the fisheye, turned 30 degrees to the left, with depth
   reproject.py -i garden/exr --input-cfg garden/lightfield.json -o left --equidistant 120deg \\
     --rotation 30,0,0 --exr --output-cfg left/lightfield.json
+  # what the file says, as {"camera": {"lens": "rectilinear", "fov": 90, "resolution": [512, 512]},
+  # "formats": ["png"], "reinhard": 5}
+  reproject.py -i garden/exr --input-cfg garden/lightfield.json -o flat --settings flat.json
   # one photograph of a fisheye of 180 degrees, as the faces of a cube
   reproject.py --single photo.jpg --no-configs 2000,2000 --i-equidistant 180deg -o faces \\
     --cubemap 512 --png
@@ -21,7 +25,7 @@ Examples, of the views in garden/exr with garden/lightfield.json beside:
 import argparse
 
 from lightfield.core import cli
-from lightfield.reprojection import job, pipeline
+from lightfield.reprojection import flags, job, pipeline
 
 
 def main() -> None:
@@ -30,7 +34,12 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     job.add_flags(parser)
-    pipeline.run(job.Job(parser.parse_args()))
+    flags.add_configuration_flags(parser)
+    flags.add_reproject_flags(parser)
+    arguments = parser.parse_args()
+    lightfield, source = flags.read_source(arguments)
+    settings = flags.reproject_settings(arguments, source)
+    pipeline.run(job.Job(arguments, settings, lightfield, source))
 
 
 if __name__ == "__main__":

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import whole, write_json
+from lightfield.core.files import absolute_path, write_json
 from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.splits import listed
+from lightfield.dataset.splits_file import splits_content
 
 
 def main() -> None:
@@ -16,12 +16,15 @@ def main() -> None:
     parser.add_argument("--output", type=Path, required=True, help="splits.json to write")
     arguments = parser.parse_args()
 
-    scene = whole(arguments.output).parent
-    found = {whole(path).parent: LightField.read(path) for path in arguments.lightfields}
-    for folder, lightfield in found.items():
+    scene = absolute_path(arguments.output).parent
+    lightfields: dict[str, LightField] = {}
+    for path in arguments.lightfields:
+        lightfield = LightField.read(path)
+        folder = absolute_path(path).parent
         if not folder.is_relative_to(scene):
             raise UserError(f"{lightfield.path}: must be in {scene}, where --output is")
-    content = listed({folder.relative_to(scene).as_posix(): lf for folder, lf in found.items()})
+        lightfields[folder.relative_to(scene).as_posix()] = lightfield
+    content = splits_content(lightfields)
     write_json(arguments.output, content)
     print(", ".join(f"{len(views)} views for {part}" for part, views in content.items()))
 

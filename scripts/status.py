@@ -29,7 +29,8 @@ def main() -> None:
     renderings = []
     total = 0
     for name, text, reprojections in arguments.dataset:
-        folder, views = arguments.results / name, counted("--dataset", text)
+        folder = arguments.results / name
+        views = counted("--dataset", text)
         renderings.append(status.look(folder, arguments.work / name, views, now))
         others = list(filter(None, reprojections.split(",")))
         print("\n".join(status.lines(name, folder, views, others, renderings[-1])))

@@ -12,8 +12,8 @@ from pathlib import Path
 from lightfield.core.cli import positive, run
 from lightfield.core.files import write_csv
 from lightfield.core.progress import Progress
-from lightfield.export.source import Source
-from lightfield.export.splits import splits
+from lightfield.export.source import SourceDataset
+from lightfield.export.trainer_splits import splits
 from lightfield.imaging import images, pictures
 from lightfield.measurement import summaries, synthesis_quality
 
@@ -30,9 +30,12 @@ def main() -> None:
     add("--output", type=Path, required=True, metavar="STEM")
     arguments = parser.parse_args()
 
-    source = Source(arguments.dataset, "", ".exr")
-    truths = [Source(folder, "", ".exr") for folder in arguments.truth or [arguments.dataset]]
-    views, held_out = source.lightfield.views, [truth.lightfield.views for truth in truths]
+    source = SourceDataset(arguments.dataset, "", ".exr")
+    truths = [
+        SourceDataset(folder, "", ".exr") for folder in arguments.truth or [arguments.dataset]
+    ]
+    views = source.lightfield.views
+    held_out = [truth.lightfield.views for truth in truths]
     if not arguments.truth:
         views, _, tests = splits(source.lightfield)
         held_out = [tests]

@@ -23,8 +23,8 @@ from lightfield.core.files import keep_apart
 from lightfield.core.progress import Progress
 from lightfield.dataset.config import read_yaml
 from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.export.source import Source
-from lightfield.export.splits import splits
+from lightfield.export.source import SourceDataset
+from lightfield.export.trainer_splits import splits
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images, pictures
 from lightfield.imaging.video import video
@@ -56,15 +56,20 @@ def main() -> None:
     arguments = parser.parse_args()
 
     keep_apart("--output", arguments.output / NAME, arguments.dataset / NAME, arguments.poses)
-    source = Source(arguments.dataset, arguments.reprojection, ".exr")
-    views, targets = source.lightfield.views, poses(arguments.poses)
+    source = SourceDataset(arguments.dataset, arguments.reprojection, ".exr")
+    views = source.lightfield.views
+    targets = poses(arguments.poses)
     if targets is None:
         parts = splits(source.lightfield)
-        views, targets = parts.train, source.lightfield.changed(views=parts.test)
+        views = parts.train
+        targets = source.lightfield.changed(views=parts.test)
     sources = Sources(source.lens, views, reader(source), most=4 * arguments.best)
-    lens, depth = targets.lens, targets.lens.usual_depth
+    lens = targets.lens
+    depth = targets.lens.usual_depth
     targets.changed(depth=depth).write(arguments.output / NAME)
-    rays, exposure, holes = lens.pixel_rays(), arguments.exposure, []
+    rays = lens.pixel_rays()
+    exposure = arguments.exposure
+    holes = []
     path = arguments.output / "walk.mp4"
     progress = Progress(len(targets.views), "synthesize", "views")
     size = (lens.width, lens.height)

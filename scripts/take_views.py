@@ -13,7 +13,7 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.progress import Progress
-from lightfield.dataset import records
+from lightfield.dataset import shard_files
 from lightfield.dataset.view_store import VARIABLE, ViewStore
 
 
@@ -66,7 +66,7 @@ def _listed(store: ViewStore, path: Path, results: Path, work: Path) -> Iterable
         if not path.resolve().is_relative_to(work.resolve()):
             raise UserError(f"{path}: must be in {work}")
         stage = path.resolve().parent.relative_to(work.resolve())
-        files = records.read(path).items()
+        files = shard_files.read_record(path).items()
         return [(results / stage.parent / name, digest) for name, (_, digest) in files]
     return [(path.parent / name, digest) for name, digest in store.listed(sha256(path))]
 

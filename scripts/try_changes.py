@@ -1,11 +1,10 @@
-"""Try on a scene's probes what could be cheaper at equal error; scripts/advise.py says what was."""
+"""Try changes of a scene's settings on probe windows, for scripts/advise.py to report."""
 
 import argparse
 from pathlib import Path
 
 from lightfield.core.cli import positive, run
 from lightfield.core.files import write_json
-from lightfield.dataset.lightfield import LightField
 from lightfield.measurement import advice, threads, trials
 
 
@@ -26,21 +25,22 @@ def main() -> None:
         "--cores",
         type=positive,
         default=1,
-        help="for threads a process to be tried on (default: 1)",
+        help="cores on which to try numbers of threads a process (default: 1)",
     )
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 
-    lightfield = LightField.read(arguments.lightfield)
-    lightfield = lightfield.changed(render=trials.own_settings(arguments, lightfield))
-    maker = trials.Trials.of(arguments, lightfield)
+    lightfield, maker = trials.read_arguments(arguments)
     name = arguments.output.stem
-    # First, because a process that has started Blender can start no others that do.
-    scene = (arguments.blend, arguments.inventory)
-    by_threads = threads.tried(lightfield, *scene, arguments.device, arguments.cores, name)
-    probes = advice.Probes(maker, arguments.size, arguments.probes, arguments.reference, name)
-    found = advice.tried(maker, lightfield.render, maker.inventory, probes)
-    write_json(arguments.output, {**found, "threads": by_threads})
+    # Threads come first, because a process that has started Blender cannot start others that do.
+    by_threads = threads.measure(
+        lightfield, arguments.blend, arguments.inventory, arguments.device, arguments.cores, name
+    )
+    experiment = advice.probe_experiment(
+        maker, arguments.size, arguments.probes, arguments.reference, name
+    )
+    content = advice.measure(experiment, lightfield.render, maker.inventory, name)
+    write_json(arguments.output, {**content, "threads": by_threads})
 
 
 if __name__ == "__main__":

@@ -14,13 +14,14 @@ import sys
 from os.path import normpath
 from pathlib import Path
 
+from lightfield.core import leftovers
 from lightfield.core.cli import positive, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import ledger
 from lightfield.dataset.lightfield import NAME
 from lightfield.export import MANIFESTS
-from lightfield.validation.files import remove_leftovers, remove_strays, write_sums
+from lightfield.validation.files import REPORT, SUMS, remove_strays, write_sums
 from lightfield.validation.validate import validate
 
 
@@ -49,10 +50,12 @@ def main() -> None:
         raise UserError(f"{arguments.dataset}: no such folder")
 
     if arguments.output:
-        remove_leftovers(arguments.dataset)
+        (arguments.dataset / SUMS).unlink(missing_ok=True)
+        # The report is made meanwhile.
+        leftovers.remove_unfinished(arguments.dataset, age=0, kept=REPORT)
     elif not arguments.reprojection:
-        found = sorted(arguments.dataset.glob(f"*/{NAME}"))
-        arguments.reprojection = [path.parent.name for path in found]
+        lightfields = sorted(arguments.dataset.glob(f"*/{NAME}"))
+        arguments.reprojection = [path.parent.name for path in lightfields]
     wanted = arguments.exports and [path.resolve() for path in arguments.exports]
     if arguments.removed:
         count = remove_strays(

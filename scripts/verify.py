@@ -25,23 +25,23 @@ def main() -> None:
     if arguments.mend and not arguments.work:
         raise UserError("--mend: needs --work: only where a dataset is built can it be mended")
 
-    found: dict[Path, str] = {}
+    problems: dict[Path, str] = {}
     for folder in arguments.dataset:
         if not folder.is_dir():
             raise UserError(f"{folder}: no such folder")
         integrity = Integrity(folder, arguments.work)
         # A scene's files are those of all its datasets, and are named once.
-        faults = [fault for fault in integrity.faults() if fault.path not in found]
-        found |= {fault.path: fault.problem for fault in faults}
+        faults = [fault for fault in integrity.faults() if fault.path not in problems]
+        problems |= {fault.path: fault.problem for fault in faults}
         for fault in faults:
             print(fault, flush=True)
         if arguments.mend:
             for fault in faults:
                 integrity.mend(fault)
     names = ", ".join(map(str, arguments.dataset))
-    if found:
+    if problems:
         mended = "; the next run makes them again" if arguments.mend else ""
-        raise UserError(f"{len(found)} faults in {names}{mended}")
+        raise UserError(f"{len(problems)} faults in {names}{mended}")
     print(f"no fault in {names}")
 
 

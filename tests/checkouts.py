@@ -2,6 +2,7 @@
 
 import filecmp
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -32,6 +33,14 @@ def checkout(folder, **scenes):
     return folder
 
 
+def with_consumers(folder):
+    """Put an environment of the consumers into a checkout whose programs are stand-ins."""
+    environment = folder / ".venv-consumers"
+    (environment / "bin").mkdir(parents=True)
+    (environment / "bin/python").symlink_to(sys.executable)
+    (environment / "complete").touch()
+
+
 def _words(arguments):
     return [Path(sys.executable).with_name("snakemake"), "--cores", "1", *arguments]
 
@@ -48,12 +57,15 @@ def start_snakemake(folder, *arguments, **options):
 
 def snakemake(folder, *arguments):
     """Run Snakemake in a checkout; return its CompletedProcess."""
+    # The logger plugin of tests/ comes after what a test itself has set.
+    folders = [os.environ.get("PYTHONPATH"), str(Path(__file__).parent)]
     return subprocess.run(
         _words(arguments),
         cwd=folder,
         capture_output=True,
         text=True,
         check=False,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, folders))},
     )
 
 
@@ -73,6 +85,16 @@ def planned(folder, *arguments):
     assert result.returncode == 0, result.stdout + result.stderr
     table = (result.stdout + result.stderr).split("Job stats:")[1].split("total")[0]
     return {name: int(count) for name, count in re.findall(r"^(\w+)\s+(\d+)$", table, re.M)}
+
+
+def jobs_on(stderr):
+    """Return the jobs that a plan with ``--logger jobs`` has written."""
+    jobs = [json.loads(line) for line in stderr.splitlines() if line.startswith("{")]
+    for job in jobs:
+        # Whether a page is there is all that `checksums` asks of it.
+        if job["rule"] == "checksums":
+            job["input"] = [name for name in job["input"] if not name.endswith(".html")]
+    return jobs
 
 
 def published(folder, dataset=""):

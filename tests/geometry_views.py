@@ -143,6 +143,17 @@ def moving():
     bpy.context.scene.render.use_motion_blur = True
 
 
+def unfocused():
+    """The artist's camera has a wide aperture, and focuses on what is near."""
+    known()
+    camera = bpy.data.cameras.new("wide open")
+    camera.dof.use_dof = True
+    camera.dof.aperture_fstop = 0.1
+    camera.dof.focus_distance = 0.5
+    bpy.context.scene.camera = bpy.data.objects.new("wide open", camera)
+    bpy.context.scene.collection.objects.link(bpy.context.scene.camera)
+
+
 def main(folder: Path, cases: Path) -> None:
     results = {}
     for name, (scene, content) in json.loads(cases.read_text()).items():

@@ -20,6 +20,7 @@ from scenes import room
 
 RENDER = {"samples": 4, "adaptive_threshold": 0, "denoise": False, "seed": 0}
 FRAME = 7
+RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 
 
 def add(kind, name=None, **settings):
@@ -39,6 +40,12 @@ def keyed(owner, path, values, index=-1):
 
 def shader(name, material_name="Principled BSDF"):
     return bpy.data.materials[name].node_tree.nodes[material_name]
+
+
+def meet_only(thing, *kinds):
+    """Let an object be met by these kinds of rays alone."""
+    for kind in RAYS:
+        setattr(thing, f"visible_{kind}", kind in kinds)
 
 
 def plain():
@@ -66,8 +73,12 @@ def left_behind():
     layer.layer_collection.children["excluded"].exclude = True
     unseen = add("cube", location=(0, -2, 1), size=0.5)
     unseen.name = "unseen"
-    for kind in ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow"):
-        setattr(unseen, f"visible_{kind}", False)
+    meet_only(unseen)
+    # Of these the picture shows a shadow, or a reflection, or light that they throw back.
+    for number, kind in enumerate(RAYS):
+        thing = add("cube", location=(number - 2, -1, 1), size=0.3)
+        thing.name = f"only {kind}"
+        meet_only(thing, kind)
     # These are hidden and needed all the same.
     cutter = add("cube", size=0.8, location=(2, 0.8, 0.6))
     cutter.name = "cutter"

@@ -5,16 +5,17 @@ Snakemake has nothing to do in it, and what a test spoils in it must be planned 
 
 import contextlib
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
-from checkouts import snakemake
+from checkouts import jobs_on, snakemake
 
 from lightfield.core.files import sha256, write_json, write_text
-from lightfield.dataset import ledger, records
-from lightfield.dataset.dataset import Dataset, scene_datasets
+from lightfield.dataset import ledger, shard_files
+from lightfield.dataset.dataset import Dataset
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import scene_datasets
 from lightfield.dataset.records import ShardRecord
 from lightfield.imaging import images
 
@@ -38,12 +39,13 @@ def build(folder: Path) -> list[Dataset]:
         write_text(folder / dataset.folder / "sha256sums.txt", text)
         write_text(folder / dataset.work / "checksums.txt", text)
     # The plan writes the settings of every job.
-    plan = snakemake(folder, "--dry-run", "--quiet", "all", "--", "smoke")
+    plan = snakemake(folder, "--dry-run", "--forceall", "--logger", "jobs", "--", "smoke")
     assert plan.returncode == 0, plan.stderr
+    inputs = {name: job["input"] for job in jobs_on(plan.stderr) for name in job["output"]}
     for name in ("results", "work"):
         for path in (folder / name).rglob("*"):
             os.utime(path, (WHEN, WHEN))
-    _note_jobs(folder, datasets)
+    _note_jobs(folder, datasets, inputs)
     return datasets
 
 
@@ -66,8 +68,8 @@ def note_again(folder: Path, output: Path) -> None:
         ledger.Ledger(path).note(job._replace(files=files))
 
 
-def _note_jobs(folder: Path, datasets: list[Dataset]) -> None:
-    """Write the ledger, as if every file had a job of its own."""
+def _note_jobs(folder: Path, datasets: list[Dataset], inputs: Mapping[str, Iterable[str]]) -> None:
+    """Write the ledger, as if every file had a job of its own that read its ``inputs``."""
     with contextlib.chdir(folder):
         jobs = ledger.Ledger(Path("work", ledger.NAME))
         for dataset in datasets:
@@ -77,11 +79,14 @@ def _note_jobs(folder: Path, datasets: list[Dataset]) -> None:
                 files = {name: ledger.Stamp.of(name)}
                 history = {}
                 if name in dataset.all_records:
-                    listed = [f"{dataset.folder}/{view}" for view in records.read(Path(name))]
+                    listed = [
+                        f"{dataset.folder}/{view}" for view in shard_files.read_record(Path(name))
+                    ]
                     files |= {view: ledger.Stamp.of(view) for view in listed}
                     log = f"{name.removesuffix('.json')}.sums.jsonl"
                     history[log] = ledger.Stamp.of(log)
-                jobs.note(ledger.Job([name], files, history, {}))
+                read = {path: ledger.Stamp.of(path) for path in inputs[name]}
+                jobs.note(ledger.Job([name], files, history, read))
         os.utime(Path("work", ledger.NAME), (WHEN, WHEN))
 
 
@@ -101,7 +106,7 @@ def _views(folder: Path, dataset: Dataset) -> None:
     lightfield.write(folder / dataset.folder / "lightfield.json")
     for name, reprojection in dataset.reprojections.items():
         lens = reprojection.camera.make()
-        made = lightfield.changed(lens, reprojection=reprojection.recorded)
+        made = lightfield.changed(lens, reprojection=reprojection.settings.published)
         made.write(folder / dataset.folder / name / "lightfield.json")
     for name in dataset.exported:
         kind = Path(name).parent.name if name.endswith("export.json") else "instant_ngp"

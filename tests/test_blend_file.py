@@ -13,7 +13,8 @@ from checkouts import checkout, planned, snakemake
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
 from lightfield.dataset import config, download
-from lightfield.dataset.dataset import check_presence, load_datasets, scene_datasets
+from lightfield.dataset.loading import load_datasets, scene_datasets
+from lightfield.dataset.presence import check_presence
 
 CONTENT = bytes(range(256)) * 12345
 SUM = hashlib.sha256(CONTENT).hexdigest()
@@ -117,6 +118,16 @@ def test_a_whole_part_is_not_asked_for_again(server, tmp_path):
     assert not part.exists()
 
 
+def test_a_part_that_is_longer_than_the_file_is_not_taken_for_it(server, tmp_path):
+    target = tmp_path / "scene.blend"
+    (tmp_path / "scene.blend.part").write_bytes(CONTENT + b"more")
+    tag = f'"{hashlib.md5(CONTENT).hexdigest()}"'
+    (tmp_path / "scene.blend.part.json").write_text(json.dumps({"version": tag}))
+    download.fetch(server.url, target, None, "the test")
+    assert server.asked == [f"bytes={len(CONTENT) + 4}-", None]
+    assert target.read_bytes() == CONTENT
+
+
 def test_a_server_without_ranges_sends_the_file_from_the_start(server, tmp_path):
     target = tmp_path / "scene.blend"
     server.ranges = False
@@ -131,8 +142,11 @@ def test_a_file_that_changed_meanwhile_is_fetched_anew(server, tmp_path):
     with pytest.raises(UserError):
         download.fetch(server.url, target, None, "the test")
     server.content = CONTENT[::-1]
+    server.asked.clear()
     download.fetch(server.url, target, None, "the test")
     assert target.read_bytes() == CONTENT[::-1]
+    # The server compares the versions itself, and sends the new file at once.
+    assert server.asked == ["bytes=1000000-"]
 
 
 def test_versions_are_not_mixed_by_a_kill(server, tmp_path, monkeypatch):
@@ -333,6 +347,7 @@ for name in ("library", "main"):
         with bpy.data.libraries.load(sys.argv[1] + "/library.blend", link=True) as (_, wanted):
             wanted.objects = ["thing"]
         bpy.context.collection.objects.link(wanted.objects[0])
+        bpy.ops.object.light_add(type="SUN")
     bpy.ops.wm.save_as_mainfile(filepath=f"{sys.argv[1]}/{name}.blend", compress=False)
 """
 

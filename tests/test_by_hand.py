@@ -9,7 +9,7 @@ import pytest
 from conftest import ROOT, SCRIPTS
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, whole, write_json, write_text
+from lightfield.core.files import absolute_path, read_json, write_json, write_text
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.imaging import images
@@ -47,10 +47,8 @@ def run_in_process(monkeypatch):
 
 RIG = '{"type": "plane", "cameras": [1, 1], "camera": {"lens": "equidistant", "fov": 180, '
 RIG += '"resolution": [8, 8]}, "size": 1}'
-ENERGY = '{"watts": 65, "price_per_kwh": 0.3, "currency": "EUR", "cores": 2}'
-FULL = '{"views": 6, "resolution": [64, 64], "samples": "file"}'
 COSTS = ["--dataset", ".", "--journals", ".", "--benchmarks", ".", "--scene-benchmarks", "."]
-COSTS += ["--energy", ENERGY, "--full", FULL, "--inventory"]
+FULL = {"views": 6, "resolution": [64, 64], "samples": "file"}
 VIEWS = ["--scene", "smoke", "--calibration"]
 SUMS = ["--page", "page", "--sums", "sums", "--validation"]
 
@@ -62,7 +60,6 @@ SUMS = ["--page", "page", "--sums", "sums", "--validation"]
         ("target_error: is missing; scripts/calibrate.py", "make_lightfield.py", VIEWS),
         ("valid: is missing; scripts/validate.py", "publish_checksums.py", SUMS),
         ("views: is missing; scripts/probe.py", "plan.py", ["--dataset", "scene/rig", "1"]),
-        ("blend: is missing; scripts/inventory.py", "costs.py", COSTS),
         ("device: is missing; scripts/try_changes.py", "advise.py", []),
     ],
 )
@@ -99,11 +96,23 @@ def test_a_count_that_is_none_is_refused(refused, tmp_path, program):
     assert said == "--dataset: is many; must be 1 or more"
 
 
-def test_what_a_machine_draws_and_the_full_size_are_checked(refused, tmp_path):
-    words = ["--output", tmp_path / "made"]
-    for name, content in (("--energy", "[]"), ("--full", "{}"), ("--full", '{"views": 1e400}')):
-        given = [*COSTS[:-1], name, content]
-        assert refused("costs.py", *given, *words).startswith(f"{name}: ")
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        ({"energy": []}, "settings.json: energy: is []; must be a mapping"),
+        ({"full": {"views": 6}}, "settings.json: full: is missing the key resolution"),
+        ({"full": FULL | {"views": 0}}, "settings.json: full.views: is 0; must be"),
+        ({"watts": 65}, "settings.json: watts: unknown key"),
+        ({}, "other.json: blend: is missing; scripts/inventory.py writes it"),
+    ],
+)
+def test_what_a_machine_draws_and_the_full_size_are_checked(refused, tmp_path, content, problem):
+    write_json(tmp_path / "settings.json", {"energy": {}, "full": FULL, **content})
+    write_json(tmp_path / "other.json", {})
+    words = ["--settings", tmp_path / "settings.json", "--inventory", tmp_path / "other.json"]
+    said = refused("costs.py", *COSTS, *words, "--output", tmp_path / "made")
+    assert said.startswith(f"{tmp_path}/{problem}")
+    assert not (tmp_path / "made").exists()
 
 
 @pytest.fixture
@@ -287,7 +296,7 @@ def test_a_folder_has_its_name_from_within(tmp_path, monkeypatch):
     (tmp_path / "scene/rig/exr").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "scene/rig/exr")
     for path in (Path(".."), Path("../../rig/"), Path("../exr/.."), tmp_path / "scene/rig"):
-        assert whole(path).parts[-2:] == ("scene", "rig")
+        assert absolute_path(path).parts[-2:] == ("scene", "rig")
         assert Integrity(path, tmp_path)._name == "scene/rig"
 
 
@@ -340,9 +349,10 @@ def test_an_index_of_no_folder_is_refused(refused, tmp_path):
 
 def test_the_lens_of_no_blend_is_not_made_up(refused, lightfield, tmp_path):
     camera = '{"lens": "file", "resolution": [8, 8]}'
-    words = ["-i", tmp_path, "--input-cfg", lightfield, "--exr", "-o", tmp_path / "made"]
-    said = refused("reproject.py", *words, "--camera", camera)
-    assert said.endswith("lens: is file, which goes with a rig of type blend_camera alone")
+    write_text(tmp_path / "flat.json", f'{{"camera": {camera}, "formats": ["exr"]}}')
+    words = ["-i", tmp_path, "--input-cfg", lightfield, "-o", tmp_path / "made"]
+    said = refused("reproject.py", *words, "--settings", tmp_path / "flat.json")
+    assert said == f"{tmp_path}/flat.json: camera.lens: file goes with a rig of type blend_camera"
     rig = '{"type": "plane", "cameras": [1, 1], "size": 1, "camera": ' + camera + "}"
     write_text(tmp_path / "rig.yaml", rig)
     words = [tmp_path, "--poses", tmp_path / "rig.yaml", "--output", tmp_path / "made"]

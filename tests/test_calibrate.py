@@ -10,8 +10,8 @@ from checkouts import checkout, planned, snakemake
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
 from lightfield.dataset.config import Preset
-from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import lenses
 from lightfield.measurement.calibration import Candidate, Search, effort_for
 from lightfield.measurement.sampling import PLAIN
@@ -127,25 +127,26 @@ def test_what_calibration_will_cost_is_said_beforehand(tmp_path):
     assert re.search(r"^calibration of aimed +0\.025 +$", table, re.M), table
 
 
-class SimulatedBench:
-    """Plain path tracing of error 1/N, 8/N of all pixels, and others of half that error.
+def simulated(whole_error, bias=0.0):
+    """Plain path tracing of error 1/N, 8/N of all pixels, and other methods of half that error.
 
-    They leave ``whole_error`` in all pixels, and ``bias`` in most, however much effort they take.
+    Those leave ``whole_error`` in all pixels, and ``bias`` in most, however much effort they take.
     """
 
-    def __init__(self, whole_error, bias=0.0):
-        self.whole_error, self.bias = whole_error, bias
+    def measure(method):
+        settings = {**PLAIN, **method.settings}
+        samples = min(settings["samples"], 1 / (settings["adaptive_threshold"] or 1e-4))
+        is_plain = method.name == "plain"
+        error = 1 / samples if is_plain else bias + 0.5 / samples
+        whole = 8 / samples if is_plain else whole_error
+        return Candidate(method.name, settings, samples, samples, error, whole, 1.0)
 
-    def measure(self, way, settings):
-        samples = min(settings["samples"], 1 / (settings.get("adaptive_threshold") or 1e-4))
-        error = 1 / samples if way == "plain" else self.bias + 0.5 / samples
-        whole = 8 / samples if way == "plain" else self.whole_error
-        return Candidate(way, {**PLAIN, **settings}, samples, samples, error, whole, 1.0), [error]
+    return measure
 
 
 @pytest.mark.parametrize(("whole_error", "way"), [(0.1, "denoised"), (1.0, "plain")])
 def test_what_hides_fireflies_is_not_chosen(whole_error, way):
-    search = Search(SimulatedBench(whole_error), TARGET)
+    search = Search(simulated(whole_error), TARGET)
     # That of plain path tracing at the target, of 50 samples, is 8 / 50.
     assert search.most_whole_error == pytest.approx(2 * 8 / 50)
     choice = search.choose()
@@ -154,7 +155,7 @@ def test_what_hides_fireflies_is_not_chosen(whole_error, way):
 
 @pytest.mark.parametrize("bias", [2 * TARGET, 1e6])
 def test_a_way_whose_bias_is_above_the_target_is_given_up(bias):
-    search = Search(SimulatedBench(0.0, bias), TARGET, denoise=True)
+    search = Search(simulated(0.0, bias), TARGET, denoise=True)
     assert search.choose().error > TARGET
     assert max(entry.settings["samples"] for entry in search.measured) <= 4096
 

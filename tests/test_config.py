@@ -16,7 +16,7 @@ import schema
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
 from lightfield.dataset.config import Preset
-from lightfield.dataset.dataset import load_datasets, scene_datasets
+from lightfield.dataset.loading import load_datasets, scene_datasets
 
 RIGHT = {
     "scene": {"builder": "room"},
@@ -279,6 +279,12 @@ def test_every_mistake_names_file_key_value_and_what_is_right(name, tmp_path):
         ("render: {samples: 12:30:45}\n", 'render.samples: is "12:30:45"; must be a whole number'),
         ("render: {samples: 010}\n", 'render.samples: is "010"; must be a whole number'),
         ("render: {samples: 0b11}\n", 'render.samples: is "0b11"; must be a whole number'),
+        (
+            "scene: {builder: room}\n"
+            "render: {samples: 1}\n"
+            "reprojections: {flat: {camera: {lens: rectilinear, focal_length: 1e-300}}}\n",
+            "flat.camera.focal_length: is 1e-300; must be a number at least 0.001",
+        ),
         ("render: {clamp_indirect: 1:30.5}\n", 'clamp_indirect: is "1:30.5"; must be a number'),
         ("scene: !!python/object/apply:os.getcwd []\n", "could not determine a constructor"),
     ],
@@ -351,7 +357,14 @@ def test_flow_of_a_rig_that_a_preset_leaves_one_place_is_refused(tmp_path, monke
 def test_numbers_of_yaml_1_1_that_look_like_numbers_stay_numbers(tmp_path):
     file = tmp_path / "numbers.yaml"
     numbers = {"7": 7, "-7": -7, "0": 0, "1_000": 1000, "0x1F": 31, "+1.5": 1.5, ".5": 0.5}
-    numbers |= {"2.": 2.0, "1.0e-3": 0.001, "-.inf": -float("inf"), "-0.0": 0.0}
+    numbers |= {
+        "2.": 2.0,
+        "1.0e-3": 0.001,
+        "1e-3": 0.001,
+        "-2E3": -2000.0,
+        "-.inf": -float("inf"),
+        "-0.0": 0.0,
+    }
     file.write_text("".join(f"{key!r}: {key}\n" for key in numbers))
     assert config.read_yaml(file, "numbers") == numbers
 
@@ -433,7 +446,8 @@ def test_a_preset_leaves_the_pixels_of_a_perspective_view_square(tmp_path, monke
         assert rig.camera.make().has_square_pixels
     # What is not written stays so.
     cuboid, sphere = scene_datasets("right", limits=Preset(resolution=64))
-    assert "sensor_size" not in cuboid.rig_json + sphere.reprojections["perspective"].optics
+    assert "sensor_size" not in cuboid.rig_json
+    assert "sensor_size" not in sphere.reprojections["perspective"].settings.as_json()["camera"]
 
 
 def test_a_cube_map_has_a_lens_map_and_a_view_a_face(tmp_path, monkeypatch):
@@ -442,7 +456,19 @@ def test_a_cube_map_has_a_lens_map_and_a_view_a_face(tmp_path, monkeypatch):
     (tmp_path / "right.yaml").write_text(yaml.safe_dump(content))
     monkeypatch.setattr(config, "SCENES", tmp_path)
     dataset = scene_datasets("right", limits=config.Preset(resolution=32, views=20))[0]
-    assert dataset.reprojections["faces"].optics == "--cubemap 32 --filter adaptive"
+    assert dataset.reprojections["faces"].settings.as_json() == {
+        "camera": {"lens": "rectilinear", "fov": 90, "resolution": [32, 32]},
+        "cube_map": True,
+        "rotation": [0, 0, 0],
+        "filter": "adaptive",
+        "samples": 1,
+        "formats": ["png"],
+        "bits": 8,
+        "exposure": 0,
+        "reinhard": 1,
+        "mask": False,
+        "passes": [],
+    }
     names = [Path(path).name for path in dataset.lens_maps("faces")]
     assert names == [f"lens_map_{face}.npy" for face in "fblrud"]
     assert set(dataset.lens_maps("faces")) <= set(dataset.intermediates)
@@ -551,6 +577,13 @@ def test_snakemake_ends_with_one_line_and_no_job(arguments, expected, tmp_path):
     assert expected in told[0]
     assert "Traceback" not in result.stderr
     assert "rule " not in result.stdout + result.stderr
+
+
+@pytest.mark.parametrize("key", ["most_shards", "shard_minutes"])
+def test_a_removed_key_names_the_key_that_answers_its_question(key):
+    content = {"scenes": ["garden"], "preset": "full", "presets": {"full": {}}, key: 100}
+    with pytest.raises(UserError, match=f"config.yaml: {key}: .*views_per_shard"):
+        config.load_config(content)
 
 
 def test_no_two_scenes_have_one_folder(tmp_path, monkeypatch):

@@ -91,19 +91,25 @@ def dataset(tmp_path, run_program):
         (work / path).parent.mkdir(parents=True, exist_ok=True)
         (work / path).write_text(HEAD + row + "\n")
 
-    def count(*lines, full=None):
+    def count(*lines, full=None, inventory=None):
         journals = work / "journals"
         journals.mkdir(exist_ok=True)
         # A user's copy is of no shard.
         (journals / "kept.journal.jsonl").write_text("{}\n")
         (journals / "0-3.journal.jsonl").write_text("\n".join(map(json.dumps, lines)) + "\n")
+        words = []
+        if inventory:
+            (work / "inventory.json").write_text(json.dumps(inventory))
+            words = ["--inventory", work / "inventory.json"]
+        settings = {"energy": TARIFF, "full": FULL | (full or {}), "reprojections": ["flat"]}
+        (tmp_path / "settings.json").write_text(json.dumps(settings))
         run_program(
             "costs.py",
             *("--dataset", folder, "--journals", journals, "--benchmarks", work / "rig"),
             *("--scene-benchmarks", work / "scene", "--blend", work / "scene.blend"),
-            *("--energy", json.dumps(TARIFF), "--reprojection", "flat"),
-            *("--full", json.dumps(FULL | (full or {}))),
+            *("--settings", tmp_path / "settings.json"),
             *("--output", tmp_path / "costs.json"),
+            *words,
         )
         return json.loads((tmp_path / "costs.json").read_text())
 
@@ -201,6 +207,12 @@ def test_the_full_dataset_is_extrapolated_from_the_path_tracing_of_the_views(dat
     same = dataset(*lines)["extrapolation"]["basis"]
     assert "times the path tracing" not in same
     assert not re.search(r"\d\.\d", found["basis"] + same)
+
+
+def test_samples_that_the_file_has_are_those_of_the_full_dataset(dataset):
+    inventory = {"blend": {"samples": 6}}
+    content = dataset(*KILLED, *RESUMED, full={"samples": "file"}, inventory=inventory)
+    assert content["extrapolation"]["samples"] == 6
 
 
 def test_what_other_programs_took_is_no_part_of_a_views_path_tracing():

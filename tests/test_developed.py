@@ -8,11 +8,12 @@ import json
 import numpy as np
 import pytest
 
+from lightfield.core.files import write_json
 from lightfield.dataset.config import Scene
 from lightfield.dataset.exports import NerfSynthetic
 from lightfield.dataset.lightfield import LightField
 from lightfield.export import nerf_synthetic
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import decode_srgb, encode_srgb
@@ -49,7 +50,7 @@ def dataset(folder, camera=FISHEYE, transparent=True):
 
 
 @pytest.fixture
-def reproject(tmp_path, run_program):
+def reproject(tmp_path, tmp_path_factory, run_program):
     """Make a set of the dataset in tmp_path by a reprojection's YAML; return its folder."""
 
     def run(name, **settings):
@@ -62,10 +63,12 @@ def reproject(tmp_path, run_program):
             }
         ).reprojections[name]
         folder = tmp_path / name
-        words = [*content.optics.split("'"), *content.development.split()]
-        words = [word for part in words for word in ([part] if "{" in part else part.split())]
+        # Validation finds any file in the dataset's folder that is not of it.
+        settings = tmp_path_factory.mktemp("settings") / f"{name}.json"
+        write_json(settings, content.settings.as_json())
         run_program(
-            *("reproject.py", *words, "--input-cfg", tmp_path / "lightfield.json"),
+            *("reproject.py", "--settings", settings),
+            *("--input-cfg", tmp_path / "lightfield.json"),
             *("--input-dir", tmp_path / "exr", "--output-dir", folder),
             *("--output-cfg", folder / "lightfield.json"),
         )
@@ -101,7 +104,7 @@ def test_alpha_goes_through_a_reprojection_and_is_associated_in_exr_alone(tmp_pa
 
 def test_transparent_views_are_rgba_to_trainers(tmp_path):
     dataset(tmp_path, PERSPECTIVE)
-    source = Source(tmp_path, "", ".exr")
+    source = SourceDataset(tmp_path, "", ".exr")
     folder = tmp_path / "nerf"
     nerf_synthetic.export(source, NerfSynthetic(sources=["views"]), folder)
     found = read(next(folder.rglob("view_0000f.png")))
@@ -173,7 +176,7 @@ def test_a_bracket_is_a_folder_for_each_exposure():
         "png_ev0.5": 0.5,
         "png_ev2": 2.0,
     }
-    assert {each.optics for each in found.values()} == {"--no-reproject"}
+    assert not any("camera" in each.settings.as_json() for each in found.values())
 
 
 @pytest.mark.parametrize(

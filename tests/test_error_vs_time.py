@@ -15,7 +15,8 @@ from lightfield.dataset.passes import PARTS_OF_LIGHT
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.measurement import strata, trials
-from lightfield.measurement.error_vs_time import compared, evaluated, together
+from lightfield.measurement.error_vs_time import evaluated, measured_point, whole_views_point
+from lightfield.measurement.experiment import Method
 from lightfield.measurement.metrics import Reference, disagreement, make_reference
 from lightfield.measurement.strata import STRATA
 from lightfield.measurement.trials import SURFACES, Window
@@ -229,8 +230,9 @@ def test_a_stratum_without_noise_has_no_error_and_no_psnr(tmp_path):
     sky, depth = np.full((16, 16, 3), 0.5, np.float32), np.full((16, 16), 2, np.float32)
     reference = make_reference([sky] * 2, [depth] * 2, np.ones((16, 16), bool))
     trial = trials.Trial(sky, depth, 1, 1.0, "CPU")
-    points = [compared("plain", {"samples": 1}, [[trial, trial]], [reference])]
-    points.append(together({"environment": points[0]}, {"environment": 1.0}, 0.0))
+    plain = Method("plain", {"samples": 1})
+    points = [measured_point(plain, [[trial, trial]], [reference])]
+    points.append(whole_views_point({"environment": points[0]}, {"environment": 1.0}, 0.0))
     found = evaluated(points, 0.0)
     assert [(p["relative_mse"], p["psnr"]) for p in found["points"]] == [(0, None)] * 2
     write_json(tmp_path / "points.json", found)

@@ -10,7 +10,7 @@ from sphere import write_views
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.geometry.depth import z_from_distance
 from lightfield.imaging import images
 from lightfield.measurement import evaluation
@@ -40,7 +40,7 @@ BLACK, WHITE = np.zeros(3), np.ones(3)
 
 def rows_of(dataset, name, shown, mask=True, view="view_0001f"):
     """Return the errors of a render by region."""
-    source = Source(dataset, name, ".exr")
+    source = SourceDataset(dataset, name, ".exr")
     found = next(each for each in source.lightfield.views if each.name == view)
     rendered = evaluation.rendered(shown, source, BLACK)
     true = evaluation.truth(source, found, shown, BLACK)
@@ -53,7 +53,7 @@ def rows_of(dataset, name, shown, mask=True, view="view_0001f"):
 def test_the_truth_scores_perfectly(dataset, tmp_path, name, run_program):
     renders = tmp_path / "renders"
     shutil.copytree(dataset / name, renders)
-    source = Source(dataset, name, ".exr")
+    source = SourceDataset(dataset, name, ".exr")
     second = next(view for view in source.lightfield.views if view.name == TESTS[1])
     (renders / f"{second.name}.exr").unlink()
     images.write_png(renders / f"{second.name}.png", source.colour(second))
@@ -84,7 +84,7 @@ def named(dataset, tmp_path, folder):
     shutil.copytree(dataset / "perspective", tmp_path / folder / "perspective")
     path = tmp_path / folder / "perspective" / "lightfield.json"
     LightField.read(path).changed(scene={"name": "ball"}).write(path)
-    return Source(tmp_path / folder, "perspective", ".exr")
+    return SourceDataset(tmp_path / folder, "perspective", ".exr")
 
 
 @pytest.mark.parametrize(
@@ -131,7 +131,7 @@ def test_renders_and_masks_under_exported_names_are_compared(dataset, tmp_path, 
 def test_errors_are_those_that_were_made(dataset, tmp_path):
     path = dataset / "perspective" / "view_0001f.exr"
     image = images.read_image(path)
-    source = Source(dataset, "perspective", ".exr")
+    source = SourceDataset(dataset, "perspective", ".exr")
     view = source.lightfield.views[1]
     pixels = source.colour(view)
     pixels[:, :32] += 10
@@ -172,7 +172,7 @@ def transparent(tmp_path):
     for view in TESTS:
         channels = dict.fromkeys("RGB", np.float32(0.25) * alpha) | {"A": alpha, "Z": 1 + alpha}
         images.write_exr(folder / "exr" / f"{view}.exr", channels)
-    return Source(folder, "", ".exr")
+    return SourceDataset(folder, "", ".exr")
 
 
 def compared(source, path, background):
@@ -209,13 +209,14 @@ def test_renders_without_alpha_are_compared_over_their_background(
     assert f"has no alpha, and is {code} where the truth is transparent" in problem
 
 
-def test_linear_renders_are_composited_as_light(transparent, tmp_path):
+# The light of a grey of sRGB's 0.5, by IEC 61966-2-1.
+@pytest.mark.parametrize(("background", "light"), [(0, 0), (0.5, 0.2140411), (1, 1)])
+def test_linear_renders_are_composited_as_light(background, light, transparent, tmp_path):
     alpha = images.read_image(transparent.path(transparent.lightfield.views[1])).channels["A"]
     path = tmp_path / "view_0001f.exr"
-    images.write_exr(path, dict.fromkeys("RGB", (np.float32(0.25) * alpha + 1 - alpha)))
-    assert compared(transparent, path, WHITE)[0]["psnr"] > 100
-    images.write_exr(path, dict.fromkeys("RGB", np.float32(0.25) * alpha))
-    assert compared(transparent, path, BLACK)[0]["psnr"] > 100
+    colour = np.float32(0.25) * alpha + np.float32(light) * (1 - alpha)
+    images.write_exr(path, dict.fromkeys("RGB", colour))
+    assert compared(transparent, path, np.full(3, float(background)))[0]["psnr"] > 100
 
 
 @pytest.mark.parametrize("background", [BLACK, WHITE])
@@ -236,7 +237,7 @@ def test_renders_with_alpha_are_composited_over_the_background_too(
 
 
 def test_a_render_with_holes_of_opaque_views_is_warned_of(dataset, tmp_path):
-    source = Source(dataset, "perspective", ".exr")
+    source = SourceDataset(dataset, "perspective", ".exr")
     view = source.lightfield.views[1]
     alpha = np.full((48, 64), 255, np.uint8)
     path = tmp_path / f"{view.name}.png"
@@ -269,7 +270,7 @@ def test_white_renders_are_warned_of_until_their_background_is_given(
 
 
 def test_regions_are_where_the_lens_sees_and_where_depth_jumps(dataset):
-    source = Source(dataset, "fisheye", ".exr")
+    source = SourceDataset(dataset, "fisheye", ".exr")
     distance = np.ones((48, 48))
     distance[:, 24:], distance[:10] = 2, np.inf
     depth = z_from_distance(distance, source.lens.pixel_rays())
@@ -296,7 +297,7 @@ def test_what_is_missing_or_of_another_size_is_named(dataset, tmp_path, run_prog
     problem = f"{TESTS[1]}.exr: has colour that is no number where it is compared"
     assert (result.returncode, result.stderr.splitlines()[-1].endswith(problem)) == (1, True)
     assert [path.name for path in tmp_path.iterdir()] == ["renders"]
-    source = Source(dataset, "perspective", ".exr")
+    source = SourceDataset(dataset, "perspective", ".exr")
     images.write_png(tmp_path / "small.png", np.zeros((4, 6, 3), np.uint8))
     images.write_png(tmp_path / "grey.png", np.zeros((48, 64), np.uint8))
     images.write_exr(tmp_path / "grey.exr", {"Z": np.ones((48, 64), np.float32)})

@@ -12,7 +12,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.exports import InstantNgp
+from lightfield.dataset.exports import ExportSettings, InstantNgp
 from lightfield.dataset.lightfield import LightField
 from lightfield.export import instant_ngp
 from lightfield.export.source import millimetres
@@ -339,6 +339,26 @@ def test_exr_views_become_files_that_the_loader_accepts(dataset: Dataset) -> Non
     assert len(list(elsewhere.iterdir())) == 6
 
 
+def test_exr_pixels_without_a_source_are_hidden(dataset: Dataset) -> None:
+    content = dataset.write(PERSPECTIVE, depth="z")
+    dataset.render(content, PERSPECTIVE, "z", 2.0)
+    path = dataset.folder / "view_0000f.exr"
+    channels = images.read_image(path).channels
+    without_source = np.zeros((48, 64), bool)
+    without_source[:5, :7] = True
+    channels = {
+        name: np.where(without_source, np.nan if name == "Z" else 0, pixels).astype(pixels.dtype)
+        for name, pixels in channels.items()
+    }
+    images.write_exr(path, channels, {images.DEPTH_ATTRIBUTE: "z"})
+    frames = dataset.export("--image-suffix", ".exr")["frames"]
+    first, second = (images.read_image(dataset.folder / f["file_path"]) for f in frames[:2])
+    for name in "RGB":
+        expected = np.where(without_source, -1, 0.25)
+        np.testing.assert_array_equal(first.channels[name], expected)
+        np.testing.assert_array_equal(second.channels[name], 0.25)
+
+
 def test_a_depth_map_counts_millimetres_and_is_0_where_there_is_none() -> None:
     depth = np.array([2.0, 0.001, 0.0004, 65.535, 65.5361, np.inf, np.nan])
     assert millimetres(depth).tolist() == [2000, 1, 0, 65535, 0, 0, 0]
@@ -413,6 +433,24 @@ def test_fitted_to_depth_the_scene_is_within_the_cube(dataset: Dataset) -> None:
     assert in_unit_cube(loader, [1, -2, 3] + 0.85 * 4.0 * corners)
 
 
+def test_a_wall_straight_ahead_puts_the_rig_in_the_middle_of_the_cubes_sides(
+    dataset: Dataset,
+) -> None:
+    # Of three by three pixels the bounds take the one in the middle, whose ray goes through its
+    # centre: to the left and to the right they reach equally far.
+    camera = {"lens": "rectilinear", "fov": 90, "resolution": [192, 192]}
+    rig = {"type": "plane", "cameras": [2, 2], "size": 0.5}
+    content = dataset.write(camera, rig, depth="z")
+    for frame in content["frames"]:
+        pixels = {name: np.full((192, 192), 4, np.float32) for name in "RGBZ"}
+        attributes = {images.DEPTH_ATTRIBUTE: "z"}
+        images.write_exr(dataset.folder / f"{frame['name']}.exr", pixels, attributes)
+    loader = Loader(dataset.export("--depth-bounds"))
+    left, right = (loader.position(silvr_orientation([x, 0, 0])) for x in (-0.25, 0.25))
+    np.testing.assert_allclose((left + right)[:2] / 2, 0.5, atol=1e-6)
+    assert np.abs(right - left).max() == pytest.approx(0.5 * loader.scale, abs=1e-6)
+
+
 def test_split_gives_odd_sequence_numbers_to_the_test_file(
     dataset: Dataset, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -457,7 +495,9 @@ def test_the_yaml_asks_for_all_that_the_program_can_do(dataset: Dataset) -> None
     settings = {"sources": ["views"], "bounds": "depth", "aabb_scale": 2, "depth": True}
     box = [[0.1, 0.2, 0.3], [0.7, 0.8, 0.9]]
     model = TypeAdapter(InstantNgp).validate_python(settings | {"render_aabb": box})
-    transforms = dataset.export("--image-suffix", ".exr", *model.words(str(dataset.folder)))
+    file = dataset.folder / "settings.json"
+    file.write_text(json.dumps(ExportSettings(options=model).as_json()))
+    transforms = dataset.export("--settings", file)
     assert transforms["scale"] == dataset.export("--depth-bounds")["scale"]
     assert transforms["options"] == model.recorded
     assert transforms["render_aabb"] == box
@@ -465,10 +505,36 @@ def test_the_yaml_asks_for_all_that_the_program_can_do(dataset: Dataset) -> None
     depth = dataset.folder / transforms["frames"][0]["depth_path"]
     assert depth.parent == dataset.folder / "instant_ngp" / "depth"
     assert images.read_image(depth).channels["Y"].max() == 4000
+    with pytest.raises(UserError, match="--settings: excludes --scale"):
+        dataset.export("--settings", file, "--scale", 1)
     with pytest.raises(ValidationError, match="bounds: goes without scale"):
         TypeAdapter(InstantNgp).validate_python(settings | {"scale": 0.1})
     with pytest.raises(ValidationError, match="offset: goes with scale"):
         TypeAdapter(InstantNgp).validate_python(settings | {"offset": [0, 0, 0]})
+
+
+@pytest.mark.parametrize(
+    ("settings", "problem"),
+    [
+        ({}, "is missing the key options"),
+        ({"options": {"sources": ["views"], "scal": 1}}, "options.scal: unknown key; did you mean"),
+        (
+            {"options": {"sources": ["views"], "scale": -1}},
+            "options.scale: is -1; must be a number",
+        ),
+        ({"options": {"sources": ["views", "flat"]}}, "options.sources: must name one source"),
+        ({"options": {"sources": ["views"]}, "suffix": ".jpg"}, "suffix: is "),
+    ],
+)
+def test_mistakes_in_a_settings_file_are_named(
+    settings: Any, problem: str, dataset: Dataset
+) -> None:
+    dataset.write(FISHEYE)
+    file = dataset.folder / "settings.json"
+    file.write_text(json.dumps(settings))
+    with pytest.raises(UserError) as error:
+        dataset.export("--settings", file)
+    assert str(error.value).startswith(f"{file}: {problem}")
 
 
 @pytest.mark.parametrize(
@@ -527,6 +593,7 @@ def test_what_is_a_polynomial_goes_as_it_is(turned: int, dataset: Dataset) -> No
         (PANORAMA | {"longitude": [-180, 170]}, [], "instant-ngp cannot follow"),
         # A fisheye along both axes of the image, and none between them.
         (HALF_PANORAMA, [], "instant-ngp cannot follow"),
+        (FISHEYE, ["--depth-bounds", "--scale", 1], "bounds: goes without scale"),
         (FISHEYE, ["--offset", 0, 0, 0], "--offset: goes with --scale"),
         (FISHEYE, ["--placed-as", __file__], r"\.py: is not JSON"),
         (FISHEYE, ["--image-suffix", ".exr"], "view_0000f.exr: no such file"),

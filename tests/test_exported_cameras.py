@@ -19,9 +19,9 @@ from lightfield import export
 from lightfield.core.files import read_json, write_json
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.splits import listed
+from lightfield.dataset.splits_file import splits_content
 from lightfield.export import MANIFESTS, instant_ngp
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.validation import exported_cameras
 from lightfield.validation.exported_depth import ExportedDepth
 from lightfield.validation.files import File, read_sets
@@ -103,7 +103,7 @@ def home(folder, name):
 
 def write_export(folder, name, kind, options, beside=None):
     settings = TypeAdapter(settings_of(kind)).validate_python({"sources": [name], **options})
-    source = Source(folder, "" if name == "views" else name, ".exr", beside or {})
+    source = SourceDataset(folder, "" if name == "views" else name, ".exr", beside or {})
     export.run(kind, source, settings, home(folder, name) / "exports" / kind)
 
 
@@ -641,7 +641,7 @@ def scene(tmp_path_factory):
     trained = folder / "around" / "transforms.json"
     write_instant_ngp(folder / "along", "views", ["--placed-as", str(trained)])
     lightfields = {n: LightField.read(folder / n / "lightfield.json") for n in ("around", "along")}
-    write_json(folder / "splits.json", listed(lightfields))
+    write_json(folder / "splits.json", splits_content(lightfields))
     return folder
 
 
@@ -667,6 +667,18 @@ def test_an_unpacked_dataset_may_have_views_of_rigs_that_are_not_here(scene, tmp
     for kind in ("colmap", "nerfstudio", "nerf_synthetic", "instant_ngp"):
         assert problems(tmp_path / "scene_around", "views", kind) == []
     assert problems(tmp_path / "scene_along", "views", "instant_ngp") == []
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+def test_a_rig_of_another_size_in_the_middle_of_the_unit_cube_is_found(factor, tmp_path):
+    folder = tmp_path / "dataset"
+    write_views(folder, LENSES["perspective"], RIG, see=look_at_ball)
+    write_instant_ngp(folder, "views", [])
+    content = read_json(folder / "transforms.json")
+    content["scale"] *= factor
+    content["offset"] = [0.5 - factor * (0.5 - value) for value in content["offset"]]
+    write_json(folder / "transforms.json", content)
+    assert "scale, offset" in problems(folder, "views", "instant_ngp")[0]
 
 
 def test_a_rig_that_looks_inward_fills_the_unit_cube(tmp_path):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 from scipy.spatial.transform import Rotation
-from sphere import LENSES, RADIUS, colour_of, write_views
+from sphere import LENSES, RADIUS, colour_of, look, write_views
 
 from lightfield import export
 from lightfield.core.errors import UserError
@@ -23,7 +23,7 @@ from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.export import disparity
 from lightfield.export.points import evenly
-from lightfield.export.source import Source, Surface
+from lightfield.export.source import SourceDataset, Surface
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import images
 from lightfield.validation import files as validation_files
@@ -49,7 +49,7 @@ def exported(dataset, name, source, tmp_path, **options):
     suffix = ".png" if source == "png" else ".exr"
     folder = tmp_path / name / source
     views = "" if source == "views" else source
-    export.run(name, Source(dataset, views, suffix), settings, folder)
+    export.run(name, SourceDataset(dataset, views, suffix), settings, folder)
     return folder
 
 
@@ -262,6 +262,21 @@ def test_colmap_depth_maps_are_z_in_metres(dataset, tmp_path, source):
         assert len(row) > 1000
         local = model.lift(np.stack([column, row], axis=-1) + 0.5, z[row, column])
         on_sphere((local - shift) @ turn, 1e-5)
+
+
+def test_colmap_depth_maps_are_0_where_a_view_sees_the_sky(tmp_path):
+    def open_above(lens, matrix):
+        colour, distance = look(lens, matrix)
+        distance[: lens.height // 2] = np.inf
+        return colour, distance
+
+    folder = tmp_path / "dataset"
+    write_views(folder, LENSES["perspective"], RIG, see=open_above)
+    made = exported(folder, "colmap", "views", tmp_path, depth=True, points=50)
+    for path in sorted((made / "stereo/depth_maps").iterdir()):
+        z = np.frombuffer(path.read_bytes().removeprefix(b"64&48&1&"), "<f4").reshape(48, 64)
+        assert (z[:24] == 0).all()
+        assert ((z[24:] > 0.5) & (z[24:] < 2 * RADIUS)).all()
 
 
 def nerfstudio_rays(content):
@@ -659,7 +674,7 @@ def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(da
 
 def test_a_failed_export_leaves_nothing(dataset, tmp_path):
     shutil.copytree(dataset / "perspective", tmp_path / "perspective")
-    source = Source(tmp_path, "perspective", ".exr")
+    source = SourceDataset(tmp_path, "perspective", ".exr")
     last = source.path(source.lightfield.views[-1])
     settings = settings_of("nerf_synthetic")(sources=["perspective"])
     last.unlink()
@@ -757,7 +772,7 @@ def test_what_lies_among_the_files_of_an_earlier_export_is_kept(dataset, tmp_pat
     (folder / "thesis.txt").unlink()
     link = tmp_path / "link"
     link.symlink_to(folder)
-    source = Source(dataset, "perspective", ".png")
+    source = SourceDataset(dataset, "perspective", ".png")
     assert export.run("poses_csv", source, settings_of("poses_csv")(sources=["perspective"]), link)
     assert link.is_symlink()
     assert (folder / "poses.csv").is_file()
@@ -776,6 +791,46 @@ def test_what_a_consumer_cannot_take_is_refused_by_hand_too(dataset, tmp_path, n
     with pytest.raises(UserError, match=rf"lightfield.json: {why}"):
         exported(dataset, name, source, tmp_path)
     assert not [*tmp_path.iterdir()]
+
+
+def by_hand(run_program, dataset, folder, *words):
+    """Export a table of poses by the program; return the names of its views."""
+    words = ["poses_csv", "--dataset", dataset, "--output", folder, *words]
+    run_program("export.py", *words)
+    rows = (folder / "poses.csv").read_text().splitlines()[1:]
+    return [row.split(",")[0] for row in rows]
+
+
+def test_a_settings_file_gives_source_and_rigs_that_test(run_program, dataset, tmp_path):
+    words = ["--source", "perspective", "--suffix", ".exr"]
+    names = by_hand(run_program, dataset, tmp_path / "flags", *words)
+    settings = tmp_path / "settings.json"
+    content = {"options": {"sources": ["perspective"]}, "suffix": ".exr"}
+    settings.write_text(json.dumps(content))
+    assert by_hand(run_program, dataset, tmp_path / "file", "--settings", settings) == names
+    settings.write_text(json.dumps(content | {"tested_by": {"other": str(dataset)}}))
+    both = by_hand(run_program, dataset, tmp_path / "both", "--settings", settings)
+    assert both == [*names, *(f"other_{name}" for name in names)]
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        ({"options": {"sources": ["views"], "point": 5}}, "options.point: unknown key"),
+        ({"options": {"sources": ["views"], "points": 0}}, "options.points: is 0; must be"),
+        ({"options": {"sources": ["views"]}, "tested_by": ["other"]}, "tested_by: is "),
+    ],
+)
+def test_mistakes_in_a_settings_file_are_named(run_program, dataset, tmp_path, content, problem):
+    settings = tmp_path / "settings.json"
+    settings.write_text(json.dumps(content))
+    words = ["--dataset", dataset, "--output", tmp_path / "made", "--settings", settings]
+    refused = run_program("export.py", "colmap", *words, check=False)
+    assert refused.stderr.startswith(f"error: {settings}: {problem}")
+    assert (refused.returncode, refused.stderr.count("\n")) == (1, 1)
+    refused = run_program("export.py", "colmap", *words, "--suffix", ".png", check=False)
+    assert "--settings: excludes --suffix" in refused.stderr
+    assert not (tmp_path / "made").exists()
 
 
 def test_a_model_as_text_may_be_without_points(tmp_path):
@@ -803,12 +858,21 @@ def test_points_are_lifted_from_views_that_see_the_sky_too():
     np.testing.assert_allclose(np.linalg.norm(points, axis=1), 3)
 
 
+def test_points_are_as_dense_at_the_origin_as_elsewhere():
+    line = np.linspace(-1, 1, 2001)
+    for axis in range(3):
+        positions = np.full((len(line), 3), 0.5)
+        positions[:, axis] = line
+        gaps = np.diff(line[evenly(positions, 40)])
+        assert gaps.max() < 1.5 * np.median(gaps)
+
+
 def test_points_that_several_views_see_alike_are_kept_once():
     points = np.random.default_rng(1).normal(size=(50, 3))
     assert evenly(np.repeat(points, 4, axis=0), 100).tolist() == list(range(0, 200, 4))
 
 
 def test_views_of_another_lens_do_not_test(dataset):
-    source = Source(dataset / "perspective", "", ".exr", {"other": dataset / "shifted"})
+    source = SourceDataset(dataset / "perspective", "", ".exr", {"other": dataset / "shifted"})
     with pytest.raises(UserError, match="camera: is another than that of"):
         _ = source.lightfield

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from checkouts import checkout
+from checkouts import checkout, with_consumers
 from sphere import write_views
 
 from lightfield.core import files
@@ -89,6 +89,7 @@ class Failing:
             stand_in = self.folder / program.relative_to(ROOT)
             stand_in.parent.mkdir(exist_ok=True)
             stand_in.write_text(FAILING)
+        with_consumers(self.folder)
         # No job's program: it runs before the first one.
         (self.folder / "scripts/check_device.py").write_text("")
         (self.folder / "bin").mkdir()
@@ -294,7 +295,7 @@ def test_the_cause_is_the_last_error_or_else_the_last_line(tmp_path):
 
 @pytest.mark.parametrize(
     ("signal", "advice"),
-    [("KILL", "memory ran out: lower --cores"), ("BUS", "make room in /dev/shm and TMPDIR")],
+    [("KILL", "memory ran out: lower --cores"), ("BUS", "free some space in /dev/shm and TMPDIR")],
 )
 @pytest.mark.slow
 def test_a_signal_is_named_with_what_to_lower(failing, signal, advice):
@@ -349,7 +350,7 @@ sys.exit({"'error: no log has it'" if mounted else "1"})
         program.write_text(FAILING)
         logs.unlink()
     assert why.startswith("render failed: ")
-    assert why.endswith("is full: make room" if mounted else "it said nothing"), why
+    assert why.endswith("is full: free some space" if mounted else "it said nothing"), why
 
 
 @pytest.mark.slow

@@ -177,6 +177,22 @@ def test_validation_knows_what_flow_must_hold(what, computed, tmp_path):
     assert said.startswith("flow/view_0000f_to_view_0001f.exr: ") and problem in said
 
 
+@pytest.mark.parametrize("changed", ["view_0000f", "view_0001f"])
+def test_flow_follows_a_change_of_either_view(changed, computed, tmp_path, run_program):
+    folder = shutil.copytree(computed, tmp_path / "dataset")
+    path = folder / f"exr/{changed}.exr"
+    image = images.read_image(path)
+    channels = dict(image.channels) | {"Z": image.channels["Z"] * np.float32(0.9)}
+    images.write_exr(path, channels, image.attributes)
+    words = ("--lightfield", folder / "lightfield.json", "--output", folder / "flow")
+    run_program("flow.py", *words)
+    name = "flow/view_0000f_to_view_0001f.exr"
+    assert (folder / name).read_bytes() != (computed / name).read_bytes()
+    kept = "flow/view_0002f_to_view_0001f.exr"
+    is_same = (folder / kept).read_bytes() == (computed / kept).read_bytes()
+    assert is_same == (changed == "view_0000f")
+
+
 def found(folder):
     return next(check for check in validate(folder).checks if check.name == "passes")
 

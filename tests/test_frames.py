@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from lightfield.dataset import config
-from lightfield.dataset.dataset import rendered_frames, scene_datasets
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import rendered_frames, scene_datasets
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 
@@ -153,6 +153,17 @@ def test_cameras_are_checked_against_what_their_frame_shows(name, folder, run_pr
     inside = checked(5)
     assert inside.returncode == 1
     assert "1 of 2 cameras are inside late: view_0000f" in inside.stderr
+
+
+def test_a_camera_that_touches_the_floor_is_refused(room, run_program, tmp_path):
+    rig = {"type": "lattice", "cameras": [1, 1, 2], "size": 1, "center": [0.2, 0.1, 0.5005]}
+    lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
+    LightField.from_rig(rig, lens, depth="distance", frame=1).write(tmp_path / "lightfield.json")
+    words = ("--blend", room, "--lightfield", tmp_path / "lightfield.json")
+    output = ("--output", tmp_path / "cameras.json")
+    result = run_program("check_cameras.py", *words, *output, check=False)
+    assert result.returncode == 1
+    assert "1 of 2 cameras are inside a surface" in result.stderr
 
 
 def test_cameras_are_checked_against_what_particles_place(folder, run_program, tmp_path):

@@ -129,7 +129,7 @@ def assert_refused(write, path):
     assert told.startswith(f"{path.with_suffix('')}.")
     assert ": cannot be written: " in told and "\n" not in told
     # What to do, and sizes as a person reads them.
-    assert re.search(r"GB are free on its disk: |is full: make room", told), told
+    assert re.search(r"GB are free on its disk: |is full: free some space", told), told
     after = {p.name: p.read_bytes() for p in path.parent.iterdir()}
     assert after.keys() == before.keys()
     assert after[path.name] == before[path.name]

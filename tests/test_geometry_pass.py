@@ -23,11 +23,11 @@ TURNED = {"center": [0.2, -0.4, 1.1], "rotation": [8, -5, 12]}
 AHEAD = {"center": [0, 0, 0]}
 
 
-def lightfield(camera, place, frame=1, depth=None):
+def lightfield(camera, place, frame=1, depth=None, **more):
     lens = lenses.from_camera(camera)
     rig = {"type": "lattice", "cameras": [1, 1, 1], **place}
     depth = depth or ("z" if lens.has_z_depth else "distance")
-    render = RENDER | {"depth_precision": "float"}
+    render = RENDER | {"depth_precision": "float"} | more
     return LightField.from_rig(rig, lens, depth=depth, frame=frame, render=render)
 
 
@@ -35,6 +35,7 @@ CASES = {
     **{name: ("known", lightfield(camera, TURNED)) for name, camera in LENSES.items()},
     **{fog: (fog, lightfield(LENSES["fisheye_180"], TURNED)) for fog in FOGS},
     "moving": ("moving", lightfield(LENSES["fisheye_180"], TURNED, frame=2)),
+    "unfocused": ("unfocused", lightfield(LENSES["perspective"], TURNED, depth_of_field=True)),
     "curtains": (
         "curtains",
         lightfield(LENSES["perspective"] | {"fov": 105}, AHEAD, depth="distance"),
@@ -91,7 +92,7 @@ def stored(content, distance):
     return distance * -content.lens.pixel_rays()[..., 2]
 
 
-@pytest.mark.parametrize("name", [*LENSES, *FOGS, "moving"])
+@pytest.mark.parametrize("name", [*LENSES, *FOGS, "moving", "unfocused"])
 def test_depth_and_normals_are_those_of_the_first_surface_at_the_pixels_centre(name, views):
     content = CASES[name][1]
     distance, normals, surfaces = truth(content)

@@ -29,7 +29,7 @@ class Simulated:
 
     def __init__(self, lens, device="cpu"):
         self.lens, self.device, self.lightfield = lens, device, None
-        self.whole = lens
+        self.first_view = lens
 
     def on(self, device, lens):
         return Simulated(lens, device)
@@ -55,8 +55,8 @@ class Simulated:
 @pytest.fixture(scope="module")
 def trials():
     maker = Simulated(lenses.from_camera(CAMERA))
-    made = [maker.render(maker.whole, seed, {"samples": 4}) for seed in range(8)]
-    return made[:4], made[4:], maker.mask(maker.whole)
+    made = [maker.render(maker.first_view, seed, {"samples": 4}) for seed in range(8)]
+    return made[:4], made[4:], maker.mask(maker.first_view)
 
 
 def test_renders_of_other_seeds_are_the_same_picture(trials):

@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import pytest
 import yaml
+from checkouts import checkout, snakemake
 from test_config import RIGHT, SNAKEMAKE, changed
 
 from lightfield.core.errors import UserError
@@ -71,6 +72,8 @@ PERSPECTIVE = RIGHT["reprojections"]["perspective"]
 NOT_A_NUMBER = [float("nan"), float("inf"), -float("inf"), 1e31, -1e31, "1e31", True, None, [], {}]
 NOT_A_NAME = ["a\n", LONG, "..", ".hidden", "-rf", "a b", "a/b", "a;b", "$(id)", "ä", "", "a\0"]
 
+# Settings of a scene YAML: the key, its value, and the key that the message begins with, where that
+# is another one.
 VALUES = [
     *(("render.samples", value) for value in [*NOT_A_NUMBER[:-3], HUGE, -1, 0.5, b"1"]),
     *(("render.seed", value) for value in (HUGE, -1, 1.5, datetime.date(2024, 1, 1))),
@@ -86,12 +89,12 @@ VALUES = [
     *(("rigs.LFSphere.camera.fov", value) for value in (0, -1, 1e31, float("nan"), True)),
     ("rigs.LFSphere.camera.principal_point", [1e31, 0]),
     ("rigs.LFSphere.camera.sensor_size", 1e31),
-    ("rigs.LFSphere.frames", {"first": 0, "last": 1_000_000}),
+    ("rigs.LFSphere.frames", {"first": 0, "last": 1_000_000}, "rigs.LFSphere"),
     ("rigs.LFSphere.frames", {"first": 0, "last": HUGE}),
     ("rigs.LFSphere.frames", {"first": 5, "last": 1}),
     ("rigs.LFSphere.frames", {"first": 0, "last": 9999, "step": 0}),
-    ("rigs.LFSphere.frames", {"first": 0, "last": 9999}),
-    ("rigs.LFCuboid.cameras", [2000, 2000, 2000]),
+    ("rigs.LFSphere.frames", {"first": 0, "last": 9999}, "rigs.LFSphere"),
+    ("rigs.LFCuboid.cameras", [2000, 2000, 2000], "rigs.LFCuboid"),
     ("rigs.LFCuboid.cameras", [HUGE, 1, 1]),
     ("rigs.LFCuboid.cameras", [0, 1, 1]),
     ("rigs.LFCuboid.camera.lens", LONG),
@@ -126,17 +129,18 @@ VALUES = [
             {},
         )
     ),
-    *(("rigs.LFSphere.camera.fov", value) for value in (1e-300, 5, 360.1, "180")),
+    *(("rigs.LFSphere.camera.fov", value, "rigs.LFSphere.camera") for value in (1e-300, 5)),
+    *(("rigs.LFSphere.camera.fov", value) for value in (360.1, "180")),
     *(
         ("render.samples", value)
         for value in ("12:30:45", "010", "0b11", "1,000", "64 ", "sixty", "٣")
     ),
     *(
-        ("scene", {"blend": "a.blend", "sha256": value})
+        ("scene", {"blend": "a.blend", "sha256": value}, "scene.sha256")
         for value in (83, "0123", "A" * 64, "0" * 63, "0" * 65, "g" * 64, 0.5, True, ["0" * 64])
     ),
     *(
-        ("scene", {"blend": "a.blend", "url": value})
+        ("scene", {"blend": "a.blend", "url": value}, "scene.url")
         for value in ("ftp://a/b", "//a/b", " http://a", "javascript:0", 7, "")
     ),
     *(("scene.builder", value) for value in ("Room", "room ", "ro-om", "library", "__init__", 7)),
@@ -148,24 +152,152 @@ VALUES = [
     ("scene.parameters", {"detail": float("nan")}),
     ("scene.parameters", {"detail": b"\xff"}),
     ("scene.parameters", {"detail": datetime.date(2024, 1, 1)}),
-    ("scene", {"blend": "a{b}.blend"}),
-    ("scene", {"blend": "a\n.blend"}),
-    ("scene", {"blend": "*.blend"}),
-    ("scene", {"blend": LONG * 10 + ".blend"}),
-    ("scene", {"blend": "a.blend", "url": "file:///etc/passwd"}),
-    ("scene", {"blend": "a.blend", "sha256": "0" * 64 + "\n"}),
+    ("scene", {"blend": "a{b}.blend"}, "scene.blend"),
+    ("scene", {"blend": "a\n.blend"}, "scene.blend"),
+    ("scene", {"blend": "*.blend"}, "scene.blend"),
+    ("scene", {"blend": LONG * 10 + ".blend"}, "scene.blend"),
+    ("scene", {"blend": "a.blend", "url": "file:///etc/passwd"}, "scene.url"),
+    ("scene", {"blend": "a.blend", "sha256": "0" * 64 + "\n"}, "scene.sha256"),
     ("exports", {"instant_ngp": {"sources": ["perspective"], "offset": [0, 0, 1e31]}}),
-    ("render.sa\nmples", 1),
-    ("x" * 100_000, 1),
+    ("render.sa\nmples", 1, "render: sa\\nmples"),
+    ("x" * 100_000, 1, "is larger than 65 kB"),
     ("rigs.LFSphere", {"type": "poses", "file": "missing.csv", "camera": CAMERA}),
     ("rigs.LFSphere", {"type": "poses", "file": "/dev/zero", "camera": CAMERA}),
     ("rigs.LFSphere", {"type": "poses", "file": ".", "camera": CAMERA}),
+    *(("render.max_bounces", value) for value in (-1, 1025, 1.5, True, "8")),
+    *(("render.adaptive_threshold", value) for value in (-0.1, 1.1, float("nan"), "0")),
+    *(("render.denoise", value) for value in ("yes", 1, "auto")),
+    *(("render.denoise_quality", value) for value in ("best", 1, True)),
+    ("render.denoise_prefilter", "High"),
+    *(("render.passes", value) for value in (["Normal"], "normal", [1], ["normal"] * 2, ["depth"])),
+    *(("render.depth", value) for value in ("w", True, 0)),
+    ("render.transparent", "no"),
+    ("render.light_tree", 1),
+    ("render.guiding", "cpu"),
+    *(("render.motion_blur", value) for value in ("half", -1)),
+    ("render.target_error", {"value": 0}, "render.target_error.value"),
+    ("render.target_error", {"denoise": "never"}, "render.target_error"),
+    ("render.target_error", {"value": 0.1, "denoise": "always"}, "render.target_error.denoise"),
+    ("render.depth_of_field", True),
+    *(("render", value) for value in (None, "fast")),
+    *(("rigs", value) for value in ({}, [])),
+    *(("rigs.A", value) for value in ("sphere", 7, [], {})),
+    *(
+        ("rigs.A", {"type": value}, "rigs.A.type")
+        for value in ("cone", "Plane", None, 1, ["plane"])
+    ),
+    *(
+        ("rigs.LFSphere.stereo", {"distance": value}, "rigs.LFSphere.stereo.distance")
+        for value in (0, -1, 1001)
+    ),
+    *(("rigs.LFSphere.stereo", value) for value in ({}, 0.065)),
+    ("rigs.LFSphere.stereo", {"distance": 1, "omnidirectional": True}),
+    *(("rigs.LFSphere.split", value) for value in ("even", "train", True, {"test": ["nobody"]})),
+    *(("rigs.LFSphere.split", {"every": value}, "rigs.LFSphere.split.every") for value in (1, 2.5)),
+    *(("rigs.LFSphere.look_at", value) for value in ([0, 0], "origin", [float("nan")] * 3)),
+    *(("rigs.LFSphere.face_inside", value) for value in (1, "no")),
+    ("rigs.LFSphere.cube_map", "yes"),
+    ("rigs.LFSphere.radius", 1),
+    *(
+        ("rigs.A", {"type": "plane", "camera": CAMERA, "cameras": value}, "rigs.A.cameras")
+        for value in ([0, 1], [2001, 1], [2], [2, 2, 2], "2x2", [2, 1.5], [True, 2])
+    ),
+    *(
+        ("rigs.A", {"type": kind, "camera": CAMERA, "count": 4, key: value}, f"rigs.A.{key}")
+        for kind, key, value in (
+            ("hemisphere", "count", 0),
+            ("hemisphere", "count", 100_001),
+            ("hemisphere", "elevation", [10, 91]),
+            ("hemisphere", "elevation", [50, 10]),
+            ("hemisphere", "pattern", "spiral"),
+            ("ring", "count", 2.0),
+            ("ring", "elevation", 91),
+            ("ring", "elevation", [0, 1]),
+            ("spiral", "turns", 0),
+            ("spiral", "turns", 1001),
+            ("spiral", "elevation", 10),
+            ("path", "keys", []),
+            ("path", "keys", [{}]),
+            ("path", "keys", "a.csv"),
+            ("path", "keys", [{"position": [0, 0, 0], "quaternion_wxyz": [0, 0, 0, 0]}] * 2),
+            ("random", "count", HUGE),
+            ("random", "seed", -1),
+            ("random", "seed", 0.5),
+        )
+    ),
+    *(
+        ("reprojections.perspective.camera", {"resolution": [8, 8], "lens": lens, **keys})
+        for lens, keys in (
+            ("pinhole", {"fov": 60}),
+            (None, {"fov": 60}),
+            ("rectilinear", {"fov": 60, "resolution": "8x8"}),
+            ("rectilinear", {"fov": 60, "resolution": [65537, 8]}),
+            ("rectilinear", {"fov": 60, "principal_point": "centre"}),
+            ("equirectangular", {"longitude": [90, -90]}),
+            ("equirectangular", {"longitude": [0, 0]}),
+            ("equirectangular", {"latitude": [0, 91]}),
+            ("kannala_brandt", {"focal_length": 10, "coefficients": [1]}),
+            ("kannala_brandt", {"focal_length": 10, "coefficients": [float("nan"), 0, 0, 0]}),
+            ("polynomial", {"fov": 120, "coefficients": "abc"}),
+            ("polynomial", {"fov": 361, "coefficients": [0, -0.1, 0, 0, 0]}),
+            ("equisolid", {"fov": 120, "focal_length": 0}),
+            ("stereographic", {"fov": 360}),
+            ("orthographic", {"fov": 181}),
+        )
+    ),
+    *(("reprojections.perspective", value) for value in ("rectilinear", None, [])),
+    *(("reprojections.perspective.rigs", value) for value in ([], "LFSphere", ["Nobody"], [7])),
+    *(("reprojections.perspective.samples", value) for value in (0, 65, 1.5)),
+    *(("reprojections.perspective.bits", value) for value in (10, "8", True)),
+    *(("reprojections.perspective.format", value) for value in ("jpg", "PNG", 7)),
+    *(("reprojections.perspective.filter", value) for value in ("gauss", 1)),
+    *(
+        ("reprojections.perspective.exposure", value)
+        for value in ([], [0, 0], [101], "auto", -101, [0] * 33)
+    ),
+    *(("reprojections.perspective.passes", value) for value in (["albedo"], ["Normal"], "normal")),
+    *(("exports", value) for value in ([], "colmap")),
+    ("exports.nerf", {}),
+    *(("exports.colmap", value) for value in (None, [])),
+    *(
+        (f"exports.{name}", {"sources": ["perspective"], key: value}, f"exports.{name}.{key}")
+        for name, key, value in (
+            ("colmap", "points", 0),
+            ("colmap", "points", 1.5),
+            ("colmap", "format", "csv"),
+            ("colmap", "depth", 1),
+            ("colmap", "sources", []),
+            ("colmap", "sources", ["nowhere"]),
+            ("colmap", "sources", "perspective"),
+            ("nerfstudio", "exposure", 101),
+            ("nerfstudio", "reinhard", 0),
+            ("instant_ngp", "scale", 0),
+            ("instant_ngp", "scale", float("inf")),
+            ("instant_ngp", "aabb_scale", 3),
+            ("instant_ngp", "aabb_scale", 256),
+            ("instant_ngp", "bounds", "all"),
+            ("instant_ngp", "render_aabb", [[0, 0, 0]]),
+            ("instant_ngp", "render_aabb", [[1, 1, 1], [0, 0, 0]]),
+            ("opendibr", "format", "mp4"),
+        )
+    ),
+    *(("flow", value) for value in (True, {"pairs": "all"}, {}, [])),
+    *(("report.panorama", value) for value in ("yes", 1)),
+    *((key, value) for key in ("description", "licence", "credit") for value in (7, ["a"])),
+    *(("scene.parameters.detail", value) for value in (0, 1.1, "1")),
+    *(("scene.parameters.seed", value) for value in (2**63, "7", 0.0)),
+    *(("scene.frame", value) for value in (-1, 1048575, 1.0, "last", "file")),
+    *(("scene", value) for value in (None, [], {})),
+    ("scene.view_layers", ["a"]),
+    ("scene.allow_missing", True),
+    ("scene.scene_name", "a"),
 ]
 
+# Settings of config.yaml; the message begins with the first key.
 SETTINGS = [
     *({"results": value} for value in ("a b", "a;b", "a\n", "$(id)", "a'b", 'a"b', "{a}", "-a")),
     *({"results": value} for value in ("", "a|b", "a>b", "a&b", "a`b", "~", "*", LONG * 10, 7)),
-    *({"results": value} for value in ("work", "./work/", "..")),
+    {"results": ".."},
     *({"work": value} for value in ("a b", ".", "/", "\0", None, ["a"], {"a": "b"})),
     *(
         {key: value}
@@ -180,7 +312,7 @@ SETTINGS = [
         )
     ),
     *({"work": value} for value in ("results", "results/smoke", "./results/../results/a")),
-    *({"results": value} for value in ("work/a", "work/../work")),
+    *({"work": "a", "results": value} for value in ("a", "./a/", "a/b", "a/../a")),
     {"results": str(config.ROOT / "rules")},
     {"results": str(config.ROOT / "README.md")},
     *(
@@ -200,6 +332,29 @@ SETTINGS = [
     {"energy": {"watts": 1e31}},
     {"energy": {"price_per_kwh": float("nan")}},
     {"device": "cpu\n"},
+    *({"preset": value} for value in ("Full", "nope", 7, None, ["full"])),
+    *({"presets": value} for value in ({}, [], {"full": None}, {"Full": {}})),
+    *(
+        {"presets": {"full": {key: value}}}
+        for key, value in (
+            ("resolution", 0),
+            ("denoise", "yes"),
+            ("sample", 1),
+            ("views", 1.5),
+            ("samples", 2**31),
+        )
+    ),
+    *({"views_per_shard": value} for value in (0, 1.5, "all", "10", True)),
+    *({"package_gigabytes": value} for value in (0, -1, "2", float("inf"))),
+    *({"accept_blend": value} for value in ("yes", 1, None)),
+    *({"device": value} for value in ("GPU", "gpu", 0, ["cpu"])),
+    *({"energy": value} for value in (65, {"cores": 0}, {"cores": "all"}, {"price": 1})),
+    *({"energy": {"currency": value}} for value in ("x" * 21, 7)),
+    *({"rigs": value} for value in ([], "a b", ["a", "a"], 7, {"a": 1})),
+    *({"scenes": value} for value in (7, True, [7], [["a"]], "a/b")),
+    {"scene": "room"},
+    {"results": True},
+    {"work": 7.5},
 ]
 
 EYE = np.eye(4).tolist()
@@ -276,15 +431,19 @@ def test_a_hostile_text_is_no_scene(name, tmp_path):
 @pytest.mark.parametrize("number", range(len(VALUES)), ids=lambda n: f"{n}-{VALUES[n][0][:40]}")
 def test_a_hostile_value_is_refused(number, tmp_path):
     file = tmp_path / "hostile.yaml"
-    file.write_text(yaml.safe_dump(changed(*VALUES[number])))
-    assert assert_refused(lambda: config.read_scene(file)).startswith(f"{file}: ")
+    path, value, *named = VALUES[number]
+    file.write_text(yaml.safe_dump(changed(path, value)))
+    message = assert_refused(lambda: config.read_scene(file))
+    assert message.startswith(f"{file}: {named[0] if named else path}")
 
 
 @pytest.mark.parametrize("number", range(len(SETTINGS)))
 def test_a_hostile_setting_is_refused(number, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     content = {"scenes": ["room"], "preset": "full", "presets": {"full": {}}, **SETTINGS[number]}
-    assert assert_refused(lambda: config.load_config(content)).startswith("config.yaml: ")
+    key = next(iter(SETTINGS[number]))
+    message = assert_refused(lambda: config.load_config(content))
+    assert message.startswith(f"config.yaml: {key}")
 
 
 @pytest.mark.parametrize("number", range(len(POSES)))
@@ -356,3 +515,28 @@ def test_a_hostile_plan_ends_with_one_line_and_little_memory(text, own, argument
     # In KiB, but for macOS.
     assert int(largest) * (1 if sys.platform == "darwin" else 1024) < 500e6
     assert not (tmp_path / "results").exists() and not (tmp_path / "work").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        (b"scenes: [garden]\n\tpreset: full\n", "line 2, column 1: is indented with a tab"),
+        (b"scenes: [garden\n", "line 2, column 1"),
+        (b"- garden\n", "must be a mapping"),
+        (b"", "must be a mapping"),
+        (b"\xff\xfe", "cannot be read as YAML"),
+        (None, "cannot be read as YAML"),
+    ],
+)
+def test_what_is_wrong_with_the_checkouts_own_config_is_one_line(text, problem, tmp_path):
+    folder = checkout(tmp_path)
+    if text is None:
+        (folder / "config.yaml").unlink()
+    else:
+        (folder / "config.yaml").write_bytes(text)
+    run = snakemake(folder, "--dry-run")
+    said = (run.stdout + run.stderr).splitlines()
+    assert run.returncode != 0
+    assert said[-1].startswith("error: ") and "config.yaml: " in said[-1] and problem in said[-1]
+    assert len(said) <= 2

@@ -1,5 +1,7 @@
 """Images in and out, against OpenImageIO, Blender and the files' own bytes."""
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 import OpenEXR
@@ -184,6 +186,50 @@ def test_what_is_not_there_is_named(tmp_path, channels):
     (tmp_path / "text.exr").write_text("no image")
     with pytest.raises(UserError, match=r"text\.exr: is no image that can be read"):
         read_header(tmp_path / "text.exr")
+
+
+def test_16_bits_are_shown_by_the_nearest_8(tmp_path):
+    values = np.linspace(0, 65535, 37 * 53 * 3).astype(np.uint16).reshape(37, 53, 3)
+    write_png(tmp_path / "a.png", values)
+    shown = read_image(tmp_path / "a.png").srgb
+    assert np.abs(shown - values / 65535 * 255).max() < 0.5
+
+
+class DamagingWriter:
+    """OpenImageIO's writer on a disk that changes a bit of what it is given."""
+
+    def __init__(self, path, writer):
+        self.path = path
+        self.writer = writer
+        self.open, self.write_image = writer.open, writer.write_image
+
+    def close(self):
+        closed = self.writer.close()
+        with Path(self.path).open("r+b") as file:
+            content = bytearray(file.read())
+            content[content.index(b"IDAT") + 10] ^= 1
+            file.seek(0)
+            file.write(content)
+        return closed
+
+
+def test_a_png_that_the_disk_has_damaged_replaces_no_other(tmp_path, monkeypatch):
+    path = tmp_path / "a.png"
+    pixels = np.random.default_rng(0).integers(0, 255, (37, 53, 3), np.uint8)
+    write_png(path, pixels)
+    create = oiio.ImageOutput.create
+
+    class Output:
+        @staticmethod
+        def create(name):
+            return DamagingWriter(name, create(name))
+
+    monkeypatch.setattr(oiio, "ImageOutput", Output)
+    with pytest.raises(UserError, match=r"a\.png: cannot be written: .*damaged"):
+        write_png(path, 255 - pixels)
+    found = read_image(path)
+    assert np.array_equal(np.dstack([found.channels[name] for name in "RGB"]), pixels)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.png"]
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path, channels):

@@ -2,6 +2,9 @@
 
 import json
 import math
+import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -10,10 +13,10 @@ from pydantic import TypeAdapter
 from sphere import write_views
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import second_name, sha256
+from lightfield.core.files import link_or_copy, sha256
 from lightfield.core.settings import checked
 from lightfield.dataset.config import Scene
-from lightfield.dataset.dataset import scene_datasets
+from lightfield.dataset.loading import scene_datasets
 from lightfield.dataset.published import lightfields
 from lightfield.geometry import lenses
 from lightfield.imaging import images
@@ -28,6 +31,36 @@ reprojections:
     format: exr
 exports:
   instant_ngp: {sources: [perspective], depth: true}
+"""
+
+# Runs Snakemake, then writes how often it listed each folder.
+COUNTING = """
+import atexit, collections, json, os, sys
+listings = collections.Counter()
+def count(event, arguments):
+    if event in ("os.listdir", "os.scandir") and not isinstance(arguments[0], int):
+        listings[os.path.relpath(os.fsdecode(arguments[0] or "."))] += 1
+sys.addaudithook(count)
+atexit.register(lambda: json.dump(listings, open("listings.json", "w")))
+from snakemake.cli import main
+main(sys.argv[1:])
+"""
+
+# Runs Snakemake, then writes how many timers it had at most at one time.
+TIMING = """
+import atexit, json, sys, threading
+waiting = most = 0
+class Timer(threading.Timer):
+    def run(self):
+        global waiting, most
+        waiting += 1
+        most = max(most, waiting)
+        super().run()
+        waiting -= 1
+threading.Timer = Timer
+atexit.register(lambda: json.dump(most, open("timers.json", "w")))
+from snakemake.cli import main
+main(sys.argv[1:])
 """
 
 
@@ -80,8 +113,10 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
     view.write_bytes(content)
     run("import_views.py", *words)
     again = dataset / "perspective"
-    camera = '{"lens": "rectilinear", "fov": 90, "resolution": [24, 24]}'
-    words = ["--exr", "--camera", camera, "--input-cfg", own, "--input-dir", views]
+    camera = {"lens": "rectilinear", "fov": 90, "resolution": [24, 24]}
+    settings = tmp_path / "perspective.json"
+    settings.write_text(json.dumps({"camera": camera, "formats": ["exr"]}))
+    words = ["--settings", settings, "--input-cfg", own, "--input-dir", views]
     run("reproject.py", *words, "--output-dir", again, "--output-cfg", again / "lightfield.json")
     words = ["--input-cfg", again / "lightfield.json", "--image-suffix", ".exr"]
     run("export_instant_ngp.py", *words, "--output", again / "transforms.json")
@@ -133,6 +168,35 @@ def test_nothing_is_rendered_of_it(published, tmp_path):
         assert sha256(dataset / "exr" / view.name) == sha256(view)
         again.append(images.read_image(dataset / "perspective" / view.name).channels["R"])
     assert again[1].sum() == pytest.approx(again[0].sum() / 2, rel=0.01)
+
+
+@pytest.mark.slow
+def test_a_run_lists_no_folder_once_a_shard(published, tmp_path):
+    """Thousands of shards have a folder of many thousand files in common."""
+    command = [sys.executable, "-c", COUNTING, "--cores", "1", "--snakefile", ROOT / "Snakefile"]
+    command += ["--config", "scenes=theirs", "preset=full"]
+    of_views_and_records = []
+    for views_per_shard in (4, 1):
+        words = [*command, f"views_per_shard={views_per_shard}"]
+        subprocess.run(words, cwd=tmp_path, capture_output=True, check=True)
+        assert len([*tmp_path.glob("work/theirs/LFPlane/render/*-?.json")]) == 4 / views_per_shard
+        listings = json.loads((tmp_path / "listings.json").read_text())
+        roots = ("results", "work")
+        own = {folder: count for folder, count in listings.items() if folder.startswith(roots)}
+        assert "results/theirs/LFPlane/exr" in own
+        of_views_and_records.append(own)
+        for folder in (*roots, ".snakemake"):
+            shutil.rmtree(tmp_path / folder)
+    assert of_views_and_records[0] == of_views_and_records[1]
+
+
+@pytest.mark.slow
+def test_waiting_for_jobs_takes_no_more_the_more_have_finished(published, tmp_path):
+    """A timer for each job of hundreds keeps Snakemake looking for jobs without a pause."""
+    command = [sys.executable, "-c", TIMING, "--cores", "1", "--snakefile", ROOT / "Snakefile"]
+    command += ["--config", "scenes=theirs", "preset=full", "views_per_shard=1"]
+    subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
+    assert json.loads((tmp_path / "timers.json").read_text()) <= 2
 
 
 def test_linked_folders_are_rigs_by_the_names_of_their_links(published, tmp_path, monkeypatch):
@@ -207,6 +271,6 @@ def test_a_view_that_nobody_may_write_is_taken_over(nobody):
     link = nobody / "deep" / "link.exr"
     link.symlink_to("../published.exr")
     for name in (view, link):
-        second_name(name, taken)
+        link_or_copy(name, taken)
         assert taken.samefile(view)
         assert not taken.is_symlink()

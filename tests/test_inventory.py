@@ -62,8 +62,9 @@ def test_what_artists_leave_behind_is_found_and_left_out(scenes):
     # What a modifier or an instancer needs stays, though no ray meets it as it stands.
     assert found["inventory"]["hidden"] == ["hidden", "in excluded", "in off", "unseen"]
     assert "only hidden" not in found["materials"]
-    # The room's seven, the cutter by its modifier, the instanced, its instancer, and our camera.
-    assert found["objects"] == 11
+    # The room's seven, the cutter by its modifier, the instanced, its instancer, our camera, and
+    # one for each kind of ray that meets nothing else.
+    assert found["objects"] == 11 + 6
 
 
 def test_an_animation_is_frozen_at_the_frame_of_the_dataset(scenes):

@@ -193,7 +193,7 @@ def test_numbas_file_in_the_folder_where_a_program_runs_is_not_read(run_program,
 # Settings are read before a kernel is needed, as some programs do. What is compiled has signatures.
 KERNEL = """
 import lightfield.dataset.config
-from lightfield.core.kernels import kernel
+from lightfield.core.compiled import kernel
 
 @kernel
 def double(value):

@@ -1,5 +1,6 @@
 """What follows from journals: machines to avoid, views that hang, and views that are suspect."""
 
+import json
 import signal
 import subprocess
 import sys
@@ -7,7 +8,7 @@ import sys
 import pytest
 from conftest import SCRIPTS
 
-from lightfield.dataset.journal import Run, avoided, is_suspect
+from lightfield.dataset.journal import Run, avoided, is_suspect, read
 
 
 def runs(*hosts):
@@ -35,6 +36,8 @@ def runs(*hosts):
         # Thrice, by other shards, of which the last run may still be at work.
         ([], [["a!", "a!", "a!", "b"]], ["a"]),
         ([], [["a!", "a!", "b"], ["a!"]], []),
+        # Whatever ended there before.
+        ([], [["a", "a!", "a!", "a!", "b"]], ["a"]),
         # Not one after the other.
         ([], [["a!", "a!", "a", "a!", "b"]], []),
         (["c!"], [["a!", "a!", "a!", "b"]], ["a", "c"]),
@@ -48,6 +51,23 @@ def test_a_view_is_suspect_that_took_nearly_no_time_beside_the_others():
     assert is_suspect(0.01, [1.0, 1.1, 0.9])
     assert not is_suspect(0.1, [1.0, 1.1, 0.9])
     assert not is_suspect(0.01, [1.0, 1.1])
+
+
+def test_what_stands_before_the_first_start_is_of_no_run(tmp_path):
+    """A journal whose first line was damaged can still be read."""
+    path = tmp_path / "0-2.journal.jsonl"
+    view = {"finished": 12.0, "wall_seconds": 2.0, "cpu_seconds": 2.0, "render_seconds": 1.0}
+    lines = [
+        {"start_up_seconds": 1.0, "device": "CPU", "threads": 1},
+        {"view": "view_0000f"} | view,
+        {"ended": 13.0, "cpu_seconds": 5.0, "peak_memory_bytes": 100},
+        {"started": 20.0, "host": "there", "pid": 1},
+        {"view": "view_0001f"} | view,
+    ]
+    path.write_text("".join(f"{json.dumps(line)}\n" for line in lines))
+    (run,) = read(path)
+    assert run.start["started"] == 20.0 and run.end is None
+    assert [line["view"] for line in run.views] == ["view_0001f"]
 
 
 HANG = """

@@ -7,6 +7,21 @@ from lightfield.dataset import ledger
 from lightfield.dataset.ledger import Job, Ledger, Stamp
 
 
+def test_a_file_that_no_job_made_is_read_once_for_all_that_read_it(tmp_path, monkeypatch):
+    scene = tmp_path / "scene.blend"
+    scene.write_bytes(b"scene")
+    reads = []
+    monkeypatch.setattr(ledger, "sha256", lambda path: reads.append(path) or sha256(path))
+    jobs = Ledger(tmp_path / "ledger.txt")
+    for _ in range(20):
+        (stamp,) = jobs.input_stamps([str(scene)]).values()
+        assert stamp.sha256 == sha256(scene)
+    assert len(reads) == 1
+    scene.write_bytes(b"another")
+    (stamp,) = jobs.input_stamps([str(scene)]).values()
+    assert stamp.sha256 == sha256(scene)
+
+
 def test_a_touched_file_is_read_once_for_all_that_was_made_from_it(tmp_path, monkeypatch):
     scene = tmp_path / "scene.blend"
     scene.write_bytes(b"scene")

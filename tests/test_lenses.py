@@ -18,7 +18,7 @@ from pydantic import TypeAdapter
 from scipy.spatial.transform import Rotation
 
 from lightfield.core.errors import UserError
-from lightfield.geometry.depth import z_from_distance
+from lightfield.geometry.depth import conventional_depth, z_from_distance
 from lightfield.geometry.lenses import (
     LENSES,
     CameraSettings,
@@ -163,7 +163,9 @@ def test_cycles_depth_is_z_for_perspective_and_distance_otherwise(
 ) -> None:
     rays, distance = cycles[name + ".rays"], cycles[name + ".distance"]
     seen = np.isfinite(distance)
-    depth = z_from_distance(distance, rays) if name.startswith("perspective") else distance
+    meaning = conventional_depth(CAMERAS[name])
+    assert meaning == ("z" if name.startswith("perspective") else "distance")
+    depth = z_from_distance(distance, rays) if meaning == "z" else distance
     np.testing.assert_allclose(cycles[name + ".depth"][seen], depth[seen], rtol=1e-5)
 
 
@@ -949,14 +951,18 @@ def test_rays_of_all_pixel_centres(dtype: type) -> None:
 USE_IT = """
 import argparse, math
 from lightfield.geometry import lenses
-from lightfield.reprojection import lens_arguments
+from lightfield.reprojection import flags
+from lightfield.reprojection.geometry import Geometry
 
 lens = lenses.from_camera({"lens": "halved", "fov": 60, "resolution": [8, 8]})
 assert lenses.from_lightfield(lens.to_lightfield()).fov == math.radians(60)
 parser = argparse.ArgumentParser()
-lens_arguments.add_geometry_flags(parser)
+flags.add_configuration_flags(parser)
+flags.add_lens_map_flags(parser)
 words = ["--no-configs", "8,8", "--i-halved", "1", "--halved", "0.5"]
-geometry = lens_arguments.geometry(parser.parse_args(words))
+arguments = parser.parse_args(words)
+source = flags.read_source(arguments)[1]
+geometry = Geometry.of(flags.lens_map_settings(arguments, source), source)
 assert (geometry.source.fov, geometry.targets[0].lens.description) == (1, "halved fisheye, 28.65°")
 """
 

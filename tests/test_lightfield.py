@@ -12,7 +12,7 @@ import pytest
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import keys
-from lightfield.dataset.config import Source
+from lightfield.dataset.config import SceneSource
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.geometry import lenses, rigs, rotations
 
@@ -110,20 +110,19 @@ def test_the_matrix_looks_where_the_rig_points() -> None:
 
 
 @pytest.mark.parametrize(
-    ("lens", "absent", "cycles", "impossible"),
+    ("lens", "absent", "impossible"),
     [
-        (FISHEYE, "z", "distance", "Z"),
-        (PERSPECTIVE, "z", "z", "none"),
-        (WIDE, "distance", "distance", "z"),
-        (PANORAMA, "distance", "distance", "z"),
+        (FISHEYE, "z", "Z"),
+        (PERSPECTIVE, "z", "none"),
+        (WIDE, "distance", "z"),
+        (PANORAMA, "distance", "z"),
     ],
 )
 def test_what_depth_means_follows_from_the_key_and_the_lens(
-    lens: lenses.Lens, absent: str, cycles: str, impossible: str
+    lens: lenses.Lens, absent: str, impossible: str
 ) -> None:
     rig = {"type": "plane", "cameras": [1, 1]}
     assert LightField.from_rig(rig, lens).depth == absent
-    assert LightField.from_rig(rig, lens).cycles_depth == cycles
     for depth in {absent, "distance", None}:
         assert LightField.from_rig(rig, lens, depth=depth).depth == depth
     with pytest.raises(UserError, match=f"^lightfield.json: depth: is '{impossible}'"):
@@ -269,7 +268,7 @@ def test_a_views_seed_is_its_own_and_stays_what_it_was() -> None:
 def test_a_scenes_fingerprint_is_its_files_or_its_builders(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    blend = Source(blend="a.blend", sha256="ab" * 32)
+    blend = SceneSource(blend="a.blend", sha256="ab" * 32)
     assert keys.scene_fingerprint(blend) == "ab" * 32
     with pytest.raises(UserError, match=r"a.blend: its sha256 is not known"):
         keys.scene_fingerprint(blend.model_copy(update={"sha256": None}))
@@ -279,7 +278,7 @@ def test_a_scenes_fingerprint_is_its_files_or_its_builders(
         for folder, text in (("library", common), ("room", own)):
             (tmp_path / folder).mkdir(exist_ok=True)
             (tmp_path / folder / "__init__.py").write_text(text)
-        found.add(keys.scene_fingerprint(Source(builder="room", parameters={"seed": seed})))
+        found.add(keys.scene_fingerprint(SceneSource(builder="room", parameters={"seed": seed})))
     assert len(found) == 4 and all(len(key) == 64 for key in found)
 
 
@@ -310,11 +309,11 @@ def test_keys_stay_what_they_were(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         (tmp_path / name).write_text(name)
     scene, render = {"name": "a"}, {"samples": 4, "seed": 0}
     first = LightField.from_rig(PLANE, FISHEYE, depth="z", frame=1, scene=scene, render=render)
-    blend = Source(blend="a.blend", sha256="ab" * 32)
+    blend = SceneSource(blend="a.blend", sha256="ab" * 32)
     found = [
         keys.render_key(first, first.views[1]),
         keys.names_key(first),
-        keys.scene_fingerprint(Source(builder="room")),
+        keys.scene_fingerprint(SceneSource(builder="room")),
         keys.scene_fingerprint(blend, [("a.png", "cd" * 32), ("b.png", None)]),
     ]
     assert [key[:12] for key in found] == [

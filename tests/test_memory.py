@@ -9,8 +9,8 @@ from lightfield.core import memory as machine
 from lightfield.core.errors import UserError
 from lightfield.dataset import memory
 from lightfield.dataset.config import load_config, read_config
-from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import lenses
 from lightfield.rendering import scene_memory, shard
 
@@ -38,9 +38,40 @@ def test_what_runs_at_once_fits_into_memory(cores, shards, need, available, expe
 def test_this_machines_memory_is_within_every_limit(tmp_path, monkeypatch):
     found = machine.available()
     assert 0 < machine.peak() < found
-    (tmp_path / "memory").mkdir()
-    (tmp_path / "memory/memory.limit_in_bytes").write_text("1000000\n")
-    monkeypatch.setattr(machine, "_limit_files", lambda: list(tmp_path.glob("*/*")))
+    monkeypatch.setattr(machine, "CONTROL_GROUPS", tmp_path)
+    monkeypatch.setattr(machine, "OWN_GROUPS", tmp_path / "own")
+    assert machine.available() >= found
+
+
+@pytest.mark.parametrize(
+    ("own", "limits"),
+    [
+        # The second version of control groups: a batch system limits a job, and not its steps.
+        (
+            "0::/batch/job_7/step_0",
+            {"batch/job_7/memory.max": "1000000", "batch/job_7/step_0/memory.max": "max"},
+        ),
+        ("0::/batch/job_7", {"memory.max": "max", "batch/job_7/memory.max": "1000000"}),
+        # The first version, whose limit of the whole machine is a huge number.
+        (
+            "5:cpu:/batch\n9:memory:/batch/job_7",
+            {
+                "cpu/batch/memory.max": "1000",
+                "memory/memory.limit_in_bytes": "9223372036854771712",
+                "memory/batch/memory.limit_in_bytes": "1000000",
+                "memory/batch/job_7/memory.limit_in_bytes": "2000000",
+            },
+        ),
+    ],
+)
+def test_of_nested_limits_of_memory_the_tightest_counts(own, limits, tmp_path, monkeypatch):
+    (tmp_path / "own").write_text(f"{own}\n")
+    for name, limit in limits.items():
+        path = tmp_path / "groups" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"{limit}\n")
+    monkeypatch.setattr(machine, "CONTROL_GROUPS", tmp_path / "groups")
+    monkeypatch.setattr(machine, "OWN_GROUPS", tmp_path / "own")
     assert machine.available() == 1_000_000
 
 
@@ -48,12 +79,12 @@ def test_a_job_asks_for_what_the_scene_was_measured_to_take(tmp_path):
     content = read_config(ROOT / "config.yaml") | {"work": str(tmp_path)}
     dataset = scene_datasets("garden", settings=load_config(content))[0]
     pixels = 2048 * 2048 * memory.PIXEL_BYTES
-    assert dataset.view_memory_bytes == memory.UNKNOWN_SCENE + pixels
+    assert dataset.estimate.view_memory_bytes == memory.UNKNOWN_SCENE + pixels
     (tmp_path / "garden").mkdir()
     (tmp_path / "garden/inventory.json").write_text(json.dumps({"memory_bytes": 2 * GB}))
-    assert dataset.view_memory_bytes == 2.4 * GB + pixels
+    assert dataset.estimate.view_memory_bytes == 2.4 * GB + pixels
     # Four pixels for each of a view's, up to 4096 by 2048.
-    assert dataset.memory_bytes(dataset.panorama_width**2 // 2) == 2.4 * GB + 2 * pixels
+    assert dataset.estimate.memory_bytes(dataset.panorama_width**2 // 2) == 2.4 * GB + 2 * pixels
 
 
 def test_a_scene_is_measured_in_a_process_of_its_own(room):

@@ -17,12 +17,12 @@ from pass_views import LENSES, RENDER, SIZE, WALL
 from scipy.ndimage import binary_dilation, binary_erosion
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json, sha256
+from lightfield.core.files import read_json, sha256, write_json
 from lightfield.dataset import passes
 from lightfield.dataset.config import Scene
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.geometry import lenses
 from lightfield.imaging import images
 from lightfield.rendering import shard
@@ -98,6 +98,13 @@ def test_motion_across_the_seam_of_a_panorama_is_the_short_one():
     motion = np.array([[[60, 1, -61.5, 2]]], np.float32)
     channels, _ = shard.pass_channels(PASSES["motion"], SimpleNamespace(motion=motion), None, lens)
     assert [plane.item() for plane in channels.values()] == [-4, 1, 2.5, 2]
+
+
+def test_light_beyond_what_halves_hold_is_clamped_and_counted():
+    colour = np.array([[[70_000, -70_000, 65_504], [1, -1, 0]]], np.float32)
+    channels, attributes = shard.colour_channels(colour)
+    assert attributes[images.CLAMPED_ATTRIBUTE] == 2
+    assert [channels[name][0, 0] for name in "RGB"] == [65_504, -65_504, 65_504]
 
 
 def test_what_is_not_a_number_is_counted_and_becomes_0():
@@ -185,7 +192,7 @@ def test_views_without_a_centre_are_not_reprojected_nor_exported(made, tmp_path,
         assert "omnidirectional_stereo: its views have no centre" in refused.stderr
     assert not list(tmp_path.iterdir())
     with pytest.raises(UserError, match="its views have no centre"):
-        _ = Source(source, "", ".exr").lightfield
+        _ = SourceDataset(source, "", ".exr").lightfield
 
 
 def mattes(folder):
@@ -394,9 +401,10 @@ def test_reprojected_ids_are_kept_normals_unit_and_light_still_adds_up(made, tmp
     """A perspective view made of the fisheye's, against the one that was rendered."""
     names = [name for name in PASSES if name != "motion"]
     source, target = made / "fisheye", tmp_path / "perspective"
-    camera = json.dumps(LENSES["perspective"])
+    settings = {"camera": LENSES["perspective"], "filter": "bilinear"}
+    write_json(tmp_path / "flat.json", settings | {"formats": ["exr"], "passes": names})
     run_program(
-        *("reproject.py", "--camera", camera, "--exr", "--bl", "--passes", ",".join(names)),
+        *("reproject.py", "--settings", tmp_path / "flat.json"),
         *("--input-cfg", source / "lightfield.json", "--input-dir", source / "exr"),
         *("--output-dir", target, "--output-cfg", target / "lightfield.json"),
         *("--source-record", made / "fisheye.json", "--record", tmp_path / "record.json"),
@@ -489,8 +497,8 @@ def test_passes_that_cannot_be_are_refused(wrong, problem):
 def test_passes_keep_the_tables_order_and_what_asks_for_none_is_as_before():
     content = Scene.model_validate(scene(passes=["emission", "normal"], again=["normal"]))
     assert content.render.passes == ["normal", "emission"]
-    assert "--passes normal" in content.reprojections["other"].development
+    assert content.reprojections["other"].settings.passes == ["normal"]
     bare = Scene.model_validate(scene())
     assert "passes" not in bare.render.model_dump(exclude_none=True)
-    assert "passes" not in bare.reprojections["other"].development
+    assert bare.reprojections["other"].settings.passes == []
     assert passes.without(RENDER).keys() == RENDER.keys() - {"passes"}

@@ -10,9 +10,10 @@ from checkouts import checkout, planned
 
 from lightfield.core.files import write_json
 from lightfield.dataset import shard_counts
-from lightfield.dataset.dataset import scene_datasets
+from lightfield.dataset.description import Cluster
 from lightfield.dataset.journal import Journal
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import lenses
 from lightfield.measurement import plan
 from lightfield.rendering import probe as probing
@@ -75,22 +76,24 @@ def test_shards_follow_from_the_jobs_of_a_cluster_and_from_a_probe(sphere):
         return len(replace(sphere, **settings).shards)
 
     assert count() == 64
-    assert count(most_shards=100) == 100
-    # Of 16 cores for 20 minutes each: three of them a view.
-    assert count(most_shards=100, shard_minutes=320) == 216
-    assert count(most_shards=100, shard_minutes=1) == 642
+    # Jobs of 16 cores for 20 minutes: three of them render a view.
+    assert count(cluster=Cluster(jobs=100, cores=16)) == 216
+    assert count(cluster=Cluster(jobs=300, cores=16)) == 300
+    assert count(cluster=Cluster(jobs=100, cores=1)) == 642
+    # Jobs of 1000 cores would do with fewer than 100, but 100 run at once.
+    assert count(cluster=Cluster(jobs=100, cores=1000)) == 100
     probe = {"device": "CPU", "resolution": [2048, 2048], "samples": 256}
     write_json(
         Path(sphere.work, "probe.json"), probe | {"view_seconds": [6.0], "view_bytes": [1e7]}
     )
     # Ten views are the shortest for which start-up is a small part.
-    assert count(most_shards=100, shard_minutes=320) == 65
-    assert count(most_shards=50, shard_minutes=320) == 50
+    assert count(cluster=Cluster(jobs=100, cores=16)) == 65
+    assert count(cluster=Cluster(jobs=50, cores=16)) == 64
 
 
 def test_a_dataset_that_was_begun_keeps_its_shards(sphere):
     shard_counts.note(sphere.work_root, {sphere.name: (642, 400), "other/rig": (10, 3)})
-    begun = replace(sphere, most_shards=100)
+    begun = replace(sphere, cluster=Cluster(jobs=100, cores=1000))
     assert len(begun.shards) == 400
     assert begun.shards[0][0] == 0 and begun.shards[-1][1] == 642
     assert len(replace(begun, views_per_shard=321).shards) == 2
@@ -127,6 +130,8 @@ def test_the_table_adds_up_what_the_probes_measured():
     assert "| garden/LFCuboid_8panos | 8 | 4096 × 2048 | 256 | 90 ± 0 | 0 | — | — | 0.1 |" in text
     assert "| all | 308 | | | | 3 ± 0 | — | — | 3 |" in text
     assert "Hours of one processor core" in text
+    # Under the table: 300 × 36 / 3600 = 3.
+    assert "hours = views × s a view / 3600" in text.split("| all |")[1]
     assert "Hours of the graphics card." in plan.table(
         [("a/b", 1, fisheye | {"device": "GPU"})], {}
     )

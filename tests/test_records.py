@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from lightfield.core.files import read_json, sha256
-from lightfield.dataset.records import ShardRecord, read
+from lightfield.dataset.records import ShardRecord
+from lightfield.dataset.shard_files import read_record
 
 
 def test_a_file_is_finished_with_its_key_and_bytes_whichever_shard_made_it(tmp_path: Path) -> None:
@@ -30,7 +31,7 @@ def test_a_record_lists_files_that_were_not_looked_at_too(tmp_path: Path) -> Non
     ShardRecord(path, file.parent).write([file], counts={"views": 1})
     entry = {"bytes": 5, "sha256": sha256(file)}
     assert read_json(path) == {"files": {"exr/a.exr": entry}, "counts": {"views": 1}}
-    assert read(path) == {"exr/a.exr": (entry["bytes"], entry["sha256"])}
+    assert read_record(path) == {"exr/a.exr": (entry["bytes"], entry["sha256"])}
 
 
 def test_a_view_made_by_other_settings_is_not_looked_for_in_other_logs(tmp_path: Path) -> None:

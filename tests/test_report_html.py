@@ -600,6 +600,7 @@ def test_epipolar_images_hold_the_light_and_depth_of_the_scene(rig, tilt):
     ("change", "expected"),
     [
         ({"type": "plane", "cameras": [5, 3]}, range(5, 10)),
+        ({"type": "plane", "cameras": [5, 3], "face_inside": True}, range(5, 10)),
         ({"type": "cuboid", "cameras": [4, 3, 1]}, range(4)),
         # The left side comes after front and back, each of 2 × 3.
         ({"type": "cuboid", "cameras": [2, 5, 3]}, range(12 + 5, 12 + 10)),
@@ -616,6 +617,12 @@ def test_the_row_is_the_middle_one(change, expected):
     poses = np.tile(np.eye(4), (9, 1, 1)) if unread else [p.matrix() for p in rig.poses()]
     row = epipolar.find_row(rig, np.array(poses))
     assert (sorted(row.views) if row else None) == (list(expected) if expected else None)
+    if row:
+        # The first is the leftmost camera, as the cameras themselves see it.
+        assert (np.diff(row.places) > 0).all()
+    if row and row.kind == "line":
+        first, last = (poses[row.views[end]] for end in (0, -1))
+        assert first[:3, 0] @ (last - first)[:3, 3] > 0
 
 
 def test_a_spheres_row_is_its_equator():

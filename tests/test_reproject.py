@@ -90,6 +90,8 @@ def run(dataset, monkeypatch):
     return go
 
 
+CAMERA = {"lens": "rectilinear", "fov": 90, "resolution": [24, 16]}
+FOCAL_LENGTH = {"lens": "rectilinear", "focal_length": 18, "resolution": [24, 16]}
 PERSPECTIVE = ("--rectilinear", "18,36", "--scale", "0.5")
 
 
@@ -161,6 +163,8 @@ def test_pixels_without_a_source_are_marked(dataset, run):
     assert set(np.unique(rgba["A"])) == {0, 255}
     assert not any(rgba[c][missing].any() for c in "RGB")
     assert np.array_equal(np.isnan(depth.channels["Z"]), missing)
+    # Depth says it: no second mark beside it.
+    assert depth.channels.keys() == {*"RGBZ"}
     assert not depth.channels["G"][missing].any()
     mask = read_image(out / "dynamic_mask_view_0000f.png").channels["Y"]
     assert np.array_equal(mask, np.where(missing, 255, 0))
@@ -168,6 +172,16 @@ def test_pixels_without_a_source_are_marked(dataset, run):
     assert integers.dtype == np.uint16 and not integers[missing].any()
     z = depth.channels["Z"][~missing].astype(float)
     assert np.abs(integers[~missing] - z * 1000).max() <= 0.5
+
+
+def test_what_is_too_far_for_a_depth_png_has_no_depth_there(dataset, run):
+    run(*PERSPECTIVE, "--exr", "--depth-png", "40000")
+    z = read_image(dataset / "out" / "view_0000f.exr").channels["Z"].astype(float)
+    integers = read_image(dataset / "out" / "view_0000f_depth.png").channels["Y"]
+    # 16 bits end at 1.638 m.
+    assert 0.1 < (z < 1.638).mean() < 0.9
+    assert np.abs(integers - z * 40000)[z < 1.638].max() <= 0.5
+    assert not integers[z > 1.639].any()
 
 
 def test_a_copy_has_no_depth_below_zero_in_a_png_and_no_pixel_that_is_no_number(dataset, run):
@@ -547,6 +561,67 @@ def test_mistakes_are_named(run, flags, told):
     with pytest.raises(UserError) as error:
         run(*flags)
     assert told in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("flags", "settings"),
+    [
+        (
+            ["--rectilinear", "18,36", "--output-resolution", "24,16", "--png", "--exr"],
+            {"camera": FOCAL_LENGTH, "formats": ["png", "exr"]},
+        ),
+        (
+            ["--cubemap", "12", "--rotation", "20,-10,30", "--exr", "--bl", "-s", "2", "--mask"],
+            {
+                "camera": CAMERA | {"resolution": [12, 12]},
+                "cube_map": True,
+                "rotation": [20, -10, 30],
+                "filter": "bilinear",
+                "samples": 2,
+                "formats": ["exr"],
+                "mask": True,
+            },
+        ),
+        (
+            ["--no-reproject", "--png", "--bits", "16", "--exposure", "-1", "--reinhard", "5"],
+            {"formats": ["png"], "bits": 16, "exposure": -1, "reinhard": 5},
+        ),
+    ],
+)
+def test_a_settings_file_gives_the_bytes_of_the_flags(dataset, run, tmp_path, flags, settings):
+    run(*flags, "--depth-png", "1000")
+    by_flags = {path.name: path.read_bytes() for path in (dataset / "out").iterdir()}
+    shutil.rmtree(dataset / "out")
+    (tmp_path / "settings.json").write_text(json.dumps({**settings, "depth_png": 1000}))
+    run("--settings", str(tmp_path / "settings.json"))
+    assert {path.name: path.read_bytes() for path in (dataset / "out").iterdir()} == by_flags
+
+
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        ({"formats": ["png"], "exposur": 1}, "exposur: unknown key; did you mean exposure?"),
+        ({"formats": ["png"], "exposure": 101}, "exposure: is 101; must be a number at most 100"),
+        ({"formats": ["jpg"]}, "formats.[0]: is "),
+        ({"bits": 16}, "formats: must be a list of exr, png, or both"),
+        ({"formats": ["png"], "camera": CAMERA | {"fov": "90"}}, "camera.fov: is "),
+        ({"formats": ["png"], "camera": CAMERA, "cube_map": True}, "camera.resolution: is [24, 16"),
+        ({"formats": ["png"], "passes": ["normal"]}, "passes: is normal; "),
+        ([], "must be a mapping"),
+    ],
+)
+def test_mistakes_in_a_settings_file_are_named(dataset, run, tmp_path, settings, told):
+    (tmp_path / "settings.json").write_text(json.dumps(settings))
+    with pytest.raises(UserError) as error:
+        run("--settings", str(tmp_path / "settings.json"))
+    assert told in str(error.value)
+    assert not (dataset / "out").exists()
+
+
+def test_a_settings_file_excludes_the_flags(run, tmp_path):
+    (tmp_path / "settings.json").write_text('{"formats": ["png"]}')
+    with pytest.raises(UserError, match="--settings: excludes --exposure"):
+        run("--settings", str(tmp_path / "settings.json"), "--exposure", "1")
 
 
 def test_two_images_of_one_name_are_named(dataset, run):

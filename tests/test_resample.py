@@ -437,6 +437,16 @@ def test_depth_stays_within_its_neighbourhood_and_missing_values_stay_where_they
     assert np.array_equal(np.isnan(found), np.isnan(distance[row, column]))
 
 
+def test_the_top_of_a_ridge_is_no_nearer_than_its_pixels():
+    # Its top lies between two pixels, where a curve through them would be nearer than all.
+    from_top = np.minimum(np.abs(np.arange(256) - 127.5), 3)
+    distance = np.broadcast_to(1 / (1 - 0.05 * from_top**2), (256, 256))
+    made = lens_map.compute(FISHEYE, narrow_lens(900, focal_length=90), IDENTITY, "adaptive")
+    found = apply_depth(distance.astype("f4"), made, False, False)
+    assert found.max() > 1.5
+    assert found.min() == pytest.approx(distance.min(), rel=1e-6)
+
+
 def test_depth_is_taken_at_the_pixel_centre_whatever_the_samples():
     source = Equidistant(width=256, height=256, fov=math.pi)
     depth = as_depth(plane_distance(rays_of(source), np.array([0.3, 0, -1.0]), 2.0), source)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
-from lightfield.dataset.dataset import scene_datasets
+from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import colmap
 from lightfield.geometry.rigs import from_settings
 from lightfield.geometry.rigs import poses as rig_of_poses

@@ -207,6 +207,7 @@ def test_the_table_sets_computed_figures_beside_the_printed_ones(
     cuboid = rows["LFCuboid_2x2x1"]
     assert (cuboid["views"], cuboid["printed_views"]) == ("1806", "1806")
     assert float(cuboid["nearest_m"]) == pytest.approx(0.1)
+    assert float(cuboid["printed_m"]) == pytest.approx(0.1)
     assert float(cuboid["immersive_interpolation_volume_m3"]) == pytest.approx(4)
     sphere = rows["LFSphere_e100cm_d170cm"]
     assert sphere["views"] == sphere["printed_views"] == "642"

@@ -587,6 +587,15 @@ def test_a_hemisphere_is_evenly_covered():
         assert nearest.min() > 0.5 * even and nearest.max() < 1.6 * even, name
 
 
+def test_each_camera_of_a_hemisphere_stands_in_the_middle_of_its_share_of_the_area():
+    """The area of a zone grows with its height, so a zone's cameras have its mean height."""
+    low, high = (math.sin(math.radians(angle)) for angle in (10, 80))
+    places = rigs.from_settings(ORBITS["hemisphere"] | {"size": 2}).poses()
+    heights = np.array([pose.position[2] for pose in places])
+    assert heights.mean() == pytest.approx((low + high) / 2, abs=1e-9)
+    assert heights.min() - low == pytest.approx(high - heights.max(), abs=1e-9)
+
+
 def test_spiral_rises_evenly_round_and_round():
     places = np.array([p.position for p in rigs.from_settings(ORBITS["spiral"]).poses()]) * 2
     azimuth = np.unwrap(np.arctan2(places[:, 0], places[:, 1]))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lightfield.dataset import config, keys
-from lightfield.dataset.config import Source
+from lightfield.dataset.config import SceneSource
 from scenes.library.architecture import cut
 from scenes.library.points import evenly, lattice, mirrored, noise, points, polar, smoothstep
 from scenes.library.scene import Model, Scene
@@ -171,7 +171,7 @@ def test_a_fingerprint_is_of_the_library_and_the_builders_own_files(
     builders = tmp_path / "scenes"
     shutil.copytree(config.BUILDERS, builders, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(keys, "BUILDERS", builders)
-    source = Source(builder="garden", parameters={"seed": 1})
+    source = SceneSource(builder="garden", parameters={"seed": 1})
     before = keys.scene_fingerprint(source)
     with (builders / file).open("a") as text:
         text.write("# changed\n")

@@ -9,7 +9,7 @@ from checkouts import checkout, planned
 
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
-from lightfield.dataset.dataset import load_datasets, scene_datasets
+from lightfield.dataset.loading import load_datasets, scene_datasets
 from lightfield.imaging import images
 
 SCENE = """

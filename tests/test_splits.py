@@ -14,14 +14,14 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.settings import checked
 from lightfield.dataset import config
-from lightfield.dataset.dataset import scene_datasets
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.splits import listed
-from lightfield.export.source import Source
-from lightfield.export.splits import splits
+from lightfield.dataset.loading import scene_datasets
+from lightfield.dataset.splits_file import splits_content
+from lightfield.export.source import SourceDataset
+from lightfield.export.trainer_splits import splits
 from lightfield.geometry import rigs
-from lightfield.validation import splits as validation
+from lightfield.validation import splits_check
 from lightfield.validation.files import read_sets
 
 PERSPECTIVE = {"lens": "rectilinear", "fov": 70, "resolution": [32, 24]}
@@ -134,7 +134,7 @@ def scene(tmp_path_factory):
 def exported(scene, name, folder, **options):
     settings = TypeAdapter(settings_of(name)).validate_python({"sources": ["small"], **options})
     beside = {rig: scene / rig for rig in ("near", "along")}
-    export.run(name, Source(scene / "around", "small", ".exr", beside), settings, folder)
+    export.run(name, SourceDataset(scene / "around", "small", ".exr", beside), settings, folder)
     return folder
 
 
@@ -178,7 +178,7 @@ def test_points_come_from_the_views_to_train_on_alone(scene, tmp_path):
 
 def test_points_of_a_rig_that_only_tests_come_from_all_its_views(scene, tmp_path):
     settings = settings_of("point_cloud")(sources=["small"], voxel=0.1)
-    export.run("point_cloud", Source(scene / "along", "small", ".exr"), settings, tmp_path)
+    export.run("point_cloud", SourceDataset(scene / "along", "small", ".exr"), settings, tmp_path)
     assert len(ply(tmp_path / "points.ply")[0])
 
 
@@ -198,11 +198,11 @@ def test_validation_finds_what_is_not_as_the_split_says(scene, tmp_path):
 
     def problems():
         dataset = folder / "around"
-        return validation.check(path, dataset, read_sets(dataset, ["small"])[0]).problems
+        return splits_check.check(path, dataset, read_sets(dataset, ["small"])[0]).problems
 
     def write():
         found = {name: LightField.read(folder / name / "lightfield.json") for name in rig_names}
-        write_json(path, listed(found))
+        write_json(path, splits_content(found))
         return json.loads(path.read_text())
 
     content = write()
@@ -216,7 +216,9 @@ def test_validation_finds_what_is_not_as_the_split_says(scene, tmp_path):
     tested["frames"][2] = trained["frames"][1] | {"name": "view_0002f", "split": "test"}
     write_json(folder / "along" / "lightfield.json", tested)
     write()
-    assert problems() == ["along/view_0002f: is for test, but is around/view_0001f of train"]
+    assert problems() == [
+        "along/view_0002f: is for test, but has the pose of around/view_0001f, which trains"
+    ]
     trained["frames"][0]["split"] = "validation"
     write_json(folder / "around" / "lightfield.json", trained)
     write()
@@ -225,4 +227,4 @@ def test_validation_finds_what_is_not_as_the_split_says(scene, tmp_path):
     with pytest.raises(UserError, match="must map train, validation, test to names of views"):
         problems()
     with pytest.raises(UserError, match=r"splits\.json: is of the rigs in .*, and .* is not in it"):
-        validation.check(path, tmp_path / "copy", [])
+        splits_check.check(path, tmp_path / "copy", [])

@@ -214,7 +214,8 @@ def test_a_record_says_which_views_are_finished_until_a_file_is_lost(dataset):
         name: (dataset.folder / name).stat().st_size
         for name in ("exr/b.exr", "exr/c.exr", "object/names.json")
     }
-    files.write_json(record, {"files": {name: {"bytes": size} for name, size in sizes.items()}})
+    entries = {name: {"bytes": size, "sha256": ""} for name, size in sizes.items()}
+    files.write_json(record, {"files": entries})
     assert dataset()[1].startswith("  rendered: 3 of 4")
     (dataset.folder / "exr/c.exr").write_bytes(b"cut short")
     assert dataset()[1].startswith("  rendered: 1 of 4")

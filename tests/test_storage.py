@@ -10,7 +10,7 @@ import cloud
 from cloud import Cloud, kill_group
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.dataset import records
+from lightfield.dataset import shard_files
 from lightfield.dataset.view_store import ViewStore
 
 PANORAMAS = "smoke/LFLattice_2panos"
@@ -69,8 +69,8 @@ def test_a_build_in_isolated_folders_loses_no_view_when_its_jobs_are_killed(smok
 
     for stage in ("render", "perspective"):
         record = f"work/{PANORAMAS}/{stage}/0-2.json"
-        found = records.read(folder / record)
-        assert found == records.read(smoke / record)
+        found = shard_files.read_record(folder / record)
+        assert found == shard_files.read_record(smoke / record)
         for name, (_, digest) in found.items():
             assert store.take(digest, tmp_path / name)
             assert (tmp_path / name).read_bytes() == (
@@ -150,10 +150,10 @@ def test_what_a_user_brings_reaches_jobs_in_isolated_folders(run_program, tmp_pa
     words += ("--lightfield", folder / "results/brought/LFPlane/lightfield.json")
     words += ("--output", tmp_path / "exr", "--record", tmp_path / "here.json")
     run_program("render_shard.py", *words)
-    found = records.read(work / "brought/LFPlane/render/0-2.json")
-    assert found == records.read(tmp_path / "here.json")
+    found = shard_files.read_record(work / "brought/LFPlane/render/0-2.json")
+    assert found == shard_files.read_record(tmp_path / "here.json")
 
-    found = records.read(work / "theirs/LFPlane/render/0-2.json")
+    found = shard_files.read_record(work / "theirs/LFPlane/render/0-2.json")
     for name, (_, digest) in found.items():
         assert digest == sha256(root / "published/LFPlane" / name)
         assert store.take(digest, tmp_path / "theirs" / name)

@@ -12,7 +12,7 @@ from scipy.ndimage import binary_dilation, binary_erosion
 from sphere import look, look_at_ball, write_views
 
 from lightfield.core.errors import UserError
-from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
 from lightfield.geometry import lenses
 from lightfield.imaging import images
@@ -71,6 +71,77 @@ def test_it_tears_where_depth_jumps():
     between = (made.distance > 2.0) & (made.distance < 2.4)
     assert not between.any()
     assert np.median(np.abs(colour)) < 0.005
+
+
+def panel_before_wall(lens, matrix):
+    """What cameras along +Y see of a red panel at y = 2, of which the wall is 0.3 m behind."""
+    rays = lens.pixel_rays() @ matrix[:3, :3].T
+    panel = 2.0 - matrix[1, 3]
+    plane = panel if panel > 0 else panel + 0.3
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = np.where(rays[..., 1] > 0, plane / rays[..., 1], np.inf)
+    colour = np.zeros((*distance.shape, 3)) + ([0.8, 0, 0] if panel > 0 else [0, 0.8, 0])
+    return colour, np.where(np.isnan(rays[..., 0]), np.nan, distance)
+
+
+def views_along_y(places):
+    """Return views that look along +Y, from places on that axis."""
+    views = []
+    for number, y in enumerate(places):
+        matrix = EYE.copy()
+        matrix[:3, 3] = (0, y, 0)
+        views.append(View.placed(f"view_{number:04}f", matrix))
+    return views
+
+
+def test_of_views_in_one_line_the_nearer_to_the_surface_counts():
+    lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [48, 48]})
+    views = views_along_y([0.0, -6.0])
+
+    def wall(view):
+        """What a view sees of a wall at y = 2: the first one calls it red, the other green."""
+        distance = (2 - view.matrix[1, 3]) / -lens.pixel_rays()[..., 2]
+        return np.full((48, 48, 3), [0.8, 0, 0] if view is views[0] else [0, 0.8, 0]), distance
+
+    field = Sources(lens, views, wall)
+    (target,) = (view.matrix for view in views_along_y([-2.0]))
+    made = field.blended(target, lenses.from_camera(EYES["perspective"] | {"fov": 20}), [0, 1])
+    middle = made.colour[30:34, 38:42]
+    assert (middle[..., 0] > 10 * middle[..., 1]).all()
+
+
+def test_the_colour_of_an_edge_counts_where_no_other_view_sees_the_surface():
+    lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [48, 48]})
+    views = views_along_y([0.0, 0.0])
+    green_column = 23
+
+    def edge(view):
+        """One view sees a red wall; to the other it ends, and its last pixels are green."""
+        depth = np.full((48, 48), 2.0)
+        colour = np.full((48, 48, 3), [0.8, 0, 0])
+        if view is views[0]:
+            depth[:, green_column + 1 :] = 4
+            colour[:, green_column] = [0, 0.8, 0]
+        return colour, depth / -lens.pixel_rays()[..., 2]
+
+    field = Sources(lens, views, edge)
+    alone = field.blended(views[0].matrix, lens, [0]).colour[8:40, green_column]
+    np.testing.assert_allclose(alone, np.broadcast_to([0, 0.8, 0], alone.shape), atol=0.05)
+    both = field.blended(views[0].matrix, lens, [0, 1]).colour[8:40, green_column]
+    np.testing.assert_allclose(both, np.broadcast_to([0.8, 0, 0], both.shape), atol=0.01)
+
+
+def test_a_wall_does_not_shine_through_a_panel_close_before_it():
+    lens = lenses.from_camera(FISHEYE | {"fov": 120})
+    # The second camera stands between the panel and the wall, and sees the wall alone.
+    views = views_along_y([0.0, 2.1])
+    field = Sources(lens, views, lambda view: panel_before_wall(lens, view.matrix))
+    target = lenses.from_camera({"lens": "rectilinear", "fov": 30, "resolution": [48, 48]})
+    made = field.blended(field.matrices[0], target, [0, 1])
+    assert not made.holes.any()
+    np.testing.assert_allclose(made.colour[..., 0], 0.8, atol=1e-3)
+    assert (made.colour[..., 1:] == 0).all()
+    np.testing.assert_allclose(made.distance * -target.pixel_rays()[..., 2], 2, rtol=1e-3)
 
 
 def test_what_no_view_sees_is_a_hole():

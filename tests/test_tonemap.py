@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from skimage.color import xyz2rgb
 
-from lightfield.imaging.tonemap import decode_srgb, encode_srgb, to_8_bit, tone_map
+from lightfield.imaging.tonemap import decode_srgb, encode_srgb, to_8_bit, to_16_bit, tone_map
 
 
 def test_reinhard_makes_its_maximum_white_and_keeps_order():
@@ -57,6 +57,12 @@ def test_every_8_bit_code_survives_the_way_there_and_back(step):
     codes = np.arange(256)
     linear = np.nextafter(decode_srgb(codes / 255).astype(np.float32), np.float32(step))
     assert np.array_equal(to_8_bit(linear), codes)
+
+
+@pytest.mark.parametrize("beside", [-0.4, 0, 0.4])
+def test_16_bit_codes_are_the_nearest_ones(beside):
+    codes = np.arange(1000, 65000, 7)
+    assert np.array_equal(to_16_bit(decode_srgb((codes + beside) / 65535)), codes)
 
 
 def test_what_is_out_of_range_is_clipped():

@@ -474,6 +474,14 @@ def test_two_views_that_disagree_are_both_named(tmp_path: Path) -> None:
     assert check(validate(dataset), "geometry").views == names(dataset)
 
 
+def test_of_three_views_the_one_that_disagrees_with_both_others_is_named(
+    small_dataset: Path,
+) -> None:
+    # Each of the others disagrees with one of its two neighbours, which is not its own fault.
+    relist(small_dataset, move(0, (0, 0.1, 0)))
+    assert check(validate(small_dataset), "geometry").views == names(small_dataset)[:1]
+
+
 # ---- what cannot be checked is said ---------------------------------------------------------
 
 UNCHECKED = {
@@ -864,7 +872,7 @@ def test_of_a_scene_with_volumes_the_misses_are_counted(
         many = validate(small_dataset, inventory=tmp_path / "inventory.json")
         assert check(many, "depth").warnings[0].endswith(end)
     write_json(tmp_path / "inventory.json", [])
-    with pytest.raises(UserError, match=r"inventory\.json: volumes: must be a list of names"):
+    with pytest.raises(UserError, match=r"inventory\.json: volumes: is missing"):
         validate(small_dataset, inventory=tmp_path / "inventory.json")
     write_json(tmp_path / "inventory.json", {"volumes": []})
     clear = validate(small_dataset, inventory=tmp_path / "inventory.json")

@@ -86,6 +86,18 @@ def test_what_is_cut_short_in_the_store_is_not_there(store, tmp_path):
     assert not store.has(digest(b"texture"), 7)
 
 
+def test_no_view_is_listed_before_the_store_has_it(store, tmp_path):
+    path = write(tmp_path / "a.exr", b"view")
+    # As where a job is killed while it puts the view.
+    write(tmp_path / "store/views/sums", b"no folder")
+    with pytest.raises(UserError, match="the view store cannot be used"):
+        store.put_view(path, "exr/a.exr", KEY, digest(b"view"))
+    assert store.listed(KEY) == []
+    (tmp_path / "store/views/sums").unlink()
+    store.put_view(path, "exr/a.exr", KEY, digest(b"view"))
+    assert store.listed(KEY) == [("exr/a.exr", digest(b"view"))]
+
+
 @pytest.mark.parametrize("content", [b"", b"tex", b"something longer"])
 def test_an_object_with_other_bytes_is_not_taken_and_is_mended(store, tmp_path, content):
     path = write(tmp_path / "texture.png", b"texture")

@@ -11,7 +11,7 @@ from PIL import Image
 from sphere import BALL, RED, look_at_ball, write_views
 
 from lightfield.dataset.lightfield import LightField
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.geometry import lenses, rigs
 from lightfield.imaging import pictures
 from lightfield.report import dataset_page
@@ -107,7 +107,7 @@ def psnr(one, other):
 def test_the_canvas_shows_what_is_synthesised_and_what_is_true(dataset, tab):
     opened = tab()
     exposure = opened.evaluate("viewer.exposure")
-    source, lens = Source(dataset, "", ".exr"), lenses.from_camera(EYE)
+    source, lens = SourceDataset(dataset, "", ".exr"), lenses.from_camera(EYE)
     field = Sources(source.lens, source.lightfield.views, reader(source), most=99)
     random = np.random.default_rng(3)
     for _ in range(10):

@@ -2,13 +2,17 @@
 
 
 def full_sizes(wildcards):
-    """Return the views and the resolution of each rig of a scene at full size, as JSON."""
-    return json.dumps(
-        {
-            name: {
-                "views": dataset.view_count,
-                "resolution": dataset.rig.camera.resolution,
-            }
-            for name, dataset in full_datasets(wildcards.scene).items()
+    """Return the views and the resolution of each rig of a scene at full size."""
+    return {
+        name: {
+            "views": dataset.view_count,
+            "resolution": dataset.rig.camera.resolution,
         }
-    )
+        for name, dataset in full_datasets(wildcards.scene).items()
+    }
+
+
+def gpu_check_settings(wildcards):
+    """Return the settings file of a scene's check of the GPU: what is foretold of its rigs."""
+    path = f"{WORK}/{wildcards.scene}/settings/gpu_check.json"
+    return settings_file(path, {"full": full_sizes(wildcards)})

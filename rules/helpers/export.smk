@@ -39,51 +39,30 @@ def trained_by(wildcards):
     return f"{folder}/{wildcards.source}transforms.json"
 
 
-def instant_ngp_words(wildcards, input):
-    """Return the words that say to scripts/export_instant_ngp.py from what it writes, and what."""
-    dataset, reprojection = dataset_of(wildcards), reprojection_of(wildcards)
-    words = ["--image-suffix", reprojection.suffix if reprojection else ".exr"]
-    if not reprojection:
-        words += ["--image-dir", f"{dataset.folder}/exr"]
-    if dataset.exports.instant_ngp:
-        folder = Path(dataset.folder, wildcards.source)
-        words += dataset.exports.instant_ngp.words(str(folder))
-    if input.trained:
-        words += ["--placed-as", str(input.trained)]
-    return shlex.join(words)
-
-
-def export_words(wildcards):
-    """Return the words that say to scripts/export.py from what it exports, and how."""
-    dataset = dataset_of(wildcards)
-    reprojection = reprojection_of(wildcards)
-    suffix = reprojection.suffix if reprojection else ".exr"
-    options = export_of(wildcards).model_dump_json(
-        exclude_unset=True, exclude={"sources"}
-    )
-    name = wildcards.source.rstrip("/") or VIEWS
-    words = ["--source", name, "--suffix", suffix, "--options", options]
-    for other in tested_by(wildcards):
-        words += ["--tested-by", other.rig_name, other.folder]
-    return shlex.join(words)
+def folder_of_views(wildcards):
+    """Return the folder of the views that an export reads."""
+    source = wildcards.source.rstrip("/")
+    return f"{dataset_of(wildcards).folder}/{source or 'exr'}"
 
 
 def export_settings(wildcards):
-    """Return the settings file of an export: its options, and the rigs that test it."""
+    """Return the settings file of an export."""
     dataset = dataset_of(wildcards)
-    mark_stale_files(dataset.name)
-    name = wildcards.get("format", "instant_ngp")
     source = wildcards.source.rstrip("/") or VIEWS
     reprojection = reprojection_of(wildcards)
-    # A transforms.json can be asked for where the scene YAML has no such export.
-    wanted = dataset.exports.wanted.get(name)
-    testing = tested_by(wildcards) if "format" in wildcards.keys() else []
-    content = {
-        "options": wanted.recorded if wanted else {},
-        "suffix": reprojection.suffix if reprojection else ".exr",
-        "trained_by": dataset.trained_by,
-        "tested_by": [other.rig_folder for other in testing],
-    }
-    return settings_file(
-        f"{dataset.work}/settings/exports/{source}/{name}.json", content
+    if "format" in wildcards.keys():
+        name = wildcards.format
+        options = export_of(wildcards)
+        roles = {"tested_by": {d.rig_name: d.folder for d in tested_by(wildcards)}}
+    else:
+        name = "instant_ngp"
+        # A transforms.json can be asked for where the scene YAML has no such export.
+        options = dataset.exports.instant_ngp or InstantNgp(sources=[source])
+        trained = trained_by(wildcards)
+        roles = {"trained_by": trained} if trained else {}
+    settings = export_settings_of(name)(
+        options=options.model_copy(update={"sources": [source]}),
+        suffix=reprojection.suffix if reprojection else ".exr",
+        **roles,
     )
+    return dataset_settings(dataset, f"exports/{source}/{name}", settings.as_json())

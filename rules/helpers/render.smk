@@ -5,21 +5,21 @@
 def shard_threads(wildcards):
     """Give each shard so many cores that what runs at once fits this machine's memory."""
     shards = sum(len(dataset.shards) for dataset in CHOSEN)
-    need = dataset_of(wildcards).view_memory_bytes
+    need = dataset_of(wildcards).estimate.view_memory_bytes
     return memory.threads(workflow.cores or 1, shards, need, MEMORY)
 
 
 @of_each_shard
 def shard_memory(wildcards, attempt):
     """Ask for the memory in MB that a shard takes, and for more where that was too little."""
-    return math.ceil(dataset_of(wildcards).view_memory_bytes / 1e6) * attempt
+    return math.ceil(dataset_of(wildcards).estimate.view_memory_bytes / 1e6) * attempt
 
 
 @of_each_shard
 def shard_minutes(wildcards):
     """Allow a shard several times its estimated time, and never less than half an hour."""
     views = int(wildcards.end) - int(wildcards.first)
-    seconds = views * dataset_of(wildcards).expected_view[0]
+    seconds = views * dataset_of(wildcards).estimate.view_seconds
     return 30 + math.ceil(5 * seconds / 60)
 
 
@@ -29,7 +29,7 @@ def stall_seconds(wildcards):
 
     On this machine, where a build may be stopped and continued by hand, none is.
     """
-    seconds = dataset_of(wildcards).expected_view[0]
+    seconds = dataset_of(wildcards).estimate.view_seconds
     return 1800 + math.ceil(10 * seconds) if RUNS_ELSEWHERE else 0
 
 

@@ -4,7 +4,7 @@
 def panorama_memory(wildcards, attempt):
     """Ask for the same for the panorama."""
     dataset = dataset_of(wildcards)
-    need = dataset.memory_bytes(dataset.panorama_width**2 // 2)
+    need = dataset.estimate.memory_bytes(dataset.panorama_width**2 // 2)
     return math.ceil(need / 1e6) * attempt
 
 
@@ -38,7 +38,6 @@ def rebuilding(wildcards):
 def page_settings(wildcards):
     """Return the settings file of a page: the scene YAML's text, and which measurements it shows."""
     dataset = dataset_of(wildcards)
-    mark_stale_files(dataset.name)
     content = {
         "rig": json.loads(dataset.rig_json),
         "yaml": scene_path(dataset.scene_name).read_text(),
@@ -48,4 +47,4 @@ def page_settings(wildcards):
             [str(path), path.stat().st_mtime_ns] for path in measurements(wildcards)
         ],
     }
-    return settings_file(f"{dataset.work}/settings/page.json", content)
+    return dataset_settings(dataset, "page", content)

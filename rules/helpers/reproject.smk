@@ -7,18 +7,12 @@ def lens_maps_of(wildcards):
     return dataset.lens_maps(name) if name in dataset.reprojections else []
 
 
-def of_reprojection(attribute):
-    """Return the function by which a rule asks for an attribute of its reprojection."""
-    return lambda wildcards: getattr(reprojection_of(wildcards), attribute)
-
-
 def reprojection_settings_of(stage, content):
-    """Return the input function for the settings of a reprojection: ``content`` of it."""
+    """Return the input function for a reprojection's settings file: ``content`` of its settings."""
 
     def input_function(wildcards):
         dataset, name = dataset_of(wildcards), wildcards.reprojection
-        mark_stale_files(dataset.name)
-        path = f"{dataset.work}/settings/{name}/{stage}.json"
-        return settings_file(path, content(reprojection_of(wildcards)))
+        settings = content(reprojection_of(wildcards).settings)
+        return dataset_settings(dataset, f"{name}/{stage}", settings)
 
     return input_function

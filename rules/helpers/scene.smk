@@ -7,13 +7,14 @@ def inventory_settings(dataset):
     datasets = scene_datasets(dataset.scene_name)
     return {
         # Raised when the program lists something else.
-        "version": 3,
+        "version": 4,
         "scene_name": written.scene.scene_name,
         "view_layers": written.scene.view_layers,
         "allow_missing": written.scene.allow_missing,
         "motion_blur": written.render.motion_blur,
         "rendered_frames": rendered_frames(datasets),
-        "camera_frames": [each.camera_frames for each in datasets],
+        # As the program has them: a rig without any changes nothing.
+        "camera_frames": [frame for each in datasets for frame in each.camera_frames],
     }
 
 

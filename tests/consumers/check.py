@@ -1,4 +1,6 @@
-"""Read the exports with the consumers' own code: pycolmap, nerfstudio and OpenCV.
+"""Read the exports with the consumers' own code, and learn a radiance field from them.
+
+The consumers are pycolmap, nerfstudio and OpenCV.
 
 Run by `make consumers` in an environment of theirs, on what export.py wrote. A line for each with
 the largest error found; anything beyond its limit ends in an AssertionError.
@@ -10,6 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+ROOT = Path(__file__).resolve().parents[2]
 RADIUS = 3.0  # of the scene, a sphere around the origin
 
 
@@ -131,6 +134,25 @@ def opencv(folder, name):
     assert pixels < 1e-3
 
 
+def radiance_field(folder):
+    """Check that `make learn` learns more from true poses than from shuffled ones."""
+    sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "benchmarks")]
+    import torch
+
+    from learn import EVALUATIONS, learn
+    from lightfield.core.progress import Progress
+    from nerfstudio_views import SHUFFLED, TRUE, read, readings
+
+    views = dict(readings(read(folder / "learn" / "export")))
+    progress = Progress(2 * EVALUATIONS, "learn", "evaluations")
+    psnr = {name: learn(views[name], progress, 60)[1][-1]["psnr"] for name in (TRUE, SHUFFLED)}
+    print(
+        f"torch {torch.__version__}: a radiance field shows held-out rays with "
+        f"{psnr[TRUE]:.1f} dB, and with {psnr[SHUFFLED]:.1f} dB from shuffled poses"
+    )
+    assert psnr[TRUE] > psnr[SHUFFLED] + 5
+
+
 def main():
     folder = Path(sys.argv[1])
     for check, kind in ((colmap, "colmap"), (nerfstudio, "nerfstudio")):
@@ -138,6 +160,7 @@ def main():
             check(folder, path.name)
     for name in ("fisheye", "opencv"):
         opencv(folder, name)
+    radiance_field(folder)
 
 
 if __name__ == "__main__":

@@ -16,9 +16,11 @@ from sphere import LENSES, enlarged, write_views  # noqa: E402
 
 from lightfield import export  # noqa: E402
 from lightfield.dataset.exports import settings_of  # noqa: E402
-from lightfield.export.source import Source  # noqa: E402
+from lightfield.export.source import SourceDataset  # noqa: E402
 
 RIG = {"type": "plane", "cameras": [3, 2], "size": 1.2, "center": [0.3, -0.2, 0.1]}
+# Views enough for a radiance field to learn from.
+LEARNED_RIG = {"type": "random", "count": 40, "size": [2, 2, 1]}
 OF = {
     "colmap": ("perspective", "shifted", "fisheye", "opencv"),
     "nerfstudio": ("perspective", "shifted", "fisheye", "wide", "panorama"),
@@ -31,7 +33,7 @@ def main() -> None:
     write_views(folder / "dataset", enlarged(LENSES["wide"], 2), RIG)
     for name in sorted({*OF["colmap"], *OF["nerfstudio"]}):
         write_views(folder / "dataset" / name, enlarged(LENSES[name], 2), RIG)
-        source = Source(folder / "dataset", name, ".exr")
+        source = SourceDataset(folder / "dataset", name, ".exr")
         np.savez(
             folder / f"{name}.npz",
             names=[view.name for view in source.lightfield.views],
@@ -43,8 +45,12 @@ def main() -> None:
             settings = settings_of(kind).model_validate(
                 {"sources": [name], "points": 40000, "depth": True}
             )
-            source = Source(folder / "dataset", name, ".exr")
+            source = SourceDataset(folder / "dataset", name, ".exr")
             export.run(kind, source, settings, folder / kind / name)
+    write_views(folder / "learn" / "dataset", LENSES["panorama"], LEARNED_RIG)
+    source = SourceDataset(folder / "learn" / "dataset", "", ".exr")
+    settings = settings_of("nerfstudio").model_validate({"sources": ["views"], "depth": True})
+    export.run("nerfstudio", source, settings, folder / "learn" / "export")
 
 
 if __name__ == "__main__":

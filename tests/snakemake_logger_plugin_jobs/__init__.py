@@ -21,8 +21,9 @@ class LogHandler(LogHandlerBase):
     def emit(self, record: LogRecord) -> None:
         if getattr(record, "event", None) != LogEvent.JOB_INFO:
             return
-        job = {"rule": record.rule_name, "cpus": record.threads}
+        job = {"rule": record.rule_name, "reason": record.reason, "cpus": record.threads}
         job |= {name: [str(file) for file in getattr(record, name)] for name in FILES}
+        job["command"] = record.shellcmd
         for name in ("mem_mb", "runtime", "gpu"):
             job[name] = record.resources.get(name)
         print(json.dumps(job), file=sys.stderr)

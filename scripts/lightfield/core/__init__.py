@@ -1,1 +1,1 @@
-"""Errors, failures, files, progress and command lines: what every other room stands on."""
+"""Errors, failures, files, progress and command lines, which all other packages use."""

@@ -1,4 +1,4 @@
-"""What programs in scripts/ have in common: how they end, counts, and which views they take."""
+"""What programs in scripts/ share: how they end, the types of their flags, and --views."""
 
 import argparse
 import math
@@ -8,16 +8,16 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from lightfield.core.disk_space import REMEDIES, write_problem
 from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_MEMORY
 from lightfield.core.files import read_problem
-from lightfield.core.room import REMEDIES, write_problem
 
 
 def run(main: Callable[[], None]) -> None:
-    """Run ``main``; a `UserError` becomes ``error: …`` on standard error and exit status 1.
+    """Run ``main``. Print a `UserError` as ``error: …`` on standard error, and exit with status 1.
 
-    So does what the system refuses: memory, and files and folders that nobody expected it to.
+    Do the same if memory runs out, or if the system refuses access to a file or folder.
     """
     sys.argv[1:] = map(_as_value, sys.argv[1:])
     try:
@@ -29,7 +29,7 @@ def run(main: Callable[[], None]) -> None:
     except KeyboardInterrupt:
         sys.exit("error: interrupted")
     except BrokenPipeError:
-        # The reader of our output left (as `head` does): say nothing more, not even at exit.
+        # The program that read our output has ended, as `head` does: print nothing more.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except OSError as error:
@@ -37,7 +37,7 @@ def run(main: Callable[[], None]) -> None:
 
 
 def _refusal(error: OSError) -> str:
-    """Return what the system refused, and what to do."""
+    """Return what the system refused, and what the user can do."""
     path = error.filename if isinstance(error.filename, str) else ""
     if path and Path(path).is_file() and isinstance(error, PermissionError):
         return f"{path}: cannot be read: {read_problem(error)}"
@@ -47,14 +47,26 @@ def _refusal(error: OSError) -> str:
 
 
 def _as_value(word: str) -> str:
-    """Return a word so that argparse takes -1e-05, -1,2, -1:2 and -90deg for values.
+    """Return an argument so that argparse takes -1e-05, -1,2, -1:2 and -90deg for values.
 
-    It knows -1 and -0.5 by itself, and takes no word that begins with a blank for a flag.
+    argparse takes -1 and -0.5 for values by itself, and all arguments that begin with a blank.
     """
     return f" {word}" if re.fullmatch(r"-[\d.]+[,:de][\d.,:deg+-]*", word) else word
 
 
-# What follows may be the ``type`` of an argument.
+def refuse_beside_settings(
+    arguments: argparse.Namespace, add_flags: Callable[[argparse.ArgumentParser], None]
+) -> None:
+    """Raise `UserError` where a flag of ``add_flags`` is given beside --settings."""
+    parser = argparse.ArgumentParser()
+    add_flags(parser)
+    for name, default in vars(parser.parse_args([])).items():
+        if getattr(arguments, name) != default:
+            flag = name.replace("_", "-")
+            raise UserError(f"--settings: excludes --{flag}; write it into the file")
+
+
+# The following functions are for the ``type`` of an argument.
 
 
 def positive(text: str) -> int:
@@ -65,7 +77,7 @@ def positive(text: str) -> int:
 
 
 def counted(flag: str, text: str) -> int:
-    """Return a whole number from 1 on of a flag with several values; raises `UserError`."""
+    """Return a whole number from 1 on, for a flag with several values. Raises `UserError`."""
     try:
         return positive(text)
     except argparse.ArgumentTypeError as error:
@@ -87,23 +99,24 @@ def above_zero(text: str) -> float:
 
 
 def white(text: str) -> float:
-    """Return the value of light that becomes white."""
+    """Return the value of light that becomes white, from a flag."""
     if 1e-9 <= float(text) <= 1e9:
         return float(text)
     raise argparse.ArgumentTypeError(f"is {text}; must be from 1e-9 to 1e9")
 
 
 def stops(text: str) -> float:
-    """Return an exposure."""
+    """Return an exposure in stops, from a flag."""
     if abs(float(text)) <= 100:
         return float(text)
     raise argparse.ArgumentTypeError(f"is {text}; must be from -100 to 100 stops")
 
 
 def view_slice(text: str, count: int) -> slice:
-    """Read ``--views FIRST:END``, either of which may be left out, as a slice of ``count`` views.
+    """Return the slice of ``count`` views that ``--views FIRST:END`` means.
 
-    Raises `UserError` where that chooses none, or one that there is not.
+    Both numbers may be left out. Raises `UserError` if it holds no view, or a view that does not
+    exist.
     """
     first, colon, end = text.partition(":")
     if colon and (first + end or "0").isdecimal():

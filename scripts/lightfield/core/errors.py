@@ -5,9 +5,9 @@ LONGEST = 2000
 
 
 class UserError(Exception):
-    """Something the user can mend; the message says what is wrong, where, and what is right.
+    """An error that the user can mend. The message says what is wrong, where, and what is right.
 
-    It is one line whatever it quotes: line breaks and a terminal's codes are written as escapes.
+    It is always one line: quoted line breaks and terminal codes are written as escapes.
     """
 
     def __init__(self, message: str) -> None:

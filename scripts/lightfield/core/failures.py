@@ -1,20 +1,20 @@
-"""What a run that failed says last: why, and where the whole of it can be read."""
+"""Says why a run failed, and which log has the details."""
 
 import itertools
 from collections.abc import Iterable
 from pathlib import Path
 
-# What takes less memory, wherever it ran out.
+# What the user can do where memory ran out.
 LESS_MEMORY = "lower --cores, for fewer shards at once, or resolution"
 LESS_GPU_MEMORY = (
     "lower resolution, shrink the scene's textures, end what else uses the GPU, or take device=cpu"
 )
-# What a signal that ends a program most likely means.
+# What most likely happened if a signal ended a program.
 _SIGNALS = {
     "SIGKILL": f"most likely memory ran out: {LESS_MEMORY}",
     "SIGABRT": f"most likely memory ran out: {LESS_MEMORY}",
     "SIGSEGV": f"Blender crashed, as it does where it gets no memory: {LESS_MEMORY}",
-    "SIGBUS": "most likely a temporary folder is full: make room in /dev/shm and TMPDIR",
+    "SIGBUS": "most likely a temporary folder is full: free some space in /dev/shm and TMPDIR",
     "SIGALRM": "a view took far longer than expected: it hung",
     "SIGTERM": "it was cancelled, or ran longer than it may",
 }
@@ -24,7 +24,7 @@ _AFTER_THE_CAUSE = ("tar: Exiting with failure status", "tar: Error is not recov
 
 
 def cause(log: Path) -> str | None:
-    """Return the line of a program's log that says why it failed; None if the log has no line.
+    """Return the line of a program's log that says why it failed, or None for an empty log.
 
     That is its last ``error: …``; of a program that did not get so far, its last line. What a
     signal means is added.
@@ -47,7 +47,7 @@ def first_sentence(message: str) -> str:
 
 
 def failure_report(jobs: Iterable[tuple[str, str, Path]]) -> str:
-    """Return each cause and a log that has it, of failed jobs given by rule, cause and log."""
+    """Return each cause of failed jobs, with one log that has it. Jobs are rule, cause and log."""
     logs: dict[tuple[str, str], list[Path]] = {}
     for rule, why, log in jobs:
         logs.setdefault((rule, why), []).append(log)
@@ -59,17 +59,17 @@ def failure_report(jobs: Iterable[tuple[str, str, Path]]) -> str:
 
 
 def is_newer(path: Path, time: float) -> bool:
-    """Return whether there is a file that was written since ``time``, in seconds since 1970."""
+    """Return whether a file exists that was written after ``time``, in seconds since 1970."""
     return path.is_file() and path.stat().st_mtime >= time
 
 
 def batch_log(name: str, since: float) -> Path | None:
-    """Return the newest log that a batch system wrote of a job or group of this name, if any.
+    """Return the newest log that a batch system wrote for a job or group, or None.
 
-    It is looked for where the profiles let Slurm write it, and is no older than ``since``, in
-    seconds since 1970.
+    Looks in the folders into which the profiles have Slurm write. The log must be newer than
+    ``since``, in seconds since 1970.
     """
     folder = Path(".snakemake")
     logs = [*folder.glob(f"slurm_logs/*_{name}/**/*.log"), *folder.glob(f"{name}-*.log")]
-    found = [log for log in logs if is_newer(log, since)]
-    return max(found, key=lambda log: log.stat().st_mtime, default=None)
+    new_logs = [log for log in logs if is_newer(log, since)]
+    return max(new_logs, key=lambda log: log.stat().st_mtime, default=None)

@@ -1,22 +1,24 @@
-"""Files that are either whole or absent, and their checksums."""
+"""Reads, writes and moves files. A file that is written here is complete or absent, never half."""
 
 import csv
+import fcntl
 import hashlib
 import json
 import os
 import shutil
+import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from lightfield.core.disk_space import write_problem
 from lightfield.core.errors import UserError
-from lightfield.core.room import write_problem
 
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn an OSError into a `UserError` that names ``path``, the cause, and what to do."""
+    """Raise a `UserError` for an OSError: it names ``path``, the cause, and what to do."""
     try:
         yield
     except OSError as error:
@@ -24,16 +26,16 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def read_problem(error: OSError) -> str:
-    """Return why a file cannot be read, from what the system said of it, and what to do."""
+    """Return why reading a file raised ``error``, and what to do."""
     if isinstance(error, PermissionError):
         return "you may not read it: change its permissions (chmod u+r)"
     return error.strerror or str(error)
 
 
 def check_readable(path: Path | str) -> None:
-    """Raise `UserError` for a file that is missing, or that may not be read.
+    """Raise `UserError` for a file that is missing, or that the user may not read.
 
-    Libraries say of both that it is none of theirs.
+    Call this before a library reads the file: many report both as a wrong format.
     """
     try:
         Path(path).open("rb").close()
@@ -43,13 +45,13 @@ def check_readable(path: Path | str) -> None:
 
 @contextmanager
 def atomic_path(target: Path | str) -> Iterator[Path]:
-    """Yield a temporary path beside ``target``; on success it is flushed to disk and renamed.
+    """Yield a temporary path beside ``target``. On success flush it to disk, and rename it.
 
     The temporary name keeps the target's suffix, because image writers choose the format by it. It
-    holds a random number: in containers several processes may have one number.
-    On any error the temporary file is removed and the target is left as it was; an OSError, and an
-    empty file, become a `UserError`. Python reports every byte that it cannot write. A library
-    that may not must be checked by whoever calls it: it raises an OSError for a file cut short.
+    has a random number, because processes in several containers may have the same process number.
+    On any error the temporary file is removed, and the target stays as it was. An OSError, and an
+    empty file, become a `UserError`. Python itself raises an error if it cannot write all bytes.
+    Some libraries do not: then the caller must check the file, and raise an OSError.
     """
     target = Path(target)
     number = int.from_bytes(os.urandom(4))
@@ -58,7 +60,7 @@ def atomic_path(target: Path | str) -> Iterator[Path]:
         target.parent.mkdir(parents=True, exist_ok=True)
         try:
             yield temporary
-            # For reading: it may be a second name of a file that nobody may write.
+            # Open it for reading: it may be a hard link to a file that nobody may write.
             with temporary.open("rb") as file:
                 if not file.seek(0, os.SEEK_END):
                     raise OSError("the file is empty")
@@ -68,11 +70,11 @@ def atomic_path(target: Path | str) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
-def second_name(file: Path, target: Path) -> None:
-    """Make ``target`` a hard link to a file, or a copy where the file system has no links."""
+def link_or_copy(file: Path, target: Path) -> None:
+    """Make ``target`` a hard link to ``file``, or a copy if the file system has no hard links."""
     with atomic_path(target) as temporary:
         try:
-            # Not of a link, as git-annex has them: Linux would take over the link itself.
+            # Link what a symbolic link leads to, as in git-annex. Linux would link the link itself.
             os.link(file.resolve(), temporary)
         except OSError:
             shutil.copyfile(file, temporary)
@@ -96,12 +98,12 @@ def write_text(path: Path | str, text: str) -> None:
 
 
 def write_json(path: Path | str, content: Any) -> None:
-    """Write ``content`` as JSON, atomically; NaN and infinities are refused (ValueError)."""
+    """Write ``content`` as JSON, atomically. Raises ValueError for NaN and infinities."""
     write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
 def write_json_if_changed(path: Path, content: Any) -> bool:
-    """Write ``content`` as JSON, atomically, unless the file holds just that; return if it did."""
+    """Write ``content`` as JSON, atomically, if the file differs. Return whether it was written."""
     text = json.dumps(content, indent=1, allow_nan=False) + "\n"
     try:
         if path.read_text(encoding="utf-8") == text:
@@ -113,7 +115,7 @@ def write_json_if_changed(path: Path, content: Any) -> bool:
 
 
 def write_csv(path: Path | str, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows of the same columns as CSV, atomically, the first line their names."""
+    """Write rows with the same columns as CSV, atomically. The first line names the columns."""
     with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         table = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
         table.writeheader()
@@ -121,9 +123,9 @@ def write_csv(path: Path | str, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def append_json_line(path: Path, entry: Mapping[str, Any]) -> None:
-    """Add ``entry`` to a file of one JSON object a line, at once and flushed to disk.
+    """Append ``entry`` to a file with one JSON object a line, and flush it to disk.
 
-    A last line that a kill or a full disk cut short is ended first.
+    If a kill or a full disk cut the last line short, that line is ended first.
     """
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -138,7 +140,7 @@ def append_json_line(path: Path, entry: Mapping[str, Any]) -> None:
 
 
 def read_json_lines(path: Path) -> list[dict[str, Any]]:
-    """Return the objects of such a file, in their order; what is not one is left out."""
+    """Return the objects of a file with one JSON object a line. Skips lines that are no object."""
     entries = []
     try:
         content = path.read_bytes()
@@ -155,8 +157,8 @@ def read_json_lines(path: Path) -> list[dict[str, Any]]:
 
 
 def unreadable(path: Path | str) -> str | None:
-    """Say why what lies at a path cannot be read as a file; None if it can, or nothing is there."""
-    if os.path.isdir(path):  # noqa: PTH112, a `Path` for each of a hundred thousand is slow
+    """Return why a path cannot be read as a file. None if it can, or if nothing is there."""
+    if os.path.isdir(path):  # noqa: PTH112, a `Path` is slow for 100,000 files
         return "is a folder"
     if os.path.lexists(path) and not os.access(path, os.R_OK):
         if not os.path.exists(path):  # noqa: PTH110
@@ -166,9 +168,9 @@ def unreadable(path: Path | str) -> str | None:
 
 
 def broken(path: Path) -> str | None:
-    """Say what is wrong with a file that a program wrote; None if nothing is, or it is not there.
+    """Return what is wrong with a file that a program wrote. None if nothing is, or it is missing.
 
-    Every JSON of a dataset is a mapping.
+    A JSON file of a dataset must hold a mapping.
     """
     if (problem := unreadable(path)) is not None:
         return problem
@@ -187,29 +189,44 @@ def broken(path: Path) -> str | None:
         return str(error).removeprefix(f"{path}: ")
 
 
-def whole(path: Path) -> Path:
-    """Return a path from / on, without ``.`` and ``..``: it and all folders above it have names.
+def is_locked(path: Path, flags: int) -> bool:
+    """Return whether a process holds the lock of a file or folder, opened with ``flags``.
 
-    Links stay what they are, for what is on another disk may have another name there.
+    Raises OSError if it cannot be opened.
+    """
+    file = os.open(path, flags)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return False
+    except OSError:
+        return True
+    finally:
+        os.close(file)
+
+
+def absolute_path(path: Path) -> Path:
+    """Return a path from the root, without ``.`` and ``..``, so that its name and parents show.
+
+    Symbolic links are kept, because the names behind them may differ.
     """
     return Path(os.path.normpath(path.absolute()))
 
 
 def keep_apart(flag: str, written: Path, *read: Path | None) -> None:
-    """Raise `UserError` where what the ``flag`` has written is a file or folder that is read."""
+    """Raise `UserError` if a program's ``flag`` has it write a path that it also reads."""
     if any(path is not None and path.resolve() == written.resolve() for path in read):
         raise UserError(f"{flag} {written}: is what is read, and would be lost; give another")
 
 
 def set_aside(path: Path, folder: Path) -> Path:
-    """Move a file or folder into ``folder``, under its own path; return where it is now.
+    """Move a file or folder into ``folder``, under its own path, and return its new path.
 
-    That is from the present folder, or from / of what is not in it. What lies there already keeps
-    its name, and the new one gets a number behind its own.
+    Its own path is relative to the current folder, or to the root if it lies outside. An earlier
+    file there keeps its name, and the new one gets a number after its name.
     """
     inside = Path(os.path.normpath(path))
     if inside.is_absolute() or ".." in inside.parts:
-        inside = whole(path).relative_to(path.absolute().anchor)
+        inside = absolute_path(path).relative_to(path.absolute().anchor)
     target = folder / inside
     number = 1
     while os.path.lexists(target):
@@ -222,7 +239,7 @@ def set_aside(path: Path, folder: Path) -> Path:
 
 
 def read_text(path: Path | str) -> str:
-    """Read a text in UTF-8; one that is missing, or something else, is a `UserError`."""
+    """Read a text in UTF-8. Raises `UserError` if it is missing, or no such text."""
     try:
         return Path(path).read_text(encoding="utf-8")
     except OSError as error:
@@ -232,20 +249,39 @@ def read_text(path: Path | str) -> str:
 
 
 def read_keys(path: Path | str, program: str, *keys: str) -> dict[str, Any]:
-    """Read the JSON mapping that a program of scripts/ writes.
+    """Read a JSON mapping that ``program`` of scripts/ writes.
 
-    Raises `UserError` as `read_json` does, and for one that lacks one of the ``keys``.
+    Raises `UserError` as `read_json` does, and if one of the ``keys`` is missing.
     """
     content = read_json(path)
     for key in keys:
         if not isinstance(content, dict) or key not in content:
             raise UserError(f"{path}: {key}: is missing; scripts/{program} writes it")
-    found: dict[str, Any] = content
-    return found
+    mapping: dict[str, Any] = content
+    return mapping
+
+
+# The exceptions that a program may raise when it uses the content of a damaged file.
+DAMAGE = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError)
+
+
+@contextmanager
+def reading(place: Path | str, kind: str) -> Iterator[None]:
+    """Raise a `UserError` if a file, or a ``place`` in it, cannot be read as its ``kind``."""
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"{place}: cannot be read: {read_problem(error)}") from None
+    except KeyError as error:
+        raise UserError(f"{place}: {error.args[0]}: is missing") from None
+    except DAMAGE as error:
+        raise UserError(f"{place}: is no {kind}: {error}") from None
+    except struct.error:
+        raise UserError(f"{place}: is no {kind}: it is cut short") from None
 
 
 def read_json(path: Path | str) -> Any:
-    """Read a JSON file; a missing or malformed one is a `UserError` that names it."""
+    """Read a JSON file. Raises a `UserError` that names the file if it is missing or malformed."""
     try:
         return json.loads(read_text(path))
     except (ValueError, RecursionError) as error:

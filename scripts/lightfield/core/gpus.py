@@ -1,4 +1,4 @@
-"""Which GPU a process renders on: each one is taken by one process at a time."""
+"""Gives each process a GPU that no other process renders on at the same time."""
 
 import fcntl
 import os
@@ -15,41 +15,41 @@ from typing import BinaryIO
 
 from lightfield.core.errors import UserError
 
-# From these, CUDA (and OptiX) and HIP read which GPUs a process sees.
+# CUDA, OptiX and HIP read from these environment variables which GPUs a process sees.
 CUDA, HIP = "CUDA_VISIBLE_DEVICES", "HIP_VISIBLE_DEVICES"
 _KFD = Path("/sys/class/kfd/kfd/topology/nodes")
 
 
 @dataclass(frozen=True)
 class Gpu:
-    """A GPU: its id, in the words of the ``variable`` by which a process sees it alone."""
+    """A GPU by its id. A process whose environment ``variable`` is that id sees only this GPU."""
 
     variable: str
     id: str
 
 
 def visible(environment: Mapping[str, str] = os.environ) -> list[Gpu]:
-    """Return the GPUs that this process sees: those that a batch system or user left it, or all."""
-    found = []
+    """Return the GPUs that this process sees: those that its environment allows, or all."""
+    gpus = []
     for variable, every in ((CUDA, _nvidia), (HIP, _amd)):
-        given = environment.get(variable)
-        ids = every() if given is None else [name.strip() for name in given.split(",")]
-        found += [Gpu(variable, name) for name in ids if name and name != "-1"]
-    return found
+        chosen = environment.get(variable)
+        ids = every() if chosen is None else [name.strip() for name in chosen.split(",")]
+        gpus += [Gpu(variable, name) for name in ids if name and name != "-1"]
+    return gpus
 
 
 def _nvidia() -> list[str]:
     """Return the UUIDs of NVIDIA's GPUs, as their driver lists them."""
     try:
-        words = ["nvidia-smi", "--query-gpu=uuid", "--format=csv,noheader"]
-        output = subprocess.run(words, capture_output=True, text=True, check=True, timeout=30)
+        command = ["nvidia-smi", "--query-gpu=uuid", "--format=csv,noheader"]
+        output = subprocess.run(command, capture_output=True, text=True, check=True, timeout=30)
     except (OSError, subprocess.SubprocessError):
         return []
     return [line for line in output.stdout.split() if line.startswith("GPU-")]
 
 
 def _amd() -> list[str]:
-    """Return the numbers of AMD's GPUs; the driver lists processors, too, whose id is 0."""
+    """Return the numbers of AMD's GPUs. The driver also lists processors, whose id is 0."""
     ids = (path.read_text().strip() for path in sorted(_KFD.glob("*/gpu_id")))
     return [str(number) for number, _ in enumerate(name for name in ids if name != "0")]
 
@@ -84,7 +84,7 @@ def _opened(path: Path) -> int:
     For writing if it can be, for NFS locks no others. A link is never followed: in a folder of all
     users it may be anybody's, and lead to a file of this user. Raises `UserError` for one.
     """
-    # A pipe that somebody has put there must not be waited for.
+    # Do not wait for a pipe that somebody has put there.
     flags = os.O_NOFOLLOW | os.O_NONBLOCK
     while True:
         try:
@@ -92,7 +92,7 @@ def _opened(path: Path) -> int:
         except PermissionError:
             return os.open(path, os.O_RDONLY | flags)
         except FileNotFoundError:
-            # Unless another process is quicker.
+            # Another process may have created it in the meantime.
             with suppress(FileExistsError):
                 file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
                 # Whatever the umask: another user's process must be able to lock it.

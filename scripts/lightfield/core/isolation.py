@@ -43,9 +43,9 @@ def isolate() -> None:
     """
     if _MARK not in sys._xoptions and _is_program():
         # Without the packages in the user's home (-s), too.
-        words = [sys.executable, "-s", "-X", _MARK, *sys.orig_argv[1:]]
+        command = [sys.executable, "-s", "-X", _MARK, *sys.orig_argv[1:]]
         folder = {"BLENDER_USER_RESOURCES": str(_folder_without_user_files())}
-        os.execve(sys.executable, words, cleaned(os.environ) | folder)
+        os.execve(sys.executable, command, cleaned(os.environ) | folder)
 
 
 def _is_program() -> bool:

@@ -1,4 +1,4 @@
-"""What killed processes leave behind: temporary folders, and files that were on their way."""
+"""Removes what killed processes leave behind: temporary folders, and half-written files."""
 
 import fcntl
 import os
@@ -10,16 +10,18 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from lightfield.core.room import SHARED_MEMORY
+from lightfield.core.disk_space import SHARED_MEMORY
+from lightfield.core.files import is_locked
 
-# Nobody calls a folder of his own so: it would be removed.
+# No user's folder may have this prefix: it would be removed.
 PREFIX = "plenoforge-temporary-"
-# Blender makes itself such a folder as long as it runs, an artist's Blender, too.
+# Every Blender that runs has such a folder, an artist's, too.
 BLENDERS = "blender_*"
 # The names of `atomic_path`.
 _ON_THE_WAY = re.compile(r"\..+\.\d+\.tmp(\.\w+)?")
 # Seconds: nobody writes one file for so long, or has a Blender with an empty folder.
-FILE_AGE, BLENDER_AGE = 3600.0, 24 * 3600.0
+FILE_AGE = 3600.0
+BLENDER_AGE = 24 * 3600.0
 # Between making a folder and taking it.
 FOLDER_AGE = 60.0
 
@@ -43,36 +45,44 @@ def temporary_folder(parent: Path | str | None = None) -> Iterator[Path]:
 
 
 def remove(folders: Iterable[Path] = ()) -> list[Path]:
-    """Remove what killed processes of this user have left; return what that was.
+    """Remove what killed processes of this user left behind. Return the removed paths.
 
-    That is files on their way in ``folders`` and below, and temporary folders of this machine.
+    These are half-written files in ``folders`` and below, and temporary folders of this machine.
     """
-    found = [path for folder in folders for path in _files(folder)]
-    for path in found:
-        path.unlink(missing_ok=True)
+    removed = [path for folder in folders for path in remove_unfinished(folder)]
     for parent in {Path(tempfile.gettempdir()), SHARED_MEMORY}:
         for path in parent.glob(f"{PREFIX}*"):
             if path.is_dir() and _is_old(path, FOLDER_AGE) and not _is_in_use(path):
                 shutil.rmtree(path, ignore_errors=True)
-                found.append(path)
+                removed.append(path)
         for path in parent.glob(BLENDERS):
             if path.is_dir() and _is_old(path, BLENDER_AGE):
-                # One that is not empty stays.
+                # A folder that is not empty stays.
                 with suppress(OSError):
                     path.rmdir()
-                    found.append(path)
-    return found
+                    removed.append(path)
+    return removed
 
 
-def _files(folder: Path) -> Iterator[Path]:
-    for parent, _, names in os.walk(folder):
+def remove_unfinished(folder: Path, age: float = FILE_AGE, kept: str = "") -> list[Path]:
+    """Remove the files below a folder that were on their way ``age`` seconds ago; return them.
+
+    Leaves alone what lies in its folder ``kept``.
+    """
+    removed = []
+    for parent, folders, names in os.walk(folder):
+        if Path(parent) == folder and kept in folders:
+            folders.remove(kept)
         for name in names:
-            if _ON_THE_WAY.fullmatch(name) and _is_old(path := Path(parent, name), FILE_AGE):
-                yield path
+            path = Path(parent, name)
+            if _ON_THE_WAY.fullmatch(name) and _is_old(path, age):
+                path.unlink(missing_ok=True)
+                removed.append(path)
+    return removed
 
 
 def _is_old(path: Path, age: float) -> bool:
-    """Whether a file or folder is this user's and has not been changed for so many seconds."""
+    """Return whether a file or folder is this user's, and unchanged for ``age`` seconds."""
     try:
         status = path.lstat()
     except OSError:
@@ -81,15 +91,8 @@ def _is_old(path: Path, age: float) -> bool:
 
 
 def _is_in_use(folder: Path) -> bool:
-    """Whether the process lives that has made a temporary folder; a link is nobody's to remove."""
+    """Return whether the process that made a temporary folder lives. Links always count as used."""
     try:
-        lock = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW)
+        return is_locked(folder, os.O_RDONLY | os.O_NOFOLLOW)
     except OSError:
         return True
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        return False
-    except OSError:
-        return True
-    finally:
-        os.close(lock)

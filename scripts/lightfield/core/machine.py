@@ -1,4 +1,4 @@
-"""What of a machine changes bytes: two that are described alike make the same files.
+"""Describes what of a machine changes bytes. Machines with one description make the same files.
 
 Cycles and Embree take other kernels on processors without AVX2, and the denoiser on those with
 AVX-512. Embree builds on approximate reciprocals, which each maker of processors has in its own
@@ -32,7 +32,7 @@ def describe(denoise: bool, cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
 
 
 def _first_processor(cpuinfo: Path) -> dict[str, str]:
-    """Return what Linux says of the first processor, by its names."""
+    """Return what /proc/cpuinfo says of the first processor, by its keys."""
     if not cpuinfo.exists():
         return {}
     first, _, _ = cpuinfo.read_text().partition("\n\n")

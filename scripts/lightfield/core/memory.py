@@ -1,4 +1,4 @@
-"""How much memory this machine lets a process have, and how much it has had."""
+"""How much memory a process may have on this machine, and how much it has had."""
 
 import resource
 import sys
@@ -6,13 +6,15 @@ from pathlib import Path
 
 import psutil
 
-_CGROUPS = Path("/sys/fs/cgroup")
+# The folder of the control groups, and the file that says in which of them this process is.
+CONTROL_GROUPS = Path("/sys/fs/cgroup")
+OWN_GROUPS = Path("/proc/self/cgroup")
 
 
 def available() -> int:
-    """Return how many bytes all processes here may have: the machine's, or what a limit leaves.
+    """Return how many bytes all processes here may have: the machine's memory, or a limit.
 
-    A batch system and a container limit by control groups, each of which limits those in it.
+    Batch systems and containers set limits by control groups. A group limits all groups inside it.
     """
     limits: list[int] = [psutil.virtual_memory().total]
     for file in _limit_files():
@@ -23,23 +25,22 @@ def available() -> int:
 
 
 def _limit_files() -> list[Path]:
-    """Return the files of version 1 and 2 of control groups that may hold a limit."""
-    found = []
-    own = Path("/proc/self/cgroup")
-    for line in own.read_text().splitlines() if own.exists() else ():
+    """Return the files that may hold a limit, of control groups in version 1 and 2."""
+    files = []
+    for line in OWN_GROUPS.read_text().splitlines() if OWN_GROUPS.exists() else ():
         _, controllers, path = line.split(":", 2)
         if controllers in ("", "memory"):
             name = "memory.limit_in_bytes" if controllers else "memory.max"
-            root = _CGROUPS / controllers
+            root = CONTROL_GROUPS / controllers
             group = root / path.lstrip("/")
-            found += [folder / name for folder in (group, *group.parents)]
-    return [file for file in found if file.is_file()]
+            files += [folder / name for folder in (group, *group.parents)]
+    return [file for file in files if file.is_file()]
 
 
 def peak() -> int:
     """Return the most bytes of memory that this process has had.
 
-    Of a process's own account, not of getrusage's, which counts what started it, too.
+    Reads /proc: getrusage also counts the process that started this one.
     """
     try:
         for line in Path("/proc/self/status").read_text().splitlines():
@@ -47,6 +48,6 @@ def peak() -> int:
                 return int(line.split()[1]) * 1024
     except OSError:
         pass
-    # In KiB, but for macOS.
+    # getrusage counts in KiB, but in bytes on macOS.
     unit = 1 if sys.platform == "darwin" else 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit

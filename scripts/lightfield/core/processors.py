@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-# macOS, where Cycles renders with Metal, lets no process choose its processors.
+# On macOS no process can choose its processors.
 _HAS_AFFINITY = hasattr(os, "sched_getaffinity")
 
 
@@ -16,7 +16,7 @@ def available() -> int:
 
 @contextmanager
 def only(count: int) -> Iterator[None]:
-    """Let a library that is imported in here start no more threads than ``count``.
+    """Make a library that is imported in this context start at most ``count`` threads.
 
     TBB, whose threads Blender and OpenImageDenoise use beside Cycles' own, makes one for each
     processor that it may use when it is loaded. Idle ones keep asking for work: they take a tenth

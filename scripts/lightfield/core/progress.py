@@ -1,4 +1,4 @@
-"""Progress of long work: views done, rate, and time left, readable on a terminal and in a log."""
+"""Prints the progress of long work: pieces done, seconds a piece, and time left."""
 
 import re
 import sys
@@ -26,7 +26,7 @@ def duration(seconds: float) -> str:
 class Said:
     """What a line of `Progress` says: pieces ``done`` of ``total``, and seconds for ``each``.
 
-    The first line knows no seconds, and alone how many were ``already`` done before.
+    Only the first line says how many were ``already`` done before. It says no seconds.
     """
 
     done: int
@@ -61,7 +61,7 @@ class Progress:
         self.begin()
 
     def begin(self) -> None:
-        """Take the time from now on; called again after preparations that are no such work."""
+        """Start the clock. Call it again after preparations that are not part of the pieces."""
         self.started = self.printed = time.monotonic()
         self.first: tuple[int, float] | None = None
 
@@ -77,7 +77,7 @@ class Progress:
         if now - self.printed < max(INTERVAL, min(elapsed / 20, 60)) and self.count < self.total:
             return
         self.printed = now
-        # The first piece often pays for preparations that the others need not make.
+        # The first piece often takes longer, because it prepares the others.
         counted, since = self.first if self.count > self.first[0] else (0, 0.0)
         each = (elapsed - since) / (self.count - counted)
         left = each * (self.total - self.count)

@@ -89,9 +89,9 @@ class Task:
                 content = file.read()
         except OSError:
             return []
-        whole = content[: content.rfind(b"\n") + 1]
-        self.read += len(whole)
-        return whole.decode(errors="replace").splitlines()
+        complete_lines = content[: content.rfind(b"\n") + 1]
+        self.read += len(complete_lines)
+        return complete_lines.decode(errors="replace").splitlines()
 
 
 class RunDisplay:
@@ -119,9 +119,12 @@ class RunDisplay:
 
     def begin(self, tasks: Mapping[Hashable, Task], cores: int) -> None:
         """Take these tasks, on which ``cores`` work."""
-        self._tasks, self._open, self._cores = tasks, dict(tasks), cores
+        self._tasks = tasks
+        self._open = dict(tasks)
+        self._cores = cores
         self._phases = dict.fromkeys(task.phase for task in tasks.values())
-        self._began, self._due = time.time(), FIRST_LINE
+        self._began = time.time()
+        self._due = FIRST_LINE
 
     def start(self) -> None:
         """Look each second how far the run is."""
@@ -169,7 +172,9 @@ class RunDisplay:
             said = progress.read(line)
             if said:
                 task.kept = task.kept if said.already is None else said.already
-                task.done, task.total, task.each = said.done, said.total + task.kept, said.each
+                task.done = said.done
+                task.total = said.total + task.kept
+                task.each = said.each
             elif _FOR_THE_USER.match(line) and line not in self._seen:
                 self._seen.add(line)
                 # A note names what it is about; a warning is the program's, whatever it works on.

@@ -4,7 +4,8 @@ import difflib
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping
-from typing import Annotated, Any, TypeVar
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -20,6 +21,7 @@ from pydantic_core import ErrorDetails
 from typing_extensions import TypeAliasType
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import read_json
 
 Model = TypeVar("Model")
 
@@ -36,17 +38,26 @@ class Settings(BaseModel):
         extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True
     )
 
+    # Keys that earlier versions had, and what to do instead.
+    removed_keys: ClassVar[Mapping[str, str]] = {}
+
     @model_validator(mode="before")
     @classmethod
     def _known_keys(cls, content: Any) -> Any:
-        known = cls.model_fields
+        allowed_keys = cls.model_fields
         for key, value in content.items() if isinstance(content, Mapping) else ():
-            if key not in known:
-                hint = suggestion(key, known) or f"; allowed here: {', '.join(known)}"
+            if key in cls.removed_keys:
+                raise ValueError(f"{key}: is no longer a key; {cls.removed_keys[key]}")
+            if key not in allowed_keys:
+                hint = suggestion(key, allowed_keys) or f"; allowed here: {', '.join(allowed_keys)}"
                 raise ValueError(f"{key}: unknown key{hint}")
             if value is None:
                 raise ValueError(f"{key}: is null; must have a value, or be left out")
         return content
+
+    def as_json(self, keys: set[str] | None = None) -> dict[str, Any]:
+        """Return the content of a settings file: all keys that have a value, or some ``keys``."""
+        return self.model_dump(mode="json", include=keys, exclude_none=True)
 
 
 def as_list(count: int) -> BeforeValidator:
@@ -96,9 +107,9 @@ Name = Annotated[
 ]
 
 
-def suggestion(name: str, known: Iterable[str]) -> str:
+def suggestion(name: str, allowed: Iterable[str]) -> str:
     """Return ``; did you mean …?``, or nothing where no name that is known is near."""
-    close = difflib.get_close_matches(name, list(known), n=1)
+    close = difflib.get_close_matches(name, list(allowed), n=1)
     return f"; did you mean {close[0]}?" if close else ""
 
 
@@ -110,14 +121,19 @@ def checked(model: TypeAdapter[Model], content: Any, file: str) -> Model:
         raise UserError(f"{file}: {_first(error.errors(), content)}") from None
 
 
+def read_settings(model: type[Model], path: Path) -> Model:
+    """Read a settings file; raises `UserError` with file, key, value, and why."""
+    return checked(TypeAdapter(model), read_json(path), str(path))
+
+
 def _first(errors: list[ErrorDetails], content: Any) -> str:
     """Say in one line what is wrong with the first key that is."""
-    found = [(*_find(error, content), error) for error in errors]
+    located_errors = [(*_find(error, content), error) for error in errors]
     # Of a value that may be of several types, each type has an error, and the deepest knows most.
-    start = found[0][0]
-    path = max((p for p, _, _ in found if p[: len(start)] == start), key=len)
-    same = [(value, error) for p, value, error in found if p == path]
-    value, error = same[0]
+    start = located_errors[0][0]
+    path = max((p for p, _, _ in located_errors if p[: len(start)] == start), key=len)
+    errors_of_key = [(value, error) for p, value, error in located_errors if p == path]
+    value, error = errors_of_key[0]
     key = ".".join(f"[{part}]" if isinstance(part, int) else part for part in path)
     prefix = f"{key}: " if key else ""
     context = error.get("ctx", {})
@@ -130,17 +146,22 @@ def _first(errors: list[ErrorDetails], content: Any) -> str:
             name = context["discriminator"] if "discriminator" in context else error["loc"][-1]
             return f"{prefix}is missing the key {str(name).strip(chr(39))}"
         case "union_tag_invalid":
-            kind = ".".join(filter(None, [key, context["discriminator"].strip("'")]))
-            known = context["expected_tags"].replace("'", "")
-            return f'{kind}: is "{context["tag"]}"; must be one of {known}'
+            name = context["discriminator"].strip("'")
+            kind = ".".join(filter(None, [key, name]))
+            allowed_tags = context["expected_tags"].replace("'", "")
+            return f"{kind}: is {_shown(value[name])}; must be one of {allowed_tags}"
     if error["loc"][-1:] == ("[key]",):
         # Not of the path: rigs that are somebody else's folders are not in the content.
         *above, name, _ = error["loc"]
         return f"{'.'.join(map(str, above))}: {name!r} is no name; must {_allowed(error)}"
+    allowed = dict.fromkeys(_allowed(error) for _, error in errors_of_key)
+    return f"{prefix}is {_shown(value)}; must {' or '.join(allowed).replace(' or be ', ' or ')}"
+
+
+def _shown(value: Any) -> str:
+    """Return a value as JSON, shortened where it is long."""
     text = json.dumps(value, default=str)
-    text = text if len(text) <= 60 else f"{text[:57]}..."
-    allowed = dict.fromkeys(_allowed(error) for _, error in same)
-    return f"{prefix}is {text}; must {' or '.join(allowed).replace(' or be ', ' or ')}"
+    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _find(error: ErrorDetails, content: Any) -> tuple[tuple[int | str, ...], Any]:
@@ -162,6 +183,8 @@ def _allowed(error: ErrorDetails) -> str:
     match error["type"]:
         case "value_error":
             return str(error["ctx"]["error"]).removeprefix("must ")
+        case "missing":
+            return f"have the key {error['loc'][-1]}"
         case "model_type" | "model_attributes_type" | "dict_type":
             return "be a mapping of keys to values"
         case "int_type" | "int_from_float":
@@ -179,11 +202,11 @@ def _allowed(error: ErrorDetails) -> str:
             return "be a list"
         case "literal_error":
             return f"be {error['ctx']['expected']}".replace("'", "")
-    for name, words in _BOUNDS.items():
+    for name, comparison in _BOUNDS.items():
         if name in error.get("ctx", {}):
             bound = error["ctx"][name]
             if isinstance(bound, int):
-                return f"be a whole number {words} {bound}"
-            return f"be a number {words} {bound:g}"
+                return f"be a whole number {comparison} {bound}"
+            return f"be a number {comparison} {bound:.10g}"
     text = re.sub(r"^\w+ should ", "", error["msg"])
     return re.sub(r" after validation, not .*", "", text)

@@ -4,7 +4,7 @@ What the .blend says is in the scene's inventory: under ``blend`` what `lightfie
 ``blend_facts`` found, and under ``missing`` which of its files are not there.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from lightfield.core.errors import UserError
@@ -78,71 +78,99 @@ def taken(
     rig of the .blend's own camera.
     """
     blend = inventory["blend"]
+    return [
+        *_scene(blend, frames, render),
+        *_camera(blend["camera"], own_camera),
+        *(f"{name} ignored" for name in ("compositor", "sequencer") if blend[name]),
+        *_switches(blend, render),
+        *_display(blend),
+        *_film(blend, render),
+        *_missing(inventory["missing"]),
+    ]
+
+
+def _scene(blend: Settings, frames: Sequence[int], render: Settings) -> Iterator[str]:
+    """Yield which scene, frames and view layers are rendered, and with how many samples."""
     layers = blend["layers"]
-    words = []
     if len(blend["scenes"]) > 1:
-        words.append(f"scene {blend['scene']} of {len(blend['scenes'])}")
-    words.append(_frames(frames, blend["frame"]))
+        yield f"scene {blend['scene']} of {len(blend['scenes'])}"
+    yield _frames(frames, blend["frame"])
     if blend["view_layers"] > 1:
         together = "" if len(layers) == 1 else " in one picture"
         name = "view layer" if len(layers) == 1 else "view layers"
-        words.append(f"{name} {' and '.join(layers)} of {blend['view_layers']}{together}")
+        yield f"{name} {' and '.join(layers)} of {blend['view_layers']}{together}"
     if blend["engine"] != "CYCLES":
         made_for = ENGINES.get(blend["engine"], blend["engine"])
-        words.append(f"made for {made_for}, rendered with Cycles")
+        yield f"made for {made_for}, rendered with Cycles"
     if isinstance(render.get("samples"), int):
-        words.append(_samples(render["samples"], blend["samples"]))
+        yield _samples(render["samples"], blend["samples"])
     elif "samples" in render:
-        words.append(_samples(blend["samples"], blend["samples"]))
-    if camera := blend["camera"]:
-        lens = camera["lens"]
-        length = f" ({lens['lens']:g} mm)" if lens["type"] == "PERSP" else ""
-        words.append(f"camera {camera['name']}{length} {'taken' if own_camera else 'ignored'}")
-        # An inventory from before this was looked at has none.
-        near, far = camera.get("clip", _BLENDERS_CLIP)
-        if own_camera and (near > _BLENDERS_CLIP[0] or far < _BLENDERS_CLIP[1]):
-            words.append(f"clip planes at {near:g} and {far:g} m ignored")
-    words += [f"{name} ignored" for name in ("compositor", "sequencer") if blend[name]]
-    threshold = render.get("adaptive_threshold")
+        yield _samples(blend["samples"], blend["samples"])
+
+
+def _camera(camera: Settings | None, is_taken: bool) -> Iterator[str]:
+    """Yield what is taken of the .blend's own camera."""
+    if not camera:
+        return
+    lens = camera["lens"]
+    length = f" ({lens['lens']:g} mm)" if lens["type"] == "PERSP" else ""
+    yield f"camera {camera['name']}{length} {'taken' if is_taken else 'ignored'}"
+    # An inventory from before this was looked at has none.
+    near, far = camera.get("clip", _BLENDERS_CLIP)
+    if is_taken and (near > _BLENDERS_CLIP[0] or far < _BLENDERS_CLIP[1]):
+        yield f"clip planes at {near:g} and {far:g} m ignored"
+
+
+def _switches(blend: Settings, render: Settings) -> Iterator[str]:
+    """Yield what is on or off here, of what is on here or in the .blend."""
     focus = bool(blend["camera"] and blend["camera"]["lens"]["depth_of_field"])
-    blur = render.get("motion_blur", blend["motion_blur"])
-    for name, here, there in (
-        ("adaptive sampling", bool(threshold), blend["adaptive_sampling"]),
+    for name, is_on, is_on_in_blend in (
+        ("adaptive sampling", bool(render.get("adaptive_threshold")), blend["adaptive_sampling"]),
         ("denoising", bool(render.get("denoise")), blend["denoising"]),
         ("depth of field", bool(render.get("depth_of_field")), focus),
-        ("motion blur", blur, blend["motion_blur"]),
+        ("motion blur", render.get("motion_blur", blend["motion_blur"]), blend["motion_blur"]),
     ):
-        if here or there:
-            words.append(f"{name} {'ON' if here else 'off'}")
-    words.append(f"view transform {blend['view_transform']} ignored")
+        if is_on or is_on_in_blend:
+            yield f"{name} {'ON' if is_on else 'off'}"
+
+
+def _display(blend: Settings) -> Iterator[str]:
+    """Yield what Blender would change of the colours when it shows or saves a picture."""
+    yield f"view transform {blend['view_transform']} ignored"
     if blend["look"] != "None":
-        words.append(f"look {blend['look']} ignored")
+        yield f"look {blend['look']} ignored"
     if blend["exposure"]:
-        words.append(f"view exposure {blend['exposure']:+g} ignored")
+        yield f"view exposure {blend['exposure']:+g} ignored"
     if blend["gamma"] != 1:
-        words.append(f"view gamma {blend['gamma']:g} ignored")
+        yield f"view gamma {blend['gamma']:g} ignored"
     if blend["curves"]:
-        words.append("view curves ignored")
+        yield "view curves ignored"
+
+
+def _film(blend: Settings, render: Settings) -> Iterator[str]:
+    """Yield what the .blend says of the film, of units, and of what it runs."""
     if render.get("transparent"):
-        words.append("film transparent ON")
+        yield "film transparent ON"
     elif blend["film_transparent"]:
-        words.append("film transparent on, ignored")
+        yield "film transparent on, ignored"
+    # An inventory from before this was looked at has none.
+    if blend.get("pixel_aspect", 1) != 1:
+        yield f"pixel aspect {blend['pixel_aspect']:g} ignored, pixels are square"
     for name, title in (
         ("border", "render border"),
         ("stereoscopy", "stereoscopy"),
         ("freestyle", "Freestyle lines"),
     ):
         if blend[name]:
-            words.append(f"{title} ignored")
+            yield f"{title} ignored"
     if blend["simplify"]:
-        words.append("simplify ON")
+        yield "simplify ON"
     if blend.get("working_space", REC_709) != REC_709:
-        words.append(f"working space {blend['working_space']} converted to Rec. 709")
+        yield f"working space {blend['working_space']} converted to Rec. 709"
     if blend["unit_scale"] != 1:
-        words.append(f"unit scale {blend['unit_scale']:g} ignored")
+        yield f"unit scale {blend['unit_scale']:g} ignored"
     if blend["scripts"]:
-        words.append("scripts and drivers in Python not run")
-    return words + list(_missing(inventory["missing"]))
+        yield "scripts and drivers in Python not run"
 
 
 def _frames(frames: Sequence[int], own: int) -> str:

@@ -8,11 +8,10 @@ import difflib
 import math
 import os
 import re
-import shlex
 from collections.abc import Mapping
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import yaml
 from pydantic import (
@@ -29,7 +28,6 @@ from lightfield.core.settings import (
     AS_WRITTEN,
     Name,
     Settings,
-    Vector,
     checked,
     pattern,
     suggestion,
@@ -37,12 +35,17 @@ from lightfield.core.settings import (
 from lightfield.dataset import published
 from lightfield.dataset.exports import VIEWS, Export, Exports
 from lightfield.dataset.passes import FLOW, PASSES, in_order
-from lightfield.geometry.lenses import LENSES, CameraSettings, Lens
-from lightfield.geometry.lenses.cube_map import CubeMap
+from lightfield.dataset.reprojections import (
+    ReprojectionOptions,
+    ReprojectionSettings,
+    Stops,
+    face_problem,
+)
+from lightfield.geometry.lenses import LENSES, Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import AnyRig, BlendCamera, Poses, Rig
 from lightfield.geometry.rigs.rig import Frame
-from lightfield.geometry.rigs.split import PARTS, Chosen
+from lightfield.geometry.rigs.split_setting import PARTS, Chosen
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENES = ROOT / "configs" / "scenes"
@@ -141,8 +144,18 @@ class Energy(Settings):
     currency: str = Field("EUR", max_length=20)
 
 
+_SHARDS_ARE_AUTOMATIC = (
+    "leave it out, or set views_per_shard to the number of views that one render job makes"
+)
+
+
 class Configuration(Settings):
     """Which scenes to build, how well, and where."""
+
+    removed_keys: ClassVar[Mapping[str, str]] = {
+        "most_shards": _SHARDS_ARE_AUTOMATIC,
+        "shard_minutes": _SHARDS_ARE_AUTOMATIC,
+    }
 
     scenes: Names = Field(description="Names of files in configs/scenes/, without .yaml.")
     rigs: Literal["all"] | Names = Field(
@@ -160,7 +173,7 @@ class Configuration(Settings):
             ),
         ],
         Preset,
-    ]
+    ] = Field(min_length=1)
     results: Folder = Field("results", description="Folder of the datasets.")
     work: Folder = Field(
         "work",
@@ -170,18 +183,10 @@ class Configuration(Settings):
         "auto", description="What Cycles renders on."
     )
     views_per_shard: Auto | AtLeastOne = Field(
-        "auto", description="auto, or how many views one render job makes."
-    )
-    most_shards: AtLeastOne = Field(
-        64,
-        description="With views_per_shard: auto, the most render jobs of one dataset, unless they "
-        "are long; without it 64, or as many as Snakemake runs at once (--jobs).",
-    )
-    shard_minutes: Annotated[float, Field(gt=0, le=1e6)] | None = Field(
-        None,
-        description="With views_per_shard: auto, a render job that is expected to take longer than "
-        "so many minutes of one core is cut; without it 20 minutes of a cluster's job. A dataset "
-        "that was begun keeps its jobs.",
+        "auto",
+        description="How many views one render job makes. With auto, the number follows from the "
+        "expected time of a view, and on a cluster from the jobs that run at once (--jobs). A "
+        "dataset that was begun with auto keeps its jobs.",
     )
     accept_blend: Annotated[bool, BeforeValidator(_switch)] = Field(
         False,
@@ -204,7 +209,8 @@ class Configuration(Settings):
                 raise ValueError(f"scenes: {name} is no name for a scene; no dots, and not {taken}")
         for key in ("results", "work"):
             _check_folder(key, getattr(self, key))
-        results, work = Path(self.results).resolve(), Path(self.work).resolve()
+        results = Path(self.results).resolve()
+        work = Path(self.work).resolve()
         if results == work or results in work.parents or work in results.parents:
             raise ValueError(
                 f"work: is {self.work!r}, and results is {self.results!r}; "
@@ -234,11 +240,11 @@ class Parameters(Settings):
 
 # What a value of the .blend's own is called, wherever the scene YAML may ask for it.
 FILE = "file"
-# Keys of `Source` that a builder does not take.
+# Keys of `SceneSource` that a builder does not take.
 OF_A_BLEND = ("scene_name", "view_layers", "allow_missing", "sha256", "url", "page")
 
 
-class Source(Settings):
+class SceneSource(Settings):
     """Where the scene comes from: a builder, a .blend file, or views that are there already."""
 
     builder: str | None = Field(
@@ -410,31 +416,15 @@ class Render(Settings):
         return self
 
 
-Stops = Annotated[float, Field(ge=-100, le=100)]
-
-
-class Reprojection(Settings):
+class Reprojection(ReprojectionOptions):
     """The same views through another lens, or as other files."""
 
     rigs: list[str] | None = Field(
         None, min_length=1, description="The rigs it is made for; without it, every one of them."
     )
-    camera: CameraSettings | None = Field(
-        None, description="Without it, the rig's own: the pixels are those of the views."
-    )
-    cube_map: bool = Field(False, description="Six faces of each view, each a 90 degree view.")
-    rotation: Vector = Field((0, 0, 0), description="Pan, pitch and roll in degrees.")
     format: Literal["png", "exr"] = Field("png", description="EXR has depth.")
-    filter: Literal["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp"] = Field(
-        "adaptive", description="How colour is resampled."
-    )
-    samples: int = Field(1, ge=1, le=64, description="n x n samples a pixel.")
-    bits: Literal[8, 16] = Field(8, description="Of a PNG's values.")
     exposure: Stops | Annotated[list[Stops], Field(min_length=1, max_length=32)] = Field(
         0, description="In stops; of a list each makes a folder, as in png_ev-2 and png_ev0."
-    )
-    reinhard: Annotated[float, Field(ge=1e-9, le=1e9)] | None = Field(
-        None, description="Reinhard tone mapping with this maximum."
     )
     passes: PassNames | None = Field(
         None, description="Those of render.passes that are reprojected, too, as EXR."
@@ -454,51 +444,18 @@ class Reprojection(Settings):
         """Of the images' names."""
         return f".{self.format}"
 
-    def lens(self, rendered: CameraSettings) -> Lens:
-        """Return the lens of the images that are made of what a camera has ``rendered``."""
-        camera = self.camera or rendered
-        size = camera.resolution[0]
-        return CubeMap(width=6 * size, height=size).face if self.cube_map else camera.make()
-
     @property
-    def optics(self) -> str:
-        """The words that say to scripts/reproject.py where each pixel comes from."""
-        if self.camera is None:
-            return "--no-reproject"
-        if self.cube_map:
-            words = ["--cubemap", str(self.camera.resolution[0])]
-        else:
-            words = ["--camera", self.camera.model_dump_json(exclude_unset=True)]
-        words += ["--filter", self.filter]
-        if self.samples > 1:
-            words += ["--samples", str(self.samples)]
-        if any(self.rotation):
-            words += ["--rotation", ",".join(map(str, self.rotation))]
-        return shlex.join(words)
-
-    @property
-    def recorded(self) -> dict[str, Any]:
-        """What its lightfield.json says beside the lens: see `lightfield.reprojection.job`."""
-        return {
-            "rotation": list(self.rotation),
-            "filter": self.filter,
-            "samples": self.samples,
-            "exposure": self.exposure,
-            "reinhard": 1 if self.reinhard is None else self.reinhard,
-            **({"bits": self.bits} if self.bits != 8 else {}),
-        }
-
-    @property
-    def development(self) -> str:
-        """The words that say to scripts/reproject.py what to write."""
-        words = [f"--{self.format}", "--exposure", str(self.exposure)]
-        if self.reinhard is not None:
-            words += ["--reinhard", str(self.reinhard)]
-        if self.bits != 8:
-            words += ["--bits", str(self.bits)]
-        if self.passes:
-            words += ["--passes", ",".join(self.passes)]
-        return shlex.join(words)
+    def settings(self) -> ReprojectionSettings:
+        """What scripts/reproject.py is to do."""
+        # `Scene` has made a reprojection of each exposure.
+        assert not isinstance(self.exposure, list)
+        options = self.model_dump(include={*ReprojectionOptions.model_fields}, exclude_none=True)
+        return ReprojectionSettings(
+            **options,
+            formats=[self.format],
+            exposure=self.exposure,
+            passes=self.passes or [],
+        )
 
 
 class Flow(Settings):
@@ -529,7 +486,7 @@ def _bracketed(reprojections: dict[str, Reprojection]) -> dict[str, Reprojection
         for stops in reprojection.exposure:
             key = f"{name}_ev{stops:g}"
             if key in found or key in reprojections:
-                raise ValueError(f"must not name {key} twice")
+                raise ValueError(f"{name}.exposure: must not name {key} twice")
             found[key] = reprojection.model_copy(update={"exposure": stops})
     return found
 
@@ -540,7 +497,7 @@ class Scene(Settings):
     description: str | None = Field(None, description="One line about the scene.")
     licence: str | None = Field(None, description="Of the scene, for a package's card.")
     credit: str | None = Field(None, description="How the scene's artist is to be cited.")
-    scene: Source
+    scene: SceneSource
     render: Render | None = Field(None, description="How; scene.dataset alone has none.")
     rigs: dict[Name, AnyRig] = Field(
         {},
@@ -583,14 +540,11 @@ class Scene(Settings):
                 raise ValueError("render.depth_of_field: goes with scene.blend, for its camera")
         for name, reprojection in self.reprojections.items():
             key = f"reprojections.{name}"
-            if reprojection.camera and reprojection.camera.lens == FILE:
-                raise ValueError(f"{key}.camera.lens: file goes with a rig of type blend_camera")
             _check_name(key, name, REPROJECTION_NEIGHBOURS)
             for rig_name in reprojection.rigs or ():
                 if rig_name not in self.rigs:
                     hint = suggestion(rig_name, self.rigs)
                     raise ValueError(f"{key}.rigs: there is no rig {rig_name!r}{hint}")
-            _check_cube_map(key, reprojection)
             for pass_name in reprojection.passes or ():
                 if self.render is None or pass_name not in (self.render.passes or ()):
                     raise ValueError(f"{key}.passes: {pass_name} is not in render.passes")
@@ -713,16 +667,10 @@ def _check_blender_takes(key: str, lens: Lens) -> None:
         raise ValueError(f"{key}.sensor_size: is {lens.sensor[0]:g}; Blender has at least 1 mm")
 
 
-def _check_cube_map(key: str, settings: Rig | Reprojection) -> None:
-    """Check that a camera can be that of a cube map's face, where it has to."""
-    camera = settings.camera
-    if camera is None or not settings.cube_map:
-        return
-    if (camera.lens, getattr(camera, "fov", None)) != ("rectilinear", 90):
-        raise ValueError(f"{key}.camera: must be rectilinear with fov 90 with cube_map")
-    if camera.resolution[0] != camera.resolution[1]:
-        size = list(camera.resolution)
-        raise ValueError(f"{key}.camera.resolution: is {size}; must be square with cube_map")
+def _check_cube_map(key: str, rig: Rig) -> None:
+    """Check that a rig's camera can be that of a cube map's face, where it has to."""
+    if rig.cube_map and (problem := face_problem(rig.camera)):
+        raise ValueError(f"{key}.camera{problem}")
 
 
 def _check_name(key: str, name: str, neighbours: set[str]) -> None:
@@ -786,7 +734,7 @@ def builders() -> list[str]:
     return sorted(name for name in folders if name != "library")
 
 
-def blend_sha256(scene: str, source: Source) -> tuple[str | None, Path]:
+def blend_sha256(scene: str, source: SceneSource) -> tuple[str | None, Path]:
     """Return the SHA-256 that a scene's .blend must have, or None if no one knows it yet.
 
     The second value is the file that says so, or that shall: the scene YAML or its lock file.
@@ -867,7 +815,7 @@ class _UniqueKeyLoader(yaml.SafeLoader):
 
 
 # YAML 1.1 takes 12:30 for 750, 0123 for 83 and 0b11 for 3. Here they stay the texts that they look
-# like, which messages show as they were written.
+# like, which messages show as they were written. It takes 1e-3 for a text; here it is a number.
 _UniqueKeyLoader.yaml_implicit_resolvers = {
     first: [(tag, form) for tag, form in resolvers if not tag.endswith((":int", ":float"))]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
@@ -881,6 +829,7 @@ _UniqueKeyLoader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
     re.compile(
         r"[-+]?(?:[0-9][0-9_]*\.[0-9_]*|\.[0-9][0-9_]*)(?:[eE][-+][0-9]+)?$"
+        r"|[-+]?[0-9]+[eE][-+]?[0-9]+$"
         r"|[-+]?\.(?:inf|Inf|INF)$|\.(?:nan|NaN|NAN)$"
     ),
     list("-+0123456789."),

@@ -6,7 +6,7 @@ cannot open and how it can be had. What the options do is written in `lightfield
 
 import math
 import shutil
-from typing import Annotated, Any, ClassVar, Literal, Self, get_args
+from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar, get_args
 
 from pydantic import Field, model_validator
 
@@ -18,7 +18,7 @@ from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import Rig
 from lightfield.geometry.rigs.plane import Plane
-from lightfield.geometry.rigs.split import PARTS
+from lightfield.geometry.rigs.split_setting import PARTS
 
 # In `sources`, the rendered views themselves.
 VIEWS = "views"
@@ -82,8 +82,8 @@ class InstantNgp(Export):
     scale: Annotated[float, Field(gt=0, le=1e6)] | None = Field(
         None, description="World to unit cube; without it, fitted to the scene."
     )
-    offset: Vector = Field(
-        (0.5, 0.5, 0.5), description="Where the mean camera lies in the unit cube."
+    offset: Vector | None = Field(
+        None, description="Where the mean camera lies in the unit cube; 0.5 each without it."
     )
     bounds: Literal["rig", "depth"] = Field(
         "rig",
@@ -101,8 +101,12 @@ class InstantNgp(Export):
     def _one_placement(self) -> Self:
         if self.scale is not None and self.bounds == "depth":
             raise ValueError("bounds: goes without scale, which it would find")
-        if self.scale is None and "offset" in self.model_fields_set:
+        if self.scale is None and self.offset is not None:
             raise ValueError("offset: goes with scale; without it both are fitted")
+        if self.render_aabb:
+            lowest, highest = self.render_aabb
+            if any(low >= high for low, high in zip(lowest, highest, strict=True)):
+                raise ValueError("render_aabb: must have the corner of smaller numbers first")
         return self
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
@@ -115,27 +119,15 @@ class InstantNgp(Export):
 
     @property
     def recorded(self) -> dict[str, Any]:
-        # Without a scale the offset is found, too.
-        found = {"offset"} if self.scale is None else set()
-        return self.model_dump(mode="json", exclude={"sources", *found})
+        options = super().recorded
+        del options["offset"]
+        # Without a scale the offset is fitted, too.
+        return options if self.scale is None else {**options, "offset": list(self.middle)}
 
-    def words(self, folder: str) -> list[str]:
-        """Return the words of scripts/export_instant_ngp.py; depth maps go below ``folder``."""
-        words = []
-        if self.scale is not None:
-            words += ["--scale", str(self.scale), "--offset", *map(str, self.offset)]
-        if self.bounds == "depth":
-            words += ["--depth-bounds"]
-        if self.aabb_scale is not None:
-            words += ["--aabb-scale", str(self.aabb_scale)]
-        if self.render_aabb is not None:
-            words += [
-                "--render-aabb",
-                *(str(value) for corner in self.render_aabb for value in corner),
-            ]
-        if self.depth:
-            words += ["--depth-dir", f"{folder}/instant_ngp/depth"]
-        return words
+    @property
+    def middle(self) -> tuple[float, float, float]:
+        """Where the mean camera lies in the unit cube, with a scale."""
+        return self.offset or (0.5, 0.5, 0.5)
 
 
 class Colmap(Developed):
@@ -293,6 +285,41 @@ def _centred_pinhole(lens: Lens) -> str | None:
     if lens.center != (lens.width / 2, lens.height / 2) or not lens.has_square_pixels:
         return "has its axis off centre or oblong pixels, which this layout cannot say"
     return None
+
+
+Options = TypeVar("Options", bound=Export)
+
+
+class ExportSettings(Settings, Generic[Options]):
+    """The settings of one job, which exports the views of one source."""
+
+    options: Options = Field(description="As in the scene YAML, with one source.")
+    suffix: Literal[".png", ".exr"] = Field(".exr", description="Of the views.")
+    tested_by: dict[str, str] = Field(
+        {}, description="Folders of the rigs' datasets whose views test what is trained on these."
+    )
+    trained_by: str | None = Field(
+        None, description="The transforms.json that these views test, whose scale is taken."
+    )
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if len(self.options.sources) != 1:
+            raise ValueError("options.sources: must name one source")
+        return self
+
+    @property
+    def source(self) -> str:
+        """The source's folder in the dataset's; empty for the rendered views."""
+        (name,) = self.options.sources
+        return "" if name == VIEWS else name
+
+
+def export_settings_of(name: str) -> type[ExportSettings[Export]]:
+    """Return the model of an exporter's settings file."""
+    generic: Any = ExportSettings
+    model: type[ExportSettings[Export]] = generic[settings_of(name)]
+    return model
 
 
 def settings_of(name: str) -> type[Export]:

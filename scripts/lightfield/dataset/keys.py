@@ -16,7 +16,7 @@ from typing import Any
 
 from lightfield.core.errors import UserError
 from lightfield.dataset import published
-from lightfield.dataset.config import BUILDERS, Source
+from lightfield.dataset.config import BUILDERS, SceneSource
 from lightfield.dataset.lightfield import MACHINE, LightField, View
 
 # Raised when the program that renders changes what it writes for the same settings, and that which
@@ -29,7 +29,7 @@ FLOW_VERSION = 1
 version = cache(metadata.version)
 
 
-def scene_fingerprint(source: Source, external: Sequence[tuple[str, str | None]] = ()) -> str:
+def scene_fingerprint(source: SceneSource, external: Sequence[tuple[str, str | None]] = ()) -> str:
     """Return what identifies a scene YAML's ``scene`` block: 64 hexadecimal digits.
 
     A .blend is identified by its bytes and those of the ``external`` files that it reads, each

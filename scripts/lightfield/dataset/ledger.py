@@ -24,7 +24,15 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, broken, read_problem, sha256, unreadable, writing
+from lightfield.core.files import (
+    DAMAGE,
+    atomic_path,
+    broken,
+    read_problem,
+    sha256,
+    unreadable,
+    writing,
+)
 
 NAME = "ledger.txt"
 # The ledger is written anew when more than this part of its lines counts no more.
@@ -140,6 +148,20 @@ class Ledger:
                 }
                 _append(self._path, job._replace(files=files))
 
+    def outdated_outputs(self) -> Iterator[str]:
+        """Yield the outputs that were made from something else than their jobs would read now."""
+        return (output for output in self._inputs if self.changed_input(output) is not None)
+
+    def has_other_inputs(self, output: str, names: set[str], *, may_lack: bool = False) -> bool:
+        """Return whether an output was made from other files than these, whatever they hold.
+
+        With ``may_lack`` the ledger may lack some that were read.
+        """
+        noted = self._inputs.get(output)
+        if noted is None:
+            return False
+        return not noted.keys() <= names if may_lack else noted.keys() != names
+
     def changed_input(self, output: str) -> str | None:
         """Return an input that is no longer the one from which an output was made; None if none.
 
@@ -165,7 +187,7 @@ class Ledger:
         stamps = {}
         for name in names:
             if Path(name).is_file():
-                stamps[name] = Stamp.of(name, self._trusted_sum(name))
+                stamps[name] = Stamp.of(name, self._trusted_sum(name) or _digest_now(name))
         return stamps
 
     def _trusted_sum(self, name: str) -> str | None:
@@ -223,15 +245,19 @@ def forget(path: Path, name: str) -> None:
 def _has_changed(name: str, stamp: Stamp) -> bool:
     """Return whether a file has other bytes than its stamp; one that is gone has not."""
     try:
-        status = os.stat(name)  # noqa: PTH116, as above
-        return _digest(name, status.st_mtime_ns, status.st_ctime_ns) != stamp.sha256
+        return _digest_now(name) != stamp.sha256
     except OSError:
         return False
 
 
+def _digest_now(name: str) -> str:
+    """Return the SHA-256 of a file, read once: thousands of shards are made from one .blend."""
+    status = os.stat(name)  # noqa: PTH116, as above
+    return _digest(name, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+
+
 @lru_cache(maxsize=64)
-def _digest(name: str, _modified_ns: int, _changed_ns: int) -> str:
-    """Return the SHA-256 of a file: thousands of shards are made from one large .blend."""
+def _digest(name: str, _bytes: int, _modified_ns: int, _changed_ns: int) -> str:
     return sha256(name)
 
 
@@ -261,17 +287,31 @@ def _parse(line: bytes) -> Job | None:
     digest, _, text = line.partition(b" ")
     if digest.decode(errors="replace") != hashlib.sha256(text).hexdigest():
         return None
-    content = json.loads(text)
-    return Job(
-        content["outputs"],
-        _stamps(content["files"]),
-        _stamps(content["history"]),
-        _stamps(content["inputs"]),
-    )
+    try:
+        content = json.loads(text)
+        return Job(
+            [_checked(name, str) for name in _checked(content["outputs"], list)],
+            _stamps(content["files"]),
+            _stamps(content["history"]),
+            _stamps(content["inputs"]),
+        )
+    except DAMAGE:
+        return None
 
 
 def _stamps(entries: Mapping[str, Any]) -> dict[str, Stamp]:
-    return {name: Stamp(*entry) for name, entry in entries.items()}
+    return {name: _stamp(*entry) for name, entry in entries.items()}
+
+
+def _stamp(digest: Any, *numbers: Any) -> Stamp:
+    return Stamp(_checked(digest, str), *(_checked(number, int) for number in numbers))
+
+
+def _checked(value: Any, kind: type) -> Any:
+    """Return a value of a kind; raises TypeError for any other."""
+    if not isinstance(value, kind):
+        raise TypeError(f"is no {kind.__name__}")
+    return value
 
 
 def _line(job: Job) -> bytes:

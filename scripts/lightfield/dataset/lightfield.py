@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
+from lightfield.core.settings import FARTHEST
 from lightfield.dataset import passes
 from lightfield.dataset.passes import PASSES, Pass
 from lightfield.geometry import lenses, rotations
 from lightfield.geometry.flow import neighbours
 from lightfield.geometry.lenses import Lens
-from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 if TYPE_CHECKING:
     from lightfield.geometry import rigs
@@ -213,11 +213,6 @@ class LightField:
         """The folder that the file lies in."""
         return self.path.parent
 
-    @property
-    def cycles_depth(self) -> str:
-        """What Cycles' depth pass holds: "z" for a perspective camera, or else "distance"."""
-        return "z" if isinstance(self.lens, Rectilinear) else "distance"
-
     @cached_property
     def matrices(self) -> Floats:
         """The views' camera-to-world matrices, (n, 4, 4)."""
@@ -310,7 +305,14 @@ def _numbers(where: str, value: Any, shape: tuple[int, ...]) -> Floats:
         array = np.array(value)
     except ValueError:  # rows of different lengths
         array = np.empty(0)
-    if array.shape != shape or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+    # NaN fails the comparison, too.
+    if (
+        array.shape != shape
+        or array.dtype.kind not in "iuf"
+        or not (np.abs(array.astype(np.float64)) <= FARTHEST).all()
+    ):
         size = " × ".join(map(str, shape))
-        raise UserError(f"{where}: must be {size} finite numbers")
+        raise UserError(
+            f"{where}: must be {size} finite numbers, from -{FARTHEST:g} to {FARTHEST:g}"
+        )
     return array.astype(np.float64)

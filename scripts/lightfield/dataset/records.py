@@ -9,13 +9,13 @@ Where machines see no common folder, the view store takes the log's place.
 """
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import append_json_line, read_json, read_json_lines, sha256, write_json
+from lightfield.core.files import append_json_line, read_json_lines, sha256, write_json
 from lightfield.dataset.shard_files import LOG_SUFFIX
 from lightfield.dataset.view_store import ViewStore
 from lightfield.imaging import images
@@ -42,7 +42,8 @@ class ShardRecord:
             self._take(file, key)
         if not file.is_file():
             return False
-        name, sums = self._name(file), _sums(file)
+        name = self._name(file)
+        sums = _sums(file)
         entry = (name, key, sums["sha256"])
         if entry not in self._logged_here and not self._is_logged_elsewhere(entry):
             return False
@@ -73,7 +74,8 @@ class ShardRecord:
         """Log a file that has just been finished; a kill before that makes it once more."""
         if self._path is None:
             return
-        name, sums = self._name(file), _sums(file)
+        name = self._name(file)
+        sums = _sums(file)
         if self._store:
             self._store.put_view(file, name, key, sums["sha256"])
         append_json_line(_log(self._path), {"file": name, "key": key, **sums})
@@ -108,7 +110,7 @@ class ShardRecord:
         """The last line of the log on each file."""
         assert self._path
         log = _log(self._path)
-        return {line.get("file"): line for line in read_json_lines(log)} if log.exists() else {}
+        return {line["file"]: line for line in _lines(log)} if log.exists() else {}
 
     @cached_property
     def _logged_here(self) -> set[tuple[Any, Any, Any]]:
@@ -127,26 +129,20 @@ class ShardRecord:
         return _entries(self._path.parent.glob(f"*{LOG_SUFFIX}"))
 
 
-def read(record: Path) -> dict[str, tuple[int, str]]:
-    """Return each file's bytes and SHA-256 by its path in the dataset; errors name the record."""
-    content = read_json(record)
-    try:
-        return {path: (entry["bytes"], entry["sha256"]) for path, entry in content["files"].items()}
-    except (LookupError, TypeError, AttributeError):
-        raise UserError(f"{record}: files: must map paths to bytes and sha256") from None
-
-
 def _log(record: Path) -> Path:
     return record.with_name(record.stem + LOG_SUFFIX)
 
 
 def _entries(logs: Iterable[Path]) -> set[tuple[Any, Any, Any]]:
     """Return file, key and SHA-256 of every line of the logs."""
-    return {
-        (entry.get("file"), entry.get("key"), entry.get("sha256"))
-        for log in logs
-        for entry in read_json_lines(log)
-    }
+    return {(line["file"], line["key"], line["sha256"]) for log in logs for line in _lines(log)}
+
+
+def _lines(log: Path) -> Iterator[dict[str, Any]]:
+    """Yield the complete lines of a log. A damaged line does not count."""
+    for line in read_json_lines(log):
+        if all(isinstance(line.get(key), str) for key in ("file", "key", "sha256")):
+            yield line
 
 
 def _sums(file: Path) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from lightfield.core.files import write_json
+from lightfield.core.files import DAMAGE, write_json_if_changed
 
 NAME = "shards.json"
 
@@ -27,7 +27,7 @@ def noted(work: str, dataset: str, views: int) -> int | None:
     try:
         entry = _read(path, path.stat().st_mtime_ns)[dataset]
         return max(1, min(int(entry["shards"]), views)) if entry["views"] == views else None
-    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+    except (OSError, *DAMAGE):
         return None
 
 
@@ -36,12 +36,11 @@ def note(work: str, counts: dict[str, tuple[int, int]]) -> None:
     path = Path(work, NAME)
     try:
         known = dict(_read(path, path.stat().st_mtime_ns))
-    except (OSError, ValueError, TypeError, AttributeError):
+    except (OSError, *DAMAGE):
         known = {}
     new = {name: {"views": views, "shards": shards} for name, (views, shards) in counts.items()}
-    if known != known | new:
-        datasets = known | new
-        write_json(path, {"datasets": datasets, "sha256": _digest(datasets)})
+    datasets = dict(sorted((known | new).items()))
+    write_json_if_changed(path, {"datasets": datasets, "sha256": _digest(datasets)})
 
 
 @lru_cache(maxsize=1)
@@ -50,7 +49,10 @@ def _read(path: Path, _changed: int) -> Any:
     content = json.loads(path.read_bytes())
     if content.get("sha256") != _digest(content.get("datasets")):
         raise ValueError(f"{path}: is damaged")
-    return content["datasets"]
+    return {
+        name: {key: int(entry[key]) for key in ("views", "shards")}
+        for name, entry in content["datasets"].items()
+    }
 
 
 def _digest(datasets: Any) -> str:

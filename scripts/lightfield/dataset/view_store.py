@@ -68,7 +68,8 @@ class ViewStore:
         with self._answering():
             stored = self._place(path)
             try:
-                time, content = stored.stat().st_mtime, stored.read_bytes()
+                time = stored.stat().st_mtime
+                content = stored.read_bytes()
             except FileNotFoundError:
                 return False
             if not content:

@@ -1,9 +1,9 @@
 """The files with which each consumer opens a dataset: one module a format.
 
-An exporter has ``export(source, settings, folder)``: it writes the views of a `source.Source` into
-a folder of its own, as its settings in `lightfield.dataset.exports` ask. `run` finds it by its
-name and lists what it wrote in the folder's export.json, which validation checks. instant-ngp's
-files lie beside the views, with a program of their own.
+Each module has ``export(source, settings, folder)``, which writes the views of a
+`source.SourceDataset` into ``folder``. Its settings are in `lightfield.dataset.exports`. `run`
+calls the module, and lists its files in the folder's export.json, which validation checks.
+instant-ngp's files lie beside the views, and have a program of their own.
 """
 
 import importlib
@@ -15,24 +15,24 @@ from lightfield.core.files import read_json, sha256, write_json
 from lightfield.dataset.exports import MANIFEST, Export
 from lightfield.dataset.view_store import ViewStore
 from lightfield.export import instant_ngp
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.validation.files import Manifest
 
-# In a dataset, where exports are.
+# The folder of a dataset that holds its exports.
 FOLDER = "exports"
 
 
-def run(name: str, source: Source, settings: Export, folder: Path) -> dict[str, str]:
-    """Write an export into ``folder``, in place of an earlier one; return its files' SHA-256.
+def run(name: str, source: SourceDataset, settings: Export, folder: Path) -> dict[str, str]:
+    """Write an export into ``folder``, and return the SHA-256 of its files by their names.
 
-    Nothing is left of an export that fails. Raises `UserError` where anything else is there, and
-    for views that its consumer cannot take.
+    Replaces an earlier export. Leaves no files behind if it fails. Raises `UserError` if the folder
+    holds other files, or if the consumer cannot take these views.
     """
-    if wrong := settings.refusal(source.lens, source.has_depth):
-        raise UserError(f"{source.lightfield.path}: {wrong}")
-    # A link stays one.
+    if reason := settings.refusal(source.lens, source.has_depth):
+        raise UserError(f"{source.lightfield.path}: {reason}")
+    # If the folder is a link, replace what it leads to, and keep the link.
     folder = folder.resolve()
-    # There a killed run may have left an export without its list.
+    # In the dataset's own exports, a killed run may have left an export without its export.json.
     if folder != (source.dataset / source.name / FOLDER / name).resolve():
         _check_replaceable(folder)
     shutil.rmtree(folder, ignore_errors=True)
@@ -50,17 +50,20 @@ def run(name: str, source: Source, settings: Export, folder: Path) -> dict[str, 
 
 
 def _check_replaceable(folder: Path) -> None:
-    """Raise `UserError` where a folder holds what no earlier export has put there."""
+    """Raise `UserError` if a folder holds a file that no earlier export wrote."""
     listing = folder / MANIFEST
-    own = {MANIFEST, *(_files(listing) if listing.is_file() else ())}
+    exported = {MANIFEST, *(_files(listing) if listing.is_file() else ())}
     for path in folder.rglob("*"):
         name = path.relative_to(folder).as_posix()
-        if name not in own and not path.is_dir():
+        if name not in exported and not path.is_dir():
             raise UserError(f"{folder}: holds {name}, which is of no export; give another folder")
 
 
 def transforms(folder: Path) -> list[Path]:
-    """Return instant-ngp's files of the dataset in a folder; nerfstudio's have the same name."""
+    """Return the transforms.json that instant-ngp's exports wrote for the dataset in ``folder``.
+
+    Those of nerfstudio have the same name, but lie deeper.
+    """
     return sorted([*folder.glob("transforms.json"), *folder.glob("*/transforms.json")])
 
 

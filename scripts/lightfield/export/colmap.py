@@ -30,8 +30,8 @@ from lightfield.export.points import (
     lift_one_each,
     observations,
 )
-from lightfield.export.source import Source
-from lightfield.export.splits import splits
+from lightfield.export.source import SourceDataset
+from lightfield.export.trainer_splits import splits
 from lightfield.geometry.colmap import pose
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -44,7 +44,7 @@ PINHOLE, OPENCV_FISHEYE = (1, "PINHOLE"), (5, "OPENCV_FISHEYE")
 TESTS = "test.txt"
 
 
-def export(source: Source, settings: Colmap, folder: Path) -> None:
+def export(source: SourceDataset, settings: Colmap, folder: Path) -> None:
     """Write the model of a source's views into ``folder``."""
     if problem := cameras.misreading(source.lens):
         print(f"warning: {source.lightfield.path}: camera: {problem}", file=sys.stderr)
@@ -52,8 +52,8 @@ def export(source: Source, settings: Colmap, folder: Path) -> None:
     if any(view.split for view in views):
         tests = [f"{view.name}.png\n".encode() for view in splits(source.lightfield).test]
         _write(folder / "sparse" / "0" / TESTS, tests)
-    found = model(source, settings.points)
-    write = found.write_binary if settings.format == "binary" else found.write_text
+    colmap_model = model(source, settings.points)
+    write = colmap_model.write_binary if settings.format == "binary" else colmap_model.write_text
     write(folder / "sparse" / "0")
     progress = Progress(len(views), "colmap", "views")
     for view in views:
@@ -67,7 +67,7 @@ def export(source: Source, settings: Colmap, folder: Path) -> None:
         progress.done()
 
 
-def model(source: Source, count: int) -> "Model":
+def model(source: SourceDataset, count: int) -> "Model":
     """Lift ``count`` points, and return them with the views that see each; print how many.
 
     A view that sees none of them gets one more of its own surface, for gsplat's depth loss ends in
@@ -103,7 +103,7 @@ class Model:
 
     def __init__(
         self,
-        source: Source,
+        source: SourceDataset,
         points: Points,
         seen: Sequence[Observations],
         kept: NDArray[np.intp],
@@ -113,11 +113,11 @@ class Model:
         self.points = points.chosen(kept)
         number = np.zeros(len(points.positions), np.int64)
         number[kept] = np.arange(1, len(kept) + 1)
-        self.seen = [
-            Observations(number[o.indices][known], o.pixels[known])
-            for o in seen
-            for known in [number[o.indices] > 0]
-        ]
+        self.seen = []
+        for of_view in seen:
+            numbers = number[of_view.indices]
+            is_kept = numbers > 0
+            self.seen.append(Observations(numbers[is_kept], of_view.pixels[is_kept]))
 
     def tracks(self) -> Iterator[list[tuple[int, int]]]:
         """Yield each point's (image, index among the image's points)."""
@@ -194,8 +194,8 @@ def _write(path: Path, parts: Iterable[bytes]) -> None:
         file.writelines(parts)
 
 
-def _write_depth(path: Path, source: Source, view: View) -> None:
+def _write_depth(path: Path, source: SourceDataset, view: View) -> None:
     depth = source.depth(view, "z")
-    known = np.where(np.isfinite(depth), depth, 0).astype("<f4")
-    height, width = known.shape
-    _write(path, [f"{width}&{height}&1&".encode(), known.tobytes()])
+    finite_depth = np.where(np.isfinite(depth), depth, 0).astype("<f4")
+    height, width = finite_depth.shape
+    _write(path, [f"{width}&{height}&1&".encode(), finite_depth.tobytes()])

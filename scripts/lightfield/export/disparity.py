@@ -9,10 +9,10 @@ from lightfield.export.source import Floats
 
 def depth_range(depth: Floats) -> tuple[float, float]:
     """Return the nearest and the farthest depth in metres of a view, NaN being unknown."""
-    known = np.minimum(depth[depth > 0], FARTHEST)
+    depths = np.minimum(depth[depth > 0], FARTHEST)
     # A plane seen head on has one depth, and a range needs two. Neither is beyond the farthest.
-    near = min(float(known.min(initial=FARTHEST)), FARTHEST / 1.001)
-    return near, max(float(known.max(initial=near)), 1.001 * near)
+    near = min(float(depths.min(initial=FARTHEST)), FARTHEST / 1.001)
+    return near, max(float(depths.max(initial=near)), 1.001 * near)
 
 
 def levels(
@@ -27,5 +27,5 @@ def levels(
     with np.errstate(invalid="ignore", divide="ignore"):
         disparity = (1 / depth - 1 / far) / (1 / near - 1 / far)
     highest = 2**bits - 1
-    found = np.clip(np.round(disparity * highest), lowest, highest)
-    return np.where(depth > 0, found, 0).astype(np.uint16)
+    quantised = np.clip(np.round(disparity * highest), lowest, highest)
+    return np.where(depth > 0, quantised, 0).astype(np.uint16)

@@ -13,24 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import whole, write_bytes, write_text
+from lightfield.core.files import absolute_path, write_bytes, write_text
 from lightfield.core.progress import Progress
 from lightfield.dataset.exports import Hci
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.export import cameras
-from lightfield.export.source import Floats, Source
+from lightfield.export.source import Floats, SourceDataset
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 FOCUS = 1e9  # metres
 
 
-def export(source: Source, settings: Hci, folder: Path) -> None:
+def export(source: SourceDataset, settings: Hci, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     views, columns, baseline = grid(source.lightfield)
     lens = source.lens
     assert isinstance(lens, Rectilinear)
     middle = len(views) // columns // 2 * columns + columns // 2
-    known: list[float] = []
+    disparities: list[float] = []
     progress = Progress(len(views), "hci", "views")
     for number, view in enumerate(views):
         source.write_image(view, folder / f"input_Cam{number:03}.png")
@@ -41,11 +41,11 @@ def export(source: Source, settings: Hci, folder: Path) -> None:
         for name, values in maps.items():
             for end in (f"_Cam{number:03}", *([""] if number == middle else [])):
                 write_pfm(folder / f"gt_{name}_lowres{end}.pfm", values)
-        known += [float(np.min(disparity)), float(np.max(disparity))]
+        disparities += [float(np.min(disparity)), float(np.max(disparity))]
         progress.done()
     write_text(
         folder / "parameters.cfg",
-        parameters(source, views[middle], (columns, len(views) // columns), baseline, known),
+        parameters(source, views[middle], (columns, len(views) // columns), baseline, disparities),
     )
 
 
@@ -75,13 +75,17 @@ def grid(lightfield: LightField) -> tuple[list[View], int, float]:
 
 
 def parameters(
-    source: Source, middle: View, size: tuple[int, int], baseline: float, disparities: list[float]
+    source: SourceDataset,
+    middle: View,
+    size: tuple[int, int],
+    baseline: float,
+    disparities: list[float],
 ) -> str:
     """Return the text of parameters.cfg; ``baseline`` is in metres."""
     lens = source.lens
     assert isinstance(lens, Rectilinear)
     scene = source.lightfield.content.get("scene", {}).get(
-        "name", whole(source.dataset).parent.name
+        "name", absolute_path(source.dataset).parent.name
     )
     center = zip(
         ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"),

@@ -1,20 +1,20 @@
-"""transforms.json, with which instant-ngp opens a dataset, and the masks and copies that it needs.
+"""Writes transforms.json for instant-ngp, and the masks and copies of views that it needs.
 
 Frames come in the order and, with --scale and --offset, with the numbers of SILVR's
-generate_NERF_transforms.py. Perspective views, fisheye views and full panoramas go as they are.
+generate_NERF_transforms.py. instant-ngp reads perspective views, fisheyes and full panoramas.
 
-instant-ngp does not hide the pixels outside a fisheye's image circle by itself: for PNG views
-this writes dynamic_mask_<name>.png beside each view that has such pixels. It refuses EXR files
-whose channels differ in type (half colour beside float depth), and hides pixels of an EXR only by
-negative colour: EXR views are therefore copied to --exr-dir as R, G, B alone.
+instant-ngp does not hide the pixels outside a fisheye's image circle by itself. So PNG views with
+such pixels get a dynamic_mask_<name>.png beside them. instant-ngp refuses EXR files whose channels
+differ in type, as half colour and float depth do. It hides pixels of an EXR only if their colour is
+negative. So EXR views are copied to --exr-dir with R, G and B alone.
 
-Give instant-ngp the transforms.json itself: of a folder it opens every .json, and lightfield.json
-is not for it.
+Give instant-ngp the transforms.json itself. Given a folder it opens every .json in it, also
+lightfield.json, which it cannot read.
 """
 
-# The loader's reading (instant-ngp, ``src/nerf_loader.cu`` and ``common_device.cuh``): it negates
-# the Y and Z axes of each camera, maps a position p to p · ``scale`` + ``offset`` and cycles the
-# axes (x, y, z) to (y, z, x). World points are given to it in SILVR's orientation: (x, y, z)
+# How instant-ngp's loader reads poses (``src/nerf_loader.cu``, ``common_device.cuh``): it negates
+# the Y and Z axes of each camera, maps a position p to p · ``scale`` + ``offset``, and cycles the
+# axes (x, y, z) to (y, z, x). This module writes world points in SILVR's orientation: (x, y, z)
 # becomes (y, −x, z). Training happens in the cube of side ``aabb_scale`` around (½, ½, ½).
 
 import argparse
@@ -28,19 +28,28 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
-from lightfield.core.cli import above_zero, finite
+from lightfield.core.cli import above_zero, finite, refuse_beside_settings
 from lightfield.core.errors import UserError
 from lightfield.core.files import keep_apart, read_json, write_json
 from lightfield.core.progress import Progress
-from lightfield.dataset.exports import BOUNDS_PIXELS, BOUNDS_VIEWS
+from lightfield.core.settings import checked, read_settings
+from lightfield.dataset.exports import (
+    BOUNDS_PIXELS,
+    BOUNDS_VIEWS,
+    VIEWS,
+    ExportSettings,
+    InstantNgp,
+)
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.view_store import ViewStore
 from lightfield.export.source import DEPTH_UNIT, Floats, check_size, depth_of, millimetres
+from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
-from lightfield.geometry.rigs.split import PARTS
+from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.imaging import images
 from lightfield.validation.files import Manifest
@@ -49,16 +58,16 @@ TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """World to NeRF coordinates, as SILVR's generate_NERF_transforms.py turns its scenes."""
 
 RIG_PART = 0.2
-"""Part of the unit cube's side that the rig takes where nothing else is known of the scene."""
+"""The part of the unit cube's side that the rig fills if nothing says how large the scene is."""
 
 MASK = "dynamic_mask_{view}.png"
-"""Beside a PNG view: the loader trains on no pixel where this is above 0."""
+"""The mask beside a PNG view. The loader does not train on pixels where it is above 0."""
 
 _FIT_LIMIT = 0.25  # pixels by which the loader's polynomial may miss a fisheye's ray
 
 
 def _pictures(path: Path) -> list[str]:
-    """Return the images that a transforms.json names, views and depth maps."""
+    """Return the images that a transforms.json names: views and depth maps."""
     try:
         frames = read_json(path)["frames"]
         depths = [frame["depth_path"] for frame in frames if "depth_path" in frame]
@@ -71,17 +80,24 @@ MANIFEST = Manifest("transforms*.json", _pictures, (MASK,))
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the words of this export to a command line."""
+    """Add the flags of this export to a command line."""
     add = parser.add_argument
     add("--input-cfg", type=Path, required=True, help="the lightfield.json")
     add("--output", type=Path, required=True, help="the transforms.json to write")
+    add("--settings", type=Path, metavar="JSON", help="settings file, as for scripts/export.py")
     add("--image-dir", type=Path, help="folder of the views (default: that of --input-cfg)")
-    add("--image-suffix", choices=[".png", ".exr"], default=".png")
     add(
         "--exr-dir",
         type=Path,
         help="folder for the copies of EXR views (default: instant_ngp beside --output)",
     )
+    add_settings_flags(parser)
+
+
+def add_settings_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that stand for the settings."""
+    add = parser.add_argument_group("Instead of --settings").add_argument
+    add("--image-suffix", choices=[".png", ".exr"], default=".png")
     add(
         "--depth-dir",
         type=Path,
@@ -116,60 +132,78 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--placed-as",
-        type=Path,
         metavar="TRANSFORMS",
         help="take scale and offset from there: the transforms.json that these views test",
     )
 
 
-def export(arguments: argparse.Namespace) -> None:
-    """Write a dataset's transforms.json and what it names, as the command line says."""
+def settings_from(arguments: argparse.Namespace) -> ExportSettings[InstantNgp]:
+    """Return the settings of --settings, or those of the flags."""
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_settings_flags)
+        return read_settings(ExportSettings[InstantNgp], arguments.settings)
     if arguments.scale is None and arguments.offset is not None:
         raise UserError("--offset: goes with --scale; without it both are fitted")
-    lightfield = LightField.read(arguments.input_cfg)
-    lightfield.require_centre()
-    parts = {arguments.output: [view.name for view in lightfield.views]}
-    for part in PARTS:
-        if own := [view.name for view in lightfield.views if view.split == part]:
-            parts[arguments.output.with_stem(f"{arguments.output.stem}_{part}")] = own
-    writer = _Writer(arguments, lightfield)
-    scale, offset = writer.placement()
-    common = writer.lens_keys | {"scale": scale, "offset": offset}
-    common["options"] = _asked(arguments)
-    if arguments.aabb_scale:
-        common["aabb_scale"] = arguments.aabb_scale
-    if arguments.render_aabb:
-        common["render_aabb"] = [arguments.render_aabb[:3], arguments.render_aabb[3:]]
-    if arguments.depth_dir:
-        common["integer_depth_scale"] = DEPTH_UNIT
-    frames = writer.frames()
-    for path, names in parts.items():
-        write_json(path, common | {"frames": [frames[name] for name in names]})
-        print(f"{path}: {len(names)} frames, scale {scale:.6g}, offset {offset}")
-    if store := ViewStore.configured():
-        store.put_list(arguments.output, [*writer.pictures, *list(parts)[1:]])
-
-
-def _asked(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return what the command line asks for, as a scene YAML names it."""
     corners = arguments.render_aabb
-    asked = {
+    options = {
+        "sources": [VIEWS],
         "scale": arguments.scale,
+        "offset": arguments.offset,
         "bounds": "depth" if arguments.depth_bounds else "rig",
         "aabb_scale": arguments.aabb_scale,
         "render_aabb": [corners[:3], corners[3:]] if corners else None,
         "depth": arguments.depth_dir is not None,
     }
-    if arguments.scale is not None:
-        asked["offset"] = arguments.offset or [0.5, 0.5, 0.5]
-    return asked
+    content = {
+        "options": {key: value for key, value in options.items() if value is not None},
+        "suffix": arguments.image_suffix,
+    }
+    if arguments.placed_as:
+        content["trained_by"] = arguments.placed_as
+    return checked(TypeAdapter(ExportSettings[InstantNgp]), content, "flags")
+
+
+def export(arguments: argparse.Namespace) -> None:
+    """Write a dataset's transforms.json and what it names, as the command line says."""
+    settings = settings_from(arguments)
+    options = settings.options
+    lightfield = LightField.read(arguments.input_cfg)
+    lightfield.require_centre()
+    view_names = {arguments.output: [view.name for view in lightfield.views]}
+    for part in PARTS:
+        if names := [view.name for view in lightfield.views if view.split == part]:
+            view_names[arguments.output.with_stem(f"{arguments.output.stem}_{part}")] = names
+    writer = _Writer(arguments, settings, lightfield)
+    scale, offset = writer.placement()
+    common = writer.lens_keys | {"scale": scale, "offset": offset}
+    common["options"] = options.recorded
+    if options.aabb_scale:
+        common["aabb_scale"] = options.aabb_scale
+    if options.render_aabb:
+        common["render_aabb"] = [list(corner) for corner in options.render_aabb]
+    if options.depth:
+        common["integer_depth_scale"] = DEPTH_UNIT
+    frames = writer.frames()
+    for path, names in view_names.items():
+        write_json(path, common | {"frames": [frames[name] for name in names]})
+        print(f"{path}: {len(names)} frames, scale {scale:.6g}, offset {offset}")
+    if store := ViewStore.configured():
+        store.put_list(arguments.output, [*writer.pictures, *list(view_names)[1:]])
 
 
 class _Writer:
-    """Writes what a transforms.json names, view by view."""
+    """Writes the files that a transforms.json names, view by view."""
 
-    def __init__(self, arguments: argparse.Namespace, lightfield: LightField) -> None:
-        self.arguments = arguments
+    def __init__(
+        self,
+        arguments: argparse.Namespace,
+        settings: ExportSettings[InstantNgp],
+        lightfield: LightField,
+    ) -> None:
+        self.output: Path = arguments.output
+        self.options = settings.options
+        self.suffix = settings.suffix
+        self.trained_by = Path(settings.trained_by) if settings.trained_by else None
         self.lightfield = lightfield
         self.lens = lightfield.lens
         try:
@@ -179,28 +213,29 @@ class _Writer:
         self.rays = self.lens.pixel_rays()
         self.blind = blind_pixels(self.lens)
         self.image_dir: Path = arguments.image_dir or lightfield.folder
-        # Those that have been written.
+        # The images written so far.
         self.pictures: list[Path] = []
-        self.exr_dir: Path = arguments.exr_dir or arguments.output.parent / "instant_ngp"
-        keep_apart("--output", arguments.output, arguments.input_cfg, arguments.placed_as)
-        if arguments.image_suffix == ".exr":
+        folder = self.output.parent / "instant_ngp"
+        self.exr_dir: Path = arguments.exr_dir or folder
+        self.depth_dir: Path = arguments.depth_dir or folder / "depth"
+        keep_apart("--output", self.output, arguments.input_cfg, self.trained_by)
+        if self.suffix == ".exr":
             keep_apart("--exr-dir", self.exr_dir, self.image_dir)
-        elif arguments.depth_dir:
-            keep_apart("--depth-dir", arguments.depth_dir, self.image_dir)
+        elif self.options.depth:
+            keep_apart("--depth-dir", self.depth_dir, self.image_dir)
 
     def placement(self) -> tuple[float, list[float]]:
         """Return scale and offset: as given, or fitted to what the views see, or to the rig."""
-        if self.arguments.placed_as:
-            trained = read_json(self.arguments.placed_as)
+        if self.trained_by:
+            training = read_json(self.trained_by)
             try:
-                return trained["scale"], trained["offset"]
+                return training["scale"], training["offset"]
             except (LookupError, TypeError):
-                raise UserError(f"{self.arguments.placed_as}: has no scale and offset") from None
+                raise UserError(f"{self.trained_by}: has no scale and offset") from None
         cameras = np.array([view.position for view in self.lightfield.views])
-        if self.arguments.scale is not None:
-            offset = self.arguments.offset or (0.5, 0.5, 0.5)
-            return self.arguments.scale, placed(cameras, self.arguments.scale, offset)
-        if not self.arguments.depth_bounds:
+        if self.options.scale is not None:
+            return self.options.scale, placed(cameras, self.options.scale, self.options.middle)
+        if self.options.bounds == "rig":
             return fitted_to_rig(cameras, -self.lightfield.matrices[:, :3, 2])
         points = np.concatenate(list(self.seen_points()))
         if not len(points):
@@ -208,26 +243,27 @@ class _Writer:
         return fitted(*scene_bounds(cameras, points))
 
     def seen_points(self) -> Iterator[Floats]:
-        """Yield world points (n, 3) seen by views spread over the rig."""
+        """Yield world points (n, 3) in metres that some views, spread over the rig, see."""
         views = self.lightfield.views
         step = max(1, max(self.lens.width, self.lens.height) // BOUNDS_PIXELS)
         part = np.s_[step // 2 :: step, step // 2 :: step]
         for index in np.unique(np.linspace(0, len(views) - 1, BOUNDS_VIEWS).round().astype(int)):
-            view, distance = views[index], self.depth(views[index], "distance")[part]
+            view = views[index]
+            distance = self.depth(view, "distance")[part]
             points = (self.rays[part] * distance[..., None])[np.isfinite(distance)]
             yield points @ view.matrix[:3, :3].T + view.matrix[:3, 3]
 
     def frames(self) -> dict[str, dict[str, Any]]:
-        """Write every view's files and return the frames that name them, by the view's name."""
+        """Write the files of all views. Return their frames by the views' names."""
         progress = Progress(len(self.lightfield.views), "export")
-        # The loader scales a depth by its ray's length, which is 1 along the axis for perspective
-        # rays, and 1 itself for all others. A depth of 0 is none to it.
-        meaning = "z" if isinstance(self.lens, Rectilinear) else "distance"
+        # The loader multiplies depth with the length of the ray. A perspective ray is 1 long along
+        # the axis, and all other rays have length 1. To the loader a depth of 0 is none.
+        meaning = conventional_depth(self.lens)
         frames = {}
         missing = []
         for view in self.lightfield.views:
-            image = self.image_dir / f"{view.name}{self.arguments.image_suffix}"
-            if self.arguments.image_suffix == ".exr":
+            image = self.image_dir / f"{view.name}{self.suffix}"
+            if self.suffix == ".exr":
                 image = self.copied_exr(image)
             else:
                 missing += [] if image.is_file() else [image]
@@ -236,8 +272,8 @@ class _Writer:
                 "file_path": self.relative(image),
                 "transform_matrix": transform_matrix(view).tolist(),
             }
-            if self.arguments.depth_dir:
-                path = self.arguments.depth_dir / f"{view.name}.png"
+            if self.options.depth:
+                path = self.depth_dir / f"{view.name}.png"
                 images.write_png(path, millimetres(self.depth(view, meaning)))
                 self.pictures.append(path)
                 frame["depth_path"] = self.relative(path)
@@ -252,18 +288,18 @@ class _Writer:
 
     def relative(self, path: Path) -> str:
         """Return a path as seen from the transforms.json."""
-        start = self.arguments.output.parent.resolve()
+        start = self.output.parent.resolve()
         return Path(os.path.relpath(path.resolve(), start)).as_posix()
 
     def depth(self, view: View, meaning: str) -> Floats:
-        """Return a view's depth in metres, (height, width): "z" or "distance"."""
+        """Return a view's depth (height, width) in metres. ``meaning`` is "z" or "distance"."""
         path = self.image_dir / f"{view.name}.exr"
         return depth_of(path, self.lightfield, self.rays, meaning)
 
     def copied_exr(self, source: Path) -> Path:
         """Copy R, G, B as half floats, with −1 in pixels that instant-ngp must not train on.
 
-        Of transparent views A too, as it is: associated.
+        Transparent views keep their channel A. Their colour stays premultiplied by it.
         """
         channels = images.read_image(source).channels
         missing = [name for name in "RGB" if name not in channels]
@@ -280,7 +316,7 @@ class _Writer:
         return target
 
     def write_mask(self, view: View, image: Path) -> None:
-        """Write the mask of a PNG view if it has pixels without a ray or without a source."""
+        """Write the mask of a PNG view if some pixels have no ray, or no source."""
         hidden = self.blind
         if image.is_file():
             channels = images.read_image(image).channels
@@ -292,30 +328,31 @@ class _Writer:
             self.pictures.append(path)
             images.write_png(path, np.where(hidden, 255, 0).astype(np.uint8))
         else:
-            # Of another lens, that the views had before.
+            # A mask here belongs to an earlier lens of the views.
             path.unlink(missing_ok=True)
 
 
 def transform_matrix(view: View) -> Floats:
     """Return the (4, 4) camera-to-world matrix of a view in NeRF coordinates.
 
-    It follows from the angles, as in all files published so far; ``world_matrix`` is rounded, and
-    differs from it by 1e-12.
+    It is computed from the angles, as in all files published so far. ``world_matrix`` is rounded,
+    and differs from it by 1e-12.
     """
-    turn, matrix = np.eye(4), np.eye(4)
+    turn = np.eye(4)
     turn[:3, :3] = TURN
+    matrix = np.eye(4)
     matrix[:3, :3] = euler_to_matrix(view.rotation)
     matrix[:3, 3] = view.position
     return turn @ matrix
 
 
 def lens_keys(lens: Lens) -> dict[str, Any]:
-    """Return the keys by which the loader knows a lens, for every frame alike.
+    """Return the keys that describe a lens to the loader.
 
-    A fisheye goes as θ = Σ p_i r^i with r in pixels (``ftheta``), which is exact for equidistant
-    and polynomial lenses; a panorama as ``latlong``, because the loader's ``equirectangular`` is
-    linear in the sine of the latitude. Raises `UserError` for a lens that the loader cannot
-    follow to a quarter of a pixel.
+    A fisheye is written as θ = Σ p_i r^i with r in pixels (``ftheta``), which is exact for
+    equidistant and polynomial lenses. A panorama is written as ``latlong``, because the loader's
+    ``equirectangular`` is linear in the sine of the latitude. Raises `UserError` if the loader
+    would miss the lens by more than a quarter of a pixel.
     """
     keys: dict[str, Any] = {
         "w": lens.width,
@@ -337,15 +374,15 @@ def lens_keys(lens: Lens) -> dict[str, Any]:
         return {"fl_x": focal, "fl_y": focal, **keys, "latlong": True}
     polynomial = _ftheta(lens)
     focal = 1 / abs(polynomial[1])
-    named = {f"ftheta_p{power}": value for power, value in enumerate(polynomial)}
-    return {"fl_x": focal, "fl_y": focal, **keys, **named}
+    coefficients = {f"ftheta_p{power}": value for power, value in enumerate(polynomial)}
+    return {"fl_x": focal, "fl_y": focal, **keys, **coefficients}
 
 
 def blind_pixels(lens: Lens) -> NDArray[np.bool_]:
-    """Return (height, width) flags of pixels without a ray, in the lens or in the loader.
+    """Return which pixels (height, width) have no ray, in the lens or in the loader.
 
-    The loader trains such a pixel with the ray of the optical axis, so it has to be hidden. Of
-    a fisheye the loader drops the exact centre and everything at 90° from the axis or beyond.
+    They must be hidden, because the loader trains them with the ray of the optical axis. In a
+    fisheye the loader has no ray at the exact centre, nor at 90° from the axis and beyond.
     """
     rays = lens.pixel_rays()
     blind: NDArray[np.bool_] = np.isnan(rays).any(axis=-1)
@@ -357,17 +394,17 @@ def blind_pixels(lens: Lens) -> NDArray[np.bool_]:
 
 
 def scene_bounds(cameras: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """Return the corners of a box (in metres) for the unit cube, from cameras and seen points.
+    """Return the corners (3,), (3,) in metres of the box that becomes the unit cube.
 
-    It holds every camera and, along each axis, the middle nine tenths of the points: sky, hills
-    and other far things are left to ``aabb_scale``.
+    It holds all ``cameras`` (n, 3) and, along each axis, the middle nine tenths of the ``points``
+    (n, 3). ``aabb_scale`` takes in sky, hills and other far things.
     """
     low, high = np.percentile(points, [5, 95], axis=0)
     return np.minimum(low, cameras.min(axis=0)), np.maximum(high, cameras.max(axis=0))
 
 
 def fitted(low: Floats, high: Floats) -> tuple[float, list[float]]:
-    """Return the scale and offset that fit a box of the world into the unit cube, centred."""
+    """Return the scale and offset that put a box of the world into the middle of the unit cube."""
     side = float(np.max(high - low))
     if not side > 0:
         raise UserError("the scene's extent is zero, so no scale fits it; give a scale")
@@ -385,25 +422,26 @@ def fitted_to_rig(cameras: Floats, axes: Floats) -> tuple[float, list[float]]:
     half = (cameras.max(axis=0) - cameras.min(axis=0)) / 2 / RIG_PART
     point = looked_at(cameras, axes)
     if point is not None:
-        center, half = point, np.abs(cameras - point).max(axis=0)
+        center = point
+        half = np.abs(cameras - point).max(axis=0)
     return fitted(center - half, center + half)
 
 
 def looked_at(cameras: Floats, axes: Floats) -> Floats | None:
-    """Return the point (3,) within a rig that all its cameras look at; None if there is none.
+    """Return the point (3,) within a rig that all its cameras look at, or None.
 
-    It is the point nearest to all optical axes by least squares; it lies before every camera, and
-    no farther from the rig's middle than the rig reaches.
+    It is the point nearest to all optical axes by least squares. It must lie in front of every
+    camera, and no farther from the rig's middle than the farthest camera.
     """
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     normal = across.sum(axis=0)
     if np.linalg.matrix_rank(normal, tol=1e-6 * len(cameras)) < 3:
         return None  # parallel
     point: Floats = np.linalg.solve(normal, (across @ cameras[:, :, None]).sum(axis=0))[:, 0]
-    before = ((point - cameras) * axes).sum(axis=1) > 0
+    in_front = ((point - cameras) * axes).sum(axis=1) > 0
     middle = (cameras.min(axis=0) + cameras.max(axis=0)) / 2
     reach = np.max(np.linalg.norm(cameras - middle, axis=1))
-    return point if before.all() and np.linalg.norm(point - middle) <= reach else None
+    return point if in_front.all() and np.linalg.norm(point - middle) <= reach else None
 
 
 def placed(cameras: Floats, scale: float, offset: Sequence[float]) -> list[float]:
@@ -413,13 +451,13 @@ def placed(cameras: Floats, scale: float, offset: Sequence[float]) -> list[float
 
 
 def _axis_pixels(lens: Lens, tangent: float) -> tuple[float, float]:
-    """Return how far from the centre a ray right and a ray down at this tangent appear."""
+    """Return the pixels from the centre to a ray right and to a ray down at this tangent."""
     right, down = lens.pixels(np.array([[tangent, 0.0, -1.0], [0.0, -tangent, -1.0]]))
     return float(right[0] - lens.center[0]), float(down[1] - lens.center[1])
 
 
 def _is_full_panorama(lens: Lens) -> bool:
-    """Whether the lens's rays are those of the loader's ``latlong``."""
+    """Return whether the lens is the loader's ``latlong``."""
     return isinstance(lens, Equirectangular) and lens.is_full
 
 
@@ -434,9 +472,11 @@ def _ftheta(lens: Lens) -> list[float]:
     # Chebyshev's nodes keep the largest error of a polynomial fit near its minimum.
     nodes = seen[-1] * (0.5 - 0.5 * np.cos(np.linspace(0, math.pi, 1001)))
     across, down = _angles(lens, nodes)
-    # The centre of a lens whose angle there is not 0 looks up, which no pixel beside it does.
-    known = np.isfinite(across) & ((nodes > 0) | (down == 0))
-    nodes, across, down = nodes[known], across[known], down[known]
+    # If the angle at the centre is not 0, the centre looks up, and no pixel beside it does.
+    usable = np.isfinite(across) & ((nodes > 0) | (down == 0))
+    nodes = nodes[usable]
+    across = across[usable]
+    down = down[usable]
     for degree in (1, 4):
         fit = Polynomial.fit(  # type: ignore[no-untyped-call, unused-ignore]
             nodes, across, degree, domain=[0, seen[-1]], window=[0, 1]
@@ -452,7 +492,7 @@ def _ftheta(lens: Lens) -> list[float]:
     powers = np.zeros(5)
     powers[: degree + 1] = fit.convert().coef
     if degree == 1:
-        powers[0] = 0.0  # rounding noise: what is linear passes through the centre
+        powers[0] = 0.0  # without rounding noise: a linear fit passes through the centre
     return [float(power) for power in powers]
 
 
@@ -465,7 +505,7 @@ def _angles(lens: Lens, radius: Floats) -> tuple[Floats, Floats]:
 
 
 def _beside_diagonal(lens: Lens, radius: Floats, angle: Floats) -> Floats:
-    """Return by which angle (n,) the rays from the centre to a corner differ from a fisheye's.
+    """Return the angles (n,) between the lens's rays towards a corner and those of a fisheye.
 
     The fisheye has ``angle`` (n,) at ``radius`` (n,). NaN where the lens has no ray.
     """

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.files import whole, write_bytes, write_json
+from lightfield.core.files import absolute_path, write_bytes, write_json
 from lightfield.core.progress import Progress
 from lightfield.dataset.exports import Miv
 from lightfield.export import yuv
 from lightfield.export.disparity import depth_range, levels
 from lightfield.export.opendibr import projection
-from lightfield.export.source import Floats, Source
-from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.export.source import Floats, SourceDataset
+from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.rotations import matrix_to_euler
 
 COLOUR_BITS, DEPTH_BITS = 10, 16
@@ -27,13 +27,13 @@ COLOUR_BITS, DEPTH_BITS = 10, 16
 FROM_OMAF = np.array([[0.0, -1, 0], [0, 0, 1], [-1, 0, 0]])
 
 
-def export(source: Source, settings: Miv, folder: Path) -> None:
+def export(source: SourceDataset, settings: Miv, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     lens = source.lens
-    meaning = "z" if isinstance(lens, Rectilinear) else "distance"
+    meaning = conventional_depth(lens)
     size = f"{lens.width}x{lens.height}"
     views = source.lightfield.views
-    found = []
+    camera_entries = []
     progress = Progress(len(views), "miv", "views")
     for view in views:
         depth = source.depth(view, meaning)
@@ -42,7 +42,7 @@ def export(source: Source, settings: Miv, folder: Path) -> None:
         write_bytes(folder / f"{view.name}_texture_{size}_yuv420p{COLOUR_BITS}le.yuv", texture)
         geometry = yuv.of_levels(levels(depth, limits, DEPTH_BITS, 1), DEPTH_BITS)
         write_bytes(folder / f"{view.name}_depth_{size}_yuv420p{DEPTH_BITS}le.yuv", geometry)
-        found.append(
+        camera_entries.append(
             {
                 "Name": view.name,
                 "Position": view.matrix[:3, 3].tolist(),
@@ -60,13 +60,13 @@ def export(source: Source, settings: Miv, folder: Path) -> None:
         progress.done()
     content: dict[str, Any] = {
         "Version": "3.0",
-        "Content_name": whole(source.dataset).name,
+        "Content_name": absolute_path(source.dataset).name,
         "BoundingBox_center": source.lightfield.matrices[:, :3, 3].mean(axis=0).tolist(),
         "Fps": 30,
         "Frames_number": 1,
         "lengthsInMeters": True,
         "sourceCameraNames": [view.name for view in views],
-        "cameras": found,
+        "cameras": camera_entries,
     }
     write_json(folder / "sequence.json", content)
 

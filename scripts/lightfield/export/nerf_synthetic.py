@@ -15,13 +15,13 @@ from lightfield.core.files import write_json
 from lightfield.core.progress import Progress
 from lightfield.dataset.exports import NerfSynthetic
 from lightfield.export import cameras
-from lightfield.export.source import Source
-from lightfield.export.splits import splits
+from lightfield.export.source import SourceDataset
+from lightfield.export.trainer_splits import splits
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
 
 
-def export(source: Source, settings: NerfSynthetic, folder: Path) -> None:
+def export(source: SourceDataset, settings: NerfSynthetic, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     lens = source.lens
     assert isinstance(lens, Rectilinear)
@@ -31,8 +31,8 @@ def export(source: Source, settings: NerfSynthetic, folder: Path) -> None:
     # Without views of its own, val has those of test.
     lists = {"train": parts.train, "test": parts.test, "val": parts.validation}
     frames: dict[str, Any] = {}
-    for part, own in lists.items():
-        for view in own:
+    for part, part_views in lists.items():
+        for view in part_views:
             if view.name in frames:
                 continue
             path = f"{part}/{view.name}"
@@ -43,5 +43,5 @@ def export(source: Source, settings: NerfSynthetic, folder: Path) -> None:
                 "transform_matrix": view.matrix.tolist(),
             }
             progress.done()
-        content = {"camera_angle_x": angle, "frames": [frames[view.name] for view in own]}
+        content = {"camera_angle_x": angle, "frames": [frames[view.name] for view in part_views]}
         write_json(folder / f"transforms_{part}.json", content)

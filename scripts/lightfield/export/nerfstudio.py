@@ -17,8 +17,9 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.exports import Nerfstudio
 from lightfield.export import cameras
 from lightfield.export.points import lift, write_ply
-from lightfield.export.source import Source, millimetres
-from lightfield.export.splits import splits
+from lightfield.export.source import SourceDataset, millimetres
+from lightfield.export.trainer_splits import splits
+from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -27,10 +28,10 @@ from lightfield.imaging import images
 POINT_CLOUD = "points.ply"
 
 
-def export(source: Source, settings: Nerfstudio, folder: Path) -> None:
+def export(source: SourceDataset, settings: Nerfstudio, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     views = source.lightfield.views
-    meaning = "z" if isinstance(source.lens, Rectilinear) else "distance"
+    meaning = conventional_depth(source.lens)
     masked = any(not source.valid(view).all() for view in views)
     frames = []
     progress = Progress(len(views), "nerfstudio", "views")
@@ -58,7 +59,10 @@ def export(source: Source, settings: Nerfstudio, folder: Path) -> None:
         **camera(source.lens),
         "applied_transform": np.eye(4)[:3].tolist(),
         "ply_file_path": POINT_CLOUD,
-        **{f"{part}_filenames": [paths[view.name] for view in own] for part, own in lists.items()},
+        **{
+            f"{part}_filenames": [paths[view.name] for view in part_views]
+            for part, part_views in lists.items()
+        },
         "frames": frames,
     }
     write_json(folder / "transforms.json", content)

@@ -16,7 +16,8 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.exports import FARTHEST, OpenDibr
 from lightfield.export import cameras, yuv
 from lightfield.export.disparity import depth_range, levels
-from lightfield.export.source import Floats, Source
+from lightfield.export.source import Floats, SourceDataset
+from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -28,14 +29,14 @@ TO_OPENGL = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 BITS = {"png": (8, 16), "h265": (10, 12)}
 
 
-def export(source: Source, settings: OpenDibr, folder: Path) -> None:
+def export(source: SourceDataset, settings: OpenDibr, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     lens = source.lens
-    meaning = "z" if isinstance(lens, Rectilinear) else "distance"
+    meaning = conventional_depth(lens)
     colour_bits, depth_bits = BITS[settings.format]
     suffix = ".png" if settings.format == "png" else ".mp4"
     views = source.lightfield.views
-    found: list[dict[str, Any]] = [viewport(source.lightfield.matrices)]
+    camera_entries: list[dict[str, Any]] = [viewport(source.lightfield.matrices)]
     progress = Progress(len(views), "opendibr", "views")
     for view in views:
         depth = source.depth(view, meaning)
@@ -51,7 +52,7 @@ def export(source: Source, settings: OpenDibr, folder: Path) -> None:
             frame = yuv.of_colour(source.encoded(view), colour_bits)
             yuv.write_hevc(texture, frame, size, colour_bits)
             yuv.write_hevc(map_of_depth, yuv.of_levels(disparity, depth_bits), size, depth_bits)
-        found.append(
+        camera_entries.append(
             {
                 "NameColor": names[0],
                 "NameDepth": names[1],
@@ -64,7 +65,7 @@ def export(source: Source, settings: OpenDibr, folder: Path) -> None:
             }
         )
         progress.done()
-    write_json(folder / "cameras.json", {"Axial_system": "OPENGL", "cameras": found})
+    write_json(folder / "cameras.json", {"Axial_system": "OPENGL", "cameras": camera_entries})
 
 
 def pose(matrix: Floats) -> dict[str, list[float]]:

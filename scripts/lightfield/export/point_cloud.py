@@ -4,9 +4,9 @@ from pathlib import Path
 
 from lightfield.dataset.exports import PointCloud
 from lightfield.export.points import lift, write_ply
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 
 
-def export(source: Source, settings: PointCloud, folder: Path) -> None:
+def export(source: SourceDataset, settings: PointCloud, folder: Path) -> None:
     """Write ``points.ply`` into ``folder``."""
     write_ply(folder / "points.ply", lift(source, voxel=settings.voxel))

@@ -1,4 +1,4 @@
-"""World points on the surfaces that a dataset's views see, evenly spread, and who sees them."""
+"""World points on the surfaces that views see, evenly spread, and the views that see them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from lightfield.core.files import write_bytes
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import View
-from lightfield.export.source import Floats, Source, Surface, pixel_indices
+from lightfield.export.source import Floats, SourceDataset, Surface, pixel_indices
 
-# Candidates for each point that is wanted, of which an even selection is taken.
+# How many points are lifted for each wanted point. An even selection of them is kept.
 _CANDIDATES = 8
 
 
@@ -36,11 +36,11 @@ class Observations:
     pixels: Floats
 
 
-def lift(source: Source, count: int | None = None, voxel: float | None = None) -> Points:
+def lift(source: SourceDataset, count: int | None = None, voxel: float | None = None) -> Points:
     """Lift points from depth: about ``count``, or one in each ``voxel`` metres.
 
-    They come from all views, but with a split from those to train on alone, if there are any. Each
-    has the colour that the view it was lifted from shows there.
+    Points come from all views, or from the training views if the rig has a split. Each point has
+    the colour that its view shows there.
     """
     every = source.lightfield.views
     views = [view for view in every if view.split in (None, "train")] or every
@@ -50,9 +50,9 @@ def lift(source: Source, count: int | None = None, voxel: float | None = None) -
     progress = Progress(len(views), "points", "views")
     kept: Points | None = None
     for view, surface in source.surfaces(views):
-        found = _points_of(source, view, surface, step)
-        # With a voxel, memory stays that of the cloud, however many views there are.
-        kept = joined([kept, found]) if kept else found
+        points = _points_of(source, view, surface, step)
+        # With a voxel, memory does not grow with the number of views.
+        kept = joined([kept, points]) if kept else points
         if voxel:
             kept = kept.chosen(_one_a_voxel(kept.positions, voxel))
         progress.done()
@@ -60,8 +60,8 @@ def lift(source: Source, count: int | None = None, voxel: float | None = None) -
     return kept.chosen(evenly(kept.positions, count)) if count else kept
 
 
-def lift_one_each(source: Source, views: Sequence[View]) -> Points:
-    """Lift one point from each of the ``views`` whose depth is finite anywhere in the frame."""
+def lift_one_each(source: SourceDataset, views: Sequence[View]) -> Points:
+    """Lift one point from each of the ``views`` that has any finite depth."""
     parts = [Points(np.empty((0, 3)), np.empty((0, 3), np.uint8), np.empty((0, 3)))]
     for view, surface in source.surfaces(views):
         points = _points_of(source, view, surface, step=1)
@@ -70,7 +70,7 @@ def lift_one_each(source: Source, views: Sequence[View]) -> Points:
     return joined(parts)
 
 
-def _points_of(source: Source, view: View, surface: Surface, step: int) -> Points:
+def _points_of(source: SourceDataset, view: View, surface: Surface, step: int) -> Points:
     """Return the points of a surface at every ``step``-th pixel that the ``view`` shows."""
     positions, normals = surface.points(step)
     local = (positions - view.matrix[:3, 3]) @ view.matrix[:3, :3]
@@ -79,18 +79,18 @@ def _points_of(source: Source, view: View, surface: Surface, step: int) -> Point
     return Points(positions, source.colour(view)[row, column], normals).chosen(inside)
 
 
-def observations(source: Source, points: Points) -> list[Observations]:
-    """Return what each view sees of the points: those in its frame that no surface hides."""
-    found = []
+def observations(source: SourceDataset, points: Points) -> list[Observations]:
+    """Return the points that each view sees: those in its frame that no surface hides."""
+    seen_points = []
     progress = Progress(len(source.lightfield.views), "tracks", "views")
     for view, surface in source.surfaces(source.lightfield.views):
         local = (points.positions - view.matrix[:3, 3]) @ view.matrix[:3, :3]
         column, row, inside = pixel_indices(source.lens, local)
         inside &= source.valid(view)[row, column] & surface.sees(points.positions)
         indices = np.flatnonzero(inside)
-        found.append(Observations(indices, source.lens.pixels(local[indices])))
+        seen_points.append(Observations(indices, source.lens.pixels(local[indices])))
         progress.done()
-    return found
+    return seen_points
 
 
 def write_ply(path: Path, points: Points) -> None:
@@ -123,7 +123,7 @@ def evenly(positions: Floats, count: int) -> NDArray[np.intp]:
     """Return the indices of at most ``count`` of the ``positions`` (n, 3), evenly spread."""
     if len(positions) <= count:
         return np.arange(len(positions))
-    # Views at one place see the same points, of which there may be no more than are wanted.
+    # Views at one place see the same points, so there may be fewer than ``count``.
     different = np.sort(np.unique(positions, axis=0, return_index=True)[1])
     if len(different) <= count:
         return different
@@ -138,7 +138,8 @@ def _one_a_voxel(positions: Floats, voxel: float) -> NDArray[np.intp]:
 
 def _voxel_for(positions: Floats, count: int) -> float:
     """Return the side of voxels of which at most ``count`` hold points, to a percent."""
-    low, high = 0.0, float(np.max(positions.max(axis=0) - positions.min(axis=0)))
+    low = 0.0
+    high = float(np.max(positions.max(axis=0) - positions.min(axis=0)))
     while high - low > 0.01 * high:
         middle = (low + high) / 2
         if len(_one_a_voxel(positions, middle)) > count:

@@ -4,11 +4,11 @@ from pathlib import Path
 
 from lightfield.core.files import write_csv
 from lightfield.dataset.exports import PosesCsv
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.geometry.rigs.poses import CSV_HEADER
 
 
-def export(source: Source, settings: PosesCsv, folder: Path) -> None:
+def export(source: SourceDataset, settings: PosesCsv, folder: Path) -> None:
     """Write ``poses.csv`` into ``folder``."""
     rows = [
         (view.name, *view.position.tolist(), *view.rotation.tolist())

@@ -14,14 +14,14 @@ from lightfield.core.files import write_json
 from lightfield.core.progress import Progress
 from lightfield.dataset.exports import ScanNetPP
 from lightfield.export.colmap import model
-from lightfield.export.source import Source
-from lightfield.export.splits import splits
+from lightfield.export.source import SourceDataset
+from lightfield.export.trainer_splits import splits
 from lightfield.imaging import images
 
 IMAGES = "image_undistorted_fisheye"
 
 
-def export(source: Source, settings: ScanNetPP, folder: Path) -> None:
+def export(source: SourceDataset, settings: ScanNetPP, folder: Path) -> None:
     """Write a source's views into ``folder``."""
     model(source, settings.points).write_text(folder / "colmap")
     views = source.lightfield.views
@@ -37,5 +37,7 @@ def export(source: Source, settings: ScanNetPP, folder: Path) -> None:
         progress.done()
     parts = splits(source.lightfield)
     lists = {"train": parts.train, "test": parts.test}
-    content = {part: [f"{view.name}.png" for view in own] for part, own in lists.items()}
+    content = {
+        part: [f"{view.name}.png" for view in part_views] for part, part_views in lists.items()
+    }
     write_json(folder / "train_test_lists.json", {**content, "has_masks": masked})

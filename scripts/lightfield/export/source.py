@@ -1,4 +1,4 @@
-"""What an exporter writes from: the views of a lightfield.json, and the surfaces they see."""
+"""What an exporter reads: the views of a lightfield.json, and the surfaces that they see."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import second_name
+from lightfield.core.files import link_or_copy
 from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.geometry.depth import distance_from_z, z_from_distance
 from lightfield.geometry.lenses import Lens
@@ -20,22 +20,22 @@ from lightfield.imaging.tonemap import encode_srgb, to_8_bit, tone_map
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-# Two distances of one surface differ by less than this part: the one is of a pixel's centre, the
-# other of a point somewhere in the pixel.
+# Two distances are of one surface if they differ by less than this part. One is that of a pixel's
+# centre, the other that of a point anywhere in the pixel.
 SAME_SURFACE = 0.01
 
 DEPTH_UNIT = 0.001
-"""Metres of one step of a 16-bit depth map; what lies beyond 65.535 m has no depth there."""
+"""The metres of one step in a 16-bit depth map, which has no depth beyond 65.535 m."""
 
 
 @dataclass(frozen=True)
-class Source:
-    """The views of a dataset folder: the rendered ones (``name`` "") or those of a reprojection.
+class SourceDataset:
+    """The views of a dataset: the rendered ones (``name`` ""), or those of a reprojection.
 
-    ``beside`` are the folders of the rigs whose views test what is trained on these, by the rigs'
-    names, which precede the names of their views: spiral_view_0000f.
+    ``beside`` maps the names of other rigs to their datasets. Their views test what is trained on
+    these, and their names begin with the rig's: spiral_view_0000f.
     EXR views are developed with ``exposure`` (stops) and ``reinhard`` (the value that becomes
-    white; 1 leaves light as it is); PNG views are taken as they are.
+    white; 1 leaves light as it is). PNG views are taken as they are.
     """
 
     dataset: Path
@@ -55,15 +55,15 @@ class Source:
         return self._read("")
 
     def _read(self, name: str) -> LightField:
-        own = LightField.read(self.dataset / name / NAME)
-        own.require_centre()
-        views = list(own.views)
+        lightfield = LightField.read(self.dataset / name / NAME)
+        lightfield.require_centre()
+        views = list(lightfield.views)
         for rig, folder in self.beside.items():
             other = LightField.read(folder / name / NAME)
-            if other.lens != own.lens:
-                raise UserError(f"{other.path}: camera: is another than that of {own.path}")
+            if other.lens != lightfield.lens:
+                raise UserError(f"{other.path}: camera: is another than that of {lightfield.path}")
             views += [replace(view, name=f"{rig}_{view.name}") for view in other.views]
-        return own.changed(views=views)
+        return lightfield.changed(views=views)
 
     @property
     def lens(self) -> Lens:
@@ -83,7 +83,7 @@ class Source:
 
     @cached_property
     def _homes(self) -> dict[str, tuple[Path, str]]:
-        """The folder, and the name there, of each view of another rig."""
+        """The dataset of each view of another rig, and the view's name there, by its name here."""
         return {
             f"{rig}_{view.name}": (folder, view.name)
             for rig, folder in self.beside.items()
@@ -92,7 +92,7 @@ class Source:
         }
 
     def _image(self, view: View, channels: Sequence[str] | None = None) -> images.Image:
-        """Read a view; raises `UserError` for one of another size than the lens has."""
+        """Read a view. Raises `UserError` if its size is not the lens's."""
         image = images.read_image(self.path(view), channels)
         check_size(self.path(view), self.lightfield, next(iter(image.channels.values())))
         return image
@@ -109,7 +109,7 @@ class Source:
         return to_8_bit(tone_map(colour, self.exposure, self.reinhard))
 
     def alpha(self, view: View) -> NDArray[np.uint8]:
-        """Return how much of each pixel (height, width) is covered; 0 where there is no light."""
+        """Return how much of each pixel (h, w) is covered, 0 to 255. 0 where no light is."""
         covered = self.valid(view).astype(np.float32)
         if self.lightfield.transparent:
             alpha = self._image(view, ["A"]).channels["A"]
@@ -118,14 +118,14 @@ class Source:
         return np.asarray(np.rint(covered * 255), np.uint8)
 
     def encoded(self, view: View) -> Floats:
-        """Return a view's sRGB-encoded colour, (height, width, 3), 0 to 1, not rounded."""
+        """Return a view's sRGB-encoded colour (height, width, 3), 0 to 1, not rounded."""
         if self.suffix == ".png":
             return self.colour(view) / 255
         developed = tone_map(self._image(view).colour, self.exposure, self.reinhard)
         return np.asarray(encode_srgb(developed), np.float64)
 
     def valid(self, view: View) -> Bools:
-        """Return which pixels (height, width) hold light: the lens has a ray there and a source."""
+        """Return which pixels (height, width) hold light: they have a ray, and a source."""
         inside: Bools = np.isfinite(self._rays[..., 0])
         if self.name:
             channels = self._image(view).channels
@@ -136,21 +136,22 @@ class Source:
         return inside
 
     def depth(self, view: View, meaning: str) -> Floats:
-        """Return depth in metres, (height, width): "z" or "distance"; inf for a miss, NaN for none.
+        """Return a view's depth (height, width) in metres. ``meaning`` is "z" or "distance".
 
-        Raises `UserError` where the views have no depth.
+        inf where nothing was hit, NaN where there is no depth. Raises `UserError` if the views have
+        no depth.
         """
         if not self.has_depth:
             raise UserError(f"{self.path(view)}: has no depth; reproject with format: exr")
         return depth_of(self.path(view), self.lightfield, self._rays, meaning)
 
     def write_image(self, view: View, target: Path) -> None:
-        """Write a view as an 8-bit PNG; one that is such a PNG becomes a second name of that file.
+        """Write a view as an 8-bit PNG, with RGBA if the views are transparent.
 
-        It is RGBA if the views are transparent.
+        If the view is such a PNG already, make a hard link to it.
         """
         if self.suffix == ".png" and not self._has_16_bits:
-            second_name(self.path(view), target)
+            link_or_copy(self.path(view), target)
         elif self.lightfield.transparent:
             images.write_png(target, np.dstack([self.colour(view), self.alpha(view)]))
         else:
@@ -165,7 +166,7 @@ class Source:
         return self.lens.pixel_rays()
 
     def surfaces(self, views: Iterable[View]) -> Iterator[tuple[View, "Surface"]]:
-        """Yield views with the surface that each sees, as the rendered view beneath it has it."""
+        """Yield each view with the surface that it sees, which is that of its rendered view."""
         if self.rendered.depth is None:
             raise UserError(
                 f"{self.rendered.path}: depth: is null; points need it (render.depth in the YAML)"
@@ -174,10 +175,10 @@ class Source:
         rays = self.rendered.lens.pixel_rays()
         for view in views:
             # A face of a cube map is named after its view: view_0000f_l.
-            below = by_name.get(view.name) or by_name[view.name.rpartition("_")[0]]
-            path = self._path(below, "exr", ".exr")
+            rendered = by_name.get(view.name) or by_name[view.name.rpartition("_")[0]]
+            path = self._path(rendered, "exr", ".exr")
             distance = depth_of(path, self.rendered, rays, "distance")
-            yield view, Surface(self.rendered.lens, below, rays, distance)
+            yield view, Surface(self.rendered.lens, rendered, rays, distance)
 
 
 @dataclass(frozen=True)
@@ -192,8 +193,8 @@ class Surface:
     def points(self, step: int) -> tuple[Floats, Floats]:
         """Return the world points (n, 3) at every ``step``-th pixel, and their normals (n, 3).
 
-        A normal is that of the plane through a point's neighbours to the right and below, turned
-        to the camera; NaN at the rim and where these are on another surface.
+        A normal is that of the plane through the point and its neighbours to the right and below.
+        It points to the camera. NaN at the rim, and where a neighbour is on another surface.
         """
         first = step // 2
         part = np.s_[first::step, first::step]
@@ -211,20 +212,20 @@ class Surface:
         return world[part][seen] + self.view.matrix[:3, 3], normal[part][seen]
 
     def sees(self, points: Floats) -> Bools:
-        """Return which world points (n, 3) are on this surface, and not hidden behind it."""
+        """Return which world points (n, 3) lie on this surface, so that nothing hides them."""
         local = (points - self.view.matrix[:3, 3]) @ self.view.matrix[:3, :3]
         expected = np.linalg.norm(local, axis=1)
         column, row, inside = pixel_indices(self.lens, local)
-        found = np.where(inside, self.distance[row, column], np.nan)
+        distance = np.where(inside, self.distance[row, column], np.nan)
         with np.errstate(invalid="ignore"):
-            same: Bools = np.abs(found - expected) < SAME_SURFACE * expected
+            same: Bools = np.abs(distance - expected) < SAME_SURFACE * expected
         return same
 
 
 def pixel_indices(lens: Lens, rays: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp], Bools]:
-    """Return column and row of the pixel that each ray (n, 3) meets, and whether it is in frame.
+    """Return the column and row (n,), (n,) of each ray's pixel, and which rays are in the frame.
 
-    Outside the frame the indices are 0.
+    ``rays`` (n, 3) may have any length. Outside the frame column and row are 0.
     """
     x, y = np.floor(lens.pixels(rays)).T
     with np.errstate(invalid="ignore"):
@@ -234,36 +235,36 @@ def pixel_indices(lens: Lens, rays: Floats) -> tuple[NDArray[np.intp], NDArray[n
 
 
 def millimetres(depth: Floats) -> NDArray[np.uint16]:
-    """Return depth (h, w) in metres as 16-bit steps of `DEPTH_UNIT`; 0 is none, or too far."""
+    """Return depth (h, w) in metres as 16-bit steps of `DEPTH_UNIT`. 0 is none, or too far."""
     steps = np.round(depth / DEPTH_UNIT)
     valid = np.isfinite(steps) & (steps >= 1) & (steps <= np.iinfo(np.uint16).max)
     return np.where(valid, steps, 0).astype(np.uint16)
 
 
 def depth_of(path: Path, lightfield: LightField, rays: Floats, meaning: str) -> Floats:
-    """Return a view's depth in metres, (h, w), as "z" or "distance"; NaN where there is no ray.
+    """Return a view's depth (h, w) in metres, as "z" or "distance". NaN where there is no ray.
 
     ``rays`` (h, w, 3) are those of the pixels. Raises `UserError` for a view of another size, and
-    where nothing says what its channel Z means.
+    if neither its header nor lightfield.json says what channel Z means.
     """
     image = images.read_image(path, ["Z"])
     check_size(path, lightfield, image.channels["Z"])
     depth = image.channels["Z"].astype(np.float64)
-    held = image.attributes.get(images.DEPTH_ATTRIBUTE, lightfield.depth)
-    if held not in ("z", "distance"):
+    stored_meaning = image.attributes.get(images.DEPTH_ATTRIBUTE, lightfield.depth)
+    if stored_meaning not in ("z", "distance"):
         raise UserError(
-            f"{lightfield.path}: depth: is {held!r}; must be z or distance "
+            f"{lightfield.path}: depth: is {stored_meaning!r}; must be z or distance "
             "to say what channel Z of the views holds"
         )
-    if held == meaning:
-        # A pixel without a ray saw nothing.
+    if stored_meaning == meaning:
+        # A pixel without a ray has no depth.
         return np.where(np.isnan(rays[..., 2]), np.nan, depth)
     convert = z_from_distance if meaning == "z" else distance_from_z
     return convert(depth, rays)
 
 
 def check_size(path: Path, lightfield: LightField, pixels: NDArray[Any]) -> None:
-    """Raise `UserError` for pixels (h, w, …) of a view that are not as many as the lens has."""
+    """Raise `UserError` if a view's pixels (h, w, …) do not have the size of the lens."""
     (height, width), lens = pixels.shape[:2], lightfield.lens
     if (width, height) != (lens.width, lens.height):
         raise UserError(

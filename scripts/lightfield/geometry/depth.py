@@ -1,8 +1,31 @@
-"""Depth along the optical axis (Z-depth) and distance from the camera, each from the other."""
+"""Depth along the optical axis (Z-depth) and distance from the camera, each from the other.
+
+A view stores one of them, as `LightField.depth` says: `Lens.usual_depth` where the user chose none.
+`conventional_depth` says which of them other programs mean.
+"""
 
 import numpy as np
 
-from lightfield.geometry.lenses import Array
+from lightfield.geometry.lenses import Array, Lens
+from lightfield.geometry.lenses.rectilinear import Rectilinear
+
+
+def conventional_depth(lens: Lens) -> str:
+    """Return what other programs mean by the depth of a lens: "z" or "distance".
+
+    Cycles, instant-ngp, nerfstudio, OpenDIBR and TMIV share one convention: Z-depth for perspective
+    cameras, distance for all others.
+    """
+    return "z" if isinstance(lens, Rectilinear) else "distance"
+
+
+def stored_distance(depth: Array, rays: Array, meaning: str | None) -> Array:
+    """Return the distance (...) in metres of the ``depth`` (...) that a view stores.
+
+    ``meaning`` is what the view's depth means. Z-depth, "z", is converted with the unit ``rays``
+    (..., 3); "distance" is returned as it is.
+    """
+    return distance_from_z(depth, rays) if meaning == "z" else depth
 
 
 def z_from_distance(distance: Array, rays: Array) -> Array:

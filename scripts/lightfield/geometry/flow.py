@@ -1,4 +1,4 @@
-"""Flow between two views of a scene that stands still: where one sees what the other does."""
+"""Flow between two views of a still scene: where one view shows what the other shows."""
 
 import numpy as np
 
@@ -7,18 +7,18 @@ from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.rigs.rig import ONE_PLACE
 
-# A point is hidden if the other view sees a surface that is nearer by more than this part of it.
+# A point is hidden if the other view sees a surface that is nearer by more than this part.
 HIDDEN = 0.01
 # Two cameras are equally near if their distances differ by less than this part.
 AS_NEAR = 1e-6
 
 
 def neighbours(matrices: Array) -> list[int]:
-    """Return, for each of the views at ``matrices`` (n, 4, 4), the number of its neighbour.
+    """Return for each of the views at ``matrices`` (n, 4, 4) the number of its neighbour.
 
-    That is the one whose camera is nearest, and of equally near ones the one that looks most alike.
-    Views from the very same place are none, for between these nothing is hidden. Raises `UserError`
-    where there are no others.
+    The neighbour is the view with the nearest camera; of equally near ones, the view with the most
+    similar direction. Views from the very same place do not count, because nothing hides anything
+    between them. Raises `UserError` if there are no other places.
     """
     from lightfield.geometry.nearest import Cameras
 
@@ -39,12 +39,12 @@ def neighbours(matrices: Array) -> list[int]:
 def flow(
     lens: Lens, here: Array, there: Array, distance: Array, distance_there: Array
 ) -> tuple[Array, Array]:
-    """Return the flow (h, w, 2) in pixels, x to the right and y down, and what of it is visible.
+    """Return the flow (h, w, 2) in pixels, x right and y down, and where (h, w) it is visible.
 
     ``here`` and ``there`` are (4, 4) camera-to-world; ``distance`` (h, w) of both views is along
-    the ray, in metres, inf where nothing is hit. Flow is NaN where the lens has no ray, or the
-    other view none for the point. Visible (h, w) is what is in the other view's frame and behind
-    none of the surfaces that it sees.
+    the ray, in metres, inf where nothing is hit. Flow is NaN where the lens has no ray, or where
+    the other view has no ray to the point. A point is visible if it is in the other view's frame,
+    and if no surface hides it there.
     """
     rays = lens.pixel_rays() @ here[:3, :3].T
     far = np.isinf(distance)
@@ -54,7 +54,7 @@ def flow(
     x, y = np.moveaxis(pixels, -1, 0)
     with np.errstate(invalid="ignore"):
         inside = (x >= 0) & (x < lens.width) & (y >= 0) & (y < lens.height)
-    # The farthest of the four pixels around: at an edge what is behind it is visible, too.
+    # Take the farthest of the four pixels around: at an edge, what is behind it is visible, too.
     farthest = np.full(distance.shape, -np.inf)
     for dx in (-0.5, 0.5):
         for dy in (-0.5, 0.5):
@@ -63,21 +63,21 @@ def flow(
             farthest = np.fmax(farthest, distance_there[row, column])
     expected = np.where(far, np.inf, np.linalg.norm(offset, axis=-1))
     visible = inside & (expected <= (1 + HIDDEN) * farthest)
-    found = pixels - (np.indices(distance.shape)[::-1].transpose(1, 2, 0) + 0.5)
-    found[..., 0] = shorter(lens, found[..., 0])
-    return found, visible
+    motion = pixels - (np.indices(distance.shape)[::-1].transpose(1, 2, 0) + 0.5)
+    motion[..., 0] = shorter(lens, motion[..., 0])
+    return motion, visible
 
 
 def shorter(lens: Lens, across: Array) -> Array:
-    """Return a motion to the right in pixels by the shorter of the two paths around a panorama."""
+    """Return a motion to the right in pixels, along the shorter way around a panorama."""
     if not isinstance(lens, Equirectangular):
         return across
     return np.asarray(across - lens.turn * np.rint(across / lens.turn))
 
 
-def in_frame(lens: Lens, found: Array) -> Array:
-    """Return where flow (2, h, w) leads to a place in the frame, (h, w), but for rounding."""
-    y, x = np.indices(found.shape[1:]) + 0.5 + found[::-1]
+def in_frame(lens: Lens, motion: Array) -> Array:
+    """Return where (h, w) a flow (2, h, w) leads into the frame, up to rounding."""
+    y, x = np.indices(motion.shape[1:]) + 0.5 + motion[::-1]
     if isinstance(lens, Equirectangular):
         x %= lens.turn
     rounding = 0.01

@@ -49,7 +49,7 @@ class InterpolationVolume:
 
 
 def interpolation_volume(rig: Rig, lens: Lens) -> InterpolationVolume | None:
-    """Return the volumes of a rig seen through a lens; None for loose poses, which span nothing."""
+    """Return the volumes of a rig with a lens. None for poses of a file, which span no surface."""
     mesh = rig.cells()
     if mesh is None:
         return None
@@ -100,11 +100,11 @@ def immersive_planes(
 
 
 def parts_to_edge(matrices: Floats, lens: Lens, places: Floats) -> Floats:
-    """Return how far from the middle of cameras (m, 4, 4) to the edge of their volume places are.
+    """Return where places (n, 3) lie between the middle and the edge of the immersive volume.
 
-    Of places (n, 3) it is 0 in the middle, 1 at the edge of the immersive volume in that direction,
-    and inf where the middle itself is not within, as among cameras in a plane. The surface between
-    the cameras is taken to be their hull.
+    0 is the middle of the cameras ``matrices`` (m, 4, 4), and 1 the edge in that direction. inf if
+    the middle itself is outside, as it is among cameras in a plane. The convex hull of the cameras
+    stands for the surface between them.
     """
     positions = matrices[:, :3, 3]
     middle = positions.mean(axis=0)
@@ -118,8 +118,8 @@ def parts_to_edge(matrices: Floats, lens: Lens, places: Floats) -> Floats:
     planes = immersive_planes(mesh, hull, matrices, lens, not outward)
     if planes is None or (planes[:, :3] @ middle + planes[:, 3] >= 0).any():
         return nowhere
-    room = -(planes[:, :3] @ middle + planes[:, 3])
-    parts: Floats = ((places - middle) @ planes[:, :3].T / room).max(axis=1)
+    reach = -(planes[:, :3] @ middle + planes[:, 3])
+    parts: Floats = ((places - middle) @ planes[:, :3].T / reach).max(axis=1)
     return parts
 
 
@@ -137,7 +137,7 @@ def spacing(positions: Floats) -> float:
 
 
 def neighbour_spacing(mesh: list[tuple[int, ...]], positions: Floats) -> float:
-    """Return the mean length in metres of the cells' edges, each counted once; NaN for no cell."""
+    """Return the mean length in metres of the cells' edges, each counted once, or NaN."""
     edges = {frozenset((a, b)) for cell in mesh for a, b in _edges(cell) if a != b}
     if not edges:
         return math.nan
@@ -146,7 +146,7 @@ def neighbour_spacing(mesh: list[tuple[int, ...]], positions: Floats) -> float:
 
 
 def is_closed(mesh: list[tuple[int, ...]], positions: Floats) -> bool:
-    """Whether every edge of the surface joins two cells, cameras at one place being one corner."""
+    """Return whether each edge joins two cells. Cameras at one place are one corner."""
     _, place_of = np.unique(np.round(positions, 9), axis=0, return_inverse=True)
     place_of = place_of.ravel()
     edges = Counter(
@@ -156,12 +156,12 @@ def is_closed(mesh: list[tuple[int, ...]], positions: Floats) -> bool:
 
 
 def neighbours(mesh: list[tuple[int, ...]]) -> list[tuple[int, int]]:
-    """Return every pair (camera, corner) that occurs in a cell, a camera with itself too."""
+    """Return all pairs (camera, corner) of a cell, also of a camera with itself."""
     return sorted({(camera, corner) for cell in mesh for camera in cell for corner in cell})
 
 
 def sees_all_round(lens: Lens) -> bool:
-    """Whether the lens's image shows every direction."""
+    """Return whether the lens's image shows all directions."""
     theta, azimuth = np.meshgrid(np.linspace(0, 3.1, 17), np.linspace(-3.1, 3.1, 17))
     return bool(_seen(lens, _directions(theta, azimuth)).all())
 
@@ -181,7 +181,8 @@ def cone_sides(lens: Lens) -> Floats | None:
     azimuths = np.unique(np.concatenate([azimuths, np.mod(corners, 2 * math.pi)]))
     if not _seen(lens, _directions(np.zeros(1), azimuths[:1])).all():
         return None
-    low, high = np.zeros_like(azimuths), np.full_like(azimuths, math.pi / 2)
+    low = np.zeros_like(azimuths)
+    high = np.full_like(azimuths, math.pi / 2)
     whole = _seen(lens, _directions(high, azimuths))
     if whole.all():
         return np.array([[0.0, 0.0, -1.0]])
@@ -204,7 +205,7 @@ def _directions(theta: Floats, azimuth: Floats) -> Floats:
 
 
 def _seen(lens: Lens, directions: Floats) -> NDArray[np.bool_]:
-    """Whether the image shows these directions; its edge counts, to a millionth of a pixel."""
+    """Return whether the image shows these directions, its edge and 1e-6 pixels included."""
     pixels = lens.pixels(directions)
     with np.errstate(invalid="ignore"):
         inside = (pixels > -1e-6) & (pixels < np.array([lens.width, lens.height]) + 1e-6)

@@ -1,7 +1,7 @@
-"""Which cameras are near another one, found without comparing every camera with every other.
+"""Finds the cameras near a camera, without comparing all pairs.
 
-Cameras at the very same place are one place in a k-d tree. So a thousand of them cost no more.
-Importing scipy's tree takes a third of a second: import this file where it is needed.
+Cameras at the very same place are one place in a k-d tree, so a thousand of them cost no more.
+Importing scipy's tree takes a third of a second, so import this file only where it is needed.
 """
 
 import numpy as np
@@ -26,10 +26,10 @@ class Cameras:
         self._cameras = np.split(by_place, np.cumsum(np.bincount(place_of_camera.ravel()))[:-1])
 
     def nearest(self, camera: int, count: int, tie: float) -> NDArray[np.int64]:
-        """Return the ``count`` nearest others in ascending order, and whoever ties with them.
+        """Return the ``count`` nearest other cameras in ascending order, and all that tie.
 
-        That is who is farther by ``tie`` metres at most. Of many cameras at one place, which are
-        equally far, the first ``count`` are returned.
+        A camera ties if it is at most ``tie`` metres farther. Of many cameras at one place only the
+        first ``count`` are returned.
         """
         count = min(count, len(self._positions) - 1)
         reach = self._distances(camera, min(count + 1, self._tree.n))[-1] + tie
@@ -38,10 +38,10 @@ class Cameras:
         return others
 
     def nearest_apart(self, camera: int, apart: float, tie: float) -> NDArray[np.int64]:
-        """Return, in ascending order, all cameras not farther than the nearest one elsewhere.
+        """Return, in ascending order, all cameras as near as the nearest one elsewhere.
 
-        Elsewhere is ``apart`` metres away at least. Those farther by a part of ``tie`` count as
-        equally far.
+        Elsewhere is at least ``apart`` metres away. Cameras that are farther by the part ``tie``
+        count as equally far.
         """
         count = 2
         while True:
@@ -54,12 +54,12 @@ class Cameras:
         return self._within(camera, reach * (1 + tie))
 
     def _distances(self, camera: int, count: int) -> Array:
-        """Return the distances of the nearest places, its own first."""
+        """Return the distances of the nearest places, beginning with the camera's own."""
         distances, _ = self._tree.query(self._positions[camera], k=[*range(1, count + 1)])
         return np.asarray(distances)
 
     def _within(self, camera: int, reach: float, most: int | None = None) -> NDArray[np.int64]:
-        """Return the cameras within ``reach`` metres, of each place the first ``most``."""
+        """Return the cameras within ``reach`` metres, at most the first ``most`` of each place."""
         places = self._tree.query_ball_point(
             self._positions[camera], reach * (1 + ROUNDING), return_sorted=False
         )

@@ -39,7 +39,8 @@ def matrix_to_euler(matrix: Floats) -> Floats:
         )
         # Z from what is left when the turn about X is undone, so that the two agree however
         # near gimbal lock is (Day, "Extracting Euler angles from a rotation matrix").
-        sine, cos = np.sin(x), np.cos(x)
+        sine = np.sin(x)
+        cos = np.cos(x)
         z = np.arctan2(
             sine * m[..., 0, 2] - cos * m[..., 0, 1], cos * m[..., 1, 1] - sine * m[..., 1, 2]
         )

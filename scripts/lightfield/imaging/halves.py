@@ -7,7 +7,7 @@ from llvmlite import ir  # type: ignore[import-untyped]
 from numba import types
 from numba.extending import intrinsic
 
-from lightfield.core.kernels import kernel
+from lightfield.core.compiled import kernel
 from lightfield.geometry.lenses import Array
 from lightfield.imaging.images import HALF_MAX
 

@@ -34,7 +34,7 @@ NAN_ATTRIBUTE = "plenoforge:nan"
 
 HALF_MAX = 65504.0
 
-# Those of OpenEXR's codecs that keep every bit of halves and floats.
+# OpenEXR's codecs that keep every bit of halves and floats.
 CODECS = {
     "zip": "ZIP_COMPRESSION",
     "zips": "ZIPS_COMPRESSION",
@@ -78,7 +78,7 @@ class Header:
     attributes: dict[str, Attribute]
 
 
-# What libjpeg says of a picture that is whole.
+# What libjpeg says of a complete picture.
 _HARMLESS = re.compile("unknown JFIF revision|Unknown Adobe color|extraneous bytes")
 
 
@@ -132,7 +132,7 @@ def read_image(
 
 
 def attribute(path: Path, name: str) -> Attribute | None:
-    """Return an attribute of a file's header; None if it has no such, or is missing or no image."""
+    """Return an attribute of a file's header, or None without it, or if the file is no image."""
     try:
         return read_header(path).attributes.get(name)
     except UserError:
@@ -140,12 +140,12 @@ def attribute(path: Path, name: str) -> Attribute | None:
 
 
 def has_key(path: Path, key: str) -> bool:
-    """Return, by its header alone, whether a file is there and made by the settings of ``key``."""
+    """Return whether a file exists, and its header says that it was made with ``key``."""
     return attribute(path, KEY_ATTRIBUTE) == key
 
 
 def is_finished(path: Path, key: str) -> bool:
-    """Return whether a file is there, whole, and made by the settings that ``key`` stands for."""
+    """Return whether a file exists, is complete, and was made with the settings of ``key``."""
     try:
         return path.exists() and read_image(path).attributes.get(KEY_ATTRIBUTE) == key
     except UserError:
@@ -153,7 +153,7 @@ def is_finished(path: Path, key: str) -> bool:
 
 
 def check_codec(compression: str) -> None:
-    """Raise `UserError` for one of `CODECS` that the OpenEXR at hand cannot write."""
+    """Raise `UserError` for one of `CODECS` that this OpenEXR cannot write."""
     if not hasattr(OpenEXR, CODECS[compression]):
         able = ", ".join(name for name, codec in CODECS.items() if hasattr(OpenEXR, codec))
         raise UserError(
@@ -211,30 +211,31 @@ def write_png(
 
 
 def _check_exr(path: Path) -> None:
-    """Raise an OSError for an EXR in scan lines that was cut short while it was written.
+    """Raise an OSError for an EXR in scan lines that is cut short.
 
-    OpenEXR reports no error of its last steps: the end of the pixels and the table of the chunks.
+    OpenEXR reports no error when it writes the last pixels and the table of chunks.
     """
     try:
         file = OpenEXR.InputFile(str(path))
-        whole = file.isComplete()
-        if whole:
+        is_complete = file.isComplete()
+        if is_complete:
             header = file.header()
             last = header["dataWindow"].max.y
             file.channels(list(header["channels"]), scanLine1=last, scanLine2=last)
     except OSError:
-        whole = False
-    if not whole:
+        is_complete = False
+    if not is_complete:
         raise OSError("the file is cut short")
 
 
 def _check_png(path: Path) -> None:
-    """Raise an OSError for a PNG whose chunks are not all there, with the checksums they carry.
+    """Raise an OSError for a PNG with missing chunks, or chunks that differ from their checksums.
 
-    OpenImageIO reports no error of its last steps: small files may be empty, large ones cut short.
+    OpenImageIO reports no error when it writes the end: files may be empty or cut short.
     """
     content = memoryview(path.read_bytes())
-    place, kind = 8, b""
+    place = 8
+    kind = b""
     try:
         while kind != b"IEND":
             length, kind = struct.unpack_from(">I4s", content, place)
@@ -282,7 +283,7 @@ def _plain_exr_header(path: Path | str) -> Header | None:
 
 
 def _colour_first(names: Iterable[str]) -> list[str]:
-    """Return an EXR's channels, which it holds by the alphabet, as R, G, B, A and the others."""
+    """Return an EXR's channels in the order R, G, B, A and others. The file sorts them by name."""
     return sorted(names, key=lambda name: ("RGBA".find(name) % 5, name))
 
 
@@ -292,11 +293,11 @@ def _read_plain_exr(
     channels: Sequence[str] | None,
     rows: tuple[int, int] | None,
 ) -> tuple[Image, list[str]]:
-    """Return an EXR's channels, those asked for, and the names of all."""
+    """Return the wanted channels of an EXR, and the names of all its channels."""
     names = [name for name in header.channels if channels is None or name in channels]
     first, end = rows or (0, header.height)
     try:
-        # OpenEXR.File, which is to replace InputFile, reads whole files only.
+        # OpenEXR.File, which will replace InputFile, can only read all rows.
         file = OpenEXR.InputFile(str(path))
         raw = file.header()
         kinds = [np.dtype(_EXR_TYPES[str(raw["channels"][name].type)]) for name in names]
@@ -314,28 +315,32 @@ def _read_plain_exr(
 def _read_other(
     path: Path | str, channels: Sequence[str] | None, rows: tuple[int, int] | None
 ) -> tuple[Image, list[str]]:
-    """Return any image's channels, those asked for, and the names of all."""
+    """Return the wanted channels of any image, and the names of all its channels."""
     file = _open(path)
-    found: dict[str, np.ndarray[Any, Any]] = {}
+    planes_by_name: dict[str, np.ndarray[Any, Any]] = {}
     attributes: dict[str, Attribute] = {}
     names: list[str] = []
     subimage = 0
     while file.seek_subimage(subimage, 0):
         spec = file.spec()
         attributes = _attributes(spec) | attributes
-        own = _channel_names(path, spec)
-        wanted = [index for index, name in enumerate(own) if channels is None or name in channels]
+        channel_names = _channel_names(path, spec)
+        wanted = [
+            index
+            for index, name in enumerate(channel_names)
+            if channels is None or name in channels
+        ]
         for first, end, kind in _runs(spec, wanted):
             pixels = file.read_image(subimage, 0, first, end, kind)
             if pixels is None:
                 raise UserError(f"{path}: cannot be read whole: {file.geterror()}")
             pixels = np.asarray(pixels).reshape(spec.height, spec.width, end - first)
             planes = np.moveaxis(pixels[slice(*(rows or (None,)))], -1, 0)
-            found |= dict(zip(own[first:end], planes, strict=True))
-        names += own
+            planes_by_name |= dict(zip(channel_names[first:end], planes, strict=True))
+        names += channel_names
         subimage += 1
     file.close()
-    return Image(found, attributes), names
+    return Image(planes_by_name, attributes), names
 
 
 def _channel_names(path: Path | str, spec: Any) -> list[str]:
@@ -358,12 +363,13 @@ def _runs(spec: Any, wanted: Sequence[int]) -> list[tuple[int, int, str]]:
 
 
 def _attributes(spec: Any) -> dict[str, Attribute]:
-    found: dict[str, Attribute] = {}
+    attributes: dict[str, Attribute] = {}
     for parameter in spec.extra_attribs:
         try:
-            name, value = parameter.name, parameter.value
+            name = parameter.name
+            value = parameter.value
         except UnicodeDecodeError:
             continue  # damaged: none of ours, which are ASCII
         if isinstance(value, str | int | float):
-            found[name] = value
-    return found
+            attributes[name] = value
+    return attributes

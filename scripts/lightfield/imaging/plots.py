@@ -15,8 +15,14 @@ matplotlib.use("agg")
 from matplotlib import pyplot, style
 
 # Okabe and Ito's palette, which people with any kind of colour vision can tell apart.
-BLUE, ORANGE, GREEN, VERMILION = "#0072b2", "#e69f00", "#009e73", "#d55e00"
-PURPLE, SKY, YELLOW, GREY = "#cc79a7", "#56b4e9", "#f0e442", "#777777"
+BLUE = "#0072b2"
+ORANGE = "#e69f00"
+GREEN = "#009e73"
+VERMILION = "#d55e00"
+PURPLE = "#cc79a7"
+SKY = "#56b4e9"
+YELLOW = "#f0e442"
+GREY = "#777777"
 COLOURS = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, YELLOW, GREY)
 # With the colours, so that a line is known without them too.
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")

@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import numpy.typing as npt
 
-from lightfield.core.kernels import kernel
+from lightfield.core.compiled import kernel
 from lightfield.geometry.lenses import Array
 
 

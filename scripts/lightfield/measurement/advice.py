@@ -1,19 +1,16 @@
-"""What a scene could be rendered with that is cheaper at equal error: changes tried on its probes.
+"""Changes of a scene's settings that reach the same error in less time, tried on probe windows.
 
-The probes are the windows of the strata by which `lightfield.measurement.error_vs_time` measures,
-with references as its own. Each change of the scene's settings is rendered with the seeds of the
-unchanged scene, which is rendered with half and with twice as many samples, too: how much longer
-that takes to the change's error is what the change saves. Of a denoiser's settings the same is
-asked of denoised renders.
+An `Experiment` renders windows of the scene's strata with each change, and without a change with
+half, the same and twice the samples. A change saves as many times as the unchanged scene takes
+longer to reach the change's error. Changes of the denoiser are compared with denoised renders.
 
-What makes another picture shall not pass for a saving. The mean of the differences that a change
-makes, of renders with equal seeds, is its bias. Where the square of that, of all pixels, is above
-the variance of the reference, the picture is another one, and the change is not advised. The light
-tree and guiding only choose other paths, to the same mean. Of a clamp the bias is said, and nothing
-is advised.
+A change that makes a different picture is not a saving. The bias of a change is the mean of the
+differences that it makes to renders of equal seeds. If the square of the bias, over all pixels, is
+above the variance of the reference, the picture differs, and the change is not advised. The light
+tree and path guiding choose other paths to the same mean, so they are exempt. Changes of a clamp
+are reported with their bias, and never advised.
 """
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -22,59 +19,75 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.progress import Progress
 from lightfield.measurement import metrics, strata
 from lightfield.measurement.calibration import effort_for
-from lightfield.measurement.error_vs_time import Renders, referenced, weighted
+from lightfield.measurement.experiment import WHOLE_VIEWS, Experiment, Method, References
 from lightfield.measurement.sampling import DENOISED, TRACED, standard_error
-from lightfield.measurement.trials import Trial, Trials
+from lightfield.measurement.trials import Trials
 
-# Of a pixel in what is tried, and how often; the unchanged scene has half and twice as many, too.
-SAMPLES, SEEDS = 8, 4
+# The samples of a pixel with which changes are tried; the unchanged scene also has half and twice.
+SAMPLES = 8
+SEEDS = range(1, 5)
 # Adaptive sampling decides nothing before some thirty samples.
 ADAPTIVE = {"samples": 64, "adaptive_threshold": 0.2}
-# What saves less is not worth a line, and it must save that by so many standard errors.
-WORTH, SURE = 1.03, 2.0
-# Of one that takes so many times as long as its other seeds do, the rest is other load.
+# A change is advised if it saves at least this factor, by so many standard errors.
+WORTH = 1.03
+SURE = 2.0
+# A render that takes more than this times the median of its seeds was slowed by another load.
 DISTURBED = 1.5
-WHOLE = "whole views"
 
-# What a change is compared with.
-BASES: dict[str, list[dict[str, Any]]] = {
-    of: [{"samples": n, "denoise": of == DENOISED} for n in (SAMPLES // 2, SAMPLES, 2 * SAMPLES)]
-    for of in (TRACED, DENOISED)
+# The unchanged scene, path traced and denoised, at rising samples: what changes are compared with.
+UNCHANGED = {
+    name: [
+        Method(name, {"samples": samples, "denoise": name == DENOISED})
+        for samples in (SAMPLES // 2, SAMPLES, 2 * SAMPLES)
+    ]
+    for name in (TRACED, DENOISED)
 }
 
-# Of an inventory what may cost time, and how many names of each are said.
+# What an inventory lists that may cost time.
 COSTLY = (
-    *("volumes", "transmission", "translucency", "transparency", "hair", "subsurface"),
-    *("emission", "procedural", "displacement"),
+    "volumes",
+    "transmission",
+    "translucency",
+    "transparency",
+    "hair",
+    "subsurface",
+    "emission",
+    "procedural",
+    "displacement",
 )
+# The table names so many of a kind.
 MOST_NAMES = 8
 
 
 @dataclass(frozen=True)
-class Try:
-    """A change of a scene's ``render`` block, rendered as ``settings`` have it.
+class Change:
+    """A change of a scene's ``render`` block, and the ``settings`` that render it.
 
-    ``of`` says what it is compared with, ``unbiased`` that the picture is known to stay, and
-    ``may_be_advised`` is False where it is tried to be reported alone.
+    ``compared_with`` names the unchanged renders in `UNCHANGED`. ``unbiased`` says that the change
+    is known to keep the picture. A change that is not ``may_be_advised`` is only reported.
     """
 
-    of: str
+    compared_with: str
     change: Mapping[str, Any]
     settings: Mapping[str, Any]
     unbiased: bool = False
     may_be_advised: bool = True
 
+    @property
+    def method(self) -> Method:
+        """The method of the experiment that renders this change."""
+        return Method(self.compared_with, self.settings)
+
 
 @dataclass(frozen=True)
 class Saving:
-    """What a change saves: ``times`` as long the unchanged scene takes to the change's error.
+    """What a change saves: the unchanged scene takes ``times`` as long to reach the same error.
 
-    ``uncertainty`` is its standard error over seeds, and ``times_of_all_pixels`` counts the worst
-    thousandth of pixels, too. ``bias``, squared, and the reference's own ``noise`` are relative
-    mean squared errors of all pixels; ``light`` is by what part all light changes.
+    ``uncertainty`` is the standard error of ``times`` over seeds. ``times_of_all_pixels`` includes
+    the worst thousandth of pixels. ``bias`` (squared) and the reference's own ``noise`` are
+    relative mean squared errors of all pixels. ``light`` is the relative change of all light.
     """
 
     times: float
@@ -91,248 +104,307 @@ class Saving:
         return self.bias <= self.noise
 
 
-def tries(own: Mapping[str, Any], on_cpu: bool) -> list[Try]:
-    """Return what is tried of a scene whose paths are traced as ``own`` says, by `render` keys."""
-    # Elsewhere Cycles has no guiding.
-    switches = ("light_tree", "guiding") if on_cpu else ("light_tree",)
-    bounces = [{"max_bounces": n} for n in (own["max_bounces"] // 2, own["max_bounces"] // 4) if n]
-    clamp = own["clamp_indirect"]
-    clamps = [{"clamp_indirect": n} for n in ((0, clamp / 4) if clamp else (10,))]
-    denoisers = [{"denoise_quality": quality} for quality in ("balanced", "fast")]
-    denoisers += [{"denoise_prefilter": prefilter} for prefilter in ("fast", "none")]
-    count = {"samples": SAMPLES}
-    return [
-        *(
-            Try(TRACED, {name: not own[name]}, count | {name: not own[name]}, unbiased=True)
-            for name in switches
-        ),
-        *(Try(TRACED, change, count | change) for change in bounces),
-        *(Try(TRACED, change, count | change, may_be_advised=False) for change in clamps),
-        Try(TRACED, {"adaptive_threshold": ADAPTIVE["adaptive_threshold"]}, ADAPTIVE),
-        Try(TRACED, {"denoise": True}, count | {"denoise": True}),
-        *(Try(DENOISED, change, count | {"denoise": True} | change) for change in denoisers),
-    ]
+@dataclass(frozen=True)
+class Figures:
+    """One seed's renders: errors without the worst thousandth of pixels and of all, and time.
 
-
-# A render's errors, without the worst thousandth of pixels and of all, and seconds a megapixel.
-Figures = tuple[float, float, float]
-
-
-class Probes:
-    """The windows of a scene's strata with their references, and what was rendered of them."""
-
-    def __init__(
-        self, maker: Trials, size: int, windows: int, reference_samples: int, name: str
-    ) -> None:
-        self.maker, self.name = maker, name
-        self.windows, areas = strata.choose(maker, size, windows)
-        _, self.parts = referenced(maker, self.windows, areas, reference_samples, name)
-        self.areas = {stratum: areas[stratum] for stratum in self.parts}
-        self._renders: dict[str, list[list[Trial]]] = {}
-
-    def render(self, ways: Sequence[Mapping[str, Any]]) -> None:
-        """Render all windows in some ways: side by side, so that other load is in all alike."""
-        each = {json.dumps(settings): settings for settings in ways}
-        self._renders |= {key: [[] for _ in self.windows] for key in each}
-        progress = Progress(
-            SEEDS * len(self.windows) * len(each), f"{self.name}: trials", "renders"
-        )
-        for seed in range(1, 1 + SEEDS):
-            for number, window in enumerate(self.windows):
-                for key, settings in each.items():
-                    self._renders[key][number].append(self.maker.render(window, seed, settings))
-                    progress.done()
-
-    def of(self, settings: Mapping[str, Any]) -> Renders:
-        """Return what `render` has made in one way, by window and seed."""
-        return self._renders[json.dumps(settings)]
-
-    def figures(self, settings: Mapping[str, Any]) -> dict[str, list[Figures]]:
-        """Return the figures of each seed's renders, by stratum and of whole views."""
-        renders, found = self.of(settings), {}
-
-        def error(places: Mapping[int, metrics.Reference], seed: int, left_out: float) -> float:
-            return fmean(
-                metrics.relative_mse(renders[place][seed].colour, reference, left_out)
-                for place, reference in places.items()
-            )
-
-        def seconds(place: int, seed: int) -> float:
-            usual = median(trial.seconds for trial in renders[place])
-            return min(renders[place][seed].seconds, DISTURBED * usual)
-
-        for stratum, places in self.parts.items():
-            megapixels = next(iter(places.values())).mask.size / 1e6
-            found[stratum] = [
-                (
-                    error(places, seed, metrics.OUTLIERS),
-                    error(places, seed, 0),
-                    fmean(seconds(place, seed) for place in places) / megapixels,
-                )
-                for seed in range(SEEDS)
-            ]
-        found[WHOLE] = []
-        for seed in range(SEEDS):
-            least, whole, each = (
-                weighted({s: found[s][seed][figure] for s in self.parts}, self.areas)
-                for figure in range(3)
-            )
-            found[WHOLE].append((least, whole, each))
-        return found
-
-    def saved(self, one: Try) -> dict[str, Saving]:
-        """Return what a change saves, by stratum and of whole views.
-
-        A stratum is left out where renders are no worse than their references.
-        """
-        changed, base = self.figures(one.settings), [self.figures(w) for w in BASES[one.of]]
-        apart = self._apart(one)
-        found = {}
-        for stratum, figures in changed.items():
-            unchanged = [points[stratum] for points in base]
-            errors = [point[0] for points in unchanged for point in points]
-            if min(*errors, *(point[0] for point in figures)) <= apart[stratum]["noise"]:
-                continue
-            times, of_all = (
-                [
-                    _seconds_for(now[error], [(p[seed][2], p[seed][error]) for p in unchanged])
-                    / now[2]
-                    for seed, now in enumerate(figures)
-                ]
-                for error in (0, 1)
-            )
-            found[stratum] = Saving(*_mean(times), *_mean(of_all), **apart[stratum])
-        return found
-
-    def _apart(self, one: Try) -> dict[str, dict[str, float]]:
-        """Return bias, noise and light of a change, as `Saving` has them."""
-        changed, unchanged = self.of(one.settings), self.of(BASES[one.of][1])
-        found = {}
-        for stratum, places in self.parts.items():
-            biases, noises, lights = [], [], []
-            for place, reference in places.items():
-                pairs = list(zip(changed[place], unchanged[place], strict=True))
-                moved = [
-                    (reference.colour + n.colour - b.colour).astype(np.float32) for n, b in pairs
-                ]
-                known = replace(reference, variance=np.zeros_like(reference.variance))
-                biases.append(metrics.bias_and_variance(moved, known)[0])
-                counted = reference.counted
-                noises.append(float((reference.variance[counted] * reference.weights).mean()))
-                now, before = (
-                    fmean(float(trial.colour[counted].mean()) for trial in trials)
-                    for trials in zip(*pairs, strict=True)
-                )
-                lights.append(now / before - 1 if before else 0.0)
-            found[stratum] = {"bias": fmean(biases), "noise": fmean(noises), "light": fmean(lights)}
-        found[WHOLE] = {
-            figure: weighted({s: found[s][figure] for s in self.parts}, self.areas)
-            for figure in ("bias", "noise", "light")
-        }
-        return found
-
-
-def _seconds_for(error: float, points: Sequence[tuple[float, float]]) -> float:
-    """Return the seconds to an error, from (seconds, error); beyond these in inverse proportion."""
-    seconds, most = points[0]
-    return seconds * most / error if error >= most else effort_for(error, points)
-
-
-def _mean(times: Sequence[float]) -> tuple[float, float]:
-    """Return the geometric mean of some factors, and its standard error."""
-    logs = [math.log(value) for value in times]
-    mean = math.exp(fmean(logs))
-    return mean, mean * standard_error(logs)
-
-
-def tried(
-    maker: Trials, render: Mapping[str, Any], inventory: Mapping[str, Any], probes: Probes
-) -> dict[str, Any]:
-    """Try on ``probes`` what could be cheaper than a scene's ``render`` settings.
-
-    ``inventory`` says what the scene contains, and how its .blend traces paths.
+    ``seconds`` are those of a megapixel.
     """
-    on_cpu = maker.render(probes.windows[0], 1, {"samples": 1}).device == "CPU"
-    changes = tries({**inventory["sampling"], **render}, on_cpu)
-    probes.render([*BASES[TRACED], *BASES[DENOISED], *(one.settings for one in changes)])
-    savings = [(one, probes.saved(one)) for one in changes]
-    good = [pair for pair in savings if is_advised(pair[0], pair[1].get(WHOLE))]
-    # Of several values of one key that which saves most.
-    good.sort(key=lambda pair: pair[1][WHOLE].times)
-    taken = list({tuple(one.change): one for one, _ in good}.values())
-    traced = [one for one in taken if one.of == TRACED]
-    if len(traced) > 1:
-        change = {key: value for one in traced for key, value in one.change.items()}
-        settings = {key: value for one in traced for key, value in one.settings.items()}
-        together = Try(TRACED, change, settings, may_be_advised=False)
-        probes.render([settings])
-        savings.append((together, probes.saved(together)))
+
+    error: float
+    error_of_all_pixels: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How a change moves the picture: ``bias``, ``noise`` and ``light`` of a `Saving`."""
+
+    bias: float
+    noise: float
+    light: float
+
+
+def changes_to_try(sampling: Mapping[str, Any], on_cpu: bool) -> list[Change]:
+    """Return the changes to try of a scene that samples as ``sampling`` says, by `render` keys."""
+    # Cycles guides paths only on processors.
+    switches = ("light_tree", "guiding") if on_cpu else ("light_tree",)
+    most_bounces = sampling["max_bounces"]
+    bounces = [{"max_bounces": n} for n in (most_bounces // 2, most_bounces // 4) if n]
+    clamp = sampling["clamp_indirect"]
+    clamps = [{"clamp_indirect": n} for n in ((0, clamp / 4) if clamp else (10,))]
+    denoisers: list[dict[str, Any]] = [
+        {"denoise_quality": "balanced"},
+        {"denoise_quality": "fast"},
+        {"denoise_prefilter": "fast"},
+        {"denoise_prefilter": "none"},
+    ]
+    traced = {"samples": SAMPLES}
+    denoised = {"samples": SAMPLES, "denoise": True}
+    changes = []
+    for name in switches:
+        switched = {name: not sampling[name]}
+        changes.append(Change(TRACED, switched, traced | switched, unbiased=True))
+    changes += [Change(TRACED, change, traced | change) for change in bounces]
+    changes += [Change(TRACED, change, traced | change, may_be_advised=False) for change in clamps]
+    threshold = {"adaptive_threshold": ADAPTIVE["adaptive_threshold"]}
+    changes.append(Change(TRACED, threshold, ADAPTIVE))
+    changes.append(Change(TRACED, {"denoise": True}, denoised))
+    changes += [Change(DENOISED, change, denoised | change) for change in denoisers]
+    return changes
+
+
+def probe_experiment(
+    maker: Trials, size: int, windows: int, reference_samples: int, name: str
+) -> Experiment:
+    """Return the experiment on ``windows`` windows of ``size``² pixels of each stratum."""
+    chosen, areas = strata.choose(maker, size, windows)
+    return Experiment.stratified(maker, chosen, areas, reference_samples, name)
+
+
+def measure(
+    experiment: Experiment, render: Mapping[str, Any], inventory: Mapping[str, Any], name: str
+) -> dict[str, Any]:
+    """Try what could be cheaper than a scene's ``render`` settings.
+
+    ``inventory`` says what the scene contains, and how its .blend samples. ``name`` starts the
+    progress lines.
+    """
+    title = f"{name}: trials"
+    changes = changes_to_try({**inventory["sampling"], **render}, experiment.device == "CPU")
+    unchanged = [method for methods in UNCHANGED.values() for method in methods]
+    experiment.run([*unchanged, *(change.method for change in changes)], SEEDS, title)
+    measured = [(change, savings(experiment, change)) for change in changes]
+    advised = advised_changes(measured)
+    combined = combination([change for change in advised if change.compared_with == TRACED])
+    if combined:
+        experiment.run([combined.method], SEEDS, title)
+        measured.append((combined, savings(experiment, combined)))
     return {
-        "probes": [window.name for window in probes.windows],
-        "size": probes.windows[0].width,
-        "resolution": [maker.lens.width, maker.lens.height],
-        "seeds": SEEDS,
-        "device": "CPU" if on_cpu else "GPU",
-        "strata": probes.areas,
+        **experiment.described(),
+        "seeds": len(SEEDS),
+        "device": experiment.device,
+        "strata": experiment.areas,
         "own": {key: render[key] for key in ("samples", "denoise")},
         "unchanged": {
-            of: [
-                {
-                    "samples": way["samples"],
-                    "error": fmean(error for error, _, _ in figures),
-                    "seconds": fmean(seconds for _, _, seconds in figures),
-                }
-                for way in ways
-                for figures in [probes.figures(way)[WHOLE]]
-            ]
-            for of, ways in BASES.items()
+            of: [unchanged_figures(experiment, method) for method in methods]
+            for of, methods in UNCHANGED.items()
         },
         "tried": [
             {
-                "of": one.of,
-                "change": dict(one.change),
-                "advised": one in taken,
+                "of": change.compared_with,
+                "change": dict(change.change),
+                "advised": change in advised,
                 "savings": {
                     stratum: {**asdict(saving), "same_picture": saving.same_picture}
-                    for stratum, saving in saved.items()
+                    for stratum, saving in by_stratum.items()
                 },
             }
-            for one, saved in savings
+            for change, by_stratum in measured
         ],
-        "yaml": {key: value for one in taken for key, value in one.change.items()},
+        "yaml": {key: value for change in advised for key, value in change.change.items()},
         "costly": {"lights": inventory["lights"]}
         | {feature: inventory[feature] for feature in COSTLY if inventory[feature]},
     }
 
 
-def is_advised(one: Try, saving: Saving | None) -> bool:
-    """Return whether a change saves, surely, and leaves the picture as it is.
+def advised_changes(measured: Sequence[tuple[Change, Mapping[str, Saving]]]) -> list[Change]:
+    """Return the advised changes; of several values of one key, the one that saves most."""
+    good = [
+        (saved[WHOLE_VIEWS].times, change)
+        for change, saved in measured
+        if is_advised(change, saved.get(WHOLE_VIEWS))
+    ]
+    good.sort(key=lambda pair: pair[0])
+    return list({tuple(change.change): change for _, change in good}.values())
 
-    Of denoised renders the picture is what the denoiser makes, and its bias is in its error.
+
+def combination(changes: Sequence[Change]) -> Change | None:
+    """Return several changes as one, which is only reported; None for fewer than two."""
+    if len(changes) < 2:
+        return None
+    change = {key: value for part in changes for key, value in part.change.items()}
+    settings = {key: value for part in changes for key, value in part.settings.items()}
+    return Change(TRACED, change, settings, may_be_advised=False)
+
+
+def is_advised(change: Change, saving: Saving | None) -> bool:
+    """Return whether a change surely saves time and keeps the picture.
+
+    A denoiser defines its own picture, so its bias is part of its error.
     """
     return (
         saving is not None
-        and one.may_be_advised
+        and change.may_be_advised
         and saving.times - SURE * saving.uncertainty >= WORTH
-        # Not by hiding what is bright and rare.
+        # A change must not save by hiding rare bright pixels.
         and saving.times_of_all_pixels + SURE * saving.uncertainty_of_all_pixels >= 1
-        and (one.of == DENOISED or one.unbiased or saving.same_picture)
+        and (change.compared_with == DENOISED or change.unbiased or saving.same_picture)
     )
 
 
-# What `table` reads.
+def savings(experiment: Experiment, change: Change) -> dict[str, Saving]:
+    """Return what a change saves, by stratum and of whole views.
+
+    A stratum is left out if its renders are no worse than the reference.
+    """
+    changed = figures(experiment, change.method)
+    unchanged = [figures(experiment, method) for method in UNCHANGED[change.compared_with]]
+    differences = picture_differences(experiment, change)
+    saved = {}
+    for stratum, of_seeds in changed.items():
+        rising = [by_stratum[stratum] for by_stratum in unchanged]
+        difference = differences[stratum]
+        every = [*of_seeds, *(seed for of_method in rising for seed in of_method)]
+        if min(seed.error for seed in every) <= difference.noise:
+            continue
+        times = []
+        times_of_all_pixels = []
+        for seed, now in enumerate(of_seeds):
+            by_error = [(before[seed].seconds, before[seed].error) for before in rising]
+            times.append(seconds_to_error(now.error, by_error) / now.seconds)
+            by_error = [
+                (before[seed].seconds, before[seed].error_of_all_pixels) for before in rising
+            ]
+            seconds = seconds_to_error(now.error_of_all_pixels, by_error)
+            times_of_all_pixels.append(seconds / now.seconds)
+        saved[stratum] = Saving(
+            *geometric_mean(times), *geometric_mean(times_of_all_pixels), **asdict(difference)
+        )
+    return saved
+
+
+def figures(experiment: Experiment, method: Method) -> dict[str, list[Figures]]:
+    """Return the figures of each seed, by stratum and of whole views."""
+    by_stratum = {
+        stratum: stratum_figures(experiment, method, references)
+        for stratum, references in experiment.strata.items()
+    }
+    by_stratum[WHOLE_VIEWS] = [
+        Figures(
+            error=experiment.over_views({s: f.error for s, f in of_seed.items()}),
+            error_of_all_pixels=experiment.over_views(
+                {s: f.error_of_all_pixels for s, f in of_seed.items()}
+            ),
+            seconds=experiment.over_views({s: f.seconds for s, f in of_seed.items()}),
+        )
+        for of_seed in (
+            dict(zip(by_stratum, seeds, strict=True))
+            for seeds in zip(*by_stratum.values(), strict=True)
+        )
+    ]
+    return by_stratum
+
+
+def stratum_figures(
+    experiment: Experiment, method: Method, references: References
+) -> list[Figures]:
+    """Return the figures of each seed, means over the windows of a stratum."""
+    errors = experiment.errors(method, references)
+    errors_of_all_pixels = experiment.errors(method, references, left_out=0)
+    seconds = [
+        [min(value, DISTURBED * median(of_window)) for value in of_window]
+        for of_window in experiment.seconds(method, references)
+    ]
+    return [
+        Figures(fmean(by_window[0]), fmean(by_window[1]), fmean(by_window[2]))
+        for by_window in zip(
+            zip(*errors, strict=True),
+            zip(*errors_of_all_pixels, strict=True),
+            zip(*seconds, strict=True),
+            strict=True,
+        )
+    ]
+
+
+def unchanged_figures(experiment: Experiment, method: Method) -> dict[str, Any]:
+    """Return the samples, the error and the seconds of the unchanged scene in whole views."""
+    of_seeds = figures(experiment, method)[WHOLE_VIEWS]
+    return {
+        "samples": method.settings["samples"],
+        "error": fmean(seed.error for seed in of_seeds),
+        "seconds": fmean(seed.seconds for seed in of_seeds),
+    }
+
+
+def picture_differences(experiment: Experiment, change: Change) -> dict[str, Difference]:
+    """Return how a change moves the picture, by stratum and of whole views."""
+    changed = experiment.renders(change.method)
+    unchanged = experiment.renders(UNCHANGED[change.compared_with][1])
+    by_stratum = {}
+    for stratum, references in experiment.strata.items():
+        biases = []
+        noises = []
+        lights = []
+        for number, reference in references.items():
+            pairs = list(zip(changed[number], unchanged[number], strict=True))
+            moved = [
+                (reference.colour + now.colour - before.colour).astype(np.float32)
+                for now, before in pairs
+            ]
+            # The reference is its own truth here: only the differences have a variance.
+            exact = replace(reference, variance=np.zeros_like(reference.variance))
+            biases.append(metrics.bias_and_variance(moved, exact)[0])
+            counted = reference.counted
+            noises.append(float((reference.variance[counted] * reference.weights).mean()))
+            light, light_before = (
+                fmean(float(trial.colour[counted].mean()) for trial in trials)
+                for trials in zip(*pairs, strict=True)
+            )
+            lights.append(light / light_before - 1 if light_before else 0.0)
+        by_stratum[stratum] = Difference(fmean(biases), fmean(noises), fmean(lights))
+    by_stratum[WHOLE_VIEWS] = Difference(
+        bias=experiment.over_views({s: d.bias for s, d in by_stratum.items()}),
+        noise=experiment.over_views({s: d.noise for s, d in by_stratum.items()}),
+        light=experiment.over_views({s: d.light for s, d in by_stratum.items()}),
+    )
+    return by_stratum
+
+
+def seconds_to_error(error: float, points: Sequence[tuple[float, float]]) -> float:
+    """Return the seconds to an error, from (seconds, error) points in rising order of seconds.
+
+    Beyond the points the error is inversely proportional to the seconds.
+    """
+    seconds, largest_error = points[0]
+    if error >= largest_error:
+        return seconds * largest_error / error
+    return effort_for(error, points)
+
+
+def geometric_mean(factors: Sequence[float]) -> tuple[float, float]:
+    """Return the geometric mean of some factors, and its standard error."""
+    logarithms = [math.log(factor) for factor in factors]
+    mean = math.exp(fmean(logarithms))
+    return mean, mean * standard_error(logarithms)
+
+
+# The keys that `table` reads.
 SHOWN = ("device", "seeds", "strata", "tried", "unchanged", "threads", "costly", "yaml")
 
 
-def table(name: str, found: Mapping[str, Any]) -> str:
-    """Return what `tried` has found, in Markdown."""
-    columns = [WHOLE, *found["strata"]]
-    unit = "a core" if found["device"] == "CPU" else "the GPU"
+def table(name: str, content: Mapping[str, Any]) -> str:
+    """Return what `measure` and the trial of threads returned, in Markdown."""
+    return "\n".join(
+        [
+            *_savings_table(name, content),
+            *_unchanged_table(content),
+            *_threads_table(content),
+            *_costly_list(content),
+            *_advised_yaml(content),
+            "",
+        ]
+    )
+
+
+def _savings_table(name: str, content: Mapping[str, Any]) -> list[str]:
+    columns = [WHOLE_VIEWS, *content["strata"]]
     lines = [
         f"# {name}: what could be cheaper at equal error",
         "",
         "How many times as long the unchanged scene takes to the error of the changed one, ± the",
-        f"standard error over {found['seeds']} seeds: of whole views, of all their pixels with the",
+        f"standard error over {content['seeds']} seeds: of whole views, of all their pixels with "
+        "the",
         "worst thousandth, and by what pixels show. The bias is that of all pixels, over the noise",
         "of the reference, and light is by what part the whole picture is brighter. Where the bias",
         "is above 1 it is another picture, and nothing is advised, but of the light tree and of",
@@ -342,60 +414,85 @@ def table(name: str, found: Mapping[str, Any]) -> str:
         f"| {' | '.join(columns[1:])} |",
         "| --- | --- | --- " + "| ---: " * (3 + len(columns)) + "|",
     ]
-    for one in found["tried"]:
-        savings = one["savings"]
-        cells = [_times(savings.get(stratum)) for stratum in columns]
-        whole = savings.get(WHOLE)
-        if whole:
-            all_pixels = f"{whole['times_of_all_pixels']:.2f}"
-            cells[1:1] = [
-                all_pixels,
-                f"{whole['bias'] / whole['noise']:.2g}",
-                f"{whole['light']:+.2%}",
+    for entry in content["tried"]:
+        savings_by_stratum = entry["savings"]
+        times = [_times(savings_by_stratum.get(stratum)) for stratum in columns]
+        whole_views = savings_by_stratum.get(WHOLE_VIEWS)
+        details = ["—"] * 3
+        if whole_views:
+            details = [
+                f"{whole_views['times_of_all_pixels']:.2f}",
+                f"{whole_views['bias'] / whole_views['noise']:.2g}",
+                f"{whole_views['light']:+.2%}",
             ]
-        else:
-            cells[1:1] = ["—"] * 3
-        said = "yes" if one["advised"] else "no"
-        lines.append(f"| `{_yaml(one['change'])}` | {one['of']} | {said} | {' | '.join(cells)} |")
-    lines += [
+        cells = [
+            f"`{_yaml(entry['change'])}`",
+            entry["of"],
+            "yes" if entry["advised"] else "no",
+            times[0],
+            *details,
+            *times[1:],
+        ]
+        lines.append(f"| {' | '.join(cells)} |")
+    return lines
+
+
+def _unchanged_table(content: Mapping[str, Any]) -> list[str]:
+    unit = "a core" if content["device"] == "CPU" else "the GPU"
+    return [
         "",
         "Unchanged, of whole views:",
         "",
         f"| of | samples | s of {unit} a megapixel | error |",
+        "| --- | ---: | ---: | ---: |",
+        *(
+            f"| {of} | {point['samples']} | {point['seconds']:.3g} | {point['error']:.2g} |"
+            for of, points in content["unchanged"].items()
+            for point in points
+        ),
     ]
-    lines.append("| --- | ---: | ---: | ---: |")
-    lines += [
-        f"| {of} | {point['samples']} | {point['seconds']:.3g} | {point['error']:.2g} |"
-        for of, points in found["unchanged"].items()
-        for point in points
+
+
+def _threads_table(content: Mapping[str, Any]) -> list[str]:
+    if not content["threads"]:
+        return []
+    return [
+        "",
+        "As processes that fill the same cores, in seconds of a core, idle ones counted:",
+        "",
+        "| threads a process | processes | s a small view | s to the first view | GB of all |",
+        "| ---: | ---: | ---: | ---: | ---: |",
+        *(
+            f"| {split['threads']} | {split['processes']} | {split['view_core_seconds']:.3g} "
+            f"| {split['start_up_core_seconds']:.3g} | {split['memory_bytes'] / 1e9:.2g} |"
+            for split in content["threads"]
+        ),
     ]
-    if found["threads"]:
-        lines += [
-            "",
-            "As processes that fill the same cores, in seconds of a core, idle ones counted:",
-            "",
-            "| threads a process | processes | s a small view | s to the first view | GB of all |",
-            "| ---: | ---: | ---: | ---: | ---: |",
-            *(
-                f"| {one['threads']} | {one['processes']} | {one['view_core_seconds']:.3g} "
-                f"| {one['start_up_core_seconds']:.3g} | {one['memory_bytes'] / 1e9:.2g} |"
-                for one in found["threads"]
-            ),
-        ]
-    lines += ["", "What may cost time in the scene:", ""]
-    for kind, names in found["costly"].items():
+
+
+def _costly_list(content: Mapping[str, Any]) -> list[str]:
+    lines = ["", "What may cost time in the scene:", ""]
+    for kind, names in content["costly"].items():
         more = " …" if len(names) > MOST_NAMES else ""
         lines.append(f"- {kind}: {len(names)}, {', '.join(names[:MOST_NAMES])}{more}")
-    if found["yaml"]:
-        lines += ["", "To take what is advised:", "", "```yaml", "render:"]
-        lines += [f"  {_yaml({key: value})}" for key, value in found["yaml"].items()]
-        lines += ["```"]
-    else:
-        lines += [
+    return lines
+
+
+def _advised_yaml(content: Mapping[str, Any]) -> list[str]:
+    if not content["yaml"]:
+        return [
             "",
             "Nothing is advised: no change saves anything for sure and leaves the picture.",
         ]
-    return "\n".join([*lines, ""])
+    return [
+        "",
+        "To take what is advised:",
+        "",
+        "```yaml",
+        "render:",
+        *(f"  {_yaml({key: value})}" for key, value in content["yaml"].items()),
+        "```",
+    ]
 
 
 def _times(saving: Mapping[str, Any] | None) -> str:

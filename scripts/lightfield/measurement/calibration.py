@@ -1,7 +1,8 @@
-"""The cheapest way to render that reaches a scene's target error.
+"""The cheapest method that reaches a scene's target error.
 
-Cost is counted in samples a pixel, not in seconds, so that a scene makes the same choice each time:
-the bytes of its views follow from it. `lightfield.measurement.metrics` defines the error.
+Cost is counted in samples of a pixel, not in seconds, so that a scene makes the same choice each
+time: the bytes of its views follow from the choice. `lightfield.measurement.metrics` defines the
+error.
 """
 
 import math
@@ -12,6 +13,7 @@ from statistics import fmean
 from typing import Any
 
 from lightfield.measurement import metrics, strata
+from lightfield.measurement.experiment import Experiment, Method, split_by_stratum
 from lightfield.measurement.sampling import (
     DENOISING_SAMPLES,
     FEWEST_SEEDS,
@@ -25,19 +27,21 @@ from lightfield.measurement.sampling import (
 )
 from lightfield.measurement.trials import Trials, Window, nearest_view
 
-PROBE_SEED, HELD_OUT_SEED = 1, 2
+PROBE_SEED = 1
+HELD_OUT_SEED = 2
 
-# Cycles takes no more.
+# Cycles takes no more samples of a pixel.
 MOST_SAMPLES = 2**24
-# What adaptive sampling may take; of it, the threshold is chosen.
+# Adaptive sampling may take so many samples; the calibration chooses its threshold.
 MOST_ADAPTIVE_SAMPLES = 4096
-FIRST_THRESHOLD, LEAST_THRESHOLD = 0.4, 1e-4
+FIRST_THRESHOLD = 0.4
+LEAST_THRESHOLD = 1e-4
 
-# A way that reaches the target, which leaves out the worst thousandth of pixels, may have so many
-# times the error of all pixels that plain path tracing has there: one with more hides fireflies.
+# The target leaves out the worst thousandth of pixels. A method that reaches it may have so many
+# times the error of all pixels that plain path tracing has at the target; more hides fireflies.
 MOST_OF_PLAIN = 2
 
-# Within this part of the target a way is as good as on it.
+# An error within this part of the target counts as on the target.
 CLOSE = 0.05
 # Within this part of the target, held-out views confirm the choice.
 CONFIRMED = 0.2
@@ -45,11 +49,11 @@ CONFIRMED = 0.2
 
 @dataclass(frozen=True)
 class Candidate:
-    """One way at one effort, on some windows: means over these.
+    """A method at one effort, measured on some windows: means over the windows.
 
-    ``samples`` are those that a pixel took, ``cost`` adds the denoiser's, and ``error`` is the
-    relative mean squared error, ``whole_error`` that of all pixels, the worst thousandth too.
-    ``seconds`` are those of one core or of the GPU, a megapixel.
+    ``samples`` are those that a pixel took, ``cost`` adds the denoiser's. ``error`` is the relative
+    mean squared error without the worst thousandth of pixels, ``whole_error`` with it. ``seconds``
+    are those of one core, or of the GPU, for a megapixel.
     """
 
     way: str
@@ -60,13 +64,22 @@ class Candidate:
     whole_error: float
     seconds: float
 
+    @property
+    def method(self) -> Method:
+        """The method that was measured."""
+        return Method(self.way, self.settings)
+
     def evidence(self) -> dict[str, Any]:
-        """Return what is the same every time."""
+        """Return the figures that are the same in every calibration."""
         return {key: value for key, value in asdict(self).items() if key != "seconds"}
 
 
 class Bench:
-    """Some windows, their references, and what is measured on them."""
+    """An experiment with one seed, whose references are good enough for a target error.
+
+    The references take more seeds until their own error is a small part of the ``target``.
+    ``exposure`` is that of the references; without it, they are exposed by their own light.
+    """
 
     def __init__(
         self,
@@ -76,85 +89,81 @@ class Bench:
         target: float,
         exposure: float | None = None,
     ) -> None:
-        self.maker, self.windows, self.seed = maker, windows, seed
-        self.seeds = FEWEST_SEEDS
+        self.seed = seed
+        self.reference_seeds = FEWEST_SEEDS
         while True:
-            self.references = metrics.exposed_alike(self._references(), exposure)
-            self.own_error = fmean(reference.own_error for reference in self.references)
-            if self.own_error <= REFERENCE_PART * target or self.seeds >= MOST_SEEDS:
+            references = metrics.exposed_alike(self._references(maker, windows), exposure)
+            self.experiment = Experiment(maker, windows, references)
+            self.own_error = self.experiment.reference_error
+            if self.own_error <= REFERENCE_PART * target or self.reference_seeds >= MOST_SEEDS:
                 break
-            self.seeds *= 2
+            self.reference_seeds *= 2
 
-    def _references(self) -> list[metrics.Reference]:
-        found = []
-        for number, window in enumerate(self.windows, 1):
-            found.append(self.maker.reference(window, self.seeds, REFERENCE_SAMPLES))
-            _say(f"reference {number} of {len(self.windows)}, {self.seeds * REFERENCE_SAMPLES} spp")
-        return found
+    def _references(self, maker: Trials, windows: Sequence[Window]) -> list[metrics.Reference]:
+        references = []
+        samples = self.reference_seeds * REFERENCE_SAMPLES
+        for number, window in enumerate(windows, 1):
+            references.append(maker.reference(window, self.reference_seeds, REFERENCE_SAMPLES))
+            _print_progress(f"reference {number} of {len(windows)}, {samples} spp")
+        return references
 
-    def measure(self, way: str, settings: Mapping[str, Any]) -> tuple[Candidate, list[float]]:
-        """Render every window under ``settings``; also return the error of each."""
-        renders = [self.maker.render(window, self.seed, settings) for window in self.windows]
-        errors, whole = (
-            [
-                metrics.relative_mse(render.colour, reference, left_out)
-                for render, reference in zip(renders, self.references, strict=True)
-            ]
-            for left_out in (metrics.OUTLIERS, 0)
-        )
-        samples = fmean(render.samples for render in renders)
-        megapixels = self.windows[0].width * self.windows[0].height / 1e6
-        found = Candidate(
-            way=way,
-            settings={**PLAIN, **settings},
+    def measure(self, method: Method) -> Candidate:
+        """Render every window with a method, and return the means."""
+        self.experiment.run([method], [self.seed])
+        samples = fmean(trial.samples for (trial,) in self.experiment.renders(method))
+        candidate = Candidate(
+            way=method.name,
+            settings={**PLAIN, **method.settings},
             samples=samples,
-            cost=cost_in_samples(samples, settings.get("denoise", False)),
-            error=fmean(errors),
-            whole_error=fmean(whole),
-            seconds=fmean(render.seconds for render in renders) / megapixels,
+            cost=cost_in_samples(samples, method.settings.get("denoise", False)),
+            error=fmean(self.errors(method)),
+            whole_error=fmean(self.errors(method, left_out=0)),
+            seconds=fmean(seconds for (seconds,) in self.experiment.seconds(method)),
         )
-        _say(f"{way} {settings}: error {found.error:.3g} at cost {found.cost:.4g}")
-        return found, errors
+        _print_progress(
+            f"{method.name} {method.settings}: error {candidate.error:.3g} "
+            f"at cost {candidate.cost:.4g}"
+        )
+        return candidate
+
+    def errors(self, method: Method, left_out: float = metrics.OUTLIERS) -> list[float]:
+        """Return the error of each window, rendered with a method that was measured."""
+        by_window = self.experiment.errors(method, self.experiment.all_windows, left_out)
+        return [error for (error,) in by_window]
 
 
 class Search:
-    """Tries every way on a bench, so that ``measured`` holds what to choose from.
+    """Measures every method at rising effort; ``measured`` holds the candidates to choose from.
 
-    ``most`` limits a pixel's samples, ``denoise``, unless None, rules out the other half.
+    ``measure`` renders a method and returns its figures, as `Bench.measure` does. ``most`` limits a
+    pixel's samples. ``denoise`` True or False leaves out the methods without or with the denoiser.
     """
 
     def __init__(
-        self, bench: Bench, target: float, most: int | None = None, denoise: bool | None = None
+        self,
+        measure: Callable[[Method], Candidate],
+        target: float,
+        most: int | None = None,
+        denoise: bool | None = None,
     ) -> None:
-        self.bench, self.target, self.denoise = bench, target, denoise
+        self.measure = measure
+        self.target = target
+        self.denoise = denoise
         self.limit = math.inf if most is None else most
-        self.measured = [self._measure("plain", {"samples": n}) for n in PLAIN_SAMPLES]
-        self._needed = self.plain_samples(target)
-        _say(f"plain path tracing needs {self._needed:.3g} samples")
-        # Of all pixels its error is inversely proportional to its samples.
-        whole = fmean(entry.whole_error * entry.samples for entry in self.measured)
-        self.most_whole_error = MOST_OF_PLAIN * whole / self._needed
-        for denoised, counts, thresholds in (
-            (True, "denoised", "adaptive, denoised"),
-            (False, "plain", "adaptive"),
-        ):
-            if denoise in (None, denoised):
-                also = {"denoise": denoised}
-                if denoised:
-                    self._climb(counts, _counted, also, 1, self.limit)
-                efforts = 1 / FIRST_THRESHOLD, 1 / LEAST_THRESHOLD
-                self._climb(thresholds, self._adaptive, also, *efforts)
-        if not denoise and self._needed <= self._affordable():
-            plain = _counted(min(self._needed, self.limit))
-            self.measured.append(self._measure("plain", plain))
-
-    def _measure(self, way: str, settings: Mapping[str, Any]) -> Candidate:
-        return self.bench.measure(way, settings)[0]
-
-    def _adaptive(self, effort: float) -> dict[str, Any]:
-        threshold = float(f"{1 / effort:.3g}")
-        samples = min(self.limit, MOST_ADAPTIVE_SAMPLES)
-        return {"samples": samples, "adaptive_threshold": threshold}
+        self.measured = [measure(Method("plain", {"samples": n})) for n in PLAIN_SAMPLES]
+        self._plain_samples_needed = self.plain_samples(target)
+        _print_progress(f"plain path tracing needs {self._plain_samples_needed:.3g} samples")
+        # The error of all pixels of plain path tracing is inversely proportional to its samples.
+        error_of_one_sample = fmean(e.whole_error * e.samples for e in self.measured)
+        self.most_whole_error = MOST_OF_PLAIN * error_of_one_sample / self._plain_samples_needed
+        if denoise in (None, True):
+            self._climb("denoised", _with_samples, {"denoise": True}, 1, self.limit)
+            self._climb_thresholds("adaptive, denoised", {"denoise": True})
+        if denoise in (None, False):
+            self._climb_thresholds("adaptive", {"denoise": False})
+        if not denoise and self._plain_samples_needed <= self._affordable():
+            plain = _with_samples(min(self._plain_samples_needed, self.limit))
+            self.measured.append(measure(Method("plain", plain)))
 
     def plain_samples(self, error: float) -> float:
         """Return how many samples plain path tracing needs for an error."""
@@ -162,12 +171,20 @@ class Search:
         return effort_for(error, sorted((entry.samples, entry.error) for entry in plain))
 
     def reaches(self, entry: Candidate) -> bool:
-        """Return whether the error is on the target, or below it, and not by hiding fireflies."""
-        honest = entry.way == "plain" or entry.whole_error <= self.most_whole_error
-        return honest and entry.error <= self.target * (1 + CLOSE)
+        """Return whether the error is on the target, or below it, without hiding fireflies."""
+        keeps_fireflies = entry.way == "plain" or entry.whole_error <= self.most_whole_error
+        return keeps_fireflies and entry.error <= self.target * (1 + CLOSE)
+
+    def choose(self) -> Candidate:
+        """Return the cheapest candidate that reaches the target; else that of the least error."""
+        eligible = self._eligible()
+        good = [entry for entry in eligible if self.reaches(entry)]
+        if good:
+            return min(good, key=lambda entry: (entry.cost, entry.error))
+        return min(eligible, key=lambda entry: entry.error)
 
     def _eligible(self) -> list[Candidate]:
-        """Return what the limits leave to choose from."""
+        """Return the candidates within the limits."""
         return [
             entry
             for entry in self.measured
@@ -176,68 +193,86 @@ class Search:
         ]
 
     def _affordable(self) -> float:
-        """Return the least cost that is known to reach the target; without any, that of the limit.
+        """Return the least cost that is known to reach the target.
 
-        A preset's limit is tried out, whether it is known to suffice or not.
+        Without any, it is infinite under a limit, so that the limit itself is tried, and else what
+        Cycles can take.
         """
         costs = [entry.cost for entry in self._eligible() if self.reaches(entry)]
-        if not self.denoise and self._needed <= self.limit:
-            costs.append(self._needed)
+        if not self.denoise and self._plain_samples_needed <= self.limit:
+            costs.append(self._plain_samples_needed)
         return min(costs, default=MOST_SAMPLES if self.limit == math.inf else math.inf)
 
-    def choose(self) -> Candidate:
-        """Return the cheapest that reaches the target; if none does, that of the least error."""
-        eligible = self._eligible()
-        good = [entry for entry in eligible if self.reaches(entry)]
-        if good:
-            return min(good, key=lambda entry: (entry.cost, entry.error))
-        return min(eligible, key=lambda entry: entry.error)
+    def _climb_thresholds(self, name: str, fixed: Mapping[str, Any]) -> None:
+        """Climb with ever lower thresholds of adaptive sampling; the effort is the inverse."""
+
+        def with_threshold(effort: float) -> dict[str, Any]:
+            threshold = float(f"{1 / effort:.3g}")
+            samples = min(self.limit, MOST_ADAPTIVE_SAMPLES)
+            return {"samples": samples, "adaptive_threshold": threshold}
+
+        self._climb(name, with_threshold, fixed, 1 / FIRST_THRESHOLD, 1 / LEAST_THRESHOLD)
 
     def _climb(
         self,
-        way: str,
+        name: str,
         settings_at: Callable[[float], Mapping[str, Any]],
-        also: Mapping[str, Any],
+        fixed: Mapping[str, Any],
         first: float,
         last: float,
     ) -> None:
-        """Double a way's effort until it reaches the target, then interpolate to meet it.
+        """Double a method's effort until it reaches the target, then interpolate to meet it.
 
-        Gives up at effort ``last``, at a cost that another way reaches the target with, or where
-        the last two errors, drawn out, would take more than that.
+        ``settings_at`` returns the settings of an effort, to which ``fixed`` are added. Gives up at
+        effort ``last``, or when the target will cost more than with another method.
         """
-        affordable = self._affordable()
-        points: list[tuple[float, Candidate]] = []
-        effort = first
-        while True:
-            points.append((effort, self._measure(way, {**settings_at(effort), **also})))
-            now = points[-1][1]
-            if self.reaches(now) or effort >= last or now.cost >= affordable:
-                break
-            # Every pixel takes the most that it may.
-            if len(points) > 1 and now.samples == points[-2][1].samples:
-                break
-            if len(points) > 2:
-                before, doublings = points[-2][1].error, 0.0
-                if before <= now.error:
-                    doublings = math.inf
-                elif now.error > self.target:
-                    doublings = math.log(now.error / self.target) / math.log(before / now.error)
-                if doublings > math.log2(2 * affordable / now.samples):
-                    break
-            effort = min(2 * effort, last)
+        points = self._double(name, settings_at, fixed, first, last)
         measured = [entry for _, entry in points]
         bracket = points[-2:]
         while len(bracket) == 2 and self.reaches(bracket[1][1]):
             if bracket[1][1].error >= self.target * (1 - CLOSE):
                 break
             effort = effort_for(self.target, [(at, entry.error) for at, entry in bracket])
-            settings = {**PLAIN, **settings_at(effort), **also}
+            settings = {**PLAIN, **settings_at(effort), **fixed}
             if settings in [entry.settings for entry in measured]:
                 break
-            measured.append(self._measure(way, settings))
+            measured.append(self.measure(Method(name, settings)))
             bracket[self.reaches(measured[-1])] = (effort, measured[-1])
         self.measured += measured
+
+    def _double(
+        self,
+        name: str,
+        settings_at: Callable[[float], Mapping[str, Any]],
+        fixed: Mapping[str, Any],
+        first: float,
+        last: float,
+    ) -> list[tuple[float, Candidate]]:
+        """Return (effort, candidate) of doubled efforts, to the target or to where it gives up."""
+        affordable = self._affordable()
+        points: list[tuple[float, Candidate]] = []
+        effort = first
+        while True:
+            candidate = self.measure(Method(name, {**settings_at(effort), **fixed}))
+            points.append((effort, candidate))
+            at_end = effort >= last or candidate.cost >= affordable
+            if self.reaches(candidate) or at_end:
+                return points
+            # Every pixel takes the most samples that it may.
+            if len(points) > 1 and candidate.samples == points[-2][1].samples:
+                return points
+            if len(points) > 2 and self._is_hopeless(points[-2][1], candidate, affordable):
+                return points
+            effort = min(2 * effort, last)
+
+    def _is_hopeless(self, before: Candidate, now: Candidate, affordable: float) -> bool:
+        """Return whether the last doubling, drawn out to the target, costs more than affordable."""
+        doublings = 0.0
+        if before.error <= now.error:
+            doublings = math.inf
+        elif now.error > self.target:
+            doublings = math.log(now.error / self.target) / math.log(before.error / now.error)
+        return doublings > math.log2(2 * affordable / now.samples)
 
 
 def calibrate(
@@ -245,27 +280,55 @@ def calibrate(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Choose how to render for ``render.target_error``, from ``count`` windows of ``size``².
 
-    Returns the choice with its evidence, which is the same each time, and the seconds that each way
-    took, which are not: those of one core or of the GPU, a megapixel.
+    Returns the choice with its evidence, which is the same each time, and the seconds that each
+    method took, which are not. Seconds are those of one core, or of the GPU, for a megapixel.
     """
     target = render["target_error"]
     windows = maker.windows(size, count)
-    views = [view for view in maker.lightfield.views if view not in [w.view for w in windows]]
-    others = [replace(w, view=nearest_view(views, w.view) or w.view) for w in windows]
-    # Before all others: Cycles is set up for the parts of light.
-    pilot = maker.pilot()
-    kinds = [strata.classes(pilot, window)[0] for window in (*windows, *others)]
-    known = Bench(maker, windows, PROBE_SEED, target)
-    search = Search(known, target, render.get("most_samples"), render.get("denoise"))
+    others = held_out_windows(maker, windows)
+    # The pilot renders first, because it sets up Cycles for the parts of light.
+    classes = strata.classes_of(maker, [*windows, *others])
+    bench = Bench(maker, windows, PROBE_SEED, target)
+    search = Search(bench.measure, target, render.get("most_samples"), render.get("denoise"))
     choice = search.choose()
-    # By chance, what is far below the references' own error is measured as nothing, or less.
-    equal = search.plain_samples(max(choice.error, known.own_error))
-    _, known_errors = known.measure(choice.way, choice.settings)
-    held_out = Bench(maker, others, HELD_OUT_SEED, target, known.references[0].exposure)
-    _, errors = held_out.measure(choice.way, choice.settings)
-    error = fmean(errors)
+    held_out = Bench(maker, others, HELD_OUT_SEED, target, bench.experiment.references[0].exposure)
+    for each in (bench, held_out):
+        each.measure(choice.method)
+    # By chance, an error far below the references' own is measured as nothing, or less.
+    plain_samples = search.plain_samples(max(choice.error, bench.own_error))
     record = {
-        "target_error": target,
+        **choice_evidence(search, choice, bench),
+        **confirmation(held_out.errors(choice.method), target),
+        "plain_samples_at_equal_error": plain_samples,
+        "times_fewer_samples": plain_samples / choice.cost,
+        "denoising_samples": DENOISING_SAMPLES,
+        "size": size,
+        "probes": [window.name for window in windows],
+        "held_out": [
+            {"probe": window.name, "error": error}
+            for window, error in zip(others, held_out.errors(choice.method), strict=True)
+        ],
+        "strata": errors_by_stratum([bench, held_out], classes, choice.method),
+        "references": {
+            "samples": [each.reference_seeds * REFERENCE_SAMPLES for each in (bench, held_out)],
+            "own_error": [each.own_error for each in (bench, held_out)],
+        },
+        "candidates": [entry.evidence() for entry in search.measured],
+    }
+    return record, seconds_taken(search, choice, plain_samples)
+
+
+def held_out_windows(maker: Trials, windows: Sequence[Window]) -> list[Window]:
+    """Return each window's place in the nearest view that has no window itself, if there is one."""
+    views_of_windows = [window.view for window in windows]
+    views = [view for view in maker.lightfield.views if view not in views_of_windows]
+    return [replace(w, view=nearest_view(views, w.view) or w.view) for w in windows]
+
+
+def choice_evidence(search: Search, choice: Candidate, bench: Bench) -> dict[str, Any]:
+    """Return the choice, and the errors that it has on the bench that it was chosen by."""
+    return {
+        "target_error": search.target,
         "metric": "relative mean squared error of all but the worst thousandth of pixels",
         "choice": choice.settings,
         "way": choice.way,
@@ -274,30 +337,26 @@ def calibrate(
         "probe_error": choice.error,
         "probe_error_of_all_pixels": choice.whole_error,
         "most_error_of_all_pixels": search.most_whole_error,
-        "probe_standard_error": standard_error(known_errors),
+        "probe_standard_error": standard_error(bench.errors(choice.method)),
+    }
+
+
+def confirmation(errors: Sequence[float], target: float) -> dict[str, Any]:
+    """Return whether the errors of held-out windows confirm the choice."""
+    error = fmean(errors)
+    return {
         "held_out_error": error,
         "held_out_ratio": error / target,
         "held_out_standard_error": standard_error(errors),
         "confirmed": abs(error / target - 1) <= CONFIRMED,
-        "plain_samples_at_equal_error": equal,
-        "times_fewer_samples": equal / choice.cost,
-        "denoising_samples": DENOISING_SAMPLES,
-        "size": size,
-        "probes": [window.name for window in windows],
-        "held_out": [
-            {"probe": window.name, "error": value}
-            for window, value in zip(others, errors, strict=True)
-        ],
-        "strata": by_stratum([known, held_out], kinds, choice.settings),
-        "references": {
-            "samples": [bench.seeds * REFERENCE_SAMPLES for bench in (known, held_out)],
-            "own_error": [bench.own_error for bench in (known, held_out)],
-        },
-        "candidates": [entry.evidence() for entry in search.measured],
     }
+
+
+def seconds_taken(search: Search, choice: Candidate, plain_samples: float) -> dict[str, Any]:
+    """Return the seconds of the choice, of all candidates, and of ``plain_samples`` plain ones."""
     plain = max((e for e in search.measured if e.way == "plain"), key=lambda e: e.samples)
-    plain_seconds = plain.seconds * equal / plain.samples
-    seconds = {
+    plain_seconds = plain.seconds * plain_samples / plain.samples
+    return {
         "choice": choice.seconds,
         "plain_at_equal_error": plain_seconds,
         "times_faster": plain_seconds / choice.seconds,
@@ -306,29 +365,28 @@ def calibrate(
             for entry in search.measured
         ],
     }
-    return record, seconds
 
 
-def by_stratum(
-    benches: Sequence[Bench], kinds: Sequence[strata.Classes], settings: Mapping[str, Any]
+def errors_by_stratum(
+    benches: Sequence[Bench], classes: Sequence[strata.Classes], method: Method
 ) -> dict[str, dict[str, float]]:
-    """Return the error that a choice has in each stratum of all windows, and its part of them."""
-    places = [(bench, number) for bench in benches for number in range(len(bench.windows))]
-    total = sum(int((kind != strata.NONE).sum()) for kind in kinds)
-    found = {}
-    for number, name in enumerate(strata.STRATA):
-        errors, pixels = [], []
-        for (bench, place), kind in zip(places, kinds, strict=True):
-            reference = replace(bench.references[place], part=kind == number)
-            count = int(reference.counted.sum())
-            if count >= strata.FEWEST_PIXELS:
-                render = bench.maker.render(bench.windows[place], bench.seed, settings)
-                errors.append(metrics.relative_mse(render.colour, reference))
-                pixels.append(count)
-        if errors:
-            error = fmean(errors, weights=pixels)
-            found[name] = {"area": sum(pixels) / total, "error": error}
-    return found
+    """Return the error of a measured method in each stratum of all windows, and the stratum's area.
+
+    ``classes`` are those of the benches' windows, one bench after the other. The area is the part
+    of the windows' pixels, by which the windows' errors are weighted, too.
+    """
+    references = [reference for bench in benches for reference in bench.experiment.references]
+    trials = [trial for bench in benches for (trial,) in bench.experiment.renders(method)]
+    total = sum(int((kinds != strata.NONE).sum()) for kinds in classes)
+    errors = {}
+    for stratum, parts in split_by_stratum(references, classes).items():
+        pixels = [int(reference.counted.sum()) for reference in parts.values()]
+        by_window = [
+            metrics.relative_mse(trials[number].colour, reference)
+            for number, reference in parts.items()
+        ]
+        errors[stratum] = {"area": sum(pixels) / total, "error": fmean(by_window, weights=pixels)}
+    return errors
 
 
 def effort_for(target: float, points: Sequence[tuple[float, float]]) -> float:
@@ -348,9 +406,9 @@ def effort_for(target: float, points: Sequence[tuple[float, float]]) -> float:
     return float(x0 * (x1 / x0) ** part)
 
 
-def _counted(effort: float) -> dict[str, Any]:
+def _with_samples(effort: float) -> dict[str, Any]:
     return {"samples": math.ceil(effort)}
 
 
-def _say(text: str) -> None:
+def _print_progress(text: str) -> None:
     print(f"calibration: {text}", file=sys.stderr, flush=True)

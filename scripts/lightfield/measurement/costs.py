@@ -1,10 +1,11 @@
 """Add up what a dataset has cost, and what the full one would: report/costs.json.
 
 Times are seconds, memory and sizes bytes, energy kWh. Wall and processor time of the views come
-from the journals of their shards, which survive kills: all the time that was really spent, also on
-views that were lost or made again. Of any other job the time and memory of its last run count, as
-Snakemake measured them; it looks every half second and after a while every 30 s, so that the
-processor time may be short by as much. A job too short to be looked at counts as busy throughout.
+from the journals of their shards. Journals survive kills, so they hold all the time that was spent,
+also on views that were lost or rendered again. Any other job counts with the time and memory of its
+last run, as Snakemake measured them. Snakemake looks every half second, and after a while every
+30 s, so processor time may be short by as much. A job that ends before the first look counts as
+busy throughout.
 
     {
       "stages": [{"stage", "jobs", "wall_seconds", "cpu_seconds", "peak_memory_bytes", "bytes"}],
@@ -12,9 +13,9 @@ processor time may be short by as much. A job too short to be looked at counts a
                   "path_tracing_seconds",   Cycles' own render time of all its renderings
                   "overhead_seconds",       the rest of wall_seconds
                   "views_rendered",         renderings, repeated ones counted
-                  "runs",                   processes that worked on it; killed_runs of them
-                  "killed_runs",            did not end by themselves
-                  "repeated_seconds"}],     spent again: views made again and further start-ups
+                  "runs",                   processes that worked on it
+                  "killed_runs",            those of them that did not end by themselves
+                  "repeated_seconds"}],     spent again: views rendered again, later start-ups
       "path_tracing_seconds", "overhead_seconds", "repeated_seconds",   of all shards
       "device", "cores", "watts", "price_per_kwh", "currency",
       "energy_kwh", "price", "attribution",
@@ -23,20 +24,20 @@ processor time may be short by as much. A job too short to be looked at counts a
                         "gigabytes", "basis"}
     }
 
-Energy is the machine's wattage, times the wall time, times the part of its cores that was busy;
-that is the processor time divided by the number of cores. While it renders on a graphics card the
-whole machine counts. Waiting and idle time are nobody's.
+Energy is the machine's wattage, times the wall time, times the busy part of its cores. The busy
+part is processor time over wall time and number of cores. While a graphics card renders, the whole
+machine counts. Waiting and idle time count for nobody.
 
-The extrapolation multiplies each view's path-tracing time by the ratio of pixels and of samples,
-denoising counted in samples as `lightfield.measurement.sampling` does, and takes the mean. That
-the time follows them in proportion is assumed. Its uncertainty is the standard error of that mean
-over the views, with the correction for a finite number of views, sqrt(1 - n / N); null if there is
-only one view. What else each view needs (writing, reprojection, validation) is taken in proportion
-to views and pixels, everything else as it was. The first view of each process, which prepares the
-scene for Cycles, tells of neither. Gigabytes are those of the rendered views, in proportion to
-their pixels: an upper estimate, because larger views compress better. "device" and "extrapolation"
-are null if no journal tells of a rendered view, as when the working folder was deleted and the
-views were kept."""
+The extrapolation multiplies each view's path-tracing time by the ratio of pixels and the ratio of
+samples, and takes the mean. It assumes that the time is proportional to both. Denoising counts as
+samples (see `lightfield.measurement.sampling`). The uncertainty is the standard error of that mean
+over the views, with the correction for a finite number of views, sqrt(1 - n / N); it is null for a
+single view. The rest of each view's time (writing, reprojection, validation) is taken in proportion
+to views and pixels, and everything else as it was. The first view of each process prepares the
+scene for Cycles, so it counts for neither. Gigabytes are those of the rendered views, in proportion
+to their pixels: an upper estimate, because larger views compress better. "device" and
+"extrapolation" are null if no journal has a rendered view, for example if the working folder was
+deleted and the views were kept."""
 
 import csv
 import math
@@ -52,28 +53,29 @@ from pydantic import Field
 
 from lightfield.core.settings import Settings
 from lightfield.dataset import journal
-from lightfield.dataset.config import AtLeastOne
+from lightfield.dataset.config import AtLeastOne, Energy
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, PASSES
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 from lightfield.measurement.sampling import DENOISING_SAMPLES, cost_in_samples, standard_error
 
-# The stages that every dataset has, in the order of the work; others come between.
-FIRST_STAGES, LAST_STAGES = ("scene", "cameras", "render"), ("export", "validate", "report")
-# What a stage made, where that is not the folder of its name.
+# The stages that every dataset has, in the order of the work. Other stages come between.
+FIRST_STAGES = ("scene", "cameras", "render")
+LAST_STAGES = ("export", "validate", "report")
+# The files and folders of a stage whose folder does not have its name.
 MADE = {
     "cameras": ("lightfield.json",),
     "render": ("exr", *PASSES),
     "export": ("transforms.json",),
     "validate": ("validation.json",),
 }
-# Of the report, what differs from build to build is not counted.
+# Files of the report that differ from build to build do not count.
 NOT_COUNTED = ("costs.json", "index.html")
 
 
 @dataclass
 class Stage:
-    """What the jobs of one stage took together; the peak is that of the largest."""
+    """What the jobs of one stage took together; the peak memory is that of the largest job."""
 
     jobs: int = 0
     wall_seconds: float = 0.0
@@ -82,7 +84,7 @@ class Stage:
 
 
 class FullSize(Settings):
-    """What a dataset has at full size: samples and denoise, unless given, of the one at hand."""
+    """A dataset at full size; without ``samples`` or ``denoise``, those of the one at hand."""
 
     views: AtLeastOne
     resolution: list[AtLeastOne] = Field(min_length=2, max_length=2)
@@ -90,9 +92,17 @@ class FullSize(Settings):
     denoise: bool | None = None
 
 
+class CostSettings(Settings):
+    """The settings of scripts/costs.py: the key `energy` of config.yaml, and the full dataset."""
+
+    energy: Energy
+    full: FullSize
+    reprojections: list[str] = Field([])
+
+
 @dataclass(frozen=True)
 class Tariff:
-    """The wattage of a machine with so many cores, and what a kWh costs."""
+    """The wattage of a machine, the number of its cores, and the price of a kWh."""
 
     watts: float
     price_per_kwh: float
@@ -102,15 +112,15 @@ class Tariff:
     @classmethod
     def read(cls, settings: Mapping[str, Any]) -> "Tariff":
         """Take config.yaml's `energy`."""
-        here = {"cores": os.cpu_count() or 1} if settings["cores"] == "auto" else {}
-        return cls(**{**settings, **here})
+        cores = os.cpu_count() or 1 if settings["cores"] == "auto" else settings["cores"]
+        return cls(**{**settings, "cores": cores})
 
     def kwh(self, machine_seconds: float) -> float:
-        """Return the energy of so many seconds of the whole machine."""
+        """Return the energy that the whole machine takes in ``machine_seconds``."""
         return self.watts * machine_seconds / 3.6e6
 
     def price(self, kwh: float) -> float:
-        """Return what so much energy costs."""
+        """Return what ``kwh`` of energy cost."""
         return kwh * self.price_per_kwh
 
 
@@ -146,17 +156,18 @@ def _rounded(figures: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, Stage]:
-    """Add up the jobs' TSVs by stage: the folder that a TSV lies in, or else its own name.
+    """Add up the jobs' TSVs by stage: the name of a TSV's folder, or else its own name.
 
-    The views' own are left out: they tell only of a shard's last run.
+    The TSVs of shards are left out, because they tell only of a shard's last run. A TSV that cannot
+    be read is left out with a warning.
     """
     stages: dict[str, Stage] = {}
-    found = [("scene", path) for folder in scene for path in folder.glob("*.tsv")]
-    found += [
+    tables = [("scene", path) for folder in scene for path in folder.glob("*.tsv")]
+    tables += [
         (path.relative_to(dataset).parts[0].removesuffix(".tsv"), path)
         for path in dataset.rglob("*.tsv")
     ]
-    for name, path in found:
+    for name, path in tables:
         if name == "render":
             continue
         try:
@@ -183,7 +194,7 @@ def job_times(path: Path) -> tuple[float, float, int]:
 
 
 def stage_bytes(stage: str, dataset: Path, blend: Path | None) -> int:
-    """Return the size of what a stage left behind, 0 if that is no part of the dataset."""
+    """Return the size of a stage's files in the dataset; 0 if it has none there."""
     if stage == "scene":
         return blend.stat().st_size if blend else 0
     paths = [dataset / name for name in MADE.get(stage, (stage,))]
@@ -195,24 +206,24 @@ def stage_bytes(stage: str, dataset: Path, blend: Path | None) -> int:
 
 @dataclass(frozen=True)
 class Rendering:
-    """The time of one view: path tracing and the rest, and when it was finished.
+    """The time of one view: path tracing, the rest, and when it was finished.
 
-    In seconds of one core; of the whole machine where a graphics card renders.
+    Times are seconds of one core, or of the whole machine if a graphics card renders.
     """
 
     view: str
     finished: float
     path_tracing: float
     rest: float
-    # A process's first view pays for the scene's acceleration structures.
+    # Whether it is its process's first view, which pays for the scene's acceleration structures.
     first: bool
 
 
 def renderings(run: journal.Run) -> Iterator[Rendering]:
     """Split the time of each view that a process rendered.
 
-    While Cycles path-traces all the threads are busy, and one is for the rest. In these parts the
-    view's processor time is divided, because wall time holds what other programs took.
+    While Cycles traces paths, all threads are busy; the rest takes one thread. The view's processor
+    time is divided in these proportions, because wall time includes the work of other programs.
     """
     for index, view in enumerate(run.views):
         traced = view["render_seconds"]
@@ -241,36 +252,21 @@ def costs(
 ) -> dict[str, Any]:
     """Return what costs.json says of the dataset in the folder ``dataset``.
 
-    ``journals`` is the folder of its journals, ``benchmarks`` and ``scene_benchmarks`` are those of
-    its jobs' and its scene's TSVs. ``full`` has the ``views``, ``resolution``, ``samples`` and
-    ``denoise`` of the full dataset, null for those of this one.
+    ``journals`` is the folder of its journals. ``benchmarks`` and ``scene_benchmarks`` are the
+    folders of its jobs' and its scene's TSVs. ``full`` has the ``views``, ``resolution``,
+    ``samples`` and ``denoise`` of the full dataset, null for those of this one.
     """
     by_shard = {
         path.name.removesuffix(JOURNAL_SUFFIX): journal.read(path)
         for path in sorted(journals.glob(journal.JOURNALS))
     }
-    runs = [run for part in by_shard.values() for run in part]
-    shards = [shard_costs(name, part) for name, part in by_shard.items()]
+    runs = [run for runs_of_shard in by_shard.values() for run in runs_of_shard]
+    shards = [shard_costs(name, runs_of_shard) for name, runs_of_shard in by_shard.items()]
     shards.sort(key=lambda shard: [int(number) for number in shard["shard"].split("-")])
-    stages = job_stages(benchmarks, scene_benchmarks)
-    stages["render"] = Stage(
-        jobs=len(shards),
-        wall_seconds=sum(shard["wall_seconds"] for shard in shards),
-        cpu_seconds=sum(shard["cpu_seconds"] for shard in shards),
-        peak_memory_bytes=max((shard["peak_memory_bytes"] for shard in shards), default=0),
-    )
-    order = [*FIRST_STAGES, *sorted(stages.keys() - {*FIRST_STAGES, *LAST_STAGES}), *LAST_STAGES]
-    stages = {name: stages[name] for name in order if name in stages}
+    stages = in_order(job_stages(benchmarks, scene_benchmarks) | {"render": render_stage(shards)})
     sizes = {name: stage_bytes(name, dataset, blend) for name in stages}
     device = next((run.start["device"] for run in reversed(runs) if run.views), None)
-    # A shard's part of the machine: its cores, or all of it while its graphics card works.
-    machine_seconds = sum(
-        stage.cpu_seconds / tariff.cores for name, stage in stages.items() if name != "render"
-    ) + sum(
-        run.wall_seconds if run.views and not on_processor(run) else run.cpu_seconds / tariff.cores
-        for run in runs
-    )
-    kwh = tariff.kwh(machine_seconds)
+    kwh = tariff.kwh(machine_seconds(stages, runs, tariff.cores))
     totals = ("path_tracing_seconds", "overhead_seconds", "repeated_seconds")
     return {
         "stages": [
@@ -303,6 +299,67 @@ def costs(
     }
 
 
+def render_stage(shards: Sequence[Mapping[str, Any]]) -> Stage:
+    """Return what the jobs of all shards took together."""
+    return Stage(
+        jobs=len(shards),
+        wall_seconds=sum(shard["wall_seconds"] for shard in shards),
+        cpu_seconds=sum(shard["cpu_seconds"] for shard in shards),
+        peak_memory_bytes=max((shard["peak_memory_bytes"] for shard in shards), default=0),
+    )
+
+
+def in_order(stages: Mapping[str, Stage]) -> dict[str, Stage]:
+    """Return the stages in the order of the work."""
+    between = sorted(stages.keys() - {*FIRST_STAGES, *LAST_STAGES})
+    names = [*FIRST_STAGES, *between, *LAST_STAGES]
+    return {name: stages[name] for name in names if name in stages}
+
+
+def machine_seconds(stages: Mapping[str, Stage], runs: Sequence[journal.Run], cores: int) -> float:
+    """Return the seconds of the whole machine that the work took.
+
+    Work on processors takes its part of the ``cores``. A run on a graphics card takes the machine.
+    """
+    other_stages = sum(
+        stage.cpu_seconds / cores for name, stage in stages.items() if name != "render"
+    )
+    rendering = sum(
+        run.wall_seconds if run.views and not on_processor(run) else run.cpu_seconds / cores
+        for run in runs
+    )
+    return other_stages + rendering
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How much larger the full dataset is: ``pixels`` and ``effort`` a view are factors.
+
+    The effort is that of a pixel, in samples, denoising counted in samples.
+    """
+
+    views: int
+    samples: Any
+    pixels: float
+    effort: float
+
+    @classmethod
+    def of(cls, full: Mapping[str, Any], lightfield: LightField) -> "Scale":
+        """Return the scale of a full dataset over the one at hand."""
+        render = lightfield.render
+        lens = lightfield.lens
+        samples = full["samples"] or render["samples"]
+        # Where a target error decides, both are unknown until then.
+        denoise = render["denoise"] if full["denoise"] is None else full["denoise"]
+        effort = cost_in_samples(samples, denoise)
+        return cls(
+            views=full["views"],
+            samples=samples,
+            pixels=math.prod(full["resolution"]) / (lens.width * lens.height),
+            effort=effort / cost_in_samples(render["samples"], render["denoise"]),
+        )
+
+
 def extrapolation(
     runs: Sequence[journal.Run],
     stages: Mapping[str, Stage],
@@ -312,66 +369,74 @@ def extrapolation(
     full: Mapping[str, Any],
     reprojections: Iterable[str],
 ) -> dict[str, Any] | None:
-    """Return what the full dataset would cost, from the views of this one."""
+    """Return what the full dataset would cost, from the views of this one; None without views."""
     every = [rendering for run in runs for rendering in renderings(run)]
     if not every:
         return None
-    kept = {one.view: one for one in sorted(every, key=lambda one: one.finished)}.values()
-    # First views tell little of the others, and count only where there are none.
-    latest = [rendering for rendering in kept if not rendering.first] or list(kept)
-    here = len(lightfield.views)
-    render = lightfield.render
-    samples, denoise = render["samples"], render["denoise"]
-    wanted = full["samples"] or samples
-    # Where a target error decides, both are unknown until then.
-    denoise_wanted = denoise if full["denoise"] is None else full["denoise"]
-    effort = cost_in_samples(wanted, denoise_wanted) / cost_in_samples(samples, denoise)
-    lens = lightfield.lens
-    pixels = math.prod(full["resolution"]) / (lens.width * lens.height)
-    count = full["views"]
-
-    times = [view.path_tracing * pixels * effort for view in latest]
+    latest = latest_renderings(every)
+    scale = Scale.of(full, lightfield)
+    times = [view.path_tracing * scale.pixels * scale.effort for view in latest]
     error = None
     if len(times) > 1:
-        error = count * standard_error(times) * math.sqrt(max(0.0, 1 - len(times) / count))
-    # Processor time beside a graphics card's is a part of the machine's.
-    processor = all(on_processor(run) for run in runs if run.views)
-    part = 1 if processor else 1 / tariff.cores
-    growing = {"validate", FLOW.name, *reprojections}
-    each_view = mean(view.rest for view in latest) + part / here * sum(
-        stage.cpu_seconds for name, stage in stages.items() if name in growing
+        missing_part = max(0.0, 1 - len(times) / scale.views)
+        error = scale.views * standard_error(times) * math.sqrt(missing_part)
+    by_processor = all(on_processor(run) for run in runs if run.views)
+    # Beside a graphics card, a core's time is only a part of the machine's.
+    part = 1 if by_processor else 1 / tariff.cores
+    growing_stages = {"validate", FLOW.name, *reprojections}
+    each_view = mean(view.rest for view in latest) + part / len(lightfield.views) * sum(
+        stage.cpu_seconds for name, stage in stages.items() if name in growing_stages
     )
     once = sum(rendering.rest for rendering in every if rendering.first) + part * (
         sum(run.start.get("start_up_cpu_seconds", 0.0) for run in runs)
-        + sum(s.cpu_seconds for name, s in stages.items() if name not in {"render", *growing})
+        + sum(
+            s.cpu_seconds for name, s in stages.items() if name not in {"render", *growing_stages}
+        )
     )
-    seconds = count * (mean(times) + each_view * pixels) + once
-    machine = seconds / tariff.cores if processor else seconds
+    seconds = scale.views * (mean(times) + each_view * scale.pixels) + once
+    machine = seconds / tariff.cores if by_processor else seconds
     uncertainty = None if error is None else tariff.kwh(error * machine / seconds)
     return {
-        "views": count,
+        "views": scale.views,
         "resolution": full["resolution"],
-        "samples": wanted,
+        "samples": scale.samples,
         "core_hours": seconds / 3600,
         "core_hours_uncertainty": None if error is None else error / 3600,
         "energy_kwh": tariff.kwh(machine),
         "energy_kwh_uncertainty": uncertainty,
         "price": tariff.price(tariff.kwh(machine)),
         "price_uncertainty": None if uncertainty is None else tariff.price(uncertainty),
-        "gigabytes": view_bytes / here * count * pixels / 1e9,
-        "basis": (
-            f"path tracing of {len(times)} views: {lens.width} × {lens.height} pixels, "
-            f"{samples} samples"
-            + (f", and denoising, which counts as {DENOISING_SAMPLES}" if denoise else "")
-            + "; in proportion to pixels and samples; on "
-            + ("the processor" if processor else "a graphics card: hours are the machine's")
-            + "; all else as measured, the part that every view needs in proportion to views and "
-            "pixels"
-            + (
-                f"; a full view is {pixels * effort:.2g} times the path tracing of one here, "
-                "and the farther from 1, the less certain"
-                if pixels * effort != 1
-                else ""
-            )
-        ),
+        "gigabytes": view_bytes / len(lightfield.views) * scale.views * scale.pixels / 1e9,
+        "basis": basis(len(times), lightfield, scale, by_processor),
     }
+
+
+def latest_renderings(every: Sequence[Rendering]) -> list[Rendering]:
+    """Return the latest rendering of each view, without the first views of processes.
+
+    First views tell little of the others. They count only if there are no others.
+    """
+    by_view = {r.view: r for r in sorted(every, key=lambda rendering: rendering.finished)}
+    latest = list(by_view.values())
+    return [rendering for rendering in latest if not rendering.first] or latest
+
+
+def basis(count: int, lightfield: LightField, scale: Scale, by_processor: bool) -> str:
+    """Say what an extrapolation from ``count`` views follows from, and how far it reaches."""
+    lens = lightfield.lens
+    render = lightfield.render
+    denoising = f", and denoising, which counts as {DENOISING_SAMPLES}" if render["denoise"] else ""
+    device = "the processor" if by_processor else "a graphics card: hours are the machine's"
+    text = (
+        f"path tracing of {count} views: {lens.width} × {lens.height} pixels, "
+        f"{render['samples']} samples{denoising}; in proportion to pixels and samples; "
+        f"on {device}; all else as measured, the part that every view needs in proportion to "
+        "views and pixels"
+    )
+    factor = scale.pixels * scale.effort
+    if factor != 1:
+        text += (
+            f"; a full view is {factor:.2g} times the path tracing of one here, "
+            "and the farther from 1, the less certain"
+        )
+    return text

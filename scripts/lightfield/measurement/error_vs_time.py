@@ -1,45 +1,55 @@
-"""The error of renders against their time: sampling plain, adaptive, guided, denoised.
+"""The error of renders against their time: plain, adaptive, guided and denoised sampling.
 
-Windows of the dataset's views are rendered in every way and compared with references of other seeds
-(`lightfield.measurement.metrics` says how). What is rendered is kept with its time: killed and
-started again, this goes on where it was. The time is Cycles' own for rendering, denoising included,
-of one render the median over its seeds; it is right only where nothing else runs on the same core.
+An `Experiment` renders windows of the dataset's views with every method. A seed's time is Cycles'
+own for rendering, denoising included; a window counts with the median of its seeds. The times are
+right only if nothing else runs on the same core.
 
-The slope of a method is that of its error over its time, both in logarithms. Plain path tracing's
-is −1 over samples, whether indirect light is clamped or not: samples are clamped, not pixels. Two
-things bend it. Where light is smooth, Cycles' Sobol points converge faster than independent ones
-would; and where paths are rare and bright, leaving out the worst thousandth of pixels hides more of
-them at few samples than at many. So the slope of all pixels is told too, which is −1 there, with
-larger errors. Adaptive sampling and denoising are biased, so theirs are flatter.
+The slope of a method is the slope of its error over its time, both in logarithms. Plain path
+tracing has −1 over samples, with and without clamped indirect light, because Cycles clamps samples,
+not pixels. Two things bend the line. In smooth light, Cycles' Sobol points converge faster than
+independent points. In rare bright light, leaving out the worst thousandth of pixels hides more
+light at few samples than at many. There the slope of all pixels, which is reported too, stays at
+−1, with a larger standard error. Adaptive sampling and denoising are biased: their slopes are
+flatter.
 """
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from statistics import fmean, median
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lightfield.core.files import write_csv, write_json, write_text
-from lightfield.core.progress import Progress
 from lightfield.imaging import plots
 from lightfield.measurement import metrics, strata
+from lightfield.measurement.experiment import (
+    WHOLE_VIEWS,
+    Experiment,
+    Method,
+    Renders,
+    mean_own_error,
+    over_views,
+)
+from lightfield.measurement.sampling import DENOISED, standard_error
 from lightfield.measurement.sampling import PLAIN as PLAIN_SAMPLING
-from lightfield.measurement.sampling import standard_error
 from lightfield.measurement.summaries import strata_table
-from lightfield.measurement.trials import Trial, Trials, Window, both_see, nearest_view
+from lightfield.measurement.trials import Trial, Trials, both_see, nearest_view
 
-PLAIN, ADAPTIVE, DENOISED = "plain", "adaptive", "denoised"
-BOTH, GUIDED, OWN = "adaptive + denoised", "path guiding", "this scene's settings"
+PLAIN = "plain"
+ADAPTIVE = "adaptive"
+BOTH = "adaptive + denoised"
+GUIDED = "path guiding"
+OWN = "this scene's settings"
 
 # Above 0.2, the fewest samples that adaptive sampling takes decide.
 THRESHOLDS = (0.2, 0.1, 0.05, 0.02, 0.01)
 
-# A reference's samples are split among so many seeds, whose differences tell its own error.
-REFERENCE_SEEDS = 8
-
-# Of a point's figures, those that are means over its renders' errors.
+# The figures of a point that are means over the errors of its renders.
 COMPARED = (
     "relative_mse",
     "relative_mse_whole",
@@ -50,28 +60,26 @@ COMPARED = (
     "flip",
 )
 
-# Of a point's figures, the columns of its table.
+# The figures of a point that have a column in its table.
 FIGURES = (
     *("samples", "seconds", "relative_mse", "relative_mse_whole", "bias", "variance"),
     *("mse_seconds", "relative_mse_unexposed", "mrse", "psnr", "ssim", "flip"),
 )
 
-# What says which way a point is of.
-WAY = ("method", "settings")
-
-# The renders of one way, by window and seed.
-Renders = Sequence[Sequence[Trial]]
+# The keys of a point that tell its method; the rest are figures.
+METHOD_KEYS = ("method", "settings")
 
 
 @dataclass(frozen=True)
 class Point:
-    """One way to render, measured: means over windows and seeds.
+    """What one method gives: means over windows and seeds.
 
-    ``samples`` is the mean number that a pixel took; ``seconds`` are of one core, or of the GPU, a
-    megapixel; ``standard_error`` is that of ``relative_mse``, over seeds. ``resolved``
-    says whether the error is above the references' own, below which nothing is drawn or fitted.
-    ``bias`` (squared) and ``variance`` add up to ``relative_mse_whole``; ``mse_seconds`` is that
-    times ``seconds``, which is the same for any number of samples as long as nothing is biased.
+    ``samples`` is the mean number of samples that a pixel took. ``seconds`` are those of one core,
+    or of the GPU, for a megapixel. ``standard_error`` is that of ``relative_mse`` over seeds.
+    ``resolved`` says whether the error is above the references' own error; points below it are
+    neither drawn nor fitted. ``bias`` (squared) and ``variance`` add up to ``relative_mse_whole``.
+    ``mse_seconds`` is ``relative_mse_whole`` times ``seconds``: without bias, it is the same for
+    any number of samples.
     """
 
     method: str
@@ -93,7 +101,7 @@ class Point:
     depth_error: float | None
 
     def figures(self) -> dict[str, Any]:
-        """Return all figures as JSON can have them: no psnr of what is equal to its reference."""
+        """Return all figures for JSON, with null for the infinite psnr of an exact render."""
         return {**asdict(self), "psnr": self.psnr if math.isfinite(self.psnr) else None}
 
 
@@ -108,332 +116,330 @@ def measure(
     seeds: int,
     name: str,
 ) -> dict[str, Any]:
-    """Measure every way at so many ``windows`` of ``size``² pixels of each stratum.
+    """Measure every method on ``windows`` windows of ``size``² pixels of each stratum.
 
-    And at that of the first one's neighbour. Errors of whole views are those of the strata,
-    weighted by their parts of the views. ``render`` is the scene's own. Sample counts are 1 to
-    2^``octaves``, each rendered with ``seeds`` seeds; ``name`` is for the progress that is printed.
+    One more window is that of the first one's neighbouring view. ``render`` is the scene's own
+    block. Sample counts are 1 to 2^``octaves``, each rendered with ``seeds`` seeds. Errors of whole
+    views are the mean of the strata's, weighted by their areas. ``name`` starts the progress lines.
     """
     chosen, areas = strata.choose(maker, size, windows)
-    near = nearest_view(maker.lightfield.views, chosen[0].view)
-    if near:
-        chosen.insert(1, replace(chosen[0], view=near))
-    references, parts = referenced(maker, chosen, areas, reference_samples, name)
-    own = weighted({s: own_error(list(places.values())) for s, places in parts.items()}, areas)
-
-    on_cpu = maker.render(chosen[0], 1, {"samples": 1}).device == "CPU"
-    ways = all_ways(render, octaves, guiding=on_cpu)
-    progress = Progress(len(ways) * len(chosen) * seeds, f"{name}: trials", "renders")
-    points: list[Point] = []
-    by_stratum: dict[str, list[Point]] = {stratum: [] for stratum in parts}
-    pairs = []
-    for method, settings in ways:
-        renders = []
-        for window in chosen:
-            renders.append([maker.render(window, 1 + seed, settings) for seed in range(seeds)])
-            progress.done(seeds)
-        for stratum, places in parts.items():
-            inside = [renders[index] for index in places]
-            by_stratum[stratum].append(compared(method, settings, inside, list(places.values())))
-        points.append(together({s: found[-1] for s, found in by_stratum.items()}, areas, own))
-        if near and references[0].depth is not None:
-            apart = disagreement(maker, chosen, references, renders)
-            pairs.append({"method": method, "settings": settings, **apart})
+    neighbour = nearest_view(maker.lightfield.views, chosen[0].view)
+    if neighbour:
+        chosen.insert(1, replace(chosen[0], view=neighbour))
+    experiment = Experiment.stratified(maker, chosen, areas, reference_samples, name)
+    on_cpu = experiment.device == "CPU"
+    methods = all_methods(render, octaves, guiding=on_cpu)
+    experiment.run(methods, range(1, 1 + seeds), f"{name}: trials")
+    points = {
+        stratum: [
+            measured_point(method, [experiment.renders(method)[n] for n in places], places.values())
+            for method in methods
+        ]
+        for stratum, places in experiment.strata.items()
+    }
     return {
         "measured_on": {
-            "probes": [window.name for window in chosen],
-            "size": size,
-            "resolution": [maker.lens.width, maker.lens.height],
+            **experiment.described(),
             "seeds": seeds,
             "reference_samples": reference_samples,
-            "device": "CPU" if on_cpu else "GPU",
+            "device": experiment.device,
             "path_guiding": "measured" if on_cpu else "Cycles has it only on processors",
         },
-        **evaluated(points, own),
+        **evaluated(points_of_whole_views(points, experiment), experiment.reference_error),
         "strata": {
             stratum: {
                 "area": areas[stratum],
                 "pixels": sum(int(place.counted.sum()) for place in places.values()),
-                **evaluated(by_stratum[stratum], own_error(list(places.values()))),
+                **evaluated(points[stratum], mean_own_error(places.values())),
             }
-            for stratum, places in parts.items()
+            for stratum, places in experiment.strata.items()
         },
-        "neighbouring_views": pairs,
+        "neighbouring_views": neighbour_disagreements(experiment, methods) if neighbour else [],
     }
 
 
-def all_ways(
-    render: Mapping[str, Any], octaves: int, guiding: bool
-) -> list[tuple[str, dict[str, Any]]]:
-    """Return (method, settings) of all that is measured; the scene's own settings come last."""
+def all_methods(render: Mapping[str, Any], octaves: int, guiding: bool) -> list[Method]:
+    """Return all methods that are measured. The scene's own settings come last."""
     counts = [2**octave for octave in range(octaves + 1)]
-    ways: list[tuple[str, dict[str, Any]]] = []
+    methods: list[Method] = []
     for denoise, by_count, by_threshold in ((False, PLAIN, ADAPTIVE), (True, DENOISED, BOTH)):
-        ways += [(by_count, {"samples": n, "denoise": denoise}) for n in counts]
-        ways += [
-            (by_threshold, {"samples": counts[-1], "adaptive_threshold": t, "denoise": denoise})
-            for t in THRESHOLDS
-        ]
+        methods += [Method(by_count, {"samples": n, "denoise": denoise}) for n in counts]
+        for threshold in THRESHOLDS:
+            settings = {"samples": counts[-1], "adaptive_threshold": threshold, "denoise": denoise}
+            methods.append(Method(by_threshold, settings))
     # Elsewhere guiding stays as the .blend has it, off unless an artist turned it on.
     if guiding:
-        ways += [(GUIDED, {"samples": n, "guiding": True}) for n in counts]
-    own = {key: render[key] for key in ("samples", "adaptive_threshold", "denoise")}
-    return [*ways, (OWN, own)]
+        methods += [Method(GUIDED, {"samples": n, "guiding": True}) for n in counts]
+    own_settings = {key: render[key] for key in ("samples", "adaptive_threshold", "denoise")}
+    return [*methods, Method(OWN, own_settings)]
 
 
-def compared(
-    method: str,
-    settings: Mapping[str, Any],
-    renders: Renders,
-    references: Sequence[metrics.Reference],
+def measured_point(
+    method: Method, renders: Renders, references: Collection[metrics.Reference]
 ) -> Point:
-    """Compare the renders of one way with the windows' references."""
+    """Compare a method's renders, by window and seed, with the windows' references."""
     errors = [
-        [metrics.compare(render.colour, render.depth, reference) for render in seeds]
-        for seeds, reference in zip(renders, references, strict=True)
+        [metrics.compare(trial.colour, trial.depth, reference) for trial in trials]
+        for trials, reference in zip(renders, references, strict=True)
     ]
-    flat = [error for seeds in errors for error in seeds]
-    mean = {name: fmean(getattr(error, name) for error in flat) for name in COMPARED}
+    all_errors = [error for of_window in errors for error in of_window]
+    means = {name: fmean(getattr(error, name) for error in all_errors) for name in COMPARED}
     parts = [
-        metrics.bias_and_variance([render.colour for render in seeds], reference)
-        for seeds, reference in zip(renders, references, strict=True)
+        metrics.bias_and_variance([trial.colour for trial in trials], reference)
+        for trials, reference in zip(renders, references, strict=True)
     ]
-    height, width = references[0].mask.shape
-    seconds = fmean(median(render.seconds for render in seeds) for seeds in renders)
-    seconds *= 1e6 / (width * height)
-    depths = [error.depth for error in flat if error.depth is not None]
+    pixels = renders[0][0].colour[..., 0].size
+    seconds = fmean(median(trial.seconds for trial in trials) for trials in renders)
+    seconds *= 1e6 / pixels
+    depths = [error.depth for error in all_errors if error.depth is not None]
     return Point(
-        method=method,
-        settings=settings,
-        samples=fmean(render.samples for seeds in renders for render in seeds),
+        method=method.name,
+        settings=method.settings,
+        samples=fmean(trial.samples for trials in renders for trial in trials),
         seconds=seconds,
-        **mean,
+        **means,
         bias=fmean(bias for bias, _ in parts),
         variance=fmean(variance for _, variance in parts),
-        mse_seconds=mean["relative_mse_whole"] * seconds,
+        mse_seconds=means["relative_mse_whole"] * seconds,
         standard_error=standard_error(
-            [fmean(error.relative_mse for error in seed) for seed in zip(*errors, strict=True)]
+            [
+                fmean(error.relative_mse for error in of_seed)
+                for of_seed in zip(*errors, strict=True)
+            ]
         ),
-        resolved=mean["relative_mse"] > own_error(references),
+        resolved=means["relative_mse"] > mean_own_error(references),
         depth_error=fmean(depths) if depths else None,
     )
 
 
-def referenced(
-    maker: Trials, windows: Sequence[Window], areas: Mapping[str, float], samples: int, name: str
-) -> tuple[list[metrics.Reference], dict[str, dict[int, metrics.Reference]]]:
-    """Return the windows' references, of so many ``samples``, and by stratum as `parted` does."""
-    # Before all others: Cycles is set up for the parts of light.
-    pilot = maker.pilot()
-    kinds = [strata.classes(pilot, window)[0] for window in windows]
-    progress = Progress(len(windows), f"{name}: references")
-    made = []
-    for window in windows:
-        made.append(maker.reference(window, REFERENCE_SEEDS, samples // REFERENCE_SEEDS))
-        progress.done()
-    references = metrics.exposed_alike(made)
-    return references, parted(references, kinds, areas)
+def points_of_whole_views(
+    points: Mapping[str, Sequence[Point]], experiment: Experiment
+) -> list[Point]:
+    """Return each method's point of whole views, from its points in the strata."""
+    return [
+        whole_views_point(
+            dict(zip(points, of_method, strict=True)),
+            experiment.areas,
+            experiment.reference_error,
+        )
+        for of_method in zip(*points.values(), strict=True)
+    ]
 
 
-def parted(
-    references: Sequence[metrics.Reference],
-    kinds: Sequence[strata.Classes],
-    areas: Mapping[str, float],
-) -> dict[str, dict[int, metrics.Reference]]:
-    """Return for each stratum the windows' references, by number, of which its pixels count."""
-    found = {}
-    for stratum in areas:
-        masks = [kind == strata.STRATA.index(stratum) for kind in kinds]
-        places = {
-            index: replace(reference, part=mask)
-            for index, (reference, mask) in enumerate(zip(references, masks, strict=True))
-            if (reference.mask & mask).sum() >= strata.FEWEST_PIXELS
-        }
-        if places:
-            found[stratum] = places
-    return found
+def whole_views_point(
+    points: Mapping[str, Point], areas: Mapping[str, float], reference_error: float
+) -> Point:
+    """Return a method's point of whole views: the strata's points, weighted by their areas.
 
-
-def weighted(values: Mapping[str, float], areas: Mapping[str, float]) -> float:
-    """Return the mean of the strata's values, by their parts of the whole views."""
-    return sum(areas[s] * value for s, value in values.items()) / sum(areas[s] for s in values)
-
-
-def together(points: Mapping[str, Point], areas: Mapping[str, float], own: float) -> Point:
-    """Return what one way gives in whole views, of its points in the strata.
-
-    ``own`` is the references' own error.
+    ``reference_error`` is the references' own error in whole views.
     """
     names = ("samples", "seconds", *COMPARED, "bias", "variance")
-    mean = {
-        name: weighted({s: getattr(point, name) for s, point in points.items()}, areas)
+    means = {
+        name: over_views({s: getattr(point, name) for s, point in points.items()}, areas)
         for name in names
     }
-    total = sum(areas[s] for s in points)
+    total = sum(areas[stratum] for stratum in points)
     errors = [areas[s] * point.standard_error / total for s, point in points.items()]
     depths = {s: p.depth_error for s, p in points.items() if p.depth_error is not None}
-    one = next(iter(points.values()))
+    first = next(iter(points.values()))
     return Point(
-        method=one.method,
-        settings=one.settings,
-        **mean,
-        mse_seconds=mean["relative_mse_whole"] * mean["seconds"],
+        method=first.method,
+        settings=first.settings,
+        **means,
+        mse_seconds=means["relative_mse_whole"] * means["seconds"],
         standard_error=math.hypot(*errors),
-        resolved=mean["relative_mse"] > own,
-        depth_error=weighted(depths, areas) if depths else None,
+        resolved=means["relative_mse"] > reference_error,
+        depth_error=over_views(depths, areas) if depths else None,
     )
 
 
-def own_error(references: Sequence[metrics.Reference]) -> float:
-    return fmean(reference.own_error for reference in references)
+def evaluated(points: Sequence[Point], reference_error: float) -> dict[str, Any]:
+    """Return what follows from the points: slopes, the Pareto front, and what each method saves.
 
-
-def evaluated(points: Sequence[Point], own: float) -> dict[str, Any]:
-    """Return what follows from the points: slopes, the Pareto front, and what each way saves.
-
-    ``own`` is the references' own error.
+    ``reference_error`` is the references' own error. Points below it are left out of all but
+    ``points`` and ``settings``.
     """
-    seen = [point for point in points if point.resolved]
+    resolved = [point for point in points if point.resolved]
     lines = {
-        method: fitted([point for point in seen if point.method == method])
+        method: fitted([point for point in resolved if point.method == method])
         for method in dict.fromkeys(point.method for point in points)
     }
-    plain, saved = lines[PLAIN], []
-    if plain:
-        saved = [
-            {
-                "method": point.method,
-                "settings": point.settings,
-                "relative_mse": point.relative_mse,
-                "times_faster": plain["over_time"].inverse(point.relative_mse) / point.seconds,
-                "times_fewer_samples": plain["over_samples"].inverse(point.relative_mse)
-                / point.samples,
-            }
-            for point in seen
-            if point.method != PLAIN
-        ]
-    front = metrics.pareto([p.seconds for p in seen], [p.relative_mse for p in seen])
+    front = metrics.pareto([p.seconds for p in resolved], [p.relative_mse for p in resolved])
     return {
-        "reference_error": own,
+        "reference_error": reference_error,
         "slopes": {
-            method: {name: asdict(line) for name, line in found.items()}
-            for method, found in lines.items()
-            if found
+            method: {name: asdict(line) for name, line in fits.items()}
+            for method, fits in lines.items()
+            if fits
         },
-        "methods": by_method(seen, 0.5),
-        "methods_at_most_samples": by_method(seen, 1),
-        "pareto_front": [seen[index].figures() for index in front],
-        "against_plain_at_equal_error": saved,
+        "methods": by_method(resolved, 0.5),
+        "methods_at_most_samples": by_method(resolved, 1),
+        "pareto_front": [resolved[index].figures() for index in front],
+        "against_plain_at_equal_error": savings(resolved, lines[PLAIN]),
         "settings": [point.figures() for point in points if point.method == OWN],
         "points": [point.figures() for point in points],
     }
 
 
+def savings(points: Sequence[Point], plain: Mapping[str, metrics.Line]) -> list[dict[str, Any]]:
+    """Return how many times less time and samples each point takes than plain path tracing.
+
+    ``plain`` has the lines of `fitted` of plain path tracing; without lines nothing is returned.
+    """
+    if not plain:
+        return []
+    return [
+        {
+            "method": point.method,
+            "settings": point.settings,
+            "relative_mse": point.relative_mse,
+            "times_faster": plain["over_time"].inverse(point.relative_mse) / point.seconds,
+            "times_fewer_samples": plain["over_samples"].inverse(point.relative_mse)
+            / point.samples,
+        }
+        for point in points
+        if point.method != PLAIN
+    ]
+
+
 def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
     """Return each method's error at equal time, and its time at equal error.
 
-    Equal to those of plain path tracing at one of its points: with 0.5 as ``part`` that in the
-    middle, with 1 that of most samples. Interpolated between a method's own points, and None where
-    these do not reach so far; where its cheapest point has less error already, it is that one's
-    time.
+    Both are equal to those of one of plain path tracing's points: with ``part`` 0.5 the middle one,
+    with 1 that of most samples. Figures are interpolated between a method's own points, and None
+    beyond them. If even a method's cheapest point has less error, the time is that of this point.
     """
     plain = sorted((p for p in points if p.method == PLAIN), key=lambda p: p.seconds)
     if not plain:
         return []
     equal = plain[int(part * (len(plain) - 1) + 0.5)]
-    found = []
+    rows = []
     for method in dict.fromkeys(p.method for p in points if p.method != OWN):
-        own = sorted((p for p in points if p.method == method), key=lambda p: p.seconds)
+        line = sorted((p for p in points if p.method == method), key=lambda p: p.seconds)
         seconds = metrics.interpolated(
-            equal.relative_mse, [(p.relative_mse, p.seconds) for p in own]
+            equal.relative_mse, [(p.relative_mse, p.seconds) for p in line]
         )
-        if seconds is None and own[0].relative_mse <= equal.relative_mse:
-            seconds = own[0].seconds
-        found.append(
+        if seconds is None and line[0].relative_mse <= equal.relative_mse:
+            seconds = line[0].seconds
+        rows.append(
             {
                 "method": method,
                 "seconds": equal.seconds,
                 "error": metrics.interpolated(
-                    equal.seconds, [(p.seconds, p.relative_mse) for p in own]
+                    equal.seconds, [(p.seconds, p.relative_mse) for p in line]
                 ),
                 "equal_error": equal.relative_mse,
                 "seconds_at_equal_error": seconds,
                 "times_faster": seconds and equal.seconds / seconds,
-                "nearest": min(own, key=lambda p: abs(p.seconds - equal.seconds)).figures(),
+                "nearest": min(line, key=lambda p: abs(p.seconds - equal.seconds)).figures(),
             }
         )
-    return found
+    return rows
 
 
 def fitted(points: Sequence[Point]) -> dict[str, metrics.Line]:
-    """Fit the error of some points over time and over samples; nothing if they are too few."""
+    """Fit the errors of a method's points over time and over samples; empty for too few points."""
     lines: dict[str, metrics.Line] = {}
     for prefix, error in (("", "relative_mse"), ("of_all_pixels_", "relative_mse_whole")):
-        # Where it is nearly all in a few pixels, it may be below 0 by chance.
-        known = [point for point in points if getattr(point, error) > 0]
-        errors = [getattr(point, error) for point in known]
-        by_time = metrics.fit([point.seconds for point in known], errors)
-        by_samples = metrics.fit([point.samples for point in known], errors)
+        # An error that a few pixels make almost alone may be below 0 by chance.
+        positive = [point for point in points if getattr(point, error) > 0]
+        errors = [getattr(point, error) for point in positive]
+        by_time = metrics.fit([point.seconds for point in positive], errors)
+        by_samples = metrics.fit([point.samples for point in positive], errors)
         if by_time and by_samples:
-            lines |= {f"{prefix}over_time": by_time, f"{prefix}over_samples": by_samples}
+            lines[f"{prefix}over_time"] = by_time
+            lines[f"{prefix}over_samples"] = by_samples
         elif not prefix:
             break
     return lines
 
 
-def disagreement(
-    maker: Trials,
-    windows: Sequence[Window],
-    references: Sequence[metrics.Reference],
-    renders: Renders,
-) -> dict[str, float | None]:
-    """Return how the first two views disagree, as `metrics.Disagreement`, the mean over seeds.
+def neighbour_disagreements(
+    experiment: Experiment, methods: Sequence[Method]
+) -> list[dict[str, Any]]:
+    """Return how the first two windows, of neighbouring views, disagree under each method.
 
-    And how far their biases agree, of the renders of all seeds.
+    Each entry has the keys of `metrics.Disagreement`, means over the seeds, and
+    ``bias_correlation``: how far the views' biases agree, from the renders of all seeds. Without
+    depth there is no entry; an entry without a surface that both views see has no figures.
     """
-    pair, places = (references[0], references[1]), (windows[0], windows[1])
-    seen = both_see((maker.camera(places[0].view), maker.camera(places[1].view)), places, pair)
-    if not len(seen[0]):
-        return {}
-    found = [
-        asdict(metrics.disagreement((first.colour, second.colour), pair, seen))
-        for first, second in zip(renders[0], renders[1], strict=True)
+    references = (experiment.references[0], experiment.references[1])
+    if references[0].depth is None:
+        return []
+    windows = (experiment.windows[0], experiment.windows[1])
+    cameras = (
+        experiment.maker.camera(windows[0].view),
+        experiment.maker.camera(windows[1].view),
+    )
+    seen = both_see(cameras, windows, references)
+    entries = []
+    for method in methods:
+        entry: dict[str, Any] = {"method": method.name, "settings": method.settings}
+        if len(seen[0]):
+            renders = experiment.renders(method)
+            entry |= disagreement((renders[0], renders[1]), references, seen)
+        entries.append(entry)
+    return entries
+
+
+def disagreement(
+    renders: tuple[Sequence[Trial], Sequence[Trial]],
+    references: tuple[metrics.Reference, metrics.Reference],
+    seen: tuple[NDArray[np.int64], NDArray[np.int64]],
+) -> dict[str, float | None]:
+    """Return how two windows' renders of the same seeds disagree at the pixels ``seen``."""
+    by_seed = [
+        asdict(metrics.disagreement((first.colour, second.colour), references, seen))
+        for first, second in zip(*renders, strict=True)
     ]
-    colours = [render.colour for render in renders[0]], [render.colour for render in renders[1]]
     means: dict[str, float | None] = {
-        name: fmean(entry[name] for entry in found) for name in found[0]
+        name: fmean(figures[name] for figures in by_seed) for name in by_seed[0]
     }
-    return means | {"bias_correlation": metrics.bias_correlation(colours, pair, seen)}
+    colours = [trial.colour for trial in renders[0]], [trial.colour for trial in renders[1]]
+    return means | {"bias_correlation": metrics.bias_correlation(colours, references, seen)}
 
 
 def write(stem: Path, content: Mapping[str, Any]) -> None:
     """Write the points as ``stem``.csv, a plot as .svg and .png, tables as .md, all as .json."""
-    rows = []
-    for stratum, measured in {"whole views": content, **content["strata"]}.items():
-        for point in measured["points"]:
-            settings = {**PLAIN_SAMPLING, **point["settings"]}
-            limits = {"most_samples": settings["samples"]}
-            limits |= {name: settings[name] for name in ("adaptive_threshold", "denoise")}
-            figures = {name: value for name, value in point.items() if name not in WAY}
-            way = {"stratum": stratum, "method": point["method"], **limits}
-            rows.append({**way, **figures, "pareto": point in measured["pareto_front"]})
-    write_csv(stem.with_name(stem.name + ".csv"), rows)
-    _draw(stem, content)
+    write_csv(stem.with_name(stem.name + ".csv"), csv_rows(content))
+    draw(stem, content)
     write_text(stem.with_name(stem.name + ".md"), tables(stem.name, content))
     write_json(stem.with_name(stem.name + ".json"), content)
 
 
+def csv_rows(content: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return a row for each point of whole views and of each stratum."""
+    rows = []
+    for stratum, measured in {WHOLE_VIEWS: content, **content["strata"]}.items():
+        for point in measured["points"]:
+            settings = {**PLAIN_SAMPLING, **point["settings"]}
+            rows.append(
+                {
+                    "stratum": stratum,
+                    "method": point["method"],
+                    "most_samples": settings["samples"],
+                    "adaptive_threshold": settings["adaptive_threshold"],
+                    "denoise": settings["denoise"],
+                    **{name: value for name, value in point.items() if name not in METHOD_KEYS},
+                    "pareto": point in measured["pareto_front"],
+                }
+            )
+    return rows
+
+
 def tables(name: str, content: Mapping[str, Any]) -> str:
     """Return the methods at equal time and at equal error, and all figures, in Markdown."""
-    methods = content["methods"]
-    if not methods:
+    if not content["methods"]:
         return f"# {name}\n\nNo point of plain path tracing is above the references' own error.\n"
-    seconds, error = methods[0]["seconds"], methods[0]["equal_error"]
-    common = {
-        (pair["method"], json.dumps(pair["settings"])): pair.get("bias_correlation")
-        for pair in content["neighbouring_views"]
-    }
-    lines = [
+    lines = [*_equal_table(name, content), *_figures_table(content), *_strata_table(content)]
+    return "\n".join([*lines, ""])
+
+
+def _equal_table(name: str, content: Mapping[str, Any]) -> list[str]:
+    methods = content["methods"]
+    seconds = methods[0]["seconds"]
+    error = methods[0]["equal_error"]
+    return [
         f"# {name}: methods at equal time and at equal error",
         "",
         "The error is the relative mean squared error of all but the worst thousandth of pixels;",
@@ -445,8 +451,18 @@ def tables(name: str, content: Mapping[str, Any]) -> str:
             _row(m["method"], m["error"], m["seconds_at_equal_error"], m["times_faster"])
             for m in methods
         ),
+    ]
+
+
+def _figures_table(content: Mapping[str, Any]) -> list[str]:
+    bias_correlations = {
+        (pair["method"], json.dumps(pair["settings"])): pair.get("bias_correlation")
+        for pair in content["neighbouring_views"]
+    }
+    lines = [
         "",
-        f"Of each method what was measured nearest to {seconds:.3g} s. Bias (squared) and variance",
+        f"Of each method what was measured nearest to {content['methods'][0]['seconds']:.3g} s. "
+        "Bias (squared) and variance",
         "add up to the error of all pixels, and × s is that times the seconds; a bias below 0 is",
         "within the noise of 0. In common is the correlation of the bias with the neighbouring",
         "view's; texture has 1.",
@@ -455,13 +471,17 @@ def tables(name: str, content: Mapping[str, Any]) -> str:
         "| MRSE | PSNR | SSIM | FLIP | in common |",
         "| --- " + "| ---: " * 13 + "|",
     ]
-    for method in methods:
+    for method in content["methods"]:
         point = method["nearest"]
-        figures = [point[figure] for figure in FIGURES]
         key = (point["method"], json.dumps(point["settings"]))
-        lines.append(_row(point["method"], *figures, common.get(key)))
+        figures = [point[figure] for figure in FIGURES]
+        lines.append(_row(point["method"], *figures, bias_correlations.get(key)))
+    return lines
+
+
+def _strata_table(content: Mapping[str, Any]) -> list[str]:
     columns, rows = strata_table(content)
-    lines += [
+    return [
         "",
         "By stratum, what pixels show, which is a part of the views: the slope of a method's error",
         "over time, its error in the time of plain path tracing in the middle of its points, its",
@@ -472,7 +492,6 @@ def tables(name: str, content: Mapping[str, Any]) -> str:
         "| --- | ---: | --- " + "| ---: " * (len(columns) - 3) + "|",
         *(_row(*row) for row in rows),
     ]
-    return "\n".join([*lines, ""])
 
 
 def _row(*cells: str | float | None) -> str:
@@ -482,82 +501,94 @@ def _row(*cells: str | float | None) -> str:
     return f"| {' | '.join(texts)} |"
 
 
-def _draw(stem: Path, content: Mapping[str, Any]) -> None:
-    """Draw error over time, with slopes, the Pareto front, and where the scene's settings lie."""
-
-    def figures(name: str, points: Sequence[Mapping[str, Any]]) -> list[float]:
-        return [point[name] for point in points]
-
-    with plots.plot(stem, 1, 2, size=(18, 5.5)) as (axes, beside):
-        methods = dict.fromkeys(p["method"] for p in content["points"] if p["method"] != OWN)
-        for method, colour, marker in zip(methods, plots.COLOURS, plots.MARKERS, strict=False):
-            own = [p for p in content["points"] if p["method"] == method and p["resolved"]]
-            axes.errorbar(
-                *(figures(name, own) for name in ("seconds", "relative_mse", "standard_error")),
-                color=colour,
-                marker=marker,
-                linewidth=1,
-                label=method + _slopes(content["slopes"].get(method, {})),
-            )
-        front = content["pareto_front"]
-        axes.plot(
-            *(figures(name, front) for name in ("seconds", "relative_mse")),
-            color=plots.GREY,
-            linewidth=6,
-            alpha=0.3,
-            label="Pareto front",
-        )
-        own = [point for point in content["settings"] if point["resolved"]]
-        if own:
-            axes.plot(
-                *(figures(name, own) for name in ("seconds", "relative_mse")),
-                marker="*",
-                markersize=15,
-                linestyle="none",
-                color="black",
-                markerfacecolor="none",
-                label=OWN,
-            )
-        axes.axhline(
-            content["reference_error"],
-            color="black",
-            linestyle=":",
-            linewidth=1,
-            label="the references' own error (subtracted)",
-        )
+def draw(stem: Path, content: Mapping[str, Any]) -> None:
+    """Draw error over time as ``stem``.svg and .png: by method, and beside it by stratum."""
+    with plots.plot(stem, 1, 2, size=(18, 5.5)) as (by_method_axes, by_stratum_axes):
+        _draw_methods(by_method_axes, content)
         unit = "core" if content["measured_on"]["device"] == "CPU" else "GPU"
-        axes.set(
+        by_method_axes.set(
             xscale="log",
             yscale="log",
             title=f"{stem.name}: error against render time",
             xlabel=f"render time, {unit} seconds per megapixel",
             ylabel="relative mean squared error of all but the worst thousandth of pixels",
         )
-        axes.legend(fontsize=8)
-        strata_and_looks = zip(
-            content["strata"].items(), plots.COLOURS, plots.MARKERS, strict=False
-        )
-        for (stratum, found), colour, marker in strata_and_looks:
-            for method, line in ((PLAIN, "-"), (DENOISED, ":")):
-                own = [p for p in found["points"] if p["method"] == method and p["resolved"]]
-                beside.plot(
-                    *(figures(name, own) for name in ("seconds", "relative_mse")),
-                    color=colour,
-                    marker=marker,
-                    linestyle=line,
-                    linewidth=1,
-                    label=f"{stratum}, {found['area']:.1%} of the views, {method}"
-                    + _slopes(found["slopes"].get(method, {})),
-                )
-        beside.set(
+        by_method_axes.legend(fontsize=8)
+        _draw_strata(by_stratum_axes, content)
+        by_stratum_axes.set(
             xscale="log",
             yscale="log",
             title="by what pixels show",
-            xlabel=axes.get_xlabel(),
+            xlabel=by_method_axes.get_xlabel(),
         )
-        beside.xaxis.set_minor_formatter("")
-        # Beside the axes: of seven strata it would hide the curves.
-        beside.legend(fontsize=8, loc="center left", bbox_to_anchor=(1, 0.5))
+        by_stratum_axes.xaxis.set_minor_formatter("")
+        # Beside the axes: a legend of seven strata would hide the curves.
+        by_stratum_axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1, 0.5))
+
+
+def _draw_methods(axes: Any, content: Mapping[str, Any]) -> None:
+    """Draw the methods, the Pareto front, the scene's own settings, and the references' error."""
+    methods = dict.fromkeys(p["method"] for p in content["points"] if p["method"] != OWN)
+    for method, colour, marker in zip(methods, plots.COLOURS, plots.MARKERS, strict=False):
+        points = [p for p in content["points"] if p["method"] == method and p["resolved"]]
+        axes.errorbar(
+            _column("seconds", points),
+            _column("relative_mse", points),
+            _column("standard_error", points),
+            color=colour,
+            marker=marker,
+            linewidth=1,
+            label=method + _slopes(content["slopes"].get(method, {})),
+        )
+    axes.plot(
+        _column("seconds", content["pareto_front"]),
+        _column("relative_mse", content["pareto_front"]),
+        color=plots.GREY,
+        linewidth=6,
+        alpha=0.3,
+        label="Pareto front",
+    )
+    own_points = [point for point in content["settings"] if point["resolved"]]
+    if own_points:
+        axes.plot(
+            _column("seconds", own_points),
+            _column("relative_mse", own_points),
+            marker="*",
+            markersize=15,
+            linestyle="none",
+            color="black",
+            markerfacecolor="none",
+            label=OWN,
+        )
+    axes.axhline(
+        content["reference_error"],
+        color="black",
+        linestyle=":",
+        linewidth=1,
+        label="the references' own error (subtracted)",
+    )
+
+
+def _draw_strata(axes: Any, content: Mapping[str, Any]) -> None:
+    """Draw each stratum's plain path tracing as a full line, and its denoised renders dotted."""
+    strata_and_styles = zip(content["strata"].items(), plots.COLOURS, plots.MARKERS, strict=False)
+    for (stratum, measured), colour, marker in strata_and_styles:
+        for method, line in ((PLAIN, "-"), (DENOISED, ":")):
+            points = [p for p in measured["points"] if p["method"] == method and p["resolved"]]
+            axes.plot(
+                _column("seconds", points),
+                _column("relative_mse", points),
+                color=colour,
+                marker=marker,
+                linestyle=line,
+                linewidth=1,
+                label=f"{stratum}, {measured['area']:.1%} of the views, {method}"
+                + _slopes(measured["slopes"].get(method, {})),
+            )
+
+
+def _column(name: str, points: Sequence[Mapping[str, Any]]) -> list[float]:
+    return [point[name] for point in points]
 
 
 def _slopes(lines: Mapping[str, Mapping[str, float]]) -> str:

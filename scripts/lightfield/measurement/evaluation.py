@@ -1,10 +1,10 @@
-"""How well somebody's views of a dataset are those that were rendered: view by view, by region.
+"""Compare somebody's renders of a dataset's views with the dataset's own, view by view, by region.
 
-A render is ``<view>.png``, sRGB, or ``<view>.exr``, linear, whose channel Z is depth as the
-dataset's; normals are ``normal/<view>.exr``, as the dataset's pass of that name. Each may have the
-rig's name before the view's, as exports of several rigs have: ``spiral_view_0000f.png``. What is
-compared is the developed picture, and one with alpha is composited over a background. LPIPS is not
-among the metrics: no package of this environment holds the weights of its network.
+A render is ``<view>.png``, sRGB, or ``<view>.exr``, linear, with depth as the dataset's in its
+channel Z. Normals are ``normal/<view>.exr``, as the dataset's pass. The rig's name may stand before
+the view's, as in exports of several rigs: ``spiral_view_0000f.png``. The developed pictures are
+compared; pictures with alpha are composited over a background. LPIPS is not among the metrics,
+because no package of this environment holds the weights of its network.
 """
 
 import math
@@ -18,10 +18,10 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import whole
+from lightfield.core.files import absolute_path
 from lightfield.dataset.lightfield import View
-from lightfield.export.source import Bools, Floats, Source, check_size
-from lightfield.geometry.depth import distance_from_z
+from lightfield.export.source import Bools, Floats, SourceDataset, check_size
+from lightfield.geometry.depth import stored_distance
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import decode_srgb, encode_srgb, tone_map
 from lightfield.measurement import metrics
@@ -30,17 +30,17 @@ from lightfield.measurement import metrics
 EDGE = 0.1
 EDGE_PIXELS = 5  # the width of what counts as an edge
 NORMALS = "normal"
-# A render's alpha is another than the truth's where they differ by more than this, in more than
-# this part of the pixels: at silhouettes they always differ somewhat.
+# A render's alpha differs from the truth's if it is off by more than this step, in more than this
+# part of the pixels. At silhouettes they always differ somewhat.
 ALPHA_STEP = 0.1
 ALPHA_PART = 0.01
 
 
 @dataclass(frozen=True)
 class Pictures:
-    """What one view is compared by: sRGB-encoded colour (h, w, 3), depth (h, w), normals.
+    """The pictures of one view: sRGB-encoded colour (h, w, 3), depth (h, w), normals (h, w, 3).
 
-    The colour is composited over the background; ``alpha`` (h, w) is how much of a pixel covers it.
+    The colour is composited over the background, of which ``alpha`` (h, w) covers a part.
     """
 
     colour: Floats
@@ -50,11 +50,11 @@ class Pictures:
 
 
 def find(
-    folder: Path, source: Source, view: View, suffixes: Sequence[str] = (".exr", ".png")
+    folder: Path, source: SourceDataset, view: View, suffixes: Sequence[str] = (".exr", ".png")
 ) -> Path:
-    """Return the picture of a view in a folder; raises `UserError` where there is none.
+    """Return the picture of a view in a folder. Raises `UserError` if there is none.
 
-    The name with the rig's before it goes first: the other may be that of another rig's view.
+    Names with the rig's name go first, because a bare view's name may be another rig's.
     """
     names = [*(f"{rig}_{view.name}" for rig in _rig_names(source)), view.name]
     for name in names:
@@ -69,13 +69,13 @@ def find(
     )
 
 
-def _rig_names(source: Source) -> list[str]:
-    """Return what the rig of a dataset's folder may be called, the whole folder's name first.
+def _rig_names(source: SourceDataset) -> list[str]:
+    """Return the names that a dataset's rig may have, the name of its folder first.
 
-    The folder of a frame lies in the rig's. A package unfolds to <scene>_<rig>, where a preset may
-    stand between.
+    The folder of a frame lies in the rig's. A package unfolds to <scene>_<rig>, or to
+    <scene>_<preset>_<rig>.
     """
-    folder = whole(source.dataset)
+    folder = absolute_path(source.dataset)
     if re.fullmatch(r"f\d{5,}", folder.name):
         folder = folder.parent
     lightfield = source.lightfield
@@ -86,17 +86,17 @@ def _rig_names(source: Source) -> list[str]:
     return ["_".join(parts[first:]) for first in range(len(parts))]
 
 
-def mask(path: Path, source: Source) -> Bools:
-    """Return where a grey picture is not 0; raises `UserError` for one of another size or kind."""
+def mask(path: Path, source: SourceDataset) -> Bools:
+    """Return where a grey picture is not 0. Raises `UserError` for another size or kind."""
     pixels = images.read_image(path, ["Y"]).channels["Y"]
     check_size(path, source.lightfield, pixels)
     return np.asarray(pixels > 0)
 
 
-def truth(source: Source, view: View, like: Path, background: Floats) -> Pictures:
+def truth(source: SourceDataset, view: View, like: Path, background: Floats) -> Pictures:
     """Return a dataset's own view over a background (3,) in sRGB, 0 to 1.
 
-    It is as coarse as a PNG if what it is compared with is ``like``.
+    It is rounded as a PNG if ``like``, the picture that it is compared with, is one.
     """
     transparent = source.lightfield.transparent
     if like.suffix == ".png":
@@ -105,7 +105,7 @@ def truth(source: Source, view: View, like: Path, background: Floats) -> Picture
     else:
         image = images.read_image(source.path(view))
         check_size(source.path(view), source.lightfield, image.channels["R"])
-        # Of views that are not transparent it says where another lens saw nothing.
+        # In views that are not transparent, alpha marks where another lens saw nothing.
         alpha = _alpha(image) if transparent else None
         colour = _developed(image, alpha, source, background)
     has_depth = source.suffix == ".exr" and source.lightfield.depth
@@ -117,10 +117,10 @@ def truth(source: Source, view: View, like: Path, background: Floats) -> Picture
     )
 
 
-def rendered(path: Path, source: Source, background: Floats) -> Pictures:
+def rendered(path: Path, source: SourceDataset, background: Floats) -> Pictures:
     """Return somebody's view over a background (3,) in sRGB, 0 to 1.
 
-    Raises `UserError` where it has no colour, or another size than the dataset's.
+    Raises `UserError` if it has no colour, or another size than the dataset's.
     """
     image = images.read_image(path)
     if not {*"RGB"} <= image.channels.keys():
@@ -143,12 +143,12 @@ def _alpha(image: images.Image) -> Floats | None:
 
 
 def _developed(
-    image: images.Image, alpha: Floats | None, source: Source, background: Floats
+    image: images.Image, alpha: Floats | None, source: SourceDataset, background: Floats
 ) -> Floats:
     """Return a picture's sRGB colour (h, w, 3) over a background.
 
-    An EXR's colour is multiplied by alpha, and the background is added as light. A PNG's is not,
-    and sRGB values are blended, as trainers blend those of RGBA pictures.
+    An EXR's colour is multiplied by alpha, and the background is added as light. A PNG's colour is
+    not, and its sRGB values are blended, as trainers blend those of RGBA pictures.
     """
     if image.channels["R"].dtype.kind == "u":
         pixels = np.stack([image.channels[name] for name in "RGB"], axis=-1)
@@ -174,9 +174,9 @@ def _on_background(
 def background_problem(
     shown: Pictures, true: Pictures, counted: Bools, background: Floats
 ) -> str | None:
-    """Say how a render's alpha or background is not the truth's; None if they agree.
+    """Return how a render's alpha or background differs from the truth's; None if they agree.
 
-    A render without alpha must have the ``background`` where the truth is transparent.
+    A render without alpha must show the ``background`` where the truth is transparent.
     """
     if shown.alpha is None:
         if true.alpha is None or not (empty := counted & (true.alpha == 0)).any():
@@ -200,43 +200,47 @@ def hexadecimal(colour: Floats) -> str:
     return "#" + "".join(f"{round(255 * value):02x}" for value in colour.tolist())
 
 
-def regions(source: Source, view: View, counted: Bools, depth: Floats | None) -> dict[str, Bools]:
-    """Return the parts (h, w) of a view in which errors are counted, by their names.
+def regions(
+    source: SourceDataset, view: View, counted: Bools, depth: Floats | None
+) -> dict[str, Bools]:
+    """Return the regions (h, w) of a view in which errors are counted, by their names.
 
-    ``counted`` is what a mask leaves. ``centre`` and ``rim`` divide the lens at half its largest
-    angle; with ``depth``, as the dataset has it, ``edges`` are where the distance jumps, and
-    ``background`` is where nothing was hit.
+    ``counted`` are the pixels that a mask leaves. ``centre`` and ``rim`` divide the lens at half
+    its largest angle. With ``depth``, as the dataset has it, ``edges`` are where the distance
+    jumps, and ``background`` is where nothing was hit.
     """
-    valid, rays = source.valid(view), source.lens.pixel_rays()
+    valid = source.valid(view)
+    rays = source.lens.pixel_rays()
     every = counted & valid
     angle = np.arccos(np.clip(-rays[..., 2], -1, 1))
     inner = angle < np.nanmax(angle) / 2
-    found = {"all": every, "centre": every & inner, "rim": every & ~inner}
+    by_name = {"all": every, "centre": every & inner, "rim": every & ~inner}
     if depth is not None:
         # Towards the rim of a wide lens Z falls on any surface.
-        distance = distance_from_z(depth, rays) if source.lightfield.depth == "z" else depth
-        known = np.where(np.isfinite(distance), distance, 1e9)
-        near = minimum_filter(np.where(valid, known, np.inf), EDGE_PIXELS)
-        far = maximum_filter(np.where(valid, known, 0), EDGE_PIXELS)
-        found["edges"] = every & (far > (1 + EDGE) * near)
-        found["background"] = every & np.isposinf(depth)
-    return {name: region for name, region in found.items() if region.any()}
+        distance = stored_distance(depth, rays, source.lightfield.depth)
+        finite_distance = np.where(np.isfinite(distance), distance, 1e9)
+        near = minimum_filter(np.where(valid, finite_distance, np.inf), EDGE_PIXELS)
+        far = maximum_filter(np.where(valid, finite_distance, 0), EDGE_PIXELS)
+        by_name["edges"] = every & (far > (1 + EDGE) * near)
+        by_name["background"] = every & np.isposinf(depth)
+    return {name: region for name, region in by_name.items() if region.any()}
 
 
 def errors(
     shown: Pictures, true: Pictures, parts: Mapping[str, Bools]
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the errors of each region: a mean over its pixels, None where something is missing.
+    """Yield the errors of each region: means over its pixels, None without depth or normals.
 
     psnr in decibel (inf if equal), ssim (1 if equal), flip (0 if equal), depth as
-    `metrics.depth_error`, normal as the mean angle in degrees. What lies outside the region
-    "all" is black to both pictures.
+    `metrics.depth_error`, normal as the mean angle in degrees. Outside the region "all" both
+    pictures count as black.
     """
     every = parts["all"][..., np.newaxis]
-    one, other = np.where(every, true.colour, 0), np.where(every, shown.colour, 0)
-    squares = ((one - other) ** 2).mean(axis=-1)
-    similarity = metrics.ssim_map(one, other)
-    flip = metrics.flip_map(one, other)
+    true_colour = np.where(every, true.colour, 0)
+    shown_colour = np.where(every, shown.colour, 0)
+    squares = ((true_colour - shown_colour) ** 2).mean(axis=-1)
+    similarity = metrics.ssim_map(true_colour, shown_colour)
+    flip = metrics.flip_map(true_colour, shown_colour)
     for name, region in parts.items():
         mean_square = float(squares[region].mean())
         yield (
@@ -257,16 +261,16 @@ def errors(
 
 
 def means(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return a row for each region with the means over the views; a PSNR of inf is the mean's."""
-    found = []
+    """Return a row of means over the views for each region; one PSNR of inf makes the mean inf."""
+    mean_rows = []
     for region in dict.fromkeys(row["region"] for row in rows):
-        own = [row for row in rows if row["region"] == region]
+        of_region = [row for row in rows if row["region"] == region]
         mean: dict[str, Any] = {"view": "mean", "region": region}
-        for name in list(own[0])[2:]:
-            values = [row[name] for row in own if row[name] is not None]
+        for name in list(of_region[0])[2:]:
+            values = [row[name] for row in of_region if row[name] is not None]
             mean[name] = sum(values) / len(values) if values else None
-        found.append(mean)
-    return found
+        mean_rows.append(mean)
+    return mean_rows
 
 
 def _normals(path: Path) -> Floats | None:
@@ -276,11 +280,13 @@ def _normals(path: Path) -> Floats | None:
 
 
 def _angle(normals: Floats, truth: Floats) -> float | None:
-    """Return the mean angle in degrees between normals (n, 3) where the truth has one."""
-    known = np.linalg.norm(truth, axis=-1) > 0.5
-    if not known.any():
+    """Return the mean angle in degrees between normals (n, 3) where the truth has a normal."""
+    has_normal = np.linalg.norm(truth, axis=-1) > 0.5
+    if not has_normal.any():
         return None
-    lengths = np.linalg.norm(normals[known], axis=-1)
-    cosine = (normals[known] * truth[known]).sum(axis=-1) / np.maximum(lengths, 1e-12)
-    sine = np.linalg.norm(np.cross(normals[known], truth[known]), axis=-1)
+    normals = normals[has_normal]
+    truth = truth[has_normal]
+    lengths = np.linalg.norm(normals, axis=-1)
+    cosine = (normals * truth).sum(axis=-1) / np.maximum(lengths, 1e-12)
+    sine = np.linalg.norm(np.cross(normals, truth), axis=-1)
     return float(np.degrees(np.arctan2(sine / np.maximum(lengths, 1e-12), cosine)).mean())

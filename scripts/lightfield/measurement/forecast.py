@@ -1,12 +1,12 @@
-"""What a run will take, by what is known before it: it is said at the end of each dry run.
+"""What a run will take, as a dry run prints it at its end, before anything is measured.
 
-Every job reads this file with the rules, so it imports nothing that takes long.
+Every job reads this file with the rules, so it must import nothing that takes long.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from lightfield.dataset.dataset import SECONDS_PER_SAMPLE, START_UP_SECONDS
+from lightfield.dataset.estimate import COMPRESSED, SECONDS_PER_SAMPLE, START_UP_SECONDS
 from lightfield.measurement.sampling import (
     FEWEST_SEEDS,
     MOST_SEEDS,
@@ -17,14 +17,23 @@ from lightfield.measurement.sampling import (
     WINDOW_SIZE,
 )
 
-# Measured in the courtyard: how many renders a calibration's search makes of each window, how many
-# of the samples that the target needs, and what a render of a window takes beside its samples.
-SEARCH_RENDERS, SEARCH_PART, WINDOW_SECONDS = 9, 2.5, 0.07
+# Measured in the courtyard: a calibration's search makes so many renders of each window, with so
+# many times the samples that the target needs, and a render takes so long beside its samples.
+SEARCH_RENDERS = 9
+SEARCH_PART = 2.5
+WINDOW_SECONDS = 0.07
+
+# The formulas of the columns, which stand under the table.
+FORMULAS = f"""\
+CPU hours = (views × pixels × samples × {1e6 * SECONDS_PER_SAMPLE:g} µs \
++ jobs × {START_UP_SECONDS:g} s) / 3600, with the report's panorama.
+GB = views × pixels × bytes of a pixel × {COMPRESSED:g}, with the reprojections.
+After `snakemake plan`, the seconds and bytes of a view are those that its probes measured."""
 
 
 @dataclass(frozen=True)
 class Work:
-    """What a run will do of one rig, or to calibrate: views, seconds of one core, and bytes."""
+    """The rendering of one rig or one calibration: views, seconds of one core, and bytes."""
 
     name: str
     views: int
@@ -33,7 +42,7 @@ class Work:
 
 
 def forecast(works: Sequence[Work]) -> str:
-    """Return the table that a dry run ends with, sums below."""
+    """Return the table that ends a dry run, with the sums and the formulas below."""
     total = Work(
         "all",
         sum(work.views for work in works),
@@ -46,21 +55,22 @@ def forecast(works: Sequence[Work]) -> str:
         for work in [*works, *([total] if len(works) > 1 else [])]
     ]
     head = f"{'to render':<40} {'views':>8} {'CPU hours':>10} {'GB':>8}"
-    return "\n".join([head, *rows, "Expected from pixels and samples, or from probes: see `plan`."])
+    return "\n".join([head, *rows, FORMULAS])
 
 
 def calibration_seconds(target: float, size: int, most: int | None = None) -> float:
-    """Estimate how long one core calibrates for a ``target`` error with views of ``size``².
+    """Estimate how many seconds one core calibrates for a ``target`` error with views of ``size``².
 
-    Path tracing of N samples a pixel has an error of about 1 / N (0.4 / N in the courtyard, 1.4 / N
-    in the barbershop, 2.6 / N in the garden), and a preset may allow no more than ``most`` samples.
+    The estimate takes the error of N samples a pixel as 1 / N. It is 0.4 / N in the courtyard,
+    1.4 / N in the barbershop, and 2.6 / N in the garden. A preset allows at most ``most`` samples.
     """
-    needed, seeds = 1 / target, FEWEST_SEEDS
+    needed = 1 / target
+    seeds = FEWEST_SEEDS
     while seeds < MOST_SEEDS and seeds * REFERENCE_SAMPLES * REFERENCE_PART < needed:
         seeds *= 2
-    # References for the windows and for those held out, plain path tracing, and what else is tried.
-    tried = sum(PLAIN_SAMPLES) + SEARCH_PART * min(needed, most or needed)
-    samples = 2 * seeds * REFERENCE_SAMPLES + tried
+    # Windows and held-out windows have references; plain path tracing and the search come on top.
+    search_samples = sum(PLAIN_SAMPLES) + SEARCH_PART * min(needed, most or needed)
+    samples = 2 * seeds * REFERENCE_SAMPLES + search_samples
     renders = 2 * seeds + SEARCH_RENDERS
     pixels = min(size, WINDOW_SIZE) ** 2
     window = renders * WINDOW_SECONDS + pixels * samples * SECONDS_PER_SAMPLE
@@ -68,5 +78,5 @@ def calibration_seconds(target: float, size: int, most: int | None = None) -> fl
 
 
 def figure(value: float) -> str:
-    """Return a number in two digits, or whole with commas."""
+    """Return a number with two digits, or from 10 on as a whole number with commas."""
     return f"{value:.2g}" if value < 10 else f"{value:,.0f}"

@@ -1,27 +1,28 @@
-"""How far a rendered image is from the truth, and how well that truth itself is known.
+"""The errors of a rendered image against a reference, and the reference's own error.
 
-The truth is a reference: the mean of n renders that differ in nothing but their seeds. Every metric
-counts only pixels that the lens has a ray for.
+The reference is the mean of n renders that differ only in their seeds. Every metric counts only
+pixels that the lens has a ray for.
 
-The one that is minimised is the relative mean squared error, (x − r)² / (r² + ε), the mean over
-channels and over all pixels but the worst thousandth (Rousselle, Knaus and Zwicker 2011, section
-5). Images are exposed so that the references' geometric mean luminance is middle grey, 0.18, and ε
-is 0.01. The thousandth makes it robust: a few fireflies would otherwise decide it, so that it would
-take thousands of views to tell two ways to render apart. Of N independent samples the expected
-error of all pixels is proportional to 1/N exactly. Without the worst it falls slower: where light
-comes in rare bright paths, few samples make few bright pixels, and the thousandth is most of them.
+The main metric is the relative mean squared error, (x − r)² / (r² + ε): the mean over channels and
+over all pixels but the worst thousandth (Rousselle, Knaus and Zwicker 2011, section 5). Images are
+exposed so that the references' geometric mean luminance is middle grey, 0.18; ε is 0.01. Leaving
+out the worst thousandth makes the metric robust. Otherwise a few fireflies would decide it, and it
+would take thousands of views to tell two methods apart. The expected error of all pixels is
+exactly proportional to 1/N for N independent samples. Without the worst pixels it falls slower:
+where light comes in rare bright paths, few samples make few bright pixels, and the thousandth is
+most of them.
 
-Beside it stand the same of all pixels, and two that others publish, also of all pixels and of light
-as it is, not exposed: (x − r)² / (r² + ε), and pbrt's MRSE, (x − r)² / (r + ε)². Of a linear image
-whose middle grey is far from 0.18 these say little: ε is then no small part of it, or none at all.
+Beside it stands the same error of all pixels. Two more are published by others, of all pixels and
+of light without exposure: (x − r)² / (r² + ε), and pbrt's MRSE, (x − r)² / (r + ε)². They say
+little about a linear image whose middle grey is far from 0.18, where ε is too large or too small.
 
-Error is bias and variance: what the mean of many renders would still differ by, and how single ones
-differ from that mean (Celarek, Jakob, Wimmer and Lehtinen 2019 measure them so, by many short
-renders). Plain path tracing has variance alone, which more samples take away; a denoiser's error
-ends at its bias, which they take away more slowly or not at all.
+The error is the sum of bias and variance. The bias is what the mean of many renders differs by; the
+variance is how single renders differ from that mean. Many short renders measure both (Celarek,
+Jakob, Wimmer and Lehtinen 2019). Plain path tracing has only variance, which falls with more
+samples. A denoiser's error ends at its bias, which falls more slowly or not at all.
 
-An independent reference adds its own variance to every expected square and nothing else, so
-subtracting an estimate of it, from how its n renders differ, leaves the image's own error.
+An independent reference adds its own variance, and nothing else, to every expected square. So
+subtracting an estimate of that variance, from how its n renders differ, leaves the image's error.
 """
 
 import math
@@ -44,7 +45,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 EPSILON = 0.01
-# The part of the pixels that is left out, those with the largest errors.
+# The part of the pixels that does not count, those with the largest errors.
 OUTLIERS = 0.001
 # From sRGB to luma and two differences of colour. Source: ITU-R BT.709.
 TO_YCBCR = np.array(
@@ -62,8 +63,8 @@ class Reference:
 
     colour (h, w, 3): scene-linear, the mean of the renders; variance (h, w, 3): the estimated
     variance of that mean; depth (h, w): the median of the renders' depths, inf for a miss, or None;
-    mask (h, w): pixels that the lens has a ray for; exposure: stops at which it is looked at;
-    part (h, w): of these, the ones that count, or None for all.
+    mask (h, w): pixels that the lens has a ray for; exposure: stops at which the image is shown;
+    part (h, w): the pixels of the mask that count, or None for all.
     """
 
     colour: Array
@@ -80,20 +81,20 @@ class Reference:
 
     @property
     def weights(self) -> Array:
-        """What a squared difference of each pixel and channel is multiplied by, (n, 3)."""
+        """The factors (n, 3) of the squared differences of the counted pixels."""
         return _weights(self.colour[self.counted], self.exposure)
 
     @property
     def unexposed_weights(self) -> tuple[Array, Array]:
-        """The same of the unexposed relative mean squared error, and of pbrt's MRSE."""
+        """The factors of the unexposed relative mean squared error, and of pbrt's MRSE."""
         truth = self.colour[self.counted]
         return 1 / (truth**2 + EPSILON), 1 / (truth + EPSILON) ** 2
 
     @property
     def own_error(self) -> float:
         """Expected relative mean squared error of the reference itself."""
-        own = (self.variance[self.counted] * self.weights).mean(axis=-1)
-        return float(own[_inliers(own)].mean())
+        variance = (self.variance[self.counted] * self.weights).mean(axis=-1)
+        return float(variance[_inliers(variance)].mean())
 
 
 def _weights(truth: Array, exposure: float) -> Array:
@@ -111,14 +112,15 @@ def make_reference(
     stack = np.stack(colours).astype(np.float64)
     with np.errstate(invalid="ignore"):
         depth = np.median(np.stack(depths), axis=0).astype(np.float64) if depths else None
-    mean, variance = stack.mean(axis=0), stack.var(axis=0, ddof=1) / len(stack)
+    mean = stack.mean(axis=0)
+    variance = stack.var(axis=0, ddof=1) / len(stack)
     return Reference(mean, variance, depth, mask, exposure_for(mean[mask]))
 
 
 def exposed_alike(
     references: Sequence[Reference], exposure: float | None = None
 ) -> list[Reference]:
-    """Return references under one ``exposure``; that for all their pixels together by default."""
+    """Return references under one ``exposure``, by default that of all their pixels together."""
     if exposure is None:
         exposure = exposure_for(np.concatenate([r.colour[r.mask] for r in references]))
     return [replace(reference, exposure=exposure) for reference in references]
@@ -126,15 +128,13 @@ def exposed_alike(
 
 @dataclass(frozen=True)
 class Errors:
-    """What one image differs by from its reference.
+    """The errors of one image against its reference.
 
-    relative_mse: without the reference's own error, and below 0 by chance where it is far smaller
-    than that; relative_mse_whole: the same of all pixels, the worst thousandth too;
-    relative_mse_unexposed and mrse, pbrt's: of all pixels, as light is; psnr (decibel; inf if
-    equal), ssim and flip (0 is equal) of the tone-mapped image;
-    depth: mean of |z/r − 1|, at most 1 a pixel, where a pixel in which only one of the two hit
-    anything counts as 1, or None without depth. That is one sample, so that more do not
-    improve it.
+    relative_mse: without the reference's own error; an error far below that is below 0 by chance.
+    relative_mse_whole: the same of all pixels, with the worst thousandth.
+    relative_mse_unexposed, mrse (pbrt's): of all pixels, of light without exposure.
+    psnr (decibel; inf if equal), ssim (1 if equal), flip (0 if equal): of the tone-mapped image.
+    depth: as `depth_error`, or None without depth. Depth is one sample; more do not improve it.
     """
 
     relative_mse: float
@@ -259,20 +259,20 @@ def relative_mse(
 
     ``left_out`` is the part of the pixels that does not count, those with the largest errors.
     """
-    found = (_squares(colour, reference) * reference.weights).mean(axis=-1)
-    own = (reference.variance[reference.counted] * reference.weights).mean(axis=-1)
-    kept = _inliers(found, left_out)
-    return float((found - own)[kept].mean())
+    errors = (_squares(colour, reference) * reference.weights).mean(axis=-1)
+    reference_error = (reference.variance[reference.counted] * reference.weights).mean(axis=-1)
+    kept = _inliers(errors, left_out)
+    return float((errors - reference_error)[kept].mean())
 
 
 def bias_and_variance(
     colours: Sequence[NDArray[np.float32]], reference: Reference
 ) -> tuple[float, float]:
-    """Return the squared bias and the variance of renders that differ in their seeds alone.
+    """Return the squared bias and the variance of renders that differ only in their seeds.
 
-    Both are relative, as `relative_mse` of all pixels, which is their sum. Of n ≥ 2 renders, the
-    mean's square holds the bias's, an n-th of the variance, and the reference's own; so the bias is
-    known to about an n-th of the variance, and below 0 by chance where it is smaller.
+    Both are relative, and add up to `relative_mse` of all pixels. The squared mean of n ≥ 2 renders
+    holds the squared bias, an n-th of the variance, and the reference's own. So the bias is known
+    to about an n-th of the variance; a smaller one may be below 0 by chance.
     """
     stack = np.stack([colour[reference.counted] for colour in colours]).astype(np.float64)
     variance = stack.var(axis=0, ddof=1)
@@ -287,10 +287,10 @@ def bias_correlation(
     references: tuple[Reference, Reference],
     seen: tuple[NDArray[np.int64], NDArray[np.int64]],
 ) -> float | None:
-    """Return how far two views' biases agree at pixels ``seen``, as `disagreement` has them.
+    """Return the correlation of two views' biases at the pixels ``seen`` (see `disagreement`).
 
-    1 where both are wrong alike, as texture is, and 0 where they have nothing in common; None where
-    the square of a bias is not above 0 by two standard errors over the pixels.
+    1 if both views are wrong alike, as texture is; 0 if their biases have nothing in common. None
+    if the square of a bias is not above 0 by two standard errors over the pixels.
     """
     means, squares = [], []
     for colours, reference, where in zip(renders, references, seen, strict=True):
@@ -299,36 +299,40 @@ def bias_correlation(
         noise = stack.var(axis=0, ddof=1) / len(stack)
         squares.append(means[-1] ** 2 - noise - reference.variance.reshape(-1, 3)[where])
     weights = _weights(references[0].colour.reshape(-1, 3)[seen[0]], references[0].exposure)
-    known = [(square * weights).mean(axis=-1) for square in squares]
-    if any(one.mean() <= 2 * one.std() / math.sqrt(one.size) for one in known):
+    biases = [(square * weights).mean(axis=-1) for square in squares]
+    if any(bias.mean() <= 2 * bias.std() / math.sqrt(bias.size) for bias in biases):
         return None
-    first, second = (float(one.mean()) for one in known)
+    first, second = (float(bias.mean()) for bias in biases)
     return float((means[0] * means[1] * weights).mean()) / math.sqrt(first * second)
 
 
 def _squares(colour: NDArray[np.float32], reference: Reference) -> Array:
     """Return the squared differences of the pixels that count, (n, 3)."""
-    found: Array = (colour.astype(np.float64) - reference.colour)[reference.counted] ** 2
-    return found
+    squares: Array = (colour.astype(np.float64) - reference.colour)[reference.counted] ** 2
+    return squares
 
 
 def _inliers(errors: Array, left_out: float = OUTLIERS) -> NDArray[np.int64]:
-    """Return the indices of all but the worst part of some pixels, in rising order."""
+    """Return the indices of all but the largest errors, in rising order."""
     return np.argsort(errors, kind="stable")[: errors.size - math.ceil(left_out * errors.size)]
 
 
 def developed(colour: NDArray[Any], reference: Reference) -> Array:
-    """Return the sRGB image in [0, 1] that is looked at: exposed and tone-mapped as reports are."""
+    """Return the sRGB image in [0, 1] as reports show it: exposed and tone-mapped."""
     mapped = tone_map(np.ascontiguousarray(colour, np.float32), reference.exposure, WHITE)
     return np.where(reference.mask[..., np.newaxis], encode_srgb(mapped), 0.0)
 
 
 def depth_error(depth: NDArray[Any], truth: NDArray[Any]) -> float:
-    """Return the mean relative error of depths, as `Errors` has it; inf is a miss, NaN unknown."""
-    missed, gone = np.isinf(depth), np.isinf(truth)
+    """Return the mean of |depth / truth − 1|, at most 1 a pixel; inf is a miss, NaN unknown.
+
+    A pixel in which only one of the two hit anything counts as 1.
+    """
+    missed = np.isinf(depth)
+    truth_missed = np.isinf(truth)
     with np.errstate(invalid="ignore"):
         error = np.fmin(np.abs(depth / truth - 1), 1.0)
-    return float(np.where(missed | gone, missed != gone, error).mean())
+    return float(np.where(missed | truth_missed, missed != truth_missed, error).mean())
 
 
 @dataclass(frozen=True)
@@ -344,7 +348,7 @@ class Line:
         return float(self.factor * x**self.slope)
 
     def inverse(self, y: float) -> float:
-        """Return x at y; 1e300 where a line that hardly falls or rises does not get there."""
+        """Return x at y; at most 1e300, as for a line that hardly falls or rises."""
         with np.errstate(divide="ignore", invalid="ignore"):
             exponent = np.log10(y / self.factor) / np.float64(self.slope)
         return float(10 ** np.fmin(exponent, 300.0))
@@ -353,16 +357,16 @@ class Line:
 def fit(x: Sequence[float], y: Sequence[float]) -> Line | None:
     """Fit a power law by least squares of the logarithms.
 
-    None for fewer than three different x, and where a number is not above 0.
+    None for fewer than three different x, and if a number is not above 0.
     """
     if len(set(x)) < 3 or min(*x, *y) <= 0:
         return None
-    found = linregress(np.log(x), np.log(y))
-    return Line(float(found.slope), float(found.stderr), float(np.exp(found.intercept)))
+    line = linregress(np.log(x), np.log(y))
+    return Line(float(line.slope), float(line.stderr), float(np.exp(line.intercept)))
 
 
 def interpolated(x: float, points: Sequence[tuple[float, float]]) -> float | None:
-    """Return y at x of points (x, y) in any order, by power laws between them; None outside."""
+    """Return y at x by power laws between points (x, y), in any order; None outside of them."""
     points = sorted(points)
     for (x0, y0), (x1, y1) in pairwise(points):
         if x0 <= x <= x1 and x1 > x0 and min(y0, y1) > 0:
@@ -371,12 +375,15 @@ def interpolated(x: float, points: Sequence[tuple[float, float]]) -> float | Non
 
 
 def pareto(cost: Sequence[float], error: Sequence[float], same_cost: float = 0.0) -> list[int]:
-    """Return the points to which no other is better in one and at least as good in the other.
+    """Return the indices of the Pareto front: points that no other point beats, by rising cost.
 
-    In order of their costs; the first of those that are the same. Costs are as good where they
-    differ by the part ``same_cost``, errors by a millionth.
+    A point beats another if it is better in one figure and as good in the other. Of equal points
+    the first counts. Costs within the part ``same_cost``, and errors within a millionth, are as
+    good.
     """
-    costs, errors, order = np.array(cost), np.array(error), np.arange(len(cost))
+    costs = np.array(cost)
+    errors = np.array(error)
+    order = np.arange(len(cost))
     own_cost, own_error = costs[:, np.newaxis], errors[:, np.newaxis]
     better = errors < own_error * (1 - 1e-6), costs < own_cost * (1 - same_cost)
     as_good = errors <= own_error * (1 + 1e-6), costs <= own_cost * (1 + same_cost)
@@ -390,11 +397,11 @@ def pareto(cost: Sequence[float], error: Sequence[float], same_cost: float = 0.0
 class Disagreement:
     """How two views differ where both see the same surface.
 
-    total: root of the mean relative squared difference of the images; floor: the same of their
-    references, so what reflections, texture and the look-up of nearest pixels make; added: root of
-    the mean relative squared difference of the images' errors, so what rendering makes; share:
-    added² as a part of both images' squared errors: 1 where errors are independent of each other,
-    as noise is, less where both views are wrong alike, and 0 where nothing is wrong.
+    total: root of the mean relative squared difference of the images.
+    floor: the same of their references; reflections, texture and the nearest pixels make it.
+    added: the same of the images' errors; rendering makes it.
+    share: added² as a part of both images' squared errors: 1 for independent errors, as noise is;
+    less if both views are wrong alike; 0 without errors.
     """
 
     total: float
@@ -408,10 +415,10 @@ def disagreement(
     references: tuple[Reference, Reference],
     seen: tuple[NDArray[np.int64], NDArray[np.int64]],
 ) -> Disagreement:
-    """Compare two views at pixels ``seen``, flat indices (n,) into each of a surface both see.
+    """Compare two views at the pixels ``seen``: flat indices (n,) into each, of common surfaces.
 
-    The pixels nearest to each other are compared: interpolation would take noise away. Weights are
-    those of the first view's reference. What the references' own errors add is subtracted.
+    Compares the nearest pixels, because interpolation would remove noise. The weights are those of
+    the first view's reference. What the references' own errors add is subtracted.
     """
     truths = [r.colour.reshape(-1, 3)[where] for r, where in zip(references, seen, strict=True)]
     errors = [
@@ -419,7 +426,7 @@ def disagreement(
         for image, truth, where in zip(images, truths, seen, strict=True)
     ]
     weights = _weights(truths[0], references[0].exposure)
-    own = sum(
+    reference_errors = sum(
         r.variance.reshape(-1, 3)[where] * weights
         for r, where in zip(references, seen, strict=True)
     )
@@ -431,9 +438,9 @@ def disagreement(
         float(value[kept].mean())
         for value in (
             (apart + between) ** 2 * weights,
-            between**2 * weights - own,
-            apart**2 * weights - own,
-            both - own,
+            between**2 * weights - reference_errors,
+            apart**2 * weights - reference_errors,
+            both - reference_errors,
         )
     )
     return Disagreement(

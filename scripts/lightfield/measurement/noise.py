@@ -1,4 +1,4 @@
-"""How noisy a rendered picture is, estimated from the picture alone."""
+"""The noise of a rendered picture, estimated from the picture alone."""
 
 from typing import Any
 
@@ -8,21 +8,21 @@ from skimage.util import view_as_blocks
 
 Array = NDArray[Any]
 
-# What the median of the magnitude of normally distributed values is to their standard deviation.
+# The median magnitude of normally distributed values, over their standard deviation.
 MEDIAN_OF_NORMAL = 0.6745
 # The root of the sum of the squares of Immerkær's mask.
 MASK_NORM = 6.0
-# Pixels beyond which a block's estimate is steady to a few percent.
+# From so many pixels along a side on, a block's estimate is steady to a few percent.
 SMALLEST_BLOCK = 8
 
 
 def relative_noise(luminance: Array, block: int = SMALLEST_BLOCK) -> Array:
     """Return noise over luminance of each ``block`` × ``block`` pixels of (height, width).
 
-    Noise is the standard deviation of what the mask [[1, −2, 1], [−2, 4, −2], [1, −2, 1]] leaves,
-    which no linear gradient passes (Immerkær, *Fast Noise Variance Estimation*, 1996), taken from
-    the median of its magnitude, so that an edge through a block does not count. Fine texture does.
-    NaN where a block is black, not finite, or cut by the picture's border.
+    Noise is the standard deviation of the filtered picture. The filter, [[1, −2, 1], [−2, 4, −2],
+    [1, −2, 1]], removes linear gradients (Immerkær, *Fast Noise Variance Estimation*, 1996). The
+    deviation follows from the median magnitude, so an edge through a block does not count. Fine
+    texture does. NaN for a block that is black, not finite, or cut by the picture's border.
     """
     light = luminance.astype(np.float64)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -34,9 +34,9 @@ def relative_noise(luminance: Array, block: int = SMALLEST_BLOCK) -> Array:
 
 
 def _blocks(values: Array, block: int) -> Array:
-    """Return (rows, columns, block²) of the whole blocks of (height, width)."""
+    """Return (rows, columns, block²) of the complete blocks of (height, width)."""
     rows, columns = (side // block * block for side in values.shape)
-    whole = np.ascontiguousarray(values[:rows, :columns])
-    blocks = view_as_blocks(whole, (block, block))
-    # numpy 1.26 refuses the median over two axes where there is no block at all.
+    complete = np.ascontiguousarray(values[:rows, :columns])
+    blocks = view_as_blocks(complete, (block, block))
+    # numpy 1.26 refuses a median over two axes if there is no block at all.
     return np.asarray(blocks.reshape(*blocks.shape[:2], block**2))

@@ -2,72 +2,170 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from statistics import fmean
 from typing import Any
 
 from scipy.stats import linregress
 
 from lightfield.core import processors
+from lightfield.core.files import read_keys, reading
 from lightfield.measurement import metrics
 from lightfield.measurement.forecast import figure
 from lightfield.measurement.sampling import DENOISED, TRACED, standard_error
 
-HEAD = "| dataset | views | resolution | samples | s a view | hours | denoised | calibrated | GB |"
+COLUMNS = (
+    "dataset",
+    "views",
+    "resolution",
+    "samples",
+    "s a view",
+    "hours",
+    "denoised",
+    "calibrated",
+    "GB",
+)
 
-# What `table` reads of a probe.
+# The keys of a probe that `read_probe` needs.
 PROBED = ("views", "resolution", "samples", "device", "view_seconds", "view_bytes")
 
-# The target error that the calibrated hours are for.
+# The error that the calibrated hours are for.
 TARGET_ERROR = 0.01
-# Times as long as plain path tracing.
+# A method that takes this many times as long as plain path tracing does not reach its error.
 OUT_OF_REACH = 1e4
+
+# The formulas of the columns, which stand under the table.
+FORMULAS = f"""\
+- hours = views × s a view / 3600
+- s a view = mean over the probes of seconds of the probe × pixels of a view / pixels of the \
+probe, ± its standard error
+- denoised = hours × seconds to the same error with the denoiser / seconds without it
+- calibrated = hours × seconds to the error {TARGET_ERROR:g}, by the cheaper of both / seconds of \
+the samples
+- GB = views × mean over the probes of bytes of the probe × pixels of a view / pixels of the probe \
+/ 10⁹
+"""
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What one dataset will take. Seconds and hours are those of one core or of the GPU.
+
+    ``parts`` are those of `cheaper_parts`.
+    """
+
+    name: str
+    views: int
+    probe: Mapping[str, Any]
+    parts: tuple[float | None, float | None]
+
+    @property
+    def view_seconds(self) -> float:
+        """The mean seconds of a view."""
+        return fmean(self.probe["view_seconds"])
+
+    @property
+    def view_error(self) -> float:
+        """The standard error of `view_seconds`."""
+        return standard_error(self.probe["view_seconds"])
+
+    @property
+    def hours(self) -> float:
+        """The hours of all views."""
+        return self.views * self.view_seconds / 3600
+
+    @property
+    def cheaper_hours(self) -> list[float | None]:
+        """The hours of all views denoised and calibrated; None if they are not known."""
+        return [None if part is None else part * self.hours for part in self.parts]
+
+    @property
+    def bytes(self) -> float:
+        """The bytes of all views."""
+        return self.views * fmean(self.probe["view_bytes"])
+
+    @property
+    def row(self) -> str:
+        """The dataset's row of the table."""
+        width, height = self.probe["resolution"]
+        return (
+            f"| {self.name} | {self.views} | {width} × {height} | {self.probe['samples']} "
+            f"| {self.view_seconds:.0f} ± {self.view_error:.0f} | {self.hours:.0f} "
+            f"| {_hours(self.cheaper_hours)} | {self.bytes / 1e9:.1f} |"
+        )
+
+
+def read_probe(path: Path | str) -> dict[str, Any]:
+    """Return what scripts/probe.py has measured. Raises `UserError` if the file is damaged."""
+    probe = read_keys(path, "probe.py", *PROBED)
+    with reading(path, "probe"):
+        width, height = probe["resolution"]
+        numbers = [*probe["view_seconds"], *probe["view_bytes"]]
+        counts = [probe["views"], probe["samples"], width, height]
+        if not all(0 <= number < 1e18 for number in [*numbers, *counts]):
+            raise ValueError("a number is below 0, or far too large")
+        if not all(isinstance(count, int) and count < 2**31 for count in counts):
+            raise ValueError("a count is no whole number")
+        if not (probe["view_seconds"] and probe["view_bytes"]):
+            raise ValueError("no view was measured")
+    return probe
 
 
 def table(datasets: list[tuple[str, int, dict[str, Any]]], advice: Mapping[str, Any]) -> str:
-    """Return the table of (name, frames, probe), with the sums below.
+    """Return the table of (name, frames, probe), with the sums and the formulas below.
 
-    ``advice`` is what `lightfield.measurement.advice` has found of datasets, by their names.
+    ``advice`` has what `lightfield.measurement.advice` measured of datasets, by their names.
     """
-    lines = ["# What it will take", "", HEAD, "| --- " + "| ---: " * (HEAD.count("|") - 2) + "|"]
-    total_views, total_hours, total_bytes, variance = 0, 0.0, 0.0, 0.0
-    cheaper: list[list[float | None]] = []
-    for name, frames, probe in datasets:
-        views = probe["views"] * frames
-        seconds = probe["view_seconds"]
-        error = standard_error(seconds)
-        hours = views * fmean(seconds) / 3600
-        size = views * fmean(probe["view_bytes"])
-        width, height = probe["resolution"]
-        parts = cheaper_parts(probe["samples"], advice.get(name))
-        cheaper.append([part and part * hours for part in parts])
-        lines.append(
-            f"| {name} | {views} | {width} × {height} | {probe['samples']} "
-            f"| {fmean(seconds):.0f} ± {error:.0f} | {hours:.0f} | {_hours(cheaper[-1])} "
-            f"| {size / 1e9:.1f} |"
+    expected = [
+        Expected(
+            name,
+            probe["views"] * frames,
+            probe,
+            cheaper_parts(probe["samples"], advice.get(name)),
         )
-        total_views += views
-        total_hours += hours
-        total_bytes += size
-        variance += (views * error / 3600) ** 2
-    sums = [None if None in column else sum(column) for column in zip(*cheaper, strict=True)]
-    lines.append(
-        f"| all | {total_views} | | | | {total_hours:.0f} ± {math.sqrt(variance):.0f} "
-        f"| {_hours(sums)} | {total_bytes / 1e9:.0f} |"
-    )
-    cores = processors.available()
-    if all(probe["device"] == "CPU" for _, _, probe in datasets):
-        days = total_hours / cores / 24
-        lines += ["", f"Hours of one processor core; this machine's {cores} take {days:.1f} days."]
-    else:
-        lines += ["", "Hours of the graphics card."]
-    lines += [
-        "Measured on small views, with all their samples; ± is the standard error over these.",
-        "Denoised: to the same error by fewer samples and the denoiser. Calibrated: to the error "
-        f"{TARGET_ERROR:g}, by the cheaper of both. By `snakemake advise`; — where it has not run, "
-        "or no number of samples is enough.",
+        for name, frames, probe in datasets
+    ]
+    lines = [
+        "# What it will take",
+        "",
+        f"| {' | '.join(COLUMNS)} |",
+        "| --- " + "| ---: " * (len(COLUMNS) - 1) + "|",
+        *(dataset.row for dataset in expected),
+        sums_row(expected),
+        "",
+        hours_of(expected),
+        "",
+        FORMULAS,
+        "Probes are a few of the views, small, with all their samples. The seconds to an error",
+        "follow from the measurements of `snakemake advise`: the error is a power of the samples,",
+        "and the seconds are a line over them. — means that it has not run, or that no number of",
+        "samples is enough.",
         "",
     ]
     return "\n".join(lines)
+
+
+def sums_row(expected: Sequence[Expected]) -> str:
+    """Return the table's last row: the sums over all datasets."""
+    views = sum(dataset.views for dataset in expected)
+    hours = sum(dataset.hours for dataset in expected)
+    error = math.hypot(*(dataset.views * dataset.view_error / 3600 for dataset in expected))
+    gigabytes = sum(dataset.bytes for dataset in expected) / 1e9
+    columns = zip(*(dataset.cheaper_hours for dataset in expected), strict=True)
+    cheaper = [None if None in column else sum(column) for column in columns]
+    return (
+        f"| all | {views} | | | | {hours:.0f} ± {error:.0f} | {_hours(cheaper)} | {gigabytes:.0f} |"
+    )
+
+
+def hours_of(expected: Sequence[Expected]) -> str:
+    """Say what device the hours are of, and how many days this machine's cores take."""
+    if any(dataset.probe["device"] != "CPU" for dataset in expected):
+        return "Hours of the graphics card."
+    cores = processors.available()
+    days = sum(dataset.hours for dataset in expected) / cores / 24
+    return f"Hours of one processor core; this machine's {cores} take {days:.1f} days."
 
 
 def cheaper_parts(
@@ -75,30 +173,30 @@ def cheaper_parts(
 ) -> tuple[float | None, float | None]:
     """Return the parts of the time of plain path tracing that denoised and calibrated views take.
 
-    ``samples`` are those of a pixel. Errors and seconds follow ``advice``: a power law and a line
-    over samples, and fewer than one sample there are not. None where it is not known, as of a scene
-    without noise, or no number of samples would be enough, as where a denoiser's error is nothing
-    but bias.
+    Plain path tracing takes ``samples`` a pixel. By ``advice``, the error is a power of the samples
+    and the seconds are a line over them, from one sample on. A part is None if the advice does not
+    fit, as for a scene without noise, or if no number of samples is enough, as for a denoiser whose
+    error is all bias.
     """
     if not advice or advice["own"] != {"samples": samples, "denoise": False}:
         return None, None
-    ways = {}
-    for way, points in advice["unchanged"].items():
+    laws = {}
+    for method, points in advice["unchanged"].items():
         counts = [point["samples"] for point in points]
         errors = metrics.fit(counts, [point["error"] for point in points])
         seconds = linregress(counts, [point["seconds"] for point in points])
         if errors is None or seconds.slope <= 0:
             return None, None
-        ways[way] = errors, max(0.0, float(seconds.intercept)), float(seconds.slope)
+        laws[method] = errors, max(0.0, float(seconds.intercept)), float(seconds.slope)
 
-    def seconds_to(error: float, way: str) -> float:
-        errors, overhead, each = ways[way]
+    def seconds_to(error: float, method: str) -> float:
+        errors, overhead, each = laws[method]
         return overhead + each * max(1.0, math.ceil(errors.inverse(error)))
 
-    errors, overhead, each = ways[TRACED]
+    errors, overhead, each = laws[TRACED]
     plain = overhead + each * samples
     denoised = seconds_to(errors.at(samples), DENOISED) / plain
-    calibrated = min(seconds_to(TARGET_ERROR, way) for way in ways) / plain
+    calibrated = min(seconds_to(TARGET_ERROR, method) for method in laws) / plain
     return (
         denoised if denoised < OUT_OF_REACH else None,
         calibrated if calibrated < OUT_OF_REACH else None,

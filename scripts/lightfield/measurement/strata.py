@@ -1,8 +1,8 @@
-"""Strata: the pixels of a light field by what they show that path tracing may find hard.
+"""Strata: classes of pixels by what they show, because path tracing finds some things hard.
 
-That is not spread evenly: a fire, a mirror or a pane of glass is small, and windows spread over the
-views miss it. A pilot, a few small whole views of few samples with the parts of light that add up
-to the colour and with the materials seen, finds where each is, and how noisy.
+A fire, a mirror or a pane of glass is small, so windows spread evenly over the views miss it. A
+pilot finds where each stratum is, and how noisy. It renders a few small whole views with few
+samples, with the parts of light that add up to the colour, and with the materials.
 """
 
 from collections.abc import Sequence
@@ -19,19 +19,24 @@ from lightfield.measurement.trials import FULL_ENOUGH, SURFACES, Trials, Window
 
 Classes = NDArray[np.int64]
 
-# In the order of the classes' numbers. By the light that a pixel shows most of: glossy is that of
-# metal and mirrors. Of these, leaves and paper are translucent, glass and water transparent.
+# The light that a pixel shows most of; glossy is the light of metal and mirrors.
 BY_LIGHT = ("diffuse", "glossy", "emission", "environment")
+# In the order of the classes' numbers. Leaves and paper are translucent, glass is transparent.
 STRATA = [*BY_LIGHT, "translucent", "transparent", "volume"]
-# Fog, smoke or fire that gives so much of a pixel's light is what the pixel shows.
+# A pixel shows fog, smoke or fire if they give at least this part of its light.
 OF_VOLUME = 0.25
-# A pixel of no stratum: outside the image circle.
+# The class of pixels outside the image circle.
 NONE = -1
 
 # The pilot: views, pixels of their longer side, samples of a pixel, renders of each.
-VIEWS, SIZE, SAMPLES, SEEDS = 8, 96, 4, 2
-# A stratum has at least this part of the pilot's pixels, and of all pixels measured so many.
-SMALLEST_AREA, FEWEST_PIXELS = 0.0005, 64
+VIEWS = 8
+SIZE = 96
+SAMPLES = 4
+SEEDS = 2
+# A stratum has at least this part of the pilot's pixels.
+SMALLEST_AREA = 0.0005
+# A window counts in a stratum if it has so many of its pixels.
+FEWEST_PIXELS = 64
 
 
 def classes(pilot: Trials, window: Window) -> tuple[Classes, NDArray[Any]]:
@@ -39,7 +44,7 @@ def classes(pilot: Trials, window: Window) -> tuple[Classes, NDArray[Any]]:
     trials = [pilot.render(window, 1 + seed, {"samples": SAMPLES}) for seed in range(SEEDS)]
     parts = {name: np.mean([t.parts[name] for t in trials], axis=0) for name in trials[0].parts}
     emitting, translucent, transparent = (parts[name] > 0 for name in SURFACES)
-    # What glows and is no surface that emits is a volume.
+    # Emission that comes from no emitting surface comes from a volume.
     glow = np.where(emitting | (not pilot.has_volumes), 0, parts["emission"])
     of_volumes = parts["volume_light"] + glow
     by_light = [parts["diffuse_light"], parts["glossy_light"], parts["emission"] - glow]
@@ -54,30 +59,37 @@ def classes(pilot: Trials, window: Window) -> tuple[Classes, NDArray[Any]]:
     return np.where(pilot.mask(window), kinds, NONE), noise
 
 
-def choose(maker: Trials, size: int, count: int) -> tuple[list[Window], dict[str, float]]:
-    """Choose ``count`` windows of ``size``² pixels for each stratum, and return its part of all.
+def classes_of(maker: Trials, windows: Sequence[Window]) -> list[Classes]:
+    """Return the stratum of each pixel of some windows, (h, w) each, by a pilot of ``maker``."""
+    pilot = maker.pilot()
+    return [classes(pilot, window)[0] for window in windows]
 
-    Of a stratum's pixels in the pilot, its windows are around ones that are as noisy as the rest
-    of it: at even steps of their rank, and away from its borders if it is large enough.
+
+def choose(maker: Trials, size: int, count: int) -> tuple[list[Window], dict[str, float]]:
+    """Choose ``count`` windows of ``size``² pixels for each stratum.
+
+    Returns all windows, and each stratum's part of the whole views. A stratum's windows lie around
+    pixels that stand for its noise: sorted by noise, at even steps. They keep away from the
+    stratum's borders if it is large enough.
     """
     small = maker.lens.fitted(SIZE)
     pilot = maker.pilot(small)
     views = maker.lightfield.views
     views = [views[(2 * n + 1) * len(views) // (2 * VIEWS)] for n in range(min(VIEWS, len(views)))]
-    found = [classes(pilot, Window(view, 0, 0, small.width, small.height)) for view in views]
-    total = sum(int((kinds != NONE).sum()) for kinds, _ in found)
+    pilots = [classes(pilot, Window(view, 0, 0, small.width, small.height)) for view in views]
+    total = sum(int((kinds != NONE).sum()) for kinds, _ in pilots)
     windows: list[Window] = []
     areas: dict[str, float] = {}
     for number, name in enumerate(STRATA):
-        members = [kinds == number for kinds, _ in found]
+        members = [kinds == number for kinds, _ in pilots]
         area = sum(int(member.sum()) for member in members) / total
         if area < SMALLEST_AREA:
             continue
         areas[name] = area
         inner = [binary_erosion(member) for member in members]
-        around = _around(
-            maker, views, inner if np.any(inner) else members, [noise for _, noise in found], size
-        )
+        if np.any(inner):
+            members = inner
+        around = _around(maker, views, members, [noise for _, noise in pilots], size)
         for step in range(count):
             window = around[int((step + 0.5) / count * len(around))]
             if window not in windows:
@@ -92,13 +104,13 @@ def _around(
     noise: Sequence[NDArray[Any]],
     size: int,
 ) -> list[Window]:
-    """Return a window around each member pixel of the pilot's views, those of little noise first.
+    """Return a window around each member pixel of the pilot's views, the least noisy first.
 
-    Those that reach too far out of the image circle are left out, unless all do.
+    Windows that reach too far out of the image circle are left out, unless all of them do.
     """
     lens = maker.lens
     side = min(size, lens.width, lens.height)
-    found = []
+    by_noise = []
     for view, member, noisy in zip(views, members, noise, strict=True):
         height, width = member.shape
         for row, column in np.argwhere(member):
@@ -108,7 +120,7 @@ def _around(
             y = round(
                 min(max((row + 0.5) / height * lens.height - side / 2, 0), lens.height - side)
             )
-            found.append((float(noisy[row, column]), Window(view, x, y, side, side)))
-    found.sort(key=lambda entry: entry[0])
-    windows = [window for _, window in found]
+            by_noise.append((float(noisy[row, column]), Window(view, x, y, side, side)))
+    by_noise.sort(key=lambda entry: entry[0])
+    windows = [window for _, window in by_noise]
     return [w for w in windows if maker.mask(w).mean() >= FULL_ENOUGH] or windows

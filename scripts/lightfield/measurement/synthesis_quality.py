@@ -1,8 +1,8 @@
-"""What a light field is worth: views that were held out, synthesised from the others, against them.
+"""The quality of a light field: held-out views, synthesised from the others, against the truth.
 
-Each variant changes one thing: how many views there are, of how many a picture is made, their
-resolution, the precision of their depth. Two controls say what is owed to the method: the nearest
-view as it stands, without its depth, and depth that belongs to other views.
+Each variant changes one thing: the number of views, how many of them make a picture, their
+resolution, or the precision of their depth. Two controls show what the synthesis itself adds: the
+nearest view without its depth, and views with the depth of other views.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.files import whole
+from lightfield.core.files import absolute_path
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.passes import PARTS_OF_LIGHT, PASSES
-from lightfield.export.source import Source
+from lightfield.export.source import SourceDataset
 from lightfield.geometry.depth import with_precision
 from lightfield.geometry.interpolation_volume import parts_to_edge
 from lightfield.geometry.lenses import Array, Lens
@@ -29,7 +29,10 @@ from lightfield.synthesis.view import BEST, Sources, reader
 
 @dataclass(frozen=True)
 class Variant:
-    """``name`` says what is changed, ``value`` to what; ``size`` is the bytes of what is read."""
+    """One way to synthesise: ``name`` is what it changes, ``value`` what it changes that to.
+
+    ``best`` is how many views make a picture, and ``size`` the bytes of the views that are read.
+    """
 
     name: str
     value: str
@@ -38,18 +41,19 @@ class Variant:
     size: int
 
 
-def variants(source: Source, views: Sequence[View]) -> Iterator[Variant]:
+def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[Variant]:
     """Yield the variants and controls of the ``views`` of a dataset, the plain one first."""
-    lens, read = source.lens, reader(source)
+    lens = source.lens
+    read = reader(source)
     sizes = {view.name: source.path(view).stat().st_size for view in views}
     size = sum(sizes.values())
-    whole = Sources(lens, views, read)
-    yield Variant("all", str(len(views)), whole, BEST, size)
-    for some in subsets(source.lightfield, views):
-        fewer = Sources(lens, some, read)
-        yield Variant("views", str(len(some)), fewer, BEST, sum(sizes[v.name] for v in some))
+    all_views = Sources(lens, views, read)
+    yield Variant("all", str(len(views)), all_views, BEST, size)
+    for subset in subsets(source.lightfield, views):
+        fewer = Sources(lens, subset, read)
+        yield Variant("views", str(len(subset)), fewer, BEST, sum(sizes[v.name] for v in subset))
     for best in (1, 2, 4, 8):
-        yield Variant("best", str(best), whole, best, size)
+        yield Variant("best", str(best), all_views, best, size)
     for part in (2, 4):
         small = lens.resized(lens.width // part, lens.height // part)
 
@@ -66,18 +70,18 @@ def variants(source: Source, views: Sequence[View]) -> Iterator[Variant]:
         )
     for precision in ("rounded", "half"):
 
-        def held(view: View, precision: str = precision) -> tuple[Array, Array]:
+        def with_depth(view: View, precision: str = precision) -> tuple[Array, Array]:
             colour, distance = read(view)
             return colour, with_precision(distance, precision)
 
-        yield Variant("depth", precision, Sources(lens, views, held), BEST, size)
+        yield Variant("depth", precision, Sources(lens, views, with_depth), BEST, size)
 
     def flat(view: View) -> tuple[Array, Array]:
         colour, distance = read(view)
         return colour, np.where(np.isnan(distance), np.nan, np.inf)
 
     nearest = Sources(lens, views, flat)
-    nearest.distances = whole.distances
+    nearest.distances = all_views.distances
     yield Variant("control", "nearest view alone", nearest, 1, size)
     after = dict(zip([view.name for view in views], [*views[1:], views[0]], strict=True))
 
@@ -88,63 +92,70 @@ def variants(source: Source, views: Sequence[View]) -> Iterator[Variant]:
 
 
 def subsets(lightfield: LightField, views: Sequence[View]) -> Iterator[Sequence[View]]:
-    """Yield fewer and fewer of a dataset's ``views``: those of coarser spheres, or else halves."""
+    """Yield ever fewer of a dataset's ``views``: those of coarser spheres, or else halves."""
     coarser = nested(len(views)) if lightfield.content.get("lf_type") == "SPHERE" else []
-    some: list[Sequence[View]] = [[views[number] for number in numbers] for numbers in coarser]
-    yield from some or [views[::step] for step in (2, 4, 8) if len(views[::step]) >= 4]
+    spheres: list[Sequence[View]] = [[views[number] for number in numbers] for numbers in coarser]
+    yield from spheres or [views[::step] for step in (2, 4, 8) if len(views[::step]) >= 4]
 
 
-def regions(truth: Source, view: View, inside: Array) -> dict[str, Array]:
-    """Return which pixels (h, w) of a true view are of each region, of those ``inside`` the lens.
+def regions(truth: SourceDataset, view: View, inside: Array) -> dict[str, Array]:
+    """Return the pixels (h, w) of each region of a true view, of those ``inside`` the lens.
 
-    The kinds of light are told apart if the view has all of them as passes.
+    There is a region for each kind of light if the view has all of them as passes.
     """
-    found = {WHOLE: inside}
-    if {*PARTS_OF_LIGHT} <= {one.name for one in truth.lightfield.passes}:
+    by_region = {WHOLE: inside}
+    if {*PARTS_OF_LIGHT} <= {render_pass.name for render_pass in truth.lightfield.passes}:
         folder = truth.lightfield.folder
         paths = [PASSES[name].path(folder, view.name) for name in PARTS_OF_LIGHT]
         light = np.array([images.read_image(path, "RGB").colour.mean(axis=-1) for path in paths])
         most = light.argmax(axis=0)
         for number, name in enumerate(PARTS_OF_LIGHT):
-            found[name.removesuffix("_light")] = inside & (most == number)
-    return {name: pixels for name, pixels in found.items() if pixels.any()}
+            by_region[name.removesuffix("_light")] = inside & (most == number)
+    return {name: pixels for name, pixels in by_region.items() if pixels.any()}
 
 
 def compare(
-    variant: Variant, around: Sequence[View], views: Sequence[View], truth: Source, exposure: float
+    variant: Variant,
+    around: Sequence[View],
+    views: Sequence[View],
+    truth: SourceDataset,
+    exposure: float,
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for each region of each of the ``views`` of the ``truth``.
 
-    A row has psnr, ws_psnr and iv_psnr in decibel, ssim, flip and the part of holes; ``part`` is
-    the region's of the picture. Holes count as they are filled; psnr_black and flip_black are those
-    of the picture whose holes are black. ``to_edge`` is how far the view is
-    from the middle of the views ``around`` it, as a part of what it is to the edge of their volume.
+    A row has psnr, ws_psnr and iv_psnr in decibel, ssim, flip and the part of holes. Holes count as
+    they are filled; psnr_black and flip_black are those of the picture whose holes are black.
+    ``part`` is the region's part of the picture. ``to_edge`` is the view's distance from the middle
+    of the views ``around`` it, over the distance to the edge of their volume.
     """
     inside = np.isfinite(truth.lens.pixel_rays()[..., 0])
     angles = metrics.solid_angles(truth.lens)
-    cameras, eyes = (np.array([view.matrix for view in some]) for some in (around, views))
+    cameras = np.array([view.matrix for view in around])
+    eyes = np.array([view.matrix for view in views])
     parts = parts_to_edge(cameras, variant.sources.lens, eyes[:, :3, 3])
     for view, to_edge in zip(views, parts.tolist(), strict=True):
         made = variant.sources.synthesise(view.matrix, truth.lens, variant.best)
         true = images.read_image(truth.path(view), "RGB").colour
-        one, other = (_developed(colour, exposure, inside) for colour in (true, made.colour))
-        black = np.where(made.holes[..., None], 0, other)
-        similar = metrics.ssim_map(one, other)
-        flips, black_flips = metrics.flip_map(one, other), metrics.flip_map(one, black)
+        true_picture = _developed(true, exposure, inside)
+        picture = _developed(made.colour, exposure, inside)
+        black = np.where(made.holes[..., None], 0, picture)
+        similar = metrics.ssim_map(true_picture, picture)
+        flips = metrics.flip_map(true_picture, picture)
+        black_flips = metrics.flip_map(true_picture, black)
         for region, pixels in regions(truth, view, inside).items():
             yield {
                 "variant": variant.name,
                 "value": variant.value,
-                "truth": whole(truth.dataset).name,
+                "truth": absolute_path(truth.dataset).name,
                 "view": view.name,
                 "to_edge": to_edge,
                 "place": next(name for name, most in PLACES.items() if to_edge <= most),
                 "region": region,
                 "part": float(pixels[inside].mean()),
-                "psnr": metrics.ws_psnr(one, other, pixels),
-                "psnr_black": metrics.ws_psnr(one, black, pixels),
-                "ws_psnr": metrics.ws_psnr(one, other, np.where(pixels, angles, 0)),
-                "iv_psnr": metrics.iv_psnr(one, other, pixels),
+                "psnr": metrics.ws_psnr(true_picture, picture, pixels),
+                "psnr_black": metrics.ws_psnr(true_picture, black, pixels),
+                "ws_psnr": metrics.ws_psnr(true_picture, picture, np.where(pixels, angles, 0)),
+                "iv_psnr": metrics.iv_psnr(true_picture, picture, pixels),
                 "ssim": float(similar[pixels].mean()),
                 "flip": float(flips[pixels].mean()),
                 "flip_black": float(black_flips[pixels].mean()),
@@ -154,9 +165,9 @@ def compare(
 
 
 def draw(rows: Sequence[Mapping[str, Any]], stem: Path) -> None:
-    """Plot quality against bytes and number of views, and of how many a picture is.
+    """Plot quality against bytes, the number of views, and how many of them make a picture.
 
-    The rows are those of `summaries.means`; of several truths it is that of the first.
+    The rows are those of `summaries.means`. Of several truths, only the first one is drawn.
     """
     by_name: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:

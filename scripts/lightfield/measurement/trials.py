@@ -1,11 +1,11 @@
-"""Windows of a dataset's views, rendered in many ways to learn what each way costs and gives.
+"""Renders of windows of a dataset's views under changed settings, with the times that they took.
 
-Whole views made small would show more detail a pixel than the dataset does, which a denoiser cannot
-tell from noise; so a window is a part of a view at the view's own resolution.
+A window is a part of a view at the view's own resolution. A whole view made small would show more
+detail in a pixel than the dataset does, and a denoiser cannot tell detail from noise.
 
-Every render is kept in a folder, under a key of all that it follows from, with the time that it
-took, so that what is interrupted goes on where it was and what is repeated costs nothing. The key
-names the device that rendered, not `auto`: seconds of one device are not those of another.
+A cache folder keeps every render with its time, under a key of all its inputs. An interrupted
+measurement goes on where it was, and a repeated one renders nothing. The key names the device that
+rendered, not `auto`, because the seconds of one device are not those of another.
 """
 
 import argparse
@@ -22,24 +22,27 @@ from numpy.typing import NDArray
 from lightfield.core import processors
 from lightfield.core.cli import positive
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys
 from lightfield.dataset import keys, passes
+from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.measurement.metrics import Mask, Reference, make_reference
 from lightfield.measurement.sampling import PLAIN, WINDOW_SIZE, calibrated, without_target
 from lightfield.validation.consistency import Camera
 
-# Seeds of references begin here, and those of trials at 1: no trial is part of its reference.
+# Seeds of references begin here and those of trials at 1, so no trial is part of its reference.
 REFERENCE_SEED = 1000
 
+# The steps of Roberts' R2 sequence, which fills a square evenly.
 R2 = (0.7548776662466927, 0.5698402909980532)
-# A window has at least this part of its pixels in the image circle, if one of so many places has.
-FULL_ENOUGH, MOST_PLACES = 0.75, 64
+# A window has at least this part of its pixels in the image circle, if one of so many places does.
+FULL_ENOUGH = 0.75
+MOST_PLACES = 64
 
-# What a pilot says of the surface that a pixel sees: whether its material has one of these features
-# of the scene's inventory.
+# What a pilot tells of the surface in a pixel: whether the inventory lists its material under one
+# of these features.
 SURFACES = {
     "emitting": ("emission",),
     "translucent": ("translucency",),
@@ -53,7 +56,7 @@ DEVICE_ATTRIBUTE = "plenoforge:device"
 
 @dataclass(frozen=True)
 class Window:
-    """A part of one view at its own resolution: its top left pixel, and its size."""
+    """A part of one view at the view's resolution: its top left pixel, and its size in pixels."""
 
     view: View
     x: int
@@ -63,20 +66,20 @@ class Window:
 
     @property
     def name(self) -> str:
-        """The view's name and the place in it."""
+        """The view's name and the window's place in it."""
         return f"{self.view.name}+{self.x}+{self.y}"
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One render: colour (h, w, 3) scene-linear; depth (h, w) metres as Cycles gives it, or None.
+    """One render: colour (h, w, 3) scene-linear; depth (h, w) in metres as Cycles has it, or None.
 
-    ``parts``, of a pilot alone, are those of its light, each (h, w), by their passes' names, and 1
-    or 0 for each of `SURFACES`.
-    ``samples`` is the mean number that the pixels of the image circle took. ``seconds`` is the time
-    from Cycles' first sample to its being finished, denoising included and synchronization not: on
-    processors their working time, which other load is not in and in which cores add up, and on a
-    GPU Cycles' own render time. ``device`` is what Cycles rendered on, CPU or GPU.
+    ``samples`` is the mean number of samples that the pixels of the image circle took. ``seconds``
+    is the time from Cycles' first sample to the end, with denoising and without synchronization. On
+    processors it is their working time: cores add up, and other load does not count. On a GPU it is
+    Cycles' own render time. ``device`` is what Cycles rendered on, CPU or GPU. Only a pilot has
+    ``parts``: the parts of its light (h, w) by their passes' names, and 1 or 0 for each of
+    `SURFACES`.
     """
 
     colour: NDArray[np.float32]
@@ -88,11 +91,11 @@ class Trial:
 
 
 class Trials:
-    """Renders windows of the dataset of a lightfield.json, or takes them from ``cache``.
+    """Renders windows of the views of a lightfield.json, or takes them from the folder ``cache``.
 
-    Blender starts only when something has to be rendered, or to see what ``auto`` is here. In a
-    process one renders after the other: after another has rendered, this one must not. With
-    ``parts`` it is a pilot.
+    Blender starts only to render, or to find out what the device ``auto`` is here. In a process,
+    `Trials` render one after the other: once another one has rendered, this one must not. With
+    ``parts`` it is a pilot, which renders the parts of the light and the materials, too.
     """
 
     def __init__(
@@ -106,18 +109,21 @@ class Trials:
         parts: bool = False,
     ) -> None:
         self.lens = lightfield.lens
-        # How many samples are taken, and why, is for each trial to say.
+        # Each trial sets its own samples, so a target error does not matter.
         render = passes.without(without_target(lightfield.render))
         if parts:
             render["passes"] = [*passes.PARTS_OF_LIGHT, "material"]
         self.lightfield = lightfield.changed(render=render)
-        self._blend, self._inventory = blend, inventory
-        self._device, self._threads, self._cache = device, threads, cache
+        self._blend = blend
+        self._inventory = inventory
+        self._device = device
+        self._threads = threads
+        self._cache = cache
         self._started = False
 
     @classmethod
     def of(cls, arguments: argparse.Namespace, lightfield: LightField) -> "Trials":
-        """Return what the arguments of `add_arguments` ask for."""
+        """Return the trials that the arguments of `add_arguments` ask for."""
         return cls(
             arguments.blend,
             arguments.inventory,
@@ -128,20 +134,26 @@ class Trials:
         )
 
     def on(self, device: str, lens: Lens) -> "Trials":
-        """Return what renders the same views on another device and through another lens."""
-        there = self.lightfield.changed(lens)
-        return Trials(self._blend, self._inventory, there, device, self._threads, self._cache)
+        """Return trials of the same views on another device and through another lens."""
+        lightfield = self.lightfield.changed(lens)
+        return Trials(self._blend, self._inventory, lightfield, device, self._threads, self._cache)
 
     def pilot(self, lens: Lens | None = None) -> "Trials":
-        """Return what renders the same views with the parts of their light, through a lens."""
-        there = self.lightfield.changed(lens)
-        on = (self._device, self._threads, self._cache)
-        return Trials(self._blend, self._inventory, there, *on, parts=True)
+        """Return trials that render the parts of the light of the same views, through a lens."""
+        return Trials(
+            self._blend,
+            self._inventory,
+            self.lightfield.changed(lens),
+            self._device,
+            self._threads,
+            self._cache,
+            parts=True,
+        )
 
     @cached_property
     def inventory(self) -> Any:
-        """What the scene contains, and how its .blend traces paths."""
-        return read_keys(self._inventory, "inventory.py", "left_out", "sampling", "volumes")
+        """What the scene contains, and how its .blend samples."""
+        return read_inventory(self._inventory, "left_out", "sampling", "volumes")
 
     @property
     def has_volumes(self) -> bool:
@@ -149,16 +161,16 @@ class Trials:
         return bool(self.inventory["volumes"])
 
     @property
-    def whole(self) -> Window:
-        """The first view, all of it."""
+    def first_view(self) -> Window:
+        """The whole first view."""
         return Window(self.lightfield.views[0], 0, 0, self.lens.width, self.lens.height)
 
     def render(self, window: Window, seed: int, sampling: Mapping[str, Any]) -> Trial:
         """Render a window under the render settings that ``sampling`` changes."""
         settings = {**self.lightfield.render, **PLAIN, **sampling, "seed": seed}
         place = [window.x, window.y, window.width, window.height]
-        one = self.lightfield.changed(render=settings, device=self._renders_on, window=place)
-        key = keys.render_key(one, window.view)
+        keyed = self.lightfield.changed(render=settings, device=self._renders_on, window=place)
+        key = keys.render_key(keyed, window.view)
         path = self._cache / f"{key[:32]}.exr"
         if not images.is_finished(path, key):
             self._render(window, settings, path, key)
@@ -176,7 +188,7 @@ class Trials:
         )
 
     def reference(self, window: Window, seeds: int, samples: int) -> Reference:
-        """Render a window with ``seeds`` seeds, ``samples`` samples each, and take their mean."""
+        """Return the mean of renders of a window with ``seeds`` seeds, ``samples`` samples each."""
         renders = [
             self.render(window, REFERENCE_SEED + number, {"samples": samples})
             for number in range(seeds)
@@ -193,38 +205,35 @@ class Trials:
         return inside
 
     def camera(self, view: View) -> Camera:
-        """Return where a view looks from, as `lightfield.validation.consistency` wants it."""
-        return Camera(self.lens, view.matrix, self.lightfield.cycles_depth)
+        """Return the camera of a view for `lightfield.validation.consistency`."""
+        return Camera(self.lens, view.matrix, conventional_depth(self.lens))
 
     def windows(self, size: int, count: int) -> list[Window]:
-        """Choose ``count`` windows of ``size``², spread evenly over the views and the image.
+        """Choose ``count`` windows of ``size``² pixels, spread evenly over the views and the image.
 
-        A view no larger than that is a window as a whole.
+        A view that is not larger is a window as a whole.
         """
         views = self.lightfield.views
         size = min(size, self.lens.width, self.lens.height)
-        found: list[Window] = []
+        chosen: list[Window] = []
         point = 0
         for number in range(count):
             view = views[int((number + 0.5) * len(views) / count)]
-            # In the corners of a fisheye view there is nothing.
-            tried: list[tuple[float, Window]] = []
-            while not tried or (tried[-1][0] < FULL_ENOUGH and len(tried) < MOST_PLACES):
-                # Roberts' R2 sequence, which fills a square evenly.
+            # The corners of a fisheye view have no pixels in the image circle.
+            places: list[tuple[float, Window]] = []
+            while not places or (places[-1][0] < FULL_ENOUGH and len(places) < MOST_PLACES):
                 point += 1
                 across, down = (point * step % 1 for step in R2)
-                x, y = (
-                    round(across * (self.lens.width - size)),
-                    round(down * (self.lens.height - size)),
-                )
+                x = round(across * (self.lens.width - size))
+                y = round(down * (self.lens.height - size))
                 window = Window(view, x, y, size, size)
-                tried.append((float(self.mask(window).mean()), window))
-            found.append(max(tried, key=lambda one: one[0])[1])
-        return found
+                places.append((float(self.mask(window).mean()), window))
+            chosen.append(max(places, key=lambda place: place[0])[1])
+        return chosen
 
     @cached_property
     def _renders_on(self) -> str:
-        """What the device is on this machine, where `auto` and `gpu` mean what is there."""
+        """The device on this machine, with its name for `auto` and `gpu`."""
         if self._device == "cpu":
             return "cpu"
         with processors.only(self._threads):
@@ -239,7 +248,7 @@ class Trials:
 
         if not self._started:
             self._start(settings)
-        # What the trial before this has changed is as the .blend has it again.
+        # Settings that an earlier trial changed go back to the .blend's own.
         cycles.set_sampling({**self.inventory["sampling"], **settings})
         cycles.set_window(window.x, window.y, window.width, window.height)
         seed = keys.view_seed(settings["seed"], window.view.name)
@@ -264,16 +273,16 @@ class Trials:
         )
 
     def _surfaces(self, materials: NDArray[np.uint16]) -> dict[str, NDArray[np.float32]]:
-        """Return the channels that say of each pixel's material, (h, w), what `SURFACES` has."""
+        """Return a channel for each of `SURFACES`, 1 or 0, from the numbers of materials (h, w)."""
         from lightfield.rendering import ids
 
         numbers = ids.names("material")
-        found = {}
+        channels = {}
         for surface, features in SURFACES.items():
-            named = {name for feature in features for name in self.inventory[feature]}
-            members = [number for name, number in numbers.items() if name in named]
-            found[f"{surface}.Y"] = np.isin(materials, members).astype(np.float32)
-        return found
+            names = {name for feature in features for name in self.inventory[feature]}
+            members = [number for name, number in numbers.items() if name in names]
+            channels[f"{surface}.Y"] = np.isin(materials, members).astype(np.float32)
+        return channels
 
     def _start(self, settings: Mapping[str, Any]) -> None:
         from lightfield.rendering import colour_pass, cycles
@@ -286,7 +295,7 @@ class Trials:
             self._threads,
         )
         colour_pass.watch_samples()
-        # The first render also loads what all others use; it is not timed.
+        # The first render also loads what all others use, so it does not count.
         cycles.set_sampling({**settings, "samples": 1, "denoise": True})
         cycles.set_window(0, 0, min(64, self.lens.width), min(64, self.lens.height))
         colour_pass.render_colour(self.lightfield.views[0].matrix, 0)
@@ -294,7 +303,7 @@ class Trials:
 
 
 def add_arguments(parser: argparse.ArgumentParser, lightfield: str) -> None:
-    """Add what a program that renders windows is asked for; ``lightfield`` says of which file."""
+    """Add the arguments of a program that renders windows; ``lightfield`` is a help text."""
     parser.add_argument("--blend", required=True, type=Path, help="the scene")
     parser.add_argument("--inventory", required=True, type=Path, help="what the scene contains")
     parser.add_argument("--lightfield", required=True, type=Path, help=lightfield)
@@ -302,47 +311,50 @@ def add_arguments(parser: argparse.ArgumentParser, lightfield: str) -> None:
         "--size",
         type=positive,
         default=WINDOW_SIZE,
-        help="of a window's sides (default: %(default)s)",
+        help="pixels of a window's sides (default: %(default)s)",
     )
     parser.add_argument("--device", default="auto", help="what Cycles renders on (default: auto)")
     parser.add_argument("--threads", type=positive, default=1, help="CPU threads (default: 1)")
-    parser.add_argument("--cache", required=True, type=Path, help="folder of what was rendered")
+    parser.add_argument("--cache", required=True, type=Path, help="folder that keeps the renders")
 
 
 def add_calibration(parser: argparse.ArgumentParser) -> None:
-    """Add what `own_settings` reads."""
+    """Add the argument that `read_arguments` reads beside those of `add_arguments`."""
     parser.add_argument(
         "--calibration", type=Path, help="what scripts/calibrate.py chose for a target error"
     )
 
 
-def own_settings(arguments: argparse.Namespace, lightfield: LightField) -> Mapping[str, Any]:
-    """Return a dataset's ``render`` block, with what was chosen for its target error.
+def read_arguments(arguments: argparse.Namespace) -> tuple[LightField, Trials]:
+    """Return the dataset, with the ``render`` settings that its views get, and its trials.
 
-    Raises `UserError` where it has one, and nothing says what was.
+    Settings that calibrate.py chose replace a target error. Raises `UserError` if the dataset has a
+    target error, and ``arguments`` name no calibration.
     """
+    lightfield = LightField.read(arguments.lightfield)
     if arguments.calibration:
-        return calibrated(lightfield.render, arguments.calibration)
-    if "samples" not in lightfield.render:
+        render = calibrated(lightfield.render, arguments.calibration)
+        lightfield = lightfield.changed(render=render)
+    elif "samples" not in lightfield.render:
         raise UserError(
             f"{arguments.lightfield}: render has a target error and no samples; "
             "give --calibration, what scripts/calibrate.py chose for it"
         )
-    return lightfield.render
+    return lightfield, Trials.of(arguments, lightfield)
 
 
 def nearest_view(views: Sequence[View], view: View) -> View | None:
-    """Return the nearest other view that looks the same way to within 70 degrees, if any."""
-    alike = math.cos(math.radians(70))
+    """Return the nearest other view whose direction differs by less than 70 degrees, if any."""
+    least_cosine = math.cos(math.radians(70))
     others = [
         (round(float(np.linalg.norm(other.matrix[:3, 3] - view.matrix[:3, 3])), 6), index)
         for index, other in enumerate(views)
-        if other.name != view.name and other.matrix[:3, 2] @ view.matrix[:3, 2] > alike
+        if other.name != view.name and other.matrix[:3, 2] @ view.matrix[:3, 2] > least_cosine
     ]
     return views[min(others)[1]] if others else None
 
 
-# Two depths of one surface differ by less than this part: pixels are coarse.
+# Two depths of one surface differ by less than this part, because pixels are coarse.
 SAME_DEPTH = 0.03
 
 
@@ -351,24 +363,25 @@ def both_see(
     windows: tuple[Window, Window],
     references: tuple[Reference, Reference],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Find surfaces that two windows see: flat indices (n,) of pixels of the one and of the other.
+    """Return the pixels of surfaces that two windows see, as flat indices (n,) into each window.
 
-    The first one's pixels are lifted by depth and looked up in the second; those that its depth
-    says are hidden there are left out. Both references need depth.
+    Lifts the first window's pixels by their depth, and looks them up in the second. Pixels that the
+    second one's depth hides are left out. Both references need depth.
     """
     first, second = cameras
-    here, there = windows
+    window, other_window = windows
     depths = references[0].depth, references[1].depth
     assert depths[0] is not None and depths[1] is not None
     rows, columns = np.nonzero(references[0].mask & np.isfinite(depths[0]))
-    points = first.lift(depths[0][rows, columns], columns + here.x, rows + here.y)
-    x, y = (second.pixels(points) - (there.x, there.y)).T
+    points = first.lift(depths[0][rows, columns], columns + window.x, rows + window.y)
+    x, y = (second.pixels(points) - (other_window.x, other_window.y)).T
     with np.errstate(invalid="ignore"):
-        inside = (x >= 0) & (x < there.width) & (y >= 0) & (y < there.height)
+        inside = (x >= 0) & (x < other_window.width) & (y >= 0) & (y < other_window.height)
     across, down = (np.where(inside, value, 0).astype(np.int64) for value in (x, y))
     inside &= references[1].mask[down, across]
-    seen = second.lift(depths[1][down, across], across + there.x, down + there.y)
+    seen = second.lift(depths[1][down, across], across + other_window.x, down + other_window.y)
     with np.errstate(invalid="ignore"):
-        expected, found = (np.linalg.norm(p - second.position, axis=1) for p in (points, seen))
-        same = inside & (np.abs(found / expected - 1) < SAME_DEPTH)
-    return (rows * here.width + columns)[same], (down * there.width + across)[same]
+        distance = np.linalg.norm(points - second.position, axis=1)
+        seen_distance = np.linalg.norm(seen - second.position, axis=1)
+        same = inside & (np.abs(seen_distance / distance - 1) < SAME_DEPTH)
+    return (rows * window.width + columns)[same], (down * other_window.width + across)[same]

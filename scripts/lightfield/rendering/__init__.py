@@ -1,1 +1,1 @@
-"""Views from Blender: the one room that imports bpy."""
+"""Renders views with Blender. No other package imports bpy."""

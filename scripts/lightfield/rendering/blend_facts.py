@@ -15,8 +15,11 @@ def facts(frames: Iterable[int | None]) -> dict[str, Any]:
     Raises `UserError` where the camera has not the same lens at all of them.
     """
     scene = bpy.context.scene
-    layer, render, cycles = view_layer(scene), scene.render, scene.cycles
-    view, frame = scene.view_settings, scene.frame_current
+    layer = view_layer(scene)
+    render = scene.render
+    cycles = scene.cycles
+    view = scene.view_settings
+    frame = scene.frame_current
     nodes = scene.compositing_node_group
     camera = _camera([frame if number is None else number for number in frames] or [frame])
     scene.frame_set(frame)
@@ -40,6 +43,7 @@ def facts(frames: Iterable[int | None]) -> dict[str, Any]:
         "exposure": round(view.exposure, 4),
         "gamma": round(view.gamma, 4),
         "curves": bool(view.use_curve_mapping),
+        "pixel_aspect": round(render.pixel_aspect_x / render.pixel_aspect_y, 4),
         "border": bool(render.use_border),
         "stereoscopy": bool(render.use_multiview),
         "freestyle": bool(render.use_freestyle),
@@ -52,11 +56,16 @@ def facts(frames: Iterable[int | None]) -> dict[str, Any]:
 
 
 def _samples(cycles: Any, layer: Any) -> int:
-    """Return the samples of a pixel; a view layer may have a number, or a bound, of its own."""
-    own, all_layers = int(layer.samples), int(cycles.samples)
-    if not own or cycles.use_layer_samples == "IGNORE":
-        return all_layers
-    return min(own, all_layers) if cycles.use_layer_samples == "BOUNDED" else own
+    """Return the samples of a pixel. A view layer may set another number, or a bound."""
+    layer_samples = int(layer.samples)
+    scene_samples = int(cycles.samples)
+    if not layer_samples or cycles.use_layer_samples == "IGNORE":
+        return scene_samples
+    return (
+        min(layer_samples, scene_samples)
+        if cycles.use_layer_samples == "BOUNDED"
+        else layer_samples
+    )
 
 
 def _camera(frames: list[int]) -> dict[str, Any] | None:
@@ -65,7 +74,10 @@ def _camera(frames: list[int]) -> dict[str, Any] | None:
     None where the scene has no camera. A marker may change the camera with the frame.
     """
     scene = bpy.context.scene
-    lenses, matrices, names, clips = [], {}, [], []
+    lenses = []
+    matrices = {}
+    names = []
+    clips = []
     for frame in sorted(set(frames)):
         scene.frame_set(frame)
         if scene.camera is None:

@@ -1,4 +1,4 @@
-"""Scenes from and to .blend files: opened with their scripts disabled, saved whole."""
+"""Opens scenes from .blend files, with their scripts disabled, and saves scenes."""
 
 import struct
 from collections.abc import Mapping, Sequence
@@ -16,12 +16,12 @@ from lightfield.rendering.quiet import quiet
 
 
 def new_scene() -> None:
-    """Start from an empty scene with one empty world-less view layer."""
+    """Open an empty scene without a world, with one empty view layer."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
 
 
 def save_scene(path: Path) -> None:
-    """Save the current scene as a compressed .blend without backup copies; OSError if it fails."""
+    """Save the current scene as a compressed .blend, without backups. Raises OSError."""
     bpy.context.preferences.filepaths.save_version = 0
     try:
         with quiet():
@@ -32,19 +32,20 @@ def save_scene(path: Path) -> None:
 
 
 def _check_blend(path: Path) -> None:
-    """Raise an OSError for a compressed .blend that is cut short, of which Blender says nothing.
+    """Raise an OSError for a compressed .blend that is cut short. Blender itself does not.
 
-    It ends with the table of its Zstandard frames: see "Zstandard Seekable Format" of the zstd
-    project. A head of 8 bytes, 8 bytes a frame of which the first 4 are its compressed length, and
-    9 bytes, which begin with the number of frames and end with a magic number.
+    The file ends with a table of its Zstandard frames; see "Zstandard Seekable Format" of the zstd
+    project. The table has a head of 8 bytes, 8 bytes for each frame, and a foot of 9 bytes. The
+    first 4 bytes for a frame are its compressed length. The foot begins with the number of frames,
+    and ends with a magic number.
     """
     content = path.read_bytes()
-    whole = content.endswith(b"\xb1\xea\x92\x8f")
-    if whole:
+    is_complete = content.endswith(b"\xb1\xea\x92\x8f")
+    if is_complete:
         count = int.from_bytes(content[-9:-5], "little")
         lengths = struct.unpack(f"<{2 * count}I", content[-9 - 8 * count : -9])[::2]
-        whole = len(content) == sum(lengths) + 8 + 8 * count + 9
-    if not whole:
+        is_complete = len(content) == sum(lengths) + 8 + 8 * count + 9
+    if not is_complete:
         raise OSError("the file is cut short")
 
 
@@ -53,13 +54,13 @@ def open_scene(
     chosen: Mapping[str, Any] = MappingProxyType({}),
     inventory: Mapping[str, Any] | None = None,
 ) -> list[str]:
-    """Open a .blend with its scripts disabled, and return the names of the view layers rendered.
+    """Open a .blend with its scripts disabled. Return the names of the view layers to render.
 
-    These and the scene are those of ``scene_name`` and ``view_layers`` in ``chosen``, a scene
-    YAML's ``scene`` block. With a view store the files that it reads, by its ``inventory``, are
-    taken from there. Raises `UserError` if Blender cannot read the file, or would lose what it does
-    not know: where a newer version saved it, or a library that it links; and where what is chosen
-    is not there.
+    ``chosen`` is a scene YAML's ``scene`` block, whose ``scene_name`` and ``view_layers`` choose
+    the scene and its view layers. With a view store, the external files in ``inventory`` are taken
+    from there. Raises `UserError` if Blender cannot read the file, if the scene or a view layer is
+    missing, or if a newer version saved the file or a library that it links: Blender would lose
+    what it does not know.
     """
     _take_files(path, inventory or {})
     here = bpy.app.version_string
@@ -85,7 +86,7 @@ def open_scene(
 
 
 def _take_files(path: Path, inventory: Mapping[str, Any]) -> None:
-    """Take from the view store, if there is one, the files that the .blend at ``path`` reads."""
+    """Fetch the files that the .blend at ``path`` reads from the view store, if there is one."""
     store = ViewStore.configured()
     if store is None:
         return
@@ -98,36 +99,36 @@ def _take_files(path: Path, inventory: Mapping[str, Any]) -> None:
 
 
 def _choose(scene_name: str | None, view_layers: str | Sequence[str] | None) -> list[str]:
-    """Make a scene the current one, and some of its view layers the only one that is in use."""
+    """Make a scene the current one, and join its chosen view layers. Return their names."""
     window = bpy.context.window
     if scene_name is not None:
         if scene_name not in bpy.data.scenes:
-            known = ", ".join(scene.name for scene in bpy.data.scenes)
-            raise UserError(f"scene_name: is {scene_name!r}; must be one of {known}")
+            names = ", ".join(scene.name for scene in bpy.data.scenes)
+            raise UserError(f"scene_name: is {scene_name!r}; must be one of {names}")
         window.scene = bpy.data.scenes[scene_name]
-    found = window.scene.view_layers
-    layers = [layer for layer in found if layer.use] or [found[0]]
+    all_layers = window.scene.view_layers
+    layers = [layer for layer in all_layers if layer.use] or [all_layers[0]]
     if view_layers is None:
         layers = layers[:1]
     elif view_layers != "all":
         for name in view_layers:
-            if name not in found:
-                known = ", ".join(layer.name for layer in found)
-                raise UserError(f"view_layers: {name!r} is none of {known}")
-        layers = [found[name] for name in view_layers]
+            if name not in all_layers:
+                names = ", ".join(layer.name for layer in all_layers)
+                raise UserError(f"view_layers: {name!r} is none of {names}")
+        layers = [all_layers[name] for name in view_layers]
     _join(layers)
     # Keyframes may turn view layers on and off.
     animation.mute(window.scene, ("view_layers[",))
-    for layer in found:
+    for layer in all_layers:
         layer.use = layer == layers[0]
     window.view_layer = layers[0]
     return [layer.name for layer in layers]
 
 
 def _join(layers: Sequence[Any]) -> None:
-    """Let the first of some view layers show each collection that any of them shows.
+    """Make the first of some view layers show all collections that any of them shows.
 
-    One is a holdout, or there for indirect light alone, where it is so in all that show it.
+    A collection is a holdout, or for indirect light only, if it is so in all layers that show it.
     """
     overrides = {(layer.material_override, layer.world_override) for layer in layers}
     if len(overrides) > 1:
@@ -150,7 +151,7 @@ def _join(layers: Sequence[Any]) -> None:
 
     if len(layers) > 1:
         visit([layer.layer_collection for layer in layers])
-    # From the outside in, for a collection takes those inside it along.
+    # Outer collections first, because a collection changes those inside it.
     for part, exclude, holdout, indirect in settings:
         if part.exclude != exclude:
             part.exclude = exclude

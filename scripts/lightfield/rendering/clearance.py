@@ -1,8 +1,8 @@
-"""How near each camera is to geometry, and which objects it stands inside of."""
+"""How near each camera is to geometry, and which objects enclose it."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -20,19 +20,21 @@ from lightfield.rendering.volumes import alone
 
 Floats = NDArray[np.float64]
 
-# Geometry farther than this from a camera, in metres, is not looked for.
+# How far from a camera geometry is looked for, in metres.
 REACH = 0.5
-# Nearer than this it counts as touching.
+# Geometry nearer than this touches the camera.
 TOUCHING = 0.001
-# How many places each camera of a random rig tries, and how many say what the box is inside of.
+# How many places each camera of a random rig tries, and how many samples say what encloses the box.
 _TRIES = 100
 _SAMPLES = 64
+# How many rays from a camera find out what encloses it.
+_RAYS = len(icosphere(1))
 
 
 def show_what_is_rendered() -> None:
-    """Let the viewport, in which what follows looks, have what a render shows, less its volumes.
+    """Make the viewport show what a render of the current frame shows, without its volumes.
 
-    A render is meant at the present frame.
+    The functions below look for geometry in the viewport.
     """
     shown = in_render(_shown) - alone()
     layer = bpy.context.view_layer
@@ -92,35 +94,70 @@ def instances() -> Iterator[tuple[Any, Any, Floats, Floats]]:
         yield thing.data, matrix, corners.min(axis=0), corners.max(axis=0)
 
 
-def enclosing_objects(positions: Floats) -> Sequence[str | None]:
-    """Return for each camera the name of the object that it is inside of, or None.
+class Enclosure(NamedTuple):
+    """An object that encloses a camera, so that the camera sees the backs of its faces.
 
-    What has the whole rig inside it is a room, not an obstacle.
+    ``share`` is the part of all directions in which the camera sees such a back first. An open mesh
+    may be a room without a wall, a dome, a backdrop, or an obstacle.
     """
-    found = enclosures(positions)
-    rooms = {name for name in found if name and found.count(name) == len(found)}
-    return [None if name in rooms else name for name in found]
+
+    name: str
+    share: float
+    is_open: bool
+
+
+def enclosing_objects(enclosures: Sequence[Enclosure | None]) -> Sequence[str | None]:
+    """Return for each camera the name of the closed object that encloses it, or None.
+
+    An object that encloses the whole rig is a room, not an obstacle.
+    """
+    names = _objects_around(enclosures)
+    rooms = {name for name in names if name and names.count(name) == len(names)}
+    rooms.update(enclosure.name for enclosure in enclosures if enclosure and enclosure.is_open)
+    return [None if name in rooms else name for name in names]
+
+
+def open_mesh_warnings(enclosures: Sequence[Enclosure | None]) -> Iterator[str]:
+    """Yield a line if cameras are inside open meshes."""
+    meshes = [enclosure.name for enclosure in enclosures if enclosure and enclosure.is_open]
+    if not meshes:
+        return
+    names = sorted(set(meshes))
+    yield (
+        f"{len(meshes)} of {len(enclosures)} cameras are inside an open mesh: "
+        f"{', '.join(names[:8])}{' …' if len(names) > 8 else ''}: they see the backs of its faces, "
+        "and it cannot be told whether it is a room or an obstacle; turn its normals inwards if "
+        "it is a room, or move the rig"
+    )
+
+
+def _objects_around(enclosures: Sequence[Enclosure | None]) -> list[str | None]:
+    """Return for each camera the name of the object whose back most of its rays meet, or None."""
+    return [
+        enclosure.name if enclosure and enclosure.share > 1 / 2 else None
+        for enclosure in enclosures
+    ]
 
 
 def free_places(rig: Random) -> Floats:
-    """Return the first place (n, 3) in the unit box that is free for each camera of a rig.
+    """Return the places (n, 3) in the unit box of a rig's cameras: the first free one of each.
 
-    What has most of the box inside it is a room, not an obstacle. Raises `UserError` where a camera
-    finds no place.
+    An object that encloses most of the box is a room, not an obstacle. Raises `UserError` if a
+    camera finds no free place.
     """
     box = rig.to_world(np.random.default_rng(rig.seed).random((_SAMPLES, 3)) - 0.5)
-    around = Counter(enclosures(box))
+    around = Counter(_objects_around(enclosures(box)))
     rooms = {name for name, count in around.items() if count > _SAMPLES / 2}
     places = np.full((rig.count, 3), np.nan)
     progress = Progress(rig.count, "places", "cameras")
     for number in range(_TRIES):
         left = np.flatnonzero(np.isnan(places[:, 0]))
-        tried = np.array([rig.candidate(int(view), number) for view in left])
-        world = rig.to_world(tried)
+        candidates = np.array([rig.candidate(int(view), number) for view in left])
+        world = rig.to_world(candidates)
         free = clearances(world, rig.clearance) >= rig.clearance
-        inside = [name not in {None, *rooms} for name in enclosures(world)]
+        inside = [name not in {None, *rooms} for name in _objects_around(enclosures(world))]
         free &= ~np.array(inside)
-        places[left[free]] = tried[free]
+        places[left[free]] = candidates[free]
         progress.done(int(free.sum()))
         if free.all():
             return places
@@ -130,22 +167,57 @@ def free_places(rig: Random) -> Floats:
     )
 
 
-def enclosures(positions: Floats) -> list[str | None]:
-    """Return for each camera the name of the object, or room, that it is inside of, or None.
+def enclosures(positions: Floats) -> list[Enclosure | None]:
+    """Return for each camera the object, or room, that encloses it, or None.
 
-    A camera is inside an object if most rays from it first meet that object's back.
+    An object encloses a camera if most rays from the camera meet the object's back first. For an
+    open mesh a third of the rays suffices, if few others meet its fronts: leaves would show both.
+    The camera must then lie in the mesh's bounding box, which is flat for a plane, and some ray
+    must miss the mesh.
     """
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    directions = [Vector(vertex).normalized() for vertex in icosphere(1)]
-    found: list[str | None] = []
+    around_each: list[Enclosure | None] = []
     for position in positions:
-        backs: Counter[str] = Counter()
-        for direction in directions:
-            hit, _, normal, _, thing, _ = bpy.context.scene.ray_cast(
-                depsgraph, Vector(position), direction
-            )
-            if hit and normal.dot(direction) > 0:
-                backs[thing.name] += 1
+        hits = _first_hits(position, depsgraph)
+        backs = Counter(hit.thing.name for hit in hits if hit.is_back)
         name, count = backs.most_common(1)[0] if backs else ("", 0)
-        found.append(name if count > len(directions) / 2 else None)
-    return found
+        of_object = [hit for hit in hits if hit.thing.name == name]
+        share = count / _RAYS
+        sees_backs = share >= 1 / 3 and count >= 0.75 * len(of_object)
+        is_open = sees_backs and _is_within_open(position, of_object[0], depsgraph)
+        is_inside = is_open or share > 1 / 2
+        around_each.append(Enclosure(name, share, is_open) if is_inside else None)
+    return around_each
+
+
+class _Hit(NamedTuple):
+    """What a ray meets first: an object, or an instance of it, with its world matrix."""
+
+    thing: Any
+    matrix: Any
+    is_back: bool
+
+
+def _first_hits(position: Floats, depsgraph: Any) -> list[_Hit]:
+    """Return what `_RAYS` rays from a camera in all directions meet first."""
+    hits = []
+    for vertex in icosphere(1):
+        direction = Vector(vertex).normalized()
+        hit, _, normal, _, thing, matrix = bpy.context.scene.ray_cast(
+            depsgraph, Vector(position), direction
+        )
+        if hit:
+            hits.append(_Hit(thing, matrix, normal.dot(direction) > 0))
+    return hits
+
+
+def _is_within_open(position: Floats, hit: _Hit, depsgraph: Any) -> bool:
+    """Return whether a camera is in an object's bounding box, and some ray does not meet it."""
+    thing = hit.thing.evaluated_get(depsgraph)
+    inverse = hit.matrix.inverted_safe()
+    local = inverse @ Vector(position)
+    corners = np.array(thing.bound_box)
+    if not np.all(np.abs(np.array(local) - corners.mean(axis=0)) < np.ptp(corners, axis=0) / 2):
+        return False
+    directions = (inverse.to_3x3() @ Vector(vertex) for vertex in icosphere(2))
+    return any(not thing.ray_cast(local, direction)[0] for direction in directions)

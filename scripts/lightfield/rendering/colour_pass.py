@@ -47,30 +47,30 @@ def render_colour(
     """
     watched = view_layer(bpy.context.scene).cycles.pass_debug_sample_count
     _reports.clear()
-    wanted = [found for found in passes if found.of_colour]
+    wanted = [rendered for rendered in passes if rendered.of_colour]
     needed = {
         name: "rgba" if each.kind == "matte" else "RGB" for each in wanted for name in each.needed
     }
     needed |= {"Combined": "RGBA" if alpha else "RGB"} | ({_COUNTS: "X"} if watched else {})
-    found = render_view(world_matrix, seed, needed)
+    rendered = render_view(world_matrix, seed, needed)
     samples = None
     if watched:
         # The pass holds each pixel's part of all samples.
-        samples = np.rint(found.passes[_COUNTS][..., 0] * max(count for _, count in _reports))
-    made = {each.name: _composed(each, found.passes) for each in wanted}
+        samples = np.rint(rendered.passes[_COUNTS][..., 0] * max(count for _, count in _reports))
+    made = {each.name: _composed(each, rendered.passes) for each in wanted}
     to_rec_709 = _to_rec_709()
     if to_rec_709 is not None:
         lights = [made[each.name] for each in wanted if each.kind == "light"]
-        for pixels in (found.passes["Combined"], *lights):
+        for pixels in (rendered.passes["Combined"], *lights):
             pixels[..., :3] = pixels[..., :3] @ to_rec_709.T
     return Colour(
-        pixels=found.passes["Combined"],
+        pixels=rendered.passes["Combined"],
         passes=made,
-        manifest=_manifest(found.attributes),
+        manifest=_manifest(rendered.attributes),
         samples=samples,
         worked_seconds=_reports[-1][0] - _reports[0][0] if _reports else None,
-        render_seconds=found.render_seconds,
-        synchronization_seconds=found.synchronization_seconds,
+        render_seconds=rendered.render_seconds,
+        synchronization_seconds=rendered.synchronization_seconds,
     )
 
 

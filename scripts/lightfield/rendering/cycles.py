@@ -1,4 +1,4 @@
-"""Cycles, set up once for all views of a light field: sampling, device, camera, passes."""
+"""Sets Cycles up once for all views of a light field: sampling, device, camera, passes."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -12,14 +12,14 @@ from lightfield.core.machine import describe
 from lightfield.dataset.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.dataset.passes import Pass
 from lightfield.geometry.rigs.rig import EYES
-from lightfield.rendering import animation, blend_file, ids, instances, pruning, volumes
+from lightfield.rendering import animation, blend_file, drawings, ids, instances, pruning, volumes
 
-# In the order in which `auto` tries them.
+# `auto` tries them in this order.
 GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
 
 CAMERA_NAME = "plenoforge_camera"
 
-# How paths are traced, by the keys of ``render`` blocks: what they leave out is as in the .blend.
+# Cycles' settings by the keys of ``render`` blocks. Without a key the .blend's own value stays.
 SAMPLING = {
     "max_bounces": "max_bounces",
     "clamp_indirect": "sample_clamp_indirect",
@@ -27,7 +27,7 @@ SAMPLING = {
     "guiding": "use_guiding",
 }
 
-# What of Cycles' passes a view's geometry is, and their channels.
+# The passes of Cycles that make up a view's geometry, and their channels.
 GEOMETRY_PASSES = {"Depth": "Z", "Normal": "XYZ", "Object Index": "X", "Material Index": "X"}
 
 
@@ -38,15 +38,15 @@ def set_up(
     device: str,
     threads: int,
 ) -> str:
-    """Open a scene and set it up for the views of a light field; returns what it renders on.
+    """Open a scene and set it up for the views of a light field. Return its device: CPU or GPU.
 
-    That is CPU or GPU. What the scene's ``inventory`` has found that no pixel depends on is left
-    out. Raises `UserError` if the scene cannot be opened or the ``device`` is not there.
+    Leaves out what no pixel depends on, as the scene's ``inventory`` says. Raises `UserError` if
+    the scene cannot be opened, or if the ``device`` is missing.
     """
     left_out = inventory["left_out"] if inventory else []
     blend_file.open_scene(blend, lightfield.content.get("scene", {}), inventory)
     passes = lightfield.passes
-    numbered = [found.name for found in passes if found.kind == "id"]
+    numbered = [each.name for each in passes if each.kind == "id"]
     if inventory and "hidden_objects" in left_out:
         pruning.remove_objects(inventory["hidden"])
     elif numbered and not inventory:
@@ -55,7 +55,7 @@ def set_up(
     for kind in {"object" if kind == "instance" else kind for kind in numbered}:
         ids.assign(kind)
     scene = bpy.context.scene
-    # At this frame a marker may choose the artist's camera, and later none may.
+    # A marker may choose the artist's camera at this frame. From here on none may choose another.
     scene.frame_set(lightfield.frame)
     focused = scene.camera if lightfield.render.get("depth_of_field") else None
     for marker in scene.timeline_markers:
@@ -68,6 +68,7 @@ def set_up(
     _set_passes(scene, passes)
     _use_device(scene, device)
     _set_camera(scene, lightfield.content)
+    drawings.set_up(view_layer(scene), scene.camera.data.type)
     volumes.alone.cache_clear()
     volumes.alone()
     if "instance" in numbered:
@@ -77,14 +78,14 @@ def set_up(
         _set_eyes(scene, lightfield.content[OMNIDIRECTIONAL])
     if focused:
         _set_focus(scene.camera.data, focused)
-    if any(found.kind == "motion" for found in passes):
+    if any(each.kind == "motion" for each in passes):
         left_out = [name for name in left_out if name != "animation"]
     pruning.leave_out(left_out)
     return str(scene.cycles.device)
 
 
 def _set_quality(settings: Mapping[str, Any]) -> None:
-    """Set what a scene YAML's ``render`` block says; what it does not stays as in the .blend."""
+    """Apply a scene YAML's ``render`` block. All else stays as in the .blend."""
     set_sampling(settings)
     cycles = bpy.context.scene.cycles
     cycles.use_animated_seed = False
@@ -98,7 +99,7 @@ def _set_quality(settings: Mapping[str, Any]) -> None:
 
 
 def _set_output(scene: Any, lightfield: LightField, threads: int) -> None:
-    """Let Cycles keep the scene in memory and write all passes, whole and in 32-bit floats."""
+    """Make Cycles keep the scene in memory, and write all passes complete, in 32-bit floats."""
     render = scene.render
     render.use_persistent_data = True
     render.threads_mode = "FIXED"
@@ -122,20 +123,20 @@ def _set_output(scene: Any, lightfield: LightField, threads: int) -> None:
 
 
 def _set_passes(scene: Any, passes: Iterable[Pass]) -> None:
-    """Make colour and what ``passes`` need, and nothing else that the artist had on.
+    """Turn on colour and the passes of Cycles that ``passes`` need, and turn all others off.
 
-    With them geometry and colour are rendered with the same passes: Cycles, which keeps the scene,
-    mixes some up when others come and go, as normals with numbers beside denoising.
+    If there are ``passes``, geometry and colour are rendered with the same passes of Cycles. Cycles
+    keeps the scene, and mixes passes up if others come and go: with denoising, normals and numbers.
     """
     layer = view_layer(scene)
     for owner in (layer, layer.cycles):
         for name in dir(owner):
             if name.startswith("use_pass_"):
                 setattr(owner, name, False)
-    needed = [name for found in passes for name in found.needed]
+    needed = [name for each in passes for name in each.needed]
     for name in ("Combined", *needed, *(GEOMETRY_PASSES if needed else ())):
         setattr(*pass_property(layer, name), True)
-    # Two objects in each of its passes.
+    # Each of its passes holds two objects.
     layer.pass_cryptomatte_depth = 6
     layer.cycles.denoising_store_passes = False
     layer.cycles.pass_debug_sample_count = False
@@ -146,7 +147,7 @@ def _set_passes(scene: Any, passes: Iterable[Pass]) -> None:
 
 
 def pass_property(layer: Any, name: str) -> tuple[Any, str]:
-    """Return where a view layer is asked for Cycles' pass of a name: the owner, its attribute."""
+    """Return the property that turns a pass of Cycles on: its owner, and its name there."""
     owner = layer.cycles if name.startswith("Volume ") else layer
     if name.startswith("CryptoObject"):
         return owner, "use_pass_cryptomatte_object"
@@ -155,7 +156,7 @@ def pass_property(layer: Any, name: str) -> tuple[Any, str]:
 
 
 def set_sampling(settings: Mapping[str, Any]) -> None:
-    """Set how paths are traced, and what is made of them, as ``render`` blocks have it."""
+    """Set sampling and denoising, by the keys of a ``render`` block."""
     cycles = bpy.context.scene.cycles
     cycles.samples = settings["samples"]
     cycles.use_adaptive_sampling = settings["adaptive_threshold"] > 0
@@ -172,32 +173,35 @@ def set_sampling(settings: Mapping[str, Any]) -> None:
 
 
 def sampling() -> dict[str, Any]:
-    """Return how paths are traced in the open scene, as ``render`` blocks would have it."""
+    """Return the sampling of the open scene, by the keys of a ``render`` block."""
     cycles = bpy.context.scene.cycles
     return {name: getattr(cycles, attribute) for name, attribute in SAMPLING.items()}
 
 
 def set_window(x: int, y: int, width: int, height: int) -> None:
-    """Let every view that follows consist of these pixels alone, (0, 0) being the top left one."""
+    """Render only these pixels of all following views. (0, 0) is the top left one."""
     render = bpy.context.scene.render
     render.use_border = render.use_crop_to_border = True
-    across, down = render.resolution_x, render.resolution_y
-    render.border_min_x, render.border_max_x = x / across, (x + width) / across
-    render.border_min_y, render.border_max_y = 1 - (y + height) / down, 1 - y / down
+    across = render.resolution_x
+    down = render.resolution_y
+    render.border_min_x = x / across
+    render.border_max_x = (x + width) / across
+    render.border_min_y = 1 - (y + height) / down
+    render.border_max_y = 1 - y / down
 
 
 def gpu(device: str) -> str | None:
-    """Return Cycles' name of the kind of GPU that a ``device`` means, or None for the processor.
+    """Return Cycles' name for the kind of GPU that a ``device`` means, or None for the processor.
 
-    "gpu" is any kind. Raises `UserError` where one is asked for that is not there.
+    "gpu" means any kind. Raises `UserError` if the machine has no such GPU.
     """
     preferences = bpy.context.preferences.addons["cycles"].preferences
     for name in {"auto": GPU_DEVICES, "gpu": GPU_DEVICES, "cpu": ()}.get(device, (device,)):
         try:
-            found = list(preferences.get_devices_for_type(name.upper()) or ())
+            entries = list(preferences.get_devices_for_type(name.upper()) or ())
         except (TypeError, ValueError):
             continue
-        if any(entry.type == name.upper() for entry in found):
+        if any(entry.type == name.upper() for entry in entries):
             return name.upper()
     if device == "gpu":
         raise UserError(
@@ -213,9 +217,9 @@ def gpu(device: str) -> str | None:
 
 
 def device_name(device: str) -> str:
-    """Return what a ``device`` means on this machine: cpu, or kind and model of the GPU.
+    """Return what a ``device`` means on this machine: cpu, or the kind and model of the GPU.
 
-    Raises `UserError` where one is asked for that is not there.
+    Raises `UserError` if the machine has no such GPU.
     """
     kind = _gpu_of_this_process(device)
     if not kind:
@@ -227,16 +231,16 @@ def device_name(device: str) -> str:
 def _gpu_of_this_process(device: str) -> str | None:
     """Return the kind of GPU that a ``device`` means, as `gpu` does.
 
-    Of several GPUs of a machine this process has one that no other process renders on.
+    If the machine has several GPUs, this process takes one that no other process renders on.
     """
     if device != "cpu":
-        # Before Cycles looks for them for the first time.
+        # Take the GPU before Cycles looks for GPUs for the first time.
         gpus.use_one()
     return gpu(device)
 
 
 def _use_device(scene: Any, device: str) -> None:
-    """Choose what Cycles renders on; a device that is asked for by name must be there."""
+    """Select Cycles' device. Raises `UserError` if a named device is missing."""
     kind = _gpu_of_this_process(device)
     scene.cycles.device = "GPU" if kind else "CPU"
     if kind:
@@ -247,7 +251,7 @@ def _use_device(scene: Any, device: str) -> None:
 
 
 def machine(denoise: bool) -> str:
-    """Return what of this machine changes bytes, with the GPU that Cycles renders on, if any."""
+    """Return what of this machine changes bytes, and the GPU that Cycles renders on, if any."""
     here = describe(denoise)
     if bpy.context.scene.cycles.device == "CPU":
         return here
@@ -257,7 +261,7 @@ def machine(denoise: bool) -> str:
 
 
 def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
-    """Make the camera of a lightfield.json's ``camera``, ``resolution`` and ``sensor_size``."""
+    """Set the camera up as the ``camera`` and sizes of a lightfield.json say."""
     intrinsics = lightfield["camera"]
     camera = bpy.data.cameras.new(CAMERA_NAME)
     camera.type = intrinsics["type"]
@@ -271,8 +275,9 @@ def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
         side = width if sensor_width >= sensor_height else height
         across, up = (side, side) if intrinsics["type"] == "PERSP" else (width, height)
         x, y = intrinsics["principal_point"]
-        camera.shift_x, camera.shift_y = (width / 2 - x) / across, (y - height / 2) / up
-    # Cycles clips a perspective view between these; nothing of a scene shall be cut away.
+        camera.shift_x = (width / 2 - x) / across
+        camera.shift_y = (y - height / 2) / up
+    # Cycles clips a perspective view between these. They must not cut anything away.
     camera.clip_start, camera.clip_end = 1e-4, 1e9
     if intrinsics["type"] == "PERSP":
         camera.lens_unit = "MILLIMETERS"
@@ -288,37 +293,41 @@ def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
 
 
 def _set_eyes(scene: Any, distance: float) -> None:
-    """Let the camera be a pair of eyes that go round its place, metres apart."""
-    scene.render.use_multiview, scene.render.views_format = True, "STEREO_3D"
+    """Make the camera a stereo pair for omnidirectional stereo, ``distance`` metres apart."""
+    scene.render.use_multiview = True
+    scene.render.views_format = "STEREO_3D"
     scene.render.views["right"].use = False
     eyes = scene.camera.data.stereo
-    eyes.use_spherical_stereo, eyes.use_pole_merge = True, False
-    eyes.interocular_distance, eyes.convergence_mode, eyes.pivot = distance, "PARALLEL", "CENTER"
+    eyes.use_spherical_stereo = True
+    eyes.use_pole_merge = False
+    eyes.interocular_distance = distance
+    eyes.convergence_mode = "PARALLEL"
+    eyes.pivot = "CENTER"
 
 
 def choose_eye(name: str) -> None:
-    """Render the next view, of this ``name``, with the eye that it is of, if it is of one."""
+    """Make the next render one of the eye of view ``name``, if the rig has eyes."""
     render = bpy.context.scene.render
     for eye in EYES if render.use_multiview else ():
         render.views[eye].use = name.endswith(f"_{eye}")
 
 
 def _set_focus(lens: Any, camera: Any) -> None:
-    """Give a camera the aperture and focus of the artist's ``camera`` at the present frame."""
-    own = camera.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    """Give a camera the aperture and focus of the artist's ``camera`` at the current frame."""
+    evaluated = camera.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     if lens.type == "PANO":
-        # From which Cycles has the aperture's width, and in a panorama nothing else.
-        lens.lens = own.lens
+        # For a panorama, Cycles computes only the width of the aperture from it.
+        lens.lens = evaluated.lens
     for name in ("aperture_fstop", "aperture_blades", "aperture_rotation", "aperture_ratio"):
-        setattr(lens.dof, name, getattr(own.dof, name))
+        setattr(lens.dof, name, getattr(evaluated.dof, name))
     lens.dof.focus_object = camera.data.dof.focus_object
     lens.dof.focus_subtarget = camera.data.dof.focus_subtarget
-    lens.dof.focus_distance = own.dof.focus_distance
+    lens.dof.focus_distance = evaluated.dof.focus_distance
     lens.dof.use_dof = True
 
 
 def view_layer(scene: Any) -> Any:
-    """Return the one view layer that is rendered: the first that the .blend has in use."""
+    """Return the view layer to render, the first that the .blend uses, and turn the others off."""
     layer = next((layer for layer in scene.view_layers if layer.use), scene.view_layers[0])
     for other in scene.view_layers:
         other.use = other == layer

@@ -46,8 +46,8 @@ def external_files() -> list[dict[str, Any]]:
     A file that is not there has None for these: that it has come is noticed, too.
     """
     home = Path(bpy.data.filepath).parent
-    found = {file for block, path in _read() for file in _files(block, path)}
-    return [_entry(file, home) for file in sorted(found)]
+    files = {file for block, path in _read() for file in _files(block, path)}
+    return [_entry(file, home) for file in sorted(files)]
 
 
 def problems(images: Collection[Any]) -> list[dict[str, str]]:
@@ -58,11 +58,11 @@ def problems(images: Collection[Any]) -> list[dict[str, str]]:
     """
     home = Path(bpy.data.filepath).parent
     users = bpy.data.user_map()
-    found = []
+    problem_entries = []
 
     def note(block: Any, kind: str, path: Path, problem: str) -> None:
         name = {"kind": kind, "name": block.name}
-        found.append(name | {"path": _from(home, path), "problem": problem})
+        problem_entries.append(name | {"path": _from(home, path), "problem": problem})
 
     for block, path in _read():
         if not _is_needed(block, images, users):
@@ -75,7 +75,7 @@ def problems(images: Collection[Any]) -> list[dict[str, str]]:
         if block.library and block.is_missing and path_of(block.library).is_file():
             library = path_of(block.library)
             note(block, f"linked {type(block).__name__.lower()}", library, "not in its library")
-    return sorted(found, key=lambda entry: (entry["kind"], entry["path"], entry["name"]))
+    return sorted(problem_entries, key=lambda entry: (entry["kind"], entry["path"], entry["name"]))
 
 
 def put(blend: Path, files: Iterable[Mapping[str, Any]], store: ViewStore) -> None:
@@ -111,7 +111,9 @@ def _named() -> Iterator[tuple[Any, str]]:
     for block, paths in bpy.data.file_path_map().items():
         if type(block).__name__ in KINDS and not _is_packed(block):
             for path in sorted(paths):
-                yield block, path
+                # Blender lists it for all particles, also where their cache is in the .blend.
+                if not (isinstance(block, bpy.types.Object) and _is_cache_folder(block, path)):
+                    yield block, path
     # Blender lists the names that stand in a node, and not those that a modifier gives to it.
     for thing in bpy.data.objects:
         for modifier in _nodes(thing):
@@ -137,8 +139,8 @@ def _read() -> Iterator[tuple[Any, str]]:
     """Yield each data-block that reads a file, and the path as Blender has it, absolute."""
     for block, path in _named():
         yield block, bpy.path.abspath(path, library=block.library)
-    folder = Path(bpy.data.filepath).parent / f"blendcache_{Path(bpy.data.filepath).stem}"
     for thing in bpy.data.objects:
+        folder = _cache_folder(thing)
         caches = [getattr(modifier, "point_cache", None) for modifier in thing.modifiers]
         caches += [system.point_cache for system in thing.particle_systems]
         if any(cache and cache.use_disk_cache and not cache.use_external for cache in caches):
@@ -150,6 +152,17 @@ def _read() -> Iterator[tuple[Any, str]]:
                 # A bake may be in the .blend itself.
                 if Path(path).is_dir():
                     yield thing, path
+
+
+def _cache_folder(thing: Any) -> Path:
+    """Return the folder beside an object's .blend where Blender keeps its caches on disk."""
+    blend = path_of(thing.library) if thing.library else Path(bpy.data.filepath)
+    return blend.parent / f"blendcache_{blend.stem}"
+
+
+def _is_cache_folder(thing: Any, path: str) -> bool:
+    absolute = bpy.path.abspath(path, library=thing.library)
+    return bool(os.path.normpath(absolute) == os.path.normpath(_cache_folder(thing)))
 
 
 def _is_packed(block: Any) -> bool:

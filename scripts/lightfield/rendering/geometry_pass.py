@@ -69,13 +69,13 @@ def render_geometry(world_matrix: Array, motion: bool = False, apart: bool = Fal
     """
     wanted = GEOMETRY_PASSES | (_MOTION if motion else {})
     with _geometry_settings(wanted):
-        asked = wanted | (instances.CYCLES_PASSES if apart else {})
-        found = render_view(world_matrix, 0, asked)
-    depth = found.passes["Depth"]
+        cycles_passes = wanted | (instances.CYCLES_PASSES if apart else {})
+        rendered = render_view(world_matrix, 0, cycles_passes)
+    depth = rendered.passes["Depth"]
     # Cycles leaves values that are not a number where the lens sees nothing.
     hit = depth < MISS
     normal, objects, materials = (
-        np.where(hit, found.passes[name], np.float32(0))
+        np.where(hit, rendered.passes[name], np.float32(0))
         for name in ("Normal", "Object Index", "Material Index")
     )
     return Geometry(
@@ -83,10 +83,10 @@ def render_geometry(world_matrix: Array, motion: bool = False, apart: bool = Fal
         normal,
         objects[..., 0].astype(np.uint16),
         materials[..., 0].astype(np.uint16),
-        instances.decoded(found.passes, objects[..., 0].astype(int)) if apart else None,
-        np.where(hit, found.passes["Vector"] * _MOTION_SIGNS, np.float32(0)) if motion else None,
-        found.render_seconds,
-        found.synchronization_seconds,
+        instances.decoded(rendered.passes, objects[..., 0].astype(int)) if apart else None,
+        np.where(hit, rendered.passes["Vector"] * _MOTION_SIGNS, np.float32(0)) if motion else None,
+        rendered.render_seconds,
+        rendered.synchronization_seconds,
     )
 
 
@@ -98,6 +98,8 @@ def _geometry_settings(wanted: Iterable[str]) -> Iterator[None]:
     with ExitStack() as stack:
         for name, value in _SAMPLING.items():
             stack.enter_context(changed(scene.cycles, name, value))
+        # Blender's drawings would change all depths a little, and have none of the other passes.
+        stack.enter_context(changed(layer, "use_grease_pencil", False))
         stack.enter_context(changed(scene.render, "use_motion_blur", False))
         stack.enter_context(changed(scene.camera.data.dof, "use_dof", False))
         for name in wanted:

@@ -33,8 +33,8 @@ def assign(kind: str) -> None:
 
 def names(kind: str) -> dict[str, int]:
     """Return the numbers that `assign` has given, by full name."""
-    found = {str(block.name_full): int(block.pass_index) for block in _blocks(kind)}
-    return dict(sorted(found.items(), key=lambda item: item[1]))
+    numbers = {str(block.name_full): int(block.pass_index) for block in _blocks(kind)}
+    return dict(sorted(numbers.items(), key=lambda item: item[1]))
 
 
 def _blocks(kind: str) -> list[Any]:

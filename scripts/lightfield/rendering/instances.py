@@ -32,15 +32,17 @@ _NO_INDEX = 2**31 - 1
 
 @dataclass(frozen=True)
 class Instances:
-    """What the scene shows: number by name; and these in order, each with its object's index.
+    """What the scene shows at a frame: objects themselves, and instances of them.
 
-    ``own`` are those of the objects that are shown themselves, by their indices, which they are.
+    ``names`` maps the name of each to its number. ``numbers`` (n,) are the same numbers in order,
+    and ``objects`` (n,) the indices of their objects. ``shown_itself`` holds, by the index of an
+    object, the number of the object that is shown itself, or 0.
     """
 
     names: dict[str, int]
     numbers: Array
     objects: Array
-    own: Array
+    shown_itself: Array
 
 
 def set_up(layer: Any) -> None:
@@ -52,32 +54,35 @@ def set_up(layer: Any) -> None:
             material.node_tree.nodes.new("ShaderNodeGroup").node_tree = group
     for name, channels in CYCLES_PASSES.items():
         aov = layer.aovs.add()
-        aov.name, aov.type = name, "VALUE" if channels == "X" else "COLOR"
+        aov.name = name
+        aov.type = "VALUE" if channels == "X" else "COLOR"
 
 
 def _node_group() -> Any:
     """Return nodes that write the number into the channel of the layer that the ray has come to."""
     tree = bpy.data.node_groups.new("plenoforge_instance", "ShaderNodeTree")
-    nodes, link = tree.nodes, tree.links.new
+    nodes = tree.nodes
+    link = tree.links.new
     random = nodes.new("ShaderNodeObjectInfo").outputs["Random"]
     depth = nodes.new("ShaderNodeLightPath").outputs["Transparent Depth"]
     for first, name in enumerate(_COLOURS):
-        output, colour = nodes.new("ShaderNodeOutputAOV"), nodes.new("ShaderNodeCombineXYZ")
+        output = nodes.new("ShaderNodeOutputAOV")
+        colour = nodes.new("ShaderNodeCombineXYZ")
         output.aov_name = name
         link(colour.outputs[0], output.inputs["Color"])
         for place in range(3):
-            is_here, number = nodes.new("ShaderNodeMath"), nodes.new("ShaderNodeMath")
+            is_here = nodes.new("ShaderNodeMath")
+            number = nodes.new("ShaderNodeMath")
             is_here.operation, number.operation = "COMPARE", "MULTIPLY"
             link(depth, is_here.inputs[0])
-            is_here.inputs[1].default_value, is_here.inputs[2].default_value = (
-                3 * first + place,
-                0.5,
-            )
+            is_here.inputs[1].default_value = 3 * first + place
+            is_here.inputs[2].default_value = 0.5
             link(is_here.outputs[0], number.inputs[0])
             link(random, number.inputs[1])
             link(number.outputs[0], colour.inputs[place])
     count = nodes.new("ShaderNodeOutputAOV")
-    count.aov_name, count.inputs["Value"].default_value = _COUNT, 1
+    count.aov_name = _COUNT
+    count.inputs["Value"].default_value = 1
     return tree
 
 
@@ -85,14 +90,16 @@ def _node_group() -> Any:
 def shown() -> Instances:
     """Return what the opened scene shows at its frame."""
     entries = in_render(_entries)
-    own = np.zeros(max((thing.pass_index for thing in bpy.data.objects), default=0) + 1, np.uint32)
+    shown_itself = np.zeros(
+        max((thing.pass_index for thing in bpy.data.objects), default=0) + 1, np.uint32
+    )
     for number, index, is_instance in entries.values():
         if not is_instance:
-            own[index] = number
+            shown_itself[index] = number
     names = {name: number for name, (number, *_) in sorted(entries.items())}
     pairs = sorted((number, index) for number, index, _ in entries.values())
     numbers, objects = np.array(pairs, np.int64).reshape(-1, 2).T
-    return Instances(names, numbers, objects, own)
+    return Instances(names, numbers, objects, shown_itself)
 
 
 def _entries(depsgraph: Any) -> dict[str, tuple[int, int, bool]]:
@@ -102,7 +109,8 @@ def _entries(depsgraph: Any) -> dict[str, tuple[int, int, bool]]:
         thing = entry.object.original
         if has_no_surface(thing):
             continue
-        name, number = str(thing.name_full), int(thing.pass_index)
+        name = str(thing.name_full)
+        number = int(thing.pass_index)
         if entry.is_instance:
             places = [str(place) for place in entry.persistent_id if place != _NO_INDEX]
             name = f"{entry.parent.name_full} > {name} {' '.join(places)}"
@@ -118,13 +126,13 @@ def decoded(passes: dict[str, Array], objects: Array) -> Array:
     without a material shows is not written, nor beyond the last layer: there it is the object, if
     that is shown itself.
     """
-    found = shown()
+    instances = shown()
     layers = np.concatenate([passes[name] for name in _COLOURS], axis=-1).astype(np.float64)
     last = passes[_COUNT].astype(int).clip(1, LAYERS) - 1
     random = np.take_along_axis(layers, last, axis=-1)[..., 0]
     numbers = np.rint(random * 2.0**32).clip(0, _LARGEST).astype(np.uint32)
     # Only where it is a number of this object.
-    keys = found.numbers * 2**16 + found.objects
+    keys = instances.numbers * 2**16 + instances.objects
     wanted = numbers.astype(np.int64) * 2**16 + objects
     place = np.searchsorted(keys, wanted).clip(0, len(keys) - 1)
-    return np.where(keys[place] == wanted, numbers, found.own[objects])
+    return np.where(keys[place] == wanted, numbers, instances.shown_itself[objects])

@@ -61,11 +61,7 @@ def inventory(frames: Sequence[int]) -> dict[str, Any]:
         pruning.remove_unused()
     pruning.remove_objects(hidden)
     objects = list(bpy.data.objects)
-    materials = sorted(
-        {slot.material for thing in objects for slot in thing.material_slots if slot.material}
-        | set_by_nodes(),
-        key=lambda material: material.name_full,
-    )
+    materials = rendered_materials()
     lights = {thing.data for thing in objects if thing.type == "LIGHT"}
     features: dict[str, set[str]] = {name: set() for name in FEATURES}
     images = set()
@@ -127,11 +123,18 @@ def _triangles(depsgraph: Any) -> dict[str, int]:
     }
 
 
+def rendered_materials() -> list[Any]:
+    """Return the materials of all objects, by name."""
+    slots = [slot for thing in bpy.data.objects for slot in thing.material_slots]
+    materials = {slot.material for slot in slots if slot.material} | set_by_nodes()
+    return sorted(materials, key=lambda material: str(material.name_full))
+
+
 def set_by_nodes() -> set[Any]:
-    """Return the materials that geometry nodes give to what they make."""
+    """Return the materials that geometry nodes, or their modifiers' inputs, give to objects."""
     users = bpy.data.user_map(subset=list(bpy.data.materials))
-    kind = bpy.types.GeometryNodeTree
-    return {material for material in users if any(isinstance(u, kind) for u in users[material])}
+    kinds = (bpy.types.GeometryNodeTree, bpy.types.Object)
+    return {material for material in users if any(isinstance(u, kinds) for u in users[material])}
 
 
 def surface_features(shader: Any) -> Iterator[tuple[str | None, Any]]:

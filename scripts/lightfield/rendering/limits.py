@@ -60,7 +60,8 @@ def _meets_more(limit: int, position: Floats, clear: Collection[str]) -> bool:
     """Return whether a ray from a camera meets more than ``limit`` of the ``clear`` materials."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for vertex in icosphere(2):
-        place, direction = Vector(position), Vector(vertex).normalized()
+        place = Vector(position)
+        direction = Vector(vertex).normalized()
         for _ in range(limit + 1):
             hit, place, _, index, thing, _ = bpy.context.scene.ray_cast(depsgraph, place, direction)
             if not hit or _material(thing.evaluated_get(depsgraph), index) not in clear:

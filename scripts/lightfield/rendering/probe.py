@@ -22,7 +22,8 @@ def measure(
     Returns the dataset's ``views``, ``resolution`` and ``samples``, the ``device``, CPU or GPU, and
     for each probe what its view would take: ``view_seconds`` and ``view_bytes``.
     """
-    views, lens = lightfield.views, lightfield.lens
+    views = lightfield.views
+    lens = lightfield.lens
     small = lens.fitted(size)
     # One more than are counted.
     step = max(1, len(views) // (count + 1))

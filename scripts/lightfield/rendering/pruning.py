@@ -1,11 +1,11 @@
-"""What of a scene is left out of its rendering, because no pixel depends on it.
+"""Leaves out of a render what no pixel depends on.
 
-Only what keeps every byte of every view is left out, so none of it enters the render key, and only
-what saves measurably: benchmarks/pruning.py measures each of these, and what was tried and is not
-here (bounces of volumes, of transmission and of transparency where there are none: nothing saved).
+Leaving something out must not change a byte of any view, so the render key does not name it. It
+must save measurably: benchmarks/pruning.py measures each of these. Fewer bounces for volumes,
+transmission and transparency that a scene does not have saved nothing, and are not here.
 
-What is left out holds for every frame. So nothing is decided by a value that keyframes, a driver or
-a simulation may change.
+What is left out is left out of every frame. So values that keyframes, a driver or a simulation may
+change decide nothing.
 """
 
 from collections.abc import Collection, Mapping
@@ -26,7 +26,7 @@ REASONS = {
 
 
 def left_out(inventory: Mapping[str, Any]) -> list[str]:
-    """Decide from a scene's inventory which of `REASONS` apply to it."""
+    """Return which of `REASONS` apply to a scene, from its inventory."""
     changes = inventory["animated"] or inventory["simulated"]
     applies = {
         "viewport": not inventory["uses_visibility"],
@@ -42,12 +42,13 @@ def left_out(inventory: Mapping[str, Any]) -> list[str]:
 
 
 def removable_objects() -> list[str]:
-    """Return the names of the objects that no frame shows and that nothing but the scene holds.
+    """Return the names of the objects that no frame shows, and that nothing but the scene uses.
 
-    Hidden are objects by themselves, by their collections, or by having every kind of ray turned
-    off. An object with keyframes or drivers is not removable, as they may show it. Blender animates
-    neither the visibility of collections nor what a modifier, a constraint or an instancer refers
-    to. What these or a physics simulation may use is not removable, nor what drivers read.
+    An object may be hidden by itself, by its collections, or because all kinds of rays are turned
+    off for it. Objects with keyframes or drivers are not removable, because these may show them.
+    Blender cannot animate the visibility of collections, nor what a modifier, a constraint or an
+    instancer refers to. Objects that these, a physics simulation or drivers may use are not
+    removable.
     """
     scene = bpy.context.scene
     shown: set[Any] = set()
@@ -67,7 +68,7 @@ def removable_objects() -> list[str]:
         and thing.type != "CAMERA"
         and not animation.is_animated(thing)
         and not _is_physical(thing)
-        # Blender takes nothing out of a collection of another file.
+        # Blender cannot remove objects from a collection of a linked file.
         and not any(collection.library for collection in thing.users_collection)
     }
     while used := {
@@ -80,7 +81,7 @@ def removable_objects() -> list[str]:
 
 
 def background_scenes(scene: Any) -> list[Any]:
-    """Return the scene that a scene is rendered with as its background, that one's, and so on."""
+    """Return a scene's background scene, the background scene of that one, and so on."""
     backgrounds: list[Any] = []
     while (scene := scene.background_set) and scene not in backgrounds:
         backgrounds.append(scene)
@@ -88,7 +89,7 @@ def background_scenes(scene: Any) -> list[Any]:
 
 
 def remove_objects(names: Collection[str]) -> None:
-    """Unload objects of the scene, with all that nothing else uses."""
+    """Unload objects of the scene, and all that only they use."""
     for thing in list(bpy.context.scene.objects):
         if thing.name_full in names:
             for collection in thing.users_collection:
@@ -98,13 +99,13 @@ def remove_objects(names: Collection[str]) -> None:
 
 
 def remove_unused() -> None:
-    """Unload what nothing uses."""
+    """Unload all data-blocks that nothing uses."""
     with quiet():
         bpy.ops.outliner.orphans_purge(do_recursive=True)
 
 
 def leave_out(names: Collection[str]) -> None:
-    """Leave out of the scene, set up for its frame, what `pruning.left_out` has found."""
+    """Leave out what `left_out` names. The scene must be set up for its frame."""
     scene = bpy.context.scene
     if "motion_blur" in names:
         scene.render.use_motion_blur = False
@@ -137,7 +138,7 @@ def _collect_shown(layer_collection: Any, shown: set[Any]) -> None:
 
 
 def _meets_rays(thing: Any) -> bool:
-    """Return whether an object has any kind of ray turned on; empties stand for others."""
+    """Return whether an object has any kind of ray turned on. Empties may place other objects."""
     return thing.type == "EMPTY" or any(
         getattr(thing, f"visible_{kind}")
         for kind in ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")

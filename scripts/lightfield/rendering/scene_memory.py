@@ -37,13 +37,13 @@ def measure(blend: Path, inventory: Mapping[str, Any], chosen: Mapping[str, Any]
         LightField(content, [View.placed("view", np.eye(4))]).write(folder / "lightfield.json")
         # What the .blend reads is where it is: nothing is taken from a view store.
         write_json(folder / "inventory.json", {**inventory, "external_files": []})
-        words: list[Any] = [
+        command: list[Any] = [
             *("--blend", blend, "--lightfield", folder / "lightfield.json"),
             *("--inventory", folder / "inventory.json", "--journal", folder / "journal.jsonl"),
             *("--output", folder / "exr", "--device", "cpu", "--threads", "1"),
         ]
         result = subprocess.run(
-            [sys.executable, PROGRAM, *words],
+            [sys.executable, PROGRAM, *command],
             capture_output=True,
             text=True,
             check=False,

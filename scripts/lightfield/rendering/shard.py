@@ -1,15 +1,17 @@
-"""A shard: views of a dataset that one process renders, keeping every one that is already right.
+"""Renders a shard: some views of a dataset, in one process.
 
-Each view is written, and its checksum logged beside the record, the moment it is done. A view whose
-files, one and one for each pass, have the bytes that were logged for the render key that its
-settings give is left as it is, so that a shard, killed and started again, renders only what is
-missing. Its journal, one JSON line a rendered view, says what was done and how fast.
+Each view is written as soon as it is rendered, and the checksums of its files are logged beside the
+shard's record. A view has one file, and one for each pass. It is finished if its files have the
+bytes that were logged for the view's present render key. Finished views are kept, so that a shard
+that was killed renders only the missing views. The journal gets one JSON line for each rendered
+view: when it was finished, and how long it took.
 """
 
 import signal
 import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from statistics import median
@@ -21,10 +23,11 @@ import psutil
 from lightfield.core import leftovers, processors
 from lightfield.core.cli import view_slice
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys, write_json
+from lightfield.core.files import write_json
 from lightfield.core.memory import available
 from lightfield.core.progress import Progress
 from lightfield.dataset import keys, memory, passes
+from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.journal import Journal, is_suspect
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.dataset.passes import Pass
@@ -54,78 +57,104 @@ def render(
     journal: Path | None = None,
     stall: int = 0,
 ) -> None:
-    """Render into ``folder`` those of the ``views``, FIRST:END, that are missing there.
+    """Render those of the ``views``, FIRST:END, that are missing in ``folder``.
 
-    Their passes go into folders beside it, with the names of what has a number in them.
-    ``blend`` is the scene and ``inventory`` a JSON of what it contains; ``threads`` None are all.
-    ``record`` and ``journal`` may be None. A view that takes more than ``stall`` seconds, if not
-    0, ends the process by SIGALRM.
-    Raises `UserError` where the scene cannot be opened, the ``device`` is not there, or a file
+    Passes go into folders beside it, and so do the names of the objects, materials and instances
+    that passes number. ``blend`` is the scene, and ``inventory`` a JSON of what it contains.
+    ``threads`` None means all processors. ``record`` and ``journal`` are files to write, or None.
+    A view that takes more than ``stall`` seconds ends the process by SIGALRM; 0 sets no limit.
+    Raises `UserError` if the scene cannot be opened, if the ``device`` is missing, or if a file
     cannot be written.
     """
     images.check_codec(lightfield.render.get("compression", "zip"))
-    log, sums = Journal(journal), ShardRecord(record, folder)
-    # On the machine that renders: what was killed there may fill its memory.
+    shard_journal = Journal(journal)
+    shard_record = ShardRecord(record, folder)
+    # Remove leftovers on the render node: shared memory of killed jobs may fill its RAM.
     leftovers.remove()
-    chosen = lightfield.views[view_slice(views, len(lightfield.views))]
-    wanted = lightfield.passes
-    paths = {view.name: _files(folder, view, wanted) for view in chosen}
-    names = [folder.parent / found.name / passes.NAMES for found in wanted if found.kind == "id"]
-    names_key = keys.names_key(lightfield)
-    missing = [
-        view
-        for view in chosen
-        if not all(
-            sums.is_finished(path, keys.render_key(lightfield, view)) for path in paths[view.name]
-        )
+    chosen_views = lightfield.views[view_slice(views, len(lightfield.views))]
+    missing_views = [
+        view for view in chosen_views if not _is_finished(view, lightfield, folder, shard_record)
     ]
-    nameless = [path for path in names if not sums.is_finished(path, names_key)]
-    _warn_of_other_versions(folder / f"{view.name}.exr" for view in missing)
-    # The dataset's folder says which scene and rig it is, and in a sequence which frame.
+    name_files = _name_files(lightfield, folder)
+    names_key = keys.names_key(lightfield)
+    missing_name_files = [
+        path for path in name_files if not shard_record.is_finished(path, names_key)
+    ]
+    _warn_of_other_versions(folder / f"{view.name}.exr" for view in missing_views)
+    # The dataset's folder names the scene and the rig, and the frame of a sequence.
     label = f"render {folder.parent}" + (f" {views}" if views != ":" else "")
-    progress = Progress(len(missing), label, already=len(chosen) - len(missing))
-    if missing or nameless:
-        found = read_keys(inventory, "inventory.py", "left_out") if inventory else None
-        _refuse_what_does_not_fit(blend, found or {}, lightfield)
-        threads = threads or processors.available()
-        # Only now, because it takes a second and a shard that is finished does not need it.
-        with processors.only(threads):
-            from lightfield.rendering import cycles
-        used = cycles.set_up(blend, found, lightfield, device, threads)
-        log.append(
-            {
-                "start_up_seconds": round(time.time() - log.started, 4),
-                "start_up_cpu_seconds": round(time.process_time(), 4),
-                "device": used,
-                "threads": threads,
-            }
-        )
-        for path in nameless:
+    progress = Progress(len(missing_views), label, already=len(chosen_views) - len(missing_views))
+    if missing_views or missing_name_files:
+        _open_scene(lightfield, blend, inventory, device, threads, shard_journal)
+        for path in missing_name_files:
             write_json(path, _names(path.parent.name))
-            sums.add(path, names_key)
-        _render_views(missing, lightfield, folder, sums, log, progress, stall)
-    sums.write([*names, *(path for view in chosen for path in paths[view.name])])
-    log.end()
+            shard_record.add(path, names_key)
+        _render_views(
+            missing_views, lightfield, folder, shard_record, shard_journal, progress, stall
+        )
+    view_files = [path for view in chosen_views for path in _files(folder, view, lightfield.passes)]
+    shard_record.write([*name_files, *view_files])
+    shard_journal.end()
+
+
+def _is_finished(view: View, lightfield: LightField, folder: Path, record: ShardRecord) -> bool:
+    """Return whether all files of a view are as the view's render key and the record say."""
+    key = keys.render_key(lightfield, view)
+    return all(record.is_finished(path, key) for path in _files(folder, view, lightfield.passes))
 
 
 def _files(folder: Path, view: View, wanted: Iterable[Pass]) -> list[Path]:
     """Return all files of a view: its own, and one for each pass."""
     return [
         folder / f"{view.name}.exr",
-        *(found.path(folder.parent, view.name) for found in wanted),
+        *(view_pass.path(folder.parent, view.name) for view_pass in wanted),
+    ]
+
+
+def _name_files(lightfield: LightField, folder: Path) -> list[Path]:
+    """Return the files that say which object, material or instance has which number."""
+    return [
+        folder.parent / view_pass.name / passes.NAMES
+        for view_pass in lightfield.passes
+        if view_pass.kind == "id"
     ]
 
 
 def _names(kind: str) -> dict[str, int]:
+    """Return the numbers of the scene's objects, materials or instances by their names."""
     from lightfield.rendering import ids, instances
 
     return instances.shown().names if kind == "instance" else ids.names(kind)
 
 
-def _refuse_what_does_not_fit(
-    blend: Path, inventory: Mapping[str, Any], lightfield: LightField
+def _open_scene(
+    lightfield: LightField,
+    blend: Path,
+    inventory: Path | None,
+    device: str,
+    threads: int | None,
+    journal: Journal,
 ) -> None:
-    """Raise `UserError` where a scene, as it was measured, and a view exceed this memory."""
+    """Open the scene in Blender, set Cycles up, and journal how long that took."""
+    contents = read_inventory(inventory, "left_out") if inventory else None
+    _check_memory(blend, contents or {}, lightfield)
+    threads = threads or processors.available()
+    # A finished shard does not import Blender, which takes a second.
+    with processors.only(threads):
+        from lightfield.rendering import cycles
+    used_device = cycles.set_up(blend, contents, lightfield, device, threads)
+    journal.append(
+        {
+            "start_up_seconds": round(time.time() - journal.started, 4),
+            "start_up_cpu_seconds": round(time.process_time(), 4),
+            "device": used_device,
+            "threads": threads,
+        }
+    )
+
+
+def _check_memory(blend: Path, inventory: Mapping[str, Any], lightfield: LightField) -> None:
+    """Raise `UserError` if the scene, as the inventory measured it, and a view need more memory."""
     lens = lightfield.lens
     denoise = lightfield.render["denoise"]
     needed = memory.needed(inventory.get("memory_bytes", 0), lens.width * lens.height, denoise)
@@ -138,9 +167,9 @@ def _refuse_what_does_not_fit(
 
 
 def _warn_of_other_versions(paths: Iterable[Path]) -> None:
-    """Warn if there are views that another version of bpy rendered, which are rendered again."""
+    """Warn of views that another version of bpy rendered, and that this run renders again."""
     versions = [images.attribute(path, images.BPY_ATTRIBUTE) for path in paths]
-    for other in sorted({str(found) for found in versions if found} - {version("bpy")}):
+    for other in sorted({str(name) for name in versions if name} - {version("bpy")}):
         print(
             f"warning: views rendered by bpy {other}, which bpy {version('bpy')} renders again: "
             f"{versions.count(other)}",
@@ -157,85 +186,136 @@ def _render_views(
     progress: Progress,
     stall: int,
 ) -> None:
-    """Render ``views`` one after the other, in the scene that is set up for them."""
-    from lightfield.rendering.colour_pass import render_colour
-    from lightfield.rendering.cycles import choose_eye, machine
-    from lightfield.rendering.geometry_pass import render_geometry
-
-    rays = depth_rays(lightfield)
-    blind = ~np.isfinite(lightfield.lens.pixel_rays()[..., 0]) if lightfield.transparent else None
-    wanted = lightfield.passes
-    seed = lightfield.render["seed"]
-    compression = lightfield.render.get("compression", "zip")
-    names = {found.name for found in wanted}
-    has_geometry = lightfield.depth or not all(found.of_colour for found in wanted)
-    made_here = {
-        images.BPY_ATTRIBUTE: version("bpy"),
-        images.MACHINE_ATTRIBUTE: machine(lightfield.render["denoise"]),
-    }
+    """Render ``views`` one after the other in the open scene. Write, record and journal each."""
+    files = _ViewFiles(lightfield, folder, record)
     process = psutil.Process()
-    past: list[float] = []
+    earlier_seconds: list[float] = []
     progress.begin()
     for view in views:
-        # The system's own timer: what hangs need not run any Python.
+        # A timer of the system, because a process that hangs may run no Python.
         signal.alarm(stall)
-        began, began_cpu = time.perf_counter(), time.process_time()
-        choose_eye(view.name)
-        # Of the same pose one after the other: Cycles keeps the scene as it is.
-        geometry = (
-            render_geometry(view.matrix, "motion" in names, "instance" in names)
-            if has_geometry
-            else None
-        )
-        geometry_seconds = time.perf_counter() - began
-        colour = render_colour(
-            view.matrix, keys.view_seed(seed, view.name), wanted, lightfield.transparent
-        )
-        if blind is not None:
-            # Cycles calls opaque what the lens does not see.
-            colour.pixels[blind, 3] = 0
-        parts = [part for part in (geometry, colour) if part]
-        channels, attributes = colour_channels(colour.pixels)
-        if geometry and lightfield.depth:
-            channels["Z"] = depth_channel(geometry.depth, lightfield, rays)
-            attributes[images.DEPTH_ATTRIBUTE] = str(lightfield.depth)
-        key = keys.render_key(lightfield, view)
-        made = {images.KEY_ATTRIBUTE: key, **made_here}
-        contents = [(channels, attributes)]
-        contents += [pass_channels(found, geometry, colour, lightfield.lens) for found in wanted]
-        for path, (channels, attributes) in zip(
-            _files(folder, view, wanted), contents, strict=True
-        ):
-            images.write_exr(path, channels, attributes | made, compression)
-            record.add(path, key)
+        began = time.perf_counter()
+        began_cpu = time.process_time()
+        rendered = _render_view(view, lightfield)
+        files.write(view, rendered)
         journal.append(
             {
                 "view": view.name,
                 "finished": round(time.time(), 3),
                 "wall_seconds": round(time.perf_counter() - began, 4),
                 "cpu_seconds": round(time.process_time() - began_cpu, 4),
-                "render_seconds": round(sum(part.render_seconds for part in parts), 4),
-                "synchronization_seconds": round(
-                    sum(part.synchronization_seconds for part in parts), 4
-                ),
-                "geometry_seconds": round(geometry_seconds, 4),
+                **rendered.seconds,
                 "memory_bytes": process.memory_info().rss,
             },
         )
-        if is_suspect(colour.render_seconds, past):
+        seconds = rendered.colour.render_seconds
+        if is_suspect(seconds, earlier_seconds):
             print(
-                f"warning: {folder}/{view.name}.exr took {colour.render_seconds:.3g} s, and others "
-                f"some {median(past):.3g} s: look at it",
+                f"warning: {folder}/{view.name}.exr took {seconds:.3g} s, and others "
+                f"some {median(earlier_seconds):.3g} s: look at it",
                 file=sys.stderr,
             )
-        past.append(colour.render_seconds)
+        earlier_seconds.append(seconds)
         progress.done()
     signal.alarm(0)
 
 
+@dataclass(frozen=True)
+class _Rendered:
+    """What Cycles rendered of one view. ``geometry`` is None if neither depth nor a pass needs it.
+
+    ``geometry_seconds`` is the time that rendering the geometry took.
+    """
+
+    colour: "Colour"
+    geometry: "Geometry | None"
+    geometry_seconds: float
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """The journal's figures, in seconds."""
+        parts = [part for part in (self.geometry, self.colour) if part]
+        return {
+            "render_seconds": round(sum(part.render_seconds for part in parts), 4),
+            "synchronization_seconds": round(
+                sum(part.synchronization_seconds for part in parts), 4
+            ),
+            "geometry_seconds": round(self.geometry_seconds, 4),
+        }
+
+
+def _render_view(view: View, lightfield: LightField) -> _Rendered:
+    """Render the geometry of a view, if it is wanted, and then its colour."""
+    from lightfield.rendering.colour_pass import render_colour
+    from lightfield.rendering.cycles import choose_eye
+    from lightfield.rendering.geometry_pass import render_geometry
+
+    wanted = lightfield.passes
+    names = {view_pass.name for view_pass in wanted}
+    has_geometry = lightfield.depth or not all(view_pass.of_colour for view_pass in wanted)
+    began = time.perf_counter()
+    choose_eye(view.name)
+    # Render both at the same pose, one after the other, so that Cycles does not update the scene.
+    geometry = (
+        render_geometry(view.matrix, "motion" in names, "instance" in names)
+        if has_geometry
+        else None
+    )
+    geometry_seconds = time.perf_counter() - began
+    seed = keys.view_seed(lightfield.render["seed"], view.name)
+    colour = render_colour(view.matrix, seed, wanted, lightfield.transparent)
+    return _Rendered(colour, geometry, geometry_seconds)
+
+
+class _ViewFiles:
+    """Writes the files of rendered views into ``folder`` and beside it, and records them."""
+
+    def __init__(self, lightfield: LightField, folder: Path, record: ShardRecord) -> None:
+        from lightfield.rendering.cycles import machine
+
+        self.lightfield = lightfield
+        self.folder = folder
+        self.record = record
+        self.depth_rays = depth_rays(lightfield)
+        if lightfield.transparent:
+            self.pixels_without_ray = ~np.isfinite(lightfield.lens.pixel_rays()[..., 0])
+        self.compression = lightfield.render.get("compression", "zip")
+        self.attributes = {
+            images.BPY_ATTRIBUTE: version("bpy"),
+            images.MACHINE_ATTRIBUTE: machine(lightfield.render["denoise"]),
+        }
+
+    def write(self, view: View, rendered: _Rendered) -> None:
+        """Write and record the view's own file, and one for each pass."""
+        lightfield = self.lightfield
+        colour = rendered.colour
+        geometry = rendered.geometry
+        if lightfield.transparent:
+            # Cycles makes pixels opaque for which the lens has no ray.
+            colour.pixels[self.pixels_without_ray, 3] = 0
+        channels, attributes = colour_channels(colour.pixels)
+        if geometry and lightfield.depth:
+            channels["Z"] = depth_channel(geometry.depth, lightfield, self.depth_rays)
+            attributes[images.DEPTH_ATTRIBUTE] = str(lightfield.depth)
+        contents = [(channels, attributes)]
+        contents += [
+            pass_channels(view_pass, geometry, colour, lightfield.lens)
+            for view_pass in lightfield.passes
+        ]
+        key = keys.render_key(lightfield, view)
+        made = {images.KEY_ATTRIBUTE: key, **self.attributes}
+        paths = _files(self.folder, view, lightfield.passes)
+        for path, (channels, attributes) in zip(paths, contents, strict=True):
+            images.write_exr(path, channels, attributes | made, self.compression)
+            self.record.add(path, key)
+
+
 def depth_rays(lightfield: LightField) -> Array | None:
-    """Return the unit rays that turn Cycles' depth into the dataset's, or None if it is that."""
-    if lightfield.depth in (None, lightfield.cycles_depth):
+    """Return the unit rays (height, width, 3) that convert Cycles' depth to the dataset's.
+
+    Return None if no conversion is needed.
+    """
+    if lightfield.depth in (None, depth.conventional_depth(lightfield.lens)):
         return None
     return lightfield.lens.pixel_rays()
 
@@ -243,8 +323,8 @@ def depth_rays(lightfield: LightField) -> Array | None:
 def colour_channels(colour: Array) -> tuple[dict[str, Array], dict[str, images.Attribute]]:
     """Turn colour (height, width, 3 or 4) into the channels and attributes of a view's EXR.
 
-    Colour beyond the half range is clamped and counted; what is not a number is counted and kept,
-    so that validation finds it.
+    Values beyond the half range are clamped and counted. NaNs are counted and kept, so that
+    validation finds them.
     """
     nan = int(np.isnan(colour).sum())
     clamped = int((np.abs(colour) > images.HALF_MAX).sum())
@@ -258,7 +338,7 @@ def pass_channels(
 ) -> tuple[dict[str, Array], dict[str, images.Attribute]]:
     """Return the channels and attributes of the EXR of one of a view's passes.
 
-    What is not a number is counted and becomes 0: Cycles leaves it out of the colour alone.
+    NaNs are counted and become 0: Cycles leaves them out of the colour, but not out of passes.
     """
     if wanted.kind == "matte":
         planes = np.moveaxis(colour.passes[wanted.name], -1, 0)
@@ -289,7 +369,7 @@ def pass_channels(
 
 
 def depth_channel(cycles_depth: Array, lightfield: LightField, rays: Array | None) -> Array:
-    """Turn depth (height, width) as Cycles has it into channel Z of a view's EXR.
+    """Turn Cycles' depth (height, width) in metres into channel Z of a view's EXR.
 
     ``rays`` are those of `depth_rays`.
     """
@@ -298,6 +378,6 @@ def depth_channel(cycles_depth: Array, lightfield: LightField, rays: Array | Non
         z = depth.z_from_distance(z, rays)
     elif rays is not None:
         z = depth.distance_from_z(z, rays)
-    # Outside the image circle there is no ray; nothing was hit there.
+    # Outside the image circle there is no ray, and a pixel without a ray hits nothing.
     z = np.where(np.isnan(z), np.inf, z)
     return depth.with_precision(z, lightfield.render["depth_precision"])

@@ -1,4 +1,4 @@
-"""One render of one view with Cycles, as `lightfield.rendering.cycles` has set it up."""
+"""Renders one view with Cycles, which `lightfield.rendering.cycles` has set up."""
 
 import math
 import shutil
@@ -10,7 +10,7 @@ import bpy
 import mathutils
 import numpy as np
 
-from lightfield.core import room
+from lightfield.core import disk_space
 from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_GPU_MEMORY, LESS_MEMORY
 from lightfield.core.leftovers import temporary_folder
@@ -24,7 +24,7 @@ Array = np.ndarray[Any, Any]
 
 @dataclass(frozen=True)
 class Rendered:
-    """What Cycles made of a view, in float32.
+    """What Cycles rendered of a view, in float32.
 
     ``passes`` are (height, width, channels) by Cycles' names for them, ``attributes`` the header.
     ``render_seconds`` and ``synchronization_seconds`` are Cycles' own.
@@ -50,13 +50,13 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
         for name, channels in passes.items()
     }
     pixels = scene.render.resolution_x * scene.render.resolution_y
-    with temporary_folder(room.fast_folder(pixels * PASSES_PIXEL_BYTES)) as folder:
+    with temporary_folder(disk_space.fast_folder(pixels * PASSES_PIXEL_BYTES)) as folder:
         scene.render.filepath = str(folder / "view.exr")
         try:
             with quiet():
                 bpy.ops.render.render(write_still=True)
         except RuntimeError as error:
-            # Cycles' errors are reported by itself, and again at the end of the render.
+            # Cycles prints its errors itself, and Blender again at the end of the render.
             lines = [line.removeprefix("Error:").strip() for line in str(error).splitlines()]
             text = "; ".join(dict.fromkeys(filter(None, lines)))
             on_gpu = scene.cycles.device == "GPU"
@@ -65,15 +65,15 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
                 f"Cycles cannot render the view: {text}{advice if 'memory' in text.lower() else ''}"
             ) from None
         try:
-            # Of one eye of a pair it is view_L.exr or view_R.exr.
+            # One eye of a stereo pair is in view_L.exr or view_R.exr.
             path = next(folder.glob("*.exr"), folder / "view.exr")
             channels = [channel for group in names.values() for channel in group]
             image = images.read_image(path, channels)
         except UserError as error:
-            free = room.gigabytes(shutil.disk_usage(folder).free)
-            needed = room.gigabytes(pixels * PASSES_PIXEL_BYTES)
+            free = disk_space.gigabytes(shutil.disk_usage(folder).free)
+            needed = disk_space.gigabytes(pixels * PASSES_PIXEL_BYTES)
             raise UserError(
-                f"{error}; {free} are free there: make room, or set TMPDIR to a folder with "
+                f"{error}; {free} are free there: free some space, or set TMPDIR to a folder with "
                 f"{needed}"
             ) from None
     return Rendered(
@@ -88,7 +88,7 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
 
 
 def _seconds(text: images.Attribute) -> float:
-    """Read a time of the form [hours:]minutes:seconds, as Cycles' header has it."""
+    """Return the seconds of a time in Cycles' header: [hours:]minutes:seconds."""
     return math.fsum(
         float(part) * 60**power for power, part in enumerate(reversed(str(text).split(":")))
     )

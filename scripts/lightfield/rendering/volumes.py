@@ -1,4 +1,4 @@
-"""Fog, smoke and every other volume: what of a scene is a volume without any surface."""
+"""Volumes such as fog and smoke: which objects of a scene have no surface."""
 
 from collections.abc import Iterator
 from functools import cache
@@ -11,7 +11,7 @@ from lightfield.rendering.render_graph import in_render
 
 @cache
 def alone() -> frozenset[str]:
-    """Return the full names of the opened scene's objects that are volumes alone, at its frame."""
+    """Return the full names of the open scene's objects that are only volumes at its frame."""
     by_nodes = [t for t in bpy.data.objects if any(m.type == "NODES" for m in t.modifiers)]
 
     def made(depsgraph: Any) -> dict[Any, bool]:
@@ -22,15 +22,15 @@ def alone() -> frozenset[str]:
             if now.is_evaluated
         }
 
-    found = {thing: _is_volume(thing) for thing in bpy.data.objects}
+    is_volume = {thing: _is_volume(thing) for thing in bpy.data.objects}
     if by_nodes:
-        found |= in_render(made)
-    return frozenset(str(thing.name_full) for thing in found if found[thing])
+        is_volume |= in_render(made)
+    return frozenset(str(thing.name_full) for thing in is_volume if is_volume[thing])
 
 
 def _parts(geometry: Any) -> Iterator[Any]:
-    """Yield the meshes, volumes and others that nodes have made, and objects that they place."""
-    # Of a mesh that is replaced an empty one stays.
+    """Yield the parts that nodes made, such as meshes, and the objects that they place."""
+    # Replacing a mesh leaves an empty one behind.
     if geometry.mesh and geometry.mesh.polygons:
         yield geometry.mesh
     others = (geometry.curves, geometry.pointcloud, geometry.grease_pencil, geometry.volume)
@@ -49,12 +49,12 @@ def _is_volume(part: Any) -> bool:
 
 
 def has_volume(shader: Any) -> bool:
-    """Whether a material or world has a volume."""
+    """Return whether a material or world has a volume shader."""
     return _is_linked(shader, "Volume")
 
 
 def has_surface(shader: Any) -> bool:
-    """Whether a material has a surface; a world is taken to have one."""
+    """Return whether the material has a surface shader. Worlds always count as having one."""
     return _is_linked(shader, "Surface") or isinstance(shader, bpy.types.World)
 
 

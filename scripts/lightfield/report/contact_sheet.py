@@ -39,7 +39,8 @@ def sheet(views: Sequence[Path], width: int, height: int) -> Array:
     cells = [small_view(path, cell_width, cell_height) for path in views]
     exposure = pictures.exposure_for(np.stack(cells))
 
-    step_x, step_y = cell_width + GAP, cell_height + GAP + CAPTION
+    step_x = cell_width + GAP
+    step_y = cell_height + GAP + CAPTION
     page = np.full((GAP + rows * step_y, GAP + columns * step_x, 3), BACKGROUND, dtype=np.uint8)
     corners = [(GAP + n % columns * step_x, GAP + n // columns * step_y) for n in range(len(views))]
     for path, cell, (left, top) in zip(views, cells, corners, strict=True):

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.files import whole
+from lightfield.core.files import absolute_path
 from lightfield.dataset import blend
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW
-from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.splits_file import SPLITS
 from lightfield.export import transforms
 from lightfield.geometry import rigs
 from lightfield.geometry.lenses import Lens
@@ -50,13 +50,15 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
 
     What is not there (validation, measurements, depth, costs) has no section.
     """
-    lightfield, rig = LightField.read(folder / NAME), origin.rig
+    lightfield = LightField.read(folder / NAME)
+    rig = origin.rig
     lightfield.require_rig(rig)
     validation = tables.validation(folder / "validation.json")
     looks = views.collect(folder / IMAGES, lightfield, rig, _unreadable(validation))
     middle = lightfield.views[middle_view(rig)]
     report = folder / REPORT
-    found, own = origin.measurements, whole(folder)
+    found = origin.measurements
+    own = absolute_path(folder)
     measured = {
         "error_vs_time": tables.error_vs_time(found, str(lightfield.scene["name"])),
         "synthesis": tables.synthesis(found, f"{own.parent.name}/{own.name}"),
@@ -126,7 +128,8 @@ def facts(
 
     ``missed`` is the part of the depths that are inf.
     """
-    lens, render = lightfield.lens, lightfield.render
+    lens = lightfield.lens
+    render = lightfield.render
     parts = [view.split for view in lightfield.views]
     counts = [f"{parts.count(part)} {part}" for part in dict.fromkeys(parts) if part]
     # Views that others made say nothing of theirs.
@@ -187,7 +190,8 @@ def _reprojected(folder: Path) -> Iterator[tuple[str, str, int, int, str]]:
     """Yield name, lens, number of views and of those shown, and sheet of each reprojection."""
     for path in sorted(folder.glob(f"*/{NAME}")):
         lightfield = LightField.read(path)
-        lens, count = lightfield.lens, len(lightfield.views)
+        lens = lightfield.lens
+        count = len(lightfield.views)
         shown = lightfield.views[:: math.ceil(count / MOST_REPROJECTED)]
         suffix = next((one.suffix for one in path.parent.glob(f"{shown[0].name}.*")), ".exr")
         paths = [path.with_name(f"{view.name}{suffix}") for view in shown]

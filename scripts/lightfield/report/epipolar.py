@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from lightfield.geometry.depth import distance_from_z
+from lightfield.geometry.depth import stored_distance
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.rigs import Rig
 
@@ -70,7 +70,9 @@ def find_row(rig: Rig, matrices: Array) -> Row | None:
         return None
     along = along / length
     if along @ matrices[views[0], :3, 0] < 0:
-        along, views, places = -along, views[::-1], places[::-1]
+        along = -along
+        views = views[::-1]
+        places = places[::-1]
     forward = -matrices[views[0], :3, 2]
     forward = forward - (forward @ along) * along
     forward = forward / np.linalg.norm(forward)
@@ -126,8 +128,7 @@ def sample(
         column = np.minimum(x[seen].astype(int), width - 1)
         line = np.minimum(y[seen].astype(int), height - 1)
         found = depth[line, column].astype(np.float64)
-        if meaning == "z":
-            found = distance_from_z(found, lens.rays(column + 0.5, line + 0.5))
+        found = stored_distance(found, lens.rays(column + 0.5, line + 0.5), meaning)
         reach[seen] = found / np.linalg.norm(own[seen], axis=-1)
     return light, reach
 

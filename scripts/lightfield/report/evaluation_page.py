@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import whole, write_csv
+from lightfield.core.files import absolute_path, write_csv
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import View
-from lightfield.export.source import Floats, Source
+from lightfield.export.source import Floats, SourceDataset
 from lightfield.imaging import images
 from lightfield.measurement import evaluation, metrics
 from lightfield.report import page
@@ -23,7 +23,7 @@ WIDEST = 1500
 
 def write(
     output: Path,
-    source: Source,
+    source: SourceDataset,
     tests: Sequence[View],
     renders: Path,
     masks: Path | None,
@@ -36,31 +36,16 @@ def write(
     ``renders`` lacks, or that cannot be compared.
     """
     paths = {view.name: evaluation.find(renders, source, view) for view in tests}
-    rows = []
+    rows: list[dict[str, Any]] = []
     problems = []
     progress = Progress(len(tests), "evaluate", "views")
     for view in tests:
-        path = paths[view.name]
-        shown = evaluation.rendered(path, source, background)
-        true = evaluation.truth(source, view, path, background)
-        counted = np.ones(shown.colour.shape[:2], bool)
-        if masks:
-            counted = evaluation.mask(evaluation.find(masks, source, view, [".png"]), source)
-        parts = evaluation.regions(source, view, counted, true.depth)
-        if not parts:
-            raise UserError(f"{path}: its mask leaves no pixel that the lens sees")
-        if not np.isfinite(shown.colour[parts["all"]]).all():
-            raise UserError(f"{path}: has colour that is no number where it is compared")
-        if problem := evaluation.background_problem(shown, true, parts["all"], background):
-            problems.append(f"{path}: {problem}")
-        for region, errors in evaluation.errors(shown, true, parts):
-            rows.append({"view": view.name, "region": region, **errors})
-        pictures = [np.nan_to_num(one.colour) for one in (true, shown)]
-        flip = metrics.flip_map(*pictures)[..., np.newaxis].repeat(3, axis=-1)
-        strip = np.concatenate([*pictures, flip], axis=1).clip(0, 1)
-        images.write_png(
-            output / "pictures" / f"{view.name}.png", np.round(strip * 255).astype(np.uint8)
-        )
+        mask = evaluation.find(masks, source, view, [".png"]) if masks else None
+        picture = output / "pictures" / f"{view.name}.png"
+        errors, problem = _compare(view, paths[view.name], source, mask, background, picture)
+        rows += errors
+        if problem:
+            problems.append(f"{paths[view.name]}: {problem}")
         progress.done()
     if problems:
         others = f" (and {len(problems) - 1} more of {len(tests)})" if problems[1:] else ""
@@ -70,8 +55,8 @@ def write(
     page.write(
         output / "index.html",
         "evaluation.html.j2",
-        name="/".join(whole(source.dataset).parts[-2:]),
-        renders=whole(renders).name,
+        name="/".join(absolute_path(source.dataset).parts[-2:]),
+        renders=absolute_path(renders).name,
         means=means,
         rows=rows,
         background=evaluation.hexadecimal(background),
@@ -82,3 +67,36 @@ def write(
         },
     )
     return means[0]
+
+
+def _compare(
+    view: View,
+    path: Path,
+    source: SourceDataset,
+    mask: Path | None,
+    background: Floats,
+    picture: Path,
+) -> tuple[list[dict[str, Any]], str | None]:
+    """Return a row of errors for each region of the render at ``path``, and what to warn of.
+
+    Writes to ``picture`` the truth, the render and the FLIP map beside each other.
+    """
+    shown = evaluation.rendered(path, source, background)
+    true = evaluation.truth(source, view, path, background)
+    counted = np.ones(shown.colour.shape[:2], bool)
+    if mask:
+        counted = evaluation.mask(mask, source)
+    regions = evaluation.regions(source, view, counted, true.depth)
+    if not regions:
+        raise UserError(f"{path}: its mask leaves no pixel that the lens sees")
+    if not np.isfinite(shown.colour[regions["all"]]).all():
+        raise UserError(f"{path}: has colour that is no number where it is compared")
+    rows = [
+        {"view": view.name, "region": region, **errors}
+        for region, errors in evaluation.errors(shown, true, regions)
+    ]
+    pictures = [np.nan_to_num(image.colour) for image in (true, shown)]
+    flip = metrics.flip_map(*pictures)[..., np.newaxis].repeat(3, axis=-1)
+    strip = np.concatenate([*pictures, flip], axis=1).clip(0, 1)
+    images.write_png(picture, np.round(strip * 255).astype(np.uint8))
+    return rows, evaluation.background_problem(shown, true, regions["all"], background)

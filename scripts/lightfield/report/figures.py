@@ -76,7 +76,8 @@ def read_panorama(path: Path) -> Overview:
 
 def read_view(path: Path, lightfield: LightField) -> Overview:
     """Read a view; where it is no image, as validation will say, its overview is black."""
-    lens, label = lightfield.lens, DEPTHS[lightfield.depth]
+    lens = lightfield.lens
+    label = DEPTHS[lightfield.depth]
     unknown = np.full((lens.height, lens.width), np.nan, np.float32)
     try:
         image = images.read_image(path)
@@ -109,7 +110,8 @@ def draw_rig(stem: Path, rig: Rig, poses: Array, parts: Sequence[str | None]) ->
     lines = [line @ screen for line in rig.outline()]
     with plot(stem, size=(7, 6)) as axes:
         axes.add_collection(LineCollection(lines, colors=GREY, linewidths=0.8))
-        start, end = places[order] @ screen, ends @ screen
+        start = places[order] @ screen
+        end = ends @ screen
         axes.quiver(
             *start.T,
             *(end - start).T,

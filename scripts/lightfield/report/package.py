@@ -143,7 +143,8 @@ def _parts(paths: Sequence[Path], most: float | None, first: int) -> Iterator[li
         needed = _size(path.stat().st_size)
         if part and most is not None and size + needed > most:
             yield part
-            part, size = [], tarfile.RECORDSIZE
+            part = []
+            size = tarfile.RECORDSIZE
         part.append(path)
         size += needed
     yield part

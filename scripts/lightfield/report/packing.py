@@ -19,7 +19,8 @@ Array = NDArray[Any]
 MOST_STOPS = 18.0
 # Steps of depth: 12 bits, which is 0.3 percent over a scene from centimetres to hundreds of metres.
 DEPTH_STEPS = 4096
-NO_DEPTH, MISS = 0, DEPTH_STEPS - 1
+NO_DEPTH = 0
+MISS = DEPTH_STEPS - 1
 
 
 def light_range(colour: Array) -> tuple[float, float]:
@@ -30,7 +31,8 @@ def light_range(colour: Array) -> tuple[float, float]:
     lit = colour[np.isfinite(colour) & (colour > 0)]
     if not lit.size:
         return -1.0, 1.0
-    low, high = np.log2(np.percentile(lit, 0.1)), np.log2(lit.max())
+    low = np.log2(np.percentile(lit, 0.1))
+    high = np.log2(lit.max())
     high = max(high, low + 1.0)
     return float(max(low, high - MOST_STOPS)), float(high)
 
@@ -50,7 +52,8 @@ def depth_range(depth: Array) -> tuple[float, float]:
     hit = depth[np.isfinite(depth) & (depth > 0)]
     if not hit.size:
         return 0.0, 1.0
-    low, high = np.log2(hit.min()), np.log2(hit.max())
+    low = np.log2(hit.min())
+    high = np.log2(hit.max())
     # Rays that graze the camera's own plane have a Z-depth of nearly nothing.
     low = max(low, np.log2(np.percentile(hit, 1)) - 4)
     return float(low), float(max(high, low + 1.0))

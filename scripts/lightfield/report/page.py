@@ -56,7 +56,8 @@ def photo(path: Path, widest: int) -> str | None:
 
 def plot(stem: Path) -> str | None:
     """Return the plot ``stem``.svg or .png as a data URI, or None where there is neither."""
-    svg, png = stem.with_name(f"{stem.name}.svg"), stem.with_name(f"{stem.name}.png")
+    svg = stem.with_name(f"{stem.name}.svg")
+    png = stem.with_name(f"{stem.name}.png")
     if svg.is_file() and (svg.stat().st_size <= LARGEST_SVG or not png.is_file()):
         return data_uri(svg.read_bytes(), "image/svg+xml")
     return data_uri(png.read_bytes(), "image/png") if png.is_file() else None

@@ -56,10 +56,8 @@ def _picture(found: Pass, pixels: Array, exposure: float) -> Array:
         case "id":
             colours = _distinct(pixels[..., 0]) * (pixels > 0)
         case "matte":
-            hashes, parts = (
-                np.ascontiguousarray(pixels[..., ::2]).view(np.uint32),
-                pixels[..., 1::2],
-            )
+            hashes = np.ascontiguousarray(pixels[..., ::2]).view(np.uint32)
+            parts = pixels[..., 1::2]
             colours = np.sum(_distinct(hashes) * parts[..., None], axis=-2)
         case _:
             colours = _directions(*np.moveaxis(pixels[..., -2:], -1, 0))

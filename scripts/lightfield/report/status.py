@@ -67,7 +67,7 @@ def _recorded(folder: Path, work: Path) -> set[str]:
     written = (folder / NAME).stat().st_mtime_ns
     records = (work / "render").glob("*-*.json")
     current = (path for path in records if path.stat().st_mtime_ns >= written)
-    files = (shard_files.recorded(path, str(folder)) for path in current)
+    files = (shard_files.recorded_sizes(path, str(folder)) for path in current)
     # Beside the views a record has their passes, and the names of what these number.
     return {_stem(name) for sizes in files for name in sizes or () if name.startswith(f"{IMAGES}/")}
 

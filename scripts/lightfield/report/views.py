@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from lightfield.dataset.lightfield import LightField
 from lightfield.export.points import evenly
-from lightfield.geometry.depth import distance_from_z
+from lightfield.geometry.depth import stored_distance
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.overview import middle_view
 from lightfield.geometry.rigs import Rig
@@ -80,81 +80,106 @@ def collect(
     be ``unreadable`` are black; raises `UserError` for any other that cannot be read.
     """
     names = [view.name for view in lightfield.views]
-    matrices, lens, meaning = lightfield.matrices, lightfield.lens, lightfield.depth
-    shown = list(range(len(names)))[:: math.ceil(len(names) / pictures.MOST_VIEWS)]
-    side = SIDE if len(shown) <= MANY_VIEWS else SMALLER_SIDE
-    small = lens.fitted(side)
+    lens = lightfield.lens
+    meaning = lightfield.depth
 
-    def load(view: int, lens: Lens) -> View:
-        if names[view] in unreadable:
-            return _black(lens, meaning)
-        return read(folder / f"{names[view]}.exr", lens, meaning)
+    def load(number: int, small: Lens) -> View:
+        if names[number] in unreadable:
+            return _black(small, meaning)
+        return read(folder / f"{names[number]}.exr", small, meaning)
 
-    loaded = [load(view, small) for view in shown]
-    light = np.stack([view.colour for view in loaded])
-    found = [view.depth for view in loaded if view.depth is not None]
-    depths = np.stack(found) if found else None
-    limits, exposure = light_range(light), round(pictures.exposure_for(light), 2)
-    packed_views = []
-    rays = small.pixel_rays()
-    reach = points = missed = walked = None
-    if depths is not None:
-        depths = np.where(np.isnan(rays[..., 0]), np.nan, depths)
-        reach = depth_range(depths)
-        known = depths[~np.isnan(depths)]
-        missed = float(np.isposinf(known).mean()) if known.size else None
-        distances = distance_from_z(depths, rays) if meaning == "z" else depths
-        walked = walk.collect(small, matrices[:, :3, 3], distances)
-        points = _points(distances, rays, matrices[shown], pictures.develop(light, exposure))
-    for number, view in enumerate(shown):
-        entry = {"view": view, "light": webp(pack_light(light[number], limits), LIGHT_QUALITY)}
-        if depths is not None and reach is not None:
-            entry["depth"] = webp(pack_depth(depths[number], reach))
-        packed_views.append(entry)
-
-    noises = [view.noise for view in loaded if math.isfinite(view.noise)]
-    row = epipolar.find_row(rig, matrices)
-    middle = matrices[middle_view(rig)]
+    embedded = list(range(len(names)))[:: math.ceil(len(names) / pictures.MOST_VIEWS)]
+    small = lens.fitted(SIDE if len(embedded) <= MANY_VIEWS else SMALLER_SIDE)
+    views = [load(number, small) for number in embedded]
+    depths = _depths(views, small)
+    shown = _pictures(views, depths, embedded, lightfield, small)
+    row = epipolar.find_row(rig, lightfield.matrices)
+    row_views = epipolar.thinned(row.views, MOST_ROWS) if row else []
+    middle = lightfield.matrices[middle_view(rig)]
+    distances = np.abs(lightfield.matrices[embedded] - middle).sum(axis=(1, 2))
     data = {
-        "views": [
-            {
-                "name": view.name,
-                "part": view.split,
-                "at": _rounded(matrix[:3, 3]),
-                "right": _rounded(matrix[:3, 0]),
-                "up": _rounded(matrix[:3, 1]),
-                "ahead": _rounded(-matrix[:3, 2]),
-            }
-            for view, matrix in zip(lightfield.views, matrices, strict=True)
-        ],
+        "views": _cameras(lightfield),
         "outline": [[_rounded(point) for point in line] for line in rig.outline()],
         "resolution": [lens.width, lens.height],
         "size": [small.width, small.height],
-        "light": limits,
         "white": pictures.WHITE,
-        "exposure": exposure,
-        "points": points,
-        "depth": _depth_scale(depths, reach, meaning),
-        "embedded": packed_views,
         # The one most like that in the middle.
-        "first": int(np.argmin(np.abs(matrices[shown] - middle).sum(axis=(1, 2)))),
-        "row": None,
-        "walk": walked,
+        "first": int(np.argmin(distances)),
+        "row": _epipolar_images(load, lightfield, row, row_views, shown["light"]) if row else None,
+        **shown,
     }
-    kept: list[int] = []
-    if row:
-        kept = epipolar.thinned(row.views, MOST_ROWS)
-        data["row"] = _epipolar_images(load, matrices, lens, meaning, row, kept, limits)
+    noises = [view.noise for view in views if math.isfinite(view.noise)]
     return Looks(
-        data,
-        len(shown),
-        len(names),
-        sorted({view.split for view in lightfield.views if view.split}),
-        (min(noises), float(np.median(noises)), max(noises)) if noises else None,
-        missed,
-        row,
-        len(kept),
+        data=data,
+        embedded=len(embedded),
+        views=len(names),
+        parts=sorted({view.split for view in lightfield.views if view.split}),
+        noise=(min(noises), float(np.median(noises)), max(noises)) if noises else None,
+        missed=None if depths is None else _missed(depths),
+        row=row,
+        row_shown=len(row_views),
     )
+
+
+def _cameras(lightfield: LightField) -> list[dict[str, Any]]:
+    """Return where each view's camera is and how it is turned."""
+    return [
+        {
+            "name": view.name,
+            "part": view.split,
+            "at": _rounded(matrix[:3, 3]),
+            "right": _rounded(matrix[:3, 0]),
+            "up": _rounded(matrix[:3, 1]),
+            "ahead": _rounded(-matrix[:3, 2]),
+        }
+        for view, matrix in zip(lightfield.views, lightfield.matrices, strict=True)
+    ]
+
+
+def _depths(views: list[View], small: Lens) -> Array | None:
+    """Return the depth of the views, NaN where ``small`` sees nothing; None if they have none."""
+    stored = [view.depth for view in views if view.depth is not None]
+    if not stored:
+        return None
+    return np.where(np.isnan(small.pixel_rays()[..., 0]), np.nan, np.stack(stored))
+
+
+def _pictures(
+    views: list[View],
+    depths: Array | None,
+    embedded: list[int],
+    lightfield: LightField,
+    small: Lens,
+) -> dict[str, Any]:
+    """Return the packed pictures of the ``embedded`` views, seen through the lens ``small``."""
+    light = np.stack([view.colour for view in views])
+    limits = light_range(light)
+    exposure = round(pictures.exposure_for(light), 2)
+    packed: list[dict[str, Any]] = [
+        {"view": number, "light": webp(pack_light(colour, limits), LIGHT_QUALITY)}
+        for number, colour in zip(embedded, light, strict=True)
+    ]
+    shown = {"light": limits, "exposure": exposure, "embedded": packed}
+    if depths is None:
+        return shown | {"points": None, "depth": None, "walk": None}
+    rays = small.pixel_rays()
+    reach = depth_range(depths)
+    for entry, depth in zip(packed, depths, strict=True):
+        entry["depth"] = webp(pack_depth(depth, reach))
+    matrices = lightfield.matrices
+    distances = stored_distance(depths, rays, lightfield.depth)
+    colours = pictures.develop(light, exposure)
+    return shown | {
+        "points": _points(distances, rays, matrices[embedded], colours),
+        "depth": _depth_scale(depths, reach, lightfield.depth),
+        "walk": walk.collect(small, matrices[:, :3, 3], distances),
+    }
+
+
+def _missed(depths: Array) -> float | None:
+    """Return the part of the depths that are inf; None without any depth."""
+    known = depths[~np.isnan(depths)]
+    return float(np.isposinf(known).mean()) if known.size else None
 
 
 def read(path: Path, small: Lens, meaning: str | None) -> View:
@@ -226,12 +251,8 @@ def _rounded(values: Array) -> list[float]:
     return [round(value, 5) + 0.0 for value in values.tolist()]
 
 
-def _depth_scale(
-    depths: Array | None, reach: tuple[float, float] | None, meaning: str | None
-) -> dict[str, Any] | None:
+def _depth_scale(depths: Array, reach: tuple[float, float], meaning: str | None) -> dict[str, Any]:
     """Return what depth codes mean, and which colours, from near to far, depths are shown in."""
-    if depths is None or reach is None:
-        return None
     hit = depths[np.isfinite(depths) & (depths > 0)]
     near, far = np.log2(np.percentile(hit, [5, 98])).tolist() if hit.size else reach
     palette = matplotlib.colormaps["viridis_r"](np.arange(256), bytes=True)[:, :3]
@@ -246,15 +267,17 @@ def _depth_scale(
 
 def _epipolar_images(
     load: Callable[[int, Lens], View],
-    matrices: Array,
-    lens: Lens,
-    meaning: str | None,
+    lightfield: LightField,
     row: epipolar.Row,
     kept: list[int],
     limits: tuple[float, float],
 ) -> dict[str, Any]:
-    """Return a row's epipolar-plane images, all tilts beneath each other in one picture."""
-    fitted = lens.fitted(EPIPOLAR_SIDE)
+    """Return a row's epipolar-plane images, all tilts beneath each other in one picture.
+
+    ``kept`` are the positions in the row of the views that are shown.
+    """
+    matrices = lightfield.matrices
+    fitted = lightfield.lens.fitted(EPIPOLAR_SIDE)
     columns = epipolar.COLUMNS[row.kind]
     count = len(kept)
     light = np.zeros((len(epipolar.TILTS), count, columns, 3), np.float32)
@@ -265,7 +288,7 @@ def _epipolar_images(
         for tilted, tilt in enumerate(epipolar.TILTS):
             rays = epipolar.directions(row, tilt, columns)
             light[tilted, place], depth[tilted, place] = epipolar.sample(
-                fitted, matrices[number], view.colour, view.depth, meaning, rays
+                fitted, matrices[number], view.colour, view.depth, lightfield.depth, rays
             )
     reach = depth_range(depth)
     sight = np.isfinite(depth) | np.isposinf(depth)

@@ -92,7 +92,8 @@ def _bounds(places: Array) -> Array:
         planes: Array = np.unique(np.round(ConvexHull(places).equations, 9), axis=0)
         return planes
     except QhullError:
-        low, high = places.min(axis=0), places.max(axis=0)
+        low = places.min(axis=0)
+        high = places.max(axis=0)
         slack = 0.1 * max(float(np.linalg.norm(high - low)), 0.1)
         sides = np.concatenate([np.eye(3), -np.eye(3)])
         return np.column_stack([sides, np.concatenate([-high, low]) - slack])

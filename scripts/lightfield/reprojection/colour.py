@@ -26,13 +26,15 @@ def colour_strips(source: Array, lens_map: LensMap) -> Iterator[tuple[slice, Arr
     """Yield the rows of what `resample_colour` returns, as many at a time as the caches hold."""
     height, width = lens_map.target_cos.shape
     source = _with_borders(source, lens_map)
-    valid, topology = lens_map.source_cos, lens_map.topology
+    valid = lens_map.source_cos
+    topology = lens_map.topology
     if source.shape[:2] != valid.shape:
         raise UserError(
             f"the source window has {source.shape[1]} × {source.shape[0]} pixels and the lens map "
             f"expects {valid.shape[1]} × {valid.shape[0]}"
         )
-    name, samples = lens_map.settings["filter"], lens_map.settings["samples"]
+    name = lens_map.settings["filter"]
+    samples = lens_map.settings["samples"]
     chosen = FILTERS[name]
     if chosen.sample is None:
         yield slice(0, height), _st_warp(source, lens_map)
@@ -41,10 +43,12 @@ def colour_strips(source: Array, lens_map: LensMap) -> Iterator[tuple[slice, Arr
     for first in range(0, height, step):
         rows = slice(first, min(first + step, height))
         fine = slice(rows.start * samples, rows.stop * samples)
-        coordinates, flags = lens_map.coordinates[fine], lens_map.flags[fine]
+        coordinates = lens_map.coordinates[fine]
+        flags = lens_map.flags[fine]
         out = np.empty((*flags.shape, 4), np.float32)
         if chosen.cover and lens_map.footprints is not None and lens_map.counts is not None:
-            footprints, counts = lens_map.footprints[rows], lens_map.counts[rows]
+            footprints = lens_map.footprints[rows]
+            counts = lens_map.counts[rows]
             chosen.cover(source, valid, coordinates, footprints, counts, flags, topology, out)
         else:
             chosen.sample(source, valid, coordinates, flags, topology, out)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.kernels import inline, kernel
+from lightfield.core.compiled import inline, kernel
 from lightfield.geometry.lenses import Array
 from lightfield.imaging.halves import to_half
 from lightfield.reprojection.kernels import Topology, source_index
@@ -56,13 +56,20 @@ def _cell(
     within = row >= 1 and row < height - 2 and column >= 1 and column < width - 2
     if within:
         # Unsigned, so that no index is checked for counting from the end.
-        one, two, i, j = np.uint64(1), np.uint64(2), np.uint64(row), np.uint64(column)
-        a0, a1 = inverse[i, j - one], inverse[i, j]
+        one = np.uint64(1)
+        two = np.uint64(2)
+        i = np.uint64(row)
+        j = np.uint64(column)
+        a0 = inverse[i, j - one]
+        a1 = inverse[i, j]
         a2, a3 = inverse[i, j + one], inverse[i, j + two]
-        b0, b1 = inverse[i + one, j - one], inverse[i + one, j]
+        b0 = inverse[i + one, j - one]
+        b1 = inverse[i + one, j]
         b2, b3 = inverse[i + one, j + one], inverse[i + one, j + two]
-        c1, c2 = inverse[i - one, j], inverse[i - one, j + one]
-        d1, d2 = inverse[i + two, j], inverse[i + two, j + one]
+        c1 = inverse[i - one, j]
+        c2 = inverse[i - one, j + one]
+        d1 = inverse[i + two, j]
+        d2 = inverse[i + two, j + one]
     else:
         a0 = _value(inverse, row, column - 1, topology)
         a1 = _value(inverse, row, column, topology)
@@ -134,10 +141,10 @@ def _pick(
             smooth = top + fy * (bottom - top) + across
             if smooth > 0:
                 low, high = min(min(a, b), min(c, d)), max(max(a, b), max(c, d))
-                found = min(max(smooth, low), high)
+                picked = min(max(smooth, low), high)
             else:
                 nearest = min(int(y), height - 1), min(int(x), width - 1)
-                found = inverse[nearest]
+                picked = inverse[nearest]
                 if valid[nearest] != valid[nearest]:
                     # Beyond the rim of the image circle: the nearest of the four pixels around.
                     shortest = np.float32(4)
@@ -147,11 +154,11 @@ def _pick(
                             away = (fx - p) * (fx - p) + (fy - q) * (fy - q)
                             if k >= 0 and valid[k, m] == valid[k, m] and away < shortest:
                                 shortest = away
-                                found = inverse[k, m]
-            if found == 0:
+                                picked = inverse[k, m]
+            if picked == 0:
                 out[i, j] = np.inf
             else:
-                out[i, j] = (cos[i, j] if as_z else np.float32(1)) / found
+                out[i, j] = (cos[i, j] if as_z else np.float32(1)) / picked
 
 
 def resample_depth(depth: Array, source_is_z: bool, target_is_z: bool, lens_map: LensMap) -> Array:
@@ -174,7 +181,7 @@ def resample_depth(depth: Array, source_is_z: bool, target_is_z: bool, lens_map:
     out = np.empty(lens_map.target_cos.shape, depth.dtype)
     for first in range(0, len(out), _STRIP):
         rows = slice(first, first + _STRIP)
-        found = np.empty(out[rows].shape, np.float32)
+        strip = np.empty(out[rows].shape, np.float32)
         _pick(
             inverse,
             lens_map.source_cos,
@@ -183,7 +190,7 @@ def resample_depth(depth: Array, source_is_z: bool, target_is_z: bool, lens_map:
             target_is_z,
             _SMOOTH[depth.dtype],
             lens_map.topology,
-            found,
+            strip,
         )
-        out[rows] = to_half(found) if out.dtype == np.float16 else found
+        out[rows] = to_half(strip) if out.dtype == np.float16 else strip
     return out

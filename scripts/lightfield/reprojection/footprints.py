@@ -1,10 +1,10 @@
-"""The loops of a lens map: what a target pixel covers in the source, and what needs care there."""
+"""The loops of a lens map: what each target pixel covers, and which samples need care."""
 
 import math
 
 import numpy as np
 
-from lightfield.core.kernels import inline, kernel
+from lightfield.core.compiled import inline, kernel
 from lightfield.geometry.lenses import Array
 from lightfield.reprojection.kernels import CAREFUL, INSIDE, NOTHING
 
@@ -13,7 +13,7 @@ _MOST_SAMPLES = 256  # each way, of a footprint that meets a pole
 
 @inline
 def _difference(before: float, middle: float, after: float, period: float) -> float:
-    """The central difference; one-sided where one neighbour is missing, 0 where both are."""
+    """Return the central difference: one-sided if one neighbour is missing, 0 if both are."""
     backward, forward = middle - before, after - middle
     if period > 0:
         backward -= period * np.rint(backward / period)
@@ -29,7 +29,7 @@ def _difference(before: float, middle: float, after: float, period: float) -> fl
 
 @kernel
 def extent(step: Array, counts: Array) -> int:
-    """How far a pixel's samples lie from its centre at most, in whole source pixels, along x or y.
+    """Return how far a pixel's samples lie from its centre: the most in x or y, in source pixels.
 
     ``step`` is (2, 2) and ``counts`` (2,), as in a lens map.
     """
@@ -39,6 +39,31 @@ def extent(step: Array, counts: Array) -> int:
         reach += abs(step[axis, 1] * np.float32(counts[1] - 1))
         most = max(most, reach)
     return int(np.ceil(most / 2))
+
+
+@inline
+def _fill_footprint(jacobian: Array, widest: float, steps: Array, counts: Array) -> int:
+    """Fill the ``steps`` (2, 2) between samples and their ``counts`` (2,); return the larger count.
+
+    A pixel is a mean over its area, in the source too, so what is missing to a target pixel that
+    spans s source pixels is a box of width √(s² − 1), by the variances. n samples at distance d
+    have the variance of a box of width d √(n² − 1), so that gives d; n is as small as the bicubic
+    kernel, under which d may exceed a pixel, allows. Where s is little above 1 or below it, one
+    sample is all: magnifying does not blur.
+    """
+    most = 1
+    for way in range(2):
+        squared = jacobian[0, way] ** 2 + jacobian[1, way] ** 2
+        box = min(math.sqrt(max(squared - 1, 0.0)), widest)
+        counts[way] = 1
+        if box > 0.5:
+            count = int(min(max(math.ceil(0.75 * box), 2), _MOST_SAMPLES))
+            scale = box / math.sqrt(squared) / math.sqrt(count * count - 1)
+            counts[way] = count
+            steps[0, way] = jacobian[0, way] * scale
+            steps[1, way] = jacobian[1, way] * scale
+            most = max(most, count)
+    return most
 
 
 @kernel
@@ -56,29 +81,24 @@ def measure(
     footprints: Array,
     counts: Array,
 ) -> int:
-    """Find what target pixels cover, of their coordinates (h, w, 2) and their neighbours'.
+    """Measure what target pixels cover, from their coordinates (h, w, 2) and their neighbours'.
 
     Fills ``centers``, NaN outside the source's ``size``, and ``magnification``, which is 1 / √|det|
     of the Jacobian. ``period`` is the source's width if it wraps around, or else 0. Unless they are
     empty it fills, for the adaptive filter, ``counts``, how many samples a pixel takes each way,
     and ``footprints``, which are zeros, with the steps between them; returns the largest count.
     No box is wider than ``widest``, in source pixels.
-
-    A pixel is a mean over its area, in the source too, so what is missing to a target pixel that
-    spans s source pixels is a box of width √(s² − 1), by the variances. n samples at distance d
-    have the variance of a box of width d √(n² − 1), so that gives d; n is as small as the bicubic
-    kernel, under which d may exceed a pixel, allows. Where s is little above 1 or below it, one
-    sample is all: magnifying does not blur.
     """
     jacobian = np.empty((2, 2))
-    covers, most = len(counts) > 0, 1
+    fills_footprints = len(counts) > 0
+    most = 1
     for i in range(middle.shape[0]):
         for j in range(middle.shape[1]):
             x, y = middle[i, j, 0], middle[i, j, 1]
             if not (0 <= x <= size[0] and 0 <= y <= size[1]):
                 centers[i, j] = np.nan
                 magnification[i, j] = np.nan
-                if covers:
+                if fills_footprints:
                     counts[i, j] = 1
                 continue
             centers[i, j, 0] = x
@@ -90,24 +110,15 @@ def measure(
                 jacobian[c, 1] = _difference(above[i, j, c], center, below[i, j, c], span)
             area = abs(jacobian[0, 0] * jacobian[1, 1] - jacobian[0, 1] * jacobian[1, 0])
             magnification[i, j] = 1 / math.sqrt(area)
-            if covers:
-                for way in range(2):
-                    squared = jacobian[0, way] ** 2 + jacobian[1, way] ** 2
-                    box = min(math.sqrt(max(squared - 1, 0.0)), widest)
-                    counts[i, j, way] = 1
-                    if box > 0.5:
-                        count = int(min(max(math.ceil(0.75 * box), 2), _MOST_SAMPLES))
-                        scale = box / math.sqrt(squared) / math.sqrt(count * count - 1)
-                        counts[i, j, way] = count
-                        footprints[i, j, 0, way] = jacobian[0, way] * scale
-                        footprints[i, j, 1, way] = jacobian[1, way] * scale
-                        most = max(most, count)
+            if fills_footprints:
+                count = _fill_footprint(jacobian, widest, footprints[i, j], counts[i, j])
+                most = max(most, count)
     return most
 
 
 @kernel
 def distance_to_missing(cos: Array, out: Array) -> None:
-    """How many pixels away, in rows or columns, the nearest is that is NaN or outside the image."""
+    """Fill ``out`` with the distance, in rows or columns, to the nearest pixel without a ray."""
     height, width = cos.shape
     for i in range(height):
         for j in range(width):
@@ -155,14 +166,14 @@ def mark(
 def bounds(
     points: Array, margin: int, footprints: Array, counts: Array
 ) -> tuple[float, float, float, float, int]:
-    """The least and the largest x and y that are read around ``points``, and the largest extent.
+    """Return the least and largest x and y that are read around ``points``, and the largest extent.
 
-    ``margin`` is added on each side, and each point's own extent where it has a footprint. The
+    ``margin`` is added on each side, and the extent of each point that has a footprint. The
     bounds are inf and −inf where no point has coordinates.
     """
     left = top = np.inf
     right = bottom = -np.inf
-    most = 0
+    largest_extent = 0
     for i in range(points.shape[0]):
         for j in range(points.shape[1]):
             x, y = points[i, j, 0], points[i, j, 1]
@@ -170,9 +181,9 @@ def bounds(
                 continue
             around = margin
             if len(counts):
-                own = extent(footprints[i, j], counts[i, j])
-                most = max(most, own)
-                around += own
+                point_extent = extent(footprints[i, j], counts[i, j])
+                largest_extent = max(largest_extent, point_extent)
+                around += point_extent
             left, right = min(left, x - around), max(right, x + around)
             top, bottom = min(top, y - around), max(bottom, y + around)
-    return left, top, right, bottom, most
+    return left, top, right, bottom, largest_extent

@@ -1,4 +1,4 @@
-"""What a run of scripts/reproject.py is to do: its flags, its views, and the files to make."""
+"""What a run of scripts/reproject.py does: its files, its views, and their keys."""
 
 import argparse
 import hashlib
@@ -11,17 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.cli import above_zero, positive, stops, view_slice, white
+from lightfield.core.cli import positive, view_slice
 from lightfield.core.errors import UserError
-from lightfield.dataset import lightfield, records
+from lightfield.dataset import lightfield, shard_files
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.passes import PASSES, Pass
 from lightfield.dataset.records import ShardRecord
+from lightfield.dataset.reprojections import ReprojectionSettings
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.rotations import matrix_to_euler
 from lightfield.reprojection import lens_map
-from lightfield.reprojection.lens_arguments import Target, add_geometry_flags, geometry
+from lightfield.reprojection.geometry import Geometry, Target
 from lightfield.reprojection.lens_map import LensMap
 
 VERSION = 3  # of the files: part of every key, raised when the same settings give others
@@ -29,40 +30,20 @@ SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
 
 
 def add_flags(parser: argparse.ArgumentParser) -> None:
-    """Add all flags of the program."""
+    """Add the flags that name files, and those that say how the program runs."""
     files = parser.add_argument_group("Input and output")
     source = files.add_mutually_exclusive_group(required=True)
     source.add_argument("-i", "--input-dir", type=Path, help="folder of the images")
     source.add_argument("--single", type=Path, metavar="FILE", help="one image")
     files.add_argument("-o", "--output-dir", type=Path, required=True, help="folder to write to")
     files.add_argument("--output-cfg", type=Path, metavar="JSON", help="lightfield.json to write")
-    files.add_argument("--exr", action="store_true", help="write EXR: colour and depth")
-    files.add_argument("--png", action="store_true", help="write PNG: colour, sRGB")
-    files.add_argument("--bits", type=int, choices=[8, 16], default=8, help="of a PNG, default 8")
-    files.add_argument(
-        "--depth-png",
-        type=above_zero,
-        metavar="SCALE",
-        help="write <name>_depth.png: 16-bit, depth in metres × SCALE, 0 for none",
-    )
-    files.add_argument(
-        "--mask",
-        action="store_true",
-        help="write dynamic_mask_<name>.png: 255 where a pixel has no source",
-    )
-    files.add_argument(
-        "--passes",
-        type=lambda text: text.split(","),
-        default=[],
-        metavar="NAME,…",
-        help="reproject these passes, too, which lie beside --input-cfg, into --output-dir/<pass>/",
-    )
     files.add_argument(
         "--record", type=Path, metavar="JSON", help="list of the files, written last"
     )
     files.add_argument(
         "--source-record", type=Path, metavar="JSON", help="record that the images must agree with"
     )
+    files.add_argument("--lens-map", type=Path, metavar="FILE", help="computed by lens_map.py")
     chosen = parser.add_argument_group("Choice of files")
     chosen.add_argument("--filter-prefix", default="", help="only names that start so")
     chosen.add_argument("--filter-suffix", default="", help="only names that end so")
@@ -70,13 +51,6 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
         "--views",
         metavar="FIRST:END",
         help="only these frames of --input-cfg, from 0, END excluded",
-    )
-    add_geometry_flags(parser)
-    parser.add_argument("--lens-map", type=Path, metavar="FILE", help="computed by lens_map.py")
-    colour = parser.add_argument_group("Colour")
-    colour.add_argument("--exposure", type=stops, default=0.0, help="stops, default 0")
-    colour.add_argument(
-        "--reinhard", type=white, default=1.0, help="value that becomes white, default 1: off"
     )
     runtime = parser.add_argument_group("Runtime")
     runtime.add_argument("--skip-if-exists", action="store_true", help="keep any existing output")
@@ -93,33 +67,40 @@ class SourceView:
 
 
 class Job:
-    """All that is the same for every view; a `UserError` names the flag that is wrong."""
+    """What all views of a run have in common; a `UserError` names the wrong flag or key."""
 
-    def __init__(self, arguments: argparse.Namespace) -> None:
+    def __init__(
+        self,
+        arguments: argparse.Namespace,
+        settings: ReprojectionSettings,
+        lightfield: LightField,
+        source: Lens,
+    ) -> None:
         self.arguments = arguments
-        self.geometry = geometry(arguments)
-        self.lightfield = self.geometry.lightfield
-        self.source = self.geometry.source
+        self.settings = settings
+        self.lightfield = lightfield
+        self.source = source
+        self.geometry = Geometry.of(settings, source)
         self.targets = self.geometry.targets
-        if not (arguments.exr or arguments.png):
-            raise UserError("--exr, --png: give one of them, or both")
         if arguments.no_configs and arguments.output_cfg:
             raise UserError("--output-cfg: needs --input-cfg, which --no-configs excludes")
         if not self.copies:
             self.lightfield.require_centre()
-        self.passes = self._passes_wanted(arguments.passes)
+        self.passes = self._chosen_passes()
         self.record = ShardRecord(arguments.record, arguments.output_dir)
-        given = records.read(arguments.source_record) if arguments.source_record else {}
+        record = arguments.source_record
+        source_files = shard_files.read_record(record) if record else {}
         # The SHA-256 of each image, by its path in the dataset.
-        self.source_sums = {path: digest for path, (_, digest) in given.items()}
+        self.source_sums = {path: digest for path, (_, digest) in source_files.items()}
 
-    def _passes_wanted(self, names: list[str]) -> list[Pass]:
-        there = [found.name for found in self.lightfield.passes if found.kind != "motion"]
-        for name in names:
-            if name not in there:
-                known = ", ".join(there) or "no passes to reproject"
-                raise UserError(f"--passes: is {name}; --input-cfg has {known}")
-        return [PASSES[name] for name in names]
+    def _chosen_passes(self) -> list[Pass]:
+        """Return the passes to reproject; raises `UserError` for one that the views lack."""
+        available = [each.name for each in self.lightfield.passes if each.kind != "motion"]
+        for name in self.settings.passes:
+            if name not in available:
+                allowed = ", ".join(available) or "no passes to reproject"
+                raise UserError(f"passes: is {name}; {self.arguments.input_cfg} has {allowed}")
+        return [PASSES[name] for name in self.settings.passes]
 
     @cached_property
     def copies(self) -> bool:
@@ -137,34 +118,18 @@ class Job:
         if path is None:
             return self.geometry.compute(target)
         path = path.with_name(path.stem + target.suffix + path.suffix)
-        made = lens_map.load(path)
-        for key, value in self.geometry.settings(target).items():
-            if made.settings[key] != value:
+        loaded = lens_map.load(path)
+        for key, value in self.geometry.map_settings(target).items():
+            if loaded.settings[key] != value:
                 raise UserError(
-                    f"{path}: is a lens map for {key} {json.dumps(made.settings[key])}, "
+                    f"{path}: is a lens map for {key} {json.dumps(loaded.settings[key])}, "
                     f"and this is {json.dumps(value)}; compute it anew with lens_map.py"
                 )
-        return made
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """What, beside the lens, was done to the pixels: with it, a PNG's can be undone.
-
-        ``rotation`` is pan, pitch and roll in degrees; `lightfield.imaging.tonemap` defines
-        ``exposure`` and ``reinhard``.
-        """
-        return {
-            "rotation": self.geometry.rotation,
-            "filter": self.geometry.filter,
-            "samples": self.geometry.samples,
-            "exposure": self.arguments.exposure,
-            "reinhard": self.arguments.reinhard,
-            **({"bits": 16} if self.arguments.bits == 16 else {}),
-        }
+        return loaded
 
     @property
     def depth_wanted(self) -> bool:
-        return bool(self.arguments.exr or self.arguments.depth_png)
+        return "exr" in self.settings.formats or self.settings.depth_png is not None
 
     @property
     def depth_precision(self) -> str:
@@ -179,14 +144,12 @@ class Job:
         """
         content = {
             "version": VERSION,
-            "map": self.geometry.settings(target),
-            "exposure": self.arguments.exposure,
-            "reinhard": self.arguments.reinhard,
-            "depth_png": self.arguments.depth_png,
+            "map": self.geometry.map_settings(target),
+            **self.settings.development,
+            "depth_png": self.settings.depth_png,
             "depth": self.lightfield.content.get("depth"),
             "source": identity,
-            # Not said where it is as it has always been, for keys to stay as they are.
-            **({"bits": 16} if self.arguments.bits == 16 else {}),
+            # Left out where it is false, so that existing keys hold.
             **({"transparent": True} if self.lightfield.transparent else {}),
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
@@ -194,28 +157,27 @@ class Job:
     def outputs(self, view: SourceView, target: Target) -> dict[str, Path]:
         """Return the files to make of a view, by kind."""
         name = view.name + target.suffix
-        every = {
-            "exr": (self.arguments.exr, f"{name}.exr"),
-            "png": (self.arguments.png, f"{name}.png"),
-            "depth": (self.arguments.depth_png, f"{name}_depth.png"),
-            "mask": (self.arguments.mask, f"dynamic_mask_{name}.png"),
-        }
+        files: dict[str, str] = {kind: f"{name}.{kind}" for kind in self.settings.formats}
+        if self.settings.depth_png is not None:
+            files["depth"] = f"{name}_depth.png"
+        if self.settings.mask:
+            files["mask"] = f"dynamic_mask_{name}.png"
         folder: Path = self.arguments.output_dir
-        return {kind: folder / file for kind, (wanted, file) in every.items() if wanted}
+        return {kind: folder / file for kind, file in files.items()}
 
     def pass_outputs(self, view: SourceView, target: Target) -> dict[Pass, Path]:
         """Return the files to make of a view's passes."""
         folder: Path = self.arguments.output_dir
-        return {found: found.path(folder, view.name + target.suffix) for found in self.passes}
+        return {each: each.path(folder, view.name + target.suffix) for each in self.passes}
 
     def files(self, view: SourceView, target: Target) -> list[Path]:
         """Return all files to make of a view."""
         return [*self.outputs(view, target).values(), *self.pass_outputs(view, target).values()]
 
     def sources(self, view: SourceView) -> list[Path]:
-        """Return the files that a view is made of: its own, and those of its passes."""
+        """Return the files that a view is made of: its images, and those of its passes."""
         folder = self.lightfield.folder
-        return [*view.paths, *(found.path(folder, view.name) for found in self.passes)]
+        return [*view.paths, *(each.path(folder, view.name) for each in self.passes)]
 
     def output_lightfield(self) -> LightField:
         """Return the input's lightfield.json with lens, depth and poses of what is written."""
@@ -227,13 +189,13 @@ class Job:
             if self._passes(view.name, ".exr")
             for target in self.targets
         ]
-        passes = [found.name for found in self.passes]
-        more: dict[str, Any] = {"passes": passes} if self.lightfield.passes else {}
-        more["reprojection"] = self.settings
-        return self.lightfield.changed(lens, views, depth=depth, **more)
+        changes: dict[str, Any] = {"reprojection": self.settings.published}
+        if self.lightfield.passes:
+            changes["passes"] = [each.name for each in self.passes]
+        return self.lightfield.changed(lens, views, depth=depth, **changes)
 
     def views(self) -> list[SourceView]:
-        """Return the views that the command line chooses, in the order of their names or frames."""
+        """Return the chosen views, in the order of their names or frames."""
         arguments = self.arguments
         if arguments.single:
             if isinstance(self.source, CubeMap):
@@ -273,7 +235,7 @@ class Job:
         return [SourceView(path.stem, (path,)) for path in paths]
 
     def _passes(self, name: str, suffix: str) -> bool:
-        """Whether a name passes the filters; theirs may have ``suffix`` or not."""
+        """Return whether a name passes the filters, with or without its ``suffix``."""
         end = self.arguments.filter_suffix
         return name.startswith(self.arguments.filter_prefix) and (
             name.endswith(end) or (name + suffix).endswith(end)
@@ -281,7 +243,7 @@ class Job:
 
 
 def _find(folder: Path, name: str, lens: Lens) -> tuple[Path, ...]:
-    """Return the file of a view; one that exists if any does, so that a missing one is named."""
+    """Return the file of a view; of a missing one the name that it would have first."""
     if isinstance(lens, CubeMap):
         return tuple(
             path for face in CUBE_FACES for path in _find(folder, f"{name}_{face}", lens.face)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.kernels import inline, kernel, part
+from lightfield.core.compiled import inline, kernel, part
 from lightfield.geometry.lenses import Array
 
 # What a sample finds in the source.
@@ -26,13 +26,13 @@ Topology = tuple[bool, bool, bool]
 
 @part
 def linear_weights(t: Any) -> tuple[Any, ...]:
-    """Weights of the two pixels around a point at ``t`` in [0, 1) past the left one."""
+    """Return the weights of the two pixels around a point at ``t`` in [0, 1) past the left one."""
     return np.float32(1) - t, t
 
 
 @part
 def cubic_weights(t: Any) -> tuple[Any, ...]:
-    """Weights of four pixels, for a point at ``t`` in [0, 1) past the second.
+    """Return the weights of four pixels, for a point at ``t`` in [0, 1) past the second.
 
     Source: Catmull and Rom 1974; the cubic convolution of third order of Keys 1981 (a = −1/2).
     """
@@ -47,16 +47,19 @@ def cubic_weights(t: Any) -> tuple[Any, ...]:
 
 @part
 def lanczos_weights(t: Any) -> tuple[Any, ...]:
-    """Weights of six pixels, for a point at ``t`` in [0, 1) past the third.
+    """Return the weights of six pixels, for a point at ``t`` in [0, 1) past the third.
 
     sinc(u) sinc(u / 3) (Turkowski 1990), made to sum to one.
     """
-    zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
+    zero = np.float32(0)
+    half = np.float32(0.5)
+    one = np.float32(1)
     if t < np.float32(1e-5):
         return zero, zero, one, zero, zero, zero
     # sin(π u / 3) at u = t + 2, t + 1, …, t − 3, by the addition theorem.
     third = np.float32(np.pi / 3) * t
-    a, b = half * np.sin(third), np.float32(math.sqrt(0.75)) * np.cos(third)
+    a = half * np.sin(third)
+    b = np.float32(math.sqrt(0.75)) * np.cos(third)
     w0 = (b - a) / ((t + 2) * (t + 2))
     w1 = -(b + a) / ((t + 1) * (t + 1))
     w2 = 2 * a / (t * t)
@@ -72,14 +75,16 @@ def lanczos_weights(t: Any) -> tuple[Any, ...]:
 def source_index(
     row: int, column: int, height: int, width: int, topology: Topology
 ) -> tuple[int, int]:
-    """The pixel that continues the image at (row, column), or row −1 if none does."""
+    """Return the pixel that continues the image at (row, column); row −1 if none does."""
     wraps, top, bottom = topology
     if wraps:
         # Beyond a pole lies the same row, half a turn away.
         if row < 0 and top:
-            row, column = -1 - row, column + width // 2
+            row = -1 - row
+            column = column + width // 2
         elif row >= height and bottom:
-            row, column = 2 * height - 1 - row, column + width // 2
+            row = 2 * height - 1 - row
+            column = column + width // 2
         column %= width
     if row < 0 or row >= height or column < 0 or column >= width:
         return -1, 0
@@ -88,7 +93,7 @@ def source_index(
 
 @inline
 def _sample(source: Array, row: int, column: int, wy: Any, wx: Any) -> tuple[Any, Any, Any, Any]:
-    """The weighted sum of the pixels from (row, column) on, all of which exist."""
+    """Return the weighted sum of the pixels from (row, column) on, all of which exist."""
     # Unsigned, so that no index is checked for counting from the end.
     i: Any = np.uint64(row)
     j: Any = np.uint64(column)
@@ -123,7 +128,7 @@ def _sum_of_present(
     topology: Topology,
     result: Array,
 ) -> tuple[Any, bool]:
-    """Sum the pixels from (row, column) on that are there; their weight, and whether all are.
+    """Sum the existing pixels from (row, column) on; return their weight, and if all exist.
 
     ``result`` (2, 4) becomes the sum, and the least of the pixels and zero.
     """
@@ -158,7 +163,7 @@ def _careful(
     topology: Topology,
     result: Array,
 ) -> bool:
-    """Sample where pixels may be missing or negative; whether any is there.
+    """Sample where pixels may be missing or negative; return whether any exists.
 
     The sample lies (``fy``, ``fx``) past pixel (``row``, ``column``). Where one is missing, the
     answer is bilinear among those of the four nearest that are there: a kernel with negative lobes
@@ -265,7 +270,7 @@ def covering(weights: Weights) -> Callable[..., None]:
                 ux, uy = footprints[i, j, 0, 0], footprints[i, j, 1, 0]
                 vx, vy = footprints[i, j, 0, 1], footprints[i, j, 1, 1]
                 a0 = a1 = a2 = a3 = np.float32(0)
-                found = 0
+                sample_count = 0
                 for q in range(down):
                     v = np.float32(q) - half * np.float32(down - 1)
                     for p in range(across):
@@ -284,14 +289,17 @@ def covering(weights: Weights) -> Callable[..., None]:
                                 source, valid, row, column, fy, fx, wy, wx, topology, result
                             ):
                                 continue
-                            s0, s1, s2, s3 = result[0, 0], result[0, 1], result[0, 2], result[0, 3]
-                        found += 1
+                            s0 = result[0, 0]
+                            s1 = result[0, 1]
+                            s2 = result[0, 2]
+                            s3 = result[0, 3]
+                        sample_count += 1
                         a0 += s0
                         a1 += s1
                         a2 += s2
                         a3 += s3
-                if found:
-                    scale = np.float32(1) / np.float32(found)
+                if sample_count:
+                    scale = np.float32(1) / np.float32(sample_count)
                     out[i, j, 0] = a0 * scale
                     out[i, j, 1] = a1 * scale
                     out[i, j, 2] = a2 * scale
@@ -306,16 +314,16 @@ def block_mean(fine: Array, samples: int, out: Array) -> None:
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             a0 = a1 = a2 = a3 = np.float32(0)
-            found = 0
+            sample_count = 0
             for p in range(i * samples, (i + 1) * samples):
                 for q in range(j * samples, (j + 1) * samples):
                     if fine[p, q, 0] == fine[p, q, 0]:
-                        found += 1
+                        sample_count += 1
                         a0 += fine[p, q, 0]
                         a1 += fine[p, q, 1]
                         a2 += fine[p, q, 2]
                         a3 += fine[p, q, 3]
-            scale = np.float32(1) / np.float32(found) if found else np.float32(np.nan)
+            scale = np.float32(1) / np.float32(sample_count) if sample_count else np.float32(np.nan)
             out[i, j, 0] = a0 * scale
             out[i, j, 1] = a1 * scale
             out[i, j, 2] = a2 * scale
@@ -329,13 +337,16 @@ def continue_faces(source: Array, strip: Array, out: Array) -> None:
     border = (side - size) // 2
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
-            row, column = i - border, j % side - border
+            row = i - border
+            column = j % side - border
             if 0 <= row < size and 0 <= column < size:
                 out[i, j] = source[row, j // side * size + column]
                 continue
-            x, y = strip[i, j, 0] - np.float32(0.5), strip[i, j, 1] - np.float32(0.5)
+            x = strip[i, j, 0] - np.float32(0.5)
+            y = strip[i, j, 1] - np.float32(0.5)
             column, row = int(np.floor(x)), int(np.floor(y))
-            wx, wy = cubic_weights(x - np.float32(column)), cubic_weights(y - np.float32(row))
+            wx = cubic_weights(x - np.float32(column))
+            wy = cubic_weights(y - np.float32(row))
             first = int(strip[i, j, 0]) // size * size
             for c in range(4):
                 total = darkest = np.float32(0)

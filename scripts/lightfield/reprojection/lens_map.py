@@ -1,7 +1,7 @@
 """The lens map: where in the source image each pixel of the target image looks.
 
-A map depends on the two lenses, their sizes, the rotation between them and the filter, and on no
-view. It is computed once in float64, kept in float32, and applied to every view of a rig.
+A map depends on the two lenses, their sizes, the rotation between them and the filter, but not on
+a view. It is computed once in float64, kept in float32, and applied to every view of a rig.
 """
 
 import json
@@ -12,12 +12,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from statistics import fmean
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path, read_problem
+from lightfield.core.files import DAMAGE, atomic_path, read_problem
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.reprojection.filters import DEFAULT_FILTER, FILTERS
@@ -36,7 +37,9 @@ def rotation_matrix(pan: float, pitch: float, roll: float) -> Array:
     down, which are −pitch and −roll where y points up. So a positive pan turns the target
     camera to the left, a positive pitch down, and a positive roll clockwise.
     """
-    pan, pitch, roll = math.radians(pan), math.radians(-pitch), math.radians(-roll)
+    pan = math.radians(pan)
+    pitch = math.radians(-pitch)
+    roll = math.radians(-roll)
     about_x = [
         [1, 0, 0],
         [0, math.cos(pitch), -math.sin(pitch)],
@@ -50,13 +53,12 @@ def rotation_matrix(pan: float, pitch: float, roll: float) -> Array:
 
 @dataclass(frozen=True)
 class LensMap:
-    """What it takes to resample a view; (H, W) is the target's size, (h, w) the window's.
+    """The arrays that resample a view; (H, W) is the target's size, (h, w) the window's.
 
-    ``settings`` describes what the map is for; ``summary`` has the min, median and max of the
-    magnification, target pixels to one of the source along a line, and the fraction of the image
-    that has a source (covered). ``window`` is the
-    part of the source (row, end row, column, end column) that the map reads at all, and every
-    coordinate counts in pixels from that window's corner.
+    ``settings`` describes what the map is for. ``summary`` has the min, median and max of the
+    magnification, in target pixels to one of the source along a line, and the fraction of the
+    image that has a source (covered). ``window`` is the part of the source that the map reads
+    (row, end row, column, end column). Coordinates count in pixels from the window's corner.
     """
 
     settings: dict[str, Any]
@@ -71,14 +73,14 @@ class LensMap:
     # (h, w) and (H, W) float32: cos θ at each pixel's centre; NaN where it has no ray.
     source_cos: Array
     target_cos: Array
-    # Of the adaptive filter where anything is minified: (H, W, 2) uint16, how many samples a pixel
-    # takes along its row and its column, and (H, W, 2, 2) float32, the (x, y) step from one to the
-    # next, the first index being x or y and the second the way.
+    # Only where the adaptive filter minifies. `counts` (H, W, 2) uint16 is how many samples a pixel
+    # takes along its row and its column. `footprints` (H, W, 2, 2) float32 is the step from one
+    # sample to the next: the first index is x or y, the second the row or the column.
     footprints: Array | None = None
     counts: Array | None = None
-    # Of a cube map: (h + 2b, 6 (h + 2b), 2) float32, where in the strip of faces each pixel of the
-    # strip of faces with borders of b pixels lies. All other coordinates, `source_cos` and the
-    # flags are then of the strip with borders, and the window is the whole of the one without.
+    # Only of a cube map, whose faces get borders of b pixels: (h + 2b, 6 (h + 2b), 2) float32,
+    # where each pixel of the strip with borders lies in the strip without. The window is then the
+    # whole strip without borders. All other coordinates, `source_cos` and the flags are with them.
     strip: Array | None = None
 
     @property
@@ -117,6 +119,52 @@ def compute(
 
     ``rotation`` (3, 3) turns rays of the target camera into the source camera's.
     """
+    _check_sampling(filter_name, samples)
+    reach = FILTERS[filter_name].reach
+    fold = Fold.of_map(source, target, rotation)
+    points, target_cos, magnification, footprints, counts, areas = _measure_pixels(
+        source, target, rotation, fold, filter_name
+    )
+    summary = _summary(fold.unfolded(magnification))
+    sample_points, sample_fold = points, fold
+    if samples > 1:
+        sample_points, areas = _measure_samples(source, target, rotation, samples, reach)
+        sample_fold = Fold((len(sample_points), sample_points.shape[1]))
+    part = _source_part(source, areas, sample_fold, reach)
+    if isinstance(source, CubeMap):
+        points = _on_strip(points, source, part.border)
+    centers = fold.placed(points, part.corner, source)
+    coordinates = centers
+    if samples > 1:
+        coordinates = sample_fold.placed(sample_points, part.corner, source)
+    # In float64 they are the largest arrays, and no longer needed.
+    del points, sample_points
+    target_cos = fold.unfolded(target_cos)
+    has_footprints = len(counts) > 0
+    if has_footprints:
+        footprints = fold.steps(footprints)
+        counts = fold.unfolded(counts)
+    lens_map = LensMap(
+        settings=settings(source, target, rotation, filter_name, samples),
+        summary=summary,
+        window=part.window,
+        centers=centers,
+        coordinates=coordinates,
+        flags=_flags(coordinates, part.cos, reach, footprints, counts),
+        source_cos=part.cos,
+        target_cos=target_cos,
+        footprints=footprints if has_footprints else None,
+        counts=counts if has_footprints else None,
+        strip=part.strip,
+    )
+    # Read-only, as `load` gives them, so that both use the same compiled kernels.
+    for array in _arrays(lens_map).values():
+        array.flags.writeable = False
+    return lens_map
+
+
+def _check_sampling(filter_name: str, samples: int) -> None:
+    """Raise `UserError` for a filter or a number of samples that cannot be."""
     if samples < 1:
         raise UserError(f"samples: {samples} must be at least 1")
     if filter_name not in FILTERS:
@@ -125,19 +173,32 @@ def compute(
         raise UserError(
             f"samples: the {filter_name} filter covers the whole pixel already; leave 1"
         )
-    reach, covers = FILTERS[filter_name].reach, FILTERS[filter_name].cover is not None
-    wraps, _, _ = _topology(source)
+
+
+def _measure_pixels(
+    source: Lens, target: Lens, rotation: Array, fold: Fold, filter_name: str
+) -> tuple[Array, Array, Array, Array, Array, list[Any]]:
+    """Measure the target pixels of the fold's part: where each lies in the source, and its extent.
+
+    Returns the points (h, w, 2) float64, cos θ in the target (h, w) and the magnification (h, w),
+    the footprints (h, w, 2, 2) and counts (h, w, 2) of `LensMap`, and the `bounds` of each strip of
+    rows. Footprints and counts are empty if the filter takes one sample of each pixel.
+    """
+    reach = FILTERS[filter_name].reach
+    covers = FILTERS[filter_name].cover is not None
+    period = float(source.width) if _topology(source)[0] else 0.0
     # A cube map's faces continue only so far.
     widest = float(source.height) if isinstance(source, CubeMap) else math.inf
-    fold = Fold.of_map(source, target, rotation)
     height, width = fold.part
     # In float64 until they count from the window's corner, which is not known before.
     points = np.empty((height, width, 2))
-    target_cos, scale = (np.empty((height, width), np.float32) for _ in range(2))
+    target_cos = np.empty((height, width), np.float32)
+    magnification = np.empty((height, width), np.float32)
     # Zeros take no memory as long as nothing else is written.
     footprints = np.zeros((height, width, 2, 2) if covers else (0, 0, 2, 2), np.float32)
     counts = np.zeros((height, width, 2) if covers else (0, 0, 2), np.uint16)
-    most, areas = 1, []
+    largest_count = 1
+    areas = []
     for rows in _strips(height, width):
         # One pixel more on every side, for central differences at the border too.
         x = np.arange(-1, width + 1) + 0.5
@@ -146,88 +207,90 @@ def compute(
         target_cos[rows] = -rays[1:-1, 1:-1, 2]
         padded = source.pixels(rays @ rotation.T)
         left, right, above, below = _neighbours(padded, source)
-        found = measure(
+        count = measure(
             padded[1:-1, 1:-1],
             left,
             right,
             above,
             below,
             (source.width, source.height),
-            source.width if wraps else 0.0,
+            period,
             widest,
             points[rows],
-            scale[rows],
+            magnification[rows],
             footprints[rows],
             counts[rows],
         )
-        most = max(most, found)
+        largest_count = max(largest_count, count)
         areas.append(bounds(points[rows], reach + 1, footprints[rows], counts[rows]))
-    summary = _summary(fold.unfolded(scale))
-    fine, fine_fold = points, fold
-    if samples > 1:
-        fine, areas = _samples(source, target, rotation, samples, reach)
-        fine_fold = Fold((len(fine), fine.shape[1]))
-    strip = None
+    if largest_count == 1:
+        footprints, counts = footprints[:0], counts[:0]
+    return points, target_cos, magnification, footprints, counts, areas
+
+
+@dataclass(frozen=True)
+class _SourcePart:
+    """The part of the source that a map reads; ``window``, ``cos``, ``strip`` as in `LensMap`.
+
+    Coordinates count from ``corner`` (x, y). A cube map's faces have borders of ``border`` pixels.
+    """
+
+    window: tuple[int, int, int, int]
+    corner: tuple[int, int]
+    cos: Array
+    border: int = 0
+    strip: Array | None = None
+
+
+def _source_part(source: Lens, areas: list[Any], fold: Fold, reach: int) -> _SourcePart:
+    """Return the part of the source that a filter reads within ``areas``, those of the fold's part.
+
+    Of a cube map it is the whole strip, with borders as wide as the filter reaches.
+    """
     if isinstance(source, CubeMap):
         border = _border(reach + max(area[4] for area in areas))
-        points = _on_strip(points, source, border)
-        strip = _strip_with_borders(source, border)
-        source_cos = _face_cosines(source, border)
-        window, corner = (0, source.height, 0, source.width), (0, 0)
-    else:
-        window = _window(areas, fine_fold, source, wraps)
-        source_cos = _cosines(source, window)
-        corner = (window[2], window[0])
-    centers = fold.placed(points, corner, source)
-    coordinates = centers if samples == 1 else fine_fold.placed(fine, corner, source)
-    del points, fine
-    target_cos = fold.unfolded(target_cos)
-    if most > 1:
-        footprints, counts = fold.steps(footprints), fold.unfolded(counts)
-    else:
-        footprints, counts = footprints[:0], counts[:0]
+        return _SourcePart(
+            window=(0, source.height, 0, source.width),
+            corner=(0, 0),
+            cos=_face_cosines(source, border),
+            border=border,
+            strip=_strip_with_borders(source, border),
+        )
+    window = _window(areas, fold, source)
+    return _SourcePart(window, (window[2], window[0]), _cosines(source, window))
+
+
+def _flags(
+    coordinates: Array, source_cos: Array, reach: int, footprints: Array, counts: Array
+) -> Array:
+    """Return the flags of a map's samples; see `LensMap.flags`."""
     distance = np.empty(source_cos.shape, np.int32)
     distance_to_missing(source_cos, distance)
     flags = np.empty(coordinates.shape[:2], np.uint8)
     mark(coordinates, distance, reach, footprints, counts, flags)
-    lens_map = LensMap(
-        settings=settings(source, target, rotation, filter_name, samples),
-        summary=summary,
-        window=window,
-        centers=centers,
-        coordinates=coordinates,
-        flags=flags,
-        source_cos=source_cos,
-        target_cos=target_cos,
-        footprints=footprints if most > 1 else None,
-        counts=counts if most > 1 else None,
-        strip=strip,
-    )
-    # Read-only, as `load` gives them, so that both use the same compiled kernels.
-    for array in _arrays(lens_map).values():
-        array.flags.writeable = False
-    return lens_map
+    return flags
 
 
 def save(path: Path | str, lens_map: LensMap) -> None:
     """Write a lens map as one .npy record that `load` maps into memory; atomic."""
-    fields = _arrays(lens_map)
+    arrays = _arrays(lens_map)
     if lens_map.coordinates is lens_map.centers:
-        del fields["coordinates"]
-    said = {
+        del arrays["coordinates"]
+    content = {
         "settings": lens_map.settings,
         "summary": lens_map.summary,
         "window": list(lens_map.window),
     }
-    description = json.dumps(said | {"checksum": _checksum(said, fields)}).encode()
+    checksum = _checksum(content, arrays)
+    description = json.dumps(content | {"checksum": checksum}).encode()
     dtype = np.dtype(
         [("description", f"S{_HEADER}")]
-        + [(name, array.dtype, array.shape) for name, array in fields.items()]
+        + [(name, array.dtype, array.shape) for name, array in arrays.items()]
     )
     with atomic_path(path) as temporary:
         record = np.empty(1, dtype)
         record["description"] = description
-        for name, array in fields.items():
+        for name, array in arrays.items():
             record[name][0] = array
         with temporary.open("wb") as file:
             np.save(file, record)
@@ -245,18 +308,19 @@ def load(path: Path | str) -> LensMap:
         description = json.loads(bytes(record["description"][0]))
         arrays = {name: record[name][0] for name in record.dtype.names if name != "description"}
         # Older files have the magnification, too.
-        known = {field.name for field in fields(LensMap)}
+        field_names = {field.name for field in fields(LensMap)}
+        fields_read = {name: array for name, array in arrays.items() if name in field_names}
         if description.pop("checksum") != _checksum(description, arrays):
             raise ValueError("it is damaged: its checksum does not hold")
         return LensMap(
             settings=description["settings"],
             summary=description["summary"],
             window=tuple(description["window"]),
-            **{"coordinates": arrays["centers"]} | {k: v for k, v in arrays.items() if k in known},
+            **{"coordinates": arrays["centers"]} | fields_read,
         )
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
-    except (EOFError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+    except (EOFError, SyntaxError, TokenError, *DAMAGE) as error:
         raise UserError(f"{path}: is not a lens map that can be read: {error}") from None
 
 
@@ -279,58 +343,59 @@ def _arrays(lens_map: LensMap) -> dict[str, Array]:
 
 
 def warnings(lens_map: LensMap) -> list[str]:
-    """Return what a person should know of the map's magnification: upsampling and aliasing."""
+    """Return the warnings about the map's magnification: upsampling and aliasing."""
     if not lens_map.summary["covered"]:
         return ["the source sees nothing of the target image"]
     largest, smallest = lens_map.summary["max"], lens_map.summary["min"]
     if not smallest:
         return []
-    found = []
+    texts = []
     if largest > 1.5:
-        found.append(
+        texts.append(
             f"upsampling: up to {largest:.3g} target pixels to one of the source (median "
             f"{lens_map.summary['median']:.3g}); a smaller --scale or field of view helps"
         )
     steps = math.ceil(1 / smallest)
     samples = lens_map.settings["samples"]
     if not FILTERS[lens_map.settings["filter"]].cover and samples * 1.5 * smallest < 1:
-        found.append(
+        texts.append(
             f"aliasing: one target pixel spans up to {1 / smallest:.3g} of the source's; "
             f"--filter adaptive or --samples {steps} helps"
         )
-    return found
+    return texts
 
 
 def report(lens_maps: Sequence[LensMap]) -> None:
     """Print the magnification and the warnings to standard error, once for all targets."""
     summaries = [lens_map.summary for lens_map in lens_maps]
-    seen = [summary for summary in summaries if summary["covered"]] or summaries
-    found = {
-        "min": min(summary["min"] for summary in seen),
-        "max": max(summary["max"] for summary in seen),
-        "median": float(np.median([summary["median"] for summary in seen])),
+    covered = [summary for summary in summaries if summary["covered"]] or summaries
+    overall = {
+        "min": min(summary["min"] for summary in covered),
+        "max": max(summary["max"] for summary in covered),
+        "median": float(np.median([summary["median"] for summary in covered])),
         "covered": fmean(summary["covered"] for summary in summaries),
     }
     print(
-        f"magnification: {found['min']:.3g} to {found['max']:.3g}, median {found['median']:.3g} "
-        f"target pixels to one of the source; {found['covered']:.1%} of the image has a source",
+        f"magnification: {overall['min']:.3g} to {overall['max']:.3g}, "
+        f"median {overall['median']:.3g} target pixels to one of the source; "
+        f"{overall['covered']:.1%} of the image has a source",
         file=sys.stderr,
     )
-    for warning in warnings(replace(lens_maps[0], summary=found)):
+    for warning in warnings(replace(lens_maps[0], summary=overall)):
         print(f"warning: {warning}", file=sys.stderr)
 
 
-def _summary(scale: Array) -> dict[str, float]:
-    """Return what a lens map says of its magnification (H, W), NaN where it has no source."""
-    # Of a pixel without any neighbour it is infinite.
-    known: Array = scale[np.isfinite(scale)]
-    if not known.size:
-        known = np.zeros(1)
+def _summary(magnification: Array) -> dict[str, float]:
+    """Return the summary of a lens map's magnification (H, W), NaN where it has no source."""
+    # A pixel without any neighbour has an infinite one.
+    finite: Array = magnification[np.isfinite(magnification)]
+    if not finite.size:
+        finite = np.zeros(1)
     return {
-        "min": float(known.min()),
-        "median": float(np.median(known)),
-        "max": float(known.max()),
-        "covered": float(1 - np.isnan(scale).mean()),
+        "min": float(finite.min()),
+        "median": float(np.median(finite)),
+        "max": float(finite.max()),
+        "covered": float(1 - np.isnan(magnification).mean()),
     }
 
 
@@ -391,14 +456,15 @@ def _face_cosines(source: CubeMap, border: int) -> Array:
     return np.asarray(np.tile(np.pad(cosines.astype(np.float32), border, mode="edge"), 6))
 
 
-def _samples(
+def _measure_samples(
     source: Lens, target: Lens, rotation: Array, samples: int, reach: int
 ) -> tuple[Array, list[Any]]:
     """Return the coordinates of n × n samples a pixel in the source, and their bounds.
 
     In float32 from the start: they are n² times as many as the pixels.
     """
-    height, width = target.height * samples, target.width * samples
+    height = target.height * samples
+    width = target.width * samples
     fine = np.empty((height, width, 2), np.float32)
     x = (np.arange(width) + 0.5) / samples
     none = np.zeros((0, 0, 2, 2), np.float32), np.zeros((0, 0, 2), np.uint16)
@@ -449,13 +515,14 @@ def _on_face_of(source: CubeMap, coordinates: Array, middle: Array) -> Array:
     return out
 
 
-def _window(areas: list[Any], fold: Fold, source: Lens, wraps: bool) -> tuple[int, int, int, int]:
+def _window(areas: list[Any], fold: Fold, source: Lens) -> tuple[int, int, int, int]:
     """Return the rows and columns [row, end) × [column, end) that the filter may read.
 
-    ``areas`` are those of the fold's part. All columns if the source ``wraps`` around.
+    ``areas`` are those of the fold's part. All columns if the source wraps around.
     """
-    found = np.array([area[:4] for area in areas])
-    low, high = found[:, :2].min(axis=0), found[:, 2:].max(axis=0)
+    limits = np.array([area[:4] for area in areas])
+    low = limits[:, :2].min(axis=0)
+    high = limits[:, 2:].max(axis=0)
     if np.isinf(low).any():
         return 0, 1, 0, 1
     size = np.array([source.width, source.height])
@@ -463,6 +530,7 @@ def _window(areas: list[Any], fold: Fold, source: Lens, wraps: bool) -> tuple[in
     high = np.where(fold.mirrors[::-1], size - low, high)
     left, top = (int(start) for start in np.clip(np.floor(low), 0, size - 1))
     right, bottom = (int(end) for end in np.clip(np.ceil(high), 1, size))
-    if wraps:
-        left, right = 0, source.width
+    if _topology(source)[0]:
+        left = 0
+        right = source.width
     return top, bottom, left, right

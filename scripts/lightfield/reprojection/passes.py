@@ -1,4 +1,4 @@
-"""Passes through a lens map: light as colour, normals unit vectors, ids and mattes as they are."""
+"""Reprojects passes: light as colour, normals as unit vectors, ids and mattes unmixed."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -16,14 +16,16 @@ from lightfield.reprojection.lens_map import LensMap
 
 
 def write_pass(
-    job: Job, wanted: Pass, view: SourceView, made: LensMap, path: Path, key: str
+    job: Job, wanted: Pass, view: SourceView, lens_map: LensMap, path: Path, key: str
 ) -> None:
     """Resample one pass of a view through one lens map and write its file; 0 has no source."""
     image = read_image(wanted.path(job.lightfield.folder, view.name), wanted.channels)
     channels = image.channels
     if not job.copies:
         planes = [channels[name] for name in wanted.channels]
-        resampled = [_resampled(planes[i : i + 3], wanted, made) for i in range(0, len(planes), 3)]
+        resampled = [
+            _resampled(planes[i : i + 3], wanted, lens_map) for i in range(0, len(planes), 3)
+        ]
         pixels = np.concatenate(resampled, axis=-1)[..., : len(planes)]
         if wanted.kind == "normal":
             length = np.linalg.norm(pixels, axis=-1, keepdims=True)
@@ -37,17 +39,17 @@ def write_pass(
     job.record.add(path, key)
 
 
-def _resampled(planes: list[Array], wanted: Pass, made: LensMap) -> Array:
-    row, end_row, column, end_column = made.window
-    # A float has all numbers that an id can be.
+def _resampled(planes: list[Array], wanted: Pass, lens_map: LensMap) -> Array:
+    row, end_row, column, end_column = lens_map.window
+    # A float holds every id exactly.
     source = widen(*(plane[row:end_row, column:end_column] for plane in (planes * 3)[:3]))
     if wanted.kind in ("id", "matte"):
-        # Of each target pixel the one ray through its centre.
-        seen = ~np.isnan(made.centers[..., 0])
-        made = replace(
-            made,
-            settings={**made.settings, "filter": "nearest", "samples": 1},
-            coordinates=made.centers,
+        # An id cannot be mixed: take the ray through each pixel's centre.
+        seen = ~np.isnan(lens_map.centers[..., 0])
+        lens_map = replace(
+            lens_map,
+            settings={**lens_map.settings, "filter": "nearest", "samples": 1},
+            coordinates=lens_map.centers,
             flags=np.where(seen, kernels.INSIDE, kernels.NOTHING).astype(np.uint8),
         )
-    return np.nan_to_num(resample_colour(source, made), nan=0)
+    return np.nan_to_num(resample_colour(source, lens_map), nan=0)

@@ -1,4 +1,4 @@
-"""Runs a reprojection: each view once, only what is missing, and a record of what was made."""
+"""Runs a reprojection: makes the missing views and writes a record of all of them."""
 
 import os
 import sys
@@ -9,18 +9,18 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import keep_apart, sha256, whole
+from lightfield.core.files import absolute_path, keep_apart, sha256
 from lightfield.core.progress import Progress
 from lightfield.imaging.images import KEY_ATTRIBUTE, read_header
 from lightfield.reprojection import lens_map
+from lightfield.reprojection.geometry import Target
 from lightfield.reprojection.job import Job, SourceView
-from lightfield.reprojection.lens_arguments import Target
 from lightfield.reprojection.passes import write_pass
-from lightfield.reprojection.pixels import Source, write
+from lightfield.reprojection.pixels import SourcePixels, write
 
 
 def run(job: Job) -> None:
-    """Do all that the command line asks for; a `UserError` says how many views failed."""
+    """Reproject the chosen views; raises `UserError` with the number of views that failed."""
     arguments = job.arguments
     views = [] if arguments.dry_run else job.views()
     _check_apart(job, views)
@@ -28,10 +28,10 @@ def run(job: Job) -> None:
         job.output_lightfield().write(arguments.output_cfg)
     if arguments.dry_run:
         return
-    # One view is one thread's work: OpenImageIO, imported where it is needed, shall add none.
+    # Each view is one thread's work. OpenImageIO, which is imported later, must add no threads.
     os.environ["OPENIMAGEIO_THREADS"] = "1"
     maps = job.maps
-    # What lens_map.py computed, it has reported.
+    # lens_map.py has reported the maps that it computed.
     if arguments.lens_map is None:
         lens_map.report(maps)
     label = f"reproject to {arguments.output_dir} {arguments.views or ''}".rstrip()
@@ -54,7 +54,7 @@ def run(job: Job) -> None:
 
 
 def _check_apart(job: Job, views: list[SourceView]) -> None:
-    """Raise `UserError` where a file would be written that is read, by whatever path."""
+    """Raise `UserError` if an output would replace a file that is read, by whatever path."""
     if job.arguments.output_cfg and job.arguments.input_cfg:
         keep_apart("--output-cfg", job.arguments.output_cfg, job.arguments.input_cfg)
     folder = cache(Path.resolve)
@@ -80,14 +80,14 @@ def _results(job: Job, views: list[SourceView]) -> Iterator[tuple[SourceView, An
 
 
 def reproject_view(job: Job, view: SourceView) -> list[Path]:
-    """Make a view's files, but for those that are there and up to date; return them all."""
+    """Make a view's missing or outdated files; return all of its files."""
     arguments = job.arguments
-    made: list[Path] = []
+    paths_of_view: list[Path] = []
     todo: list[tuple[int, Target, str]] = []
     identity = ""
     for index, target in enumerate(job.targets):
         paths = job.files(view, target)
-        made += paths
+        paths_of_view += paths
         if arguments.skip_if_exists and all(path.exists() for path in paths):
             continue
         identity = identity or _identity(view)
@@ -96,18 +96,18 @@ def reproject_view(job: Job, view: SourceView) -> list[Path]:
             todo.append((index, target, key))
     if todo:
         _check(job, view)
-        source = Source(job, view, [job.maps[index].window for index, *_ in todo])
+        source = SourcePixels(job, view, [job.maps[index].window for index, *_ in todo])
         for index, target, key in todo:
             write(job, target, job.maps[index], source, job.outputs(view, target), key)
             for wanted, path in job.pass_outputs(view, target).items():
                 write_pass(job, wanted, view, job.maps[index], path, key)
-    return made
+    return paths_of_view
 
 
 def _check(job: Job, view: SourceView) -> None:
-    """Raise `UserError` for a source that is not as the record of those who made it says."""
+    """Raise `UserError` for a source whose bytes differ from its record."""
     for path in job.sources(view):
-        expected = job.source_sums.get(f"{whole(path).parent.name}/{path.name}")
+        expected = job.source_sums.get(f"{absolute_path(path).parent.name}/{path.name}")
         if expected and sha256(path) != expected:
             raise UserError(
                 f"{path}: is not as it was written, {job.arguments.source_record} says; "
@@ -116,7 +116,7 @@ def _check(job: Job, view: SourceView) -> None:
 
 
 def _identity(view: SourceView) -> str:
-    """Return what stands for the source's content: its render key, or else its checksum."""
+    """Return the identity of the source's content: its render key, or else its checksum."""
     parts = []
     for path in view.paths:
         is_exr = path.suffix.lower() == ".exr"

@@ -1,6 +1,7 @@
 """A view's pixels in and out: read as linear light, resampled, and written as asked for."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,23 +23,27 @@ from lightfield.imaging.images import (
 from lightfield.imaging.tonemap import decode_srgb, to_8_bit, to_16_bit, tone_map
 from lightfield.reprojection.colour import colour_strips
 from lightfield.reprojection.depth import resample_depth
+from lightfield.reprojection.geometry import Target
 from lightfield.reprojection.job import Job, SourceView
-from lightfield.reprojection.lens_arguments import Target
 from lightfield.reprojection.lens_map import LensMap
+
+Attributes = Mapping[str, Attribute]
 
 # A seventh of the time that zlib's own level and the choice of a filter for each row take, and
 # files as small: level 4, and libpng's PNG_FILTER_AVG for every row.
 PNG_OPTIONS = {"png:compressionLevel": 4, "png:filter": 64}
 
 
-class Source:
+class SourcePixels:
     """The part of a view's pixels that its targets need, linear and in float32."""
 
     def __init__(
         self, job: Job, view: SourceView, windows: list[tuple[int, int, int, int]]
     ) -> None:
-        low, high = np.min(windows, axis=0), np.max(windows, axis=0)
-        self.rows, self.columns = (int(low[0]), int(high[1])), (int(low[2]), int(high[3]))
+        low = np.min(windows, axis=0)
+        high = np.max(windows, axis=0)
+        self.rows = (int(low[0]), int(high[1]))
+        self.columns = (int(low[2]), int(high[3]))
         faces = [self._read(job, path) for path in view.paths]
         self.colour = _side_by_side([face[0] for face in faces])
         depths = [face[1] for face in faces if face[1] is not None]
@@ -73,9 +78,9 @@ class Source:
             depth = depth.astype(np.float32, copy=False)
         return colour, depth, alpha is not None, image.attributes.get(DEPTH_ATTRIBUTE)
 
-    def window(self, made: LensMap) -> tuple[Array, Array | None]:
+    def window(self, lens_map: LensMap) -> tuple[Array, Array | None]:
         """Return the colour and depth that a lens map reads."""
-        row, end_row, column, end_column = made.window
+        row, end_row, column, end_column = lens_map.window
         rows = slice(row - self.rows[0], end_row - self.rows[0])
         columns = slice(column - self.columns[0], end_column - self.columns[0])
         colour = np.ascontiguousarray(self.colour[rows, columns])
@@ -103,23 +108,67 @@ def _linear(planes: list[Array], alpha: Array | None) -> Array:
 def write(
     job: Job,
     target: Target,
-    made: LensMap,
-    source: Source,
+    lens_map: LensMap,
+    source: SourcePixels,
     outputs: Mapping[str, Path],
     key: str,
 ) -> None:
     """Resample a view through one lens map and write its files."""
-    arguments = job.arguments
-    as_z = target.lens.has_z_depth
-    transparent = job.lightfield.transparent
-    if transparent and not source.has_alpha:
+    if job.lightfield.transparent and not source.has_alpha:
         raise UserError("has no channel A, although --input-cfg says that it is transparent")
-    strips, depth = _resampled(job, made, source, as_z)
-    size = made.target_cos.shape
+    image = _developed(job, target, lens_map, source, outputs)
+    attributes = {KEY_ATTRIBUTE: key} | {
+        f"plenoforge:{name}": str(value) for name, value in job.settings.published.items()
+    }
+    if "exr" in outputs and image.depth is not None:
+        attributes[DEPTH_ATTRIBUTE] = target.lens.usual_depth
+    for kind, path in outputs.items():
+        match kind:
+            case "exr":
+                _write_exr(path, image, attributes)
+            case "png":
+                _write_png(path, image, {**attributes, **PNG_OPTIONS})
+            case "depth":
+                assert job.settings.depth_png is not None
+                _write_depth(path, image, job.settings.depth_png, key)
+            case "mask":
+                mask = np.where(image.empty, 255, 0).astype(np.uint8)
+                write_png(path, mask, {KEY_ATTRIBUTE: key})
+        job.record.add(path, key)
+
+
+@dataclass(frozen=True)
+class _Image:
+    """A resampled view, as its files hold it.
+
+    ``half`` (3, h, w) is float16 R G B for an EXR, ``pixels`` (h, w, 3) sRGB for a PNG, ``alpha``
+    (h, w) float32 what is covered, and ``depth`` (h, w) metres. What has no source is ``empty``.
+    """
+
+    half: Array
+    pixels: Array
+    alpha: Array
+    depth: Array | None
+    empty: Array
+    transparent: bool
+
+    @property
+    def has_empty(self) -> bool:
+        return bool(self.empty.any())
+
+
+def _developed(
+    job: Job, target: Target, lens_map: LensMap, source: SourcePixels, outputs: Mapping[str, Path]
+) -> _Image:
+    """Resample a view, and develop its colour for those ``outputs`` that hold it."""
+    settings = job.settings
+    transparent = job.lightfield.transparent
+    encode = to_8_bit if settings.bits == 8 else to_16_bit
+    strips, depth = _resampled(job, lens_map, source, target.lens.has_z_depth)
+    size = lens_map.target_cos.shape
     empty = np.empty(size, bool)
     half = np.empty((3, *size), np.float16)
-    encode = to_8_bit if arguments.bits == 8 else to_16_bit
-    pixels = np.empty((*size, 3), f"uint{arguments.bits}")
+    pixels = np.empty((*size, 3), f"uint{settings.bits}")
     covered = np.empty(size, np.float32)
     for rows, strip in strips:
         empty[rows] = np.isnan(strip[:, :, 0])
@@ -131,73 +180,73 @@ def write(
         if source.has_alpha:
             with np.errstate(invalid="ignore", divide="ignore"):
                 strip[:, :, :3] /= alpha
-        strip = tone_map(strip[:, :, :3], arguments.exposure, arguments.reinhard)
+        colour = tone_map(strip[:, :, :3], settings.exposure, settings.reinhard)
         if "png" in outputs:
-            pixels[rows] = encode(strip)
+            pixels[rows] = encode(colour)
         if "exr" in outputs:
-            half[:, rows] = narrow(strip * alpha if transparent else strip, 3)
-    marked = bool(empty.any())
-    covered[empty] = 0
-    if marked:
+            half[:, rows] = narrow(colour * alpha if transparent else colour, 3)
+    if empty.any():
+        covered[empty] = 0
         half[:, empty] = 0
         if depth is not None:
             depth[empty] = np.nan
-    attributes = {KEY_ATTRIBUTE: key} | {
-        f"plenoforge:{name}": str(value) for name, value in job.settings.items()
-    }
-    for kind, path in outputs.items():
-        match kind:
-            case "exr":
-                channels = dict(zip("RGB", half, strict=True))
-                if depth is not None:
-                    channels["Z"] = depth
-                    attributes = attributes | {DEPTH_ATTRIBUTE: "z" if as_z else "distance"}
-                if transparent:
-                    channels["A"] = covered.astype(np.float16)
-                elif marked and depth is None:
-                    channels["A"] = (~empty).astype(np.float16)
-                write_exr(path, channels, attributes)
-            case "png":
-                if marked or transparent:
-                    opacity = covered if transparent else (~empty).astype(np.float32)
-                    opacity = np.rint(opacity * np.iinfo(pixels.dtype).max)
-                    pixels = np.dstack([pixels, opacity.astype(pixels.dtype)])
-                write_png(path, pixels, {**attributes, **PNG_OPTIONS})
-            case "depth":
-                if depth is None:
-                    raise UserError("--depth-png: the image has no channel Z")
-                scaled = np.rint(depth.astype(np.float64) * arguments.depth_png)
-                # Comparisons with NaN are false.
-                known = (scaled > 0) & (scaled <= 65535)
-                write_png(path, np.where(known, scaled, 0).astype(np.uint16), {KEY_ATTRIBUTE: key})
-            case "mask":
-                write_png(path, np.where(empty, 255, 0).astype(np.uint8), {KEY_ATTRIBUTE: key})
-        job.record.add(path, key)
+    return _Image(half, pixels, covered, depth, empty, transparent)
+
+
+def _write_exr(path: Path, image: _Image, attributes: Attributes) -> None:
+    """Write R G B and Z, and A where the view is transparent or no Z tells what is empty."""
+    channels = dict(zip("RGB", image.half, strict=True))
+    if image.depth is not None:
+        channels["Z"] = image.depth
+    if image.transparent:
+        channels["A"] = image.alpha.astype(np.float16)
+    elif image.depth is None and image.has_empty:
+        channels["A"] = (~image.empty).astype(np.float16)
+    write_exr(path, channels, attributes)
+
+
+def _write_png(path: Path, image: _Image, attributes: Attributes) -> None:
+    pixels = image.pixels
+    if image.transparent or image.has_empty:
+        alpha = image.alpha if image.transparent else (~image.empty).astype(np.float32)
+        alpha = np.rint(alpha * np.iinfo(pixels.dtype).max).astype(pixels.dtype)
+        pixels = np.dstack([pixels, alpha])
+    write_png(path, pixels, attributes)
+
+
+def _write_depth(path: Path, image: _Image, scale: float, key: str) -> None:
+    """Write 16 bits of depth times ``scale``; 0 where there is none, or more than they hold."""
+    if image.depth is None:
+        raise UserError("--depth-png: the image has no channel Z")
+    scaled = np.rint(image.depth.astype(np.float64) * scale)
+    # Comparisons with NaN are false.
+    is_held = (scaled > 0) & (scaled <= 65535)
+    write_png(path, np.where(is_held, scaled, 0).astype(np.uint16), {KEY_ATTRIBUTE: key})
 
 
 def _resampled(
-    job: Job, made: LensMap, source: Source, as_z: bool
+    job: Job, lens_map: LensMap, source: SourcePixels, as_z: bool
 ) -> tuple[Iterable[tuple[slice, Array]], Array | None]:
     """Return the target's colour, in strips, and its depth in the source's precision."""
-    colour, depth = source.window(made)
+    colour, depth = source.window(lens_map)
     if job.copies and source.is_z == as_z:
-        row, end_row, column, end_column = made.window
+        row, end_row, column, end_column = lens_map.window
         # A channel that is no number makes a pixel none, as it does where pixels are resampled.
         none = np.isnan(colour).any(axis=-1)
-        none |= np.isnan(made.target_cos[row:end_row, column:end_column])
+        none |= np.isnan(lens_map.target_cos[row:end_row, column:end_column])
         colour = np.where(none[:, :, None], np.float32(np.nan), colour)
-        copy = None if depth is None else _in_frame(depth, made)
-        return [(np.s_[:], _in_frame(colour, made))], copy
+        copy = None if depth is None else _in_frame(depth, lens_map)
+        return [(np.s_[:], _in_frame(colour, lens_map))], copy
     if depth is not None:
-        depth = resample_depth(depth, source.is_z, as_z, made)
+        depth = resample_depth(depth, source.is_z, as_z, lens_map)
         if depth.dtype != np.float16:
             depth = with_precision(depth, job.depth_precision)
-    return colour_strips(colour, made), depth
+    return colour_strips(colour, lens_map), depth
 
 
-def _in_frame(window: Array, made: LensMap) -> Array:
+def _in_frame(window: Array, lens_map: LensMap) -> Array:
     """Return the window's pixels in their place in the whole image, NaN around them."""
-    out = np.full((*made.target_cos.shape, *window.shape[2:]), np.nan, window.dtype)
-    row, end_row, column, end_column = made.window
+    out = np.full((*lens_map.target_cos.shape, *window.shape[2:]), np.nan, window.dtype)
+    row, end_row, column, end_column = lens_map.window
     out[row:end_row, column:end_column] = window
     return out

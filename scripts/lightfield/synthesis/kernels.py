@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.kernels import kernel
+from lightfield.core.compiled import kernel
 from lightfield.geometry.lenses import Array
 
 # Neighbours that differ in inverse distance more than a surface does that is seen at the steepest
@@ -25,6 +25,8 @@ DARK = np.float32(0.03)
 FAR = np.float32(1e-4)
 # A triangle that is larger than this part of the picture is an artefact at a lens's rim.
 LARGEST = np.float32(0.25)
+# Of a triangle's width times its height: rounding moves its edges by no more.
+ROUNDING = np.float32(1e-6)
 
 
 @kernel
@@ -69,9 +71,11 @@ def link(inverse: Array, steepest: np.float32, right: Array, down: Array) -> Non
 def _draw_pole(top: Any, bottom: Any, values: Array, inverse: Array, drawn: Array) -> None:
     """Draw a triangle around a panorama's pole where nothing is drawn yet, in one colour."""
     height, width = inverse.shape
-    first, end = 0, min(int(bottom + np.float32(0.5)), height)
+    first = 0
+    end = min(int(bottom + np.float32(0.5)), height)
     if top + bottom > height:
-        first, end = max(int(top), 0), height
+        first = max(int(top), 0)
+        end = height
     for i in range(first, end):
         for j in range(width):
             if inverse[i, j] < 0:
@@ -89,7 +93,7 @@ def _draw_triangle(
     ``corners`` (3, 2) are pixels, ``values`` (3, 5) inverse distance, R, G, B and weight.
     """
     height, width = inverse.shape
-    half = np.float32(0.5)
+    zero, half = np.float32(0), np.float32(0.5)
     x0, y0 = corners[0, 0], corners[0, 1]
     x1, y1 = corners[1, 0], corners[1, 1]
     x2, y2 = corners[2, 0], corners[2, 1]
@@ -109,10 +113,13 @@ def _draw_triangle(
     top, bottom = min(y0, y1, y2), max(y0, y1, y2)
     if right - left > LARGEST * width or bottom - top > LARGEST * height:
         return
+    # A pixel's centre on an edge that two triangles share must be in one of them.
+    rounding = ROUNDING * (right - left) * (bottom - top)
     first = math.ceil(left - half)
     last = math.floor(right - half)
     if not wraps:
-        first, last = max(first, 0), min(last, width - 1)
+        first = max(first, 0)
+        last = min(last, width - 1)
     for i in range(max(math.ceil(top - half), 0), min(int(bottom - half), height - 1) + 1):
         y = np.float32(i) + half
         for column in range(first, last + 1):
@@ -120,9 +127,11 @@ def _draw_triangle(
             w0 = (x1 - x) * (y2 - y) - (x2 - x) * (y1 - y)
             w1 = (x2 - x) * (y0 - y) - (x0 - x) * (y2 - y)
             w2 = area - w0 - w1
-            if w0 < 0 or w1 < 0 or w2 < 0:
+            if min(w0, w1, w2) < -rounding:
                 continue
-            w0, w1, w2 = w0 / area, w1 / area, w2 / area
+            w0, w1, w2 = max(w0, zero), max(w1, zero), max(w2, zero)
+            total = w0 + w1 + w2
+            w0, w1, w2 = w0 / total, w1 / total, w2 / total
             j = column % width if wraps else column
             near = w0 * values[0, 0] + w1 * values[1, 0] + w2 * values[2, 0]
             if near > inverse[i, j]:
@@ -150,7 +159,8 @@ def draw(
     picture's left edge continues its right one.
     """
     height, width = pixels.shape[:2]
-    corners, corner_values = np.empty((3, 2), np.float32), np.empty((3, 5), np.float32)
+    corners = np.empty((3, 2), np.float32)
+    corner_values = np.empty((3, 5), np.float32)
     for i in range(height - 1):
         for j in range(width - 1):
             for lower in range(2):
@@ -176,7 +186,8 @@ def draw_pixels(pixels: Array, values: Array, wraps: bool, inverse: Array, drawn
 
     ``values`` (n, 5) and the others are as in `draw`.
     """
-    corners, corner_values = np.empty((3, 2), np.float32), np.empty((3, 5), np.float32)
+    corners = np.empty((3, 2), np.float32)
+    corner_values = np.empty((3, 5), np.float32)
     for n in range(len(pixels)):
         corner_values[:] = values[n]
         for second in range(2):

@@ -16,7 +16,7 @@ from scipy.ndimage import distance_transform_cdt
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import View
-from lightfield.export.source import Source, pixel_indices
+from lightfield.export.source import SourceDataset, pixel_indices
 from lightfield.geometry.depth import z_from_distance
 from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -92,7 +92,7 @@ class Surface:
 Reader = Callable[[View], tuple[Array, Array]]
 
 
-def reader(source: Source) -> Reader:
+def reader(source: SourceDataset) -> Reader:
     """Return what reads views of a dataset for `Sources`; raises `UserError` without depth."""
     if source.lightfield.depth is None:
         raise UserError(f"{source.lightfield.path}: depth: is null; a synthesis needs it")
@@ -143,7 +143,8 @@ class Sources:
         with np.errstate(divide="ignore", invalid="ignore"):
             inverse = np.where(distance > 0, 1 / distance, np.nan).astype(np.float32)
         inverse[~np.isfinite(colour).all(axis=-1)] = np.nan
-        right, down = np.empty(inverse.shape, bool), np.empty(inverse.shape, bool)
+        right = np.empty(inverse.shape, bool)
+        down = np.empty(inverse.shape, bool)
         kernels.link(inverse, steepest(self.lens), right, down)
         torn = np.isfinite(inverse) & ~_is_amid(right, down)
         certainty = np.where(torn, TORN_WEIGHT, 1) * self._to_rim
@@ -308,7 +309,8 @@ def penalty(seen: Array, source: Array) -> Array:
 
     ``seen`` (..., 3) is from the target's camera to the point, in the same unit.
     """
-    here, there = np.linalg.norm(seen, axis=-1), np.linalg.norm(source, axis=-1)
+    here = np.linalg.norm(seen, axis=-1)
+    there = np.linalg.norm(source, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         angle = np.linalg.norm(seen / here[..., None] - source / there[..., None], axis=-1)
         farther: Array = np.maximum(there / here - 1, 0)

@@ -1,1 +1,1 @@
-"""Whether a finished dataset is whole and right."""
+"""Checks that a finished dataset is complete and correct."""

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.geometry import depth as depth_conversion
+from lightfield.geometry.depth import stored_distance
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.nearest import Cameras
 
@@ -56,7 +56,10 @@ DECIMALS = 6
 # Residuals beyond this many footprints are another surface, not a slightly wrong view.
 SAME_SURFACE = 1.0
 
-UNKNOWN, AGREE, OCCLUDED, CONTRADICT = 0, 1, 2, 3
+UNKNOWN = 0
+AGREE = 1
+OCCLUDED = 2
+CONTRADICT = 3
 
 
 @dataclass(frozen=True)
@@ -80,10 +83,9 @@ class Camera:
     def lift(self, depth: Array, columns: NDArray[np.int64], rows: NDArray[np.int64]) -> Array:
         """Return the world points (..., 3) that ``depth`` puts on the rays of the pixel centres."""
         rays = self.lens.rays(columns + 0.5, rows + 0.5)
-        if self.depth == "z":
-            depth = depth_conversion.distance_from_z(depth, rays)
+        distance = stored_distance(depth, rays, self.depth)
         with np.errstate(invalid="ignore"):
-            arms = rays * depth[..., np.newaxis]
+            arms = rays * distance[..., np.newaxis]
             points: Array = arms @ self.world_matrix[:3, :3].T + self.position
         return points
 
@@ -133,7 +135,8 @@ def _patches(
     camera: Camera, depth: NDArray[Any], columns: NDArray[np.int64], rows: NDArray[np.int64]
 ) -> tuple[Patches, NDArray[np.bool_]]:
     """Fit planes to 3 × 3 pixels about inner pixels; also say which of them are smooth surfaces."""
-    columns, rows = columns[:, np.newaxis] + _COLUMNS, rows[:, np.newaxis] + _ROWS
+    columns = columns[:, np.newaxis] + _COLUMNS
+    rows = rows[:, np.newaxis] + _ROWS
     values = depth[rows, columns]
     with np.errstate(invalid="ignore", over="ignore"):
         points = camera.lift(values.astype(np.float64), columns, rows)
@@ -211,19 +214,21 @@ def sample(camera: Camera, depth: NDArray[Any], rays: int) -> Patches:
 class Comparison:
     """What one view says of another's n patches.
 
-    verdict (n,): AGREE, OCCLUDED or CONTRADICT, or UNKNOWN beside pixels without a source. Where
-    the answer is a smooth patch too, ``fine`` is true, ``asked`` and ``found`` are the patches, and
-    ``residual`` (n,) is how far the one's centre lies in front of the other's plane, in units of
-    ``footprint`` (n,), metres; ``expected`` (n,) is the standard deviation of that, in the same
-    units, by how well the planes fit and what the files resolve. ``curved_residual`` (n,) is the
-    residual between curved surfaces. It is noisier, but a plane through nine pixels lies inside a
-    ball, and deeper where the ball is seen at an angle.
+    - ``verdict`` (n,): AGREE, OCCLUDED or CONTRADICT, or UNKNOWN beside pixels without a source.
+    - ``fine`` (n,): where the answering view has a smooth patch, too.
+    - ``asked`` and ``answered``: the patches of both views.
+    - ``residual`` (n,): how far the centre of the one lies in front of the plane of the other, in
+      units of ``footprint`` (n,), which is in metres.
+    - ``expected`` (n,): the standard deviation of the residual in the same units. It follows from
+      how well the planes fit, and from what the files resolve.
+    - ``curved_residual`` (n,): the residual between curved surfaces. It is noisier. But a plane
+      through nine pixels lies inside a ball, and deeper where the ball is seen at an angle.
     """
 
     verdict: NDArray[np.int64]
     fine: NDArray[np.bool_]
     asked: Patches
-    found: Patches
+    answered: Patches
     residual: Array
     footprint: Array
     expected: Array
@@ -258,18 +263,18 @@ def compare(asked: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison:
     asked = asked[looked_for]
     where = where[looked_for]
     columns, rows = np.floor(where).astype(np.int64).T
-    found, smooth = _patches(camera, depth, columns, rows)
-    residual = np.einsum("ij,ij->i", found.normals, asked.points - found.points)
+    answered, smooth = _patches(camera, depth, columns, rows)
+    residual = np.einsum("ij,ij->i", answered.normals, asked.points - answered.points)
     aside = where - np.floor(where) - 0.5
-    curved_residual = residual + asked.height() - found.height(aside[:, 0], aside[:, 1])
+    curved_residual = residual + asked.height() - answered.height(aside[:, 0], aside[:, 1])
     # The centre of nine jittered points, and the plane of nine a pixel's half diagonal off centre.
-    deviation = np.sqrt(asked.spread**2 / 9 + found.spread**2 * (1 / 9 + 0.5 / 6))
-    footprint = np.maximum(asked.footprint, found.footprint)
+    deviation = np.sqrt(asked.spread**2 / 9 + answered.spread**2 * (1 / 9 + 0.5 / 6))
+    footprint = np.maximum(asked.footprint, answered.footprint)
     tolerance = (
         TOLERANCE_DEVIATIONS * deviation
         + TOLERANCE_FOOTPRINTS * footprint
         + asked.error
-        + found.error
+        + answered.error
     )
     verdict = np.full(len(asked), AGREE)
     verdict[residual < -tolerance] = OCCLUDED
@@ -283,7 +288,7 @@ def compare(asked: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison:
     verdict[rough[nearest > expected + slack]] = CONTRADICT
     verdict[rough[np.isnan(nearest)]] = UNKNOWN
     # Of an error that may be anything up to its bound, as a number's last digit.
-    resolved = (asked.error**2 + found.error**2) / 12
+    resolved = (asked.error**2 + answered.error**2) / 12
     finest = TOLERANCE_FOOTPRINTS * footprint / TOLERANCE_DEVIATIONS
     expected = np.sqrt(deviation**2 + finest**2 + resolved)
     unit = np.maximum(footprint, np.finfo(np.float64).tiny)
@@ -291,7 +296,7 @@ def compare(asked: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison:
         verdict,
         smooth,
         asked,
-        found,
+        answered,
         residual / unit,
         footprint,
         expected / unit,
@@ -303,7 +308,8 @@ def _recorded_range(
     camera: Camera, depth: NDArray[Any], columns: NDArray[np.int64], rows: NDArray[np.int64]
 ) -> tuple[Array, Array]:
     """Return the least and largest distance in 3 × 3 pixels; NaN where one has no source."""
-    columns, rows = columns[:, np.newaxis] + _COLUMNS, rows[:, np.newaxis] + _ROWS
+    columns = columns[:, np.newaxis] + _COLUMNS
+    rows = rows[:, np.newaxis] + _ROWS
     nine = depth[rows, columns].astype(np.float64)
     points = camera.lift(nine, columns, rows)
     with np.errstate(invalid="ignore"):
@@ -314,13 +320,14 @@ def _recorded_range(
 
 
 def displacement(measured: Comparison, camera: Camera) -> tuple[float, float]:
-    """Return by how many pixels the asked patches must move to lie on the found ones.
+    """Return by how many pixels the asked patches must move to lie on the answered ones.
 
-    The rigid motion about ``camera``, which found them, that makes the residuals least, in the
+    The rigid motion about ``camera``, which answers, that makes the residuals least, in the
     directions that they determine; its root mean square over the points, in pixel footprints. The
     second value is the root mean square that residuals as large as expected lead to.
     """
-    residual, footprint = measured.residual, measured.footprint
+    residual = measured.residual
+    footprint = measured.footprint
     arms = (measured.asked.points - camera.position) / footprint[:, np.newaxis]
     # Unknowns of like size: both in pixels, the rotation as seen at the median distance.
     arms /= np.median(np.linalg.norm(arms, axis=1))
@@ -328,16 +335,16 @@ def displacement(measured: Comparison, camera: Camera) -> tuple[float, float]:
     across = np.eye(3) * (np.median(footprint) / footprint)[:, np.newaxis, np.newaxis]
     around = np.cross(np.eye(3), arms[:, np.newaxis]).swapaxes(1, 2)
     moves = np.concatenate([across, around], axis=2)
-    rows = np.einsum("ni,nij->nj", measured.found.normals, moves)
+    rows = np.einsum("ni,nij->nj", measured.answered.normals, moves)
     motion = np.zeros(6)
     for _ in range(5):
         root = np.sqrt(_huber(residual + rows @ motion))
         solution = np.linalg.pinv(rows * root[:, np.newaxis], rcond=0.1) * root
         motion = -solution @ residual
     spread = solution * measured.expected
-    found = np.einsum("nij,jk,nik->n", moves, np.outer(motion, motion), moves)
+    squares = np.einsum("nij,jk,nik->n", moves, np.outer(motion, motion), moves)
     expected = np.einsum("nij,jk,nik->n", moves, spread @ spread.T, moves)
-    return float(np.sqrt(found.mean())), float(np.sqrt(expected.mean()))
+    return float(np.sqrt(squares.mean())), float(np.sqrt(expected.mean()))
 
 
 def _huber(residual: Array) -> Array:
@@ -353,12 +360,13 @@ def scale_moments(measured: Comparison, asking: Camera, answering: Camera) -> Ar
     They are the weighted sums of products of how the residual grows with the scale of all angles,
     how with that of all depths, and minus the residual itself.
     """
-    asked, found = measured.asked, measured.found
+    asked = measured.asked
+    answered = measured.answered
     # Where the two surfaces go when every angle from the axis, or every depth, grows.
-    by_angle = _outwards(asking, asked.points) - _outwards(answering, found.points)
+    by_angle = _outwards(asking, asked.points) - _outwards(answering, answered.points)
     by_depth = answering.position - asking.position
     grows = np.stack(
-        [np.einsum("ij,ij->i", found.normals, by_angle), found.normals @ by_depth], axis=1
+        [np.einsum("ij,ij->i", answered.normals, by_angle), answered.normals @ by_depth], axis=1
     )
     residual = measured.curved_residual
     columns = np.column_stack([grows / measured.footprint[:, np.newaxis], -residual])
@@ -387,8 +395,8 @@ def view_pairs(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tu
     positions = np.array([camera.position for camera in cameras])
     nearest = Cameras(positions)
     pairs = set()
-    for view, own in enumerate(patches):
-        if len(own) < FEWEST_POINTS:
+    for view, patches_of_view in enumerate(patches):
+        if len(patches_of_view) < FEWEST_POINTS:
             continue
         candidates = nearest.nearest(view, NEIGHBOURHOOD, 10**-DECIMALS)
         away = np.linalg.norm(positions[candidates] - positions[view], axis=1)
@@ -402,7 +410,7 @@ def view_pairs(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tu
             for other in near[start:].tolist():
                 if other in chosen or other in blind:
                     continue
-                if _looks_for(own, cameras[other])[0].sum() >= FEWEST_POINTS:
+                if _looks_for(patches_of_view, cameras[other])[0].sum() >= FEWEST_POINTS:
                     chosen.add(other)
                     break
                 blind.add(other)
@@ -446,8 +454,8 @@ class Answer:
 
 
 def _mean(*values: float | None) -> float | None:
-    known = [value for value in values if value is not None]
-    return fmean(known) if known else None
+    numbers = [value for value in values if value is not None]
+    return fmean(numbers) if numbers else None
 
 
 NOTHING = Answer()
@@ -477,10 +485,11 @@ def scales(answers: Answer) -> tuple[Array, Array]:
 
     Two arrays (2,): angle and depth. A deviation is inf where the residuals do not determine it.
     """
-    squares, products = answers.moments[:2, :2], answers.moments[:2, 2]
+    squares = answers.moments[:2, :2]
+    products = answers.moments[:2, 2]
     if answers.measured < FEWEST_POINTS or np.linalg.cond(squares) > 1e9:
         return np.zeros(2), np.full(2, np.inf)
     inverse = np.linalg.inv(squares)
-    found = inverse @ products
-    left = max(float(answers.moments[2, 2] - found @ products), 0.0)
-    return found, np.sqrt(np.diagonal(inverse) * left / answers.measured)
+    errors = inverse @ products
+    left = max(float(answers.moments[2, 2] - errors @ products), 0.0)
+    return errors, np.sqrt(np.diagonal(inverse) * left / answers.measured)

@@ -45,13 +45,16 @@ class Answer:
 
 def answer(question: Question, camera: Camera, depth: NDArray[Any]) -> Answer:
     """Answer a question about a view's ``depth`` (height, width)."""
-    nearest, farthest, has_unknown = np.inf, 0.0, False
+    nearest = np.inf
+    farthest = 0.0
+    has_unknown = False
     if question.meaning:
         values = converted(depth, camera, question.meaning)
-        known = ~np.isnan(values)
-        has_unknown = not known.all()
-        if known.any():
-            nearest, farthest = float(np.nanmin(values)), float(np.nanmax(values))
+        is_known = ~np.isnan(values)
+        has_unknown = not is_known.all()
+        if is_known.any():
+            nearest = float(np.nanmin(values))
+            farthest = float(np.nanmax(values))
     seen = np.empty((0, 3))
     if question.step:
         down, across = (np.arange(question.step // 2, side, question.step) for side in depth.shape)

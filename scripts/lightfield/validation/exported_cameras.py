@@ -1,8 +1,8 @@
-"""Do the exports have the cameras of lightfield.json? Each is read as its consumer reads it.
+"""Checks that exports have the cameras of lightfield.json. Reads each export as its consumer does.
 
-Compared are each view's pose, each lens by where it projects the rays of pixels, which views are
-there and what they are for, and the numbers that a file has twice. Numbers agree that are a few
-steps of float32 apart, for consumers compute with that.
+It compares the poses of views, the lenses by where they project the rays of pixels, the lists of
+views and their parts, and the numbers that a file has twice. Numbers may differ by a few steps of
+float32, with which consumers compute.
 """
 
 from collections import Counter
@@ -16,10 +16,10 @@ from numpy.polynomial import Polynomial
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import NAME, LightField, View
-from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.splits_file import SPLITS
 from lightfield.geometry import rotations
 from lightfield.geometry.lenses import Lens
-from lightfield.geometry.rigs.split import PARTS
+from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.validation import unit_cube
 from lightfield.validation.files import ImageSet, Manifest, lists_of
 from lightfield.validation.readers import read
@@ -27,7 +27,7 @@ from lightfield.validation.readers.cameras import Camera, PolynomialFisheye
 from lightfield.validation.readers.contents import FLOAT32, Exported, ExportedView, Floats
 from lightfield.validation.result import Check
 
-# Rays are compared at so many pixels along each side of an image.
+# How many pixels along each side of an image have their rays compared.
 GRID = 33
 # To a lens that is no polynomial one is fitted for instant-ngp. It may miss the lens by so many
 # pixels, and by so many times what one fitted here does.
@@ -38,7 +38,7 @@ EVERY = 8
 
 @dataclass(frozen=True)
 class SetExport:
-    """What one export says of the views of the set with this number.
+    """What one export says of the views of the set ``number``.
 
     ``fits_depth`` is whether instant-ngp's unit cube is fitted to the depth of these views.
     """
@@ -49,7 +49,7 @@ class SetExport:
 
 
 class Expected:
-    """What lightfield.json says of a set's views, and the scene's other rigs of theirs."""
+    """What an export must say: the views of a set, and those of the scene's other rigs."""
 
     def __init__(self, dataset: Path, image_set: ImageSet) -> None:
         self.dataset = dataset
@@ -59,7 +59,7 @@ class Expected:
 
     @cached_property
     def others(self) -> dict[str, View]:
-        """The views of rigs in the same scene, named <rig>_<view>, as far as they are here."""
+        """The views of the scene's other rigs that are here, by the names <rig>_<view>."""
         return {
             f"{rig}_{view.name}": view
             for rig, folder in self.other_rigs.items()
@@ -68,26 +68,26 @@ class Expected:
 
     @cached_property
     def other_rigs(self) -> dict[str, Path]:
-        """The datasets of the scene's other rigs, by their names; none without a splits.json."""
+        """The datasets of the scene's other rigs by their names. Empty without a splits.json."""
         # A frame of a sequence lies one folder deeper.
         for home in self.dataset.parents[:2]:
             if (home / SPLITS).is_file():
                 rig, *below = self.dataset.relative_to(home).parts
                 folders = {path.parent.name: path.parent for path in home.glob(f"*/{NAME}")}
                 if below:
-                    found = home.glob(f"*/{below[0]}/{NAME}")
-                    folders = {path.parent.parent.name: path.parent for path in found}
+                    frames = home.glob(f"*/{below[0]}/{NAME}")
+                    folders = {path.parent.parent.name: path.parent for path in frames}
                 return {name: folder for name, folder in folders.items() if name != rig}
         return {}
 
     @property
     def has_split(self) -> bool:
-        """Whether the scene itself says what the views are for."""
+        """Whether the rig has a split."""
         return any(view.split for view in self.image_set.lightfield.views)
 
     @cached_property
     def parts(self) -> Mapping[str, set[str]]:
-        """The names of the views of each part: by the scene's split, or every eighth to test."""
+        """The names of the views of each part: as the rig splits them, or every eighth to test."""
         views = dict(zip(self.numbers, self.image_set.lightfield.views, strict=True))
         if self.has_split:
             views |= self.others
@@ -98,7 +98,7 @@ class Expected:
         else:
             tests = set(sorted(views)[::EVERY])
             parts = {"train": views.keys() - tests, "validation": set(), "test": tests}
-        # Without views of their own, those to test with validate.
+        # Without views for validation, the test views validate.
         parts["validation"] = parts["validation"] or parts["test"]
         return parts
 
@@ -108,14 +108,14 @@ class Expected:
         return not self.parts["test"]
 
     def view(self, name: str) -> View | None:
-        """Return the view of a name that an export has; None if it is not here."""
+        """Return the view with a name from an export. None if it is not here."""
         if name in self.numbers:
             return self.image_set.lightfield.views[self.numbers[name]]
         return self.others.get(name)
 
 
 def _views(path: Path) -> Sequence[View]:
-    """Return the views of another rig; none where its lightfield.json cannot be read."""
+    """Return the views of another rig. No views if its lightfield.json cannot be read."""
     try:
         return LightField.read(path).views
     except UserError:
@@ -128,12 +128,12 @@ def check(
     manifests: Sequence[Manifest],
     wanted: Collection[Path] | None = None,
 ) -> tuple[list[Check], list[SetExport]]:
-    """Return a check for each set that has exports, and what could be read of them.
+    """Return a check for each set that has exports, and the exports that could be read.
 
     ``wanted`` is that of `files.of_exports`.
     """
     checks = []
-    found: list[SetExport] = []
+    set_exports: list[SetExport] = []
     for number, image_set in enumerate(sets):
         expected = Expected(dataset, image_set)
         lens = image_set.lightfield.lens
@@ -153,7 +153,7 @@ def check(
             cube = exported.cube
             if cube and not unit_cube.is_of_rig(cube, image_set, expected.other_rigs):
                 cube = None
-            found.append(SetExport(number, exported, cube is not None and cube.fits_depth))
+            set_exports.append(SetExport(number, exported, cube is not None and cube.fits_depth))
             views += len(exported.views)
             problems += exported.faults
             problems += _faults(exported, expected)
@@ -166,11 +166,11 @@ def check(
                 detail = f"{len(paths)} exports have {views} cameras, not all as {expected.path}"
             name = f"{image_set.prefix}exported_cameras"
             checks.append(Check(name, not problems, detail, problems=shown))
-    return checks, found
+    return checks, set_exports
 
 
 def _faults(exported: Exported, expected: Expected) -> Iterator[str]:
-    """Yield what one export says otherwise than lightfield.json."""
+    """Yield what an export says that differs from lightfield.json."""
     lens = expected.image_set.lightfield.lens
     errors: dict[Camera, str | None] = {}
     for given in exported.cameras:
@@ -225,7 +225,7 @@ def _fitted(lens: Lens) -> PolynomialFisheye:
 
 
 def _pose_faults(views: Sequence[ExportedView], expected: Expected) -> Iterator[str]:
-    """Yield the views whose matrix is not that of lightfield.json, in either of its two forms."""
+    """Yield the views whose matrix is neither form of the pose in lightfield.json."""
     matrices = np.array([view.matrix for view in views])
     named = [expected.view(view.name) if view.name else None for view in views]
     if all(view.name is None for view in views):
@@ -264,7 +264,7 @@ def _nearest(positions: Floats, expected: Expected) -> Iterable[View]:
 
 
 def _name_faults(exported: Exported, expected: Expected) -> Iterator[str]:
-    """Yield the views that a file lacks, has twice, or that it must not have."""
+    """Yield the views that a file lacks, has twice, or must not have."""
     first = exported.views[0]
     if first.name is None:
         if len(exported.views) != len(expected.numbers):
@@ -286,7 +286,7 @@ def _name_faults(exported: Exported, expected: Expected) -> Iterator[str]:
 def _different_names(
     place: str, names: Sequence[str], wanted: Collection[str], expected: Expected
 ) -> Iterator[str]:
-    """Yield the names that are there twice, are missing, or are too many."""
+    """Yield the names that are doubled, missing, or not expected."""
     for name, count in Counter(names).items():
         if count > 1:
             yield f"{place}: has {name} {count} times"

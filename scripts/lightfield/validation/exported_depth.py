@@ -1,9 +1,8 @@
-"""Do the exports' points and ranges of depth agree with the depth of the views?
+"""Checks that points and depth in exports agree with the depth of the views.
 
-A point was lifted from the centre of a pixel of a rendered view: it must be where the depth of that
-pixel puts it, to what float32 resolves. Each view is asked for the points that are likely its own
-(`lifted_points`), while it is read for everything else. Only a point that is not where this view
-has it is looked for in all others.
+A point was lifted from the centre of a pixel of a rendered view. So it must lie where that pixel's
+depth puts it, as exactly as float32 resolves. While a view is read, it is asked for the points that
+were likely lifted from it (`lifted_points`). A point that does not fit is looked for in all others.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -27,9 +26,9 @@ from lightfield.validation.result import Check
 
 Ints = NDArray[np.int64]
 
-# Of the points that are not where their view has them, so many are looked for in all views.
+# How many points that do not fit their view are looked for in all views.
 MOST_SOUGHT = 20_000
-# So many wrong points of a cloud are named one by one.
+# How many wrong points of a cloud are named one by one.
 MOST_NAMED = 100
 # A plane that is seen head on has one depth; the range that an export gives it is no wider.
 WIDENED = 1.002
@@ -42,7 +41,7 @@ Ask = Callable[[Sequence[tuple[File, Question]]], Iterable[Answer | None]]
 
 @dataclass(frozen=True)
 class _Piece:
-    """The points of a cloud, by their indices, that one rendered view is asked for.
+    """The indices of a cloud's points for which one rendered view is asked.
 
     They follow ``start`` others in the question to that view.
     """
@@ -58,7 +57,7 @@ class _Piece:
 
 
 class ExportedDepth:
-    """What the views are asked, and what their answers say of the exports."""
+    """The questions to the views, and the checks that follow from their answers."""
 
     def __init__(
         self, dataset: Path, sets: Sequence[ImageSet], exports: Sequence[SetExport]
@@ -75,13 +74,13 @@ class ExportedDepth:
         self.questions = self._questions()
 
     def question(self, file: File) -> Question | None:
-        """Return what an image file is asked, if anything."""
+        """Return the question to an image file, or None."""
         if file.of_pass or not file.path.endswith(".exr"):
             return None
         return self.questions.get((file.set, file.view))
 
     def checks(self, answers: Mapping[Key, Answer], ask: Ask) -> list[Check]:
-        """Return a check for each set with an export that says something of depth."""
+        """Return a check for each set with exports that hold depth."""
         faults: dict[int, list[str]] = {}
         for export in self.exports:
             if _speaks_of_depth(export):
@@ -92,9 +91,9 @@ class ExportedDepth:
         return [self._check(number, problems, unread) for number, problems in faults.items()]
 
     def _check(self, number: int, problems: Sequence[str], unread: int) -> Check:
-        own = [index for index, (of, _) in enumerate(self.clouds) if of == number]
-        points = sum(len(self.clouds[index][1].positions) for index in own)
-        compared = sum(self.compared[index] for index in own)
+        cloud_indices = [index for index, (of, _) in enumerate(self.clouds) if of == number]
+        points = sum(len(self.clouds[index][1].positions) for index in cloud_indices)
+        compared = sum(self.compared[index] for index in cloud_indices)
         ranges = sum(len(e.exported.ranges) for e in self.exports if e.number == number)
         name = f"{self.sets[number].prefix}exported_depth"
         if (unread or compared < points) and not problems:
@@ -112,10 +111,10 @@ class ExportedDepth:
             figures={"points": points, "ranges": ranges},
         )
 
-    # ---- what is asked ------------------------------------------------------------------
+    # ---- questions ----------------------------------------------------------------------
 
     def _pieces(self) -> Iterator[_Piece]:
-        """Yield which points each rendered view is asked for."""
+        """Yield the points for which each rendered view is asked."""
         source = rendered(self.sets)
         if source is None:
             return
@@ -128,9 +127,9 @@ class ExportedDepth:
             by_view = np.argsort(views, kind="stable")
             bounds = np.searchsorted(views[by_view], np.arange(len(source.views) + 1))
             for view in range(len(source.views)):
-                own = points[by_view[bounds[view] : bounds[view + 1]]]
-                yield _Piece(index, own, view, starts[view])
-                starts[view] += len(own)
+                view_points = points[by_view[bounds[view] : bounds[view + 1]]]
+                yield _Piece(index, view_points, view, starts[view])
+                starts[view] += len(view_points)
 
     def _questions(self) -> dict[Key, Question]:
         points: dict[Key, list[NDArray[Any]]] = {}
@@ -162,7 +161,7 @@ class ExportedDepth:
             return [*range(len(image_set.views))]
         return [image_set.numbers[given.view]] if given.view in image_set.numbers else []
 
-    # ---- what the answers say -----------------------------------------------------------
+    # ---- answers ------------------------------------------------------------------------
 
     def _range_faults(self, export: SetExport, answers: Mapping[Key, Answer]) -> Iterator[str]:
         """Yield what is wrong with an export's ranges of depth, depth map and unit cube."""
@@ -203,18 +202,18 @@ class ExportedDepth:
     def _cloud_faults(
         self, index: int, cloud: Cloud, answers: Mapping[Key, Answer], ask: Ask
     ) -> Iterator[str]:
-        """Yield the points of a cloud that are not where a view's depth has them."""
+        """Yield the faults of a cloud: points that no view's depth puts there."""
         source = rendered(self.sets)
         if source is None or any((0, view) not in answers for view in range(len(source.views))):
             return
         apart = np.full(len(cloud.positions), np.inf)
         for piece in self.pieces:
             if piece.cloud == index:
-                found = answers[0, piece.view].apart[piece.rows]
-                apart[piece.points] = np.fmin(apart[piece.points], found)
+                distances = answers[0, piece.view].apart[piece.rows]
+                apart[piece.points] = np.fmin(apart[piece.points], distances)
         limit = resolved(cloud.positions)
         off = np.flatnonzero(~(apart <= limit))
-        # They may be another view's than the likely one.
+        # They may have been lifted from another view than the likely one.
         count = min(len(off), MOST_SOUGHT)
         sought = off[np.linspace(0, len(off) - 1, count).astype(int)]
         self.compared[index] = len(apart) - len(off) + count
@@ -238,7 +237,7 @@ def _speaks_of_depth(export: SetExport) -> bool:
 
 
 def _bounds_views(export: SetExport, image_set: ImageSet) -> list[int]:
-    """Return the views to whose depth a unit cube is fitted: some, spread evenly."""
+    """Return the views whose depth a unit cube is fitted to. They are spread evenly."""
     if not export.fits_depth:
         return []
     last = len(image_set.views) - 1
@@ -250,8 +249,8 @@ def _lifting_views(image_set: ImageSet, source: ImageSet) -> Ints:
     """Return the rendered views in the order in which a set's exporters lift points from them."""
     views = image_set.lightfield.views
     training = [view for view in views if view.split in (None, "train")] or views
-    found = [source_view(source, view.name) for view in training]
-    return np.array([view for view in found if view is not None], np.int64)
+    source_views = [source_view(source, view.name) for view in training]
+    return np.array([view for view in source_views if view is not None], np.int64)
 
 
 def _range_fault(given: DepthRange, answers: Sequence[Answer]) -> Iterator[str]:

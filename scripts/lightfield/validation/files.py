@@ -1,4 +1,4 @@
-"""Which files a dataset has: every one of its own is there, and none that is not.
+"""Checks which files a dataset has: none of its own is missing, and no other is there.
 
 A dataset is a folder with lightfield.json, exr/<view>.exr, and reprojections, each a folder with
 its own lightfield.json and images.
@@ -14,7 +14,7 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, set_aside, sha256, write_text
-from lightfield.dataset.dataset import REPORT_FILES
+from lightfield.dataset.dataset_paths import REPORT_FILES
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, NAMES, Pass
 from lightfield.geometry import rotations
@@ -43,13 +43,14 @@ BESIDE = "{view}_depth.png"
 
 @dataclass(frozen=True)
 class Manifest:
-    """How one export's files are recognised, and so published and checked.
+    """How to find the files of one kind of export, so that they are published and checked.
 
-    ``lists`` is a pattern for files beside a lightfield.json, and ``pictures`` reads one of them:
-    it returns the paths, relative to that file, of images that have the size of the views, and
-    raises `UserError` for what is no such list. ``beside`` are the names of images of that size
-    that a ``{view}`` may have in the folders of those pictures and of the views. ``files`` reads
-    the SHA-256 of every file of the export, pictures or not, where its list has them.
+    - ``lists``: a pattern for the export's lists, which are files beside a lightfield.json.
+    - ``pictures``: reads a list, and returns the paths, relative to it, of images that have the
+      size of the views. It raises `UserError` for a file that is no such list.
+    - ``beside``: names, with ``{view}``, of images of that size that may lie beside the views and
+      beside those pictures.
+    - ``files``: returns the SHA-256 of every file of the export, if its list has them.
     """
 
     lists: str
@@ -77,7 +78,7 @@ class ImageSet:
 
     @property
     def prefix(self) -> str:
-        """What its files' paths and its checks' names begin with."""
+        """The prefix of its files' paths and of its checks' names."""
         return f"{self.name}/" if self.name else ""
 
     @cached_property
@@ -86,7 +87,7 @@ class ImageSet:
 
     @cached_property
     def numbers(self) -> dict[str, int]:
-        """The places of its views by their names."""
+        """The positions of its views by their names."""
         return {name: number for number, name in enumerate(self.views)}
 
     def camera(self, view: int) -> Camera:
@@ -97,7 +98,7 @@ class ImageSet:
 
 @dataclass(frozen=True)
 class File:
-    """An image file: ``path`` relative to the dataset, and the set and view that it is of.
+    """An image file: its ``path`` relative to the dataset, its set, and its view.
 
     What is no view (a mask, a depth map, a picture for a trainer) has ``view`` −1, and has only to
     be readable and of its set's size. ``of_pass`` is the pass that it holds of a view.
@@ -110,7 +111,7 @@ class File:
 
 
 def read_sets(dataset: Path, reprojections: Iterable[str]) -> tuple[list[ImageSet], list[Check]]:
-    """Read every lightfield.json; return what could be understood, and a check of each."""
+    """Read every lightfield.json. Return the sets that could be read, and a check of each."""
     sets: list[ImageSet] = []
     checks = []
     for name in ("", *reprojections):
@@ -131,12 +132,12 @@ def read_sets(dataset: Path, reprojections: Iterable[str]) -> tuple[list[ImageSe
 
 
 def rendered(sets: Sequence[ImageSet]) -> ImageSet | None:
-    """Return the set of the dataset's own views, if it was understood."""
+    """Return the set of the rendered views, or None if its lightfield.json could not be read."""
     return sets[0] if sets and not sets[0].name else None
 
 
 def source_view(source: ImageSet | None, name: str) -> int | None:
-    """Return the number of the view of which a reprojected one of this name was made."""
+    """Return the number of the view from which the reprojected view ``name`` was made."""
     numbers = source.numbers if source else {}
     # A face of a cube map is named for its view, and itself.
     return numbers.get(name, numbers.get(name.rpartition("_")[0]))
@@ -180,9 +181,9 @@ def _central_angle(lens: Lens) -> float:
 
 
 def of_views(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[Check]]:
-    """Return the views' files that are there, and for each set a check that none is missing.
+    """Return the files of the views that exist, and for each set a check that none is missing.
 
-    A reprojection is EXR, PNG or both: a format of which it has one view, it must have whole.
+    A reprojection is EXR, PNG or both. A format that it has of one view, it must have of all.
     """
     files: list[File] = []
     checks = []
@@ -198,11 +199,11 @@ def of_views(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[
             for suffix in formats or [".exr"]
             for view, name in enumerate(image_set.views)
         ]
-        own = [File(path, number, view) for view, path in paths if Path(path).name in present]
+        set_files = [File(path, number, view) for view, path in paths if Path(path).name in present]
         missing = {path: "is missing" for _, path in paths if Path(path).name not in present}
-        detail = f"{len(own)} of {len(paths)} images are there"
+        detail = f"{len(set_files)} of {len(paths)} images are there"
         checks.append(Check.of_files(f"{image_set.prefix}views", missing, detail))
-        files += own
+        files += set_files
     return files, checks
 
 
@@ -212,7 +213,7 @@ def _files(folder: Path) -> set[str]:
 
 
 def of_passes(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], dict[str, str]]:
-    """Return the files of the views' passes and flow, and what is wrong with those not there."""
+    """Return the files of passes and flow that exist, and by path what is wrong with the others."""
     files = _of_passes(sets)
     present = [file for file in files if (dataset / file.path).is_file()]
     missing = {file.path for file in files} - {file.path for file in present}
@@ -221,21 +222,21 @@ def of_passes(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], dict
 
 def _of_passes(sets: Sequence[ImageSet]) -> list[File]:
     return [
-        File(found.path(Path(image_set.name), name).as_posix(), number, index, found)
+        File(view_pass.path(Path(image_set.name), name).as_posix(), number, index, view_pass)
         for number, image_set in enumerate(sets)
         for index, view in enumerate(image_set.lightfield.views)
-        for found, name in (
-            *((found, view.name) for found in image_set.lightfield.passes),
+        for view_pass, name in (
+            *((view_pass, view.name) for view_pass in image_set.lightfield.passes),
             *([(FLOW, view.flow)] if view.flow else []),
         )
     ]
 
 
 def names(sets: Sequence[ImageSet]) -> list[str]:
-    """Return the files in which what is rendered has its numbers."""
-    own = rendered(sets)
-    found = own.lightfield.passes if own else []
-    return [f"{each.name}/{NAMES}" for each in found if each.kind == "id"]
+    """Return the paths of the files that name what the passes of a dataset number."""
+    rendered_set = rendered(sets)
+    passes = rendered_set.lightfield.passes if rendered_set else []
+    return [f"{each.name}/{NAMES}" for each in passes if each.kind == "id"]
 
 
 def lists_of(
@@ -244,9 +245,9 @@ def lists_of(
     manifest: Manifest,
     wanted: Collection[Path] | None = None,
 ) -> list[Path]:
-    """Return a set's lists of one kind of export; only those ``wanted``, if it is given."""
-    there = sorted((dataset / image_set.name).glob(manifest.lists))
-    return [path for path in there if wanted is None or path.resolve() in wanted]
+    """Return a set's lists of one kind of export. ``wanted`` limits them, unless it is None."""
+    lists = sorted((dataset / image_set.name).glob(manifest.lists))
+    return [path for path in lists if wanted is None or path.resolve() in wanted]
 
 
 def of_exports(
@@ -256,16 +257,17 @@ def of_exports(
     manifests: Sequence[Manifest],
     wanted: Collection[Path] | None = None,
 ) -> tuple[list[File], list[str], Check]:
-    """Return the pictures beside the views, the exports' other files, and a check of these.
+    """Return the pictures beside the views, the exports' other files, and a check of both.
 
-    Of lists only those ``wanted`` count; without it every one that is there.
+    Only the ``wanted`` lists count; None takes all that exist.
     """
-    found: dict[str, File] = {}
+    pictures: dict[str, File] = {}
     lists: list[str] = []
     others: list[str] = []
     problems: list[str] = []
     for number, image_set in enumerate(sets):
-        folders, patterns = {image_set.folder}, [BESIDE]
+        folders = {image_set.folder}
+        patterns = [BESIDE]
         for manifest in manifests:
             taken = lists_of(dataset, image_set, manifest, wanted)
             patterns += manifest.beside if taken or wanted is None else ()
@@ -281,7 +283,7 @@ def of_exports(
                     target = (path.parent / name).resolve()
                     if target.is_file() and target.is_relative_to(dataset):
                         relative = target.relative_to(dataset)
-                        found[relative.as_posix()] = File(relative.as_posix(), number)
+                        pictures[relative.as_posix()] = File(relative.as_posix(), number)
                         folders.add(relative.parent.as_posix())
                     else:
                         problems.append(f"{lists[-1]}: {name} is no file of the dataset")
@@ -298,34 +300,34 @@ def of_exports(
             for view in image_set.views:
                 for name in (pattern.format(view=view) for pattern in patterns):
                     if name in present:
-                        found[f"{folder}/{name}"] = File(f"{folder}/{name}", number)
+                        pictures[f"{folder}/{name}"] = File(f"{folder}/{name}", number)
     for file in views:
-        found.pop(file.path, None)
-    files = [file for _, file in sorted(found.items())]
+        pictures.pop(file.path, None)
+    files = [file for _, file in sorted(pictures.items())]
     passed = not problems if lists or files else None
     detail = f"{len(lists)} lists of frames, {len(files)} pictures beside the views"
     return files, [*lists, *others], Check("exports", passed, detail, problems=problems)
 
 
 def listing(
-    dataset: Path, sets: Sequence[ImageSet], known: Iterable[str]
+    dataset: Path, sets: Sequence[ImageSet], owned: Iterable[str]
 ) -> tuple[list[str], Check]:
-    """Return every file that the dataset publishes, and fail on those that are not its own."""
-    published, strays = _sorted_out(dataset, sets, known)
+    """Return the files that the dataset publishes, and a check that fails if there are others."""
+    published, strays = _sorted_out(dataset, sets, owned)
     problems = [f"{path}: is no file of this dataset" for path in strays]
     return published, Check("files", not strays, f"{len(published)} files", problems=problems)
 
 
 def _sorted_out(
-    dataset: Path, sets: Sequence[ImageSet], known: Iterable[str]
+    dataset: Path, sets: Sequence[ImageSet], owned: Iterable[str]
 ) -> tuple[list[str], list[str]]:
-    """Return the files that the dataset publishes, and those that are not its own."""
-    own = {*known, *(f"{image_set.prefix}{NAME}" for image_set in sets)}
+    """Return the files that the dataset publishes, and all others in its folder."""
+    all_owned = {*owned, *(f"{image_set.prefix}{NAME}" for image_set in sets)}
     paths = [path.relative_to(dataset) for path in dataset.rglob("*") if path.is_file()]
     present = sorted(path.as_posix() for path in paths if path.parts[0] != REPORT)
     beside = (*OUTPUTS, README, CARD)
-    strays = [path for path in present if path not in own and path not in beside]
-    return [path for path in present if path in own], strays
+    strays = [path for path in present if path not in all_owned and path not in beside]
+    return [path for path in present if path in all_owned], strays
 
 
 def remove_strays(
@@ -335,11 +337,11 @@ def remove_strays(
     folder: Path,
     wanted: Collection[Path] | None = None,
 ) -> int:
-    """Move the files that are not the dataset's own into ``folder``; return how many they were.
+    """Move files that do not belong to the dataset into ``folder``. Return their number.
 
-    Such are the views of a rig that had more cameras, reprojections and exports that there were,
-    and what an older program drew for the report. Nothing is moved of a dataset with a
-    lightfield.json or an export that cannot be understood. ``wanted`` is that of `of_exports`.
+    Such files are views of a rig that had more cameras, former reprojections and exports, and what
+    an older program drew for the report. Moves nothing if a lightfield.json or an export cannot be
+    read. ``wanted`` is that of `of_exports`.
     """
     sets, _ = read_sets(dataset, reprojections)
     if len(sets) <= len(reprojections):
@@ -349,9 +351,9 @@ def remove_strays(
     extras, lists, exports = of_exports(dataset.resolve(), sets, views, manifests, wanted)
     if exports.passed is False:
         return 0
-    known = {*lists, *names(sets), *(file.path for file in [*views, *extras])}
-    _, strays = _sorted_out(dataset, sets, known)
-    # Hidden is what is being drawn at this moment.
+    owned = {*lists, *names(sets), *(file.path for file in [*views, *extras])}
+    _, strays = _sorted_out(dataset, sets, owned)
+    # Hidden files are being drawn at this moment.
     drawn = {path.name for path in (dataset / REPORT).glob("[!.]*")}
     strays += [f"{REPORT}/{name}" for name in sorted(drawn - {*REPORT_FILES})]
     for name in strays:
@@ -365,41 +367,42 @@ def remove_strays(
 
 def checksums(
     recorded: Mapping[str, tuple[int, str]] | None,
-    found: Mapping[str, tuple[int, str]],
+    sums: Mapping[str, tuple[int, str]],
     sets: Sequence[ImageSet],
     altered_files: Mapping[str, str],
 ) -> Check:
-    """Compare the images' sizes and SHA-256, by path, with those that their writers recorded.
+    """Check that the images have the sizes and SHA-256 that their writers recorded.
 
-    The ``altered_files`` that the ledger found fail, too.
+    ``recorded`` and the actual sums are by path. The ``altered_files`` of the ledger fail, too.
     """
     if recorded is None and not altered_files:
         return Check("checksums", None, "no record was given")
     recorded = recorded or {}
     faults = dict(altered_files)
     for path, (size, digest) in sorted(recorded.items()):
-        if path not in found:
+        if path not in sums:
             faults[path] = "is recorded but is no image of this dataset"
-        elif size != found[path][0]:
-            faults[path] = f"has {found[path][0]} bytes, but its record says {size}"
-        elif digest != found[path][1]:
-            faults[path] = f"has the sha256 {found[path][1]}, but its record says {digest}"
-    # Masks and pictures for trainers are not the renderer's.
-    own = rendered(sets)
-    views = own.views if own else []
-    own_files = [f"{IMAGES}/{view}.exr" for view in views]
-    own_files += [file.path for file in _of_passes(sets[:1])] if own else []
-    for path in sorted(own_files):
-        if path in found and path not in recorded:
+        elif size != sums[path][0]:
+            faults[path] = f"has {sums[path][0]} bytes, but its record says {size}"
+        elif digest != sums[path][1]:
+            faults[path] = f"has the sha256 {sums[path][1]}, but its record says {digest}"
+    # Renderers record views and passes, but not masks and pictures for trainers.
+    rendered_set = rendered(sets)
+    views = rendered_set.views if rendered_set else []
+    rendered_files = [f"{IMAGES}/{view}.exr" for view in views]
+    rendered_files += [file.path for file in _of_passes(sets[:1])] if rendered_set else []
+    for path in sorted(rendered_files):
+        if path in sums and path not in recorded:
             faults[path] = "has no record"
-    detail = f"{len(recorded)} of {len(found)} images have a record"
+    detail = f"{len(recorded)} of {len(sums)} images have a record"
     return Check.of_files("checksums", faults, detail)
 
 
 def altered(published: Mapping[str, str], noted: Mapping[str, str]) -> dict[str, str]:
-    """Return the published files that no longer have the SHA-256 ``noted`` when they were made.
+    """Return which published files changed since they were made, and how.
 
-    Both are by path; the values say what is wrong. Without this, damage would get a checksum.
+    Both arguments hold SHA-256 by path; ``noted`` is from when the files were made. Without this
+    check, a damaged file would be published with a checksum of its damage.
     """
     return {
         path: f"has the sha256 {published[path]}, but {noted[path]} when it was made"
@@ -420,8 +423,8 @@ def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:
         }
     except (LookupError, TypeError, ValueError, AttributeError):
         raise UserError(f"{path}: views: must map names to distance and inside") from None
-    own = rendered(sets)
-    views = own.views if own else []
+    rendered_set = rendered(sets)
+    views = rendered_set.views if rendered_set else []
     faults = {}
     for view in views:
         if view not in around:
@@ -429,23 +432,16 @@ def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:
         elif around[view][1]:
             faults[f"{IMAGES}/{view}.exr"] = "its camera is inside geometry"
     nearest = min((around[view][0] for view in views if view in around), default=math.inf)
-    detail, figures = "nothing is near a camera", {}
+    detail = "nothing is near a camera"
+    figures = {}
     if math.isfinite(nearest):
         detail = f"nothing is nearer to a camera than {nearest:.3g} m"
         figures = {"nearest_metres": round(nearest, 4)}
     return Check.of_files("cameras", faults, detail, figures=figures)
 
 
-def remove_leftovers(dataset: Path) -> None:
-    """Remove what killed programs left half-written, and the sums of an earlier validation."""
-    (dataset / SUMS).unlink(missing_ok=True)
-    for leftover in dataset.rglob(".*.tmp.*"):
-        if leftover.relative_to(dataset).parts[0] != REPORT:
-            leftover.unlink()
-
-
 def read_sums(path: Path) -> dict[str, str]:
-    """Return the SHA-256 of each file that a sha256sums.txt names, and that is below its folder."""
+    """Return the SHA-256 of each file that a sha256sums.txt names below its own folder."""
     lines = path.read_text(encoding="utf-8").splitlines()
     return {
         name: digest
@@ -455,7 +451,7 @@ def read_sums(path: Path) -> dict[str, str]:
 
 
 def write_sums(path: Path, checksums: Mapping[str, str], dataset: Path, result: Path) -> None:
-    """Write as sha256sum does: ``checksums`` by path, and ``result``'s if the dataset holds it."""
+    """Write ``checksums`` as sha256sum does, with that of ``result`` if the dataset holds it."""
     sums = dict(checksums)
     if result.resolve().is_relative_to(dataset.resolve()):
         sums[result.resolve().relative_to(dataset.resolve()).as_posix()] = sha256(result)

@@ -1,8 +1,9 @@
-"""Do the views of a set see the same world? Each is compared with its neighbours."""
+"""Checks that the views of a set see the same world: compares each view with its neighbours."""
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass
 
 from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import NAME
@@ -11,136 +12,212 @@ from lightfield.validation.consistency import Answer, Patches
 from lightfield.validation.files import File, ImageSet
 from lightfield.validation.result import Check
 
-# A view fails when over half of its pairs exceed one of these: the part of contradictions among
-# the points that are not occluded, and the displacement in pixels that a pair's residuals ask for.
-# Few pixels on curved surfaces determine that badly: it must be as many times what is expected of a
-# right pair, too (right views of 40² come to 2.5).
-# A set fails when its pairs together ask for such a change of all angles or of all depths. A
-# reprojection takes each depth from a pixel of its source, which may lie half a pixel away.
+# A view fails if more than half of its pairs exceed one of two limits. The first is the part of
+# contradictions among the points that are not occluded. The second is the displacement in pixels
+# that explains a pair's residuals best. A few pixels on curved surfaces determine the displacement
+# badly, so it must also exceed EXPECTED_DISPLACEMENTS times what is expected of a right pair. Right
+# views of 40² pixels come to 2.5 times.
+# A set fails if all its pairs together ask for a larger change of all angles, or of all depths,
+# than the scale limit. A reprojection takes each depth from a pixel of its source, which may lie
+# half a pixel away, so its limits are wider.
 CONTRADICTIONS_LIMIT = 0.05
-DISPLACEMENT_LIMIT, REPROJECTED_DISPLACEMENT_LIMIT = 0.2, 0.4
+DISPLACEMENT_LIMIT = 0.2
+REPROJECTED_DISPLACEMENT_LIMIT = 0.4
 EXPECTED_DISPLACEMENTS = 3.0
-SCALE_LIMIT, REPROJECTED_SCALE_LIMIT = 0.007, 0.015
-# Residuals that determine a scale no better than this do not count as a check of it.
+SCALE_LIMIT = 0.007
+REPROJECTED_SCALE_LIMIT = 0.015
+# A scale is not checked if its standard deviation is larger than this.
 SCALE_DEVIATION_LIMIT = 0.0015
 
 Question = tuple[File, list[tuple[int, Patches]]]
-"""An image, and the numbers and patches of the views that are looked up in it."""
+"""An image, and the positions and patches of the views to look up in it."""
+
+
+Pair = tuple[int, int]
+"""The positions of two views among the views with depth."""
 
 
 def check(
     image_set: ImageSet,
-    seen: Mapping[File, Patches],
+    patches_of_files: Mapping[File, Patches],
     ask: Callable[[Sequence[Question]], Iterable[list[Answer]]],
 ) -> Check:
     """Check that the views of a set see the same world.
 
-    ``seen`` are its images with depth and the surfaces in each; ``ask`` answers questions in order.
+    ``patches_of_files`` maps the images with depth to the surface patches that they see. ``ask``
+    answers questions in their order.
     """
     name = f"{image_set.prefix}geometry"
     if image_set.lightfield.depth is None:
         return Check(name, None, "the views have no depth")
-    if len(seen) < 2:
-        return Check(name, None, f"{len(seen)} views with depth have no neighbours")
-    files, patches = list(seen), list(seen.values())
+    if len(patches_of_files) < 2:
+        return Check(name, None, f"{len(patches_of_files)} views with depth have no neighbours")
+    pairs = _pair_answers(name, image_set, patches_of_files, ask)
+    return _judge(name, image_set, list(patches_of_files), pairs)
+
+
+def _pair_answers(
+    name: str,
+    image_set: ImageSet,
+    patches_of_files: Mapping[File, Patches],
+    ask: Callable[[Sequence[Question]], Iterable[list[Answer]]],
+) -> dict[Pair, Answer]:
+    """Return for each pair of neighbours what they say of each other, in one answer."""
+    files = list(patches_of_files)
+    patches = list(patches_of_files.values())
     pairs = consistency.view_pairs([image_set.camera(file.view) for file in files], patches)
-    asking: dict[int, list[int]] = {}
-    for one, other in pairs:
-        asking.setdefault(one, []).append(other)
-        asking.setdefault(other, []).append(one)
+    neighbours: dict[int, list[int]] = {}
+    for first, second in pairs:
+        neighbours.setdefault(first, []).append(second)
+        neighbours.setdefault(second, []).append(first)
+    views = sorted(neighbours)
     questions = [
-        (files[view], [(files[other].view, patches[other]) for other in others])
-        for view, others in sorted(asking.items())
+        (files[view], [(files[other].view, patches[other]) for other in neighbours[view]])
+        for view in views
     ]
-    answers: dict[tuple[int, int], Answer] = {}
+    answers: dict[Pair, Answer] = {}
     progress = Progress(len(questions), f"validate {name}")
-    for (view, others), found in zip(sorted(asking.items()), ask(questions), strict=True):
-        answers |= {(other, view): answer for other, answer in zip(others, found, strict=True)}
+    for view, answers_of_view in zip(views, ask(questions), strict=True):
+        for other, answer in zip(neighbours[view], answers_of_view, strict=True):
+            answers[other, view] = answer
         progress.done()
-    both = {pair: answers[pair] + answers[pair[::-1]] for pair in pairs}
-    return _judged(name, image_set, files, both)
+    return {pair: answers[pair] + answers[pair[::-1]] for pair in pairs}
 
 
-def _judged(
-    name: str, image_set: ImageSet, files: Sequence[File], both: Mapping[tuple[int, int], Answer]
+@dataclass(frozen=True)
+class _ViewVerdict:
+    """What the neighbours of a view say of it: medians over its pairs.
+
+    ``contradiction`` is the part of its points that contradict them. ``displacement`` is in pixels,
+    and so is its ``displacement_limit``.
+    """
+
+    contradiction: float
+    displacement: float
+    displacement_limit: float
+
+    @property
+    def is_bad(self) -> bool:
+        return (
+            self.contradiction > CONTRADICTIONS_LIMIT or self.displacement > self.displacement_limit
+        )
+
+    def describe(self) -> str:
+        """Return what is wrong with a bad view."""
+        return (
+            f"{_percent(self.contradiction)} of its points contradict its neighbours "
+            f"(at most {_percent(CONTRADICTIONS_LIMIT)}), and it seems displaced by "
+            f"{self.displacement:.2f} pixels (at most {self.displacement_limit:.2g})"
+        )
+
+
+def _judge(
+    name: str, image_set: ImageSet, files: Sequence[File], pairs: Mapping[Pair, Answer]
 ) -> Check:
-    """Turn what the views of each pair say of each other into a check that names the wrong ones."""
-    limit, scale_limit = DISPLACEMENT_LIMIT, SCALE_LIMIT
-    if image_set.grain:
-        limit, scale_limit = REPROJECTED_DISPLACEMENT_LIMIT, REPROJECTED_SCALE_LIMIT
-    contradictions: dict[int, float] = {}
-    displacements: dict[int, tuple[float, float]] = {}
-    of_view: dict[int, list[Answer]] = defaultdict(list)
-    for pair, answer in both.items():
-        for view in pair:
-            of_view[view].append(answer)
-    for view in range(len(files)):
-        own = of_view[view]
-        contradiction = _low_median(answer.contradiction for answer in own)
-        if contradiction is not None:
-            contradictions[view] = contradiction
-            displacements[view] = _displacement(own, limit)
-    tested = len(contradictions)
-    if not tested:
+    """Turn what the views of each pair say of each other into a check that names the bad views."""
+    limit = REPROJECTED_DISPLACEMENT_LIMIT if image_set.grain else DISPLACEMENT_LIMIT
+    verdicts = _view_verdicts(pairs, limit)
+    if not verdicts:
         return Check(name, None, "no two views see enough of the same smooth surfaces")
-    bad = {
-        view: f"{_percent(contradiction)} of its points contradict its neighbours "
-        f"(at most {_percent(CONTRADICTIONS_LIMIT)}), and it seems displaced by "
-        f"{displacements[view][0]:.2f} pixels (at most {displacements[view][1]:.2g})"
-        for view, contradiction in contradictions.items()
-        if contradiction > CONTRADICTIONS_LIMIT or displacements[view][0] > displacements[view][1]
-    }
+    bad_views = [view for view, verdict in verdicts.items() if verdict.is_bad]
     path = f"{image_set.prefix}{NAME}"
-    problems = [f"{files[view].path}: {text}" for view, text in bad.items()]
-    if 2 * len(bad) > tested:
+    problems = [f"{files[view].path}: {verdicts[view].describe()}" for view in bad_views]
+    if 2 * len(bad_views) > len(verdicts):
         problems.insert(
             0,
             f"{path}: most views contradict each other: lens, axes or the meaning of depth are not "
             "those of the images",
         )
-    good = [answer for pair, answer in both.items() if not bad.keys() & set(pair)]
-    scale, deviation = consistency.scales(sum(good, start=consistency.NOTHING))
-    scales = dict(zip(("angle", "depth"), zip(scale, deviation, strict=True), strict=True))
-    for what, (value, sure) in scales.items():
-        if sure < SCALE_DEVIATION_LIMIT and abs(value) > scale_limit + 3 * sure:
+    scales = _scales(pairs, set(bad_views))
+    scale_limit = REPROJECTED_SCALE_LIMIT if image_set.grain else SCALE_LIMIT
+    for quantity, (error, deviation) in scales.items():
+        if deviation < SCALE_DEVIATION_LIMIT and abs(error) > scale_limit + 3 * deviation:
             problems.append(
-                f"{path}: the views agree better if all {what}s are scaled by {1 + value:.3f} "
+                f"{path}: the views agree better if all {quantity}s are scaled by {1 + error:.3f} "
                 f"(at most {_percent(scale_limit)} is allowed)"
             )
-    total = sum(both.values(), start=consistency.NOTHING)
-    points = total.agree + total.occluded + total.contradict
-    parts = {key: getattr(total, key) / points for key in ("agree", "contradict", "occluded")}
-    untested = len(image_set.views) - tested
+    untested = len(image_set.views) - len(verdicts)
     warning = f"{untested} views in {image_set.folder} see too little that others see too"
+    figures = _figures(pairs, verdicts, scales)
+    detail = (
+        f"{len(verdicts)} views × {2 * len(pairs) / len(verdicts):.1f} neighbours agree "
+        f"{_percent(figures['agree'])} ({_percent(figures['contradict'])} contradict, "
+        f"{_percent(figures['occluded'])} occluded)"
+    )
     return Check(
         name,
         not problems,
-        f"{tested} views × {2 * len(both) / tested:.1f} neighbours agree "
-        f"{_percent(parts['agree'])} ({_percent(parts['contradict'])} contradict, "
-        f"{_percent(parts['occluded'])} occluded)",
-        [image_set.views[files[view].view] for view in bad],
+        detail,
+        [image_set.views[files[view].view] for view in bad_views],
         problems,
         [warning] if untested else [],
-        {
-            "pairs": len(both),
-            "points": points,
-            **{key: round(part, 4) for key, part in parts.items()},
-            "worst_contradiction": round(max(contradictions.values()), 4),
-            "worst_displacement_pixels": round(max(displacements.values())[0], 3),
-            **{
-                f"{what}_scale_{key}": round(float(number), 4)
-                for what, numbers in scales.items()
-                for key, number in zip(("error", "deviation"), numbers, strict=True)
-                if math.isfinite(numbers[1])
-            },
-        },
+        {key: round(figure, DECIMALS.get(key, 4)) for key, figure in figures.items()},
     )
 
 
-def _displacement(answers: Iterable[Answer], limit: float) -> tuple[float, float]:
-    """Return the displacement of a view, and what it may be: those of its median pair.
+def _view_verdicts(pairs: Mapping[Pair, Answer], limit: float) -> dict[int, _ViewVerdict]:
+    """Return the verdicts on the views that share enough with any neighbour, in their order.
 
-    A pair may have ``limit``, and what resolution and precision alone may lead to.
+    ``limit`` is the displacement in pixels that any pair may have.
+    """
+    answers_of_view: dict[int, list[Answer]] = defaultdict(list)
+    for pair, answer in pairs.items():
+        for view in pair:
+            answers_of_view[view].append(answer)
+    verdicts = {}
+    for view in sorted(answers_of_view):
+        answers = answers_of_view[view]
+        contradiction = _low_median(answer.contradiction for answer in answers)
+        if contradiction is not None:
+            verdicts[view] = _ViewVerdict(contradiction, *_displacement(answers, limit))
+    return verdicts
+
+
+def _scales(pairs: Mapping[Pair, Answer], bad_views: Set[int]) -> dict[str, tuple[float, float]]:
+    """Return the errors of all angles and of all depths, each with its standard deviation.
+
+    An error is the part by which they must grow. Pairs with bad views do not count.
+    """
+    good = [answer for pair, answer in pairs.items() if not bad_views & set(pair)]
+    errors, deviations = consistency.scales(sum(good, start=consistency.NOTHING))
+    return {
+        "angle": (float(errors[0]), float(deviations[0])),
+        "depth": (float(errors[1]), float(deviations[1])),
+    }
+
+
+# Of the figures of validation.json; all others have 4.
+DECIMALS = {"worst_displacement_pixels": 3}
+
+
+def _figures(
+    pairs: Mapping[Pair, Answer],
+    verdicts: Mapping[int, _ViewVerdict],
+    scales: Mapping[str, tuple[float, float]],
+) -> dict[str, float]:
+    """Return the check's figures for validation.json, not yet rounded."""
+    total = sum(pairs.values(), start=consistency.NOTHING)
+    points = total.agree + total.occluded + total.contradict
+    figures = {
+        "pairs": len(pairs),
+        "points": points,
+        "agree": total.agree / points,
+        "contradict": total.contradict / points,
+        "occluded": total.occluded / points,
+        "worst_contradiction": max(verdict.contradiction for verdict in verdicts.values()),
+        "worst_displacement_pixels": max(verdict.displacement for verdict in verdicts.values()),
+    }
+    for quantity, (error, deviation) in scales.items():
+        if math.isfinite(deviation):
+            figures[f"{quantity}_scale_error"] = error
+            figures[f"{quantity}_scale_deviation"] = deviation
+    return figures
+
+
+def _displacement(answers: Iterable[Answer], limit: float) -> tuple[float, float]:
+    """Return a view's displacement in pixels and the limit for it: those of its median pair.
+
+    A pair's limit is ``limit``, or more if resolution and precision alone lead to more.
     """
     pairs = [
         (answer.displacement, max(limit, EXPECTED_DISPLACEMENTS * answer.expected))
@@ -152,9 +229,12 @@ def _displacement(answers: Iterable[Answer], limit: float) -> tuple[float, float
 
 
 def _low_median(values: Iterable[float | None]) -> float | None:
-    """Return the lower median of what is known: one bad neighbour of two is not one's own fault."""
-    known = sorted(value for value in values if value is not None)
-    return known[(len(known) - 1) // 2] if known else None
+    """Return the lower median of the values that are not None, or None without any.
+
+    The lower one, so that a view with two neighbours does not fail if one of them is bad.
+    """
+    numbers = sorted(value for value in values if value is not None)
+    return numbers[(len(numbers) - 1) // 2] if numbers else None
 
 
 def _percent(part: float) -> str:

@@ -1,8 +1,8 @@
-"""Is every byte of a dataset, and of what it was made of, as it was when it was written?
+"""Checks that all files of a dataset, and those that it was made from, are as they were written.
 
-A file's checksum is in the ledger of the workflow if a job declares it, in its shard's record if it
-is a view, and in the dataset's sha256sums.txt if it is published. The first that has it counts; of
-a copy elsewhere there is the last only.
+A file's checksum is in the ledger of the workflow if a job declares the file, in a shard's record
+if it is a view, and in the dataset's sha256sums.txt if it is published. The first of these counts.
+A copy of a dataset has only the last.
 """
 
 import os
@@ -14,19 +14,19 @@ from pathlib import Path
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import (
+    absolute_path,
     broken,
     read_json,
     read_json_lines,
     read_problem,
     set_aside,
     sha256,
-    whole,
 )
-from lightfield.dataset import ledger, records
+from lightfield.dataset import ledger, shard_files
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
-from lightfield.dataset.splits import SPLITS
+from lightfield.dataset.splits_file import SPLITS
 from lightfield.validation.files import CARD, IMAGES, README, REPORT, SUMS, read_sums
 
 # Made as the work went on, and of it alone: nothing can make them again, and no dataset needs them.
@@ -35,7 +35,7 @@ _HISTORY = (JOURNAL_SUFFIX, ".tsv")
 
 @dataclass(frozen=True)
 class Fault:
-    """A file that is not as it was written, and what is wrong with it."""
+    """A file that is not as it was written, and why."""
 
     path: Path
     problem: str
@@ -45,14 +45,14 @@ class Fault:
 
 
 class Integrity:
-    """Checks the files of the dataset in a folder, and with ``work`` those that it was made of."""
+    """Checks the files of a dataset, and with the folder ``work`` those that it was made from."""
 
     def __init__(self, dataset: Path, work: Path | None = None) -> None:
         # The ledger has paths as the configuration gives them, most of them relative.
         self.dataset = Path(os.path.relpath(dataset))
         self.work = Path(os.path.relpath(work)) if work else None
         # A sequence's datasets lie a folder deeper, one for each frame.
-        folder = whole(dataset)
+        folder = absolute_path(dataset)
         depth = 3 if re.fullmatch(r"f\d{5,7}", folder.name) else 2
         self._name = "/".join(folder.parts[-depth:])
         self._scene = folder.parts[-depth]
@@ -64,19 +64,19 @@ class Integrity:
         expected = self._expected
         if self.work:
             yield from self._ledger_faults(self.work / ledger.NAME)
-        found = {path: self._problem(path, sums) for path, sums in expected.items()}
-        for path, problem in found.items():
+        problems = {path: self._problem(path, sums) for path, sums in expected.items()}
+        for path, problem in problems.items():
             if problem:
                 yield Fault(path, problem)
-        # Also where all lists that had a file's checksum are damaged.
+        # Look for these files even if all lists with checksums are damaged.
         was_finished = self._published or self._is_noted(self.dataset / SUMS)
         present = set(self._present()) if was_finished else set()
         for path in sorted(present - expected.keys()):
             yield Fault(path, "is no file of this dataset, or has no checksum")
         for path in sorted(self._views_like(present) - expected.keys() - present):
             yield Fault(path, "is missing")
-        wrong = {path for path, problem in found.items() if problem}
-        # Of these, damaged ones say nothing of what there is.
+        wrong = {path for path, problem in problems.items() if problem}
+        # If damaged, these do not tell which files must exist.
         if wrong.isdisjoint((self.dataset / NAME, self.dataset / "validation.json")):
             yield from (fault for fault in self._contents(expected) if fault.path not in wrong)
 
@@ -89,7 +89,7 @@ class Integrity:
             yield Fault(path, "is missing: the next run makes again what nobody has a checksum of")
 
     def mend(self, fault: Fault) -> None:
-        """Set a faulty file aside, and what the next run must make anew for it to be made again."""
+        """Set a faulty file aside, and all that the next run must make again to replace it."""
         assert self.work
         own_ledger = self.work / ledger.NAME
         if fault.path == own_ledger:
@@ -105,7 +105,7 @@ class Integrity:
                     ledger.forget(own_ledger, name)
 
     def _followers(self, path: Path) -> Iterator[Path]:
-        """Yield the file by which the job is known that has made a file, where that is another."""
+        """Yield the file that stands for the job that made ``path``, if it is another one."""
         if path.name.endswith(LOG_SUFFIX):
             yield path.with_name(path.name.replace(LOG_SUFFIX, ".json"))
         is_listed = path in self._published or not self._published
@@ -118,7 +118,7 @@ class Integrity:
                         return
 
     def _is_sound(self, path: Path) -> bool:
-        """Whether a file is as the ledger says; without one, of a copy, all are taken for that."""
+        """Return whether a file is as the ledger says. All are in a copy, which has no ledger."""
         entry = self._ledger.get(str(path))
         if entry is None:
             return not self._ledger
@@ -134,17 +134,17 @@ class Integrity:
 
     @cached_property
     def _recorded(self) -> dict[Path, str]:
-        """The SHA-256 of each view by its path, from what is as it was written of its shard.
+        """The SHA-256 of each view by its path, from the records of shards.
 
-        That is the record, or else the log, in which a file's last line counts.
+        If a record is damaged, from the shard's log, in which the last line about a file counts.
         """
-        found: dict[Path, str] = {}
+        digests: dict[Path, str] = {}
         for path in map(Path, self._ledger):
             if not (self._is_own(path) and re.fullmatch(r"\d+-\d+\.json", path.name)):
                 continue
             log = path.with_name(f"{path.stem}{LOG_SUFFIX}")
             if self._is_sound(path):
-                sums = {file: digest for file, (_, digest) in records.read(path).items()}
+                sums = {file: digest for file, (_, digest) in shard_files.read_record(path).items()}
             elif self._is_sound(log):
                 lines = (line for line in read_json_lines(log) if "file" in line)
                 sums = {line["file"]: line["sha256"] for line in lines}
@@ -153,14 +153,14 @@ class Integrity:
             for file, digest in sums.items():
                 # A record of shards with other bounds may have views that there were.
                 if not self._published or self.dataset / file in self._published:
-                    found[self.dataset / file] = digest
-        return found
+                    digests[self.dataset / file] = digest
+        return digests
 
     @cached_property
     def _published(self) -> dict[Path, str]:
-        """The SHA-256 of each file in sha256sums.txt, by its path; from its twin if it is damaged.
+        """The SHA-256 of each file in sha256sums.txt by its path, or in its twin if it is damaged.
 
-        Empty where both are.
+        Empty if both are damaged.
         """
         candidates = [self.dataset / SUMS]
         if self.work:
@@ -174,7 +174,7 @@ class Integrity:
 
     @cached_property
     def _expected(self) -> dict[Path, tuple[str, str]]:
-        """The SHA-256 that each file shall have, and what says so."""
+        """The SHA-256 that each file must have, and which file says so."""
         sums = {path: (digest, SUMS) for path, digest in self._published.items()}
         sums |= {path: (digest, "its record") for path, digest in self._recorded.items()}
         for name, digest in self._ledger.items():
@@ -183,7 +183,7 @@ class Integrity:
         return dict(sorted(sums.items()))
 
     def _is_own(self, path: Path) -> bool:
-        """Whether a file of the ledger is the dataset's, or its scene's."""
+        """Return whether a file of the ledger belongs to the dataset, or to its scene."""
         if path.is_relative_to(self.dataset) or path == self._splits:
             return True
         if not self.work or not path.is_relative_to(self.work):
@@ -200,13 +200,13 @@ class Integrity:
         if problem := broken(path):
             return problem
         try:
-            found = sha256(path)
+            actual = sha256(path)
         except OSError as error:
             return f"cannot be read: {read_problem(error)}"
-        return None if found == digest else f"its sha256 is {found}, but {source} says {digest}"
+        return None if actual == digest else f"its sha256 is {actual}, but {source} says {digest}"
 
     def _present(self) -> Iterator[Path]:
-        """Yield the dataset's files, those of its report only with the ledger, which has them."""
+        """Yield the dataset's files. Those of its report only with the ledger, which lists them."""
         for path in sorted(self.dataset.rglob("*")):
             parts = path.relative_to(self.dataset).parts
             added = parts in ((SUMS,), (CARD,), (README,))
@@ -216,7 +216,7 @@ class Integrity:
                 yield path
 
     def _views_like(self, present: set[Path]) -> set[Path]:
-        """Return the views by the names that lightfield.json has, of the kinds that are there."""
+        """Return the views that lightfield.json names, in the formats that the dataset has."""
         views = set()
         for path in {self.dataset / NAME, *self.dataset.glob(f"*/{NAME}")}:
             if self._is_noted(path) and self._is_sound(path):
@@ -228,8 +228,9 @@ class Integrity:
         return views
 
     def _contents(self, expected: Mapping[Path, tuple[str, str]]) -> Iterator[Fault]:
-        """Check that the files of sums, validation and views agree on what there is."""
-        sums, validation = self.dataset / SUMS, self.dataset / "validation.json"
+        """Check that sums, validation and lightfield.json agree on which files exist."""
+        sums = self.dataset / SUMS
+        validation = self.dataset / "validation.json"
         if self._ledger and not self._published:
             return  # an unfinished build, or both files of sums are damaged, which has been said
         if not self._published:

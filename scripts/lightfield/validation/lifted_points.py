@@ -1,7 +1,7 @@
-"""Which views' pixels have exported points been lifted from?
+"""Finds the views from which exported points were lifted.
 
-A point that was lifted from a view lies on the ray of one of its pixels' centres. Exporters lift
-view by view; so the views of some points tell between which the views of the others are.
+A point that was lifted from a view lies on the ray of a pixel's centre. Exporters lift one view
+after the other. So the views of two points bound the views of all points between them.
 """
 
 from typing import Any
@@ -14,19 +14,21 @@ from lightfield.validation.readers.contents import FLOAT32, Floats
 
 Ints = NDArray[np.int64]
 
-# At most so many pairs of a point and a view are tried at once.
+# How many pairs of a point and a view are tried at once, at most.
 MOST_PAIRS = 300_000
 
 
 def likely_views(points: NDArray[Any], lens: Lens, matrices: Floats) -> tuple[Ints, Ints]:
-    """Return pairs, as two arrays of indices: points, and views from which they may be lifted.
+    """Return pairs as two arrays of indices: points, and views from which they may be lifted.
 
     ``points`` (n, 3) are taken to be in the order of their views (m, 4, 4). The middle point is
     tried with all views; those on whose pixels' rays it lies bound the views of the points before
     and after it, and so on in both halves. A point may be in no pair, or in several.
     """
-    low, high = np.array([0]), np.array([len(points)])
-    first, last = np.array([0]), np.array([len(matrices) - 1])
+    low = np.array([0])
+    high = np.array([len(points)])
+    first = np.array([0])
+    last = np.array([len(matrices) - 1])
     pairs = [(np.empty(0, np.int64), np.empty(0, np.int64))]
     while True:
         settled = first == last
@@ -47,9 +49,12 @@ def likely_views(points: NDArray[Any], lens: Lens, matrices: Floats) -> tuple[In
         np.minimum.at(least, which, view)
         np.maximum.at(most, which, view)
         unknown = most < least
-        least, most = np.where(unknown, first, least), np.where(unknown, last, most)
-        low, high = np.concatenate([low, middle + 1]), np.concatenate([middle, high])
-        first, last = np.concatenate([first, least]), np.concatenate([most, last])
+        least = np.where(unknown, first, least)
+        most = np.where(unknown, last, most)
+        low = np.concatenate([low, middle + 1])
+        high = np.concatenate([middle, high])
+        first = np.concatenate([first, least])
+        last = np.concatenate([most, last])
     found_points, found_views = zip(*pairs, strict=True)
     return np.concatenate(found_points), np.concatenate(found_views)
 

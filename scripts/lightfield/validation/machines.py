@@ -1,4 +1,4 @@
-"""On which machines were the views rendered? Those of several kinds differ in last digits."""
+"""Counts the machines that rendered the views. Different machines differ in the last digits."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -8,10 +8,10 @@ from lightfield.validation.result import Check
 
 
 def check(lightfield: LightField, machines: Iterable[str | None]) -> list[Check]:
-    """Count the views by the machine that each one's header names; no check if none does.
+    """Count the views by the machine in their headers. No check if no header names one.
 
-    Machines of several kinds, or of another than lightfield.json names, are a warning: all of the
-    views are right, but another build would not have the same bytes.
+    Warns if there are different machines, or others than lightfield.json names. The views are
+    right, but another build would not have the same bytes.
     """
     counts = Counter(sorted(machine for machine in machines if machine))
     if not counts:

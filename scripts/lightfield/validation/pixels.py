@@ -1,4 +1,4 @@
-"""What each image of a dataset shows by itself: is it whole, and does it hold what it must?"""
+"""Checks each image of a dataset by itself: that it is complete, and holds what it must."""
 
 import json
 from collections import Counter
@@ -29,25 +29,27 @@ RAYS_A_VIEW = 400
 
 # Pixels this near to the rim of what a lens sees may hold light from both sides of it.
 RIM_PIXELS = 2
-# An image has one colour if no larger part of it than this has another.
+# An image counts as having one colour if at most this part of it has another.
 FEW = 0.002
 # A unit vector's length differs from 1 by less than this.
 NOT_UNIT = 1e-4
-# So much of what lies outside the image circle may be lighter than that.
+# At most this part of what lies outside the image circle may be brighter than that.
 MOST_LIT_OUTSIDE, FAINT = 0.05, 0.001
-# Of more differently turned views than this, the regions are computed again.
+# Regions are kept for this many differently turned views, and computed again for others.
 MOST_REGIONS = 16
 
 
 @dataclass
 class Facts:
-    """What one file shows by itself; ``faults`` by the check to which they belong.
+    """What one image file shows by itself.
 
-    ``clamped`` and ``nan`` are the renderer's counts, ``machine`` is where it ran, ``marked``
-    whether the pixels without a source could be compared, ``constant`` whether a reprojected view
-    has one colour (as a piece of sky or a wall may), ``missed`` the part of the lens's pixels that
-    hit nothing and ``patches`` what geometry needs, both of a view with depth. ``of_depth``
-    answers what it was asked.
+    - ``faults``: by the check to which they belong.
+    - ``clamped``, ``nan``, ``machine``: the renderer's counts, and the machine that it ran on.
+    - ``marked``: whether the pixels without a source could be compared.
+    - ``constant``: whether a reprojected view has one colour, as a piece of sky or a wall may.
+    - ``missed``: of a view with depth, the part of the lens's pixels that hit nothing.
+    - ``patches``: of a view with depth, the surface patches that `geometry` compares.
+    - ``of_depth``: the answer to the question about its depth.
     """
 
     checksum: str
@@ -62,14 +64,14 @@ class Facts:
     patches: Patches | None = None
     of_depth: depth_questions.Answer | None = None
 
-    def fault(self, check: str, text: str, found: bool | int = True) -> None:
-        """Note what a check finds wrong, if it was ``found`` at all."""
-        if found:
+    def fault(self, check: str, text: str, is_fault: bool | int = True) -> None:
+        """Note a fault for a check, if ``is_fault``."""
+        if is_fault:
             self.faults.setdefault(check, []).append(text)
 
 
 class Examiner:
-    """Reads a dataset's images; what all views of a set share is computed once."""
+    """Reads a dataset's images. Computes once what all views of a set share."""
 
     def __init__(self, dataset: Path, sets: Sequence[ImageSet]) -> None:
         self.dataset = dataset
@@ -78,9 +80,9 @@ class Examiner:
         self.numbers: dict[Pass, set[int]] = {}
 
     def examine(self, file: File, question: Question | None = None) -> Facts:
-        """Read an image file whole and find out what it shows by itself.
+        """Read an image file, and return what it shows by itself.
 
-        A view with depth also answers the ``question`` about that.
+        The facts of a view with depth hold the answer to the ``question`` about it.
         """
         path = self.dataset / file.path
         facts = Facts(sha256(path), path.stat().st_size)
@@ -106,12 +108,13 @@ class Examiner:
             else:
                 self._examine_view(file, image, facts)
                 if question and "Z" in image.channels:
-                    camera, depth = image_set.camera(file.view), image.channels["Z"]
+                    camera = image_set.camera(file.view)
+                    depth = image.channels["Z"]
                     facts.of_depth = depth_questions.answer(question, camera, depth)
         return facts
 
     def answer(self, file: File, questions: list[tuple[int, Patches]]) -> list[Answer]:
-        """Look up in one view what others saw; ``questions`` are their numbers and patches."""
+        """Look up patches of other views in a view. ``questions`` are their numbers and patches."""
         image_set = self.sets[file.set]
         depth = images.read_image(self.dataset / file.path, ["Z"]).channels["Z"]
         camera = image_set.camera(file.view)
@@ -121,7 +124,7 @@ class Examiner:
         ]
 
     def answer_depth(self, file: File, question: Question) -> depth_questions.Answer | None:
-        """Answer a question about a view's depth; None if it cannot be read."""
+        """Answer a question about a view's depth. None if it cannot be read."""
         try:
             depth = images.read_image(self.dataset / file.path, ["Z"]).channels["Z"]
         except UserError:
@@ -204,8 +207,8 @@ class Examiner:
             part = pixels[1::2]
             wrong = int(((part < 0) | (np.diff(part, axis=0, append=0) > 0)).any(axis=0).sum())
             facts.fault("passes", f"{wrong} pixels have parts below 0 or not in order", wrong)
-            found = set(np.unique(pixels[::2][part > 0]).tolist())
-            strange = len(found - _hashes(image))
+            hashes = set(np.unique(pixels[::2][part > 0]).tolist())
+            strange = len(hashes - _hashes(image))
             facts.fault("passes", f"has {strange} objects that its manifest does not have", strange)
         if wanted.kind == "flow":
             visible = pixels[2] == 1
@@ -216,7 +219,7 @@ class Examiner:
             facts.fault("passes", f"{wrong} visible points are out of the frame", wrong)
 
     def _missed(self, file: File) -> Bools | None:
-        """Return where the rendered view of a pass hits nothing; None if it cannot say so."""
+        """Return where the rendered view of a pass hits nothing, or None without its depth."""
         image_set = self.sets[file.set]
         lens = image_set.lightfield.lens
         if image_set.name or not image_set.lightfield.depth:
@@ -226,12 +229,12 @@ class Examiner:
             depth = images.read_image(path, ["Z"]).channels["Z"]
         except UserError:
             return None  # which has been said
-        # A half knows no depth beyond 65504 m.
+        # Half floats end at 65504 m.
         is_sure = depth.dtype == np.float32 and depth.shape == (lens.height, lens.width)
         return np.isposinf(depth) if is_sure else None
 
     def _numbers(self, wanted: Pass) -> set[int]:
-        """Return the numbers that the names file of a pass has; none if it cannot be read."""
+        """Return the numbers in the names file of a pass. None of them if it cannot be read."""
         if wanted not in self.numbers:
             try:
                 named = read_json(self.dataset / wanted.name / NAMES)
@@ -241,7 +244,7 @@ class Examiner:
         return self.numbers[wanted]
 
     def _compare_marks(self, file: File, image: images.Image, facts: Facts) -> None:
-        """Compare the pixels that are marked as without source with what the two lenses say."""
+        """Check that the pixels marked as having no source are those that the source cannot see."""
         regions = self._of_source(file)
         target = self.sets[file.set].lightfield
         if regions is None:
@@ -254,7 +257,8 @@ class Examiner:
         else:
             marked = np.zeros(without.shape, bool)
         facts.marked = True
-        missing, wrong = int((without & ~marked).sum()), int((with_source & marked).sum())
+        missing = int((without & ~marked).sum())
+        wrong = int((with_source & marked).sum())
         if target.transparent and "Z" not in image.channels:
             wrong = 0  # nothing is there
         facts.fault("marks", f"{missing} pixels without a source are not marked", missing)
@@ -274,14 +278,15 @@ class Examiner:
 
         None: the dataset has no such view.
         """
-        target, source = self.sets[file.set], rendered(self.sets)
+        target = self.sets[file.set]
+        source = rendered(self.sets)
         number = source_view(source, target.views[file.view])
         if source is None or number is None:
             return None
         lens, from_lens = target.lightfield.lens, source.lightfield.lens
         to_world = target.lightfield.matrices[file.view]
         from_world = source.lightfield.matrices[number]
-        # Rounded, and free of −0, so that views turned alike share one answer.
+        # Round it, and remove −0, so that views turned alike share one answer.
         turn = np.round(from_world[:3, :3].T @ to_world[:3, :3], 5).astype(np.float32) + 0
         key = (lens, turn.tobytes())
         if key not in self.regions:
@@ -296,15 +301,15 @@ class Examiner:
 
 
 def checks(
-    image_set: ImageSet, own: Mapping[File, Facts], volumes: Sequence[str] = ()
+    image_set: ImageSet, facts: Mapping[File, Facts], volumes: Sequence[str] = ()
 ) -> list[Check]:
-    """Return the checks that each image of a set passes or fails by itself.
+    """Return the checks of a set's images, each of which an image passes or fails by itself.
 
-    ``volumes`` are those of the scene, in which depth sees nothing.
+    ``volumes`` are the names of the scene's volumes, which depth does not see.
     """
-    readable = {file: fact for file, fact in own.items() if "images" not in fact.faults}
+    readable = {file: fact for file, fact in facts.items() if "images" not in fact.faults}
     checks = [
-        _outcome(image_set, "images", own, "are whole, of the right size and channels"),
+        _outcome(image_set, "images", facts, "are whole, of the right size and channels"),
         _outcome(image_set, "colour", readable, "have finite colours, and are not black"),
     ]
     deep = {file: fact for file, fact in readable.items() if fact.patches is not None}
@@ -332,28 +337,30 @@ def checks(
     return [*checks, check]
 
 
-def _outcome(image_set: ImageSet, name: str, own: Mapping[File, Facts], claim: str) -> Check:
+def _outcome(image_set: ImageSet, name: str, facts: Mapping[File, Facts], claim: str) -> Check:
     """Return a check of what the facts say about ``name``."""
-    if not own:
+    if not facts:
         return Check(f"{image_set.prefix}{name}", None, f"no image to see if they {claim}")
     faults = {
-        file.path: ", ".join(fact.faults[name]) for file, fact in own.items() if name in fact.faults
+        file.path: ", ".join(fact.faults[name])
+        for file, fact in facts.items()
+        if name in fact.faults
     }
-    detail = f"{len(own) - len(faults)} of {len(own)} {claim}"
+    detail = f"{len(facts) - len(faults)} of {len(facts)} {claim}"
     return Check.of_files(f"{image_set.prefix}{name}", faults, detail)
 
 
-def of_passes(own: Mapping[File, Facts], missing: Mapping[str, str]) -> Check:
+def of_passes(facts: Mapping[File, Facts], missing: Mapping[str, str]) -> Check:
     """Return the check of the views' passes, some of which may be ``missing``."""
     faults = {**missing}
     faults |= {
-        file.path: ", ".join(fact.faults["passes"]) for file, fact in own.items() if fact.faults
+        file.path: ", ".join(fact.faults["passes"]) for file, fact in facts.items() if fact.faults
     }
-    count = len(own) + len(missing)
+    count = len(facts) + len(missing)
     detail = f"{count - len(faults)} of {count} are there and hold what they must"
     check = Check.of_files("passes", faults, detail)
     lost: Counter[str] = Counter()
-    for file, fact in own.items():
+    for file, fact in facts.items():
         if file.of_pass and fact.nan:
             lost[file.of_pass.name] += fact.nan
     for name, number in lost.items():
@@ -365,7 +372,7 @@ def of_passes(own: Mapping[File, Facts], missing: Mapping[str, str]) -> Check:
 
 
 def with_extras(exports: Check, extras: Mapping[File, Facts]) -> Check:
-    """Return the check of what was made for trainers, with the pictures that cannot be read."""
+    """Return the check of the exports, with the pictures for trainers that cannot be read."""
     problems = [
         f"{file.path}: {text}"
         for file, fact in extras.items()
@@ -377,7 +384,7 @@ def with_extras(exports: Check, extras: Mapping[File, Facts]) -> Check:
 
 
 def _hashes(image: images.Image) -> set[float]:
-    """Return the hashes that a matte's manifest has, as floats; none if it cannot be read."""
+    """Return the hashes in a matte's manifest as floats. No hashes if it cannot be read."""
     try:
         texts = json.loads(str(image.attributes.get(MANIFEST))).values()
         bits = np.array([int(text, 16) for text in texts], np.uint32)
@@ -389,13 +396,13 @@ def _hashes(image: images.Image) -> set[float]:
 
 
 def _inner(region: Bools) -> Bools:
-    """Return a region without its rim; the image's edge is no rim."""
+    """Return a region without its rim. The image's edge does not count as a rim."""
     inner: Bools = binary_erosion(region, np.ones((3, 3)), RIM_PIXELS, border_value=1)
     return inner
 
 
 def _shows_nothing(image: images.Image, seen: Bools, is_rendered: bool) -> bool:
-    """Return whether a transparent view shows nothing but some few pixels.
+    """Return whether a transparent view shows no more than a few pixels.
 
     At the rim of an image circle, which touches the image's edge, Cycles calls black samples
     opaque. A reprojection spreads that rim, so there the colour alone counts.
@@ -407,27 +414,27 @@ def _shows_nothing(image: images.Image, seen: Bools, is_rendered: bool) -> bool:
 
 
 def _format_problem(file: File, image_set: ImageSet, image: images.Image) -> str | None:
-    """Say which channels a view has and should have, if they differ in name or type."""
-    found = {name: pixels.dtype for name, pixels in image.channels.items()}
+    """Return which channels a view has and must have, if they differ in name or type."""
+    types = {name: pixels.dtype for name, pixels in image.channels.items()}
     transparent = image_set.lightfield.transparent
-    has_alpha = transparent or ("A" in found and image_set.name)
+    has_alpha = transparent or ("A" in types and image_set.name)
     colour = [*"RGB", *(["A"] if has_alpha else [])]
     if file.path.endswith(".png"):
-        wanted = dict.fromkeys(colour, "uint16" if found.get("R") == "uint16" else "uint8")
+        wanted = dict.fromkeys(colour, "uint16" if types.get("R") == "uint16" else "uint8")
     else:
         wanted = dict.fromkeys(colour, "float16")
         if image_set.lightfield.depth:
-            wanted["Z"] = "float16" if found.get("Z") == "float16" else "float32"
+            wanted["Z"] = "float16" if types.get("Z") == "float16" else "float32"
     return _channels_problem(image, wanted)
 
 
 def _channels_problem(image: images.Image, wanted: Mapping[str, str]) -> str | None:
-    """Say which channels an image has and should have, if they differ in name or type."""
-    found = {name: str(pixels.dtype) for name, pixels in image.channels.items()}
-    if found == wanted:
+    """Return which channels an image has and must have, if they differ in name or type."""
+    types = {name: str(pixels.dtype) for name, pixels in image.channels.items()}
+    if types == wanted:
         return None
     texts = [
         " ".join(f"{name}:{kind}" for name, kind in sorted(channels.items()))
-        for channels in (found, wanted)
+        for channels in (types, wanted)
     ]
     return f"has the channels {texts[0]}; must have {texts[1]}"

@@ -1,20 +1,22 @@
-"""What a validation found: a list of checks, and one line of them for a person."""
+"""The result of a validation: a list of checks, and its summary in one line."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-# Of a check that fails in more places than this, the first are printed; validation.json has all.
+# How many problems of a check are printed. validation.json has all of them.
 _LINES_A_CHECK = 20
 
 
 @dataclass(frozen=True)
 class Check:
-    """One check's outcome: ``passed`` is None where it does not apply, which ``detail`` explains.
+    """The outcome of a check. ``passed`` is None if it does not apply, and ``detail`` says why.
 
-    ``views`` are those that failed; ``problems`` are whole lines, each naming a file;
-    ``warnings`` what is allowed but worth a look; ``figures`` what was measured.
+    - ``views``: the names of the views that failed.
+    - ``problems``: lines that each name a file.
+    - ``warnings``: what is allowed, but should be looked at.
+    - ``figures``: what was measured.
     """
 
     name: str
@@ -27,7 +29,7 @@ class Check:
 
     @classmethod
     def of_files(cls, name: str, faults: Mapping[str, str], detail: str, **more: Any) -> "Check":
-        """Return a check that fails where a view's file, by its path, has a fault."""
+        """Return a check that fails if there are ``faults``, by the paths of files of views."""
         views = sorted({Path(path).stem for path in faults})
         problems = [f"{path}: {fault}" for path, fault in faults.items()]
         return cls(name, not faults, detail, views, problems, **more)
@@ -71,11 +73,11 @@ class Result:
         return f"{self.dataset}: {'valid' if self.valid else 'INVALID'}: {'; '.join(parts)}"
 
     def failures(self) -> list[str]:
-        """Return one line for each thing that is wrong, the first ones of each check."""
+        """Return one line for each of the first problems of each check."""
         lines = []
         for check in self.checks:
-            found = check.problems[:_LINES_A_CHECK]
-            if len(check.problems) > len(found):
-                found.append(f"… and {len(check.problems) - len(found)} more")
-            lines += [f"{self.dataset}: {check.name}: {line}" for line in found]
+            shown = check.problems[:_LINES_A_CHECK]
+            if len(check.problems) > len(shown):
+                shown.append(f"… and {len(check.problems) - len(shown)} more")
+            lines += [f"{self.dataset}: {check.name}: {line}" for line in shown]
         return lines

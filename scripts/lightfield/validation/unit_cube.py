@@ -1,8 +1,8 @@
-"""Does instant-ngp's unit cube lie where a transforms.json says that it was asked to?
+"""Checks that instant-ngp's unit cube lies where the options of a transforms.json want it.
 
-The loader maps a point of its world to ``scale`` times it plus ``offset``. The options say how both
-were found: given, or fitted to the rig or to what the views see. A rig that tests what is trained
-on another is placed as that one.
+The loader maps a point p of its world to ``scale`` · p + ``offset``. The options say whether both
+were given, or fitted to the rig, or fitted to what the views see. A rig that tests what another one
+trains has the cube of that rig.
 """
 
 from collections.abc import Iterator, Mapping
@@ -86,7 +86,8 @@ def _limit(cube: UnitCube) -> float:
 
 def _rig_in_middle(cameras: Floats, limit: float) -> bool:
     """Return whether cameras (n, 3) are a fifth of the cube, in its middle."""
-    low, high = cameras.min(axis=0), cameras.max(axis=0)
+    low = cameras.min(axis=0)
+    high = cameras.max(axis=0)
     beside = np.abs((low + high) / 2 - MIDDLE).max()
     larger = np.abs(np.max(high - low) - RIG_PART)
     return bool(beside <= limit and larger <= limit)

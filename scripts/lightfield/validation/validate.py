@@ -1,13 +1,13 @@
-"""Is a finished dataset whole and right? Every file is read, and every claim about it is tried.
+"""Checks a finished dataset: that it is complete, and that every claim about it is true.
 
-`validate` reads every image once, in as many processes as it is given, for what one file can tell
-(`pixels`); the views with depth are read once more for what only several views together can tell
-(`geometry`). Exports are read back before (`exported_cameras`); what they say of depth is compared
-while the views are read (`exported_depth`). Memory holds a few hundred points a view, and the
-exported ones.
+`validate` reads every image once, in as many processes as it is given, for what a single file can
+tell (`pixels`). It reads the views with depth once more, for what only several views together can
+tell (`geometry`). Before that it reads the exports back (`exported_cameras`). The depth in exports
+is compared while the views are read (`exported_depth`). Memory holds a few hundred points of each
+view, and the exported points.
 
-The result is a list of checks, each passed, failed, or not applicable and why: what could not be
-checked is said, never counted as right.
+The result is a list of checks. Each has passed, failed, or does not apply. What could not be
+checked does not apply, and the check says why.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -22,9 +22,10 @@ import OpenImageIO as oiio
 
 from lightfield.core.errors import UserError
 from lightfield.core.failures import LESS_MEMORY
-from lightfield.core.files import read_json, sha256
+from lightfield.core.files import sha256
 from lightfield.core.progress import Progress
-from lightfield.dataset.records import read as read_record
+from lightfield.dataset.inventory import read_inventory
+from lightfield.dataset.shard_files import read_record
 from lightfield.validation import (
     depth_questions,
     exported_cameras,
@@ -32,12 +33,12 @@ from lightfield.validation import (
     geometry,
     machines,
     pixels,
+    splits_check,
 )
-from lightfield.validation import splits as validation_splits
 from lightfield.validation.consistency import Answer
 from lightfield.validation.depth_questions import Question
 from lightfield.validation.exported_depth import ExportedDepth
-from lightfield.validation.files import File, Manifest
+from lightfield.validation.files import File, ImageSet, Manifest
 from lightfield.validation.pixels import Examiner, Facts
 from lightfield.validation.result import Check, Result
 
@@ -56,60 +57,48 @@ def validate(
 ) -> Result:
     """Check a dataset's files, and what its pixels must satisfy.
 
-    ``reprojections`` are folders in the dataset; ``records`` JSON files of what was rendered
-    (``files``: relative path: ``bytes``, ``sha256``); ``clearance`` a JSON file of what surrounds
-    each camera (``views``: name: ``distance`` in metres, ``inside``); ``inventory`` one of what the
-    scene contains; ``manifests`` those of the exports that it may hold; ``splits`` the scene's
-    splits.json, if it has one; ``wanted`` those of the exports' lists that it is to have, if it is
-    not every one that is there; ``noted`` the SHA-256 of files by their path in the dataset, as
-    they were when they were made. Raises `UserError` where one of these cannot be read; whatever is
-    wrong with the dataset is in the result.
+    - ``reprojections``: folders in the dataset.
+    - ``records``: JSON files of what was rendered (``files``: path: ``bytes``, ``sha256``).
+    - ``clearance``: a JSON file of what surrounds each camera (``views``: name: ``distance`` in
+      metres, ``inside``).
+    - ``inventory``: a JSON file of what the scene contains.
+    - ``manifests``: the kinds of exports that the dataset may hold.
+    - ``splits``: the scene's splits.json, if it has one.
+    - ``wanted``: the lists of the exports that the dataset must have; None takes those that exist.
+    - ``noted``: the SHA-256 of files when they were made, by their paths in the dataset.
+
+    Raises `UserError` if one of these cannot be read. All faults of the dataset are in the result.
     """
     dataset = dataset.resolve()
-    volumes = _volumes(inventory) if inventory else []
+    volumes = read_inventory(inventory, "volumes")["volumes"] if inventory else []
     sets, checks = files.read_sets(dataset, reprojections)
-    views, presence = files.of_views(dataset, sets)
-    passes, missing = files.of_passes(dataset, sets)
-    extras, lists, exports = files.of_exports(dataset, sets, views, manifests, wanted)
-    # What does not follow from the images comes first: a wrong file of it costs no hours.
-    written = [sums for record in records for sums in read_record(record).items()]
-    cameras = files.clearance(clearance, sets)
-    split = [validation_splits.check(splits, dataset, sets)] if splits else []
-    of_cameras, exported = exported_cameras.check(dataset, sets, manifests, wanted)
-    checks += of_cameras
+    views, presence_checks = files.of_views(dataset, sets)
+    passes, missing_passes = files.of_passes(dataset, sets)
+    extras, export_files, exports_check = files.of_exports(dataset, sets, views, manifests, wanted)
+    # What needs no images comes first: a wrong file stops the run before hours of reading.
+    recorded_sums = _recorded_sums(records)
+    cameras_check = files.clearance(clearance, sets)
+    splits_checks = [splits_check.check(splits, dataset, sets)] if splits else []
+    export_checks, exported = exported_cameras.check(dataset, sets, manifests, wanted)
+    checks += export_checks
     exported_depth = ExportedDepth(dataset, sets, exported)
-    facts: dict[File, Facts] = {}
     with _workers(Examiner(dataset, sets), processes) as mapped:
-        images = views + passes + extras
-        progress = Progress(len(images), f"validate {dataset.name}", "files")
-        with_questions = [(file, exported_depth.question(file)) for file in images]
-        for file, fact in mapped(_examine, with_questions):
-            facts[file] = fact
-            progress.done()
+        facts = _read_images(dataset, views + passes + extras, exported_depth, mapped)
         for number, image_set in enumerate(sets):
-            own = {file: facts[file] for file in views if file.set == number}
-            seen = {file: fact.patches for file, fact in own.items() if fact.patches is not None}
-            checks += [presence[number], *pixels.checks(image_set, own, volumes)]
-            checks.append(geometry.check(image_set, seen, lambda asked: mapped(_answer, asked)))
-            checks += machines.check(image_set.lightfield, [fact.machine for fact in own.values()])
+            set_facts = {file: facts[file] for file in views if file.set == number}
+            checks.append(presence_checks[number])
+            checks += _check_set(image_set, set_facts, volumes, mapped)
         answers = {(f.set, f.view): fact.of_depth for f, fact in facts.items() if fact.of_depth}
         checks += exported_depth.checks(answers, lambda asked: mapped(_answer_depth, asked))
-    if passes or missing:
-        checks.append(pixels.of_passes({file: facts[file] for file in passes}, missing))
-    checks.append(pixels.with_extras(exports, {file: facts[file] for file in extras}))
-    found = {file.path: (fact.bytes, fact.checksum) for file, fact in facts.items()}
-    for name in files.names(sets):
-        if (dataset / name).is_file():
-            found[name] = (dataset / name).stat().st_size, sha256(dataset / name)
-    published, listing = files.listing(dataset, sets, {*lists, *found})
+    if passes or missing_passes:
+        checks.append(pixels.of_passes({file: facts[file] for file in passes}, missing_passes))
+    checks.append(pixels.with_extras(exports_check, {file: facts[file] for file in extras}))
+    digests, files_checks = _check_files(
+        dataset, sets, facts, export_files, recorded_sums, noted or {}
+    )
     if len(sets) <= len(reprojections):
-        listing = Check("files", None, "a lightfield.json that cannot be understood lists no files")
-    digests = {
-        path: found[path][1] if path in found else sha256(dataset / path) for path in published
-    }
-    altered = files.altered(digests, noted or {})
-    sums = files.checksums(dict(written) if records else None, found, sets, altered)
-    checks += [listing, sums, cameras, *split]
+        files_checks[0] = UNLISTED
+    checks += [*files_checks, cameras_check, *splits_checks]
     rendered = files.rendered(sets)
     return Result(
         f"{dataset.parent.name}/{dataset.name}",
@@ -119,25 +108,83 @@ def validate(
     )
 
 
-def _volumes(inventory: Path) -> list[str]:
-    try:
-        return [str(name) for name in read_json(inventory)["volumes"]]
-    except (LookupError, TypeError):
-        raise UserError(f"{inventory}: volumes: must be a list of names") from None
-
-
 Mapped = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
+Sums = dict[str, tuple[int, str]]
+"""The size in bytes and the SHA-256 of files, by their paths in the dataset."""
+
+
+# Of a dataset whose sets could not all be read.
+UNLISTED = Check("files", None, "a lightfield.json that cannot be understood lists no files")
+
+
+def _recorded_sums(records: Sequence[Path]) -> Sums | None:
+    """Return what the records say of the images, or None without records."""
+    if not records:
+        return None
+    return dict(sums for record in records for sums in read_record(record).items())
+
+
+def _read_images(
+    dataset: Path, images: Sequence[File], exported_depth: ExportedDepth, mapped: Mapped
+) -> dict[File, Facts]:
+    """Read each image once, and return what it tells by itself."""
+    facts: dict[File, Facts] = {}
+    progress = Progress(len(images), f"validate {dataset.name}", "files")
+    with_questions = [(file, exported_depth.question(file)) for file in images]
+    for file, fact in mapped(_examine, with_questions):
+        facts[file] = fact
+        progress.done()
+    return facts
+
+
+def _check_set(
+    image_set: ImageSet, facts: Mapping[File, Facts], volumes: Sequence[Any], mapped: Mapped
+) -> list[Check]:
+    """Return the checks of one set's pixels, of its geometry, and of the machines that made it."""
+    patches = {file: fact.patches for file, fact in facts.items() if fact.patches is not None}
+    return [
+        *pixels.checks(image_set, facts, volumes),
+        geometry.check(image_set, patches, lambda asked: mapped(_answer, asked)),
+        *machines.check(image_set.lightfield, [fact.machine for fact in facts.values()]),
+    ]
+
+
+def _check_files(
+    dataset: Path,
+    sets: Sequence[ImageSet],
+    facts: Mapping[File, Facts],
+    export_files: Sequence[str],
+    recorded_sums: Sums | None,
+    noted: Mapping[str, str],
+) -> tuple[dict[str, str], list[Check]]:
+    """Return the SHA-256 of each published file, and the checks of the files and of their sums."""
+    sums = {file.path: (fact.bytes, fact.checksum) for file, fact in facts.items()}
+    sums |= _sums_of_names(dataset, sets)
+    published, files_check = files.listing(dataset, sets, {*export_files, *sums})
+    digests = {
+        path: sums[path][1] if path in sums else sha256(dataset / path) for path in published
+    }
+    altered = files.altered(digests, noted)
+    return digests, [files_check, files.checksums(recorded_sums, sums, sets, altered)]
+
+
+def _sums_of_names(dataset: Path, sets: Sequence[ImageSet]) -> Sums:
+    """Return the sums of the files that name the objects, materials and instances of passes."""
+    paths = {name: dataset / name for name in files.names(sets)}
+    return {
+        name: (path.stat().st_size, sha256(path)) for name, path in paths.items() if path.is_file()
+    }
 
 
 @contextmanager
 def _workers(examiner: Examiner, processes: int) -> Iterator[Mapped]:
-    """Yield a `map` over worker processes that hold the examiner; one process is this one."""
+    """Yield a `map` over worker processes that hold the examiner. One process is this one."""
     if processes == 1:
         _start_worker(examiner)
         yield map
         return
     try:
-        # Spawned, because OpenImageIO has threads, which do not survive a fork.
+        # Spawn workers: the threads of OpenImageIO do not survive a fork.
         with ProcessPoolExecutor(
             processes, get_context("spawn"), initializer=_start_worker, initargs=(examiner,)
         ) as pool:

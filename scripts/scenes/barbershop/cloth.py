@@ -104,14 +104,16 @@ def bowler_hat(scene: Scene) -> None:
 def coats(scene: Scene) -> None:
     """Three coats in folds from 1.85 m down, each shorter than the last."""
     angle = np.arange(scene.segments(72, 16)) * TAU / scene.segments(72, 16)
-    t, steps = np.linspace(0, 1, scene.segments(32, 6))[:, None], scene.segments(20, 5)
+    t = np.linspace(0, 1, scene.segments(32, 6))[:, None]
+    steps = scene.segments(20, 5)
     width = 0.03 + 0.15 * np.minimum(t * 6, 1) ** 0.6 + 0.05 * t
     sleeve = np.array(
         [(0.14, 0.15, 1.74), (0.20, 0.18, 1.5), (0.19, 0.20, 1.22), (0.18, 0.21, 1.12)]
     )
     lapel = prism([(0, 0), (0.06, 0.02), (0.075, -0.10), (0, -0.34)], 0.008)
     for k, (y, color) in enumerate(((1.81, "Grey"), (2.33, "Camel"), (2.89, "Green"))):
-        model, wool = Model(scene), f"{color} wool"
+        model = Model(scene)
+        wool = f"{color} wool"
         model.lathe(
             profile=[(0.012, 0), (0.012, 0.004), (0.008, 0.005)],
             at=lattice(x=0.02, y=0.245, z=evenly(1.12, 1.36, 3)),
@@ -119,7 +121,8 @@ def coats(scene: Scene) -> None:
             material="Ebony",
         )
         waves = 0.10 * np.sin(7 * angle + 2 * k) + 0.06 * np.sin(11 * angle + k)
-        radius, z = width * (1 + waves * np.minimum(t * 2, 1)), 1.85 - (0.95 - 0.12 * k) * t
+        radius = width * (1 + waves * np.minimum(t * 2, 1))
+        z = 1.85 - (0.95 - 0.12 * k) * t
         body = polar(radius, angle, z)
         body[..., 1] *= 0.5 * (0.2 + 0.8 * t)
         model.add(sheet(body[::-1], closed=True), wool, (0, 0.135, 0))
@@ -145,7 +148,8 @@ def umbrellas(scene: Scene) -> None:
         ],
         material="Oak",
     )
-    sides, t = scene.segments(72, 16), np.linspace(0, 1, scene.segments(32, 6))[:, None]
+    sides = scene.segments(72, 16)
+    t = np.linspace(0, 1, scene.segments(32, 6))[:, None]
     angle = np.arange(sides) * TAU / sides
     folds = 1 + 0.22 * np.cos(8 * angle)
     radius = folds * np.interp(t, (0, 0.12, 0.75, 1), (0.006, 0.02, 0.045, 0.018))
@@ -173,7 +177,8 @@ def folded_towel(scene: Scene, towel: str) -> bpy.types.Mesh:
 
 def rolled_towel(scene: Scene, towel: str) -> bpy.types.Mesh:
     """A rolled towel, lying along y, its end a spiral."""
-    model, s = Model(scene), np.linspace(1, 0, scene.segments(72, 12))
+    model = Model(scene)
+    s = np.linspace(1, 0, scene.segments(72, 12))
     model.lathe(
         profile=[(0.039, -0.0005), (0.039, 0.0005)],
         at=lattice(y=(-0.106, 0.106), z=0.042),
@@ -188,11 +193,9 @@ def rolled_towel(scene: Scene, towel: str) -> bpy.types.Mesh:
 
 def towel_shelves(scene: Scene) -> None:
     """Open shelves of towels beside the staff door, with a basket on top."""
-    basket, random, where = (
-        Model(scene),
-        scene.random("towel shelves"),
-        against("back", along=-0.42, away=0.036),
-    )
+    basket = Model(scene)
+    random = scene.random("towel shelves")
+    where = against("back", along=-0.42, away=0.036)
     shelves = Model(scene)
     shelves.box(
         size=(0.03, 0.32, 1.75), bevel=0.004, at=mirrored(x=0.39, y=0.16, z=0.875), material="Oak"

@@ -209,7 +209,8 @@ def broom(scene: Scene) -> None:
 
 def waste_bins(scene: Scene) -> None:
     """Two bins of crumpled paper."""
-    waste, random = Model(scene), scene.random("waste")
+    waste = Model(scene)
+    random = scene.random("waste")
     waste.lathe(
         profile=[
             (0.13, 0),

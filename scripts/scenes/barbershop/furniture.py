@@ -261,7 +261,9 @@ def magazines(scene: Scene) -> None:
 
 def stocked(scene: Scene, bottles: Goods, pots: Goods) -> None:
     """Goods in the display cabinet and on the trolley, and on shelves behind the desk."""
-    random, wares, board = scene.random("stock"), [*bottles, *pots], shelf(scene, 1.4, 0.16)
+    random = scene.random("stock")
+    wares = [*bottles, *pots]
+    board = shelf(scene, 1.4, 0.16)
     for z in (0.516, 0.89, 1.26, 1.63):
         stock(scene, random, wares, against("right", along=-1.65, away=0.065, z=z), 0.84, 0.27)
     for z, goods in ((1.25, bottles), (1.6, wares), (1.95, wares), (2.3, wares)):

@@ -72,16 +72,20 @@ def bottles(scene: Scene) -> Goods:
     for i, (name, outline) in enumerate(BOTTLES.items()):
         profile = np.array(outline) * 0.1
         neck, top = profile[-1]
-        radius, straight = max(profile[1, 0], profile[2, 0]) + 0.0008, profile[2, 1]
+        radius = max(profile[1, 0], profile[2, 0]) + 0.0008
+        straight = profile[2, 1]
         closing = np.array([(0.9, 0.0005), (1.1, 0.006), (1.1, 0.018), (0.7, 0.024)]) * (neck, 1)
         for variant in range(3):
-            model, stopper = Model(scene), ("Brass", "Black", "Oak")[(i + variant) % 3]
+            model = Model(scene)
+            stopper = ("Brass", "Black", "Oak")[(i + variant) % 3]
             model.add(scene.lathe(profile, 28), GLASSES[(i + 2 * variant) % 6])
             model.add(scene.lathe(closing, 20), stopper, (0, 0, top))
             if variant == 1:
                 model.add(scene.ball(neck * 1.3, 14), stopper, (0, 0, top + 0.03))
             if name != "flask":
-                low, high, ink = 0.25 * straight, 0.85 * straight, INKS[(i + variant) % 6]
+                low = 0.25 * straight
+                high = 0.85 * straight
+                ink = INKS[(i + variant) % 6]
                 model.add(band(scene, radius, low, high), "Paper")
                 model.add(band(scene, radius + 0.0004, low + 0.008, low + 0.016), ink)
                 stripe = 0.55 * high + 0.45 * low
@@ -251,7 +255,8 @@ def cotton_jar(scene: Scene) -> bpy.types.Mesh:
 
 def pomade_tin(scene: Scene, number: int, word: str) -> bpy.types.Mesh:
     """A round tin with a word on its lid."""
-    radius, height = 0.034 + 0.006 * (number % 2), 0.03 + 0.012 * number
+    radius = 0.034 + 0.006 * (number % 2)
+    height = 0.03 + 0.012 * number
     seam = height * 0.6
     lid = [
         (radius + 0.001, seam),
@@ -268,13 +273,15 @@ def pomade_tin(scene: Scene, number: int, word: str) -> bpy.types.Mesh:
 
 def scattered(random: Generator, count: int, radius: float, low: float, high: float) -> Array:
     """Points (count, 3) evenly spread in an upright cylinder round the Z axis."""
-    r, angle = radius * np.sqrt(random.uniform(size=count)), random.uniform(0, TAU, count)
+    r = radius * np.sqrt(random.uniform(size=count))
+    angle = random.uniform(0, TAU, count)
     return polar(r, angle, random.uniform(low, high, count))
 
 
 def shelf(scene: Scene, width: float, depth: float) -> bpy.types.Mesh:
     """A wooden board on two brass brackets, with a low rail; its top at z = 0, back at y = 0."""
-    end, rail = width / 2 - 0.01, depth - 0.008
+    end = width / 2 - 0.01
+    rail = depth - 0.008
     bracket = [
         (0, 0.008, -0.12),
         (0, 0.05, -0.09),

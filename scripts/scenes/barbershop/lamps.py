@@ -150,7 +150,9 @@ def lights(scene: Scene) -> None:
     window = transform((x, HALF_Y - 0.16, z), (-np.pi / 2, 0, 0))
     above = transform((0, 0, 2.05), (np.pi, 0, 0))
     tubes = against("left", away=0.16, z=2.36) @ transform(rotation=(np.radians(35), 0, 0))
-    back, front = transform((0, -1.5, 2.03)), transform((0, 1.5, 2.03))  # the back has no daylight
+    # the back has no daylight
+    back = transform((0, -1.5, 2.03))
+    front = transform((0, 1.5, 2.03))
     rays = towards((0.9, 8.5, 4.9), (-1.0, -6.3, -4.9))
     sun = area_light("Sun", rays, (4.2, 2.2), 260, (1.0, 0.86, 0.66))
     sun.data.spread = np.radians(2.5)

@@ -86,6 +86,7 @@ def wallpaper(name: str, ground: Color, ink: Color) -> None:
     b = graph.math("COSINE", graph.math("MULTIPLY", where["Z"], 0.5))
     leaf = graph.math("COSINE", graph.math("MULTIPLY", graph.math("MULTIPLY", a, b), 9.0))
     ogee = graph.math("ABSOLUTE", graph.math("MULTIPLY_ADD", b, 1.4, a))
-    leaf, ogee = graph.span(leaf, 0, 1, 0.3, 0.5), graph.span(ogee, 1, 0, 0.1, 0.2)
+    leaf = graph.span(leaf, 0, 1, 0.3, 0.5)
+    ogee = graph.span(ogee, 1, 0, 0.1, 0.2)
     color = graph.mix(graph.math("MAXIMUM", leaf, ogee), ground, ink)
     graph.finish(graph.principled(Base_Color=color, Roughness=0.6))

@@ -36,7 +36,8 @@ def leaf(scene: Scene, length: float, width: float, droop: float) -> Shape:
     """A leaf that grows along x from the origin, arching down, with a folded midrib."""
     n = scene.segments(10, 4)
     t = np.linspace(0, 1, n + 1)
-    half, across = width / 2 * np.sin(np.pi * t**0.8) ** 0.8, np.array([[-1], [0], [1]])
+    half = width / 2 * np.sin(np.pi * t**0.8) ** 0.8
+    across = np.array([[-1], [0], [1]])
     angle = droop / n * np.arange(n)
     x, sunk = np.cumsum([[0, *np.cos(angle)], [0, *np.sin(angle)]], axis=1) * length / n
     return sheet(xyz(x, half * across, 0.25 * half * np.abs(across) - sunk))
@@ -63,13 +64,16 @@ def plant(scene: Scene, kind: str) -> bpy.types.Mesh:
     for k in range(scene.segments(count, 6)):
         turn = k * 137.508 + random.uniform(-15, 15)
         if kind == "Fern":
-            at, rise = (0, 0, 0.185), random.uniform(40, 80)
+            at = (0, 0, 0.185)
+            rise = random.uniform(40, 80)
             blade = leaf(scene, random.uniform(0.24, 0.42), 0.035, np.radians(rise + 35))
         elif kind == "Snake plant":
             at = polar(0.07 * np.sqrt((k % 8) / 8), np.radians(turn), 0.18)
-            blade, rise = leaf(scene, random.uniform(0.3, 0.55), 0.06, 0.15), random.uniform(76, 88)
+            blade = leaf(scene, random.uniform(0.3, 0.55), 0.06, 0.15)
+            rise = random.uniform(76, 88)
         else:
-            at, rise = (0, 0, 0.24 + 0.5 * k / count), random.uniform(15, 55)
+            at = (0, 0, 0.24 + 0.5 * k / count)
+            rise = random.uniform(15, 55)
             blade = leaf(scene, random.uniform(0.16, 0.24), 0.10, 0.9)
         model.add(blade, f"Leaf {k % 3}", at, (0, -rise, turn))
     if kind == "Rubber tree":

@@ -36,7 +36,8 @@ def moustache(scene: Scene, kind: int) -> Shape:
     t = np.abs(x) * 2
     middle = -droop * t**1.3 + curl * np.maximum(t - 0.55, 0) ** 1.4 * 2
     half = thick * np.sqrt(np.maximum(1 - t**2.2, 0.002)) * (0.55 + 0.45 * np.minimum(t * 4, 1))
-    lower, upper = np.column_stack([x, middle - half / 2]), np.column_stack([x, middle + half / 2])
+    lower = np.column_stack([x, middle - half / 2])
+    upper = np.column_stack([x, middle + half / 2])
     return prism(np.concatenate([lower, upper[::-1]]), 0.6)
 
 
@@ -207,7 +208,8 @@ def portrait(model: Model) -> None:
     model.lathe(
         profile=[(0.05, 0), (0.05, 0.6)], at=(0, 0, 2), scaled=(0.85, 1.15, 1), material="Skin"
     )
-    scene, hair = model.scene, "Brown hair"
+    scene = model.scene
+    hair = "Brown hair"
     model.add(part_disc(scene, 0.1), "Black", (0, -0.15, 1), scale=(1, 0.9, 1))
     model.add(part_disc(scene, 0.05), hair, (0, 0.03, 3), scale=(0.95, 0.9, 1))
     model.add(moustache(scene, 0), hair, (0, -0.018, 4), scale=(0.07, 0.07, 1))

@@ -247,7 +247,8 @@ def desk_things(scene: Scene) -> None:
 
 def lolly_jar(scene: Scene) -> None:
     """A glass jar of lollies in the colours of the inks."""
-    jar, random = Model(scene), scene.random("lollies")
+    jar = Model(scene)
+    random = scene.random("lollies")
     jar.lathe(profile=[(0.064, 0), (0.064, 0.004)], material="Steel")
     jar.pipe(profile=[(0.06, 0.004), (0.07, 0.02), (0.07, 0.14), (0.05, 0.17)], material="Pane")
     stick = scene.tube([(0, 0, 0), (0, 0, 0.07)], 0.0015, 5)
@@ -259,7 +260,8 @@ def lolly_jar(scene: Scene) -> None:
 
 def appointment_book(scene: Scene) -> None:
     """An open book, its lines written as bars, with a pen."""
-    book, random = Model(scene), scene.random("ledger")
+    book = Model(scene)
+    random = scene.random("ledger")
     book.box(size=(0.36, 0.25, 0.006), bevel=0.002, at=(0, 0, 0.003), material="Oxblood")
     book.box(
         size=(0.17, 0.235, 0.012),

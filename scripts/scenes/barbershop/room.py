@@ -218,7 +218,8 @@ def tiles(scene: Scene) -> None:
 
 def medallion(scene: Scene) -> None:
     """An inlaid mosaic in the middle of the floor: rings of stones, a star, and the shop's name."""
-    random, model = scene.random("medallion"), Model(scene)
+    random = scene.random("medallion")
+    model = Model(scene)
     _mosaic_bed(model)
     _mosaic_stones(scene, model, random)
     words = "BARBER SHOP  ·  EST. 1927  ·  "
@@ -258,7 +259,8 @@ def _mosaic_stones(scene: Scene, model: Model, random: Generator) -> None:
 
 def rug(scene: Scene) -> None:
     """A bordered rug with lozenges and a fringe, below the low table."""
-    model, random = Model(scene), scene.random("rug")
+    model = Model(scene)
+    random = scene.random("rug")
     _rug_pattern(model)
     for end in lattice(x=evenly(-0.38, 0.38, scene.segments(60, 8)), y=(-0.975, 0.975), z=0.0025):
         model.add(box((0.006, 0.06, 0.003)), "Rug sand", end, (0, 0, random.uniform(-12, 12)))
@@ -310,19 +312,26 @@ def hair_clippings(scene: Scene) -> None:
                 0.0004,
             )
             strand = tube(path, (0.0003, 0.0006, 0.0006, 0.0002), 3)
-            at, turn = (*random.normal(0, 0.05, 2), 0.0012), (0, 0, random.uniform(0, 360))
+            at = (*random.normal(0, 0.05, 2), 0.0012)
+            turn = (0, 0, random.uniform(0, 360))
             model.add(strand, hair, at, turn)
-        tuft, around = model.mesh(f"Clippings {hair.lower()}"), standing(x=-1.4, y=y, z=0.001)
+        tuft = model.mesh(f"Clippings {hair.lower()}")
+        around = standing(x=-1.4, y=y, z=0.001)
         for _ in range(scene.count(26, 2)):
             at = polar(random.uniform(0.62, 0.85), random.uniform(0, TAU))
-            turn, size = (0, 0, random.uniform(0, 360)), random.uniform(0.7, 1.3)
+            turn = (0, 0, random.uniform(0, 360))
+            size = random.uniform(0.7, 1.3)
             put(tuft, around, at, turn, size)
 
 
 def metro_tiles(scene: Scene) -> None:
     """Glazed tiles in running bond over the left wall, green below and cream above."""
-    random, model = scene.random("tiles"), Model(scene)
-    width, height, gap, green_rows = 0.2, 0.1, 0.003, 11
+    random = scene.random("tiles")
+    model = Model(scene)
+    width = 0.2
+    height = 0.1
+    gap = 0.003
+    green_rows = 11
     row, column = np.indices((23, int(ROOM[1] / width) + 2)).reshape(2, -1)
     left = (column - (row % 2) / 2) * width - HALF_Y
     x0, x1 = np.clip([left, left + width], -HALF_Y, HALF_Y)
@@ -369,7 +378,8 @@ def _wainscot_panel(scene: Scene) -> bpy.types.Mesh:
 
 def wainscot(scene: Scene) -> None:
     """Raised mahogany panels below a chair rail, on three walls."""
-    panel, size = _wainscot_panel(scene), 0.6
+    panel = _wainscot_panel(scene)
+    size = 0.6
     for wall, start, stop in (
         ("right", -HALF_Y, HALF_Y),
         ("back", -HALF_X, -2.04),
@@ -387,7 +397,8 @@ def ceiling(scene: Scene) -> None:
     """Pressed tin tiles, and a cornice."""
     u = np.linspace(-1, 1, scene.segments(32, 6) + 1)
     v = u[:, None]
-    square, r = np.maximum(np.abs(u), np.abs(v)), np.hypot(u, v)
+    square = np.maximum(np.abs(u), np.abs(v))
+    r = np.hypot(u, v)
     petals = 0.5 + 0.5 * np.cos(8 * np.arctan2(v, u))
     relief = (
         0.020 * np.exp(-(((square - 0.92) / 0.05) ** 2))
@@ -401,7 +412,8 @@ def ceiling(scene: Scene) -> None:
         [standing(x=x, y=y, z=3) for x in evenly(-2.25, 2.25, 10) for y in evenly(-3.5, 3.5, 15)],
         degrees=(180, 0, 0),
     )
-    cornice, t = Model(scene), np.linspace(0, np.pi / 2, scene.segments(8))
+    cornice = Model(scene)
+    t = np.linspace(0, np.pi / 2, scene.segments(8))
     cove = np.column_stack([-0.13 + 0.09 * np.sin(t), 0.035 + 0.10 * (1 - np.cos(t))])
     profile = [(-0.15, 0), (-0.15, 0.03), *cove, (-0.03, 0.16), (0, 0.16)]
     cornice.add(frame(ROOM[0], ROOM[1], profile), "Cream", (0, 0, ROOM[2]), (180, 0, 0))

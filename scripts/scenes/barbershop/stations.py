@@ -338,7 +338,8 @@ def mirrors(scene: Scene) -> None:
         material="Gilt",
     )
     model.ball(radius=0.04, at=(0, 0.675, 0.04), scaled=(1, 1, 0.5), material="Gilt")
-    bead, count = scene.ball(0.008, 8), scene.segments(44)
+    bead = scene.ball(0.008, 8)
+    count = scene.segments(44)
     model.add(bead, "Gilt", lattice(x=evenly(-0.46, 0.46, count), y=(-0.58, 0.58), z=0.034))
     model.add(bead, "Gilt", lattice(x=(-0.49, 0.49), y=evenly(-0.55, 0.55, count), z=0.034))
     crest = circle(0.2, scene.segments(24, 8), np.radians(20), np.radians(160)) * (1.6, 0.6)
@@ -357,7 +358,9 @@ def mirrors(scene: Scene) -> None:
 def station_goods(scene: Scene, bottles: Goods, pots: Goods) -> None:
     """The tools, bottles and pots of the three stations."""
     random = scene.random("station goods")
-    cutter, clipper, dryer = scissors(scene), clippers(scene), hair_dryer(scene)
+    cutter = scissors(scene)
+    clipper = clippers(scene)
+    dryer = hair_dryer(scene)
     kit = [cutter, comb(scene, "Black"), comb(scene, "Oak"), hair_brush(scene)]
     kit += [razor(scene), cutter]
     for y in STATIONS:
@@ -373,7 +376,8 @@ def station_goods(scene: Scene, bottles: Goods, pots: Goods) -> None:
 
 def racks(scene: Scene, bottles: Goods, pots: Goods) -> None:
     """The shelves between the mirrors, with pots and towels below them, and towels over rails."""
-    random, board = scene.random("racks"), shelf(scene, 0.56, 0.14)
+    random = scene.random("racks")
+    board = shelf(scene, 0.56, 0.14)
     folded = [folded_towel(scene, towel) for towel in TOWELS]
     rolled = [rolled_towel(scene, towel) for towel in TOWELS[:2]]
     for y in (-3, -1, 1, 3):

@@ -32,7 +32,8 @@ def flagstone_layout(scene: Scene) -> list[Flagstone]:
     """Paths of flagstones, polygons of 5 to 7 wavy sides, to the statue, the fire, the torii."""
     random = scene.random("flagstones")
     steps = points(STEPS)
-    middles, radii = steps[:, :2], steps[:, 2]
+    middles = steps[:, :2]
+    radii = steps[:, 2]
     apart = np.hypot(*(middles[:, None] - middles).transpose(2, 0, 1))
     np.fill_diagonal(apart, np.inf)
     part = radii[:, None] / (radii[:, None] + radii)
@@ -40,8 +41,10 @@ def flagstone_layout(scene: Scene) -> list[Flagstone]:
     angles = np.linspace(0, TAU, scene.segments(48, 8), endpoint=False)
     stones = []
     for middle, radius in zip(middles, np.minimum(radii, fitting), strict=True):
-        wave, stretch = random.uniform(0, TAU, 2), random.uniform(0.86, 1.1)
-        sides, turn = random.integers(5, 8), random.uniform(0, TAU)
+        wave = random.uniform(0, TAU, 2)
+        stretch = random.uniform(0.86, 1.1)
+        sides = random.integers(5, 8)
+        turn = random.uniform(0, TAU)
         nearest = (angles - turn + np.pi / sides) % (TAU / sides) - np.pi / sides
         polygon = np.cos(np.pi / sides) / np.cos(nearest)
         reach = radius * (0.35 + 0.65 * polygon + 0.03 * np.sin(3 * angles + wave[0]))
@@ -99,12 +102,14 @@ def cushion(outline: Array, height: float, rounding: float, rings: int, seed: in
 def kerb(scene: Scene) -> None:
     """Granite blocks that hold the gravel in, but for the pond's shore and the path."""
     random = scene.random("kerb")
-    block, blocks = box((0.62, 0.15, 0.26), 0.02, 2), []
+    block = box((0.62, 0.15, 0.26), 0.02, 2)
+    blocks = []
     for i in range(3):
         bumpy = block.vertices + 0.008 * noise(block.vertices * 6 + i * 9, 41, 2)[:, None]
         blocks.append(scene.mesh(f"Kerb.{i}", block.reshaped(bumpy), "Kerb granite"))
     x0, y0, x1, y1 = COURT
-    corners, places = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)]), []
+    corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    places = []
     for side, (start, end) in enumerate(zip(corners, np.roll(corners, -1, axis=0), strict=True)):
         count = round(np.hypot(*(end - start)) / 0.645)
         for x, y in start + (end - start) * (np.arange(count)[:, None] + 0.5) / count:
@@ -117,7 +122,9 @@ def kerb(scene: Scene) -> None:
 
 def rocks(scene: Scene) -> None:
     """Rock islands in the gravel, stones along the shore, and boulders in the moss."""
-    random, places, boulders = scene.random("rocks"), [], []
+    random = scene.random("rocks")
+    places = []
+    boulders = []
     for x, y, radius in plan.ROCK_ISLANDS:
         for dx, dy, size in points("0 0 1.5, 0.62 0.25 0.85, -0.35 0.55 0.6, 0.15 -0.6 0.5"):
             spot = (x + dx * radius, y + dy * radius, 0.22 * size * radius)
@@ -133,7 +140,8 @@ def rocks(scene: Scene) -> None:
     places += standing(random, spots, (0.4, 1.5), -0.05)
     ball = icosphere(scene.segments(5, 2))  # about 1 m across
     for i in range(6):
-        v, shift = ball.vertices, np.array([17.0 * i, 5.0, 3.0])
+        v = ball.vertices
+        shift = np.array([17.0 * i, 5.0, 3.0])
         ridges = 1 - 2 * np.abs(noise(v * 1.3 + shift, 62, 1))
         swell = 1 + 0.28 * noise(v * 0.9 + shift, 61, 2) + 0.16 * ridges
         swell += 0.05 * noise(v * 5 + shift, 63, 3)

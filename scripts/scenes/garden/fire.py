@@ -9,7 +9,8 @@ from scenes.library.points import noise, points, polar, xyz
 from scenes.library.scene import Scene, animate, place
 from scenes.library.shapes import icosphere, join, transform, tube
 
-FLAME_TONGUES, FLAME_SHELLS = 6, (1.0, 0.78, 0.5)
+FLAME_TONGUES = 6
+FLAME_SHELLS = (1.0, 0.78, 0.5)
 CANDLES = """-0.62 2.82 0, -0.48 2.9 0, -0.40 2.73 0, 0.47 2.88 0, 0.60 2.76 0, 0.70 2.9 0
     -0.28 3.05 0.14, -0.12 3.05 0.14, 0.05 3.05 0.14, 0.3 3.05 0.14
     -1.30 2.13 0, -1.17 2.27 0, -1.43 1.97 0, -3.95 0.2 -0.08, -4.3 1.25 -0.08
@@ -27,10 +28,13 @@ def fire(scene: Scene) -> None:
     legs = [polar([0.30, 0.36, 0.44], 0.4 + k * TAU / 3, [0.42, 0.2, -0.05]) for k in range(3)]
     bowl += [scene.tube(leg, 0.022) for leg in legs]
     scene.add("Fire bowl", join(bowl), "Iron", matrix=transform((x, y, 0)))
-    random, logs = scene.random("fire"), []
+    random = scene.random("fire")
+    logs = []
     for k in range(9):
-        angle, tip = k * 2.4 + random.normal(0, 0.2), random.uniform(0.05, 0.14)
-        reach, rise = 0.27 * np.array([1, -tip]), [0.44, 0.58 + 0.2 * random.random()]
+        angle = k * 2.4 + random.normal(0, 0.2)
+        tip = random.uniform(0.05, 0.14)
+        reach = 0.27 * np.array([1, -tip])
+        rise = [0.44, 0.58 + 0.2 * random.random()]
         path = np.linspace(*polar(reach, angle, rise), 6)
         logs.append(scene.tube(path, 0.045 * random.uniform(0.7, 1.1, 6), 12))
     bed = icosphere(scene.segments(4, 2))
@@ -58,7 +62,10 @@ def flames(scene: Scene, x: float, y: float, z: float) -> None:
     t = np.linspace(0, 1, scene.segments(40, 8))
     body = np.sin(np.pi * t**0.55) * (1 - 0.45 * t) + 0.002
     for k in range(FLAME_TONGUES):
-        angle, reach, height, width = 2.4 * k, 0.0, 1.0, 0.15
+        angle = 2.4 * k
+        reach = 0.0
+        height = 1.0
+        width = 0.15
         if k:
             reach, height, width = random.uniform((0.09, 0.45, 0.07), (0.17, 0.8, 0.11))
         spot = transform(np.add((x, y, z), polar(reach, angle)), (0, 0, angle))
@@ -72,9 +79,13 @@ def flames(scene: Scene, x: float, y: float, z: float) -> None:
                 higher.add([vertex.index], min(1.0, vertex.co.z + 0.1), "REPLACE")
             for axis, texture, carrier in licks:
                 bend = tongue.modifiers.new(f"Lick {axis}", "DISPLACE")
-                bend.texture, bend.vertex_group = texture, higher.name
-                bend.direction, bend.space, bend.strength = axis, "GLOBAL", 0.6
-                bend.texture_coords, bend.texture_coords_object = "OBJECT", carrier
+                bend.texture = texture
+                bend.vertex_group = higher.name
+                bend.direction = axis
+                bend.space = "GLOBAL"
+                bend.strength = 0.6
+                bend.texture_coords = "OBJECT"
+                bend.texture_coords_object = carrier
 
 
 def candles(scene: Scene) -> None:

@@ -28,7 +28,8 @@ def stone_lanterns(scene: Scene) -> None:
     side = np.cos(TAU / 12) / np.cos((angle % (TAU / 6)) - TAU / 12)
     upturned = np.clip((side - 0.866) / 0.134, 0, 1) ** 3 * (1 - u) ** 2
     roof = polar((0.45 - 0.36 * u**0.72) * side, angle, 1.42 + 0.22 * u**1.3 + 0.09 * upturned)
-    under, lip = roof[:1] * (0.45, 0.45, 1) - (0, 0, 0.03), roof[:1] - (0, 0, 0.045)
+    under = roof[:1] * (0.45, 0.45, 1) - (0, 0, 0.03)
+    lip = roof[:1] - (0, 0, 0.045)
     stack.append(sheet(np.concatenate([under, lip, roof]), closed=True))
     stone = scene.mesh("Lantern stone", join(stack), "Lantern granite", smooth=0.6)
     corners = circle(0.205, 6)
@@ -67,7 +68,8 @@ def paper_globes(scene: Scene) -> None:
 def floor_lanterns(scene: Scene) -> None:
     """Framed paper lanterns beside the path."""
     width, height = 0.13, 0.52
-    corners, post = rectangle(2 * width, 2 * width), box((0.022, 0.022, height), 0.004, 1)
+    corners = rectangle(2 * width, 2 * width)
+    post = box((0.022, 0.022, height), 0.004, 1)
     bars = [post.moved(x, y, height / 2) for x, y in corners]
     for z in (0.09, 0.3, height - 0.02):
         bars += [box((2 * width, 0.016, 0.016)).moved(0, y, z) for y in (-width, width)]

@@ -19,9 +19,11 @@ def statue(scene: Scene) -> None:
     """The figure on a lotus seat and a granite plinth, with a halo of polished brass."""
     x, y = STATUE
     for i, (width, low, high) in enumerate(points("1.55 -0.1 0.14, 1.32 0.14 0.5, 1.45 0.5 0.58")):
-        block, spot = box((width, width, high - low), 0.02, 3), (x, y, (low + high) / 2)
+        block = box((width, width, high - low), 0.02, 3)
+        spot = (x, y, (low + high) / 2)
         scene.add(f"Plinth.{i}", block, "Plinth granite", matrix=transform(spot))
-    seat, spot = transform((x, y, 0.58), scale=1.05), transform((x, y, 0.78), scale=0.92)
+    seat = transform((x, y, 0.58), scale=1.05)
+    spot = transform((x, y, 0.78), scale=0.92)
     scene.add("Lotus", lotus(scene), "Rough bronze", matrix=seat)
     scene.add("Statue", join([figure(scene), curls(scene)]), "Rough bronze", matrix=spot)
     halo = [scene.ring(0.30, 0.016, 96, 12), scene.ring(0.39, 0.008, 96)]
@@ -56,8 +58,10 @@ BODY = """0 0.06 0.20 0.38 0.28 0.21, 0 0.06 0.50 0.26 0.20 0.36, 0 0.03 0.80 0.
 # Hand, ear and brow of the left; the right is their mirror image, as it is of arm and leg.
 LEFT = """0.06 -0.35 0.32 0.13 0.075 0.05, 0.165 0 1.31 0.022 0.042 0.11
     0.065 -0.158 1.385 0.045 0.028 0.018"""
-ARM, ARM_RADII = "0.32 0.03 0.93, 0.43 0 0.56, 0.09 -0.34 0.34", (0.115, 0.092, 0.055)
-LEG, LEG_RADII = "0.2 0.06 0.17, 0.55 -0.18 0.13, -0.10 -0.40 0.13", (0.17, 0.135, 0.09)
+ARM = "0.32 0.03 0.93, 0.43 0 0.56, 0.09 -0.34 0.34"
+ARM_RADII = (0.115, 0.092, 0.055)
+LEG = "0.2 0.06 0.17, 0.55 -0.18 0.13, -0.10 -0.40 0.13"
+LEG_RADII = (0.17, 0.135, 0.09)
 
 
 def figure(scene: Scene) -> Shape:
@@ -69,7 +73,8 @@ def figure(scene: Scene) -> Shape:
         parts += [limb(points(ARM) * mirror, ARM_RADII), limb(points(LEG) * mirror, LEG_RADII)]
     whole = scene.add("Statue parts", join(parts))
     remesh = whole.modifiers.new("Melt", "REMESH")
-    remesh.mode, remesh.voxel_size = "VOXEL", 0.011 / scene.detail**0.5
+    remesh.mode = "VOXEL"
+    remesh.voxel_size = 0.011 / scene.detail**0.5
     smooth = whole.modifiers.new("Smooth", "SMOOTH")
     smooth.factor, smooth.iterations = 0.5, 4
     melted = whole.evaluated_get(bpy.context.evaluated_depsgraph_get())
@@ -89,7 +94,8 @@ def figure(scene: Scene) -> Shape:
 
 def curls(scene: Scene) -> Shape:
     """The figure's hair: small snail curls on the skull and its knot."""
-    curl, places = icosphere(scene.segments(2, 1)), []
+    curl = icosphere(scene.segments(2, 1))
+    places = []
     for center, radii, count, lowest in (
         ((0, 0.02, 1.42), (0.172, 0.180, 0.180), 260, -0.35),
         ((0, 0.03, 1.60), (0.085, 0.085, 0.075), 70, -0.2),
@@ -109,7 +115,8 @@ def lotus(scene: Scene) -> Shape:
     v = np.linspace(-1, 1, scene.segments(9, 3))
     width = 0.115 * np.sin(np.pi * (0.15 + 0.85 * u)) ** 0.6
     bulge = 0.10 * np.sin(np.pi * 0.55 * u) - 0.03 * v**2 + 0.05 * u**4
-    petal, parts = sheet(xyz(width * v, bulge, 0.2 * u)), [drum]
+    petal = sheet(xyz(width * v, bulge, 0.2 * u))
+    parts = [drum]
     for start, radius, base in ((0.0, 0.57, 0.015), (0.5, 0.53, 0.06)):
         angle = (np.arange(18) + start) * TAU / 18
         parts.append(copies(petal, polar(radius, angle, base), forward=polar(1, angle)))
@@ -139,7 +146,8 @@ def torii(scene: Scene) -> None:
     red = [lintel(scene, 1.95, 3.17, 3.36, 0.12, 0.14), beams[0], beams[1].moved(0, 0, 2.9)]
     black = [lintel(scene, 2.2, 3.36, 3.46, 0.17, 0.2)]
     for side in (-1, 1):
-        foot, head = np.array([side * 1.5, 0, -0.2]), np.array([side * 1.36, 0, 3.2])
+        foot = np.array([side * 1.5, 0, -0.2])
+        head = np.array([side * 1.36, 0, 3.2])
         red.append(scene.tube(np.linspace(foot, head, 9), np.linspace(0.15, 0.125, 9), 32))
         black.append(scene.tube(np.linspace(foot, foot + 0.16 * (head - foot), 3), 0.18, 32))
     spot = transform((*TORII, float(ground_height(*TORII))))

@@ -16,7 +16,9 @@ from scenes.library.shapes import towards, transform
 TAU = 2 * np.pi
 
 COURT = (-2.7, -3.8, 4.3, 4.9)  # of raked gravel: a rectangle x0, y0, x1, y1
-POND_CENTER, POND_RADIUS, WATER_LEVEL = np.array([-5.5, 0.6]), 2.3, -0.07
+POND_CENTER = np.array([-5.5, 0.6])
+POND_RADIUS = 2.3
+WATER_LEVEL = -0.07
 STATUE = (0.0, 3.75)
 FIRE = (3.1, 1.1)
 TORII = (0.2, -8.5)
@@ -31,7 +33,8 @@ SUN_AZIMUTH = np.radians(-174.0)
 
 def pond_distance(x: ArrayLike, y: ArrayLike) -> Array:
     """Distance outside the pond's shore, negative within (about, in metres)."""
-    dx, dy = x - POND_CENTER[0], (y - POND_CENTER[1]) * 0.8
+    dx = x - POND_CENTER[0]
+    dy = (y - POND_CENTER[1]) * 0.8
     angle = np.arctan2(dy, dx)
     shore = 1 + 0.13 * np.sin(2 * angle + 1.0) + 0.07 * np.sin(3 * angle) + 0.03 * np.sin(7 * angle)
     return np.hypot(dx, dy) - POND_RADIUS * shore

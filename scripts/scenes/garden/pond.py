@@ -25,7 +25,8 @@ def water_lilies(scene: Scene) -> None:
     angle = np.linspace(0.16, TAU - 0.16, scene.segments(40, 8))
     reach, rise = points("1 0.03, 0.97 0.006, 0.6 0.002, 0.05 0").T[:, :, None]
     pad = scene.mesh("Lily pad", sheet(polar(reach, angle, rise)), "Lily pad")
-    u, v = np.linspace(0, 1, scene.segments(7, 3))[:, None], np.linspace(-1, 1, 5)
+    u = np.linspace(0, 1, scene.segments(7, 3))[:, None]
+    v = np.linspace(-1, 1, 5)
     width = 0.022 * np.sin(np.pi * (0.1 + 0.9 * u))
     petal = sheet(xyz(width * v, 0.085 * u, 0.03 * u**2 + 0.006 * v * v))
     rings = []
@@ -68,7 +69,8 @@ def carp(scene: Scene) -> None:
 
 def iris(scene: Scene) -> None:
     """Sheaves of sword-like leaves along the far shore."""
-    random, count = scene.random("iris"), scene.count(46, 8)
+    random = scene.random("iris")
+    count = scene.count(46, 8)
     leaf = blade(0.018, 6, 0.35)
     sheaves = [tuft(random, leaf, count, 0.15, (0.35, 0.8)) for _ in range(2)]
     angle = np.concatenate([random.uniform(1.2, 5.2, 20), random.uniform(-0.9, 0.9, 3)])

@@ -32,7 +32,8 @@ def bamboo(scene: Scene) -> None:
 def bamboo_culm(scene: Scene, number: int) -> Shape:
     """A culm with its rings, side twigs and leaves (slot 1), 6 to 7.5 m high."""
     random = scene.random(f"bamboo{number}")
-    height, lean = random.uniform(6.0, 7.5), random.normal(0, 0.05, 2)
+    height = random.uniform(6.0, 7.5)
+    lean = random.normal(0, 0.05, 2)
     joints = np.cumsum(np.linspace(0.16, 0.36, 24))
     joints = np.concatenate([[0.0], joints[joints < height * 0.96]])
 
@@ -56,7 +57,8 @@ def bamboo_culm(scene: Scene, number: int) -> Shape:
             spots.append(along[5:])
             forward.append(out * 0.6 + random.normal(0, 0.55, (count, 3)) - (0, 0, 0.35))
     at = np.concatenate(spots)
-    up, size = random.normal((0, 0, 1), 0.5, at.shape), random.uniform(0.15, 0.27, len(at))
+    up = random.normal((0, 0, 1), 0.5, at.shape)
+    size = random.uniform(0.15, 0.27, len(at))
     half, y = points("0 0, 0.055 0.25, 0.05 0.6, 0 1").T[:, :, None]
     x = half * (-1, 0, 1)
     leaf = sheet(xyz(x, y, 0.03 * (x != 0) - 0.25 * y * y))  # folded along its rib
@@ -97,16 +99,21 @@ def maple(scene: Scene) -> None:
 
 def pines(scene: Scene) -> None:
     """Cloud-pruned pines, 3 m high: swaying stems, limbs, and a dome of brushes on each."""
-    random, meshes = scene.random("pines"), []
+    random = scene.random("pines")
+    meshes = []
     needle = sheet(xyz([[-0.045, 0.045], [-0.04, 0.04], [-0.004, 0.004]], [[0], [0.5], [1]]))
     for number in range(2):
-        out, up = random.normal((0, 0, 0.7), 0.6, (9, 3)), random.normal(0, 1, (9, 3))
+        out = random.normal((0, 0, 0.7), 0.6, (9, 3))
+        up = random.normal(0, 1, (9, 3))
         brush = copies(needle, np.zeros((9, 3)), out, up, 0.11)
-        t, turn = np.linspace(0, 1, 14), random.uniform(0, TAU)
+        t = np.linspace(0, 1, 14)
+        turn = random.uniform(0, TAU)
         stem = polar(0.42 * np.sin(t * 6.0 + number) * t, turn, 3.1 * t - 0.2)
-        parts, pads = [scene.tube(stem, np.linspace(0.15, 0.04, 14), 12)], []
+        parts = [scene.tube(stem, np.linspace(0.15, 0.04, 14), 12)]
+        pads = []
         for k, at in enumerate((4, 6, 7, 9, 10, 11, 13)):
-            reach, size = (0.0 if at == 13 else 1.35 - 0.075 * at), 0.75 - 0.022 * at
+            reach = 0.0 if at == 13 else 1.35 - 0.075 * at
+            size = 0.75 - 0.022 * at
             tip = stem[at] + polar(reach, turn + 2.2 * k, 0.12)
             if reach:
                 bow = np.linspace(0, 1, 6)[:, None]

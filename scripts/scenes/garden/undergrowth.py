@@ -13,14 +13,18 @@ from scenes.library.shapes import copies, icosphere, join
 
 def shrubs(scene: Scene) -> None:
     """Azaleas clipped into cushions 1 m across: a core, leaves, and flowers for a part of them."""
-    random, leaf, core = scene.random("shrubs"), oval_leaf(), icosphere(scene.segments(3, 2))
-    meshes, count = [], scene.count(3600, 60)
+    random = scene.random("shrubs")
+    leaf = oval_leaf()
+    core = icosphere(scene.segments(3, 2))
+    meshes = []
+    count = scene.count(3600, 60)
     for shift, flowers in ((0.0, 0.0), (7.0, 0.12), (14.0, 0.3)):
         z = random.uniform(-0.1, 1.0, count)
         out = polar(np.sqrt(1 - z * z), random.uniform(0, TAU, count), z)
         lumps = 1 + 0.16 * noise(out * 1.6 + shift, 96, 2)[:, None]
         spots = out * 0.5 * lumps * random.uniform(0.9, 1.03, (count, 1)) * (1, 1, 0.85)
-        forward, up = random.normal(0, 1, (count, 3)), out + random.normal(0, 0.45, (count, 3))
+        forward = random.normal(0, 1, (count, 3))
+        up = out + random.normal(0, 0.45, (count, 3))
         leaves = copies(leaf, spots, forward, up, random.uniform(0.035, 0.06, count))
         slots = np.where(random.random(count) < flowers, 2, 1)
         leaves = leaves._replace(slots=np.repeat(slots, len(leaf.triangles)).astype(np.int32))
@@ -39,7 +43,9 @@ def shrubs(scene: Scene) -> None:
 
 def grass(scene: Scene) -> None:
     """Grass in the moss around the court, taller towards the woods."""
-    random, count, leaf = scene.random("grass"), scene.count(760, 30), blade(0.04, 3, 0.5)
+    random = scene.random("grass")
+    count = scene.count(760, 30)
+    leaf = blade(0.04, 3, 0.5)
     tufts = [tuft(random, leaf, count, 0.6, (0.05, 0.15)) for _ in range(4)]
     meshes = [scene.mesh("Grass", each, "Grass") for each in tufts]
 
@@ -49,7 +55,8 @@ def grass(scene: Scene) -> None:
     def farther(x: Array, y: Array) -> Array:
         return patch(x, y) & (np.hypot(x, y) > 9.5)
 
-    off, count = {"court": 0.5, "pond": 0.25, "path": 0.95}, scene.count(330, 40)
+    off = {"court": 0.5, "pond": 0.25, "path": 0.95}
+    count = scene.count(330, 40)
     near = spread(random, count, (-9.5, -9.5, 9.5, 9.5), 0.66, patch, **off)
     far = spread(random, scene.count(190, 40), (-22, -22, 22, 22), 1.55, farther, **off)
     places = standing(random, near, (0.8, 1.25), sloping=True)
@@ -58,7 +65,8 @@ def grass(scene: Scene) -> None:
 
 def fallen_leaves(scene: Scene) -> None:
     """Maple leaves on the gravel and the flagstones, thickest under the crown."""
-    random, count = scene.random("fallen leaves"), scene.count(420, 20)
+    random = scene.random("fallen leaves")
+    count = scene.count(420, 20)
     under_crown = random.normal((-1.2, -2.0), 1.3, (count, 2))
     spots = np.vstack([under_crown, random.uniform(COURT[:2], COURT[2:], (count // 3, 2))])
     spots = spots[court_distance(*spots.T) < -0.2]

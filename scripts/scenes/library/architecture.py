@@ -34,7 +34,8 @@ def ring_of_stones(
     count: int, radius: float, width: float, z: float, height: float, span: float = 2 * np.pi
 ) -> Shape:
     """Wedge-shaped stones side by side round the Z axis, from angle 0 to `span`."""
-    step, gap = span / count, 0.006 / radius
+    step = span / count
+    gap = 0.006 / radius
     places = xyz((np.arange(count) + 0.5) * step, radius, z)
     flat = blocks(places, (step - gap, width, height), (0.012 / radius, 0.012, 0.012))
     angle, reach, z = flat.vertices.T
@@ -87,7 +88,8 @@ def panel(width: float, bottom: float, top: float, opening: Array, thickness: fl
 
 def _ray_meets(outline: Array, direction: Array) -> Array:
     """Where the ray from the origin crosses an outline round it."""
-    start, along = outline, np.roll(outline, -1, axis=0) - outline
+    start = outline
+    along = np.roll(outline, -1, axis=0) - outline
     cross = direction[0] * along[:, 1] - direction[1] * along[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = (start[:, 0] * along[:, 1] - start[:, 1] * along[:, 0]) / cross

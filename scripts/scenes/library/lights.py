@@ -17,7 +17,9 @@ def point_light(
 ) -> bpy.types.Object:
     """A spherical lamp that lights but is not itself seen: give it a flame or bulb to be seen."""
     light = bpy.data.lights.new(name, "POINT")
-    light.energy, light.color, light.shadow_soft_size = watts, color, radius
+    light.energy = watts
+    light.color = color
+    light.shadow_soft_size = radius
     lamp = place(name, light, transform(location))
     lamp.visible_camera = lamp.visible_glossy = lamp.visible_transmission = False
     return lamp
@@ -38,7 +40,9 @@ def sun_light(
 ) -> bpy.types.Object:
     """A sun: azimuth from +X towards +Y, elevation above the horizon, angular diameter; radians."""
     light = bpy.data.lights.new(name, "SUN")
-    light.energy, light.color, light.angle = strength, color, angle
+    light.energy = strength
+    light.color = color
+    light.angle = angle
     return place(name, light, transform(rotation=(np.pi / 2 - elevation, 0, azimuth + np.pi / 2)))
 
 

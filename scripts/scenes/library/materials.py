@@ -61,11 +61,13 @@ class Graph:
     def ramp(self, factor: Any, stops: Points) -> bpy.types.NodeSocket:
         """Colours by position: stops (n, 4) are position 0..1, red, green, blue."""
         node = self.add("ValToRGB", {0: factor})
-        elements, rows = node.color_ramp.elements, points(stops)
+        elements = node.color_ramp.elements
+        rows = points(stops)
         while len(elements) < len(rows):
             elements.new(1.0)
         for element, (position, *color) in zip(elements, rows, strict=True):
-            element.position, element.color = position, (*color, 1.0)
+            element.position = position
+            element.color = (*color, 1.0)
         return node.outputs[0]
 
     def span(

@@ -22,7 +22,8 @@ def oval_leaf() -> Shape:
 
 def folded_leaf(width: float) -> Shape:
     """A leaf of two triangles folded along its midrib, 1 long along +Y."""
-    x, z = width / 2, 0.3 * width
+    x = width / 2
+    z = 0.3 * width
     return facets([(0, 0, 0), (-x, 0.45, z), (0, 1, 0), (x, 0.45, z)], (0, 2, 1), (0, 3, 2))
 
 
@@ -82,7 +83,8 @@ def branches(scene: Scene, random: Generator, growth: Growth) -> tuple[Shape, Ar
 
     def grow(start: Array, heading: Array, length: float, radius: float, level: int) -> None:
         count, tip = (9, 0.5) if level == 0 else (6, 0.3)
-        path, upward = np.tile(start, (count, 1)), growth.upward[level]
+        path = np.tile(start, (count, 1))
+        upward = growth.upward[level]
         for k in range(1, count):  # it changes course at random, and turns towards the light
             heading = unit(heading + random.normal(0, growth.wander, 3) + (0, 0, upward))
             path[k] = path[k - 1] + heading * length / (count - 1)

@@ -72,7 +72,8 @@ class Scene:
         `smooth` may be an angle in radians, above which edges stay sharp.
         """
         data = bpy.data.meshes.new(name)
-        nq, nt = len(shape.quads), len(shape.triangles)
+        nq = len(shape.quads)
+        nt = len(shape.triangles)
         corners = np.concatenate([shape.quads.ravel(), shape.triangles.ravel()]).astype(np.int32)
         starts = np.concatenate([np.arange(nq) * 4, nq * 4 + np.arange(nt) * 3]).astype(np.int32)
         data.vertices.add(len(shape.vertices))

@@ -162,8 +162,11 @@ def mesh_shape(data: bpy.types.Mesh) -> Shape:
 def lettering(text: str, depth: float) -> Shape:
     """Flat letters, 1 m high and centred, in Blender's own font, `depth` metres thick."""
     curve = bpy.data.curves.new("lettering", "FONT")
-    curve.body, curve.align_x, curve.align_y = text, "CENTER", "CENTER"
-    curve.resolution_u, curve.extrude = 3, depth / 2
+    curve.body = text
+    curve.align_x = "CENTER"
+    curve.align_y = "CENTER"
+    curve.resolution_u = 3
+    curve.extrude = depth / 2
     thing = bpy.data.objects.new("lettering", curve)
     data = bpy.data.meshes.new_from_object(thing)
     shape = mesh_shape(data)
@@ -187,7 +190,8 @@ def sheet(grid_of_points: ArrayLike, closed: bool = False, capped: bool = False)
     index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
     if closed:
         index = np.concatenate([index, index[:, :1]], axis=1)
-    left, right = index[:, :-1], index[:, 1:]
+    left = index[:, :-1]
+    right = index[:, 1:]
     quads = np.stack([left[:-1], right[:-1], right[1:], left[1:]], axis=-1).reshape(-1, 4)
     if not capped:
         return Shape(places.reshape(-1, 3), quads)

@@ -32,7 +32,8 @@ LOW_WALL = "10 0.9 0.54 0.13 0.246, 10 0.9 0.54 0.38 0.246, 6 0.87 0.66 0.552 0.
 def arcades(scene: Scene) -> None:
     """Low walls with columns, open at the gates, and piers where two arcades meet."""
     # The wall over one arch, with voussoirs and hood moulds; its origin is at the springing.
-    bay, n = Model(scene), scene.segments(24)
+    bay = Model(scene)
+    n = scene.segments(24)
     opening = arch_outline(ARCH_RADIUS, 0.0, 0.0, ARCH_RADIUS, n)
     wall = panel(plan.BAY, 0.0, plan.ARCADE_TOP - SPRINGING, opening, ARCADE_WALL - 0.06)
     bay.add(wall, "Plaster", (0, 0.03 - ARCADE_WALL / 2, 0))
@@ -42,7 +43,9 @@ def arcades(scene: Scene) -> None:
     for face in (0.01 - ARCADE_WALL / 2, ARCADE_WALL / 2 - 0.01):
         bay.add(hood, "Limestone", (0, face, 0))
     on_sides("Arcade", [bay.mesh("Arcade bay")], plan.BAY_AXES, ARCADE, SPRINGING)
-    column, pier, long = Model(scene), Model(scene), Model(scene)
+    column = Model(scene)
+    pier = Model(scene)
+    long = Model(scene)
     column.add(twin_column(scene), "Carved stone")
     on_sides("Column", [column.mesh("Column")], plan.COLUMNS[1:-1], ARCADE, plan.STYLOBATE)
     pier.add(pillar(PIER_FOOT), "Carved stone")
@@ -53,7 +56,8 @@ def arcades(scene: Scene) -> None:
     for count, gate, depth, z, height in points(LOW_WALL):
         for sign in (-1, 1):
             middle, length = cut(random, gate, ARCADE - 0.38, int(count))
-            places, sizes = xyz(sign * middle, ARCADE, z), xyz(length - 0.007, depth, height)
+            places = xyz(sign * middle, ARCADE, z)
+            sizes = xyz(length - 0.007, depth, height)
             long.add(blocks(places, sizes, 0.016), "Limestone")
     front = (0, FRONT, plan.ARCADE_TOP)
     strings = [(0, 0, -0.28, 2 * FRONT, 0.13, 0.06), (0, 0, -0.1, 2 * FRONT, 0.2, 0.07)]
@@ -84,7 +88,8 @@ def twin_column(scene: Scene) -> Shape:
 
 def leaf(scene: Scene, height: float, reach: float) -> Shape:
     """A carved leaf on a capital's bell that leans out along +Y and curls over at its tip."""
-    t, across = np.linspace(0, 1, scene.segments(7) + 1)[:, None], np.linspace(1, -1, 5)
+    t = np.linspace(0, 1, scene.segments(7) + 1)[:, None]
+    across = np.linspace(1, -1, 5)
     x = across * (0.034 * np.sin(np.pi * (0.25 + 0.75 * t)) ** 0.5 + 0.004)
     out = 0.088 + 0.05 * t**2.2 + reach * t**3 + 0.006 * (1 - np.abs(across))
     return sheet(xyz(x, out - 0.3 * np.abs(x), height * (t - 0.42 * t**4)))
@@ -92,9 +97,11 @@ def leaf(scene: Scene, height: float, reach: float) -> Shape:
 
 def vaults(scene: Scene) -> None:
     """A vault for each bay and each corner of the walks, and the brackets that carry them."""
-    middle, before = plan.WALK_MIDDLE, ARCADE - plan.WALK_MIDDLE - ARCADE_WALL / 2
+    middle = plan.WALK_MIDDLE
+    before = ARCADE - plan.WALK_MIDDLE - ARCADE_WALL / 2
     on_sides("Vault", [vault(scene, plan.BAY).mesh("Vault")], plan.BAY_AXES, middle, SPRINGING)
-    corner, corbel = vault(scene, WALK), Model(scene)
+    corner = vault(scene, WALK)
+    corbel = Model(scene)
     rise = arch_outline(WALK / 2 - 0.12, 0.0, 0.0, VAULT_RISE - 0.08, scene.segments(20))
     arch = panel(WALK, 0.0, 1.2, rise, ARCADE_WALL)
     corner.add(arch, "Limestone", (before, 0, 0), (0, 0, -90))
@@ -107,8 +114,11 @@ def vaults(scene: Scene) -> None:
 
 def vault(scene: Scene, length: float) -> Model:
     """The higher of two crossing elliptic barrels over a bay, with ribs along its groins."""
-    model, n = Model(scene), scene.segments(20, 6) // 2 * 2
-    a, b, t = length / 2, WALK / 2, np.sin(np.linspace(-np.pi / 2, np.pi / 2, n + 1))
+    model = Model(scene)
+    n = scene.segments(20, 6) // 2 * 2
+    a = length / 2
+    b = WALK / 2
+    t = np.sin(np.linspace(-np.pi / 2, np.pi / 2, n + 1))
     barrel = VAULT_RISE * np.sqrt(1 - t**2)
     model.add(grid(a * t, b * t, np.maximum(barrel, barrel[:, None])), "Whitewash")
     t = np.linspace(-1, 1, 2 * n + 1)

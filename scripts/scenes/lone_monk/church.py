@@ -15,19 +15,25 @@ WIDTH = 2 * BACK / BAYS
 LANCET = (0.42, 6.2, 7.75, 0.62)  # an arch, as in `walls`
 ROSE = (1.15, 7.3)  # its radius and height
 
-HALF, BELFRY, TOWER_TOP = 2.3, 12.4, 15.6  # half the tower's width, and where its parts begin
-ROOF_HALF, ROOF_SLOPE = HALF + 0.4, np.radians(33)
+# half the tower's width, and where its parts begin
+HALF = 2.3
+BELFRY = 12.4
+TOWER_TOP = 15.6
+ROOF_HALF = HALF + 0.4
+ROOF_SLOPE = np.radians(33)
 ROOF_HEIGHT = ROOF_HALF * np.tan(ROOF_SLOPE)
 BELL = """0.55 -1.15, 0.53 -1.12, 0.44 -0.95, 0.36 -0.7, 0.31 -0.4
     0.26 -0.22, 0.12 -0.15, 0.05 -0.1"""
 # Of the clock: middle x, y, z and width, depth, height.
-MARK, HOUR_HAND = "0 -0.035 0.58 0.05 0.02 0.14", "0 -0.05 0.13 0.035 0.015 0.36"
+MARK = "0 -0.035 0.58 0.05 0.02 0.14"
+HOUR_HAND = "0 -0.05 0.13 0.035 0.015 0.36"
 MINUTE_HAND = "0 -0.05 0.22 0.035 0.015 0.54"
 
 
 def church(scene: Scene) -> None:
     """Seven bays of brick between pilaster strips, with lancets and a rose, under a frieze."""
-    area, hole = (WIDTH, LEAN_TO_TOP, TOP, 0.5), arch_outline(*LANCET, scene.segments(20))
+    area = (WIDTH, LEAN_TO_TOP, TOP, 0.5)
+    hole = arch_outline(*LANCET, scene.segments(20))
     lancet = wall(scene, "Brick", area, hole, (0.14, 0.04))
     lancet.add(stones("0 -0.04 6.12 1.2 0.2 0.1", 0.02), "Limestone")
     glaze(lancet, hole, 0.3, 2, "Lead")
@@ -35,7 +41,8 @@ def church(scene: Scene) -> None:
     hole = circle(radius, scene.segments(40, 8)) + np.array((0, height))
     rose = wall(scene, "Brick", area, hole, (0.2, 0.06))
     parts = [scene.ring(0.3, 0.045), scene.ring(1.12, 0.05)]
-    circlet, foil = scene.ring(0.25, 0.03), scene.ring(0.09, 0.015, 12)
+    circlet = scene.ring(0.25, 0.03)
+    foil = scene.ring(0.09, 0.015, 12)
     for angle in np.arange(8) * np.pi / 4:
         parts.append(scene.tube(polar([0.3, 1.12], angle), 0.035))
         parts.append(circlet.moved(*polar(0.84, angle + np.pi / 8)))
@@ -45,7 +52,9 @@ def church(scene: Scene) -> None:
     x = np.delete(in_row(BAYS), BAYS // 2)
     on_sides("Lancet bay", [lancet.mesh("Lancet bay")], x, BACK, sides=[EAST])
     on_sides("Rose bay", [rose.mesh("Rose bay")], 0, BACK, sides=[EAST])
-    frieze, strip, low = Model(scene), Model(scene), TOP - 0.62
+    frieze = Model(scene)
+    strip = Model(scene)
+    low = TOP - 0.62
     arch = arch_outline(0.17, low, TOP - 0.45, 0.17, scene.segments(10))
     frieze.add(panel(WIDTH / 7, low, TOP - 0.1, arch, 0.14), "Brick")
     frieze.add(stones([(-WIDTH / 14, 0.04, low - 0.05, 0.1, 0.14, 0.12)], 0.02), "Limestone")
@@ -68,7 +77,8 @@ def tower(scene: Scene) -> None:
     opening = arch_outline(0.62, BELFRY + 0.5, TOWER_TOP - 1.3, 0.62, scene.segments(20))
     belfry = wall(scene, "Brick", (HALF, BELFRY, TOWER_TOP, 0.45), opening, (0.14, 0.05))
     belfry.add(stones([(0, 0.2, BELFRY + 0.47, 1.5, 0.62, 0.08)], 0.015), "Limestone")
-    bay, trim = belfry.mesh("Belfry bay"), tower_side(scene).mesh("Tower side")
+    bay = belfry.mesh("Belfry bay")
+    trim = tower_side(scene).mesh("Tower side")
     x = np.arange(PITCH / 2 - ROOF_HALF, ROOF_HALF, PITCH)
     rows = np.round((ROOF_HALF - np.abs(x)) / (EXPOSED * np.cos(ROOF_SLOPE)))
     x, rows = x[rows > 0], rows[rows > 0]
@@ -83,7 +93,8 @@ def tower(scene: Scene) -> None:
 
 def tower_side(scene: Scene) -> Model:
     """What each side has, facing −Y: strings, quoins, a clock, and the tiles on a hip."""
-    model, clock = Model(scene), (0, -HALF, 11.1)
+    model = Model(scene)
+    clock = (0, -HALF, 11.1)
     for z, out, height in ((9.9, 0.07, 0.14), (BELFRY, 0.12, 0.2), (TOWER_TOP - 0.1, 0.14, 0.16)):
         string = [(0, -HALF, z, 2 * HALF + 2 * out, 2 * out, height)]
         model.add(stones(string, 0.03), "Limestone")
@@ -103,7 +114,9 @@ def tower_side(scene: Scene) -> Model:
 
 def core(scene: Scene) -> Model:
     """What the tower has but once: its shaft, the bell, the roof's boards, and a cross."""
-    model, yoke, summit = Model(scene), (0, 0, BELFRY + 2.3), (0, 0, TOWER_TOP + ROOF_HEIGHT - 0.05)
+    model = Model(scene)
+    yoke = (0, 0, BELFRY + 2.3)
+    summit = (0, 0, TOWER_TOP + ROOF_HEIGHT - 0.05)
     model.add(box((2 * HALF, 2 * HALF, BELFRY)), "Brick", (0, 0, BELFRY / 2))
     clapper = scene.tube("0 0 -0.5, 0 0 -0.9, 0 0 -1.25", [0.02, 0.03, 0.08])
     model.add(join([scene.lathe(BELL, 28), clapper]), "Bronze", yoke)

@@ -20,9 +20,14 @@ CELL = (LAWN - CROSS_PATH) / CELLS
 def paving(scene: Scene) -> None:
     """The paths by the arcades and to the well, its plaza, the walks' floors, and bare earth."""
     scene.add("Ground", grid([-120, 120], [-120, 120], -0.03), "Dry earth")
-    random, paths, plaza = scene.random("paving"), Model(scene), Model(scene)
-    coarser, outer = min(1.0, scene.detail) ** -0.5, ARCADE - 0.25
-    slab, tile, far = (0.52 * coarser, 0.41), (0.3 * coarser, 0.3), BACK + 0.1
+    random = scene.random("paving")
+    paths = Model(scene)
+    plaza = Model(scene)
+    coarser = min(1.0, scene.detail) ** -0.5
+    outer = ARCADE - 0.25
+    slab = (0.52 * coarser, 0.41)
+    tile = (0.3 * coarser, 0.3)
+    far = BACK + 0.1
     paths.add(slabs(random, (-outer, LAWN, LAWN, outer), slab, 0.015), "Paving")
     paths.add(slabs(random, (-CROSS_PATH, CROSS_PATH, PLAZA - 0.1, LAWN), slab, 0.015), "Paving")
     paths.add(slabs(random, (-far, outer, outer, far), tile, WALK_FLOOR), "Terracotta floor")
@@ -53,7 +58,9 @@ def slabs(random: Generator, area: Sequence[float], size: Sequence[float], top: 
 
 def lawns(scene: Scene) -> None:
     """Turf and grass; the corner of each lawn next to the well is cut round."""
-    random, lawn, along = scene.random("lawns"), Model(scene), np.linspace(CROSS_PATH, LAWN, 25)
+    random = scene.random("lawns")
+    lawn = Model(scene)
+    along = np.linspace(CROSS_PATH, LAWN, 25)
     x, y = np.meshgrid(along, along)
     bumps = 0.012 * noise(xyz(x, y) * 1.5, scene.seed) - 0.01
     lawn.add(grid(along, along, np.where(np.hypot(x, y) < PLAZA - 0.2, -0.1, bumps)), "Turf")
@@ -67,23 +74,24 @@ def lawns(scene: Scene) -> None:
         lawn.add(blocks(xyz(run, line), (length - 0.01, 0.1, 0.14)), "Limestone")
         lawn.add(blocks(xyz(line, run), (0.1, length - 0.01, 0.14)), "Limestone")
     on_sides("Lawn", [lawn.mesh("Lawn")])
-    patches, count = [], scene.count(150)
+    patches = []
+    count = scene.count(150)
     for _ in range(6):  # squares of grass, with a daisy here and there
         foot = xyz(*random.uniform(-CELL / 2, CELL / 2, (2, count)), -0.01)
-        forward, up = (
-            random.normal(0, (1, 1, 0), (count, 3)),
-            random.normal((0, 0, 1), 0.3, (count, 3)),
-        )
+        forward = random.normal(0, (1, 1, 0), (count, 3))
+        up = random.normal((0, 0, 1), 0.3, (count, 3))
         parts = [
             copies(blade(0.055, 3, 0.35), foot, forward, up, random.uniform(0.035, 0.085, count))
         ]
         for _ in range(random.integers(2)):
-            petals, middle = polar(1, np.arange(8) * np.pi / 4, 0.25), foot[0] + (0, 0, 0.08)
+            petals = polar(1, np.arange(8) * np.pi / 4, 0.25)
+            middle = foot[0] + (0, 0, 0.08)
             parts.append(
                 copies(folded_leaf(0.5), middle + 0 * petals, petals, size=0.013).painted(1)
             )
         patches.append(scene.mesh("Grass", join(parts), "Grass", "Daisy", smooth=False))
     x, y = CROSS_PATH + (np.indices((CELLS, CELLS)).reshape(2, -1) + 0.5) * CELL
     x, y = np.stack([x, y])[:, np.hypot(x, y) > PLAZA + 0.3]
-    turn, size = 90 * random.integers(4, size=len(x)), random.uniform(0.95, 1.15, len(x))
+    turn = 90 * random.integers(4, size=len(x))
+    size = random.uniform(0.95, 1.15, len(x))
     on_sides("Grass", patches, x, y, 0, turn, size)

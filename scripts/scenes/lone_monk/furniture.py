@@ -52,7 +52,8 @@ def well(scene: Scene) -> None:
     pulley = (0, 0, 2.42)
     wheel = scene.lathe("0.02 -0.03, 0.12 -0.03, 0.09 0, 0.12 0.03, 0.02 0.03")
     model.add(upright(wheel), "Wood", pulley)
-    over, coil = np.linspace(np.pi, 0, 9), np.linspace(0, 8 * np.pi, scene.segments(90))
+    over = np.linspace(np.pi, 0, 9)
+    coil = np.linspace(0, 8 * np.pi, scene.segments(90))
     model.add(upright(scene.tube(polar(0.1, over), 0.013, 6)), "Rope", pulley)
     for path in (TAUT, SLACK):
         model.add(scene.bend(path, 0.013, 12, 6), "Rope")
@@ -88,8 +89,10 @@ def benches(scene: Scene) -> None:
 
 def lanterns(scene: Scene) -> None:
     """Lanterns of iron with a candle, hung under the vaults' bosses."""
-    model, around = Model(scene), polar(0.11, np.arange(6) * np.pi / 3)
-    roof, plate = scene.lathe("0.13 -0.82, 0.02 -0.7", 6), scene.lathe("0.11 -1.14, 0.12 -1.12", 6)
+    model = Model(scene)
+    around = polar(0.11, np.arange(6) * np.pi / 3)
+    roof = scene.lathe("0.13 -0.82, 0.02 -0.7", 6)
+    plate = scene.lathe("0.11 -1.14, 0.12 -1.12", 6)
     bars = copies(scene.tube("0 0 -1.12, 0 0 -0.82", 0.008, 4), around)
     model.add(join([scene.tube("0 0 0, 0 0 -0.7", 0.008, 5), roof, plate, bars]), "Iron")
     model.add(scene.lathe("0.03 -1.12, 0.03 -0.97", 8), "Daisy")
@@ -107,7 +110,9 @@ def jars(scene: Scene) -> None:
 
 def chair(scene: Scene) -> None:
     """A ladder-back chair on the lawn with a book on it."""
-    model, book, turn = Model(scene), (0.03, -0.03, 0.468), (0, 0, 23)
+    model = Model(scene)
+    book = (0.03, -0.03, 0.468)
+    turn = (0, 0, 23)
     model.add(stones(CHAIR_BOARDS, 0.006), "Wood")
     for radius, *ends in points(CHAIR_STICKS):
         model.add(scene.tube(np.reshape(ends, (2, 3)), radius), "Wood")
@@ -118,7 +123,8 @@ def chair(scene: Scene) -> None:
 
 def broom(scene: Scene) -> None:
     """A broom against a column."""
-    random, model = scene.random("broom"), Model(scene)
+    random = scene.random("broom")
+    model = Model(scene)
     model.add(scene.tube("0 0 0.32, 0 0.16 0.9, 0 0.32 1.5", 0.013, 6), "Wood")
     foot = random.normal((0, 0, 0.33), (0.02, 0.02, 0), (90, 3))
     down = random.normal((0, -0.25, -1), (0.22, 0.12, 0), (90, 3))

@@ -66,7 +66,8 @@ def hood(scene: Scene) -> Shape:
     around = np.linspace(0, 2 * np.pi, scene.segments(28, 8) + 1)
     back = np.linspace(np.radians(50), np.pi, 12)[:, None]
     pointed = np.clip((back - 2.2) / (np.pi - 2.2), 0, 1) ** 2
-    y, z = 0.14 * np.sin(back) * np.cos(around), 0.175 * np.sin(back) * np.sin(around)
+    y = 0.14 * np.sin(back) * np.cos(around)
+    z = 0.175 * np.sin(back) * np.sin(around)
     shell = xyz(0.19 * np.cos(back) - 0.09 * pointed, y, z - 0.06 * pointed)
     return join([sheet(shell[:, :-1], closed=True), scene.tube(shell[0], 0.014)])
 

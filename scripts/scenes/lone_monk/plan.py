@@ -17,7 +17,9 @@ from scenes.library.scene import place
 from scenes.library.shapes import transform
 
 CENTER = (-1.2, 3.6)  # in the world, so that the rigs at the origin stand beside the well
-BAY, BAYS = 2.2, 7  # of each arcade, from column to column; the middle one is the gate
+# of each arcade, from column to column; the middle one is the gate
+BAY = 2.2
+BAYS = 7
 ARCADE = BAY * BAYS / 2  # axis of the arcade's wall
 ARCADE_WALL = 0.5
 WALK = 2.7  # clear width of the vaulted walks

@@ -26,12 +26,14 @@ POT = "0.12 0, 0.175 0.27, 0.195 0.27, 0.2 0.33, 0.175 0.33, 0.165 0.27"
 
 def olive_tree(scene: Scene) -> None:
     """An old olive on the north-western lawn: a gnarled trunk, crooked limbs, silvery leaves."""
-    random, tree = scene.random("olive"), Model(scene)
+    random = scene.random("olive")
+    tree = Model(scene)
     wood, twigs = branches(scene, random, OLIVE)
     at = wood.vertices
     gnarls = 0.25 * noise(at * (5, 5, 1.6), 1) * smoothstep(1.3, 0.9, at[:, 2])
     tree.add(wood.reshaped(at * (1 + xyz(gnarls, gnarls, 0))), "Bark")
-    leaf, count = folded_leaf(0.24), scene.count(320)
+    leaf = folded_leaf(0.24)
+    count = scene.count(320)
     tree.add(leaves_on(random, twigs, leaf, count, (0.05, 0.07), 0.1, 0.09), "Olive leaf")
     place("Olive", tree.mesh("Olive"), plan.side(NORTH, (-3.5, 3.5, 0)))
 
@@ -43,8 +45,11 @@ def flame(t: Array) -> Array:
 
 def cypresses(scene: Scene) -> None:
     """A slim cypress on the north-eastern lawn, and tall ones beyond the western wall."""
-    random, count, tree = scene.random("cypresses"), scene.count(16000), Model(scene)
-    t, around = random.random(count) ** 1.25, random.uniform(0, 2 * np.pi, count)
+    random = scene.random("cypresses")
+    count = scene.count(16000)
+    tree = Model(scene)
+    t = random.random(count) ** 1.25
+    around = random.uniform(0, 2 * np.pi, count)
     lumps = 1 + 0.25 * noise(polar(1.3, around, 9 * t), scene.seed)
     radius = 0.52 * flame(t) * lumps * (1 - 0.25 * random.random(count) ** 2)
     forward = polar(0.4, around, 1) + random.normal(0, 0.25, (count, 3))
@@ -61,14 +66,19 @@ def cypresses(scene: Scene) -> None:
 
 def ivy(scene: Scene) -> None:
     """Ivy that climbs the south-western pier, spreads over two bays, and hangs from the eaves."""
-    random, count, model = scene.random("ivy"), scene.count(26000), Model(scene)
+    random = scene.random("ivy")
+    count = scene.count(26000)
+    model = Model(scene)
     from_pier = random.random(count) ** 1.4
-    x, z = ARCADE - 4.6 * from_pier, random.uniform(0.0, ARCADE_TOP - 0.1, count)
+    x = ARCADE - 4.6 * from_pier
+    z = random.uniform(0.0, ARCADE_TOP - 0.1, count)
     from_axis = np.abs((x - ARCADE) / BAY % 1 - 0.5) * BAY
     in_arch = (z > 0.62) & (np.hypot(from_axis, np.maximum(z - plan.SPRINGING, 0)) < 0.95)
     thick = 0.9 * noise(xyz(x, 0, z) * 0.9, scene.seed + 5, 3) + 0.13 * z - 0.95 * from_pier
     grows = (thick > -0.2) & ~in_arch
-    x, z, count = x[grows], z[grows], int(grows.sum())
+    x = x[grows]
+    z = z[grows]
+    count = int(grows.sum())
     spots = xyz(x, ivy_face(x, z) - random.uniform(0.01, 0.10, count), z)
     forward = random.normal((0, -0.4, -1), (0.7, 0.2, 0), (count, 3))
     up = random.normal((0, -1, 0.4), (0.3, 0, 0.3), (count, 3))
@@ -89,7 +99,8 @@ def ivy_face(x: Array, z: Array) -> Array:
 
 def geraniums(scene: Scene) -> None:
     """Pots of geraniums beside the gates, and smaller ones on the low walls."""
-    random, pots = scene.random("geraniums"), []
+    random = scene.random("geraniums")
+    pots = []
     for _ in range(3):
         model = Model(scene)
         model.add(scene.lathe(POT, capped=False), "Pot")
@@ -112,7 +123,9 @@ def geraniums(scene: Scene) -> None:
 
 def shrubs(scene: Scene) -> None:
     """Clipped box balls at the lawns' corners, and lavender along the sunny kerbs."""
-    random, balls, spots = scene.random("shrubs"), [Model(scene), Model(scene)], points(BOX_BALLS)
+    random = scene.random("shrubs")
+    balls = [Model(scene), Model(scene)]
+    spots = points(BOX_BALLS)
     for ball in balls:
         ball.add(leaf_cloud(random, scene.count(3000), 0.33, 0.038, 0.65), "Box leaf")
         ball.add(icosphere(2, 0.27), "Turf")
@@ -124,7 +137,8 @@ def shrubs(scene: Scene) -> None:
         plan.on_sides("Box ball", meshes, x, y, 0.3, 50 * size, size, sides=[number])
     bushes = []
     for _ in range(2):
-        model, count = Model(scene), scene.count(100)
+        model = Model(scene)
+        count = scene.count(100)
         out = directions(random, scene.count(350))
         out[:, 2] = np.abs(out[:, 2]) + 0.3
         model.add(leaves_at(random, out * (0.06, 0.06, 0.02), out, 0.26, 0.07), "Olive leaf")
@@ -136,17 +150,20 @@ def shrubs(scene: Scene) -> None:
             model.add(leaves_at(random, lean * (tall + below), forward, 0.032, 0.7), "Lavender")
         bushes.append(model.mesh("Lavender"))
     x = np.arange(1.95, LAWN - 0.85, 0.42)
-    size, sunny = random.uniform(0.8, 1.1, len(x)), (NORTH, EAST, WEST)
+    size = random.uniform(0.8, 1.1, len(x))
+    sunny = (NORTH, EAST, WEST)
     plan.on_sides("Lavender", bushes, x, LAWN - 0.3, 0, 200 * x, size, sides=sunny)
 
 
 def fallen_leaves(scene: Scene) -> None:
     """Dry leaves on the paths and lawns, thicker along the walls."""
-    random, count = scene.random("fallen leaves"), scene.count(1500)
+    random = scene.random("fallen leaves")
+    count = scene.count(1500)
     inwards = random.random((2, count)) ** 1.7
     x, y = (ARCADE - 0.4) * (1 - inwards) * random.choice([-1, 1], (2, count))
     at = xyz(x, y, random.uniform(0.022, 0.03, count))[np.hypot(x, y) > 1.6]
     forward = random.normal((0, 0, 0.2), (1, 1, 0.1), at.shape)
-    up, size = random.normal((0, 0, 1), 0.3, at.shape), random.uniform(0.04, 0.075, len(at))
+    up = random.normal((0, 0, 1), 0.3, at.shape)
+    size = random.uniform(0.04, 0.075, len(at))
     shape = copies(folded_leaf(0.55), at, forward, up, size)
     scene.add("Fallen leaves", shape, "Dead leaf", matrix=plan.side(NORTH), smooth=False)

@@ -19,14 +19,16 @@ UP = EXPOSED * np.cos(SLOPE)  # from row to row, seen from above
 # the row below, and which side is up.
 TILES = f"0.09 0.072 0 0.11 0.035 1, 0.074 0.088 {PITCH / 2} 0.13 0.03 -1"
 # A downpipe from the trough: how far towards the pier, and how far below the eaves or above ground.
-PIPE_HEAD, PIPE = "0 -0.05, 0 -0.16, 0.29 -0.5", "0.29 3, 0.29 0.3, 0.23 0.17, 0.13 0.12"
+PIPE_HEAD = "0 -0.05, 0 -0.16, 0.29 -0.5"
+PIPE = "0.29 3, 0.29 0.3, 0.23 0.17, 0.13 0.12"
 
 
 def half_pipe(
     scene: Scene, low: float, high: float, length: float, thick: float, segments: float = 10
 ) -> Shape:
     """A roof tile along y, arched upwards: outer radius low at y = 0 and high at y = length."""
-    count, edge = scene.segments(segments, 2) + 1, 0.06
+    count = scene.segments(segments, 2) + 1
+    edge = 0.06
     outer = circle(low, count, edge, np.pi - edge)
     inner = circle(low - thick, count, np.pi - edge, edge)
     pipe = upright(prism(np.concatenate([outer, inner]), length)).moved(0, length, 0)
@@ -49,11 +51,14 @@ def tile_column(scene: Scene, first: int, rows: int, variant: int) -> bpy.types.
     name = f"Tiles.{first}.{rows}.{variant}"
     if name in bpy.data.meshes:
         return bpy.data.meshes[name]
-    random, row, parts = scene.random(name), np.arange(first, rows), []
+    random = scene.random(name)
+    row = np.arange(first, rows)
+    parts = []
     for low, high, x, z, lift, upwards in points(TILES):
         wobble = random.normal(0, (0.004, 0.008, 0.014, 0.02), (len(row), 4)).T
         at = xyz(x + wobble[0], row * EXPOSED + wobble[1], z)
-        forward, up = xyz(wobble[2], 1, -lift / EXPOSED), xyz(wobble[3], 0, upwards)
+        forward = xyz(wobble[2], 1, -lift / EXPOSED)
+        up = xyz(wobble[3], 0, upwards)
         parts.append(copies(half_pipe(scene, low, high, LENGTH, 0.014, 7), at, forward, up))
     return scene.mesh(name, join(parts), "Roof tile", smooth=SHARP)
 
@@ -75,7 +80,8 @@ def deck(corners: ArrayLike) -> Shape:
 
 def eaves(model: Model, ends: tuple[float, float], y: float, z: float) -> None:
     """The rafters' tails that carry the eaves at y, z, and the fascia before them."""
-    x, length = np.arange(ends[0] + 0.2, ends[1], 0.46), (EAVE_OUT + 0.1) / np.cos(SLOPE)
+    x = np.arange(ends[0] + 0.2, ends[1], 0.46)
+    length = (EAVE_OUT + 0.1) / np.cos(SLOPE)
     tails = blocks(xyz(x, length / 2 + 0.03, -0.105), (0.08, length, 0.09), 0.01)
     model.add(tails, "Wood", (0, y, z), (np.degrees(SLOPE), 0, 0))
     fascia = [(sum(ends) / 2, y + 0.01, z - 0.04, ends[1] - ends[0], 0.03, 0.12)]
@@ -84,8 +90,10 @@ def eaves(model: Model, ends: tuple[float, float], y: float, z: float) -> None:
 
 def lean_to_roofs(scene: Scene) -> None:
     """The tiled roofs over the walks; they meet in valleys over the court's corners."""
-    model, y = Model(scene), FRONT - EAVE_OUT
-    x, rows = np.arange(-BACK + 0.1, BACK, PITCH), round((BACK - y) / UP)
+    model = Model(scene)
+    y = FRONT - EAVE_OUT
+    x = np.arange(-BACK + 0.1, BACK, PITCH)
+    rows = round((BACK - y) / UP)
     first = np.maximum(0, np.ceil((np.abs(x) - y) / UP))
     x, first = x[first < rows], first[first < rows]
     for number in plan.SIDES:
@@ -120,9 +128,14 @@ def house(
 ) -> None:
     """What stands behind an upper wall: its body, gables, tiled slope, ridge, and eaves."""
     model, (left, right), edge = Model(scene), ends, top - 0.02
-    y, middle, length = BACK - EAVE_OUT, (left + right) / 2, right - left
-    ridge_y, ridge_z = y + rows * UP, edge + rows * EXPOSED * np.sin(SLOPE)
-    near, far, far_eave = BACK + 0.42, 2 * ridge_y - BACK, 2 * ridge_y - y
+    y = BACK - EAVE_OUT
+    middle = (left + right) / 2
+    length = right - left
+    ridge_y = y + rows * UP
+    ridge_z = edge + rows * EXPOSED * np.sin(SLOPE)
+    near = BACK + 0.42
+    far = 2 * ridge_y - BACK
+    far_eave = 2 * ridge_y - y
     gable = [(near, 0), (far, 0), (far, top - 0.1), (ridge_y, ridge_z - 0.25), (near, top - 0.1)]
     model.add(prism(gable, length), stuff, (left, 0, 0), (90, 0, 90))
     for x0, x1, eave in ((left - 0.1, right + 0.1, y), (right + 0.1, left - 0.1, far_eave)):

@@ -39,6 +39,7 @@ def swallows(scene: Scene) -> None:
     wing = facets(right, (0, 1, 2, 4), (4, 2, 3))
     tail = facets("-0.07 0 0, -0.19 0.05 0, -0.11 0 0, -0.19 -0.05 0", (0, 1, 2), (0, 2, 3))
     bird = join([body, wing, wing.scaled(1, -1, 1), tail])
-    swallow, random = scene.mesh("Swallow", bird, "Iron", smooth=False), scene.random("swallows")
+    swallow = scene.mesh("Swallow", bird, "Iron", smooth=False)
+    random = scene.random("swallows")
     places = random.uniform((-9, -9, 9, -0.7, -0.3, 0), (9, 9, 19, 0.7, 0.3, 6.0), (14, 6))
     scatter("Swallow", [swallow], (side(NORTH) @ transform(p[:3], p[3:], 1.3) for p in places))

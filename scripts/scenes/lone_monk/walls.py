@@ -41,7 +41,8 @@ def wall(
 def glaze(model: Model, opening: Array, y: float, bars: int, stuff: str) -> None:
     """Put a pane into an opening at depth y, with a lattice before it."""
     (left, low), (right, high) = opening.min(0), opening.max(0)
-    x, z = np.linspace(left, right, bars + 2)[1:-1], np.arange(low + 0.25, high - 0.1, 0.25)
+    x = np.linspace(left, right, bars + 2)[1:-1]
+    z = np.arange(low + 0.25, high - 0.1, 0.25)
     model.add(filled(opening, y), "Glass")
     posts = blocks(xyz(x, y - 0.03, (low + high) / 2), (0.02, 0.025, high - low), 0.003)
     model.add(join([posts, blocks(xyz(0, y - 0.03, z), (right - left, 0.025, 0.02), 0.003)]), stuff)
@@ -77,7 +78,9 @@ def back_walls(scene: Scene) -> None:
         for i, x in enumerate(plan.BAY_AXES):
             bay = bays[i in (3, number * 2 % 7)]
             on_sides(f"Wall.{i}", [bay], x, BACK, sides=[number])
-    ends, width, top = Model(scene), BACK - ARCADE, LEAN_TO_TOP
+    ends = Model(scene)
+    width = BACK - ARCADE
+    top = LEAN_TO_TOP
     for x in (-ARCADE - width / 2, ARCADE + width / 2):
         ends.add(box((width, BACK_WALL, top)), "Whitewash", (x, BACK + BACK_WALL / 2, top / 2))
     ends.add(stones([(0, BACK - 0.02, WALK_FLOOR + 0.1, 2 * BACK, 0.06, 0.2)]), "Limestone")
@@ -86,7 +89,8 @@ def back_walls(scene: Scene) -> None:
 
 def upper_storeys(scene: Scene) -> None:
     """The storeys above the walks in the north and south, with shutters at their windows."""
-    hole, bays = arch_outline(*UPPER_WINDOW, scene.segments(16)), 8
+    hole = arch_outline(*UPPER_WINDOW, scene.segments(16))
+    bays = 8
     width = 2 * BACK / bays
     slat = box((0.34, 0.01, 0.05)).transformed(transform(rotation=(0.6, 0, 0)))
     slats = copies(slat, xyz(0, 0, np.linspace(-0.28, 0.28, 14)))
@@ -108,7 +112,9 @@ def upper_storeys(scene: Scene) -> None:
 
 def west_wall(scene: Scene) -> None:
     """The low western wall, over which the sun comes in, under a row of ridge tiles."""
-    model, y, z = Model(scene), BACK + BACK_WALL / 2, LEAN_TO_TOP + 0.2
+    model = Model(scene)
+    y = BACK + BACK_WALL / 2
+    z = LEAN_TO_TOP + 0.2
     model.add(box((2 * BACK + 1, BACK_WALL, 0.4)), "Plaster", (0, y, z - 0.1))
     coping = ridge(scene, (-BACK - 0.3, BACK + 0.3), 0.28)
     model.add(coping, "Roof tile", (0, y, z + 0.1), scale=(1, 1, 0.55))

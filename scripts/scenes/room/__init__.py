@@ -18,7 +18,8 @@ PAINTS = """sphere 0.7 0.15 0.1 0.6, torus 0.1 0.5 0.2 0.6, pillar 0.75 0.7 0.6 
 
 def build(parameters: Mapping[str, Any]) -> None:
     """Fill the empty scene; the room has nothing random, so the parameters change nothing."""
-    scene, walls = Scene(0, 1.0), box(SIZE)
+    scene = Scene(0, 1.0)
+    walls = box(SIZE)
     plains(PAINTS)
     graph = MaterialGraph("walls")  # checks 0.5 m wide
     tints = {"Color1": (0.75, 0.72, 0.68), "Color2": (0.35, 0.42, 0.5)}

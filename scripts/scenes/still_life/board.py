@@ -34,8 +34,11 @@ def board(scene: Scene) -> None:
 
 def cloth(scene: Scene) -> None:
     """Striped linen that lies under the bowl and hangs over the board's edge in folds."""
-    start, along = np.array([0.05, 0.02]), unit([0.42, -0.9])
-    width, bend, across = 0.21, 0.012, np.array([along[1], -along[0]])
+    start = np.array([0.05, 0.02])
+    along = unit([0.42, -0.9])
+    width = 0.21
+    bend = 0.012
+    across = np.array([along[1], -along[0]])
     s = np.linspace(0, 0.47, scene.segments(150, 24))[:, None]
     v = np.linspace(-width / 2, width / 2, scene.segments(84, 14))
     on_top = start + v[:, None] * across
@@ -62,7 +65,8 @@ def cloth(scene: Scene) -> None:
 
 def pearls(scene: Scene) -> None:
     """Pearls on a thread, each a little larger towards the middle of the string."""
-    path, count = smooth_path(STRING, 400), 52
+    path = smooth_path(STRING, 400)
+    count = 52
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     radius = 0.0037 + 0.0012 * np.sin(np.linspace(0, np.pi, count))
     x, y = (np.interp(np.linspace(0, length[-1], count), length, axis) for axis in path.T)

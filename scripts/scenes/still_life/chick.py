@@ -28,7 +28,9 @@ STEPS = 6
 def chick(scene: Scene) -> None:
     """Its hairs point outwards, backwards and down, each a little curled."""
     matrix = transform((-0.105, -0.145, 0), (0, 0, np.radians(-22)))
-    model, found, t = Model(scene), [], np.linspace(0, 1, STEPS)[:, None]
+    model = Model(scene)
+    found = []
+    t = np.linspace(0, 1, STEPS)[:, None]
     model.lathe(
         profile=[(0.0052, 0), (0.0044, 0.005), (0.0018, 0.0105), (0.0003, 0.0135)],
         at=(0, -0.0452, 0.089),
@@ -42,7 +44,8 @@ def chick(scene: Scene) -> None:
             model.add(scene.bend(points(path) * (side, 1, 1), radius, 14, 10), "Beak")
     for middle, axes, full, length in PARTS:
         model.add(scene.ball(1.0, 32), "Skin", middle, scale=axes)
-        random, count = scene.random(f"down {middle}"), scene.count(full, 60)
+        random = scene.random(f"down {middle}")
+        count = scene.count(full, 60)
         outward = unit(random.normal(size=(count, 3)))
         normal = unit(outward / axes)
         lean = unit(normal + (0, 0.55, -0.45) + 0.28 * random.normal(size=(count, 3)))

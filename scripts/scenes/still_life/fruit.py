@@ -63,7 +63,8 @@ def _leaf(scene: Scene) -> Shape:
     lobes = 0.62 + 0.26 * np.cos(5 * angle / 1.18) + 0.04 * np.cos(31 * angle)
     edge = lobes * (1 - 0.75 * np.exp(-((np.abs(angle) - np.pi) ** 2) / 0.03))
     s = np.linspace(0.02, 1, scene.segments(14, 5))[:, None]
-    x, y = s * edge * np.sin(angle), s * edge * np.cos(angle)
+    x = s * edge * np.sin(angle)
+    y = s * edge * np.cos(angle)
     z = 0.05 * np.cos(5 * angle / 1.18) * s - 0.22 * s**2
     return sheet(xyz(x, y + 0.1, z)[:, ::-1])
 

@@ -90,7 +90,8 @@ def _lid_and_handle(kettle: Model) -> None:
 
 
 def carafe(scene: Scene) -> None:
-    outside, matrix = smooth_path(CARAFE, scene.segments(60, 12)), transform((0.135, 0.125, 0))
+    outside = smooth_path(CARAFE, scene.segments(60, 12))
+    matrix = transform((0.135, 0.125, 0))
     scene.add("Carafe", scene.lathe(_wall(outside, 0.0022), 88), "Glass", matrix=matrix)
     wine = _wine(outside, 0.0022, 0.083)
     scene.add("Wine in the carafe", scene.lathe(wine, 72), "Wine", matrix=matrix)
@@ -98,7 +99,8 @@ def carafe(scene: Scene) -> None:
 
 def wineglass(scene: Scene) -> None:
     """A stem of glass, and a cup with some wine."""
-    cup, matrix = smooth_path(GLASS_CUP, scene.segments(40, 10)), transform((0.215, 0.02, 0))
+    cup = smooth_path(GLASS_CUP, scene.segments(40, 10))
+    matrix = transform((0.215, 0.02, 0))
     body = np.concatenate([points(GLASS_FOOT), cup[1:2], _wall(cup[2:], 0.0011)])
     scene.add("Wine glass", scene.lathe(body, 72), "Glass", matrix=matrix)
     wine = _wine(cup[2:], 0.0011, 0.1)
@@ -137,7 +139,9 @@ def candle(scene: Scene) -> None:
         radii = np.interp(drip[:, 2], heights, [0.0026, 0.0021, 0.0012])
         model.add(scene.tube(drip, radii, 8), "Wax")
         model.add(scene.ball(0.0026, 10), "Wax", drip[-1])
-    mesh, x, y = model.mesh("Candle", np.radians(60)), 0.005, 0.2
+    mesh = model.mesh("Candle", np.radians(60))
+    x = 0.005
+    y = 0.2
     place("Candle", mesh, transform((x, y, 0), (0, 0, 0.9)))
     point_light("Candle light", (x, y, 0.186), 0.8, (1.0, 0.58, 0.24), 0.006)
 

@@ -1,4 +1,4 @@
-"""What every lens is: two inverse methods, and how it is read from each of three places.
+"""The base classes of lenses: pixels to rays and back, and how lenses are read and written.
 
 The camera looks along −Z with +Y up and +X right. Pixel coordinates run right (x) and down (y)
 from the image's top left corner, pixel centres at (i + 0.5). θ is a ray's angle from the optical
@@ -6,17 +6,16 @@ axis, r the distance from the principal point. Conventions are those of Blender'
 on its Position pass with bpy 5.0.1:
 
 - equidistant: on a non-square image the image circle is an ellipse that touches all four edges;
-  the sensor plays no part. The other lenses given by a field of view alone follow suit here.
+  the sensor plays no part. So do the other lenses that a field of view alone describes.
 - equisolid and polynomial: r is in millimetres on the sensor, so circles stay circles when the
   sensor's pixels are square.
-- polynomial: θ = −(k0 + k1 r + k2 r² + k3 r³ + k4 r⁴), so a usual lens has k1 < 0, and k1 > 0
-  turns the image by 180°.
+- polynomial: θ = −(k0 + k1 r + k2 r² + k3 r³ + k4 r⁴). A usual lens has k1 < 0; k1 > 0 turns the
+  image by 180°.
 - equirectangular: longitude grows to the right, latitude upwards, (0, 0) is the optical axis.
 
-Arithmetic follows the input: float32 in, float32 out, anything else float64. NaN marks what a
-lens cannot do: a pixel without a ray (outside the image circle), a ray that the lens does not see.
-The image's frame is not part of a lens: both methods extend beyond it, and a caller that reads
-pixels has to check that they lie in [0, width] × [0, height].
+float32 input gives float32 output; all other input gives float64. NaN marks a pixel without a ray,
+which lies outside the image circle, and a ray that the lens does not see. A lens extends beyond the
+image's frame: a caller that reads pixels must check that they lie in [0, width] × [0, height].
 """
 
 import math
@@ -41,7 +40,7 @@ SENSOR_WIDTH = 36.0  # mm, Blender's default
 ANGLE_SLACK = 1e-6
 
 LENSES: dict[str, "type[Lens]"] = {}
-"""Every lens, by its name."""
+"""All lenses by their names."""
 
 Pixels = Annotated[int, Field(ge=1, le=65536)]
 Place = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -50,9 +49,9 @@ FocalLength = Annotated[Millimetres, Field(description="Millimetres.")]
 
 
 class LensSettings(Settings):
-    """One camera's lens and image, as a scene YAML has them; each lens adds its own keys.
+    """A camera's lens and image in a scene YAML. Each lens adds its own keys.
 
-    What the schema cannot say is for the lens itself to check, with errors of the form
+    The lens itself checks what the schema cannot say. Its errors have the form
     ``key: what is wrong``.
     """
 
@@ -90,7 +89,7 @@ class LensSettings(Settings):
         )
 
     def optics(self) -> dict[str, Any]:
-        """Return the lens's own parameters, in its units: mm and radians."""
+        """Return the lens's own parameters, in mm and radians."""
         raise NotImplementedError
 
 
@@ -101,15 +100,15 @@ class Lens(ABC):
     ``sensor_size`` is in mm (default: 36 wide, square pixels), ``principal_point`` in pixels
     (default: the image's centre).
 
-    Beside its geometry a lens's class says what it is called and how it is read:
+    A lens's class has names and settings, too:
 
-    - ``name``: in a scene YAML, and as a flag of a command;
-    - ``title``: in words;
-    - ``camera_types``: its ``panorama_type`` in lightfield.json, for a perspective camera its
-      ``type``; the first is written, any of them is read;
-    - ``in_cycles``: whether Cycles renders it, else it is reached by reprojection;
-    - ``Settings``: its keys in a scene YAML, or None if it is no lens for one;
-    - ``form``: the numbers of its flag, in mm and radians, optional ones in brackets.
+    - ``name``: its name in a scene YAML, and its flag of a command;
+    - ``title``: its name for people;
+    - ``camera_types``: its ``panorama_type`` in lightfield.json, or its ``type`` for a perspective
+      camera. The first is written, all are read;
+    - ``in_cycles``: whether Cycles renders it. Reprojection makes views of the others;
+    - ``Settings``: its keys in a scene YAML, or None if a scene YAML cannot have it;
+    - ``form``: the numbers of its flag, in mm and radians. Those in brackets are optional.
     """
 
     name: ClassVar[str]
@@ -148,7 +147,7 @@ class Lens(ABC):
 
     @property
     def description(self) -> str:
-        """The projection and its field of view in words."""
+        """The projection and its field of view, for people."""
         return self.title
 
     @property
@@ -158,12 +157,12 @@ class Lens(ABC):
 
     @property
     def usual_depth(self) -> str:
-        """What depth is written as: "z" where the lens can have that, or else "distance"."""
+        """The depth that views store by default: "z" if all rays have it, or else "distance"."""
         return "z" if self.has_z_depth else "distance"
 
     @property
     def mirrors(self) -> tuple[bool, bool]:
-        """Whether its lower half mirrors the upper one, and its right half the left one."""
+        """Whether the lower half mirrors the upper half, and the right half the left half."""
         return False, False
 
     def rays(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Array:
@@ -172,14 +171,14 @@ class Lens(ABC):
         NaN where the lens has no ray.
         """
         x, y = _as_float(x, y)
-        # One dimension at least, for numpy computes with scalars in float64.
+        # At least one dimension, because numpy computes with scalars in float64.
         rays = self._rays(np.atleast_1d(x), np.atleast_1d(y))
         return rays.astype(x.dtype, copy=False).reshape(*np.broadcast_shapes(x.shape, y.shape), 3)
 
     def pixels(self, rays: npt.ArrayLike) -> Array:
         """Return the pixel coordinates (..., 2) of ``rays`` (..., 3) of any length above zero.
 
-        NaN where the lens does not see the ray; what it sees may lie outside the frame.
+        NaN where the lens does not see the ray. Coordinates may lie outside the frame.
         """
         (array,) = _as_float(rays)
         pixels = self._pixels(np.atleast_2d(array)).astype(array.dtype, copy=False)
@@ -195,14 +194,14 @@ class Lens(ABC):
 
     @abstractmethod
     def _rays(self, x: Array, y: Array) -> Array:
-        """Return `rays` of arrays of one dtype that broadcast against each other."""
+        """Return the unit `rays` of arrays that have one dtype and broadcast against each other."""
 
     @abstractmethod
     def _pixels(self, rays: Array) -> Array:
-        """Return `pixels` of an array; NaN or inf in either coordinate marks a miss."""
+        """Return the `pixels` of an array. NaN or inf in one coordinate marks a miss."""
 
     def resized(self, width: int, height: int) -> Self:
-        """Return the lens of the same field of view with another number of pixels."""
+        """Return the lens with the same field of view and another number of pixels."""
         center = self.principal_point and (
             self.principal_point[0] * width / self.width,
             self.principal_point[1] * height / self.height,
@@ -213,8 +212,8 @@ class Lens(ABC):
 
     def fitted(self, side: int) -> Self:
         """Return the lens at a resolution whose longer side is at most ``side``."""
-        part = min(1.0, side / max(self.width, self.height))
-        return self.resized(max(1, round(self.width * part)), max(1, round(self.height * part)))
+        scale = min(1.0, side / max(self.width, self.height))
+        return self.resized(max(1, round(self.width * scale)), max(1, round(self.height * scale)))
 
     def to_lightfield(self) -> dict[str, Any]:
         """Return ``camera``, ``resolution`` and ``sensor_size`` as lightfield.json has them."""
@@ -234,15 +233,15 @@ class Lens(ABC):
         return {}
 
     def settings(self) -> dict[str, Any]:
-        """Return the ``camera`` with which a scene YAML has this lens."""
+        """Return the mapping ``camera`` that describes this lens in a scene YAML."""
         camera: dict[str, Any] = {"lens": self.name, "resolution": [self.width, self.height]}
         for field in fields(self):
             value = getattr(self, field.name)
             if value is None or field.name in ("width", "height"):
                 continue
-            angles = field.name in ("fov", "longitude", "latitude")
+            is_angle = field.name in ("fov", "longitude", "latitude")
             values = value if isinstance(value, tuple) else (value,)
-            numbers = [_degrees(number) if angles else number for number in values]
+            numbers = [_degrees(number) if is_angle else number for number in values]
             camera[field.name] = numbers if isinstance(value, tuple) else numbers[0]
         return camera
 
@@ -250,14 +249,14 @@ class Lens(ABC):
     def read(cls, camera: Mapping[str, Any], image: Mapping[str, Any]) -> Self:
         """Return the lens of a ``camera`` mapping of lightfield.json.
 
-        ``image`` holds the fields that all lenses have, as far as the file has them. A missing
-        key is a KeyError, a wrong value a TypeError, ValueError or `UserError`.
+        ``image`` holds the fields that all lenses share, if the file has them. Raises KeyError for
+        a missing key, and TypeError, ValueError or `UserError` for a wrong value.
         """
         return cls(**image, **cls._from_camera(camera))
 
     @classmethod
     def _from_camera(cls, camera: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the lens's own parameters that `_to_camera` wrote, or one of SILVR's tools."""
+        """Return the lens's own parameters, as `_to_camera` or SILVR's tools wrote them."""
         return {}
 
     @classmethod
@@ -267,7 +266,7 @@ class Lens(ABC):
 
     @classmethod
     def from_flag(cls, text: str, width: int, height: int) -> Self:
-        """Return the lens of the numbers of its flag; raises `UserError`."""
+        """Return the lens of its flag's numbers. Raises `UserError` if they have another form."""
         assert cls.form is not None
         numbers = named_numbers(text, cls.form)
         sensor = numbers.pop("SENSOR_WIDTH", None)
@@ -276,17 +275,17 @@ class Lens(ABC):
 
     @classmethod
     def _from_flag(cls, numbers: Mapping[str, float]) -> dict[str, Any]:
-        """Return the lens's own parameters, of its flag's numbers by their names in `form`."""
+        """Return the lens's own parameters, from its flag's numbers by their names in `form`."""
         return {name.lower(): number for name, number in numbers.items()}
 
 
 class RadialLens(Lens):
-    """A lens whose r depends on θ alone; r is counted in the unit of `_unit`."""
+    """A lens whose r depends on θ alone. r is in the units of `_unit`."""
 
     @property
     @abstractmethod
     def _unit(self) -> Pair:
-        """The units of r that a pixel's width and height make."""
+        """A pixel's width and height, in the unit of r."""
 
     @property
     @abstractmethod
@@ -299,7 +298,7 @@ class RadialLens(Lens):
 
     @abstractmethod
     def _radius(self, sin: Array, cos: Array) -> Array:
-        """Return r of θ, in which ``sin`` ≥ 0; NaN where there is none."""
+        """Return r at θ, given as sin θ ≥ 0 and cos θ. NaN where the lens has none."""
 
     def _rays(self, x: Array, y: Array) -> Array:
         u = (x - self.center[0]) * self._unit[0]
@@ -307,18 +306,19 @@ class RadialLens(Lens):
         r = np.hypot(u, v)
         with np.errstate(invalid="ignore", divide="ignore"):
             sin, cos = self._sin_cos(r)
-            # Plane by plane, which numpy fills much faster than vector by vector.
+            # One plane after the other: numpy fills these much faster than vectors.
             ray = np.stack([sin * (u / r), sin * (v / r), -cos])
             # The azimuth at r = 0 matters only where θ(0) ≠ 0: there Cycles takes "up".
             axis = r == 0
-            ray[0, axis], ray[1, axis] = 0, sin[axis]
+            ray[0, axis] = 0
+            ray[1, axis] = sin[axis]
             outside = ~((r <= self._limit * slack(x.dtype)) & np.isfinite(r))
         np.copyto(ray, np.nan, where=outside)
         return np.moveaxis(ray, 0, -1)
 
     def _pixels(self, rays: Array) -> Array:
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            # Scaled by the largest component: no overflow, and NaN for a ray of zero or inf.
+            # Scale by the largest component: no overflow, and NaN for a ray of length 0 or inf.
             x, y, z = np.moveaxis(rays, -1, 0)
             largest = np.maximum(np.maximum(np.abs(x), np.abs(y)), np.abs(z))
             x, y, z = x / largest, y / largest, z / largest
@@ -326,10 +326,12 @@ class RadialLens(Lens):
             length = np.hypot(side, z)
             r = self._radius(side / length, -z / length)
             r = np.where(np.abs(r) <= self._limit * slack(rays.dtype), r, np.nan)
-            u, v = r * (x / side), r * (y / side)
-            # The azimuth of the axis itself matters only backwards: "up" there, too.
+            u = r * (x / side)
+            v = r * (y / side)
+            # The azimuth of the axis matters only behind the camera: "up" there, too.
             axis = side == 0
-            u[axis], v[axis] = 0, r[axis]
+            u[axis] = 0
+            v[axis] = r[axis]
             pixels = np.stack(
                 [self.center[0] + u / self._unit[0], self.center[1] - v / self._unit[1]]
             )
@@ -366,7 +368,7 @@ def fov_up_to(largest: float, default: Any = ...) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class Fisheye(RadialLens):
-    """A lens that sees what is within ``fov`` / 2 radians of its axis."""
+    """A lens that sees up to ``fov`` / 2 radians from its axis."""
 
     largest_fov: ClassVar[float] = 360.0  # degrees
 
@@ -421,7 +423,7 @@ def checked_coefficients(coefficients: Sequence[float], count: int, names: str) 
 
 
 def slack(dtype: np.dtype[Any]) -> float:
-    """Return the factor by which rounding may carry a point on the rim beyond it."""
+    """Return the factor by which rounding may move a point on the rim outwards."""
     return 1.0 + 8.0 * float(np.finfo(dtype).eps)
 
 
@@ -434,9 +436,9 @@ def pair(values: Sequence[float]) -> Pair:
 def named_numbers(text: str, form: str) -> dict[str, float]:
     """Return the comma-separated numbers of ``text`` by their names in ``form``.
 
-    Names in brackets, as B in ``A[,B]``, may be missing; what follows a bar is another form. Angles
-    may end in ``deg``; those of lenses are in radians without it. Raises `UserError` unless
-    ``text`` is of the form.
+    Names in brackets, as B in ``A[,B]``, may be missing. Another form may follow a bar, and is not
+    read. Angles may end in ``deg``; angles of lenses without it are in radians. Raises `UserError`
+    if ``text`` has another form.
     """
     names = re.findall(r"\w+", form.partition("|")[0])
     least = len(re.findall(r"\w+", form.partition("[")[0].partition("|")[0]))
@@ -451,7 +453,7 @@ def named_numbers(text: str, form: str) -> dict[str, float]:
 
 
 def _number(text: str, name: str) -> float:
-    """Return a number that a user wrote for ``name``; raises ValueError."""
+    """Return the number that a user wrote for ``name``. Raises ValueError if it is none."""
     if not text.endswith("deg"):
         return float(text)
     if name in ("FOV", "LONG_MIN", "LONG_MAX", "LAT_MIN", "LAT_MAX"):
@@ -462,13 +464,14 @@ def _number(text: str, name: str) -> float:
 
 
 def _degrees(radians: float) -> float:
-    """Return an angle in degrees, without what Blender's float32 adds to a round one."""
+    """Return an angle in degrees. Rounds off what Blender's float32 adds to a round angle."""
     degrees = math.degrees(radians)
     rounded = round(degrees, 3)
     return rounded if abs(math.radians(rounded) - radians) < ANGLE_SLACK else degrees
 
 
 def _as_float(*arrays: npt.ArrayLike) -> list[Array]:
-    """Return the arrays in float32 if all are, else in float64."""
-    same = all(np.asarray(array).dtype == np.float32 for array in arrays)
-    return [np.asarray(array, np.float32 if same else np.float64) for array in arrays]
+    """Return the arrays in float32 if all of them are, or else in float64."""
+    all_float32 = all(np.asarray(array).dtype == np.float32 for array in arrays)
+    dtype = np.float32 if all_float32 else np.float64
+    return [np.asarray(array, dtype) for array in arrays]

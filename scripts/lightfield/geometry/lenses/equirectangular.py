@@ -72,7 +72,8 @@ class Equirectangular(Lens):
     @property
     def is_full(self) -> bool:
         """Whether it sees the whole sphere, the optical axis in its middle."""
-        given, full = [self.longitude, self.latitude], math.pi * np.array([[-1, 1], [-0.5, 0.5]])
+        given = [self.longitude, self.latitude]
+        full = math.pi * np.array([[-1, 1], [-0.5, 0.5]])
         return bool((np.abs(given - full) <= ANGLE_SLACK).all())
 
     @property
@@ -86,7 +87,8 @@ class Equirectangular(Lens):
         latitude = north - (north - south) * (y / self.height)
         with np.errstate(invalid="ignore"):
             radius = np.maximum(np.cos(latitude), 0)
-            right, ahead = radius * np.sin(longitude), -radius * np.cos(longitude)
+            right = radius * np.sin(longitude)
+            ahead = -radius * np.cos(longitude)
             ray = np.stack([right, np.broadcast_to(np.sin(latitude), right.shape), ahead])
             outside = ~((np.abs(latitude) <= math.pi / 2 + ANGLE_SLACK) & np.isfinite(x))
         np.copyto(ray, np.nan, where=outside)

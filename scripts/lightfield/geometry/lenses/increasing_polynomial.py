@@ -52,11 +52,13 @@ class IncreasingPolynomial:
         active = np.flatnonzero((goal >= self._values[0]) & (goal <= last))
         goal = goal[active]
         upper = np.clip(np.searchsorted(self._values, goal), 1, self._nodes.size - 1)
-        low, high = self._nodes[upper - 1], self._nodes[upper]
+        low = self._nodes[upper - 1]
+        high = self._nodes[upper]
         now = np.interp(goal, self._values, self._nodes)
         for _ in range(100):
             error = self.value(now) - goal
-            low, high = np.where(error <= 0, now, low), np.where(error >= 0, now, high)
+            low = np.where(error <= 0, now, low)
+            high = np.where(error >= 0, now, high)
             with np.errstate(invalid="ignore", divide="ignore"):
                 newton = now - error / self.slope(now)
             new = np.where((newton >= low) & (newton <= high), newton, (low + high) / 2)
@@ -64,6 +66,8 @@ class IncreasingPolynomial:
             going = np.abs(new - now) > 4 * np.finfo(np.float64).eps * np.abs(new)
             if not going.any():
                 break
-            active, goal, now = active[going], goal[going], new[going]
+            active = active[going]
+            goal = goal[going]
+            now = new[going]
             low, high = low[going], high[going]
         return t.reshape(values.shape)

@@ -8,7 +8,7 @@ from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_keys
+from lightfield.core.files import read_keys, reading
 from lightfield.geometry.rigs.rig import Frames, Rig, UnitPoses
 from lightfield.geometry.rotations import Floats, matrix_to_euler
 
@@ -63,15 +63,16 @@ class BlendCamera(Rig):
         if self.file is None:
             raise UserError("blend_camera: where it is, is known once the .blend has been read")
         said = read_keys(self.file, "inventory.py", "blend")["blend"]
-        frames = [said["frame"] if frame is None else frame for frame in self.path]
-        places = said["camera"]["matrices"]
-        for frame in frames:
-            if str(frame) not in places:
-                raise UserError(f"{self.file}: blend: has no camera at frame {frame}")
-        matrices: Floats = np.array([places[str(frame)] for frame in frames])
-        names = [f"view_{frame:04d}f" for frame in frames]
-        turns = matrix_to_euler(matrices[:, :3, :3])
-        return UnitPoses(names, np.arange(len(names)), matrices[:, :3, 3], turns)
+        with reading(self.file, "inventory"):
+            frames = [said["frame"] if frame is None else frame for frame in self.path]
+            places = said["camera"]["matrices"]
+            for frame in frames:
+                if str(frame) not in places:
+                    raise UserError(f"{self.file}: blend: has no camera at frame {frame}")
+            matrices: Floats = np.array([places[str(frame)] for frame in frames])
+            names = [f"view_{frame:04d}f" for frame in frames]
+            turns = matrix_to_euler(matrices[:, :3, :3])
+            return UnitPoses(names, np.arange(len(names)), matrices[:, :3, 3], turns)
 
     def _thinned_to(self, positions: int) -> Self | None:
         return self.model_copy(update={"max_views": positions}) if positions else None

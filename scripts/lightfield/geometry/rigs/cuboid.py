@@ -39,9 +39,9 @@ class Cuboid(Box):
 
     def cells(self) -> list[Cell]:
         nx, ny, nz = self.cameras
-        found = []
+        cells = []
         start = 0
         for columns, rows in ((nx, nz), (nx, nz), (ny, nz), (ny, nz), (nx, ny), (nx, ny)):
-            found += quads(np.arange(start, start + columns * rows).reshape(rows, columns))
+            cells += quads(np.arange(start, start + columns * rows).reshape(rows, columns))
             start += columns * rows
-        return found
+        return cells

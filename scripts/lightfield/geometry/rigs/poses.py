@@ -1,7 +1,7 @@
-"""Loose poses: cameras as a file has them.
+"""A rig of poses that a file lists.
 
-A lightfield.json, a CSV with angles or quaternions, a transforms.json, or COLMAP's images.txt or
-images.bin. Poses alone are read: through which lens they look, the scene YAML says.
+The file is a lightfield.json, a CSV with angles or quaternions, a transforms.json, or COLMAP's
+images.txt or images.bin. Only its poses are read. The scene YAML gives the lens.
 """
 
 import csv
@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
+from lightfield.core.disk_space import gigabytes
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, read_problem, read_text
-from lightfield.core.room import gigabytes
 from lightfield.core.settings import FARTHEST, pattern
 from lightfield.geometry import colmap
 from lightfield.geometry.rigs.rig import Rig, UnitPoses
@@ -34,14 +34,14 @@ from lightfield.geometry.rotations import (
 CSV_HEADER = ["name", "x", "y", "z", "rx", "ry", "rz"]
 QUATERNION_HEADER = ["name", "x", "y", "z", "qw", "qx", "qy", "qz"]
 LF_TYPES = ("PLANE", "CUBOID", "CYLINDER", "SPHERE")
-# How far a matrix may be from a rotation, and one form of a pose from the other: files round.
+# Files round: how far a matrix may be from a rotation, and one form of a pose from the other.
 TOLERANCE = 1e-4
-# Bytes: some hundred thousand poses of the longest form.
+# In bytes: enough for 100,000 poses of the longest form.
 LARGEST_FILE = 2**28
 
 
 class PosesFile(NamedTuple):
-    """What a file of poses says: names (n), positions and XYZ Euler angles (n, 3) in radians."""
+    """The poses of a file: names (n), positions (n, 3), and XYZ Euler angles (n, 3) in radians."""
 
     lf_type: str
     names: list[str]
@@ -50,7 +50,7 @@ class PosesFile(NamedTuple):
 
 
 class Poses(Rig):
-    """``max_views`` is for no scene YAML: a preset has thinned the rig to an even subset."""
+    """Poses from a file. Presets, but no scene YAML, set ``max_views``: an even subset."""
 
     shape = "PLANE"
     is_loose = True
@@ -89,7 +89,7 @@ class Poses(Rig):
 
 
 def _read_poses(path: Path) -> PosesFile:
-    """Read a file of poses, checked whole; the same file only once."""
+    """Read a file of poses, and check all of it. The same file is read only once."""
     try:
         status = path.stat()
     except OSError as error:
@@ -125,7 +125,7 @@ def _read_whole(path: Path, _changed: int) -> PosesFile:
 
 
 def check_name(where: str, name: Any) -> None:
-    """Check that a view's name can be that of its files; raises `UserError`."""
+    """Raise `UserError` if a view's name cannot name its files."""
     if (
         not isinstance(name, str)
         or not name.isprintable()
@@ -139,10 +139,10 @@ def check_name(where: str, name: Any) -> None:
 def check_poses(
     path: Path, where: Sequence[str], matrices: Floats, vectors: Floats, form: str = "world_matrix"
 ) -> None:
-    """Check the poses of a file, of which each has one of two forms or both; raises `UserError`.
+    """Raise `UserError` for a wrong pose of a file. A pose has one of two forms, or both.
 
-    ``where`` names each pose. ``matrices`` (n, 4, 4) are camera-to-world, ``vectors`` (n, 6) are
-    positions in metres and XYZ Euler angles in radians; the form that a pose lacks is NaN. ``form``
+    ``where`` names each pose. ``matrices`` (n, 4, 4) are camera-to-world. ``vectors`` (n, 6) are
+    positions in metres and XYZ Euler angles in radians. A form that a pose lacks is NaN. ``form``
     is what the file calls the matrices.
     """
 
@@ -182,7 +182,7 @@ def _number(path: Path, where: str, value: Any) -> float:
 
 
 def _csv_rows(path: Path) -> Iterator[Any]:
-    """Yield what `_json_rows` yields, of rows of angles or quaternions."""
+    """Yield what `_json_rows` yields, from a CSV with angles or quaternions."""
     yield Poses.shape, "quaternion"
     try:
         # Spreadsheets begin a file with a byte order mark.
@@ -248,9 +248,9 @@ def _json_rows(path: Path) -> Iterator[Any]:
 
 
 def _transforms_rows(path: Path, content: dict[str, Any]) -> Iterator[Any]:
-    """Yield what `_json_rows` yields, of a transforms.json: axes as ours, camera to world.
+    """Yield what `_json_rows` yields, from a transforms.json, whose axes are ours.
 
-    What nerfstudio's applied_transform has done to the poses is undone. Source: nerfstudio's data
+    Undoes nerfstudio's applied_transform. Source: nerfstudio's data
     conventions; instant-ngp's nerf_dataset_tips.md.
     """
     yield Poses.shape, "transform_matrix"
@@ -273,7 +273,7 @@ def _transforms_rows(path: Path, content: dict[str, Any]) -> Iterator[Any]:
 
 
 def _colmap_rows(path: Path) -> Iterator[Any]:
-    """Yield what `_json_rows` yields, of COLMAP's images.txt or images.bin."""
+    """Yield what `_json_rows` yields, from COLMAP's images.txt or images.bin."""
     yield Poses.shape, "quaternion"
     read = _colmap_text if path.suffix == ".txt" else _colmap_binary
     for where, numbers, name in read(path):
@@ -284,27 +284,28 @@ def _colmap_rows(path: Path) -> Iterator[Any]:
 
 
 def _colmap_text(path: Path) -> Iterator[tuple[str, Sequence[Any], str]]:
-    """Yield where, seven numbers and the name of each image: all lines but comments and points.
+    """Yield where it stands, seven numbers and the name of each image in an images.txt.
 
-    The line of its points is empty where an image has none, and some programs leave it out.
+    Skips comments and the lines of an image's points. Such a line is empty if the image has no
+    points, and some programs leave it out.
     """
     may_be_points = False
     for line in read_text(path).splitlines():
         if not line.strip() or line.startswith("#") or (may_be_points and _are_points(line)):
             may_be_points = False
             continue
-        number, *words = line.split(maxsplit=9)
+        number, *fields = line.split(maxsplit=9)
         where = f"image {number}"
-        if len(words) != 9:
+        if len(fields) != 9:
             raise UserError(
                 f"{path}: {where}: must be IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME"
             )
-        yield where, words[:7], words[8]
+        yield where, fields[:7], fields[8]
         may_be_points = True
 
 
 def _are_points(line: str) -> bool:
-    """Whether a line is of an image's points, x, y and number each, and not of another image."""
+    """Return whether a line holds an image's points (x, y, number), and not another image."""
     try:
         return len([float(word) for word in line.split()]) % 3 == 0
     except ValueError:
@@ -312,7 +313,7 @@ def _are_points(line: str) -> bool:
 
 
 def _colmap_binary(path: Path) -> Iterator[tuple[str, Sequence[Any], str]]:
-    """Yield where, seven numbers and the name of each image."""
+    """Yield where it stands, seven numbers and the name of each image in an images.bin."""
     content = path.read_bytes()
     try:
         (count,), start = struct.unpack_from("<Q", content), 8
@@ -334,14 +335,14 @@ _ROWS = {".csv": _csv_rows, ".json": _json_rows, ".txt": _colmap_rows, ".bin": _
 
 
 def _view_name(path: Path, where: str, image: Any) -> str:
-    """Return the name of an image's file without folders and suffix."""
+    """Return the name of an image file without its folders and suffix."""
     if not isinstance(image, str):
         raise UserError(f"{path}: {where}: file_path: must be a text, not {image!r}")
     return re.sub(r"(?i)\.(png|jpe?g|exr|tiff?|webp)$", "", image.rpartition("/")[2])
 
 
 def _unit(path: Path, where: str, quaternion: Sequence[float]) -> Floats:
-    """Return a quaternion (4,) of length 1; a file rounds it."""
+    """Return a quaternion (4,) with length 1, because files round it."""
     length = math.hypot(*quaternion)
     if not abs(length - 1) <= TOLERANCE:
         raise UserError(f"{path}: {where}: quaternion: has the length {length:g}; must be 1")
@@ -353,16 +354,16 @@ def _keyed(matrix: Floats) -> list[tuple[str, float]]:
 
 
 def _matrix(path: Path, where: str, key: str, value: Any, rows: int) -> list[tuple[str, Any]]:
-    """Return (key, value) of each number of a matrix with four columns."""
-    found = []
+    """Return (key, value) for each number of a matrix with four columns."""
+    numbers = []
     for index, (_, row) in enumerate(_numbered(path, f"{where}: {key}", "row", value, rows)):
         row_key = f"{key}[{index}]"
-        found += _numbered(path, f"{where}: {row_key}", row_key, row, 4)
-    return found
+        numbers += _numbered(path, f"{where}: {row_key}", row_key, row, 4)
+    return numbers
 
 
 def _numbered(path: Path, where: str, key: str, values: Any, count: int) -> list[tuple[str, Any]]:
-    """Return (key, value) of each of a list's values."""
+    """Return (key, value) for each value of a list."""
     if not isinstance(values, list) or len(values) != count:
         raise UserError(f"{path}: {where}: must be a list of {count}, not {values!r}")
     return [(f"{key}[{index}]", value) for index, value in enumerate(values)]

@@ -53,20 +53,20 @@ class Random(CountedRig):
         if self.file is None:
             places = np.stack([self.candidate(view, 0) for view in range(self.count)])
         else:
-            places = self._found()
+            places = self._places_from_file()
         directions = [self._numbers(view)[0] for view in range(self.count)]
         azimuth = 2 * np.pi * np.array(directions)
         return UnitPoses.of_sides(("", places, stack(np.pi / 2, 0.0, azimuth)))
 
-    def _found(self) -> Floats:
-        places = read_keys(str(self.file), "free_places.py", "box", "places")["places"]
+    def _places_from_file(self) -> Floats:
+        written = read_keys(str(self.file), "free_places.py", "box", "places")["places"]
         try:
-            found = np.array(places, float)
+            positions = np.array(written, float)
         except (TypeError, ValueError):
-            found = np.empty(0)
-        if found.shape != (self.count, 3):
+            positions = np.empty(0)
+        if positions.shape != (self.count, 3):
             raise UserError(f"{self.file}: places: must be {self.count} of 3 numbers each")
-        return found
+        return positions
 
     def unit_outline(self) -> list[Floats]:
         return box_outline()

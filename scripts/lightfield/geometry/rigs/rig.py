@@ -1,7 +1,7 @@
-"""What every rig is: its settings in the scene YAML, and from them the name and pose of each view.
+"""The base class of rigs: settings in the scene YAML, and the names and poses of the views.
 
-Positions are made in a unit box centred on the origin, then scaled by ``size``, rotated by
-``rotation`` and moved to ``center``; the rotation turns the cameras too, the size does not.
+A rig places its cameras in a unit box around the origin. The box is scaled by ``size``, rotated by
+``rotation`` and moved to ``center``. The rotation turns the cameras, too.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.settings import FARTHEST, Settings, Vector, as_list
 from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.lenses.cube_map import CUBE_FACE_ANGLES
-from lightfield.geometry.rigs.split import Chosen, Part, Split, part_of
+from lightfield.geometry.rigs.split_setting import Chosen, Part, Split, part_of
 from lightfield.geometry.rotations import (
     Floats,
     euler_to_matrix,
@@ -29,7 +29,7 @@ Side = Annotated[float, Field(strict=True, ge=0, le=FARTHEST)]
 Size = TypeAliasType("Size", Side | Annotated[tuple[Side, Side, Side], as_list(3)])
 Frame = Annotated[int, Field(ge=0, le=1048574)]
 
-# Cameras that are nearer together than so many metres are at one place.
+# Cameras are at one place if they are nearer to each other than this, in metres.
 ONE_PLACE = 1e-6
 
 
@@ -57,7 +57,7 @@ class Pose:
 
 @dataclass(frozen=True)
 class UnitPoses:
-    """The cameras of a rig in the unit box, one an entry.
+    """The cameras of a rig in the unit box, one in each entry.
 
     ``positions`` (n, 3) reach from −½ to ½, ``rotations`` (n, 3) are XYZ Euler angles in radians.
     """
@@ -69,7 +69,7 @@ class UnitPoses:
 
     @classmethod
     def of_sides(cls, *sides: tuple[str, Floats, Floats]) -> Self:
-        """Number the cameras of each side from 0; a side is its letter, positions and rotations."""
+        """Number the cameras of each side from 0. A side is a letter, positions and rotations."""
         return cls(
             [f"view_{side}{i:04d}f" for side, places, _ in sides for i in range(len(places))],
             np.concatenate([np.arange(len(places)) for _, places, _ in sides]),
@@ -91,16 +91,16 @@ class Frames(Settings):
 
     @property
     def numbers(self) -> range:
-        """Of the animation's frames, those that are rendered."""
+        """The frames of the animation to render."""
         return range(self.first, self.last + 1, self.step)
 
     @property
     def folders(self) -> dict[str, int]:
-        """The numbers by the names of the frames' folders in the rig's."""
+        """The frames' numbers by the names of their folders in the rig's folder."""
         return {f"f{number:05d}": number for number in self.numbers}
 
 
-# The eyes of a stereo pair: to which side each is of the position, along the camera's +X.
+# The eyes of a stereo pair, and the side of the position on which each is, along the camera's +X.
 EYES = {"left": -1, "right": 1}
 
 
@@ -120,13 +120,13 @@ def _require_camera(schema: dict[str, Any]) -> None:
 
 
 class Rig(Settings):
-    """The keys of every rig; a type of rig adds its own, and says where its cameras are.
+    """The keys that all rigs share. Each type of rig adds its own keys, and places the cameras.
 
     ``shape`` is the nearest of the four types that SILVR knows.
     """
 
     shape: ClassVar[Literal["PLANE", "CUBOID", "CYLINDER", "SPHERE"]]
-    # Whether the cameras of a row stand round z.
+    # Whether the cameras of a row go around z.
     is_round: ClassVar[bool] = False
     # Whether the rig is as large as the box around its cameras, whatever its ``size``.
     is_loose: ClassVar[bool] = False
@@ -169,7 +169,7 @@ class Rig(Settings):
 
     @property
     def positions(self) -> int:
-        """The number of places where cameras stand."""
+        """The number of the cameras' positions."""
         raise NotImplementedError
 
     def unit_poses(self) -> UnitPoses:
@@ -182,16 +182,16 @@ class Rig(Settings):
 
     @property
     def sequence(self) -> Frames | None:
-        """The frames of which each is a dataset of its own."""
+        """The frames, each of which is a dataset."""
         return self.frames
 
     @property
     def is_omnidirectional(self) -> bool:
-        """Whether its views have no centre from which all of their rays start."""
+        """Whether the rays of a view do not start from one centre."""
         return self.stereo is not None and self.stereo.omnidirectional
 
     def is_at_one_place(self) -> bool:
-        """Return whether all views are from one place, as far as the settings tell.
+        """Return whether the settings put all views at one place.
 
         Raises `UserError` for a pose file that cannot be read.
         """
@@ -209,7 +209,7 @@ class Rig(Settings):
 
     @property
     def view_count(self) -> int:
-        """The number of views; only a rig of poses has to read its file."""
+        """The number of views. Only a rig of poses reads its file for it."""
         return self.positions * self.views_a_position
 
     @property
@@ -221,7 +221,7 @@ class Rig(Settings):
     def thinned(self, max_views: int) -> Self:
         """Return the densest version of the rig that has at most ``max_views`` views.
 
-        Raises `UserError` where even the smallest rig of this type has more views.
+        Raises `UserError` if the smallest rig of this type has more views.
         """
         if self.view_count <= max_views:
             return self
@@ -233,7 +233,7 @@ class Rig(Settings):
         return thinner.model_copy(update={"split": None}) if listed else thinner
 
     def to_world(self, points: Floats) -> Floats:
-        """Return points (…, 3) of the unit box where the rig has them, in metres."""
+        """Return points (..., 3) of the unit box in world coordinates, in metres."""
         placed: Floats = points * self.sides @ self.turn.T + np.asarray(self.center, dtype=float)
         return placed
 
@@ -253,7 +253,9 @@ class Rig(Settings):
         Raises `UserError` for a pose file that cannot be read.
         """
         unit = self.unit_poses()
-        names, numbers, rotations = unit.names, unit.numbers, unit.rotations
+        names = unit.names
+        numbers = unit.numbers
+        rotations = unit.rotations
         positions = self.to_world(unit.positions)
         turn = self.turn
         if self.look_at is not None:
@@ -272,7 +274,7 @@ class Rig(Settings):
         if self.stereo:
             aside = euler_to_matrix(rotations)[:, None, :, 0] * self.stereo.distance / 2
             sides = np.array(list(EYES.values()))[:, None]
-            # Of an omnidirectional pair the renderer knows where the eyes are.
+            # The renderer itself places the eyes of an omnidirectional pair.
             sides = sides * (not self.stereo.omnidirectional)
             positions = (positions[:, None] + sides * aside).reshape(-1, 3)
             names = [f"{name}_{eye}" for name in names for eye in EYES]
@@ -292,25 +294,25 @@ class Rig(Settings):
         ]
 
     def cells(self) -> list[tuple[int, ...]] | None:
-        """Return the cells between neighbouring positions, as indices in their order.
+        """Return the cells between neighbouring positions, as indices of the positions.
 
-        None for cameras that stand on no surface.
+        There are no cells for cameras that span no surface.
         """
         return None
 
     def middle_row(self, places: Floats) -> list[int]:
-        """Return the numbers of neighbouring positions in a row; none where there is no row.
+        """Return the numbers of neighbouring positions in a row. No numbers if there is no row.
 
         ``places`` (n, 3) are the positions in metres, in the rig's own axes.
         """
         return []
 
     def unit_outline(self) -> list[Floats]:
-        """Return the shape that the cameras stand on, as polylines (n, 3) in the unit box."""
+        """Return the shape on which the cameras lie, as polylines (n, 3) in the unit box."""
         return []
 
     def outline(self) -> list[Floats]:
-        """Return that shape in world coordinates."""
+        """Return the shape on which the cameras lie, as polylines (n, 3) in world coordinates."""
         return [self.to_world(line) for line in self.unit_outline()]
 
 
@@ -320,19 +322,19 @@ def plain(values: Floats) -> Any:
 
 
 def stack(*coordinates: Floats | float) -> Floats:
-    """Return points (n, 3) of their coordinates, each (n,) or one number for all."""
+    """Return points (n, 3) from coordinates, each of which is (n,) or one number for all."""
     stacked: Floats = np.stack(np.broadcast_arrays(*coordinates), axis=-1)
     return stacked
 
 
 def circle() -> tuple[Floats, Floats]:
-    """Return cosine and sine of a closed circle of diameter 1, to draw."""
+    """Return the coordinates of a closed circle of diameter 1, to draw."""
     angle = np.linspace(0, 2 * np.pi, 73)
     return np.cos(angle) / 2, np.sin(angle) / 2
 
 
 def ball_outline() -> list[Floats]:
-    """Return three circles round a ball of diameter 1, across z, y and x."""
+    """Return three circles around a ball of diameter 1, across z, y and x."""
     cosine, sine = circle()
     return [stack(cosine, sine, 0.0), stack(cosine, 0.0, sine), stack(0.0, cosine, sine)]
 

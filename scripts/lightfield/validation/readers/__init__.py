@@ -10,7 +10,7 @@ file that its consumer could not open.
 from pathlib import Path
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json
+from lightfield.core.files import read_json, reading
 from lightfield.dataset.exports import MANIFEST
 from lightfield.validation.readers import (
     colmap,
@@ -24,7 +24,7 @@ from lightfield.validation.readers import (
     poses_csv,
     scannetpp,
 )
-from lightfield.validation.readers.contents import Exported, reading
+from lightfield.validation.readers.contents import Exported
 
 READERS = {
     "colmap": colmap.read,
@@ -52,4 +52,5 @@ def read(path: Path, size: tuple[int, int]) -> Exported:
         name, options = str(content["format"]), dict(content["options"])
     if name not in READERS:
         raise UserError(f"{path}: format: is {name!r}; must be of {', '.join(READERS)}")
-    return READERS[name](path, size, options)
+    with reading(path, f"list of an export for {name}"):
+        return READERS[name](path, size, options)

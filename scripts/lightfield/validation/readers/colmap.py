@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lightfield.core.files import reading
 from lightfield.validation.readers.cameras import Camera, OpenCVFisheye, Pinhole
 from lightfield.validation.readers.contents import (
     FLOAT32,
@@ -25,7 +26,6 @@ from lightfield.validation.readers.contents import (
     Part,
     from_texts,
     numbers,
-    reading,
 )
 
 Ints = NDArray[np.int64]
@@ -139,7 +139,8 @@ def exported_model(model: Model, pictures: Path) -> Exported:
         matrix[:3, 3] = -image.turn.T @ image.shift
         view = ExportedView(images_file, place, Path(image.name).stem, matrix)
         exported.views.append(view)
-    points_file, points = model.file("points3D"), model.points
+    points_file = model.file("points3D")
+    points = model.points
     if len(np.unique(points.numbers)) < len(points.numbers):
         exported.faults.append(f"{points_file}: two points have one number")
     exported.clouds.append(Cloud(points_file, "point", points.numbers, points.positions))
@@ -174,7 +175,8 @@ def _camera(model: int, width: int, height: int, parameters: Floats) -> Camera:
 
 
 def _binary_cameras(path: Path) -> dict[int, Camera]:
-    content, place = path.read_bytes(), 8
+    content = path.read_bytes()
+    place = 8
     cameras = {}
     for _ in range(struct.unpack_from("<Q", content)[0]):
         number, model, width, height = struct.unpack_from("<iiQQ", content, place)
@@ -189,7 +191,8 @@ def _binary_cameras(path: Path) -> dict[int, Camera]:
 
 
 def _binary_images(path: Path) -> list[Image]:
-    content, place = path.read_bytes(), 8
+    content = path.read_bytes()
+    place = 8
     row = np.dtype([("pixel", "<f8", 2), ("point", "<i8")])
     images = []
     for _ in range(struct.unpack_from("<Q", content)[0]):
@@ -207,7 +210,8 @@ def _binary_images(path: Path) -> list[Image]:
 
 
 def _binary_points(path: Path) -> Points:
-    content, place = path.read_bytes(), 8
+    content = path.read_bytes()
+    place = 8
     count = struct.unpack_from("<Q", content)[0]
     heads, tracks = [], []
     head = struct.Struct("<Q3d3BdQ")
@@ -290,10 +294,10 @@ def _points(heads: Sequence[tuple[Any, ...]], tracks: Ints) -> Points:
 def _whole(values: Floats) -> Ints:
     """Return whole numbers that were read as floats; raises ValueError for others."""
     with np.errstate(invalid="ignore"):
-        found = values.astype(np.int64)
-    if not (found == values).all():
+        integers = values.astype(np.int64)
+    if not (integers == values).all():
         raise ValueError("a number of a point is not whole")
-    return found
+    return integers
 
 
 # ---- what the files say twice ---------------------------------------------------------------
@@ -301,7 +305,8 @@ def _whole(values: Floats) -> Ints:
 
 def _track_faults(model: Model) -> list[str]:
     """Compare the points' tracks with the lists of points that the images have."""
-    path, points = model.file("points3D"), model.points
+    path = model.file("points3D")
+    points = model.points
     by_number = {image.number: index for index, image in enumerate(model.images)}
     starts = np.cumsum([0, *(len(image.points) for image in model.images)])
     listed = np.concatenate([np.empty(0, np.int64), *(image.points for image in model.images)])
@@ -364,7 +369,8 @@ def _projection_faults(model: Model) -> list[str]:
         faults.append(f"{model.file('points3D')}: point {point}: is where no image has it")
     alone = ~all_off[images] & ~misplaced[rows]
     for number, place, row in zip(images[alone], places[alone], rows[alone], strict=True):
-        name, point = model.images[number].name, model.points.numbers[row]
+        name = model.images[number].name
+        point = model.points.numbers[row]
         faults.append(
             f"{model.file('images')}: {name}: POINTS2D {place}: is not where its camera sees "
             f"point {point}"
@@ -380,8 +386,8 @@ def _places_and_rows(image: Image, model: Model, order: Ints) -> tuple[Ints, Int
     places = np.flatnonzero(image.points != NO_POINT)
     if not len(order):
         return places, np.full(len(places), -1)
-    found = np.searchsorted(model.points.numbers, image.points[places], sorter=order)
-    rows = order[found.clip(max=len(order) - 1)]
+    indices = np.searchsorted(model.points.numbers, image.points[places], sorter=order)
+    rows = order[indices.clip(max=len(order) - 1)]
     return places, np.where(model.points.numbers[rows] == image.points[places], rows, -1)
 
 

@@ -1,9 +1,7 @@
 """What an export says of a dataset, in the axes and metres of lightfield.json."""
 
 import math
-import struct
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lightfield.core.errors import UserError
 from lightfield.validation.readers.cameras import Camera
 
 Floats = NDArray[np.float64]
@@ -171,18 +168,3 @@ def number(value: Any) -> float:
 def from_texts(texts: Sequence[str]) -> Floats:
     """Return the finite numbers (n,) of a text file; raises ValueError for anything else."""
     return numbers([float(text) for text in texts], (len(texts),))
-
-
-@contextmanager
-def reading(place: Path | str, kind: str) -> Iterator[None]:
-    """Turn whatever keeps a file, or a place in one, from being its ``kind`` into a `UserError`."""
-    try:
-        yield
-    except OSError as error:
-        raise UserError(f"{place}: cannot be read: {error.strerror}") from None
-    except KeyError as error:
-        raise UserError(f"{place}: {error.args[0]}: is missing") from None
-    except (LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as error:
-        raise UserError(f"{place}: is no {kind}: {error}") from None
-    except struct.error:
-        raise UserError(f"{place}: is no {kind}: it is cut short") from None

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.core.files import reading
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.validation.readers.cameras import Pinhole
 from lightfield.validation.readers.contents import (
@@ -22,7 +23,6 @@ from lightfield.validation.readers.contents import (
     ExportedCamera,
     ExportedView,
     number,
-    reading,
 )
 
 INFINITY = 1e9
@@ -58,7 +58,8 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
         middle[:3, :3] = euler_to_matrix(np.array(angles))
         middle[:3, 3] = [value(f"center_cam_{axis}_m") for axis in "xyz"]
         for index in range(columns * rows):
-            right, down = index % columns - columns // 2, index // columns - rows // 2
+            right = index % columns - columns // 2
+            down = index // columns - rows // 2
             matrix = middle.copy()
             matrix[:3, 3] += baseline * (right * middle[:3, 0] - down * middle[:3, 1])
             exported.views.append(ExportedView(path, f"Cam{index:03}", None, matrix))

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.files import read_json
-from lightfield.geometry.rigs.split import PARTS
+from lightfield.core.files import read_json, reading
+from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.validation.readers.cameras import Camera, Panorama, Pinhole, PolynomialFisheye
 from lightfield.validation.readers.contents import (
     DepthMap,
@@ -21,7 +21,6 @@ from lightfield.validation.readers.contents import (
     UnitCube,
     number,
     numbers,
-    reading,
     same,
 )
 

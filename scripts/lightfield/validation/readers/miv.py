@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.files import read_json
+from lightfield.core.files import read_json, reading
 from lightfield.geometry.rotations import euler_to_matrix
 from lightfield.validation.readers.contents import (
     Exported,
@@ -17,7 +17,6 @@ from lightfield.validation.readers.contents import (
     ExportedView,
     Floats,
     numbers,
-    reading,
 )
 from lightfield.validation.readers.omaf import depth_range_of, lens_of
 

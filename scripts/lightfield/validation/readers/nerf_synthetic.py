@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from lightfield.core.files import read_json
+from lightfield.core.files import read_json, reading
 from lightfield.validation.readers.cameras import Pinhole
 from lightfield.validation.readers.contents import (
     Exported,
@@ -16,7 +16,6 @@ from lightfield.validation.readers.contents import (
     Part,
     number,
     numbers,
-    reading,
 )
 from lightfield.validation.readers.nerfstudio import PARTS
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lightfield.core.files import read_json
+from lightfield.core.files import read_json, reading
 from lightfield.validation.readers.cameras import Camera, OpenCVFisheye, Panorama, Pinhole
 from lightfield.validation.readers.contents import (
     Exported,
@@ -18,7 +18,6 @@ from lightfield.validation.readers.contents import (
     Part,
     number,
     numbers,
-    reading,
 )
 from lightfield.validation.readers.ply import read_ply
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lightfield.validation.readers.contents import Cloud, Floats, reading
+from lightfield.core.files import reading
+from lightfield.validation.readers.contents import Cloud, Floats
 
 _TYPES = {"float": "<f4", "double": "<f8", "uchar": "u1"}
 _FORMAT = "format binary_little_endian 1.0"

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.core.files import reading
 from lightfield.geometry.rotations import euler_to_matrix
-from lightfield.validation.readers.contents import Exported, ExportedView, from_texts, reading
+from lightfield.validation.readers.contents import Exported, ExportedView, from_texts
 
 HEADER = ["name", "x", "y", "z", "rx", "ry", "rz"]
 

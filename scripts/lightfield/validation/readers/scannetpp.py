@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from lightfield.core.files import read_json
+from lightfield.core.files import read_json, reading
 from lightfield.validation.readers.colmap import exported_model, read_model
-from lightfield.validation.readers.contents import Exported, Part, reading
+from lightfield.validation.readers.contents import Exported, Part
 
 IMAGES = "image_undistorted_fisheye"
 

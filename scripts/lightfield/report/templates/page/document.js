@@ -31,9 +31,15 @@ export function onceAFrame(draw) {
   };
 }
 
-export function pressed(chosen, other) {
-  chosen.setAttribute("aria-pressed", "true");
-  other.setAttribute("aria-pressed", "false");
+// Two buttons, of which one is pressed: `show` is told whether it is that of depth.
+export function chooseDepth(light, depth, show) {
+  for (const [isDepth, button, other] of [[false, light, depth], [true, depth, light]]) {
+    button.addEventListener("click", () => {
+      button.setAttribute("aria-pressed", "true");
+      other.setAttribute("aria-pressed", "false");
+      show(isDepth);
+    });
+  }
 }
 
 export function polyline(context, points) {

@@ -1,7 +1,7 @@
 // The epipolar-plane image, pointed at and tilted.
 
 import { DATA } from "./data.js";
-import { element, pressed } from "./document.js";
+import { chooseDepth, element } from "./document.js";
 import { angleAt, drawLines, epipolarPixel } from "./epipolar_drawing.js";
 import { decoded, depthCode, depthColours, depthOf, metres } from "./packing.js";
 import { drawRig } from "./rig_drawing.js";
@@ -48,15 +48,11 @@ function startTilt() {
 }
 
 function startLinesDepthButton() {
-  const [light, depth] = [element("epi-light"), element("epi-depth")];
   lines.colours = depthColours(DATA.row.range);
-  const show = (isDepth) => {
+  chooseDepth(element("epi-light"), element("epi-depth"), (isDepth) => {
     lines.depth = isDepth;
-    pressed(isDepth ? depth : light, isDepth ? light : depth);
     drawLines();
-  };
-  light.addEventListener("click", () => show(false));
-  depth.addEventListener("click", () => show(true));
+  });
 }
 
 function leaveLines() {

@@ -1,7 +1,7 @@
 // The viewer: one view, its exposure, its depth, and the way to its neighbours.
 
 import { DATA } from "./data.js";
-import { element, onceAFrame, pressed } from "./document.js";
+import { chooseDepth, element, onceAFrame } from "./document.js";
 import { drawLines } from "./epipolar_drawing.js";
 import { LIGHT, bytesOf, decoded, depthCode, depthColours, depthOf, developed, metres, paint } from "./packing.js";
 import { drawRig } from "./rig_drawing.js";
@@ -149,14 +149,11 @@ function startDepthButton() {
   }
   viewer.colours = depthColours(DATA.depth.range);
   startDepthScale();
-  const show = (isDepth) => {
+  chooseDepth(light, depth, (isDepth) => {
     viewer.depth = isDepth;
-    pressed(isDepth ? depth : light, isDepth ? light : depth);
     element("depth-scale").hidden = !isDepth;
     drawView();
-  };
-  light.addEventListener("click", () => show(false));
-  depth.addEventListener("click", () => show(true));
+  });
 }
 
 function startSteps() {

@@ -1,4 +1,4 @@
-"""Which views of a rig are to train on, for validation, and to test with."""
+"""The setting `split` of a rig: which of its views train, validate and test."""
 
 from typing import Literal, Self, get_args
 
@@ -11,7 +11,7 @@ PARTS: tuple[Part, ...] = get_args(Part)
 
 
 class Chosen(Settings):
-    """Views at each n-th position, or by name; all others train."""
+    """The views at each n-th position, or the views of given names. All others train."""
 
     every: int | None = Field(None, ge=2, description="Of so many positions the first tests.")
     validation: list[str] = Field([], description="Names of views.")
@@ -35,7 +35,7 @@ Split = Literal["odd"] | Part | Chosen
 
 
 def part_of(split: Split | None, name: str, number: int, place: int) -> Part | None:
-    """Return what a view is for: of a name, a sequence number, and the ``place``-th position."""
+    """Return the part of a view, from its name, its number, and the number of its position."""
     if split is None:
         return None
     if split == "odd":

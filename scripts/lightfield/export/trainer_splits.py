@@ -1,18 +1,18 @@
-"""Which views are to train on, for validation, and to test with."""
+"""Which views a trainer gets for training, validation and testing."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import LightField, View
-from lightfield.geometry.rigs.split import PARTS
+from lightfield.geometry.rigs.split_setting import PARTS
 
-# Where the rig has no split of its own: the test views of most trainers' own examples.
+# Most trainers' own examples test with every eighth view. Used for rigs without a split.
 EVERY = 8
 
 
 class Splits(NamedTuple):
-    """Without views for ``validation``, those to ``test`` with are for it too."""
+    """The views of each part. ``validation`` holds the test views if the rig has none for it."""
 
     train: Sequence[View]
     validation: Sequence[View]
@@ -20,9 +20,9 @@ class Splits(NamedTuple):
 
 
 def splits(lightfield: LightField) -> Splits:
-    """Return the views of each part: by the scene's split, or else every eighth to test with.
+    """Return the views of each part: those of the rig's split, or else every eighth to test with.
 
-    Raises `UserError` if there is none to train on, or none to test with.
+    Raises `UserError` if no view trains, or no view tests.
     """
     views = lightfield.views
     if any(view.split for view in views):

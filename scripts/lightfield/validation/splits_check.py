@@ -1,4 +1,4 @@
-"""What the views are for: as splits.json says it, and none to train on is seen in a test."""
+"""Check splits.json: it matches the rigs, and no test view has the pose of a training view."""
 
 from collections.abc import Sequence
 from itertools import chain
@@ -9,8 +9,8 @@ import numpy as np
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.dataset.lightfield import NAME, LightField
-from lightfield.dataset.splits import listed
-from lightfield.geometry.rigs.split import PARTS
+from lightfield.dataset.splits_file import splits_content
+from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.validation.files import ImageSet
 from lightfield.validation.result import Check
 
@@ -19,10 +19,11 @@ _SAME_POSE = 6
 
 
 def check(path: Path, dataset: Path, sets: Sequence[ImageSet]) -> Check:
-    """Check a scene's splits.json, beside the folders of its rigs, and the sets of one of these.
+    """Check a scene's splits.json, and that the image sets of one ``dataset`` agree with it.
 
-    No view may be in two lists, nor have the pose of one that is in another: it would be the same
-    picture. Raises `UserError` where splits.json cannot be read, or is of another folder.
+    ``path`` is splits.json, which lies beside the folders of the scene's rigs. No view for
+    validation or testing may have the pose of a training view: both would be the same picture.
+    Raises `UserError` if splits.json cannot be read, or belongs to another scene.
     """
     home = path.resolve().parent
     if not dataset.is_relative_to(home):
@@ -32,37 +33,40 @@ def check(path: Path, dataset: Path, sets: Sequence[ImageSet]) -> Check:
         parts = {part: [str(name) for name in content[part]] for part in PARTS}
     except (LookupError, TypeError):
         raise UserError(f"{path}: must map {', '.join(PARTS)} to names of views") from None
-    # In the order of their names, for a rig may be in several lists.
+    # Views of one rig may be in several lists.
     folders = sorted({name.rpartition("/")[0] for name in chain(*parts.values())})
     try:
         lightfields = {folder: LightField.read(path.parent / folder / NAME) for folder in folders}
     except UserError as error:
         return Check("splits", False, "cannot be checked", problems=[str(error)])
-    expected = listed(lightfields)
+    expected = splits_content(lightfields)
     problems = [
         f"{path.name}: {part}: is not what the rigs' {NAME} say"
         for part in PARTS
         if sorted(parts[part]) != sorted(expected[part])
     ]
-    own = lightfields.get(dataset.relative_to(home).as_posix())
-    split = {view.name: view.split for view in own.views} if own else {}
+    lightfield = lightfields.get(dataset.relative_to(home).as_posix())
+    split = {view.name: view.split for view in lightfield.views} if lightfield else {}
     for image_set in sets:
         for view in image_set.lightfield.views:
             # A face of a cube map is named after its view.
             names = {view.name, view.name.rpartition("_")[0]}
             if view.split not in [split[name] for name in names & split.keys()]:
                 problems.append(f"{image_set.prefix}{NAME}: frames: {view.name}: split is another")
-    trained: dict[bytes, str] = {}
+    training_views: dict[bytes, str] = {}
     for part in PARTS:
         for folder, lightfield in lightfields.items():
             for view in lightfield.views:
                 if view.split != part:
                     continue
                 name = f"{folder}/{view.name}"
-                place = (np.round(view.matrix, _SAME_POSE) + 0.0).tobytes()
+                pose = (np.round(view.matrix, _SAME_POSE) + 0.0).tobytes()
                 if part == "train":
-                    trained[place] = name
-                elif place in trained:
-                    problems.append(f"{name}: is for {part}, but is {trained[place]} of train")
+                    training_views[pose] = name
+                elif pose in training_views:
+                    problems.append(
+                        f"{name}: is for {part}, but has the pose of {training_views[pose]}, "
+                        "which trains"
+                    )
     detail = ", ".join(f"{len(parts[part])} {part}" for part in PARTS)
     return Check("splits", not problems, detail, problems=problems)

@@ -1,4 +1,4 @@
-"""The library's rooms are those of docs/architecture.md, and import only those above them."""
+"""The library's packages are those of docs/architecture.md, and import only those above them."""
 
 import ast
 import re
@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 LIBRARY = ROOT / "scripts" / "lightfield"
-ROOMS = re.findall(r"^\| (\w+) \|", (ROOT / "docs/architecture.md").read_text(), re.M)[1:]
+PACKAGES = re.findall(r"^\| (\w+) \|", (ROOT / "docs/architecture.md").read_text(), re.M)[1:]
 
 
 def imported(file):
@@ -25,20 +25,24 @@ def imported(file):
     return found
 
 
-def test_each_room_has_a_door_that_says_what_lives_there():
-    assert {path.parent.name for path in LIBRARY.glob("*/__init__.py")} == set(ROOMS)
-    for room in ROOMS:
-        assert ast.get_docstring(ast.parse((LIBRARY / room / "__init__.py").read_text())), room
+def test_each_package_says_what_it_holds():
+    assert {path.parent.name for path in LIBRARY.glob("*/__init__.py")} == set(PACKAGES)
+    for package in PACKAGES:
+        assert ast.get_docstring(ast.parse((LIBRARY / package / "__init__.py").read_text())), (
+            package
+        )
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_a_room_imports_only_rooms_above_it(room):
-    allowed = ROOMS[: ROOMS.index(room) + 1]
-    for file in (LIBRARY / room).rglob("*.py"):
-        own = {name.split(".")[1] for name in imported(file) if name.startswith("lightfield.")}
-        assert own <= set(allowed), file
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_package_imports_only_those_above_it(package):
+    allowed = PACKAGES[: PACKAGES.index(package) + 1]
+    for file in (LIBRARY / package).rglob("*.py"):
+        imported_packages = {
+            name.split(".")[1] for name in imported(file) if name.startswith("lightfield.")
+        }
+        assert imported_packages <= set(allowed), file
         blenders = {"bpy", "mathutils", "bmesh"} & {name.split(".")[0] for name in imported(file)}
-        assert not blenders or room == "rendering", file
+        assert not blenders or package == "rendering", file
 
 
 def test_no_files_import_each_other_in_a_circle():
@@ -62,7 +66,7 @@ def test_what_each_run_and_job_reads_the_rules_with_imports_nothing_heavy():
     found = subprocess.run(
         [sys.executable, "-c", program], cwd=LIBRARY.parent, capture_output=True, text=True
     ).stdout.split()
-    assert "lightfield.dataset.dataset" in found
+    assert "lightfield.dataset.loading" in found
     assert not {"numba", "skimage", "scipy", "OpenImageIO", "matplotlib", "bpy"} & set(found)
 
 

@@ -1,4 +1,4 @@
-"""Whether there is room for what a run is about to write, and why a disk takes nothing more."""
+"""Whether the disks have space for what a run writes, and why a disk takes no more files."""
 
 import errno
 import os
@@ -9,22 +9,25 @@ from pathlib import Path
 
 from lightfield.core.errors import UserError
 
-# Bytes are estimated before they are written: so many times the room there is will not fit into it,
-# and so large a part of it may not.
-SURELY, NEARLY = 2.0, 0.9
-# A disk with fewer bytes, or room for fewer files, is full: a job's log alone may take them.
-LEAST_BYTES, LEAST_FILES = 1e6, 16
+# The bytes of a run are estimates. A run that needs more than SURELY times the free space is
+# refused. One that needs more than NEARLY times the free space is warned of.
+SURELY = 2.0
+NEARLY = 0.9
+# A disk with less free space than this, or with fewer free inodes, counts as full: a job's log
+# alone may use them up.
+LEAST_BYTES = 1e6
+LEAST_FILES = 16
 
-# Not on macOS.
+# False on macOS.
 _BY_EFFECTIVE_USER = os.access in os.supports_effective_ids
 
-# A folder in memory, where there is one.
+# A folder in memory, on machines that have one.
 SHARED_MEMORY = Path("/dev/shm")
 
-# What to do where the system says of a write only what went wrong.
+# What the user can do about each error of writing.
 REMEDIES = {
-    errno.ENOSPC: "make room",
-    errno.EDQUOT: "make room, or ask for a larger quota",
+    errno.ENOSPC: "free some space",
+    errno.EDQUOT: "free some space, or ask for a larger quota",
     errno.EFBIG: "raise the limit of a file's size (ulimit -f), or choose another disk",
     errno.EACCES: "change its permissions, or write elsewhere",
     errno.EPERM: "change its permissions, or write elsewhere",
@@ -35,7 +38,7 @@ REMEDIES = {
 
 @dataclass(frozen=True)
 class Need:
-    """What is about to be written below a folder: so many bytes, in so many files."""
+    """What a run writes below a folder: ``size`` bytes, in as many ``files``."""
 
     folder: Path
     size: float
@@ -50,12 +53,12 @@ def gigabytes(size: float) -> str:
 
 
 def nearest_folder(path: Path) -> Path:
-    """Return a path, or the nearest of the folders above it, that exists."""
+    """Return the path if it exists, or else the nearest parent that does."""
     return next(part for part in (path, *path.absolute().parents) if part.exists())
 
 
 def obstacle(path: Path) -> str | None:
-    """Return why no file can be written below a path, and what to do; None if one can."""
+    """Return why no file can be written below a path, and what to do. Return None if one can."""
     folder = nearest_folder(path)
     folder = folder if folder.is_dir() else folder.parent
     disk = os.statvfs(folder)
@@ -64,7 +67,7 @@ def obstacle(path: Path) -> str | None:
     if not os.access(folder, os.W_OK | os.X_OK, effective_ids=_BY_EFFECTIVE_USER):
         return f"you may not write in {folder}: {REMEDIES[errno.EACCES]}"
     if disk.f_bavail * disk.f_frsize < LEAST_BYTES:
-        return f"the disk of {folder} is full: make room"
+        return f"the disk of {folder} is full: {REMEDIES[errno.ENOSPC]}"
     if disk.f_files and disk.f_favail < LEAST_FILES:
         return (
             f"the disk of {folder} takes no more files (its inodes are used up): remove some files"
@@ -73,8 +76,8 @@ def obstacle(path: Path) -> str | None:
 
 
 def write_problem(path: Path, error: OSError) -> str:
-    """Return why a path cannot be written, from what the system said of it, and what to do."""
-    # Libraries raise errors without a number, and a text of their own.
+    """Return why writing a path raised ``error``, and what to do."""
+    # Some libraries raise errors without a number, so ask the disk first.
     if cause := obstacle(path):
         return cause
     free = gigabytes(shutil.disk_usage(nearest_folder(path)).free)
@@ -83,27 +86,30 @@ def write_problem(path: Path, error: OSError) -> str:
 
 
 def fast_folder(size: float) -> Path | None:
-    """Return a folder in memory with room for so many bytes, or None."""
+    """Return a folder in memory with ``size`` free bytes, or None."""
     if not os.access(SHARED_MEMORY, os.W_OK | os.X_OK):
         return None
     return SHARED_MEMORY if shutil.disk_usage(SHARED_MEMORY).free > size else None
 
 
 def check(needs: Iterable[Need]) -> Iterator[str]:
-    """Yield a warning for each disk that has hardly room for what is about to be written.
+    """Yield a warning for each disk that ``needs`` nearly fill.
 
-    Raises `UserError` where it has none, or nothing can be written at all.
+    Raises `UserError` for a disk that cannot hold them, and for a folder that cannot be written.
     """
-    disks: dict[int, list[Need]] = {}
+    needs_of_disk: dict[int, list[Need]] = {}
     for need in needs:
-        disks.setdefault(nearest_folder(need.folder).stat().st_dev, []).append(need)
+        device = nearest_folder(need.folder).stat().st_dev
+        needs_of_disk.setdefault(device, []).append(need)
         if cause := obstacle(need.folder):
             raise UserError(f"{need.folder}: cannot be written: {cause}")
-    for wanted in disks.values():
-        folder = wanted[0].folder
-        there = nearest_folder(folder)
-        size, files = sum(need.size for need in wanted), sum(need.files for need in wanted)
-        disk, free = os.statvfs(there), shutil.disk_usage(there).free
+    for needs_here in needs_of_disk.values():
+        folder = needs_here[0].folder
+        existing_folder = nearest_folder(folder)
+        size = sum(need.size for need in needs_here)
+        files = sum(need.files for need in needs_here)
+        disk = os.statvfs(existing_folder)
+        free = shutil.disk_usage(existing_folder).free
         if disk.f_files and files > disk.f_favail:
             raise UserError(
                 f"{folder}: its disk takes {disk.f_favail} more files (inodes), and this run "
@@ -114,6 +120,6 @@ def check(needs: Iterable[Need]) -> Iterator[str]:
             f"{gigabytes(size)}"
         )
         if size > SURELY * free:
-            raise UserError(f"{text}: make room, choose another disk, or build less")
+            raise UserError(f"{text}: free some space, choose another disk, or build less")
         if size > NEARLY * free:
-            yield f"{text}: where that is too little, it stops, and goes on when there is room"
+            yield f"{text}: if the disk fills up, the run stops; free some space and start it again"

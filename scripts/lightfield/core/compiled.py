@@ -1,4 +1,4 @@
-"""Loops over pixels, compiled by numba."""
+"""Decorators with which numba compiles loops over pixels."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -8,7 +8,7 @@ from typing import Any, TypeVar, cast
 
 @contextmanager
 def _hidden(*names: str) -> Iterator[None]:
-    """Let what is imported in here not find these modules, not even those that are loaded."""
+    """Hide modules from the imports in this context, even modules that are loaded."""
     loaded = {name: sys.modules[name] for name in names if name in sys.modules}
     sys.modules.update(dict.fromkeys(names))  # type: ignore[arg-type]
     yield
@@ -17,9 +17,9 @@ def _hidden(*names: str) -> Iterator[None]:
     sys.modules.update(loaded)
 
 
-# Numba looks for options in YAML, for scipy's version, and in the module that its first kernel
-# imports for scipy's BLAS, which takes longer to import than numba. No kernel needs any of them.
-# Options in the folder where a program runs could even change what kernels compute.
+# Numba imports YAML for its options, scipy for its version, and scipy's BLAS with its first kernel.
+# That takes longer than numba's own import, and no kernel needs any of them. An options file in the
+# folder where a program runs could even change what kernels compute.
 with _hidden("scipy", "scipy.linalg.cython_blas", "yaml"):
     import numba
     import numba.np.arraymath
@@ -35,8 +35,8 @@ _OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz
 def kernel(function: _F) -> _F:
     """Compile a function, and keep the machine code for the next process.
 
-    It is compiled anew when its own file changes, and not when another one does: what a kernel
-    calls belongs into its file.
+    Numba compiles it again only when the function's own file changes. So define the functions that
+    a kernel calls in the kernel's file.
     """
     return cast(_F, numba.njit(cache=True, **_OPTIONS)(function))
 
@@ -47,9 +47,9 @@ def inline(function: _F) -> _F:
 
 
 def part(function: _F) -> _F:
-    """Let kernels call a function, which itself stays one of Python's.
+    """Let kernels call a function, which stays a Python function.
 
-    So a kernel that is made in a function may be given it, and is kept for the next process all
-    the same.
+    A kernel that is defined inside a function can then use it, and numba still keeps the kernel's
+    machine code for the next process.
     """
     return cast(_F, register_jitable(**_OPTIONS)(function))

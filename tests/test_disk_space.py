@@ -1,8 +1,11 @@
-"""Room before a run, and what killed runs left: refused and removed before anything is made."""
+"""Before a run: disks without space are refused, and leftovers of killed runs are removed."""
 
 import errno
 import os
 import re
+import shutil
+import signal
+import socket
 import subprocess
 import sys
 import time
@@ -12,11 +15,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from checkouts import checkout, snakemake
+from checkouts import checkout, snakemake, start_snakemake, wait_until
 from conftest import SCRIPTS, mount_disk
 from sphere import write_views
 
-from lightfield.core import files, leftovers, room
+from lightfield.core import disk_space, files, leftovers, live_runs
 from lightfield.core.errors import UserError
 
 Usage = namedtuple("Usage", "free")
@@ -41,6 +44,28 @@ rigs:
     camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
 """
 
+# In place of the program that builds a scene: it waits to be let go.
+WAITING = """
+import sys, time
+from pathlib import Path
+Path("started").touch()
+while not Path("go").exists():
+    time.sleep(0.05)
+Path(sys.argv[sys.argv.index("--output") + 1]).write_text("a scene")
+"""
+BUILD = ("--config", "scenes=one", "rigs=all", "preset=full", "--", "work/one/scene.blend")
+
+# A run that lives until it is killed, and one of its jobs.
+RUN = """
+import subprocess, sys, time
+from pathlib import Path
+from lightfield.core import live_runs
+live_runs.enter(Path(sys.argv[1]), sys.argv[2] == "cluster", lambda: None)
+job = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+print(job.pid, flush=True)
+time.sleep(60)
+"""
+
 KEEPER = """
 import sys, time
 from lightfield.core.leftovers import temporary_folder
@@ -56,15 +81,17 @@ with temporary_folder(sys.argv[1]) as folder:
     [([40, 40], None), ([50, 45], "warning"), ([150, 45], "warning"), ([150, 55], "error")],
 )
 def test_what_is_written_to_one_disk_is_added_up(sizes, expected, tmp_path, monkeypatch):
-    monkeypatch.setattr(room.shutil, "disk_usage", lambda _: Usage(100e9))
+    monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda _: Usage(100e9))
     folders = [tmp_path / f"not/there/{number}" for number in range(len(sizes))]
-    needs = [room.Need(folder, size * 1e9) for folder, size in zip(folders, sizes, strict=True)]
+    needs = [
+        disk_space.Need(folder, size * 1e9) for folder, size in zip(folders, sizes, strict=True)
+    ]
     text = f"{folders[0]}: 100 GB are free on its disk, and this run writes some {sum(sizes)} GB"
     if expected == "error":
         with pytest.raises(UserError, match=text):
-            list(room.check(needs))
+            list(disk_space.check(needs))
         return
-    warnings = list(room.check(needs))
+    warnings = list(disk_space.check(needs))
     assert [warning.startswith(text) for warning in warnings] == [True] * (expected == "warning")
 
 
@@ -73,7 +100,7 @@ def test_what_is_written_to_one_disk_is_added_up(sizes, expected, tmp_path, monk
     [(0, "0 GB"), (4096, "less than 0.01 GB"), (5.4e8, "0.54 GB"), (12638171136, "13 GB")],
 )
 def test_sizes_are_gigabytes(size, text):
-    assert room.gigabytes(size) == text
+    assert disk_space.gigabytes(size) == text
 
 
 DISK = {"f_flag": 0, "f_frsize": 4096, "f_files": 10**6, "f_favail": 10**5}
@@ -87,27 +114,27 @@ DISK |= dict.fromkeys(("f_blocks", "f_bfree", "f_bavail"), 10**9)
         ({"f_favail": 50}, 60, "takes 50 more files (inodes), and this run writes some 60"),
         ({"f_favail": 0}, 0, "takes no more files (its inodes are used up): remove some files"),
         ({"f_files": 0, "f_favail": 0}, 60, None),
-        ({"f_bavail": 0}, 0, "is full: make room"),
+        ({"f_bavail": 0}, 0, "is full: free some space"),
         ({"f_flag": os.ST_RDONLY}, 0, "is read-only: mount its disk for writing, or write else"),
     ],
 )
 def test_a_disk_that_takes_nothing_more_is_refused_with_the_cause(
     state, files, cause, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(room.os, "statvfs", lambda _: SimpleNamespace(**DISK | state))
-    needs = [room.Need(tmp_path / "results", 1, files)]
+    monkeypatch.setattr(disk_space.os, "statvfs", lambda _: SimpleNamespace(**DISK | state))
+    needs = [disk_space.Need(tmp_path / "results", 1, files)]
     if cause is None:
-        assert list(room.check(needs)) == []
+        assert list(disk_space.check(needs)) == []
         return
     with pytest.raises(UserError, match=re.escape(cause)) as caught:
-        list(room.check(needs))
+        list(disk_space.check(needs))
     assert str(caught.value).startswith(f"{tmp_path / 'results'}: ")
 
 
 def test_a_folder_of_somebody_else_is_refused_with_the_cause(nobody):
     nobody.chmod(0o500)
     with pytest.raises(UserError, match=r"you may not write in .*: change its permissions"):
-        list(room.check([room.Need(nobody / "results", 1)]))
+        list(disk_space.check([disk_space.Need(nobody / "results", 1)]))
     with pytest.raises(UserError, match=r"cannot be written: you may not write in .*: change"):
         files.write_text(nobody / "results/names.json", "text")
 
@@ -131,7 +158,10 @@ def test_a_run_that_cannot_fit_ends_before_its_first_job(tmp_path):
     [
         ("ro", ["the disk of ", "is read-only: mount its disk for writing"]),
         ("size=1m,nr_inodes=8", ["its inodes are used up): remove some files"]),
-        ("size=64k", ["GB are free on its disk, and this run writes some", "is full: make room"]),
+        (
+            "size=64k",
+            ["GB are free on its disk, and this run writes some", "is full: free some space"],
+        ),
     ],
 )
 @pytest.mark.parametrize("name", ["work", "results"])
@@ -296,3 +326,244 @@ def test_a_name_that_is_no_files_is_refused(tmp_path, monkeypatch):
     with pytest.raises(UserError, match="cannot be written"):
         files.write_text("", "text")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture
+def start_run(tmp_path):
+    """Start runs that note themselves in a folder; return the process and its job's number."""
+    runs = []
+
+    def start(place="here"):
+        words = [sys.executable, "-c", RUN, tmp_path / "locks", place]
+        run = subprocess.Popen(
+            words, stdout=subprocess.PIPE, text=True, env={"PYTHONPATH": str(SCRIPTS)}
+        )
+        runs.append((run, int(run.stdout.readline())))
+        return runs[-1]
+
+    yield start
+    for run, job in runs:
+        run.kill()
+        run.wait()
+        with suppress(ProcessLookupError):
+            os.kill(job, signal.SIGKILL)
+
+
+ENTER = """
+import sys
+from pathlib import Path
+from lightfield.core import live_runs
+others = live_runs.enter(Path(sys.argv[1]), False, lambda: print("locks are removed"))
+print(*[run.pid for run in others])
+print(live_runs.refusal(others))
+"""
+
+
+def start_entering(folder):
+    """Start a process that enters a folder."""
+    return subprocess.Popen(
+        [sys.executable, "-c", ENTER, folder],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={"PYTHONPATH": str(SCRIPTS)},
+    )
+
+
+def outcome(process):
+    """Return the runs that may live, whether locks were removed, and what would be said."""
+    told, problem = process.communicate()
+    assert process.returncode == 0, problem
+    *removed, pids, refusal = told.splitlines()
+    return list(map(int, pids.split())), removed == ["locks are removed"], refusal
+
+
+def entered(folder):
+    return outcome(start_entering(folder))
+
+
+def test_a_run_that_lives_is_named_and_one_that_was_killed_leaves_nothing(start_run, tmp_path):
+    folder = tmp_path / "locks"
+    assert entered(folder)[:2] == ([], False)
+    assert not list(folder.iterdir())
+    run, job = start_run()
+    alive, removed, refusal = entered(folder)
+    assert (alive, removed) == ([run.pid], False)
+    assert f"process {run.pid}: wait for it, or end it (kill {run.pid})" in refusal
+    os.kill(job, signal.SIGKILL)
+    run.kill()
+    run.wait()
+    assert entered(folder)[:2] == ([], True)
+    assert not list(folder.iterdir())
+
+
+def test_locks_of_a_killed_run_stay_while_another_run_lives(start_run, tmp_path):
+    (run, _), (killed, job) = start_run(), start_run()
+    os.kill(job, signal.SIGKILL)
+    killed.kill()
+    killed.wait()
+    assert entered(tmp_path / "locks")[:2] == ([run.pid], False)
+
+
+@pytest.mark.parametrize(
+    ("place", "host", "advice"),
+    [
+        (
+            "here",
+            "elsewhere",
+            "on elsewhere: wait for it; where it no longer runs: snakemake",
+        ),
+        (
+            "cluster",
+            None,
+            "jobs on the cluster: wait for them or cancel them, then: snakemake",
+        ),
+    ],
+)
+def test_what_may_live_elsewhere_keeps_its_locks(place, host, advice, start_run, tmp_path):
+    run, job = start_run(place)
+    os.kill(job, signal.SIGKILL)
+    run.kill()
+    run.wait()
+    (note,) = (tmp_path / "locks").iterdir()
+    if host:
+        note.rename(note.with_name(note.name.replace(socket.gethostname(), host)))
+    alive, removed, refusal = entered(tmp_path / "locks")
+    assert (alive, removed) == ([run.pid], False)
+    assert advice in refusal
+
+
+def test_jobs_that_outlive_their_run_are_waited_for(start_run, tmp_path):
+    run, job = start_run()
+    run.kill()
+    run.wait()
+    entering = start_entering(tmp_path / "locks")
+    told = entering.stderr.readline()
+    assert told.startswith(f"waiting for jobs that a killed run has left, processes {job} (kill")
+    os.kill(job, signal.SIGKILL)
+    assert outcome(entering)[:2] == ([], True)
+
+
+def test_a_folder_without_locks_of_files_is_left_to_snakemake(tmp_path, monkeypatch, capsys):
+    def flock(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(live_runs.fcntl, "flock", flock)
+    folder = tmp_path / "locks"
+    folder.mkdir()
+    (folder / f"7.0123abcd@{socket.gethostname()}.here").touch()
+    others = live_runs.enter(folder, False, lambda: pytest.fail("removed the locks"))
+    assert others == []
+    assert len(list(folder.iterdir())) == 1
+
+
+@pytest.fixture(params=["checkout", "own folder"])
+def building(request, tmp_path):
+    """A folder in which a run waits for its job to be let go, and the run's process."""
+    folder, words = checkout(tmp_path / "checkout", one=ONE), BUILD
+    (folder / "scripts/build_scene.py").write_text(WAITING)
+    if request.param == "own folder":
+        own = tmp_path / "own"
+        (own / "configs").mkdir(parents=True)
+        (folder / "configs/scenes").rename(own / "configs/scenes")
+        shutil.copytree(own / "configs/scenes", folder / "configs/scenes")
+        words = ("--snakefile", folder / "Snakefile", "--directory", own, *BUILD)
+        folder = own
+    else:
+        words = ("--directory", folder, *BUILD)
+    process = start_snakemake(tmp_path / "checkout", *words, stderr=subprocess.PIPE, text=True)
+    wait_until((folder / "started").exists, process)
+
+    def run(*more, target=None):
+        given = (*words[:-1], target) if target else words
+        return snakemake(tmp_path / "checkout", *more, *given)
+
+    run.start = lambda **options: start_snakemake(tmp_path / "checkout", *words, **options)
+    yield folder, process, run
+    (folder / "go").touch()
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def last_line(run):
+    return (run.stdout + run.stderr).splitlines()[-1]
+
+
+@pytest.mark.slow
+def test_a_second_live_build_is_refused_whatever_else_looks_at_the_folder(building):
+    folder, process, run = building
+    refusal = f"error: another run makes these files, process {process.pid}: wait for it, or end"
+    second = run()
+    assert second.returncode != 0
+    assert last_line(second).startswith(refusal)
+    assert "Traceback" not in second.stdout + second.stderr
+    assert "locked" not in (dry := run("--dry-run")).stderr and dry.returncode == 0
+    # What makes no files leaves the build its locks when it ends.
+    for options in ((), ("--nolock",)):
+        status = run(*options, target="status")
+        assert status.returncode == 0, status.stderr
+    assert last_line(run()).startswith(refusal)
+    (folder / "go").touch()
+    assert process.wait() == 0
+    assert run().returncode == 0
+
+
+@pytest.mark.slow
+def test_after_a_kill_with_its_jobs_the_next_run_goes_on_by_itself(building):
+    folder, process, run = building
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    (folder / "go").touch()
+    following = run()
+    assert following.returncode == 0, following.stderr
+    assert "waiting for jobs" not in following.stderr
+    assert (folder / "work/one/scene.blend").read_text() == "a scene"
+
+
+@pytest.mark.slow
+def test_after_a_kill_the_next_run_waits_for_the_jobs_that_live_on(building, tmp_path):
+    folder, process, run = building
+    process.kill()
+    process.wait()
+    log = tmp_path / "terminal.log"
+    with log.open("w") as terminal:
+        following = run.start(stdout=terminal, stderr=terminal)
+    waiting = "waiting for jobs that a killed run has left"
+    wait_until(lambda: waiting in log.read_text(), following, log=log)
+    (folder / "go").touch()
+    assert following.wait() == 0, log.read_text()
+    assert (folder / "work/one/scene.blend").read_text() == "a scene"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("building", ["checkout"], indirect=True)
+def test_a_run_that_is_stopped_says_so_and_the_next_one_goes_on(building):
+    folder, process, run = building
+    process.terminate()
+    said = process.stderr.readline()
+    while "stopping after SIGTERM" not in said:
+        said = process.stderr.readline()
+        assert said, "it ended without a word"
+    (folder / "go").touch()
+    *_, last = process.stderr.read().splitlines()
+    assert process.wait() != 0
+    assert last.startswith("error: the run was stopped") and last.endswith("goes on")
+    assert (folder / "work/one/scene.blend").read_text() == "a scene"
+    assert run().returncode == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("building", ["checkout"], indirect=True)
+def test_the_locks_of_another_machine_are_left_to_the_user(building):
+    folder, process, run = building
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    (folder / "go").touch()
+    (note,) = (folder / ".snakemake/locks").glob("*.here")
+    note.rename(note.with_name(note.name.replace(socket.gethostname(), "elsewhere")))
+    refused = run()
+    assert refused.returncode != 0
+    assert last_line(refused).endswith("where it no longer runs: snakemake --unlock")
+    assert run("--unlock").returncode == 0
+    assert run().returncode == 0

@@ -1,0 +1,174 @@
+"""Finds out which runs work in a folder, and which of them were killed.
+
+Each run leaves a note in the folder, and locks it as long as its process lives. A killed process
+and a power cut leave the note without the lock. So the next run can tell a live run from a killed
+one, which Snakemake's own locks do not show. The note's name holds all facts, because a power cut
+may leave the file empty.
+"""
+
+import atexit
+import fcntl
+import os
+import re
+import socket
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+
+from lightfield.core.files import is_locked
+
+# Jobs inherit this variable. They live on if only their run is killed.
+VARIABLE = "PLENOFORGE_RUN"
+_NAME = re.compile(r"(?P<pid>\d+)\.[0-9a-f]{8}@(?P<host>.+)\.(?P<place>here|cluster)")
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run by its note: its process, the host's name, and whether its jobs run elsewhere."""
+
+    note: Path
+    pid: int
+    host: str
+    on_cluster: bool
+
+    @property
+    def is_killed(self) -> bool:
+        """Whether the run and its jobs have certainly ended.
+
+        Processes on another machine, and jobs on a cluster, may still live.
+        """
+        return self.host == socket.gethostname() and not self.on_cluster and _is_free(self.note)
+
+    @property
+    def jobs(self) -> list[int]:
+        """The numbers of the processes of its jobs on this machine."""
+        name = str(self.note.absolute())
+        return sorted(
+            process.pid
+            for process in psutil.process_iter(["environ"])
+            if (process.info["environ"] or {}).get(VARIABLE) == name and process.pid != os.getpid()
+        )
+
+
+def enter(folder: Path, on_cluster: bool, remove_locks: Callable[[], None]) -> list[Run]:
+    """Note that this run works in a folder. Return the other runs there that may live.
+
+    If all of them were killed, ``remove_locks`` removes Snakemake's locks. Waits for jobs that
+    have outlived their run. Some network file systems have no locks: there nothing is noted, and
+    nothing is removed.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    _wait_for_jobs(folder)
+    try:
+        with _guarded(folder.parent):
+            others = _runs(folder)
+            alive = [run for run in others if not run.is_killed]
+            if others and not alive:
+                remove_locks()
+            for run in others:
+                if run not in alive:
+                    run.note.unlink(missing_ok=True)
+            folder.mkdir(exist_ok=True)
+            _leave_note(folder, on_cluster)
+    except OSError as error:
+        print(f"warning: {folder}: no locks of files: {error.strerror}", file=sys.stderr)
+        return []
+    return alive
+
+
+def refusal(others: list[Run]) -> str:
+    """Return why a run cannot work on files that are locked, and what to do."""
+    if not others:
+        return (
+            "another run has locked these files and left no note of itself: wait for it; where "
+            "none runs any more: snakemake --unlock"
+        )
+    run = others[0]
+    if run.host != socket.gethostname():
+        return (
+            f"another run makes these files, process {run.pid} on {run.host}: wait for it; where "
+            "it no longer runs: snakemake --unlock"
+        )
+    if _is_free(run.note):
+        return (
+            f"a run that was killed, process {run.pid}, may have left jobs on the cluster: wait "
+            "for them or cancel them, then: snakemake --unlock"
+        )
+    return (
+        f"another run makes these files, process {run.pid}: wait for it, or end it "
+        f"(kill {run.pid}); snakemake status says how far it is"
+    )
+
+
+def _runs(folder: Path) -> list[Run]:
+    """Return the other runs that have left a note."""
+    runs = []
+    for path in sorted(folder.iterdir()):
+        if (name := _NAME.fullmatch(path.name)) and path not in _OWN:
+            runs.append(Run(path, int(name["pid"]), name["host"], name["place"] == "cluster"))
+    return runs
+
+
+# The notes of this process, with the files that hold their locks.
+_OWN: dict[Path, int] = {}
+
+
+def _leave_note(folder: Path, on_cluster: bool) -> None:
+    place = "cluster" if on_cluster else "here"
+    unique = os.urandom(4).hex()
+    note = folder / f"{os.getpid()}.{unique}@{socket.gethostname()}.{place}"
+    # Open it for writing, because NFS locks no other files.
+    file = os.open(note, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(file)
+        note.unlink()
+        raise
+    _OWN[note] = file
+    os.environ[VARIABLE] = str(note.absolute())
+    atexit.register(note.absolute().unlink, missing_ok=True)
+
+
+def _is_free(note: Path) -> bool:
+    """Return whether no process holds the lock of a note."""
+    try:
+        return not is_locked(note, os.O_RDWR)
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+
+
+def _wait_for_jobs(folder: Path) -> None:
+    """Wait for the jobs of killed runs, because they write the same files."""
+    has_reported = False
+    while jobs := [pid for run in _runs(folder) if run.is_killed for pid in run.jobs]:
+        if not has_reported:
+            numbers = " ".join(map(str, jobs))
+            print(
+                f"waiting for jobs that a killed run has left, processes {numbers} "
+                f"(kill {numbers} ends them)",
+                file=sys.stderr,
+                flush=True,
+            )
+        has_reported = True
+        time.sleep(0.5)
+
+
+@contextmanager
+def _guarded(folder: Path) -> Iterator[None]:
+    """Lock the folder of the notes, so that one process at a time reads and writes them."""
+    lock = os.open(folder, os.O_RDONLY)
+    try:
+        # Some networks' file systems lock no folders.
+        with suppress(OSError):
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(lock)

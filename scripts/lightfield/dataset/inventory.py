@@ -1,0 +1,48 @@
+"""Reads the inventory of a scene, which scripts/inventory.py writes."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field, TypeAdapter
+
+# That of Python 3.11 is not enough for pydantic.
+from typing_extensions import TypedDict
+
+from lightfield.core.files import read_keys
+from lightfield.core.settings import checked
+
+_Count = Annotated[int, Field(ge=0)]
+
+
+class _ExternalFile(TypedDict, total=False):
+    """A file that a .blend reads. Its size and sum are null where it was missing."""
+
+    path: str
+    bytes: _Count | None
+    mtime_ns: _Count | None
+    sha256: str | None
+
+
+class _Inventory(TypedDict, total=False):
+    """The keys that programs read. Each program says which of them it needs."""
+
+    __pydantic_config__ = ConfigDict(strict=True)  # type: ignore[misc]
+
+    blend: dict[str, Any]
+    external_files: list[_ExternalFile]
+    hidden: list[str]
+    left_out: list[str]
+    memory_bytes: _Count
+    missing: list[dict[str, Any]]
+    sampling: dict[str, Any]
+    volumes: list[str]
+
+
+_INVENTORY = TypeAdapter(_Inventory)
+
+
+def read_inventory(path: Path | str, *keys: str) -> dict[str, Any]:
+    """Return the inventory of a scene. Raises `UserError` where a key is missing or wrong."""
+    content = read_keys(path, "inventory.py", *keys)
+    checked(_INVENTORY, content, str(path))
+    return content

@@ -1,0 +1,192 @@
+"""The experiment behind every measurement of rendering: methods, windows, references, errors.
+
+`Experiment.run` renders each window with each `Method` and several seeds. The errors come from
+comparing these renders with a reference of the same window (see `metrics`). `error_vs_time`,
+`advice` and `calibration` choose windows and methods, and report what the experiment measured.
+"""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from statistics import fmean
+from typing import Any
+
+from lightfield.core.progress import Progress
+from lightfield.measurement import metrics, strata
+from lightfield.measurement.metrics import Reference
+from lightfield.measurement.trials import Trial, Trials, Window
+
+# What a report calls all strata together.
+WHOLE_VIEWS = "whole views"
+
+# A stratified reference splits its samples among so many seeds; their differences tell its error.
+REFERENCE_SEEDS = 8
+
+# The renders of one method, by window and seed.
+Renders = Sequence[Sequence[Trial]]
+# References by the number of their window. Windows without a pixel of a stratum have none.
+References = Mapping[int, Reference]
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to render: a name for reports, and a change of the scene's ``render`` settings."""
+
+    name: str
+    settings: Mapping[str, Any]
+
+    @property
+    def key(self) -> str:
+        """What tells this method's renders from those of others: its settings."""
+        return json.dumps(self.settings)
+
+
+class Experiment:
+    """Renders ``windows`` with methods, and compares the renders with ``references``.
+
+    ``by_stratum`` holds each stratum's references, in which only the stratum's pixels count;
+    ``areas`` holds each stratum's part of the whole views. Without strata, all pixels are one.
+    """
+
+    def __init__(
+        self,
+        maker: Trials,
+        windows: Sequence[Window],
+        references: Sequence[Reference],
+        by_stratum: Mapping[str, References] | None = None,
+        areas: Mapping[str, float] | None = None,
+    ) -> None:
+        self.maker = maker
+        self.windows = windows
+        self.references = references
+        self.all_windows = dict(enumerate(references))
+        self.strata = by_stratum or {WHOLE_VIEWS: self.all_windows}
+        areas = areas or {WHOLE_VIEWS: 1.0}
+        self.areas = {stratum: areas[stratum] for stratum in self.strata}
+        self._renders: dict[str, list[list[Trial]]] = {}
+
+    @classmethod
+    def stratified(
+        cls,
+        maker: Trials,
+        windows: Sequence[Window],
+        areas: Mapping[str, float],
+        samples: int,
+        name: str,
+    ) -> "Experiment":
+        """Render references of ``samples`` samples a pixel, and split them by stratum.
+
+        ``areas`` is each stratum's part of the whole views; ``name`` starts the progress lines.
+        """
+        # The pilot renders first, because it sets up Cycles for the parts of light.
+        classes = strata.classes_of(maker, windows)
+        progress = Progress(len(windows), f"{name}: references")
+        references = []
+        for window in windows:
+            references.append(maker.reference(window, REFERENCE_SEEDS, samples // REFERENCE_SEEDS))
+            progress.done()
+        references = metrics.exposed_alike(references)
+        by_stratum = split_by_stratum(references, classes)
+        counted = {stratum: by_stratum[stratum] for stratum in areas if stratum in by_stratum}
+        return cls(maker, windows, references, counted, areas)
+
+    @cached_property
+    def device(self) -> str:
+        """What Cycles renders on, CPU or GPU."""
+        return self.maker.render(self.windows[0], 1, {"samples": 1}).device
+
+    @property
+    def megapixels(self) -> float:
+        """The size of a window; all have the same."""
+        return self.windows[0].width * self.windows[0].height / 1e6
+
+    def run(self, methods: Iterable[Method], seeds: Sequence[int], title: str = "") -> None:
+        """Render all windows with all methods and seeds. A ``title`` starts the progress lines.
+
+        Methods take turns, so that another load on the machine slows all of them alike.
+        """
+        by_key = {method.key: method for method in methods}
+        for key in by_key:
+            self._renders[key] = [[] for _ in self.windows]
+        count = len(seeds) * len(self.windows) * len(by_key)
+        progress = Progress(count, title, "renders") if title else None
+        for seed in seeds:
+            for number, window in enumerate(self.windows):
+                for key, method in by_key.items():
+                    trial = self.maker.render(window, seed, method.settings)
+                    self._renders[key][number].append(trial)
+                    if progress:
+                        progress.done()
+
+    def renders(self, method: Method) -> Renders:
+        """Return what `run` rendered with a method, by window and seed."""
+        return self._renders[method.key]
+
+    def errors(
+        self, method: Method, references: References, left_out: float = metrics.OUTLIERS
+    ) -> list[list[float]]:
+        """Return the relative mean squared errors of a method, by window and seed.
+
+        ``left_out`` is the part of the pixels that do not count, those with the largest errors.
+        """
+        return [
+            [
+                metrics.relative_mse(trial.colour, reference, left_out)
+                for trial in self.renders(method)[number]
+            ]
+            for number, reference in references.items()
+        ]
+
+    def seconds(self, method: Method, numbers: Iterable[int] | None = None) -> list[list[float]]:
+        """Return a method's seconds a megapixel, by window and seed, of all windows or some."""
+        renders = self.renders(method)
+        chosen = range(len(renders)) if numbers is None else numbers
+        return [[trial.seconds / self.megapixels for trial in renders[n]] for n in chosen]
+
+    def over_views(self, values: Mapping[str, float]) -> float:
+        """Return the mean of a value of each stratum, weighted by the strata's areas."""
+        return over_views(values, self.areas)
+
+    @property
+    def reference_error(self) -> float:
+        """The expected error of the references themselves, in whole views."""
+        return self.over_views(
+            {stratum: mean_own_error(places.values()) for stratum, places in self.strata.items()}
+        )
+
+    def described(self) -> dict[str, Any]:
+        """Return where this experiment measured, for its report."""
+        return {
+            "probes": [window.name for window in self.windows],
+            "size": self.windows[0].width,
+            "resolution": [self.maker.lens.width, self.maker.lens.height],
+        }
+
+
+def split_by_stratum(
+    references: Sequence[Reference], classes: Sequence[strata.Classes]
+) -> dict[str, dict[int, Reference]]:
+    """Return each stratum's references, in which only its pixels count.
+
+    ``classes`` are those of the references' windows. A window is left out of a stratum of which it
+    has fewer than `strata.FEWEST_PIXELS`, and a stratum without any window is left out.
+    """
+    by_stratum: dict[str, dict[int, Reference]] = {}
+    for stratum_number, stratum in enumerate(strata.STRATA):
+        for number, (reference, kinds) in enumerate(zip(references, classes, strict=True)):
+            part = replace(reference, part=kinds == stratum_number)
+            if part.counted.sum() >= strata.FEWEST_PIXELS:
+                by_stratum.setdefault(stratum, {})[number] = part
+    return by_stratum
+
+
+def over_views(values: Mapping[str, float], areas: Mapping[str, float]) -> float:
+    """Return the mean of a value of each stratum, weighted by the strata's ``areas``."""
+    total = sum(areas[stratum] for stratum in values)
+    return sum(areas[stratum] * value for stratum, value in values.items()) / total
+
+
+def mean_own_error(references: Iterable[Reference]) -> float:
+    """Return the mean of the references' own expected errors."""
+    return fmean(reference.own_error for reference in references)

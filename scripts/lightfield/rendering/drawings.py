@@ -1,0 +1,43 @@
+"""Drawings with Grease Pencil, which Blender draws over what Cycles has rendered."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+
+
+def set_up(layer: Any, camera_type: str) -> None:
+    """Show drawings in perspective views alone, and there hide them behind surfaces.
+
+    Blender draws them as a perspective camera sees them, whatever the lens. It hides them behind
+    surfaces only where the view layer has the pass of depth.
+    """
+    if camera_type == "PANO":
+        layer.use_grease_pencil = False
+    elif _drawings():
+        layer.use_pass_z = True
+
+
+def warnings(camera_type: str) -> Iterator[str]:
+    """Yield a line if the views of a PANO or PERSP camera lack drawings, or passes of them.
+
+    The viewport must have what is rendered: see `clearance.show_what_is_rendered`.
+    """
+    shown = sorted(str(thing.name_full) for thing in _drawings() if not thing.hide_viewport)
+    if not shown:
+        return
+    names = f"{', '.join(shown[:8])}{' …' if len(shown) > 8 else ''}"
+    if camera_type == "PANO":
+        yield (
+            f"Grease Pencil is left out: {names}: Blender draws it through perspective lenses "
+            "alone; give the rig a rectilinear lens, or make the drawing a mesh"
+        )
+    else:
+        yield (
+            f"Grease Pencil is in the colour alone: {names}: no depth and no pass has it; make the "
+            "drawing a mesh to have it there"
+        )
+
+
+def _drawings() -> list[Any]:
+    return [thing for thing in bpy.data.objects if thing.type == "GREASEPENCIL"]

@@ -1,0 +1,145 @@
+"""Simulations that are not baked, which Blender does not run up to the frame that is rendered."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import bpy
+
+from lightfield.rendering import animation
+from lightfield.rendering.render_graph import in_render
+
+
+def unbaked_fluids() -> list[str]:
+    """Return the names of the objects that a render shows with a fluid that is not baked.
+
+    Blender as a Python module has no fluid solver that works: it aborts when it evaluates them.
+    """
+    return sorted(
+        str(thing.name_full)
+        for thing in bpy.context.view_layer.objects
+        for modifier in thing.modifiers
+        if modifier.type == "FLUID"
+        and modifier.fluid_type == "DOMAIN"
+        and modifier.show_render
+        and (not thing.hide_render or animation.is_animated(thing))
+        and not _is_fluid_baked(modifier.domain_settings)
+    )
+
+
+def _is_fluid_baked(settings: Any) -> bool:
+    if settings.domain_type == "LIQUID" and settings.use_mesh:
+        return bool(settings.has_cache_baked_mesh)
+    return bool(settings.has_cache_baked_data)
+
+
+def warnings(frames: Sequence[int]) -> Iterator[str]:
+    """Yield a line if rendered objects of the open scene have unbaked simulations.
+
+    Blender goes to each of the ``frames`` directly. A simulation has no past there: its object
+    stays where it was, or falls in one step. At a simulation's first frame nothing is wrong.
+    """
+    last = max(frames)
+    unbaked = {str(thing.name_full): kind for thing, kind, first in _unbaked(last) if last > first}
+    if not unbaked:
+        return
+    bpy.context.scene.frame_set(last)
+    shown = sorted(in_render(_rendered_objects) & unbaked.keys())
+    if not shown:
+        return
+    names = ", ".join(f"{name} ({unbaked[name]})" for name in shown[:8])
+    yield (
+        f"simulations are not baked: {names}{' …' if len(shown) > 8 else ''}: Blender does not run "
+        f"them up to frame {last}, so shapes and places may be wrong; bake them in Blender and "
+        "save the .blend"
+    )
+
+
+def _unbaked(frame: int) -> Iterator[tuple[Any, str, int]]:
+    """Yield each object with an unbaked simulation, the simulation's kind, and its first frame."""
+    world = bpy.context.scene.rigidbody_world
+    if world and world.enabled and world.collection and not world.point_cache.is_baked:
+        for thing in world.collection.objects:
+            if thing.rigid_body and _is_moved(thing):
+                yield thing, "rigid body", world.point_cache.frame_start
+    for thing in bpy.data.objects:
+        for modifier in thing.modifiers:
+            if not modifier.show_render:
+                continue
+            for kind, cache in _point_caches(modifier):
+                if not cache.is_baked:
+                    yield thing, kind, cache.frame_start
+            if modifier.type == "NODES":
+                first = _first_simulated_frame(modifier)
+                if first is not None and _depends_on_way(thing, first, frame):
+                    yield thing, "simulation nodes", first
+
+
+def _is_moved(thing: Any) -> bool:
+    """Return whether the rigid-body simulation moves an object at some frame."""
+    body = thing.rigid_body
+    return body.type == "ACTIVE" and (not body.kinematic or animation.is_animated(thing))
+
+
+def _point_caches(modifier: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the kind and the cache of each simulation of a modifier that has a point cache."""
+    if modifier.type in ("CLOTH", "SOFT_BODY"):
+        yield modifier.name, modifier.point_cache
+    elif modifier.type == "PARTICLE_SYSTEM":
+        system = modifier.particle_system
+        settings = system.settings
+        # Hair without dynamics stands still, and particles without physics need no past.
+        is_hair = settings.type == "HAIR"
+        if system.use_hair_dynamics if is_hair else settings.physics_type != "NO":
+            yield f"{'hair' if is_hair else 'particles'} {system.name}", system.point_cache
+    elif modifier.type == "DYNAMIC_PAINT" and modifier.canvas_settings:
+        for surface in modifier.canvas_settings.canvas_surfaces:
+            if surface.is_active and surface.is_cache_user:
+                yield f"dynamic paint {surface.name}", surface.point_cache
+
+
+def _first_simulated_frame(modifier: Any) -> int | None:
+    """Return the first frame of the simulation zones of geometry nodes, None without any."""
+    zones = [bake for bake in modifier.bakes if _is_simulation(bake.node)]
+    firsts = [
+        bake.frame_start
+        if bake.use_custom_simulation_frame_range
+        else bpy.context.scene.frame_start
+        for bake in zones
+    ]
+    return min(firsts, default=None)
+
+
+def _is_simulation(node: Any) -> bool:
+    return node is not None and node.bl_idname == "GeometryNodeSimulationOutput"
+
+
+def _depends_on_way(thing: Any, first: int, frame: int) -> bool:
+    """Return whether an object's extent at a frame depends on the frames before.
+
+    Blender does not tell whether geometry nodes are baked. Baked ones have one result a frame.
+    """
+    extents = []
+    for way in ((first, frame), (first, frame - 1, frame)):
+        for step in way:
+            bpy.context.scene.frame_set(step)
+        extents.append(in_render(lambda depsgraph: _extents(depsgraph, thing.name_full)))
+    return extents[0] != extents[1]
+
+
+def _extents(depsgraph: Any, name: str) -> list[Any]:
+    """Return the matrix and the bounding box of all that an object shows."""
+    return [
+        (tuple(map(tuple, entry.matrix_world)), tuple(map(tuple, entry.object.bound_box)))
+        for entry in depsgraph.object_instances
+        if (entry.parent or entry.object).original.name_full == name
+    ]
+
+
+def _rendered_objects(depsgraph: Any) -> set[str]:
+    """Return the full names of the objects that a render shows, and of those that place them."""
+    return {
+        str(thing.original.name_full)
+        for entry in depsgraph.object_instances
+        for thing in (entry.object, entry.parent)
+        if thing and not thing.hide_render
+    }

@@ -1,0 +1,264 @@
+"""SILVR's flags: another way to give the settings of a reprojection than a settings file.
+
+Lengths are in mm, the angles of lenses in radians or, as in 120deg, in degrees; a rotation is in
+degrees.
+"""
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import InstanceOf, TypeAdapter
+
+from lightfield.core.cli import above_zero, refuse_beside_settings, stops, white
+from lightfield.core.errors import UserError
+from lightfield.core.files import read_json
+from lightfield.core.settings import checked, read_settings
+from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.reprojections import MOST_SAMPLES, ReprojectionSettings
+from lightfield.geometry.lenses import LENSES, Lens
+from lightfield.geometry.lenses.base import named_numbers
+from lightfield.geometry.lenses.cube_map import CubeMap
+from lightfield.reprojection.filters import DEFAULT_FILTER, FILTERS
+
+# Of an image's side: of a cube map's strip of faces, too.
+MOST_PIXELS = 2**19
+
+
+class FlagSettings(ReprojectionSettings):
+    """Settings whose lens is one that a scene YAML's camera may not be able to describe.
+
+    Flags give angles in radians, and --no-reproject with --scale gives the source's lens in
+    another size.
+    """
+
+    output_lens: InstanceOf[Lens]
+
+    def lens(self, source: Lens) -> Lens:
+        return self.output_lens
+
+
+def add_configuration_flags(parser: argparse.ArgumentParser) -> None:
+    """Add --settings, and the flags that `read_source` reads."""
+    files = parser.add_argument_group("Configuration")
+    files.add_argument(
+        "--settings",
+        type=Path,
+        metavar="JSON",
+        help="settings file, instead of the flags for output lens, sampling, files and colour",
+    )
+    files.add_argument("--input-cfg", type=Path, metavar="JSON", help="the images' lightfield.json")
+    files.add_argument(
+        "--no-configs", metavar="WIDTH,HEIGHT", help="size of the images, whose lens --i-… gives"
+    )
+    choice = _add_lens_flags(parser, "i-", "Input lens, with --no-configs")
+    choice.add_argument(
+        "--i-cubemap",
+        action="store_true",
+        help="six faces <name>_f, _b, _l, _r, _u, _d; the size is 6 × N, N",
+    )
+
+
+def add_lens_map_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that stand for the settings of a lens map."""
+    choice = _add_lens_flags(parser, "", "Output lens")
+    choice.add_argument(
+        "--cubemap", type=int, metavar="SIZE", help="six perspective faces of 90°, SIZE² pixels"
+    )
+    optics = parser.add_argument_group("Output optics")
+    optics.add_argument("--no-reproject", action="store_true", help="keep the input lens")
+    optics.add_argument(
+        "--rotation",
+        default="0,0,0",
+        metavar="PAN,PITCH,ROLL",
+        help="turn the camera left, down and clockwise, degrees",
+    )
+    optics.add_argument(
+        "--scale", type=above_zero, default=1.0, help="size over the input's, default 1"
+    )
+    optics.add_argument(
+        "--output-resolution", metavar="WIDTH,HEIGHT", help="size, instead of --scale"
+    )
+    sampling = parser.add_argument_group("Sampling")
+    sampling.add_argument("-s", "--samples", type=int, default=1, help="n × n samples a pixel")
+    kind = sampling.add_mutually_exclusive_group()
+    kind.add_argument("--nn", action="store_const", dest="filter", const="nearest")
+    kind.add_argument("--bl", action="store_const", dest="filter", const="bilinear")
+    kind.add_argument("--bc", action="store_const", dest="filter", const="bicubic")
+    kind.add_argument(
+        "--filter", choices=FILTERS, help=f"default {DEFAULT_FILTER}, or bicubic with --samples"
+    )
+
+
+def add_reproject_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that stand for the settings of a reprojection."""
+    add_lens_map_flags(parser)
+    files = parser.add_argument_group("Files of each view")
+    files.add_argument("--exr", action="store_true", help="write EXR: colour and depth")
+    files.add_argument("--png", action="store_true", help="write PNG: colour, sRGB")
+    files.add_argument("--bits", type=int, choices=[8, 16], default=8, help="of a PNG, default 8")
+    files.add_argument(
+        "--depth-png",
+        type=above_zero,
+        metavar="SCALE",
+        help="write <name>_depth.png: 16-bit, depth in metres × SCALE, 0 for none",
+    )
+    files.add_argument(
+        "--mask",
+        action="store_true",
+        help="write dynamic_mask_<name>.png: 255 where a pixel has no source",
+    )
+    files.add_argument(
+        "--passes",
+        type=lambda text: text.split(","),
+        default=[],
+        metavar="NAME,…",
+        help="reproject these passes, too, which lie beside --input-cfg, into --output-dir/<pass>/",
+    )
+    colour = parser.add_argument_group("Colour")
+    colour.add_argument("--exposure", type=stops, default=0.0, help="stops, default 0")
+    colour.add_argument(
+        "--reinhard", type=white, default=1.0, help="value that becomes white, default 1: off"
+    )
+
+
+def _add_lens_flags(parser: argparse.ArgumentParser, prefix: str, title: str) -> Any:
+    """Add a flag for each lens; return the group, in which one flag excludes the others."""
+    group = parser.add_argument_group(
+        title, "Lengths in mm, angles in radians, or in degrees as in 120deg."
+    )
+    choice = group.add_mutually_exclusive_group()
+    for lens in LENSES.values():
+        if lens.form:
+            choice.add_argument(f"--{prefix}{lens.flag()}", metavar=lens.form, help=lens.title)
+    return choice
+
+
+def read_source(arguments: argparse.Namespace) -> tuple[LightField, Lens]:
+    """Return the images' light field and lens, by the flags of `add_configuration_flags`."""
+    if arguments.no_configs:
+        if arguments.input_cfg:
+            raise UserError("--no-configs: excludes --input-cfg")
+        width, height = _size(arguments.no_configs, "--no-configs")
+        lens = _lens(arguments, "i-", width, height)
+        if lens is None:
+            raise UserError("--no-configs: needs the input lens, one of the flags --i-…")
+        return LightField(lens.to_lightfield(), ()), lens
+    if _lens(arguments, "i-", 6, 1) is not None:
+        raise UserError("--i-…: the input lens comes from --input-cfg; or give --no-configs")
+    if not arguments.input_cfg:
+        raise UserError("--input-cfg: is missing; without one, give --no-configs and --i-…")
+    path: Path = arguments.input_cfg
+    content = read_json(path)
+    if isinstance(content, dict) and "frames" not in content:
+        lightfield = LightField(content, (), path)
+    else:
+        lightfield = LightField.read(path)
+    return lightfield, lightfield.lens
+
+
+def lens_map_settings(arguments: argparse.Namespace, source: Lens) -> ReprojectionSettings:
+    """Return the settings of a lens map: those of --settings, or those of the flags."""
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_lens_map_flags)
+        return read_settings(ReprojectionSettings, arguments.settings)
+    return _of_flags(_lens_map_content(arguments, source))
+
+
+def reproject_settings(arguments: argparse.Namespace, source: Lens) -> ReprojectionSettings:
+    """Return the settings of a reprojection: those of --settings, or those of the flags."""
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_reproject_flags)
+        settings = read_settings(ReprojectionSettings, arguments.settings)
+        if not settings.formats:
+            raise UserError(f"{arguments.settings}: formats: must be a list of exr, png, or both")
+        return settings
+    formats = [name for name in ("exr", "png") if getattr(arguments, name)]
+    depth_png = {} if arguments.depth_png is None else {"depth_png": arguments.depth_png}
+    content = _lens_map_content(arguments, source)
+    if not formats:
+        raise UserError("--exr, --png: give one of them, or both")
+    names = ("bits", "exposure", "reinhard", "mask", "passes")
+    development = {name: getattr(arguments, name) for name in names}
+    return _of_flags({**content, "formats": formats, **development, **depth_png})
+
+
+def _of_flags(content: Mapping[str, Any]) -> ReprojectionSettings:
+    return checked(TypeAdapter(FlagSettings), dict(content), "flags")
+
+
+def _lens_map_content(arguments: argparse.Namespace, source: Lens) -> dict[str, Any]:
+    """Return the part of the settings that a lens map depends on."""
+    if not 1 <= arguments.samples <= MOST_SAMPLES:
+        raise UserError(f"--samples {arguments.samples}: must be from 1 to {MOST_SAMPLES}")
+    return {
+        "output_lens": _output_lens(arguments, source),
+        "cube_map": arguments.cubemap is not None,
+        "rotation": _numbers(arguments.rotation, "--rotation", "PAN,PITCH,ROLL"),
+        # The adaptive filter covers the pixel by itself; samples are those of SILVR's default.
+        "filter": arguments.filter or (DEFAULT_FILTER if arguments.samples == 1 else "bicubic"),
+        "samples": arguments.samples,
+    }
+
+
+def _output_lens(arguments: argparse.Namespace, source: Lens) -> Lens:
+    width, height = _output_size(arguments, source)
+    if arguments.cubemap is not None:
+        if arguments.no_reproject:
+            raise UserError("--no-reproject: excludes an output lens")
+        if not 1 <= arguments.cubemap <= MOST_PIXELS // 6:
+            raise UserError(
+                f"--cubemap {arguments.cubemap}: must be from 1 to {MOST_PIXELS // 6} pixels"
+            )
+        return CubeMap(width=6 * arguments.cubemap, height=arguments.cubemap).face
+    lens = _lens(arguments, "", width, height)
+    if arguments.no_reproject:
+        if lens is not None:
+            raise UserError("--no-reproject: excludes an output lens")
+        return source.resized(width, height)
+    if lens is None:
+        raise UserError("--rectilinear, …: give the output lens, or --no-reproject")
+    return lens
+
+
+def _output_size(arguments: argparse.Namespace, source: Lens) -> tuple[int, int]:
+    """Return the width and height that --output-resolution or --scale gives."""
+    if arguments.output_resolution:
+        return _size(arguments.output_resolution, "--output-resolution")
+    width = int(source.width * arguments.scale)
+    height = int(source.height * arguments.scale)
+    if min(width, height) < 1:
+        raise UserError(f"--scale {arguments.scale:g}: leaves no pixel")
+    if max(width, height) > MOST_PIXELS:
+        raise UserError(f"--scale {arguments.scale:g}: makes a side of over {MOST_PIXELS}")
+    return width, height
+
+
+def _lens(arguments: argparse.Namespace, prefix: str, width: int, height: int) -> Lens | None:
+    """Return the lens of the flag that was given, at ``width`` × ``height``; None without one."""
+    attribute = prefix.replace("-", "_")
+    if prefix and arguments.i_cubemap:
+        return CubeMap(width=width, height=height)
+    for lens in LENSES.values():
+        text = getattr(arguments, attribute + lens.name, None)
+        if text is not None:
+            try:
+                return lens.from_flag(text, width, height)
+            except UserError as error:
+                raise UserError(f"--{prefix}{lens.flag()} {text}: {error}") from None
+    return None
+
+
+def _numbers(text: str, flag: str, form: str) -> list[float]:
+    try:
+        return list(named_numbers(text, form).values())
+    except UserError as error:
+        raise UserError(f"{flag} {text}: {error}") from None
+
+
+def _size(text: str, flag: str) -> tuple[int, int]:
+    width, height = _numbers(text, flag, "WIDTH,HEIGHT")
+    if not all(side.is_integer() and 1 <= side <= MOST_PIXELS for side in (width, height)):
+        raise UserError(f"{flag} {text}: must be two whole numbers from 1 to {MOST_PIXELS}")
+    return int(width), int(height)

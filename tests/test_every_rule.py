@@ -1,0 +1,542 @@
+"""Every rule runs again when anything changes that its jobs were made from, and only then.
+
+Stand-ins do the work of all programs, so a build of every rule takes seconds. What a stand-in
+writes names its command and the SHA-256 of each input. So it shows from what it was made.
+"""
+
+import hashlib
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from checkouts import checkout, jobs_on, snakemake, with_consumers
+from sphere import write_views
+
+from lightfield.dataset import ledger
+
+pytestmark = pytest.mark.slow
+ROOT = Path(__file__).parents[1]
+CAMERA = "{lens: equidistant, fov: 180, resolution: [16, 16]}"
+BUILT = f"""
+description: Cameras in a room
+scene:
+  builder: room
+  frame: 1
+render: {{samples: 4}}
+report: {{panorama: true}}
+rigs:
+  LFPlane:
+    type: plane
+    cameras: [2, 2]
+    size: 1
+    center: [0, 0, 1]
+    camera: {CAMERA}
+    split: odd
+  LFInner: {{type: plane, cameras: [2, 2], size: 0.5, camera: {CAMERA}}}
+reprojections:
+  perspective:
+    camera: {{lens: rectilinear, fov: 60, resolution: [8, 8]}}
+    format: png
+    exposure: -1
+  cubes:
+    camera: {{lens: rectilinear, fov: 90, resolution: [8, 8]}}
+    cube_map: true
+exports:
+  instant_ngp: {{sources: [perspective]}}
+  nerfstudio: {{sources: [perspective], points: 9}}
+"""
+# What no built scene needs: a download, a calibration, free places, and flow.
+BROUGHT = f"""
+licence: CC0-1.0
+scene:
+  blend: scene.blend
+  url: https://example.org/scene.blend
+  sha256: "{0:064}"
+  allow_missing: true
+  view_layers: [One]
+  scene_name: First
+render: {{target_error: 0.1}}
+rigs:
+  anywhere:
+    type: random
+    count: 2
+    size: 1
+    camera: {CAMERA}
+flow: {{pairs: neighbours}}
+exports:
+  instant_ngp: {{sources: [views]}}
+  nerfstudio: {{sources: [views], depth: true}}
+"""
+IMPORTED = "scene: {dataset: published}\n"
+TARGETS = [
+    *("all", "package", "plan", "advise", "error_vs_time", "reprojection_benchmark", "stability"),
+    *("extremes", "render_overhead", "gpu_check", "synthesis", "learn"),
+]
+CHOSEN = ["--config", "scenes=[built,brought,imported]", "rigs=all", "preset=full"]
+# These have no output: they are asked for to be read, and always run, or only ask for others.
+WITHOUT_OUTPUT = {
+    *("all", "smoke", "report_html", "package", "error_vs_time", "gpu_check", "synthesis"),
+    *("learn", "rig_tables", "plan", "status", "advise", "verify"),
+}
+# In place of every program: it writes what its job is known by, with everything that rules read.
+STAND_IN = f"""#!{sys.executable}
+import hashlib, json, os, sys
+from pathlib import Path
+work = json.loads(Path("work_to_do.json").read_text())
+(job,) = (
+    job for log, job in work.items()
+    if os.path.exists(log) and os.path.samestat(os.stat(log), os.fstat(2))
+)
+inputs = {{name: hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in job["input"]}}
+content = {{"frames": [], "external_files": [], "cost_samples": 4, "inputs": inputs}}
+content["command"] = sys.argv
+listing = {{"files": {{}}}}
+for name in job["output"]:
+    is_list = Path(name).name == "export.json" or "-" in Path(name).stem
+    Path(name).write_text(json.dumps(content | {{"name": name}} | (listing if is_list else {{}})))
+"""
+# How a job is run, and not what it makes.
+MACHINE = {"--threads", "--processes", "--cores", "--device", "--stall"}
+
+
+class Build:
+    """A checkout in which stand-ins have built everything, and Snakemake's own notes are lost."""
+
+    def __init__(self, folder):
+        self.folder = checkout(folder, built=BUILT, brought=BROUGHT, imported=IMPORTED)
+        camera = {"lens": "equidistant", "fov": 180, "resolution": [16, 16]}
+        write_views(folder / "published/LFPlane", camera, {"type": "plane", "cameras": [2, 1]})
+        for program in [*ROOT.glob("scripts/*.py"), *ROOT.glob("benchmarks/*.py")]:
+            stand_in = folder / program.relative_to(ROOT)
+            stand_in.parent.mkdir(exist_ok=True)
+            stand_in.write_text(STAND_IN)
+        (folder / "scripts/check_device.py").write_text("")
+        with_consumers(folder)
+        self.jobs = self.run()
+        shutil.rmtree(folder / ".snakemake")
+
+    def start(self, *words):
+        return subprocess.Popen(
+            [sys.executable, "-m", "snakemake", "--cores", "4", *words, *CHOSEN, "--", *TARGETS],
+            cwd=self.folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
+        )
+
+    def snakemake(self, *words):
+        """Run everything; return what the terminal says on stderr."""
+        process = self.start(*words)
+        stdout, stderr = process.communicate()
+        assert process.returncode == 0, stdout + stderr
+        return stderr
+
+    def plan(self, *words):
+        """Return the jobs that a run would run, by their first output."""
+        stderr = self.snakemake("--dry-run", *words, "--logger", "jobs")
+        return {job["output"][0]: job for job in jobs_on(stderr) if job["output"]}
+
+    def run(self):
+        """Run everything; return all its jobs.
+
+        A page shows the measurements that there were when it was planned, so it takes two runs.
+        """
+        jobs = self.prepare()
+        for _ in range(2):
+            self.snakemake()
+        return jobs
+
+    def prepare(self):
+        """Tell the stand-ins what each job reads and writes; return all jobs."""
+        jobs = self.plan("--forceall", "--ignore-incomplete")
+        work = {job["log"][0]: job for job in jobs.values()}
+        for log in ("plan", "advise"):
+            work[f"work/logs/{log}.log"] = {"input": [], "output": []}
+        (self.folder / "work_to_do.json").write_text(json.dumps(work))
+        return jobs
+
+    def ledger(self):
+        """Return the ledger's last line of each output."""
+        lines = {}
+        for line in (self.folder / "work/ledger.txt").read_text().splitlines():
+            for name in json.loads(line.partition(" ")[2])["outputs"]:
+                lines[name] = line
+        return lines
+
+    def settings(self):
+        """Return the settings of every job, by file and key."""
+        return {
+            (str(path.relative_to(self.folder / "work")), key): value
+            for path in (self.folder / "work").rglob("settings/**/*.json")
+            for key, value in json.loads(path.read_text()).items()
+        }
+
+    def sha256(self, name):
+        return hashlib.sha256((self.folder / name).read_bytes()).hexdigest()
+
+
+@pytest.fixture(scope="module")
+def pristine(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("every_rule")
+    build = Build(folder / "plenoforge")
+    build.folder.rename(folder / "pristine")
+    return build
+
+
+@pytest.fixture
+def build(pristine):
+    """A fresh clone beside the old folders of results and work."""
+    shutil.copytree(pristine.folder.with_name("pristine"), pristine.folder)
+    yield pristine
+    shutil.rmtree(pristine.folder)
+
+
+def test_all_rules_have_jobs_in_the_build_and_none_runs_twice(build):
+    listed = {*snakemake(build.folder, "--list-rules", *CHOSEN).stdout.split()}
+    made = {job["rule"] for job in build.jobs.values()}
+    # Once there is a .blend, no rule fetches it.
+    assert made == listed - WITHOUT_OUTPUT | {"fetch_brought"}
+    assert not build.plan()
+
+
+def followers(jobs, first):
+    """Return the first outputs of these jobs and of those that follow from them."""
+    maker = {name: output for output, job in jobs.items() for name in job["output"]}
+    readers = {}
+    for output, job in jobs.items():
+        for name in job["input"]:
+            readers.setdefault(maker.get(name), set()).add(output)
+    reached = set()
+    found = set(first)
+    while found:
+        reached |= found
+        found = {reader for output in found for reader in readers.get(output, ())} - reached
+    return reached
+
+
+def made_from(command):
+    """Return the words of a command but for those that say how to run it."""
+    words = iter(command)
+    return [word for word in words if word not in MACHINE or not next(words)]
+
+
+def assert_made_from_what_is_there(build, jobs):
+    """Each output was made by its job's present command from its present inputs.
+
+    The measurements that a page shows are those that there were when it was planned.
+    """
+    shown_later = build.plan().keys()
+    assert {jobs[output]["rule"] for output in shown_later} <= {"page", "index"}
+    lines = build.ledger()
+    for first_output, job in jobs.items():
+        if first_output in shown_later:
+            continue
+        inputs = {name: build.sha256(name) for name in job["input"]}
+        words = shlex.split(job["command"])
+        (python,) = (word for word in words if Path(word).name == "python")
+        command = words[words.index(python) + 1 : words.index(">")]
+        for output in job["output"]:
+            content = json.loads((build.folder / output).read_text())
+            assert content["inputs"] == inputs, output
+            assert made_from(content["command"]) == made_from(command), output
+        line = json.loads(lines[first_output].partition(" ")[2])
+        assert {name: stamp[0] for name, stamp in line["inputs"].items()} == inputs
+        assert line["files"][first_output][0] == build.sha256(first_output)
+
+
+SCENES = {name: f"configs/scenes/{name}.yaml" for name in ("built", "brought", "imported")}
+ROOM = "scripts/scenes/room/__init__.py"
+OTHER = f"  LFOther: {{type: plane, cameras: [2, 1], size: 1, camera: {CAMERA}"
+# A light field's cameras, the panorama's, and the probes' follow from the same settings.
+CAMERAS = {"lightfield", "panorama_lightfield", "probe_cameras"}
+# The probes are those of the first rig.
+OF_PLANE = {"LFPlane lightfield", "LFPlane panorama_lightfield", "probe_cameras"}
+TESTED = {"LFPlane lightfield", "probe_cameras", "LFPlane export", "splits", "check_gpu"}
+CUBES = BUILT[BUILT.index("  cubes:") : BUILT.index("exports:")]
+TO_CUBES = BUILT[BUILT.index("render:") : BUILT.index("  cubes:")]
+INNER = BUILT[BUILT.index("  LFInner:") : BUILT.index("reprojections:")]
+# In each round one change of each scene YAML and of other files: its old and new text, and the
+# jobs whose own settings or inputs change with it, by rule and if need be by folder.
+ROUNDS = {
+    "what is built, checked, packed, and paid": {
+        "built": (
+            "builder: room",
+            "builder: room\n  parameters: {seed: 2}",
+            {"build_scene"} | CAMERAS,
+        ),
+        "brought": (f"{0:064}", f"{1:064}", {"check_blend"}),
+        "imported": ("scene:", "licence: CC0-1.0\nscene:", {"pack"}),
+        "config.yaml": ("price_per_kwh: 0.32", "price_per_kwh: 0.4", {"costs"}),
+    },
+    "samples, and what may be missing": {
+        "built": ("samples: 4", "samples: 5", CAMERAS),
+        "brought": ("allow_missing: true", "allow_missing: false", {"inventory"}),
+        "config.yaml": ("device:", "package_gigabytes: 1\ndevice:", {"pack"}),
+    },
+    "the lens, and the view layers": {
+        "built": ("lens: equidistant", "lens: equisolid, focal_length: 3", OF_PLANE),
+        "brought": ("view_layers: [One]", "view_layers: [Two]", {"inventory"}),
+        "config.yaml": ("  full: {}", "  full: {samples: 3}", CAMERAS),
+    },
+    "the frame, and the scene": {
+        "built": ("frame: 1", "frame: 2", {"inventory"} | CAMERAS),
+        "brought": ("scene_name: First", "scene_name: Second", {"inventory", "free_places"}),
+    },
+    "the place, and the error": {
+        "built": ("center: [0, 0, 1]", "center: [0, 0, 2]", OF_PLANE),
+        "brought": ("target_error: 0.1", "target_error: 0.2", CAMERAS),
+    },
+    "another lens of a reprojection, and another size": {
+        "built": (
+            "fov: 60",
+            "fov: 50",
+            {"perspective lens_map", "perspective reprojected_lightfield"},
+        ),
+        "brought": ("size: 1", "size: 2", {"free_places"}),
+    },
+    "development, and no flow": {
+        "built": (
+            "exposure: -1",
+            "exposure: -2",
+            {"perspective reproject", "perspective reprojected_lightfield"},
+        ),
+        "brought": ("flow: {pairs: neighbours}\n", "", {"lightfield"}),
+    },
+    "an export less, and other options": {
+        "built": (
+            "  nerfstudio: {sources: [perspective], points: 9}\n",
+            "",
+            {"validate", "costs"},
+        ),
+        "brought": ("depth: true}", "depth: true, points: 9}", {"export"}),
+    },
+    "a split, and a frame": {
+        "built": ("split: odd", "split: {every: 3}", {"LFPlane lightfield", "probe_cameras"}),
+        "brought": (
+            "scene_name:",
+            "frame: 3\n  scene_name:",
+            {"inventory", "free_places"} | CAMERAS,
+        ),
+    },
+    "a reprojection more, and another scale": {
+        "built": (
+            "exports:",
+            "  other: {camera: {lens: rectilinear, fov: 40, resolution: [8, 8]}}\nexports:",
+            {"costs"},
+        ),
+        "brought": ("instant_ngp: {", "instant_ngp: {scale: 2, ", {"export_to_instant_ngp"}),
+    },
+    "a reprojection less, and another .blend": {
+        "built": (CUBES, "", {"validate", "costs"}),
+        "scene.blend": ("{", "{ ", {"check_blend"}),
+    },
+    "a reprojection to faces no longer": {
+        "built": ("cube_map: true", "cube_map: false", {"cubes reprojected_lightfield"}),
+    },
+    # One that is gone is fetched again when a job needs it.
+    "a .blend to be fetched": {
+        "brought": (f"{0:064}", f"{1:064}", {"check_blend"}),
+        "scene.blend": (None, None, {"fetch_brought"}),
+    },
+    "no panorama": {"built": ("panorama: true", "panorama: false", {"figures"})},
+    "motion blur": {
+        "built": ("samples: 4", "samples: 4, motion_blur: true", {"inventory"} | CAMERAS)
+    },
+    "another format": {
+        "built": (
+            "format: png",
+            "format: exr",
+            {"perspective reproject", "perspective reprojected_lightfield"},
+        ),
+    },
+    "how pixels are resampled": {
+        "built": (
+            "exposure: -1",
+            "exposure: -1\n    filter: bilinear\n    samples: 2\n    rotation: [0, 9, 0]",
+            {"perspective lens_map", "perspective reprojected_lightfield"},
+        ),
+    },
+    "how light becomes pixels": {
+        "built": (
+            "exposure: -1",
+            "exposure: -1\n    bits: 16\n    reinhard: 4",
+            {"perspective reproject", "perspective reprojected_lightfield"},
+        ),
+    },
+    "another pass": {
+        "built": (
+            TO_CUBES,
+            TO_CUBES.replace("samples: 4", "samples: 4, passes: [normal]").replace(
+                "exposure: -1", "exposure: -1\n    passes: [normal]"
+            ),
+            CAMERAS | {"perspective reproject", "perspective reprojected_lightfield"},
+        ),
+    },
+    "distances": {"built": ("samples: 4", "samples: 4, depth: distance", CAMERAS)},
+    "another builder": {
+        "built": ("builder: room", "builder: still_life", {"build_scene"} | CAMERAS)
+    },
+    "another text of the builder": {
+        ROOM: ('"""', '""" ', {f"built {rule}" for rule in {"build_scene"} | CAMERAS}),
+    },
+    "the resolution": {"built": ("[16, 16]", "[32, 32]", OF_PLANE | {"check_gpu"})},
+    "a sequence": {
+        "built": (
+            "split: odd",
+            "frames: {first: 1, last: 2, step: 1}",
+            {"inventory", "probe_cameras", "check_gpu", "LFPlane pack"},
+        ),
+    },
+    "somebody's light field": {
+        "published/LFPlane/lightfield.json": ("{", "{ ", {"imported lightfield"}),
+    },
+    "a measurement": {
+        "results/benchmarks/learn/built/LFPlane.csv": (None, "a,b\n1,2\n", {"built LFPlane page"}),
+    },
+    "a rig that tests": {
+        "built": ("    split: odd\n", f"    split: train\n{OTHER}, split: test}}\n", TESTED),
+    },
+    "a rig that is tested": {
+        "built": ("    split: odd\n", f"    split: test\n{OTHER}, split: train}}\n", TESTED),
+    },
+    # Its views were what those of the other were compared with.
+    "a rig less": {"built": (INNER, "", {"measure_synthesis", "check_gpu"})},
+    "a rig that is the larger one": {
+        "built": ("size: 0.5", "size: 2", {"LFInner lightfield", "measure_synthesis"}),
+    },
+}
+# The first two follow from the programs' versions, the third from where the scene YAML lies. Only a
+# .blend's camera has frames. For instant-ngp a rig that tests is placed as the trained one is;
+# other formats take its views. No scene YAML asks reproject.py for masks.
+CONSTANT = {"version", "bpy", "command", "camera_frames", "reproject.json mask"}
+CONSTANT |= {"nerfstudio.json trained_by", "instant_ngp.json tested_by"}
+
+
+def apply(build, changes):
+    """Make the changes of a round; return the settings that a plan then writes otherwise."""
+    before = build.settings()
+    for name, (old, new, _) in changes.items():
+        path = build.folder / SCENES.get(name, name)
+        if new is None:
+            path.unlink()
+        elif old is None:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(new)
+        else:
+            text = path.read_text()
+            assert old in text
+            path.write_text(text.replace(old, new, 1))
+    planned = build.plan()
+    after = build.settings()
+    return planned, {key for key in before if after.get(key) != before[key]}
+
+
+def changed_jobs(jobs, changes, build):
+    """Return the first outputs of those jobs that a round changes itself, or adds."""
+    for output, job in jobs.items():
+        for name, (*_, rules) in changes.items():
+            # Each page shows the text of its scene YAML.
+            for changed in rules | {"page"} if name in SCENES else rules:
+                *folders, rule = changed.split()
+                folders += {name} & SCENES.keys()
+                if job["rule"] == rule and {*folders} <= {*output.replace(".", "/").split("/")}:
+                    yield output
+        if output not in build.jobs:
+            yield output
+
+
+# By round: the settings that it changes.
+CHANGED = {}
+
+
+@pytest.mark.parametrize("name", ROUNDS)
+def test_what_a_change_affects_is_made_anew_and_nothing_else(build, name):
+    planned, CHANGED[name] = apply(build, ROUNDS[name])
+    jobs = build.prepare()
+    assert planned.keys() == followers(jobs, changed_jobs(jobs, ROUNDS[name], build))
+    build.snakemake()
+    assert_made_from_what_is_there(build, jobs)
+
+
+def test_every_setting_of_every_job_is_changed_above(pristine, build):
+    settings = build.settings()
+    for name in ROUNDS.keys() - CHANGED.keys():
+        shutil.rmtree(build.folder)
+        shutil.copytree(pristine.folder.with_name("pristine"), build.folder)
+        _, CHANGED[name] = apply(build, ROUNDS[name])
+    changed = set().union(*CHANGED.values())
+    # By the file's name, not for each scene.
+    untouched = {f"{Path(file).name} {key}" for file, key in settings if key not in CONSTANT}
+    untouched -= {f"{Path(file).name} {key}" for file, key in changed}
+    assert untouched <= CONSTANT
+
+
+# ---- inputs ---------------------------------------------------------------------------------
+
+
+def levels(jobs):
+    """Return the first outputs of jobs in groups; no job follows from another of its group."""
+    maker = {name: output for output, job in jobs.items() for name in job["output"]}
+    depths = {}
+
+    def depth(output):
+        if output not in depths:
+            makers = {maker[name] for name in jobs[output]["input"] if name in maker}
+            depths[output] = 1 + max(map(depth, makers), default=0)
+        return depths[output]
+
+    groups = {}
+    for output in jobs:
+        groups.setdefault(depth(output), []).append(output)
+    return groups.values()
+
+
+def falsified(line, names):
+    """Return a line of the ledger in which inputs of these names have other bytes and times."""
+    content = json.loads(line.partition(" ")[2])
+    content["inputs"] |= {name: ["0" * 64, 0, 0, 0] for name in names}
+    text = json.dumps(content)
+    return f"{hashlib.sha256(text.encode()).hexdigest()} {text}"
+
+
+def test_each_job_runs_again_that_was_made_from_something_else(build):
+    """Times say nothing: all else is as if two builds had run beside each other."""
+    path = build.folder / "work/ledger.txt"
+    lines = build.ledger()
+    jobs = build.plan("--forceall")
+    for outputs in levels(jobs):
+        with_inputs = [output for output in outputs if jobs[output]["input"]]
+        false_lines = {lines[o]: falsified(lines[o], jobs[o]["input"]) for o in with_inputs}
+        present = [false_lines.get(line, line) for line in dict.fromkeys(lines.values())]
+        path.write_text("".join(f"{line}\n" for line in present))
+        assert build.plan().keys() == followers(jobs, with_inputs)
+
+
+def test_each_input_of_each_job_is_noticed_if_it_is_another_file(build, monkeypatch, tmp_path):
+    monkeypatch.chdir(build.folder)
+    inputs = 0
+    for line in {*build.ledger().values()}:
+        content = json.loads(line.partition(" ")[2])
+        for name in content["inputs"]:
+            (tmp_path / "ledger.txt").write_text(falsified(line, [name]) + "\n")
+            noted = ledger.Ledger(tmp_path / "ledger.txt")
+            assert [*noted.outdated_outputs()] == content["outputs"]
+            inputs += 1
+    assert inputs > 200
+
+
+def test_what_two_builds_at_once_have_mixed_up_one_run_mends(build):
+    """Their programs overwrite what those of the other read: no write of theirs is atomic."""
+    apply(build, ROUNDS["samples, and what may be missing"])
+    jobs = build.prepare()
+    builds = [build.start("--nolock", "--forceall") for _ in range(2)]
+    for process in builds:
+        process.communicate()
+    build.snakemake()
+    assert_made_from_what_is_there(build, jobs)

@@ -1,0 +1,121 @@
+"""The experiment behind all measurements of rendering: what is rendered, and what is compared."""
+
+import numpy as np
+import pytest
+
+from lightfield.dataset.lightfield import LightField
+from lightfield.geometry import lenses
+from lightfield.measurement.experiment import WHOLE_VIEWS, Experiment, Method, split_by_stratum
+from lightfield.measurement.metrics import exposed_alike, make_reference
+from lightfield.measurement.strata import FEWEST_PIXELS, STRATA
+from lightfield.measurement.trials import Trial, Window
+
+SIZE = 64
+LIGHT = 0.2
+SECONDS_PER_SAMPLE = 1e-3
+CAMERA = {"lens": "equirectangular", "resolution": [2 * SIZE, SIZE]}
+
+
+class SimulatedTrials:
+    """Renders of N samples with an error of 1 / N: gamma distributed light around `LIGHT`."""
+
+    def __init__(self):
+        lens = lenses.from_camera(CAMERA)
+        rig = {"type": "plane", "cameras": [2, 1], "size": 0.3}
+        views = LightField.from_rig(rig, lens, render={"samples": 4}).views
+        self.lens = lens
+        self.windows = [Window(view, 0, 0, SIZE, SIZE) for view in views]
+        self.rendered = []
+
+    def render(self, window, seed, settings):
+        self.rendered.append((window.name, seed, settings))
+        samples = settings["samples"]
+        random = np.random.default_rng([seed, samples, self.windows.index(window)])
+        colour = LIGHT * random.gamma(samples, 1 / samples, (SIZE, SIZE, 3))
+        seconds = samples * SECONDS_PER_SAMPLE
+        return Trial(colour.astype(np.float32), None, samples, seconds, "CPU")
+
+    def references(self):
+        mask = np.ones((SIZE, SIZE), bool)
+        renders = [
+            [self.render(window, 100 + seed, {"samples": 4096}).colour for seed in range(2)]
+            for window in self.windows
+        ]
+        return exposed_alike([make_reference(colours, None, mask) for colours in renders])
+
+
+@pytest.fixture
+def maker():
+    return SimulatedTrials()
+
+
+def test_errors_fall_in_proportion_to_the_samples(maker):
+    few = Method("few", {"samples": 4})
+    many = Method("many", {"samples": 64})
+    experiment = Experiment(maker, maker.windows, maker.references())
+    experiment.run([few, many], [1, 2])
+    errors = {
+        method.name: np.mean(experiment.errors(method, experiment.all_windows, left_out=0))
+        for method in (few, many)
+    }
+    assert errors["few"] / errors["many"] == pytest.approx(16, rel=0.1)
+    assert experiment.reference_error < errors["many"] / 10
+    assert np.array(experiment.errors(few, experiment.all_windows)).shape == (2, 2)
+
+
+def test_seconds_are_those_of_a_megapixel(maker):
+    method = Method("plain", {"samples": 8})
+    experiment = Experiment(maker, maker.windows, maker.references())
+    experiment.run([method], [1])
+    expected = 8 * SECONDS_PER_SAMPLE * 1e6 / SIZE**2
+    assert experiment.seconds(method) == [[pytest.approx(expected)]] * 2
+
+
+def test_methods_take_turns_and_equal_settings_render_once(maker):
+    experiment = Experiment(maker, maker.windows, maker.references())
+    maker.rendered.clear()
+    methods = [Method(name, {"samples": n}) for name, n in (("a", 1), ("b", 2), ("again", 1))]
+    experiment.run(methods, [1, 2])
+    assert [settings["samples"] for _, _, settings in maker.rendered] == [1, 2] * 4
+    assert experiment.renders(methods[0]) == experiment.renders(methods[2])
+
+
+def test_an_error_in_one_stratum_stays_in_it(maker):
+    """The left half of each window is glossy, and the renders there are twice too bright."""
+    method = Method("plain", {"samples": 256})
+    classes = np.full((SIZE, SIZE), STRATA.index("diffuse"))
+    classes[:, : SIZE // 2] = STRATA.index("glossy")
+    strata = split_by_stratum(maker.references(), [classes, classes])
+    areas = {"diffuse": 0.75, "glossy": 0.25}
+    assert set(strata) == set(areas)
+    experiment = Experiment(maker, maker.windows, maker.references(), strata, areas)
+    experiment.run([method], [1])
+    for trials in experiment.renders(method):
+        trials[0].colour[:, : SIZE // 2] *= 2
+    errors = {name: np.mean(experiment.errors(method, strata[name])) for name in strata}
+    assert errors["diffuse"] < 0.01 < 0.5 < errors["glossy"]
+    expected = 0.75 * errors["diffuse"] + 0.25 * errors["glossy"]
+    assert experiment.over_views(errors) == pytest.approx(expected)
+
+
+def test_a_window_with_too_few_pixels_of_a_stratum_does_not_count_in_it(maker):
+    plain = np.full((SIZE, SIZE), STRATA.index("diffuse"))
+    with_lamp = plain.copy()
+    with_lamp.flat[:FEWEST_PIXELS] = STRATA.index("emission")
+    with_spark = plain.copy()
+    with_spark.flat[: FEWEST_PIXELS - 1] = STRATA.index("emission")
+    strata = split_by_stratum(maker.references(), [with_lamp, with_spark])
+    assert {name: list(windows) for name, windows in strata.items()} == {
+        "diffuse": [0, 1],
+        "emission": [0],
+    }
+
+
+def test_without_strata_all_pixels_are_whole_views(maker):
+    experiment = Experiment(maker, maker.windows, maker.references())
+    assert list(experiment.strata) == [WHOLE_VIEWS]
+    assert experiment.described() == {
+        "probes": [window.name for window in maker.windows],
+        "size": SIZE,
+        "resolution": [2 * SIZE, SIZE],
+    }
