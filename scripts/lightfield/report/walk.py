@@ -59,6 +59,8 @@ def collect(lens: Lens, places: Array, distances: Array) -> dict[str, Any]:
         "dark": float(kernels.DARK),
         "even": float(kernels.EVEN),
         "same": float(kernels.SAME),
+        "hidden": float(kernels.HIDDEN),
+        "certain": float(kernels.CERTAIN),
         "far": float(kernels.FAR),
     }
 

@@ -19,6 +19,10 @@ from lightfield.geometry.lenses import Array
 EVEN = np.float32(0.5)
 # Drawings at one pixel are of one surface if their inverse distances differ by less than this part.
 SAME = np.float32(0.03)
+# What is farther than a surface by this part is hidden by it; in between, it counts less and less.
+HIDDEN = np.float32(0.1)
+# A surface hides what is behind it if its vertices are at least so certain.
+CERTAIN = np.float32(0.5)
 # Added to roots of colours before they are inverted, so that black has an inverse.
 DARK = np.float32(0.03)
 # What is this small, in 1/m, is as far as the sky.
@@ -68,6 +72,13 @@ def link(inverse: Array, steepest: np.float32, right: Array, down: Array) -> Non
 
 
 @kernel
+def _signed_weight(certainty: Any, worth: Any) -> Any:
+    """Return the weight of a drawn pixel, negative if it hides nothing behind it."""
+    weight = certainty * worth
+    return weight if certainty >= CERTAIN else -weight
+
+
+@kernel
 def _draw_pole(top: Any, bottom: Any, values: Array, inverse: Array, drawn: Array) -> None:
     """Draw a triangle around a panorama's pole where nothing is drawn yet, in one colour."""
     height, width = inverse.shape
@@ -80,8 +91,9 @@ def _draw_pole(top: Any, bottom: Any, values: Array, inverse: Array, drawn: Arra
         for j in range(width):
             if inverse[i, j] < 0:
                 inverse[i, j] = np.mean(values[:, 0])
-                for c in range(4):
+                for c in range(3):
                     drawn[i, j, c] = np.mean(values[:, c + 1])
+                drawn[i, j, 3] = _signed_weight(np.mean(values[:, 4]), np.mean(values[:, 5]))
 
 
 @kernel
@@ -90,7 +102,7 @@ def _draw_triangle(
 ) -> None:
     """Draw a triangle where nothing nearer is drawn yet.
 
-    ``corners`` (3, 2) are pixels, ``values`` (3, 5) inverse distance, R, G, B and weight.
+    ``corners`` (3, 2) are pixels, ``values`` (3, 6) inverse distance, R, G, B, certainty, worth.
     """
     height, width = inverse.shape
     zero, half = np.float32(0), np.float32(0.5)
@@ -136,10 +148,13 @@ def _draw_triangle(
             near = w0 * values[0, 0] + w1 * values[1, 0] + w2 * values[2, 0]
             if near > inverse[i, j]:
                 inverse[i, j] = near
-                for c in range(4):
+                for c in range(3):
                     drawn[i, j, c] = (
                         w0 * values[0, c + 1] + w1 * values[1, c + 1] + w2 * values[2, c + 1]
                     )
+                certainty = w0 * values[0, 4] + w1 * values[1, 4] + w2 * values[2, 4]
+                worth = w0 * values[0, 5] + w1 * values[1, 5] + w2 * values[2, 5]
+                drawn[i, j, 3] = _signed_weight(certainty, worth)
 
 
 @kernel
@@ -154,13 +169,14 @@ def draw(
 ) -> None:
     """Draw a surface whose vertices (h, w) fall on ``pixels`` (h, w, 2).
 
-    ``values`` (h, w, 5) are as in `_draw_triangle`, ``inverse`` (H, W) and ``drawn`` (H, W, 4) what
-    is drawn: inverse distance, −1 where nothing is, and R, G, B, weight. ``wraps`` is whether the
-    picture's left edge continues its right one.
+    ``values`` (h, w, 6) are as in `_draw_triangle`. ``inverse`` (H, W) is the inverse distance of
+    what is drawn, −1 where nothing is. ``drawn`` (H, W, 4) is R, G, B, and the weight: certainty
+    times worth, negative if the pixel hides nothing. ``wraps`` is whether the picture's left edge
+    continues its right one.
     """
     height, width = pixels.shape[:2]
     corners = np.empty((3, 2), np.float32)
-    corner_values = np.empty((3, 5), np.float32)
+    corner_values = np.empty((3, 6), np.float32)
     for i in range(height - 1):
         for j in range(width - 1):
             for lower in range(2):
@@ -184,10 +200,10 @@ def draw(
 def draw_pixels(pixels: Array, values: Array, wraps: bool, inverse: Array, drawn: Array) -> None:
     """Draw single pixels of a view, whose corners (n, 4, 2) run clockwise from the upper left.
 
-    ``values`` (n, 5) and the others are as in `draw`.
+    ``values`` (n, 6) and the others are as in `draw`.
     """
     corners = np.empty((3, 2), np.float32)
-    corner_values = np.empty((3, 5), np.float32)
+    corner_values = np.empty((3, 6), np.float32)
     for n in range(len(pixels)):
         corner_values[:] = values[n]
         for second in range(2):
@@ -222,36 +238,50 @@ def sharpen(root: Array, right: Array, down: Array, amount: np.float32, sharp: A
 
 
 @kernel
-def add(inverse: Array, drawn: Array, sums: Array, depths: Array) -> None:
-    """Add a drawing (H, W) to the ``sums`` (H, W, 4) of inverse colours, and of weights.
+def _hidden_part(near: Any, front: Any) -> Any:
+    """Return how much of what is drawn at ``near`` a surface at ``front`` hides, from 0 to 1."""
+    behind = (front - near) / max(front, FAR)
+    return min(max((behind - SAME) / (HIDDEN - SAME), np.float32(0)), np.float32(1))
+
+
+@kernel
+def _blend_sample(inverses: Array, drawn: Array, row: int, column: int, light: Array) -> Any:
+    """Add a sample's colour to ``light`` (3,); return its inverse distance, −1 if none sees it.
 
     A weight is that of the drawing, divided by the squared distance: what is near hides what is
-    far, but no view alone decides what is near. Colours are summed as the inverses of their roots:
-    a highlight that one view sees counts little.
-    ``depths`` (H, W, 2) has the sums of weights, and of weighted inverse distances, of the nearest
-    surface. ``inverse`` and ``drawn`` are as in `draw`; they are made empty again.
+    far, but at an edge no view alone decides what is near. Where a view is certain of a surface, it
+    hides what is behind. Colours are summed as the inverses of their roots: a highlight that one
+    view sees counts little.
     """
-    height, width = inverse.shape
-    one = np.float32(1)
-    for i in range(height):
-        for j in range(width):
-            near = inverse[i, j]
-            if near < 0:
-                continue
-            inverse[i, j] = -one
-            weight = drawn[i, j, 3]
-            here = depths[i, j, 1] / depths[i, j, 0] if depths[i, j, 0] > 0 else -one
-            slack = max(SAME * max(near, here), FAR)
-            if near > here + slack:
-                depths[i, j, 0] = weight
-                depths[i, j, 1] = weight * near
-            elif near >= here - slack:
-                depths[i, j, 0] += weight
-                depths[i, j, 1] += weight * near
-            weight *= max(near, FAR) * max(near, FAR)
-            for c in range(3):
-                sums[i, j, c] += weight / (drawn[i, j, c] + DARK)
-            sums[i, j, 3] += weight
+    count = len(inverses)
+    nearest = front = np.float32(-1)
+    for k in range(count):
+        near = inverses[k, row, column]
+        nearest = max(nearest, near)
+        if drawn[k, row, column, 3] > 0:
+            front = max(front, near)
+    if nearest < 0:
+        return nearest
+    total = red = green = blue = np.float32(0)
+    parts = mean = np.float32(0)
+    slack = max(SAME * nearest, FAR)
+    for k in range(count):
+        near = inverses[k, row, column]
+        if near < 0:
+            continue
+        weight = abs(drawn[k, row, column, 3])
+        if near >= nearest - slack:
+            parts += weight
+            mean += weight * near
+        weight *= max(near, FAR) * max(near, FAR) * (1 - _hidden_part(near, front))
+        red += weight / (drawn[k, row, column, 0] + DARK)
+        green += weight / (drawn[k, row, column, 1] + DARK)
+        blue += weight / (drawn[k, row, column, 2] + DARK)
+        total += weight
+    light[0] += (total / red - DARK) ** 2
+    light[1] += (total / green - DARK) ** 2
+    light[2] += (total / blue - DARK) ** 2
+    return mean / parts
 
 
 @kernel
@@ -261,46 +291,47 @@ def _second(a: Any, b: Any, c: Any, d: Any) -> Any:
 
 
 @kernel
-def resolve(sums: Array, depths: Array, colour: Array, inverse: Array, seen: Array) -> None:
-    """Average 2 × 2 samples to a pixel: ``colour`` (h, w, 3), ``inverse`` (h, w).
+def _of_one_surface(nears: Array) -> Any:
+    """Return the mean of those inverse distances (4,) that are of one surface, −1 being none.
 
-    ``sums`` (2h, 2w, 4) and ``depths`` (2h, 2w, 2) are as in `add`. ``seen`` (h, w) is the part of
-    a pixel's samples that have anything. Distances are not blended across an edge: those count
-    that are of one surface with the second nearest sample.
+    It is that of the second nearest: distances are not blended across an edge.
+    """
+    middle = _second(nears[0], nears[1], nears[2], nears[3])
+    if middle < 0:
+        middle = max(nears[0], nears[1], nears[2], nears[3])
+    mean = number = np.float32(0)
+    for k in range(4):
+        if nears[k] >= 0 and abs(nears[k] - middle) <= max(SAME * middle, FAR):
+            mean += nears[k]
+            number += 1
+    return mean / number
+
+
+@kernel
+def blend(inverses: Array, drawn: Array, colour: Array, inverse: Array, seen: Array) -> None:
+    """Blend drawings (n, 2h, 2w), as `draw` makes them, to ``colour`` (h, w, 3).
+
+    A pixel is the mean of 2 × 2 samples. ``inverse`` (h, w) is its inverse distance, ``seen``
+    (h, w) the part of its samples that any of the n views sees.
     """
     height, width = seen.shape
-    one, quarter = np.float32(1), np.float32(0.25)
     nears = np.empty(4, np.float32)
+    light = np.empty(3, np.float32)
     for i in range(height):
         for j in range(width):
             count = 0
-            red = green = blue = np.float32(0)
+            light[:] = 0
             for k in range(4):
-                row, column = 2 * i + k // 2, 2 * j + k % 2
-                weight = sums[row, column, 3]
-                nears[k] = -one
-                if weight > 0:
+                nears[k] = _blend_sample(inverses, drawn, 2 * i + k // 2, 2 * j + k % 2, light)
+                if nears[k] >= 0:
                     count += 1
-                    nears[k] = depths[row, column, 1] / depths[row, column, 0]
-                    red += (weight / sums[row, column, 0] - DARK) ** 2
-                    green += (weight / sums[row, column, 1] - DARK) ** 2
-                    blue += (weight / sums[row, column, 2] - DARK) ** 2
-            seen[i, j] = quarter * count
+            seen[i, j] = np.float32(0.25) * count
             if count == 0:
                 colour[i, j] = inverse[i, j] = np.nan
                 continue
-            colour[i, j, 0] = red / count
-            colour[i, j, 1] = green / count
-            colour[i, j, 2] = blue / count
-            middle = _second(nears[0], nears[1], nears[2], nears[3])
-            if middle < 0:
-                middle = max(nears[0], nears[1], nears[2], nears[3])
-            mean, number = np.float32(0), 0
-            for k in range(4):
-                if nears[k] >= 0 and abs(nears[k] - middle) <= max(SAME * middle, FAR):
-                    mean += nears[k]
-                    number += 1
-            inverse[i, j] = mean / number
+            for c in range(3):
+                colour[i, j, c] = light[c] / count
+            inverse[i, j] = _of_one_surface(nears)
 
 
 @kernel

@@ -151,6 +151,8 @@ class Sources:
         root = np.sqrt(np.nan_to_num(colour).clip(min=0)).astype(np.float32)
         sharp = np.empty_like(root)
         kernels.sharpen(root, right, down, np.float32(SHARPENED), sharp)
+        # Sharpened, the mixed colours beside a tear would be farther from those of their surface.
+        sharp[torn] = root[torn]
         row, column = np.nonzero(torn)
         corners = self.lens.rays(
             column[:, None] + np.array([0.0, 1, 1, 0]), row[:, None] + np.array([0.0, 0, 1, 1])
@@ -196,16 +198,16 @@ class Sources:
     def blended(self, target: Array, lens: Lens, chosen: Sequence[int]) -> Synthesised:
         """Return the picture of a camera at ``target`` (4, 4), made of the ``chosen`` views."""
         fine = lens.resized(SAMPLES * lens.width, SAMPLES * lens.height)
-        shape = (fine.height, fine.width)
-        inverse, drawn = np.full(shape, -1, np.float32), np.zeros((*shape, 4), np.float32)
-        sums, depths = np.zeros((*shape, 4), np.float32), np.zeros((*shape, 2), np.float32)
-        for index in chosen:
+        shape = (len(chosen), fine.height, fine.width)
+        inverses = np.full(shape, -1, np.float32)
+        drawn = np.zeros((*shape, 4), np.float32)
+        for place, index in enumerate(chosen):
             surface = self.surface(index)
-            self._draw(surface, self.matrices[index], target, fine, inverse, drawn)
-            kernels.add(inverse, drawn, sums, depths)
+            self._draw(surface, self.matrices[index], target, fine, inverses[place], drawn[place])
         colour = np.empty((lens.height, lens.width, 3), np.float32)
-        inverse, seen = np.empty((2, lens.height, lens.width), np.float32)
-        kernels.resolve(sums, depths, colour, inverse, seen)
+        inverse = np.empty((lens.height, lens.width), np.float32)
+        seen = np.empty((lens.height, lens.width), np.float32)
+        kernels.blend(inverses, drawn, colour, inverse, seen)
         outside = np.isnan(lens.pixel_rays()[..., 0])
         seen[outside] = 0
         holes = seen == 0
@@ -229,8 +231,8 @@ class Sources:
         wraps = _wraps(lens)
         pixels, seen = self._projected(self.rays, surface.inverse, here, target, lens)
         length = np.linalg.norm(seen, axis=-1)
-        weight = surface.certainty / penalty(seen, self.rays @ _turn(here)) ** 2
-        values = np.dstack([surface.inverse / length, surface.root, weight])
+        worth = 1 / penalty(seen, self.rays @ _turn(here)) ** 2
+        values = np.dstack([surface.inverse / length, surface.root, surface.certainty, worth])
         values = values.astype(np.float32, copy=False)
         kernels.draw(pixels, values, surface.right, surface.down, wraps, inverse, drawn)
         corners, _ = self._projected(

@@ -109,6 +109,7 @@ function drawPart({ linked, uniforms }, { vertices, count }, source, eye, width,
   gl.uniform1f(uniforms.near, NEAR);
   gl.uniform1f(uniforms.spread, WALK.distance);
   gl.uniform1f(uniforms.sharp, WALK.sharp);
+  gl.uniform1f(uniforms.certain, WALK.certain);
   gl.bindVertexArray(vertices);
   gl.uniform1f(uniforms.pointSize, (eye.lens[0] * width * WALK.pixel) / 2);
   gl.drawElements(kind, count, gl.UNSIGNED_INT, 0);
@@ -161,6 +162,7 @@ function blendLayers({ layers, levels, samples }, count) {
   gl.uniform1i(uniforms.count, count);
   gl.uniform1i(uniforms.samples, samples);
   gl.uniform1f(uniforms.same, WALK.same);
+  gl.uniform1f(uniforms.hidden, WALK.hidden);
   gl.uniform1f(uniforms.dark, WALK.dark);
   drawTriangle();
 }

@@ -182,7 +182,11 @@ function sharpRoots(light, { right, down }, torn) {
     }
     sharp[4 * pixel + 3] = walk.toRim[pixel] / 255;
   }
-  for (const pixel of torn) sharp[4 * pixel + 3] *= WALK.torn;
+  // The mixed colours beside a tear stay as they are.
+  for (const pixel of torn) {
+    for (let at = 4 * pixel; at < 4 * pixel + 3; at++) sharp[at] = roots[at];
+    sharp[4 * pixel + 3] *= WALK.torn;
+  }
   return sharp;
 }
 

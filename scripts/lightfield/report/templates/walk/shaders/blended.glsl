@@ -1,12 +1,12 @@
 #version 300 es
-// The layers of all sources, blended: synthesis/kernels.py's add and resolve. A pixel is the mean of
+// The layers of all sources, blended: synthesis/kernels.py's blend. A pixel is the mean of
 // samples × samples texels of the layers.
 precision highp float;
 precision highp int;
 precision highp sampler2DArray;
 uniform sampler2DArray colours, inverses;
 uniform int count, samples;
-uniform float same, far, dark;
+uniform float same, hidden, far, dark;
 // Linear light, and the part of the sources that show the nearest surface: 0 in a hole.
 layout(location = 0) out vec4 colour;
 layout(location = 1) out float inverse;
@@ -16,20 +16,27 @@ vec3 light;
 
 // Return the inverse distance of the nearest surface of one sample, −1 in a hole; add to the sums.
 float addSample(ivec2 texel) {
-  float nearest = -1.0, total = 0.0, parts = 0.0, mean = 0.0;
+  float nearest = -1.0, front = -1.0, total = 0.0, parts = 0.0, mean = 0.0;
   vec3 inverted = vec3(0.0);
-  for (int k = 0; k < count; k++) nearest = max(nearest, texelFetch(inverses, ivec3(texel, k), 0).r);
+  for (int k = 0; k < count; k++) {
+    float near = texelFetch(inverses, ivec3(texel, k), 0).r;
+    nearest = max(nearest, near);
+    if (texelFetch(colours, ivec3(texel, k), 0).a > 0.0) front = max(front, near);
+  }
   if (nearest < 0.0) return -1.0;
   for (int k = 0; k < count; k++) {
     float near = texelFetch(inverses, ivec3(texel, k), 0).r;
     if (near < 0.0) continue;
     vec4 drawn = texelFetch(colours, ivec3(texel, k), 0);
+    float weight = abs(drawn.a);
     if (near >= nearest - max(same * nearest, far)) {
-      parts += drawn.a;
-      mean += drawn.a * near;
+      parts += weight;
+      mean += weight * near;
       used += 1.0;
     }
-    float weight = drawn.a * max(near, far) * max(near, far);
+    // What is behind a surface of which a source is certain counts less and less, and then not at all.
+    float behind = (front - near) / max(front, far);
+    weight *= max(near, far) * max(near, far) * (1.0 - clamp((behind - same) / (hidden - same), 0.0, 1.0));
     inverted += weight / (drawn.rgb + dark);
     total += weight;
   }

@@ -5,7 +5,7 @@ precision highp float;
 precision highp int;
 precision highp sampler2D;
 uniform sampler2D rays, inverses;
-// The roots of colours, and how much a pixel counts.
+// The roots of colours, and how certain a pixel is of its surface.
 uniform sampler2D light;
 uniform int stride;
 uniform mat3 turn, back;
@@ -29,8 +29,7 @@ void place(ivec2 pixel, vec3 ray) {
   float here = length(seen);
   float angle = length(seen / here - direction);
   float penalty = angle + spread * max(1.0 / here - 1.0, 0.0) + sharp;
-  vec4 colour = texelFetch(light, pixel, 0);
-  shade = vec4(colour.rgb, colour.a / (penalty * penalty));
+  shade = texelFetch(light, pixel, 0);
   nearness = inverse / here;
   spot = (vec2(pixel) + 0.5) / vec2(textureSize(rays, 0));
   towards = 1.0 / (penalty * penalty);
