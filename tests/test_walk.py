@@ -78,7 +78,7 @@ def look_from(tab, place, yaw, pitch):
     """Return what the canvas shows, (HEIGHT, WIDTH, 3) in sRGB from 0 to 1."""
     uri = tab.evaluate(
         """([at, yaw, pitch, width, height]) => {
-            Object.assign(walk.canvas, { width, height });
+            walk.size = [width, height];
             Object.assign(walk, { at, yaw, pitch });
             drawWalk();
             return walk.canvas.toDataURL("image/png");
@@ -265,7 +265,7 @@ def test_a_thousand_frames_leak_nothing(tab):
     opened = tab()
     look_from(opened, [0, 0, 0], 0, 0)
     walk_on = """(frames) => {
-        Object.assign(walk.canvas, { width: 32, height: 18 });
+        walk.size = [32, 18];
         walk.sources = 1;
         for (let frame = 0; frame < frames; frame++) {
             walk.yaw += 0.02;

@@ -22,7 +22,7 @@ function listenToPointers(overlay) {
     const way = [event.clientX - last[0], event.clientY - last[1]];
     pointers.set(event.pointerId, [event.clientX, event.clientY]);
     const side = Math.max(overlay.clientWidth, overlay.clientHeight);
-    const wide = fieldOfView(walk.canvas.width, walk.canvas.height) / walk.zoom;
+    const wide = fieldOfView(...walk.size) / walk.zoom;
     if (pointers.size === 1) turned(...way.map((value) => (-value * wide) / side));
     else moved((0.5 * way[1]) / side, (-0.5 * way[0]) / side, 0);
   });
@@ -76,8 +76,7 @@ function listenToFrames() {
 
 function followSize() {
   const ratio = Math.min(window.devicePixelRatio || 1, 1.5);
-  walk.canvas.width = Math.max(2, Math.round(walk.canvas.clientWidth * ratio));
-  walk.canvas.height = Math.max(2, Math.round(walk.canvas.clientHeight * ratio));
+  walk.size = [ratio * walk.canvas.clientWidth, ratio * walk.canvas.clientHeight];
   drawWalkSoon();
 }
 

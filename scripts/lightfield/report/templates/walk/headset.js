@@ -23,7 +23,7 @@ function drawHeadset(session, space, start, frame) {
     const p = view.projectionMatrix;
     choose(walk.sources, axes, [p[0], p[5]], IN_MOTION);
     const eye = { at: walk.at, axes, lens: [p[0], p[5], p[8], p[9]], sources: walk.chosen };
-    drawEye(eye, layer.framebuffer, [x, y], [width, height], 1);
+    drawEye(eye, layer.framebuffer, [x, y], [width, height], 1, false);
   }
 }
 

@@ -216,12 +216,10 @@ function showPicture({ levels }, eye, target, corner, size) {
 
 // Draw what an eye sees into `target`, from its `corner` on. Of the eye: where it is (`at`), its `axes`, its
 // `lens` (scales across and up, and shifts), and the `sources` that it is drawn from. `samples` are those across
-// and down a pixel; below 1, the picture is drawn smaller, of fewer triangles, and
-// enlarged.
-export function drawEye(eye, target, corner, size, samples) {
-  const scale = Math.min(samples, 1);
-  const stage = stageOf(...size.map((side) => Math.max(1, Math.round(scale * side))), Math.max(samples, 1));
-  drawSources(stage.layers, eye, samples < 1);
+// and down a pixel; of coarse sources fewer triangles are drawn.
+export function drawEye(eye, target, corner, size, samples, isCoarse) {
+  const stage = stageOf(...size, samples);
+  drawSources(stage.layers, eye, isCoarse);
   blendLayers(stage, eye.sources.length);
   fillHoles(stage);
   showPicture(stage, eye, target, corner, size);

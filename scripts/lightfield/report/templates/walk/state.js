@@ -10,6 +10,8 @@ export const MODES = ["colour", "depth", "holes", "sources"];
 export const walk = {
   canvas: element("walk"),
   overlay: element("walk-overlay"),
+  // Pixels across and down of a picture that stands.
+  size: [2, 2],
   at: null,
   fadeFrom: 0,
   yaw: 0,

@@ -16,7 +16,7 @@ vec3 encoded(vec3 v) {
 void main() {
   vec2 place = (gl_FragCoord.xy - vec2(corner)) / vec2(size);
   ivec2 texel = ivec2(place * vec2(textureSize(colours, 0)));
-  float used = texelFetch(colours, texel, 0).a;
+  float used = mode == 0 ? 1.0 : texelFetch(colours, texel, 0).a;
   bool hole = used <= 0.0;
   vec3 v = gain * texture(filled, place).rgb;
   vec3 colour = encoded(v * (1.0 + v / (white * white)) / (1.0 + v));
