@@ -63,7 +63,13 @@ def main() -> None:
         parts = splits(source.lightfield)
         views = parts.train
         targets = source.lightfield.changed(views=parts.test)
-    sources = Sources(source.lens, views, reader(source), most=4 * arguments.best)
+    sources = Sources(
+        source.lens,
+        views,
+        reader(source),
+        fills_holes=not source.lightfield.transparent,
+        most=4 * arguments.best,
+    )
     lens = targets.lens
     depth = targets.lens.usual_depth
     targets.changed(depth=depth).write(arguments.output / NAME)

@@ -172,7 +172,9 @@ def _pictures(
     return shown | {
         "points": _points(distances, rays, matrices[embedded], colours),
         "depth": _depth_scale(depths, reach, lightfield.depth),
-        "walk": walk.collect(small, matrices[:, :3, 3], distances),
+        "walk": walk.collect(
+            small, matrices[:, :3, 3], distances, fills_holes=not lightfield.transparent
+        ),
     }
 
 

@@ -22,10 +22,11 @@ Array = NDArray[Any]
 SIGHT = 64
 
 
-def collect(lens: Lens, places: Array, distances: Array) -> dict[str, Any]:
+def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -> dict[str, Any]:
     """Return what the walk needs of the embedded views' ``lens`` and of all ``places`` (n, 3).
 
-    ``distances`` (m, h, w) are what embedded views see, in metres.
+    ``distances`` (m, h, w) are what embedded views see, in metres. ``fills_holes`` is as of
+    `lightfield.synthesis.view.Sources`.
     ``rays`` are those of the pixels, row by row, octahedral in two times 16 bits; ``sight`` has a
     byte for each direction of an octahedral map, 1 where the lens sees it; ``planes`` (m, 4) bound
     the volume between the cameras: n · p + c ≤ 0. ``toRim`` has a byte for each pixel, 255 where it
@@ -62,6 +63,7 @@ def collect(lens: Lens, places: Array, distances: Array) -> dict[str, Any]:
         "hidden": float(kernels.HIDDEN),
         "certain": float(kernels.CERTAIN),
         "far": float(kernels.FAR),
+        "fillsHoles": fills_holes,
     }
 
 

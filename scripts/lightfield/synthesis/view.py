@@ -50,8 +50,8 @@ class Synthesised:
     """A picture: linear ``colour`` (h, w, 3); ``distance`` (h, w) in metres, inf where nothing was
     hit, NaN in holes; ``holes`` (h, w), which pixels no view sees, or the lens does not.
 
-    Holes that the lens sees have the colour of what is around and behind them, others NaN. If no
-    view sees anything, all are black.
+    Holes that the lens sees have the colour of what is around and behind them, or are black; others
+    are NaN. If no view sees anything, all are black.
     """
 
     colour: Array
@@ -107,15 +107,23 @@ def reader(source: SourceDataset) -> Reader:
 class Sources:
     """The ``views`` that pictures are made of, through one ``lens``; ``most`` are held in memory.
 
-    ``read`` returns a view's linear colour (h, w, 3), and its distances (h, w) in metres.
+    ``read`` returns a view's linear colour (h, w, 3), and its distances (h, w) in metres. Holes are
+    black unless ``fills_holes``: what views without a background do not see is most often nothing.
     """
 
     def __init__(
-        self, lens: Lens, views: Sequence[View], read: Reader, most: int = 2 * BEST
+        self,
+        lens: Lens,
+        views: Sequence[View],
+        read: Reader,
+        *,
+        fills_holes: bool = True,
+        most: int = 2 * BEST,
     ) -> None:
         self.lens = lens
         self.views = views
         self.read = read
+        self.fills_holes = fills_holes
         self.most = most
         self.matrices: Array = np.array([view.matrix for view in views])
         self._held: OrderedDict[int, Surface] = OrderedDict()
@@ -214,7 +222,10 @@ class Sources:
         inverse[holes] = np.nan
         with np.errstate(divide="ignore"):
             distance = 1 / inverse
-        fill(colour, inverse, (~holes).astype(np.float32), _wraps(lens))
+        if self.fills_holes:
+            fill(colour, inverse, (~holes).astype(np.float32), _wraps(lens))
+        else:
+            colour[holes] = 0
         colour[outside] = np.nan
         return Synthesised(colour, distance, holes)
 

@@ -194,7 +194,8 @@ function fillHoles({ levels }) {
 function showPicture({ levels }, eye, target, corner, size) {
   const { gl } = walk;
   const { linked, uniforms } = walk.shown;
-  const { level, filled } = levels[0];
+  const { level } = levels[0];
+  const { filled } = WALK.fillsHoles ? levels[0] : { filled: level };
   gl.bindFramebuffer(gl.FRAMEBUFFER, target);
   gl.viewport(...corner, ...size);
   gl.useProgram(linked);
@@ -221,6 +222,6 @@ export function drawEye(eye, target, corner, size, samples, isCoarse) {
   const stage = stageOf(...size, samples);
   drawSources(stage.layers, eye, isCoarse);
   blendLayers(stage, eye.sources.length);
-  fillHoles(stage);
+  if (WALK.fillsHoles) fillHoles(stage);
   showPicture(stage, eye, target, corner, size);
 }
