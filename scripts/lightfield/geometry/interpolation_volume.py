@@ -101,8 +101,8 @@ def immersive_planes(
 def parts_to_edge(matrices: Floats, lens: Lens, places: Floats) -> Floats:
     """Return where places (n, 3) lie between the middle and the edge of the immersive volume.
 
-    0 is the middle of the cameras ``matrices`` (m, 4, 4), and 1 is the edge in that direction. inf
-    means that the middle itself is outside, as it is among cameras in a plane. The convex hull of
+    0 is the middle of the cameras ``matrices`` (m, 4, 4), and 1 is the edge in that direction. All
+    are inf if the middle itself is outside, as it is among cameras in a plane. The convex hull of
     the cameras stands for the surface between them.
     """
     positions = matrices[:, :3, 3]
