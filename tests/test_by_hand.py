@@ -81,7 +81,7 @@ def test_a_blend_whose_inventory_is_another_file_is_refused(tmp_path, refused):
     write_text(tmp_path / "other.json", "[]")
     words = ["--scene", "mine", "--output", "made"]
     said = refused("make_lightfield.py", *words, folder=tmp_path)
-    assert said == "--inventory: is missing; scripts/inventory.py says what the .blend has"
+    assert said == "--inventory: is missing; scripts/inventory.py writes it for a .blend"
     said = refused("make_lightfield.py", *words, "--inventory", "other.json", folder=tmp_path)
     assert said == "other.json: blend: is missing; scripts/inventory.py writes it"
 
