@@ -1,7 +1,7 @@
-"""List what a scene contains, and from that what its rendering can leave out.
+"""List what a scene contains, and what its rendering can leave out.
 
-What is missing or cannot be read is an error here, before anything is rendered pink. Of a user's
-.blend it says in one block what is taken and what is not.
+Missing or unreadable files are an error here, before they turn views pink. For a user's .blend it
+prints which settings the dataset takes and which it ignores.
 """
 
 import argparse
@@ -35,7 +35,7 @@ import bpy
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scene", help="name of a file in configs/scenes/, for what it chooses")
+    parser.add_argument("--scene", help="name of a file in configs/scenes/ that uses this .blend")
     parser.add_argument("--blend", required=True, type=Path, help="the scene")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
@@ -67,7 +67,7 @@ def main() -> None:
     warnings = list(simulations.warnings(frames))
     leave_out = pruning.left_out(contents)
     contents["left_out"] = leave_out
-    # Of what is open here nothing is left, for it to be rendered in the same memory.
+    # Close the scene, because the measurement opens it again.
     blend_file.new_scene()
     contents["memory_bytes"] = scene_memory.measure(arguments.blend, contents, chosen)
     write_json(arguments.output, contents)
@@ -77,7 +77,7 @@ def main() -> None:
         resolved = [dataset.resolved(arguments.output) for dataset in datasets]
         shown = sorted({dataset.source.frame for dataset in resolved})
         own_camera = any(isinstance(dataset.rig, BlendCamera) for dataset in datasets)
-        notes = blend.taken(contents, shown, datasets[0].render, own_camera)
+        notes = blend.usage_notes(contents, shown, datasets[0].render, own_camera)
         print(f"note: {arguments.blend}: {' · '.join(notes)}")
     print(
         f"{contents['objects']} objects, {contents['triangles']} triangles, with instances "
@@ -90,7 +90,7 @@ def main() -> None:
 def refuse_fluids(path: Path) -> None:
     """Raise `UserError` where the open .blend shows fluids that are not baked."""
     if fluids := simulations.unbaked_fluids():
-        # Blender aborts when it exits with one of them open.
+        # Blender aborts at its exit if such a file is still open.
         blend_file.new_scene()
         raise UserError(
             f"{path}: {', '.join(fluids[:8])}{' …' if len(fluids) > 8 else ''}: fluids that are "
@@ -100,14 +100,14 @@ def refuse_fluids(path: Path) -> None:
 
 def refusal(path: Path, problems: list[dict[str, str]]) -> str:
     """Return which files of a .blend are missing or cannot be read, and what to do about them."""
-    named = [
-        f"the {entry['kind']} {entry['name']} at "
-        f"{os.path.normpath(path.parent / entry['path'])} ({entry['problem']})"
-        for entry in problems[:8]
-    ]
+    descriptions = []
+    for entry in problems[:8]:
+        file = os.path.normpath(path.parent / entry["path"])
+        descriptions.append(f"the {entry['kind']} {entry['name']} at {file} ({entry['problem']})")
+    more = " …" if len(problems) > 8 else ""
     return (
         f"{path}: {len(problems)} of the files that it shows are missing or cannot be read: "
-        f"{'; '.join(named)}{' …' if len(problems) > 8 else ''}; mend them, pack them into the "
+        f"{'; '.join(descriptions)}{more}; mend them, pack them into the "
         ".blend (in Blender: File, External Data), or render without them: scene: "
         "{allow_missing: true}"
     )

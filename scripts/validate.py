@@ -52,7 +52,7 @@ def main() -> None:
     if arguments.output:
         (arguments.dataset / SUMS).unlink(missing_ok=True)
         # The report is made meanwhile.
-        leftovers.remove_unfinished(arguments.dataset, age=0, kept=REPORT)
+        leftovers.remove_unfinished(arguments.dataset, age=0, excluded=REPORT)
     elif not arguments.reprojection:
         lightfields = sorted(arguments.dataset.glob(f"*/{NAME}"))
         arguments.reprojection = [path.parent.name for path in lightfields]

@@ -110,7 +110,7 @@ def _views(folder: Path, dataset: Dataset) -> None:
         made.write(folder / dataset.folder / name / "lightfield.json")
     for name in dataset.exported:
         kind = Path(name).parent.name if name.endswith("export.json") else "instant_ngp"
-        options = dataset.exports.wanted[kind].recorded
+        options = dataset.exports.selected[kind].recorded
         write_json(folder / name, {"options": options, "files": {}})
     for stage in ("render", *dataset.reprojections):
         reprojection = dataset.reprojections.get(stage)

@@ -81,7 +81,7 @@ def test_a_blend_whose_inventory_is_another_file_is_refused(tmp_path, refused):
     write_text(tmp_path / "other.json", "[]")
     words = ["--scene", "mine", "--output", "made"]
     said = refused("make_lightfield.py", *words, folder=tmp_path)
-    assert said == "--inventory: is missing; scripts/inventory.py says what the .blend has"
+    assert said == "--inventory: is missing; scripts/inventory.py writes it for a .blend"
     said = refused("make_lightfield.py", *words, "--inventory", "other.json", folder=tmp_path)
     assert said == "other.json: blend: is missing; scripts/inventory.py writes it"
 
@@ -305,9 +305,9 @@ def test_an_image_is_no_text(refused, tmp_path):
     other.write_bytes(bytes([0x76, 0x2F, 0x31, 0x01, 0x80]))
     words = ["--dataset", tmp_path, "--name", "a/b", "--command", "c", "--rig", RIG]
     said = refused("report_html.py", *words, "--yaml", other, "--output", tmp_path / "page.html")
-    assert said == f"{other}: is no text in UTF-8"
+    assert said == f"{other}: is not text in UTF-8"
     said = refused("splits.py", other, "--output", tmp_path / "splits.json")
-    assert said == f"{other}: is no text in UTF-8"
+    assert said == f"{other}: is not text in UTF-8"
 
 
 @pytest.mark.parametrize(

@@ -223,8 +223,8 @@ def test_a_scene_has_samples_or_a_target(tmp_path):
     assert read("target_error: 0.01").render.target_error == 0.01
     for render, told in {
         "seed: 1": "render: is missing the key samples (or target_error)",
-        "samples: 4, target_error: 0.1": "render.samples: goes without target_error",
-        "denoise: true, target_error: 0.1": "render.denoise: goes without target_error",
+        "samples: 4, target_error: 0.1": "render.samples: does not go with target_error",
+        "denoise: true, target_error: 0.1": "render.denoise: does not go with target_error",
         "target_error: 0": "render.target_error: is 0; must be a number above 0",
         "target_eror: 0.1": "render.target_eror: unknown key; did you mean target_error?",
     }.items():

@@ -385,7 +385,7 @@ def test_a_scene_that_rots_after_a_kill_before_its_line_is_built_again(tmp_path)
     [
         (b'{"half": [', "is not JSON: "),
         (b"[1, 2]", "is a list, not a mapping"),
-        (b'{"\xff": 1}', "is no text in UTF-8"),
+        (b'{"\xff": 1}', "is not text in UTF-8"),
         (b"", "is empty"),
         (b"null", "is a NoneType, not a mapping"),
         (b"{}", None),

@@ -411,7 +411,7 @@ def test_locks_of_a_killed_run_stay_while_another_run_lives(start_run, tmp_path)
         (
             "here",
             "elsewhere",
-            "on elsewhere: wait for it; where it no longer runs: snakemake",
+            "on elsewhere: wait for it; if it no longer runs: snakemake",
         ),
         (
             "cluster",
@@ -564,6 +564,6 @@ def test_the_locks_of_another_machine_are_left_to_the_user(building):
     note.rename(note.with_name(note.name.replace(socket.gethostname(), "elsewhere")))
     refused = run()
     assert refused.returncode != 0
-    assert last_line(refused).endswith("where it no longer runs: snakemake --unlock")
+    assert last_line(refused).endswith("if it no longer runs: snakemake --unlock")
     assert run("--unlock").returncode == 0
     assert run().returncode == 0

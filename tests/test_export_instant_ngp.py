@@ -507,7 +507,7 @@ def test_the_yaml_asks_for_all_that_the_program_can_do(dataset: Dataset) -> None
     assert images.read_image(depth).channels["Y"].max() == 4000
     with pytest.raises(UserError, match="--settings: excludes --scale"):
         dataset.export("--settings", file, "--scale", 1)
-    with pytest.raises(ValidationError, match="bounds: goes without scale"):
+    with pytest.raises(ValidationError, match="bounds: does not go with scale"):
         TypeAdapter(InstantNgp).validate_python(settings | {"scale": 0.1})
     with pytest.raises(ValidationError, match="offset: goes with scale"):
         TypeAdapter(InstantNgp).validate_python(settings | {"offset": [0, 0, 0]})
@@ -593,7 +593,7 @@ def test_what_is_a_polynomial_goes_as_it_is(turned: int, dataset: Dataset) -> No
         (PANORAMA | {"longitude": [-180, 170]}, [], "instant-ngp cannot follow"),
         # A fisheye along both axes of the image, and none between them.
         (HALF_PANORAMA, [], "instant-ngp cannot follow"),
-        (FISHEYE, ["--depth-bounds", "--scale", 1], "bounds: goes without scale"),
+        (FISHEYE, ["--depth-bounds", "--scale", 1], "bounds: does not go with scale"),
         (FISHEYE, ["--offset", 0, 0, 0], "--offset: goes with --scale"),
         (FISHEYE, ["--placed-as", __file__], r"\.py: is not JSON"),
         (FISHEYE, ["--image-suffix", ".exr"], "view_0000f.exr: no such file"),

@@ -114,14 +114,14 @@ def test_the_gpus_are_those_that_are_left_to_the_process(
 
 
 def test_a_process_sees_the_gpu_alone_that_it_took(tmp_path, monkeypatch):
-    monkeypatch.setattr(gpus, "_taken", [])
+    monkeypatch.setattr(gpus, "_locks", [])
     monkeypatch.setattr(gpus.tempfile, "gettempdir", lambda: str(tmp_path))
     monkeypatch.setenv(CUDA, "GPU-a,GPU-b")
     monkeypatch.setenv(HIP, "0")
     _, lock = gpus.take(FAKE[:1], tmp_path)
     gpus.use_one()
     assert (gpus.os.environ[CUDA], gpus.os.environ[HIP]) == ("GPU-b", "-1")
-    for taken in (lock, *gpus._taken):
+    for taken in (lock, *gpus._locks):
         taken.close()
 
 

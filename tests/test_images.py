@@ -12,7 +12,7 @@ from lightfield.core.errors import UserError
 from lightfield.imaging.images import (
     CODECS,
     check_codec,
-    is_whole,
+    is_readable,
     read_header,
     read_image,
     write_exr,
@@ -44,11 +44,11 @@ def test_a_picture_that_ends_too_soon_is_not_whole(tmp_path, suffix):
     path = tmp_path / f"a.{suffix}"
     pixels = np.random.default_rng(0).integers(0, 255, (64, 48, 3), dtype=np.uint8)
     assert oiio.ImageBuf(pixels).write(str(path))
-    assert is_whole(path)
+    assert is_readable(path)
     whole = path.read_bytes()
     for size in (0, len(whole) // 2, len(whole) * 9 // 10):
         path.write_bytes(whole[:size])
-        assert not is_whole(path)
+        assert not is_readable(path)
 
 
 def test_a_picture_of_which_a_decoder_only_warns_is_whole(tmp_path):
@@ -57,7 +57,7 @@ def test_a_picture_of_which_a_decoder_only_warns_is_whole(tmp_path):
     content = bytearray(path.read_bytes())
     content[content.index(b"JFIF\0") + 5] = 3
     path.write_bytes(content + b"what a camera adds")
-    assert is_whole(path)
+    assert is_readable(path)
 
 
 def test_what_is_written_is_read(tmp_path, channels):

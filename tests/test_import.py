@@ -109,7 +109,7 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
     content = view.read_bytes()
     view.write_bytes(content[:-1] + b"?")
     refused = run("import_views.py", *words, check=False)
-    assert f"{view.name}: has other bytes than when it was taken over" in refused.stderr
+    assert f"{view.name}: has other bytes than at its import" in refused.stderr
     view.write_bytes(content)
     run("import_views.py", *words)
     again = dataset / "perspective"
@@ -220,9 +220,9 @@ def test_a_folder_that_can_be_no_rig_is_named(published, tmp_path, monkeypatch):
     ("content", "problem"),
     [
         ({"scene": {"dataset": "elsewhere"}}, "there is no lightfield.json in elsewhere"),
-        ({"scene": {"dataset": "published"}, "rigs": {}}, "rigs: goes without scene.dataset"),
+        ({"scene": {"dataset": "published"}, "rigs": {}}, "rigs: does not go with scene.dataset"),
         ({"scene": {"dataset": "published", "blend": "a.blend"}}, "must have one of builder,"),
-        ({"scene": {"dataset": "published", "frame": 3}}, "frame: goes without dataset"),
+        ({"scene": {"dataset": "published", "frame": 3}}, "frame: does not go with dataset"),
         (
             {"scene": {"dataset": "published"}, "exports": {"colmap": {"sources": ["views"]}}},
             "exports.colmap.sources: views sees 180 degrees",

@@ -441,16 +441,16 @@ EYES = {"stereo": {"distance": 0.06, "omnidirectional": True}}
     ("lens", "more", "problem"),
     [
         ("fisheye", {}, "rigs.one.stereo.omnidirectional: goes with the lens equirectangular"),
-        ("panorama", {"flow": {"pairs": "neighbours"}}, "flow: goes without rigs.one.stereo"),
+        ("panorama", {"flow": {"pairs": "neighbours"}}, "flow: does not go with rigs.one.stereo"),
         (
             "panorama",
             {"render": {"samples": 1, "passes": ["motion"]}},
-            "render.passes: motion goes without rigs.one.stereo",
+            "render.passes: motion does not go with rigs.one.stereo",
         ),
         (
             "panorama",
             {"reprojections": {"flat": {"camera": LENSES["perspective"]}}},
-            "reprojections.flat: goes without rigs.one.stereo",
+            "reprojections.flat: does not go with rigs.one.stereo",
         ),
         (
             "panorama",

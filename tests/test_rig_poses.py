@@ -90,7 +90,7 @@ def test_rotations_turn_evenly_from_key_to_key():
         ([CORNER[0], CORNER[1], CORNER[0]], "keys: the path turns back at a camera"),
         (
             [{"position": [1, 1, 1], "quaternion_wxyz": [1, 0, 0, 0], "rotation": [0, 0, 0]}] * 2,
-            "quaternion_wxyz: goes without rotation",
+            "quaternion_wxyz: does not go with rotation",
         ),
     ],
 )
@@ -173,7 +173,7 @@ def test_a_random_rigs_places_are_a_file_of_its_dataset(tmp_path, monkeypatch):
     (dataset,) = scene_datasets("somewhere")
     assert dataset.places == "work/somewhere/somewhere/places.json"
     assert dataset.places in dataset.intermediates
-    with pytest.raises(UserError, match="frames: goes without type random"):
+    with pytest.raises(UserError, match="frames: does not go with type random"):
         from_settings(RANDOM | {"frames": {"first": 1, "last": 2}})
 
 
@@ -201,7 +201,7 @@ def test_a_stereo_pair_stands_on_both_sides_of_its_position(kind, more):
 
 
 def test_a_stereo_pair_is_no_cube_map():
-    with pytest.raises(UserError, match="stereo: goes without cube_map"):
+    with pytest.raises(UserError, match="stereo: does not go with cube_map"):
         from_settings(
             {"type": "plane", "cameras": [2, 2], "cube_map": True, "stereo": {"distance": 0.1}}
         )

@@ -527,7 +527,7 @@ def test_the_path_of_a_blends_camera_is_thinned_from_end_to_end() -> None:
         thinner = rig.thinned(views)
         assert thinner.path == path and thinner.view_count == views
     assert from_settings({"type": "blend_camera"}).placed("inventory.json", 7).path == [7]
-    with pytest.raises(UserError, match="where it is, is known once"):
+    with pytest.raises(UserError, match="place is unknown until"):
         rig.poses()
 
 
@@ -619,7 +619,7 @@ def test_every_rig_can_look_at_a_point():
         np.testing.assert_allclose(pose.matrix()[:3, 1], (0, up, 0), atol=1e-9)
     with pytest.raises(UserError, match="a camera stands at"):
         rigs.from_settings({**one, "look_at": one["center"]}).poses()
-    with pytest.raises(UserError, match="look_at: goes without face_inside"):
+    with pytest.raises(UserError, match="look_at: does not go with face_inside"):
         rigs.from_settings({**plane, "face_inside": True})
 
 

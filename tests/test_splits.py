@@ -104,8 +104,8 @@ def test_what_one_rig_tests_is_exported_with_what_another_trains(tmp_path, monke
     around, along = scene_datasets("two")
     assert (around.tested_by, along.trained_by) == (("along",), "around")
     assert [name for name, _ in around.exports] == [name for name, _ in along.exports]
-    assert list(around.exports.wanted) == ["instant_ngp", "nerf_synthetic"]
-    assert list(along.exports.wanted) == ["instant_ngp"]
+    assert list(around.exports.selected) == ["instant_ngp", "nerf_synthetic"]
+    assert list(along.exports.selected) == ["instant_ngp"]
     assert around.splits == along.splits == "results/two/splits.json"
     assert around.splits in around.files
     (tmp_path / "checkout").mkdir()

@@ -5,7 +5,7 @@ def export_of(wildcards):
     """Return what an export's job is asked for."""
     dataset, name = dataset_of(wildcards), wildcards.format
     folder = f"{dataset.folder}/exports"
-    return one_of(dataset.exports.wanted, name, folder, "export of it")
+    return one_of(dataset.exports.selected, name, folder, "export of it")
 
 
 def tested_by(wildcards):

@@ -47,9 +47,9 @@ def _refusal(error: OSError) -> str:
 
 
 def _as_value(word: str) -> str:
-    """Return an argument so that argparse takes -1e-05, -1,2, -1:2 and -90deg for values.
+    """Return an argument with a blank before it if it is a value like -1e-05, -1,2, -1:2, -90deg.
 
-    argparse takes -1 and -0.5 for values by itself, and all arguments that begin with a blank.
+    Without the blank, argparse takes these for flags. It recognises -1 and -0.5 as values itself.
     """
     return f" {word}" if re.fullmatch(r"-[\d.]+[,:de][\d.,:deg+-]*", word) else word
 
@@ -57,13 +57,13 @@ def _as_value(word: str) -> str:
 def refuse_beside_settings(
     arguments: argparse.Namespace, add_flags: Callable[[argparse.ArgumentParser], None]
 ) -> None:
-    """Raise `UserError` where a flag of ``add_flags`` is given beside --settings."""
+    """Raise `UserError` if a flag of ``add_flags`` is given beside --settings."""
     parser = argparse.ArgumentParser()
     add_flags(parser)
     for name, default in vars(parser.parse_args([])).items():
         if getattr(arguments, name) != default:
             flag = name.replace("_", "-")
-            raise UserError(f"--settings: excludes --{flag}; write it into the file")
+            raise UserError(f"--settings: excludes --{flag}; write it into the settings file")
 
 
 # The following functions are for the ``type`` of an argument.

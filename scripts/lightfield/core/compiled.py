@@ -27,8 +27,8 @@ with _hidden("scipy", "scipy.linalg.cython_blas", "yaml"):
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
-# Infinities and NaNs keep their meaning: only contraction and the sign of zero are relaxed, and
-# dividing by zero gives one of them.
+# Infinities and NaNs keep their meaning, and dividing by zero gives one of them. Only contraction
+# and the sign of zero are relaxed.
 _OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz"}}
 
 

@@ -1,4 +1,4 @@
-"""Whether the disks have space for what a run writes, and why a disk takes no more files."""
+"""Checks that the disks have space for what a run writes, and says why a disk takes no files."""
 
 import errno
 import os
@@ -9,8 +9,8 @@ from pathlib import Path
 
 from lightfield.core.errors import UserError
 
-# The bytes of a run are estimates. A run that needs more than SURELY times the free space is
-# refused. One that needs more than NEARLY times the free space is warned of.
+# The bytes of a run are estimates. Refuse a run that needs more than SURELY times the free space.
+# Warn about a run that needs more than NEARLY times the free space.
 SURELY = 2.0
 NEARLY = 0.9
 # A disk with less free space than this, or with fewer free inodes, counts as full: a job's log
@@ -103,23 +103,33 @@ def check(needs: Iterable[Need]) -> Iterator[str]:
         needs_of_disk.setdefault(device, []).append(need)
         if cause := obstacle(need.folder):
             raise UserError(f"{need.folder}: cannot be written: {cause}")
-    for needs_here in needs_of_disk.values():
-        folder = needs_here[0].folder
-        existing_folder = nearest_folder(folder)
-        size = sum(need.size for need in needs_here)
-        files = sum(need.files for need in needs_here)
-        disk = os.statvfs(existing_folder)
-        free = shutil.disk_usage(existing_folder).free
-        if disk.f_files and files > disk.f_favail:
-            raise UserError(
-                f"{folder}: its disk takes {disk.f_favail} more files (inodes), and this run "
-                f"writes some {files}: remove some files, choose another disk, or build less"
-            )
-        text = (
-            f"{folder}: {gigabytes(free)} are free on its disk, and this run writes some "
-            f"{gigabytes(size)}"
+    for disk_needs in needs_of_disk.values():
+        if warning := _space_warning(disk_needs):
+            yield warning
+
+
+def _space_warning(needs: list[Need]) -> str | None:
+    """Return a warning if ``needs`` nearly fill their disk. Raises `UserError` if it is too small.
+
+    All ``needs`` are on one disk.
+    """
+    folder = needs[0].folder
+    existing_folder = nearest_folder(folder)
+    size = sum(need.size for need in needs)
+    files = sum(need.files for need in needs)
+    disk = os.statvfs(existing_folder)
+    free = shutil.disk_usage(existing_folder).free
+    if disk.f_files and files > disk.f_favail:
+        raise UserError(
+            f"{folder}: its disk takes {disk.f_favail} more files (inodes), and this run "
+            f"writes some {files}: remove some files, choose another disk, or build less"
         )
-        if size > SURELY * free:
-            raise UserError(f"{text}: free some space, choose another disk, or build less")
-        if size > NEARLY * free:
-            yield f"{text}: if the disk fills up, the run stops; free some space and start it again"
+    text = (
+        f"{folder}: {gigabytes(free)} are free on its disk, and this run writes some "
+        f"{gigabytes(size)}"
+    )
+    if size > SURELY * free:
+        raise UserError(f"{text}: free some space, choose another disk, or build less")
+    if size > NEARLY * free:
+        return f"{text}: if the disk fills up, the run stops; free some space and start it again"
+    return None

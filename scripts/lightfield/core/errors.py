@@ -1,13 +1,13 @@
 """The one exception that the programs show to the user without a traceback."""
 
-# Longer messages are cut: what they quote comes from a file.
+# Longer messages are cut, because they may quote a damaged file.
 LONGEST = 2000
 
 
 class UserError(Exception):
     """An error that the user can mend. The message says what is wrong, where, and what is right.
 
-    It is always one line: quoted line breaks and terminal codes are written as escapes.
+    It is always one line, with line breaks and terminal codes as escapes.
     """
 
     def __init__(self, message: str) -> None:

@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Iterable
 from pathlib import Path
 
-# What the user can do where memory ran out.
+# What the user can do if memory ran out.
 LESS_MEMORY = "lower --cores, for fewer shards at once, or resolution"
 LESS_GPU_MEMORY = (
     "lower resolution, shrink the scene's textures, end what else uses the GPU, or take device=cpu"
@@ -13,10 +13,10 @@ LESS_GPU_MEMORY = (
 _SIGNALS = {
     "SIGKILL": f"most likely memory ran out: {LESS_MEMORY}",
     "SIGABRT": f"most likely memory ran out: {LESS_MEMORY}",
-    "SIGSEGV": f"Blender crashed, as it does where it gets no memory: {LESS_MEMORY}",
+    "SIGSEGV": f"Blender crashed, as it does if it gets no memory: {LESS_MEMORY}",
     "SIGBUS": "most likely a temporary folder is full: free some space in /dev/shm and TMPDIR",
     "SIGALRM": "a view took far longer than expected: it hung",
-    "SIGTERM": "it was cancelled, or ran longer than it may",
+    "SIGTERM": "it was cancelled, or exceeded its time limit",
 }
 
 # What tar says after the cause.
@@ -26,48 +26,50 @@ _AFTER_THE_CAUSE = ("tar: Exiting with failure status", "tar: Error is not recov
 def cause(log: Path) -> str | None:
     """Return the line of a program's log that says why it failed, or None for an empty log.
 
-    That is its last ``error: …``; of a program that did not get so far, its last line. What a
-    signal means is added.
+    That is its last ``error: …``, or its last line if the program wrote no error. For a signal, the
+    likely reason is added.
     """
     text = log.read_text(encoding="utf-8", errors="replace") if log.is_file() else ""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     lines = [line for line in lines if not line.startswith(_AFTER_THE_CAUSE)]
     errors = [line for line in lines if line.startswith("error: ")]
-    said = errors or lines
-    if not said:
+    if not lines:
         return None
-    meaning = _SIGNALS.get(said[-1].removeprefix("error: killed by "))
-    return f"{said[-1]}: {meaning}" if meaning else said[-1]
+    last_line = errors[-1] if errors else lines[-1]
+    likely_reason = _SIGNALS.get(last_line.removeprefix("error: killed by "))
+    return f"{last_line}: {likely_reason}" if likely_reason else last_line
 
 
 def first_sentence(message: str) -> str:
-    """Return what an executor says of a job, without the command that it quotes below it."""
+    """Return what an executor says about a job, without the command that it quotes below."""
     lines = itertools.takewhile(lambda line: not line.startswith(" "), message.splitlines())
     return " ".join(lines).strip().rstrip(":")
 
 
 def failure_report(jobs: Iterable[tuple[str, str, Path]]) -> str:
-    """Return each cause of failed jobs, with one log that has it. Jobs are rule, cause and log."""
+    """Return each cause of failed jobs with one of its logs. Each job is a rule, cause and log."""
     logs: dict[tuple[str, str], list[Path]] = {}
     for rule, why, log in jobs:
         logs.setdefault((rule, why), []).append(log)
-    return "\n".join(
-        f"{rule} failed: {why}\n  log: {paths[0]}"
-        + (f" (and {len(paths) - 1} more with the same cause)" if paths[1:] else "")
-        for (rule, why), paths in logs.items()
-    )
+    paragraphs = []
+    for (rule, why), paths in logs.items():
+        paragraph = f"{rule} failed: {why}\n  log: {paths[0]}"
+        if len(paths) > 1:
+            paragraph += f" (and {len(paths) - 1} more with the same cause)"
+        paragraphs.append(paragraph)
+    return "\n".join(paragraphs)
 
 
 def is_newer(path: Path, time: float) -> bool:
-    """Return whether a file exists that was written after ``time``, in seconds since 1970."""
+    """Return whether a file exists, and was written after ``time``, in seconds since 1970."""
     return path.is_file() and path.stat().st_mtime >= time
 
 
 def batch_log(name: str, since: float) -> Path | None:
     """Return the newest log that a batch system wrote for a job or group, or None.
 
-    Looks in the folders into which the profiles have Slurm write. The log must be newer than
-    ``since``, in seconds since 1970.
+    Looks in the folders that the profiles give Slurm. The log must be newer than ``since``, in
+    seconds since 1970.
     """
     folder = Path(".snakemake")
     logs = [*folder.glob(f"slurm_logs/*_{name}/**/*.log"), *folder.glob(f"{name}-*.log")]

@@ -1,4 +1,4 @@
-"""Reads, writes and moves files. A file that is written here is complete or absent, never half."""
+"""Reads, writes and moves files. A file that this module writes is complete or absent."""
 
 import csv
 import fcntl
@@ -18,7 +18,7 @@ from lightfield.core.errors import UserError
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Raise a `UserError` for an OSError: it names ``path``, the cause, and what to do."""
+    """Turn an OSError into a `UserError` that names ``path``, the cause, and what to do."""
     try:
         yield
     except OSError as error:
@@ -35,7 +35,7 @@ def read_problem(error: OSError) -> str:
 def check_readable(path: Path | str) -> None:
     """Raise `UserError` for a file that is missing, or that the user may not read.
 
-    Call this before a library reads the file: many report both as a wrong format.
+    Call this before a library reads the file: many libraries would report a wrong format.
     """
     try:
         Path(path).open("rb").close()
@@ -74,7 +74,7 @@ def link_or_copy(file: Path, target: Path) -> None:
     """Make ``target`` a hard link to ``file``, or a copy if the file system has no hard links."""
     with atomic_path(target) as temporary:
         try:
-            # Link what a symbolic link leads to, as in git-annex. Linux would link the link itself.
+            # Resolve symbolic links, as git-annex has. Linux would link the symbolic link itself.
             os.link(file.resolve(), temporary)
         except OSError:
             shutil.copyfile(file, temporary)
@@ -140,7 +140,7 @@ def append_json_line(path: Path, entry: Mapping[str, Any]) -> None:
 
 
 def read_json_lines(path: Path) -> list[dict[str, Any]]:
-    """Return the objects of a file with one JSON object a line. Skips lines that are no object."""
+    """Return the objects of a file with one JSON object a line. Skips all other lines."""
     entries = []
     try:
         content = path.read_bytes()
@@ -213,16 +213,16 @@ def absolute_path(path: Path) -> Path:
 
 
 def keep_apart(flag: str, written: Path, *read: Path | None) -> None:
-    """Raise `UserError` if a program's ``flag`` has it write a path that it also reads."""
+    """Raise `UserError` if a program's ``flag`` makes it write a path that it also reads."""
     if any(path is not None and path.resolve() == written.resolve() for path in read):
-        raise UserError(f"{flag} {written}: is what is read, and would be lost; give another")
+        raise UserError(f"{flag} {written}: is an input, which would be lost; give another path")
 
 
 def set_aside(path: Path, folder: Path) -> Path:
     """Move a file or folder into ``folder``, under its own path, and return its new path.
 
-    Its own path is relative to the current folder, or to the root if it lies outside. An earlier
-    file there keeps its name, and the new one gets a number after its name.
+    Its own path is relative to the current folder, or to the root if it lies outside. If the new
+    path exists already, the moved file gets a number after its name.
     """
     inside = Path(os.path.normpath(path))
     if inside.is_absolute() or ".." in inside.parts:
@@ -239,13 +239,13 @@ def set_aside(path: Path, folder: Path) -> Path:
 
 
 def read_text(path: Path | str) -> str:
-    """Read a text in UTF-8. Raises `UserError` if it is missing, or no such text."""
+    """Read a text in UTF-8. Raises `UserError` if it is missing, or not UTF-8."""
     try:
         return Path(path).read_text(encoding="utf-8")
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
     except UnicodeDecodeError:
-        raise UserError(f"{path}: is no text in UTF-8") from None
+        raise UserError(f"{path}: is not text in UTF-8") from None
 
 
 def read_keys(path: Path | str, program: str, *keys: str) -> dict[str, Any]:
@@ -267,7 +267,7 @@ DAMAGE = (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, R
 
 @contextmanager
 def reading(place: Path | str, kind: str) -> Iterator[None]:
-    """Raise a `UserError` if a file, or a ``place`` in it, cannot be read as its ``kind``."""
+    """Raise a `UserError` if a file, or a ``place`` in it, is not a valid ``kind`` of file."""
     try:
         yield
     except OSError as error:

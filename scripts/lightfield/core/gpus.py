@@ -15,8 +15,9 @@ from typing import BinaryIO
 
 from lightfield.core.errors import UserError
 
-# CUDA, OptiX and HIP read from these environment variables which GPUs a process sees.
-CUDA, HIP = "CUDA_VISIBLE_DEVICES", "HIP_VISIBLE_DEVICES"
+# These environment variables tell CUDA, OptiX and HIP which GPUs a process sees.
+CUDA = "CUDA_VISIBLE_DEVICES"
+HIP = "HIP_VISIBLE_DEVICES"
 _KFD = Path("/sys/class/kfd/kfd/topology/nodes")
 
 
@@ -31,9 +32,9 @@ class Gpu:
 def visible(environment: Mapping[str, str] = os.environ) -> list[Gpu]:
     """Return the GPUs that this process sees: those that its environment allows, or all."""
     gpus = []
-    for variable, every in ((CUDA, _nvidia), (HIP, _amd)):
-        chosen = environment.get(variable)
-        ids = every() if chosen is None else [name.strip() for name in chosen.split(",")]
+    for variable, all_ids in ((CUDA, _nvidia), (HIP, _amd)):
+        allowed = environment.get(variable)
+        ids = all_ids() if allowed is None else [name.strip() for name in allowed.split(",")]
         gpus += [Gpu(variable, name) for name in ids if name and name != "-1"]
     return gpus
 
@@ -50,15 +51,16 @@ def _nvidia() -> list[str]:
 
 def _amd() -> list[str]:
     """Return the numbers of AMD's GPUs. The driver also lists processors, whose id is 0."""
-    ids = (path.read_text().strip() for path in sorted(_KFD.glob("*/gpu_id")))
-    return [str(number) for number, _ in enumerate(name for name in ids if name != "0")]
+    ids = [path.read_text().strip() for path in _KFD.glob("*/gpu_id")]
+    gpu_count = len([name for name in ids if name != "0"])
+    return [str(number) for number in range(gpu_count)]
 
 
 def take(gpus: Sequence[Gpu], folder: Path | None = None) -> tuple[Gpu, BinaryIO]:
     """Wait until one of several GPUs is free, and return it with its lock.
 
-    It is taken until the lock is closed, or this process ends, however it does. The lock files lie
-    in ``folder``, by default where the machine has its temporary files, and hold nothing.
+    The GPU is taken until the lock is closed, or this process ends in any way. The lock files are
+    empty. They lie in ``folder``, by default the machine's folder of temporary files.
     """
     folder = folder or Path(tempfile.gettempdir())
     waited = False
@@ -66,7 +68,7 @@ def take(gpus: Sequence[Gpu], folder: Path | None = None) -> tuple[Gpu, BinaryIO
         for gpu in gpus:
             name = re.sub(r"\W", "_", f"{gpu.variable}-{gpu.id}")
             path = folder / f"plenoforge-{name}.lock"
-            lock = os.fdopen(_opened(path), "rb")
+            lock = os.fdopen(_open_lock(path), "rb")
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 return gpu, lock
@@ -78,11 +80,11 @@ def take(gpus: Sequence[Gpu], folder: Path | None = None) -> tuple[Gpu, BinaryIO
         time.sleep(0.5)
 
 
-def _opened(path: Path) -> int:
-    """Open a lock file, which may be another user's and not to be written, or create it.
+def _open_lock(path: Path) -> int:
+    """Open a lock file, or create it. Another user may own it, and forbid writing.
 
-    For writing if it can be, for NFS locks no others. A link is never followed: in a folder of all
-    users it may be anybody's, and lead to a file of this user. Raises `UserError` for one.
+    Opens for writing if possible, because NFS locks no other files. Never follows a link: anybody
+    may have put it into a folder of all users. Raises `UserError` for a link.
     """
     # Do not wait for a pipe that somebody has put there.
     flags = os.O_NOFOLLOW | os.O_NONBLOCK
@@ -95,25 +97,27 @@ def _opened(path: Path) -> int:
             # Another process may have created it in the meantime.
             with suppress(FileExistsError):
                 file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
-                # Whatever the umask: another user's process must be able to lock it.
+                # Override the umask: another user's process must be able to lock the file.
                 os.fchmod(file, 0o666)
                 return file
         except OSError as error:
             raise UserError(f"{path}: cannot be locked: {error.strerror}; remove it") from None
 
 
-_taken: list[BinaryIO] = []
+# The lock of this process's GPU. It stays open until the process ends.
+_locks: list[BinaryIO] = []
 
 
 def use_one() -> None:
-    """Let this process see one GPU only, which no other process takes before this one ends.
+    """Let this process see only one GPU, which no other process takes before this one ends.
 
-    A single one that is left to it, as by a batch system, is its own already.
+    Does nothing if the process sees a single GPU, for example one from a batch system.
     """
     gpus = visible()
-    if len(gpus) < 2 or _taken:
+    if len(gpus) < 2 or _locks:
         return
     gpu, lock = take(gpus)
-    _taken.append(lock)
-    for variable in {other.variable for other in gpus}:
+    _locks.append(lock)
+    variables = {visible_gpu.variable for visible_gpu in gpus}
+    for variable in variables:
         os.environ[variable] = gpu.id if variable == gpu.variable else "-1"

@@ -1,8 +1,8 @@
-"""Programs run isolated: what a user's environment says to their libraries changes no byte.
+"""Isolates programs from the user's environment, so that it changes no byte of their output.
 
-Some variables act when Python starts, some when a library is loaded, and Blender reads colours,
-start-up scripts and add-ons from the user's home. So a program starts itself anew, once, before it
-has done anything, in an environment without all that. It keeps its process and its arguments.
+Some variables act when Python starts, and some when a library is loaded. Blender reads colours,
+start-up scripts and add-ons from the user's home. So a program first starts itself anew in an
+environment without all that. It keeps its process and its arguments.
 """
 
 import os
@@ -14,42 +14,57 @@ from pathlib import Path
 _SCRIPTS = Path(__file__).resolve().parents[2]
 _PROGRAM_FOLDERS = {_SCRIPTS, _SCRIPTS.parent / "benchmarks"}
 
-# How the names begin of variables that change what a program computes, by what reads them.
+# Prefixes of variables that change what a program computes, by what reads them.
 _REMOVED = (
-    # Python: modules of other folders, a sitecustomize, assertions left out.
+    # Python: modules of other folders, a sitecustomize, no assertions.
     "PYTHON",
     # Blender and Cycles: folders, colours, kernels and the instructions that they use.
-    *("BLENDER_", "CYCLES_"),
-    # What Blender is made of: colours, images, shaders, scenes in USD, denoising.
-    *("OCIO", "OIIO_", "OPENIMAGEIO_", "OSL_", "MATERIALX_", "PXR_", "OIDN_"),
-    # The arithmetic of kernels, arrays and the C library: with or without compiler or instructions.
-    *("NUMBA_", "NPY_", "OPENBLAS_CORETYPE", "GLIBC_TUNABLES"),
+    "BLENDER_",
+    "CYCLES_",
+    # Blender's libraries: colours, images, shaders, scenes in USD, denoising.
+    "OCIO",
+    "OIIO_",
+    "OPENIMAGEIO_",
+    "OSL_",
+    "MATERIALX_",
+    "PXR_",
+    "OIDN_",
+    # The arithmetic of kernels, arrays and the C library: compiler and instructions.
+    "NUMBA_",
+    "NPY_",
+    "OPENBLAS_CORETYPE",
+    "GLIBC_TUNABLES",
     # The system's loader: libraries in place of others.
-    *("LD_PRELOAD", "LD_AUDIT"),
+    "LD_PRELOAD",
+    "LD_AUDIT",
 )
-# Of these, what says only how to print, and where to keep what is compiled.
-_KEPT = {
-    *("PYTHONDONTWRITEBYTECODE", "PYTHONIOENCODING", "PYTHONPYCACHEPREFIX", "PYTHONUNBUFFERED"),
-    *("PYTHONUTF8", "NUMBA_CACHE_DIR"),
+# Variables with these prefixes that only change printing, and the places of compiled files.
+_HARMLESS = {
+    "PYTHONDONTWRITEBYTECODE",
+    "PYTHONIOENCODING",
+    "PYTHONPYCACHEPREFIX",
+    "PYTHONUNBUFFERED",
+    "PYTHONUTF8",
+    "NUMBA_CACHE_DIR",
 }
-# The option of Python's command line by which a program knows that it is isolated.
+# This option on Python's command line marks an isolated program.
 _MARK = "isolated"
 
 
 def isolate() -> None:
     """Start this program anew in a cleaned environment, if it is not isolated yet.
 
-    Where something else runs, as Snakemake or a test, nothing happens.
+    Does nothing in other processes, such as Snakemake or a test.
     """
     if _MARK not in sys._xoptions and _is_program():
-        # Without the packages in the user's home (-s), too.
+        # -s also excludes the packages in the user's home.
         command = [sys.executable, "-s", "-X", _MARK, *sys.orig_argv[1:]]
         folder = {"BLENDER_USER_RESOURCES": str(_folder_without_user_files())}
         os.execve(sys.executable, command, cleaned(os.environ) | folder)
 
 
 def _is_program() -> bool:
-    """Whether the command line runs one of our programs."""
+    """Return whether the command line runs one of our programs."""
     main = getattr(sys.modules["__main__"], "__file__", None)
     if main is None or Path(main).resolve().parent not in _PROGRAM_FOLDERS:
         return False
@@ -58,22 +73,22 @@ def _is_program() -> bool:
 
 
 def cleaned(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return an environment without what may change a byte of a dataset."""
-    kept = {
+    """Return an environment without the variables that may change a byte of a dataset."""
+    variables = {
         name: value
         for name, value in environment.items()
-        if name in _KEPT or not name.startswith(_REMOVED)
+        if name in _HARMLESS or not name.startswith(_REMOVED)
     }
-    if folders := _harmless_folders(kept.pop("LD_LIBRARY_PATH", "")):
-        kept["LD_LIBRARY_PATH"] = folders
-    return kept
+    if folders := _harmless_folders(variables.pop("LD_LIBRARY_PATH", "")):
+        variables["LD_LIBRARY_PATH"] = folders
+    return variables
 
 
 def _harmless_folders(library_path: str) -> str:
-    """Return a list of folders without those that hold a library which a package brings itself.
+    """Remove the folders that hold a library which a Python package brings itself.
 
-    The loader would take that one instead of the package's, as TBB's or a denoiser's of another
-    version on a cluster. The others may have what Python itself or a GPU needs.
+    The loader would prefer the folder's library to the package's. On a cluster this may be another
+    version of TBB or of the denoiser. The remaining folders may be needed by Python or a GPU.
     """
     packages = Path(sysconfig.get_path("platlib"))
     libraries = {library.name for library in packages.glob("*/lib/*.so*")}
@@ -85,15 +100,15 @@ def _harmless_folders(library_path: str) -> str:
 
 
 def _folder_without_user_files() -> Path:
-    """Return the folder that Blender takes for that of the user's files; it notes there what it is.
+    """Return an empty folder that Blender takes for the user's, and into which it writes notes.
 
-    It must be there, or Blender takes the one in the user's home.
+    The folder must exist, or Blender takes the one in the user's home.
     """
-    here = Path(__file__).parent
-    folder = here / "__pycache__" / f"blender-{sys.implementation.cache_tag}"
+    package = Path(__file__).parent
+    folder = package / "__pycache__" / f"blender-{sys.implementation.cache_tag}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
-        # Where nothing can be written, nothing of Blender's can be here either.
-        return here
+        # This folder is read-only, so Blender cannot have written anything here either.
+        return package
     return folder

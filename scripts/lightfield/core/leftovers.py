@@ -15,28 +15,29 @@ from lightfield.core.files import is_locked
 
 # No user's folder may have this prefix: it would be removed.
 PREFIX = "plenoforge-temporary-"
-# Every Blender that runs has such a folder, an artist's, too.
+# Every running Blender has such a folder, and so has an artist's.
 BLENDERS = "blender_*"
-# The names of `atomic_path`.
-_ON_THE_WAY = re.compile(r"\..+\.\d+\.tmp(\.\w+)?")
-# Seconds: nobody writes one file for so long, or has a Blender with an empty folder.
+# The names that `atomic_path` gives to unfinished files.
+_UNFINISHED = re.compile(r"\..+\.\d+\.tmp(\.\w+)?")
+# Seconds. Nobody writes one file for so long.
 FILE_AGE = 3600.0
+# Seconds. No Blender has an empty folder for so long.
 BLENDER_AGE = 24 * 3600.0
-# Between making a folder and taking it.
+# Seconds. A new folder is locked long before.
 FOLDER_AGE = 60.0
 
 
 @contextmanager
 def temporary_folder(parent: Path | str | None = None) -> Iterator[Path]:
-    """Yield a temporary folder in ``parent``, or where the machine has its own.
+    """Yield a temporary folder in ``parent``, or in the machine's folder of temporary files.
 
-    It is removed at the end, and where this process is killed by `remove`: a lock shows whether the
-    process lives, which a number would not from within a container.
+    The folder is removed at the end. If this process is killed, `remove` does it later. A lock
+    shows that the process lives. A process number would not, because containers have their own.
     """
     with tempfile.TemporaryDirectory(prefix=PREFIX, dir=parent) as name:
         lock = os.open(name, os.O_RDONLY)
         try:
-            # Without locks of folders, as on some networks' file systems, `remove` leaves it.
+            # Some network file systems cannot lock folders. There `remove` leaves the folder.
             with suppress(OSError):
                 fcntl.flock(lock, fcntl.LOCK_EX)
             yield Path(name)
@@ -57,25 +58,25 @@ def remove(folders: Iterable[Path] = ()) -> list[Path]:
                 removed.append(path)
         for path in parent.glob(BLENDERS):
             if path.is_dir() and _is_old(path, BLENDER_AGE):
-                # A folder that is not empty stays.
+                # This fails for a folder that is not empty.
                 with suppress(OSError):
                     path.rmdir()
                     removed.append(path)
     return removed
 
 
-def remove_unfinished(folder: Path, age: float = FILE_AGE, kept: str = "") -> list[Path]:
-    """Remove the files below a folder that were on their way ``age`` seconds ago; return them.
+def remove_unfinished(folder: Path, age: float = FILE_AGE, excluded: str = "") -> list[Path]:
+    """Remove unfinished files below a folder that are older than ``age`` seconds. Return them.
 
-    Leaves alone what lies in its folder ``kept``.
+    Skips the folder's subfolder ``excluded``.
     """
     removed = []
     for parent, folders, names in os.walk(folder):
-        if Path(parent) == folder and kept in folders:
-            folders.remove(kept)
+        if Path(parent) == folder and excluded in folders:
+            folders.remove(excluded)
         for name in names:
             path = Path(parent, name)
-            if _ON_THE_WAY.fullmatch(name) and _is_old(path, age):
+            if _UNFINISHED.fullmatch(name) and _is_old(path, age):
                 path.unlink(missing_ok=True)
                 removed.append(path)
     return removed

@@ -29,7 +29,7 @@ _NAME = re.compile(r"(?P<pid>\d+)\.[0-9a-f]{8}@(?P<host>.+)\.(?P<place>here|clus
 
 @dataclass(frozen=True)
 class Run:
-    """A run by its note: its process, the host's name, and whether its jobs run elsewhere."""
+    """A run by its note: its process, its host's name, and whether its jobs run on a cluster."""
 
     note: Path
     pid: int
@@ -59,39 +59,39 @@ def enter(folder: Path, on_cluster: bool, remove_locks: Callable[[], None]) -> l
     """Note that this run works in a folder. Return the other runs there that may live.
 
     If all of them were killed, ``remove_locks`` removes Snakemake's locks. Waits for jobs that
-    have outlived their run. Some network file systems have no locks: there nothing is noted, and
-    nothing is removed.
+    have outlived their run. On network file systems without locks, this leaves no note and removes
+    nothing.
     """
     folder.mkdir(parents=True, exist_ok=True)
     _wait_for_jobs(folder)
     try:
         with _guarded(folder.parent):
-            others = _runs(folder)
-            alive = [run for run in others if not run.is_killed]
-            if others and not alive:
+            other_runs = _runs(folder)
+            live_runs = [run for run in other_runs if not run.is_killed]
+            if other_runs and not live_runs:
                 remove_locks()
-            for run in others:
-                if run not in alive:
+            for run in other_runs:
+                if run not in live_runs:
                     run.note.unlink(missing_ok=True)
             folder.mkdir(exist_ok=True)
             _leave_note(folder, on_cluster)
     except OSError as error:
         print(f"warning: {folder}: no locks of files: {error.strerror}", file=sys.stderr)
         return []
-    return alive
+    return live_runs
 
 
-def refusal(others: list[Run]) -> str:
-    """Return why a run cannot work on files that are locked, and what to do."""
-    if not others:
+def refusal(live_runs: list[Run]) -> str:
+    """Return why a run cannot work on files that another run has locked, and what to do."""
+    if not live_runs:
         return (
-            "another run has locked these files and left no note of itself: wait for it; where "
-            "none runs any more: snakemake --unlock"
+            "another run has locked these files and left no note of itself: wait for it; if "
+            "no run is left: snakemake --unlock"
         )
-    run = others[0]
+    run = live_runs[0]
     if run.host != socket.gethostname():
         return (
-            f"another run makes these files, process {run.pid} on {run.host}: wait for it; where "
+            f"another run makes these files, process {run.pid} on {run.host}: wait for it; if "
             "it no longer runs: snakemake --unlock"
         )
     if _is_free(run.note):
@@ -101,7 +101,7 @@ def refusal(others: list[Run]) -> str:
         )
     return (
         f"another run makes these files, process {run.pid}: wait for it, or end it "
-        f"(kill {run.pid}); snakemake status says how far it is"
+        f"(kill {run.pid}); snakemake status shows its progress"
     )
 
 
@@ -109,13 +109,14 @@ def _runs(folder: Path) -> list[Run]:
     """Return the other runs that have left a note."""
     runs = []
     for path in sorted(folder.iterdir()):
-        if (name := _NAME.fullmatch(path.name)) and path not in _OWN:
+        name = _NAME.fullmatch(path.name)
+        if name and path not in _LOCKED_NOTES:
             runs.append(Run(path, int(name["pid"]), name["host"], name["place"] == "cluster"))
     return runs
 
 
-# The notes of this process, with the files that hold their locks.
-_OWN: dict[Path, int] = {}
+# The notes of this process, with the open files that hold their locks.
+_LOCKED_NOTES: dict[Path, int] = {}
 
 
 def _leave_note(folder: Path, on_cluster: bool) -> None:
@@ -130,7 +131,7 @@ def _leave_note(folder: Path, on_cluster: bool) -> None:
         os.close(file)
         note.unlink()
         raise
-    _OWN[note] = file
+    _LOCKED_NOTES[note] = file
     os.environ[VARIABLE] = str(note.absolute())
     atexit.register(note.absolute().unlink, missing_ok=True)
 
@@ -166,7 +167,7 @@ def _guarded(folder: Path) -> Iterator[None]:
     """Lock the folder of the notes, so that one process at a time reads and writes them."""
     lock = os.open(folder, os.O_RDONLY)
     try:
-        # Some networks' file systems lock no folders.
+        # Some network file systems cannot lock folders.
         with suppress(OSError):
             fcntl.flock(lock, fcntl.LOCK_EX)
         yield

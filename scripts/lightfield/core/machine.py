@@ -1,23 +1,24 @@
-"""Describes what of a machine changes bytes. Machines with one description make the same files.
+"""Describes a machine. Machines with equal descriptions write the same bytes.
 
-Cycles and Embree take other kernels on processors without AVX2, and the denoiser on those with
-AVX-512. Embree builds on approximate reciprocals, which each maker of processors has in its own
-way. C libraries round sines and powers differently. All of it shows in last digits.
+Cycles and Embree use other kernels on processors without AVX2. The denoiser uses others on those
+with AVX-512. Embree builds on approximate reciprocals, which differ between makers of processors.
+C libraries round sines and powers differently. All of this changes last digits.
 """
 
 import platform
 from pathlib import Path
 
-# All that Cycles asks for where it takes its kernel for AVX2, and the denoiser beyond that.
+# The instructions that Cycles needs for its AVX2 kernel.
 _AVX2 = {"avx", "f16c", "avx2", "fma", "bmi1", "bmi2"}
+# The further instructions that the denoiser needs for its AVX-512 kernel.
 _AVX512 = {"avx512f", "avx512cd", "avx512bw", "avx512dq", "avx512vl"}
 
 
 def describe(denoise: bool, cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
     """Return the maker and instructions of this machine's processor, and its C library.
 
-    They are those that matter for views that are rendered with or without ``denoise``. ``cpuinfo``
-    is where Linux describes processors; of one without a maker there it is the name of its kind.
+    AVX-512 matters only for views with ``denoise``. ``cpuinfo`` is where Linux describes
+    processors. If it names no maker, the machine's architecture stands for it.
     """
     facts = _first_processor(cpuinfo)
     processor = platform.machine()
@@ -32,7 +33,7 @@ def describe(denoise: bool, cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
 
 
 def _first_processor(cpuinfo: Path) -> dict[str, str]:
-    """Return what /proc/cpuinfo says of the first processor, by its keys."""
+    """Return the keys and values of the first processor in /proc/cpuinfo."""
     if not cpuinfo.exists():
         return {}
     first, _, _ = cpuinfo.read_text().partition("\n\n")

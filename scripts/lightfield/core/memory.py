@@ -1,4 +1,4 @@
-"""How much memory a process may have on this machine, and how much it has had."""
+"""Returns how much memory processes may use on this machine, and how much this one has used."""
 
 import resource
 import sys
@@ -6,13 +6,13 @@ from pathlib import Path
 
 import psutil
 
-# The folder of the control groups, and the file that says in which of them this process is.
+# The folder of the control groups, and the file with the groups of this process.
 CONTROL_GROUPS = Path("/sys/fs/cgroup")
 OWN_GROUPS = Path("/proc/self/cgroup")
 
 
 def available() -> int:
-    """Return how many bytes all processes here may have: the machine's memory, or a limit.
+    """Return how many bytes all processes here may use: the machine's memory, or a lower limit.
 
     Batch systems and containers set limits by control groups. A group limits all groups inside it.
     """
@@ -38,7 +38,7 @@ def _limit_files() -> list[Path]:
 
 
 def peak() -> int:
-    """Return the most bytes of memory that this process has had.
+    """Return the most bytes of memory that this process has used at once.
 
     Reads /proc: getrusage also counts the process that started this one.
     """

@@ -18,10 +18,10 @@ def available() -> int:
 def only(count: int) -> Iterator[None]:
     """Make a library that is imported in this context start at most ``count`` threads.
 
-    TBB, whose threads Blender and OpenImageDenoise use beside Cycles' own, makes one for each
-    processor that it may use when it is loaded. Idle ones keep asking for work: they take a tenth
-    of each processor from the renders of other shards. Where a process cannot choose its
-    processors, this changes nothing.
+    Blender and OpenImageDenoise use TBB's threads beside Cycles' own. When TBB is loaded, it starts
+    a thread for each processor that it may use. Idle threads keep asking for work, and take a tenth
+    of each processor from the renders of other shards. Does nothing on systems where a process
+    cannot choose its processors.
     """
     if not _HAS_AFFINITY:
         yield
@@ -31,8 +31,8 @@ def only(count: int) -> Iterator[None]:
     try:
         yield
     finally:
-        # Afterwards each thread runs where the system puts it, those that were started too.
+        # Afterwards all threads, also those that were started, may use all processors.
         for thread in Path("/proc/self/task").iterdir():
-            # One may have ended since.
+            # The thread may have ended in the meantime.
             with suppress(ProcessLookupError):
                 os.sched_setaffinity(int(thread.name), allowed)

@@ -16,17 +16,17 @@ def duration(seconds: float) -> str:
     """Return a duration as a person reads it: ``42 s``, ``3 min 05 s``, ``2 h 07 min``."""
     if seconds < 99.5:
         return f"{seconds:.0f} s"
-    minutes, rest = divmod(round(seconds), 60)
+    minutes, odd_seconds = divmod(round(seconds), 60)
     if minutes < 100:
-        return f"{minutes} min {rest:02d} s"
+        return f"{minutes} min {odd_seconds:02d} s"
     return f"{minutes // 60} h {minutes % 60:02d} min"
 
 
 @dataclass(frozen=True)
-class Said:
-    """What a line of `Progress` says: pieces ``done`` of ``total``, and seconds for ``each``.
+class Report:
+    """The content of a line of `Progress`: pieces ``done`` of ``total``, and seconds for ``each``.
 
-    Only the first line says how many were ``already`` done before. It says no seconds.
+    Only the first line says how many were ``already`` done before. It has no seconds.
     """
 
     done: int
@@ -35,21 +35,23 @@ class Said:
     each: float | None = None
 
 
-def read(line: str) -> Said | None:
-    """Return what a line of `Progress` says, or None if it is none."""
-    if found := _BEGIN.fullmatch(line):
-        return Said(0, int(found[1]), int(found[2] or 0))
-    if found := _NOW.match(line):
-        return Said(int(found[1]), int(found[2]), each=float(found[3]))
+def read(line: str) -> Report | None:
+    """Return the content of a line of `Progress`. None for other lines."""
+    if match := _BEGIN.fullmatch(line):
+        total, already = match.groups()
+        return Report(0, int(total), int(already or 0))
+    if match := _NOW.match(line):
+        done, total, each = match.groups()
+        return Report(int(done), int(total), each=float(each))
     return None
 
 
 class Progress:
     """Counts finished pieces of work and prints a line from time to time, the first at once.
 
-    Whole lines, never carriage returns, so that several shards can share one log. The lines come
-    every `INTERVAL`, and more rarely, down to one a minute, the longer the work takes.
-    ``already`` pieces were finished before; ``total`` are to do.
+    It prints complete lines without carriage returns, so that several shards can share one log.
+    A line comes every `INTERVAL`, and down to once a minute the longer the work takes.
+    ``already`` pieces were finished before, and ``total`` are to do.
     """
 
     def __init__(self, total: int, label: str, unit: str = "views", already: int = 0) -> None:
@@ -80,10 +82,10 @@ class Progress:
         # The first piece often takes longer, because it prepares the others.
         counted, since = self.first if self.count > self.first[0] else (0, 0.0)
         each = (elapsed - since) / (self.count - counted)
-        left = each * (self.total - self.count)
+        remaining = each * (self.total - self.count)
         self._print(
             f"{self.count} of {self.total} {self.unit}, {each:.3g} s each, "
-            + (f"{duration(left)} left" if left else f"done in {duration(elapsed)}")
+            + (f"{duration(remaining)} left" if remaining else f"done in {duration(elapsed)}")
         )
 
     def _print(self, text: str) -> None:

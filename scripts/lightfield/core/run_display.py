@@ -1,7 +1,7 @@
-"""What a run shows while it works: its phases, a line of how far it is, warnings, and failures.
+"""Shows a run while it works: its phases, a line of progress, warnings, and failures.
 
-On a terminal the line stays in view and is rewritten in place; elsewhere, as in the log of a CI,
-it is written again now and then.
+On a terminal the line of progress is rewritten in place. Elsewhere, as in the log of a CI, it is
+written again now and then.
 """
 
 import re
@@ -17,12 +17,14 @@ from typing import TextIO
 from lightfield.core import progress
 from lightfield.core.progress import duration
 
-# What a job takes beside its renders, in seconds: to start a program, to read and write its files.
+# Seconds that a job takes beside its renders: to start a program, to read and write its files.
 JOB_SECONDS = 1.5
-# Not on a terminal: after so many seconds, and so much of the time until then, a line is due.
-FIRST_LINE, NEXT_LINE = 30.0, 0.1
+# Without a terminal the first line of progress comes after so many seconds.
+FIRST_LINE = 30.0
+# Without a terminal the next line comes after this part of the elapsed time, or FIRST_LINE.
+NEXT_LINE = 0.1
 CLEAR_LINE = "\r\x1b[K"
-# Of a program's log, the lines that the user is to see.
+# The lines of a program's log that the user sees.
 _FOR_THE_USER = re.compile(r"warning: |note: ")
 
 
@@ -30,8 +32,8 @@ _FOR_THE_USER = re.compile(r"warning: |note: ")
 class Task:
     """A job: its rule, ``name``, phase and log.
 
-    ``seconds`` of one core are what its renders are expected to take, of ``views`` views, which are
-    0 where none of a dataset's own is rendered.
+    ``views`` is the number of the dataset's views that it renders. ``seconds`` is the estimated
+    time of its renders on one core.
     """
 
     rule: str
@@ -42,20 +44,21 @@ class Task:
     seconds: float = 0.0
     began: float | None = None
     ended: float | None = None
-    # As its log has it: pieces of work that were done before, those done since, all, and the
+    # From its log: pieces of work that an earlier run did, those done since, all pieces, and the
     # seconds for each.
-    kept: int = 0
+    already: int = 0
     done: int = 0
     total: int = 0
     each: float | None = None
+    # The bytes of its log that have been read.
     read: int = field(default=0, repr=False)
 
     @property
     def part(self) -> float:
-        """The part of its renders that is done."""
+        """The part of its work that is done."""
         if self.ended is not None:
             return 1.0
-        return (self.kept + self.done) / self.total if self.total else 0.0
+        return (self.already + self.done) / self.total if self.total else 0.0
 
     @property
     def views_done(self) -> int:
@@ -63,27 +66,27 @@ class Task:
 
     @property
     def views_made(self) -> int:
-        """Those of ``views_done`` that were not there before."""
-        return max(0, self.views_done - self.kept)
+        """The views of ``views_done`` that this run rendered."""
+        return max(0, self.views_done - self.already)
 
     @property
     def at_work(self) -> str:
-        """What it works on; if that is no views but several pieces, how many are done."""
+        """Its phase. Work on other pieces than views also says how many are done."""
         if self.views or self.total < 2:
             return self.phase
-        return f"{self.phase} {self.kept + self.done} of {self.total}"
+        return f"{self.phase} {self.already + self.done} of {self.total}"
 
     def lines(self, since: float) -> list[str]:
-        """Return the whole lines that its log has got; one from before ``since`` is another run's.
+        """Return the complete lines that its log got since the last call.
 
-        ``since`` is in seconds since 1970.
+        Ignores a log from before ``since``, in seconds since 1970: an earlier run wrote it.
         """
         try:
             if self.log.stat().st_mtime < since:
                 return []
             with self.log.open("rb") as file:
                 if file.seek(0, 2) < self.read:
-                    # A job that is tried again begins its log anew.
+                    # A job that is retried begins its log anew.
                     self.read = 0
                 file.seek(self.read)
                 content = file.read()
@@ -95,10 +98,10 @@ class Task:
 
 
 class RunDisplay:
-    """Shows how far the tasks of a run are.
+    """Shows the progress of a run's tasks.
 
-    ``look`` returns the keys of the jobs that are running, finished and failed; ``explain`` why
-    those of some keys failed.
+    ``look`` returns the keys of the jobs that are running, finished and failed. ``explain`` returns
+    why the jobs of some keys failed.
     """
 
     def __init__(
@@ -107,18 +110,19 @@ class RunDisplay:
         explain: Callable[[set[Hashable]], str],
         stream: TextIO | None = None,
     ) -> None:
-        self._look, self._explain = look, explain
+        self._look = look
+        self._explain = explain
         self._stream = stream or sys.stderr
         self._terminal = self._stream.isatty()
         self._failed: set[Hashable] = set()
-        self._seen: set[str] = set()
+        self._shown_warnings: set[str] = set()
         self._drawn = False
         self._end = threading.Event()
         self._lock = threading.RLock()
         self.begin({}, 1)
 
     def begin(self, tasks: Mapping[Hashable, Task], cores: int) -> None:
-        """Take these tasks, on which ``cores`` work."""
+        """Begin to show these tasks, which share ``cores``."""
         self._tasks = tasks
         self._open = dict(tasks)
         self._cores = cores
@@ -127,18 +131,18 @@ class RunDisplay:
         self._due = FIRST_LINE
 
     def start(self) -> None:
-        """Look each second how far the run is."""
+        """Update the display each second, until `stop`."""
         threading.Thread(target=self._watch, daemon=True).start()
 
     def stop(self) -> None:
-        """Show what has happened since the last look, and no more after that."""
+        """Update the display a last time."""
         if not self._end.is_set():
             self._end.set()
             self.update()
             self.clear()
 
     def clear(self) -> None:
-        """Take the line from the terminal, for another to be written."""
+        """Remove the line of progress from the terminal, so that other text can be written."""
         with self._lock:
             if self._drawn:
                 self._write(CLEAR_LINE)
@@ -149,7 +153,7 @@ class RunDisplay:
             self.update()
 
     def update(self) -> None:
-        """Look how far the run is, and show it."""
+        """Look at the state of the run, and show it."""
         with self._lock:
             running, finished, failed = map(set, self._look())
             now = time.time()
@@ -167,22 +171,23 @@ class RunDisplay:
                 self._draw(now)
 
     def _follow(self, task: Task) -> None:
-        """Take from a job's log how far it is, and show what is for the user."""
+        """Read a job's progress from its log, and show the lines for the user."""
         for line in task.lines(self._began - 1):
-            said = progress.read(line)
-            if said:
-                task.kept = task.kept if said.already is None else said.already
-                task.done = said.done
-                task.total = said.total + task.kept
-                task.each = said.each
-            elif _FOR_THE_USER.match(line) and line not in self._seen:
-                self._seen.add(line)
-                # A note names what it is about; a warning is the program's, whatever it works on.
+            report = progress.read(line)
+            if report:
+                if report.already is not None:
+                    task.already = report.already
+                task.done = report.done
+                task.total = report.total + task.already
+                task.each = report.each
+            elif _FOR_THE_USER.match(line) and line not in self._shown_warnings:
+                self._shown_warnings.add(line)
+                # A note names its subject. A warning does not, so add the task.
                 text = line.removeprefix("warning: ")
                 self._say(line if text == line else f"warning: {task.name}: {text}")
 
     def _report_failed(self, failed: set[Hashable], running: set[Hashable]) -> None:
-        """Say at once why a job failed, where others go on: all is said again at the end."""
+        """Say at once why a job failed, if others go on. The end of the run repeats it."""
         new = {key for key in failed - self._failed if key in self._tasks}
         self._failed |= failed
         if new and running:
@@ -210,7 +215,7 @@ class RunDisplay:
             self._say(self.line(now))
 
     def line(self, now: float) -> str:
-        """Return how far the run is at ``now``, in seconds since 1970."""
+        """Return the line of progress at ``now``, in seconds since 1970."""
         tasks = self._tasks.values()
         parts = [f"{len(tasks) - len(self._open)} of {_count(len(tasks), 'job')}"]
         views = sum(task.views for task in tasks)
@@ -225,37 +230,41 @@ class RunDisplay:
         return " · ".join([*parts, *dict.fromkeys(at_work)])
 
     def seconds_left(self, now: float) -> float:
-        """Return an estimate of how long the whole run will still take.
+        """Return an estimate of the seconds until the run ends.
 
-        Renders are expected to differ from their estimates as those of this run did so far. What is
-        left goes on at the rate at which work was done until now. Of what nothing is expected, a
-        measurement's, what its log says is counted from when it says so.
+        The remaining work is taken to go on at this run's rate until now. Jobs without an estimate,
+        such as measurements, take as long as their logs say.
         """
-        tasks = self._tasks.values()
-        spent = expected = 0.0
-        for task in tasks:
-            if task.views_made and task.each is not None:
-                spent += task.each * task.views_made
-                expected += task.seconds * task.views_made / task.views
-        factor = spent / expected if expected else 1.0
-        done = left = 0.0
-        for task in tasks:
-            rendering = factor * task.seconds
-            done += rendering * task.part * (1 - task.kept / (task.total or 1))
-            left += rendering * (1 - task.part)
+        slowness = self._slowness()
+        done = 0.0
+        remaining = 0.0
+        for task in self._tasks.values():
+            rendering = slowness * task.seconds
+            done += rendering * task.part * (1 - task.already / (task.total or 1))
+            remaining += rendering * (1 - task.part)
             if task.ended is None:
-                left += JOB_SECONDS
+                remaining += JOB_SECONDS
             else:
                 done += JOB_SECONDS
         elapsed = now - self._began
-        # Before anything is done, as fast as the cores can.
+        # Before anything is done, assume that all cores work.
         rate = done / elapsed if done > JOB_SECONDS else float(self._cores)
-        by_logs = [
-            (task.total - task.kept - task.done) * task.each
+        seconds_by_logs = [
+            (task.total - task.already - task.done) * task.each
             for task in self._open.values()
             if not task.seconds and task.each is not None
         ]
-        return max([left / rate, *by_logs])
+        return max([remaining / rate, *seconds_by_logs])
+
+    def _slowness(self) -> float:
+        """Return the seconds that this run's views took, divided by their estimates."""
+        spent = 0.0
+        expected = 0.0
+        for task in self._tasks.values():
+            if task.views_made and task.each is not None:
+                spent += task.each * task.views_made
+                expected += task.seconds * task.views_made / task.views
+        return spent / expected if expected else 1.0
 
     def _say(self, text: str) -> None:
         self.clear()

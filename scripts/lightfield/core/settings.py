@@ -1,4 +1,4 @@
-"""What users write in YAML: the base class of its models, and their mistakes in one line."""
+"""The base class of settings that users write in YAML, and mistakes in them as one line."""
 
 import difflib
 import json
@@ -27,11 +27,12 @@ Model = TypeVar("Model")
 
 
 class Settings(BaseModel):
-    """A mapping of known keys: nothing is converted (4.0 is no whole number), nothing ignored.
+    """A mapping of allowed keys. No value is converted (4.0 is not a whole number) or ignored.
 
-    Null, which YAML makes of a key without a value, is none: a default would pass for a choice.
+    YAML makes null of a key without a value. Null is refused, because a default in its place would
+    look like the user's choice.
 
-    A model's validator raises ``ValueError("key: what is wrong")``; the key may be dotted.
+    A model's validator raises ``ValueError("key: what is wrong")``. The key may be dotted.
     """
 
     model_config = ConfigDict(
@@ -43,9 +44,11 @@ class Settings(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _known_keys(cls, content: Any) -> Any:
+    def _check_keys(cls, content: Any) -> Any:
+        if not isinstance(content, Mapping):
+            return content
         allowed_keys = cls.model_fields
-        for key, value in content.items() if isinstance(content, Mapping) else ():
+        for key, value in content.items():
             if key in cls.removed_keys:
                 raise ValueError(f"{key}: is no longer a key; {cls.removed_keys[key]}")
             if key not in allowed_keys:
@@ -61,7 +64,7 @@ class Settings(BaseModel):
 
 
 def as_list(count: int) -> BeforeValidator:
-    """Return what makes a tuple of a YAML list of ``count`` values."""
+    """Return a validator that makes a tuple of a YAML list of ``count`` values."""
 
     def check(value: Any) -> Any:
         if not isinstance(value, list | tuple) or len(value) != count:
@@ -76,25 +79,25 @@ def _unchanged(value: Any, check: Callable[[Any], Any]) -> Any:
     return value
 
 
-# Beside a number that a dataset's identity follows from: 10 stays 10, and does not become 10.0.
+# Keeps a number as the user wrote it: 10 does not become 10.0, which would change a dataset's key.
 AS_WRITTEN = WrapValidator(_unchanged)
 
-# Metres, or degrees. Blender computes in 32 bits, which beyond that are coarser than a metre.
+# Metres, or degrees. Blender computes in 32 bits, which are coarser than a metre beyond this.
 FARTHEST = 1e7
 Coordinate = Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)]
-# Named, so that the JSON schema has it once; a model's settings do not reach in there.
+# Named, so that the JSON schema has it once.
 Vector = TypeAliasType("Vector", Annotated[tuple[Coordinate, Coordinate, Coordinate], as_list(3)])
-# What a text of a pattern is, in words: nobody is shown a regular expression.
+# What messages say instead of a regular expression.
 _MEANINGS: dict[str, str] = {}
 
 
 def pattern(expression: str, meaning: str) -> str:
-    """Return a field's pattern; ``meaning`` says in messages what such a text is."""
+    """Return a field's pattern. Messages show its ``meaning`` instead of the expression."""
     _MEANINGS[expression] = meaning
     return expression
 
 
-# Of a folder that a key names.
+# The name of a folder.
 Name = Annotated[
     str,
     Field(
@@ -108,28 +111,28 @@ Name = Annotated[
 
 
 def suggestion(name: str, allowed: Iterable[str]) -> str:
-    """Return ``; did you mean …?``, or nothing where no name that is known is near."""
+    """Return ``; did you mean …?``, or nothing if no allowed name is similar."""
     close = difflib.get_close_matches(name, list(allowed), n=1)
     return f"; did you mean {close[0]}?" if close else ""
 
 
 def checked(model: TypeAdapter[Model], content: Any, file: str) -> Model:
-    """Return a file's content as ``model``; raises `UserError` with file, key, value, and why."""
+    """Return a file's content as ``model``. Raises `UserError` with file, key, value, and why."""
     try:
         return model.validate_python(content)
     except ValidationError as error:
-        raise UserError(f"{file}: {_first(error.errors(), content)}") from None
+        raise UserError(f"{file}: {_first_problem(error.errors(), content)}") from None
 
 
 def read_settings(model: type[Model], path: Path) -> Model:
-    """Read a settings file; raises `UserError` with file, key, value, and why."""
+    """Read a settings file. Raises `UserError` with file, key, value, and why."""
     return checked(TypeAdapter(model), read_json(path), str(path))
 
 
-def _first(errors: list[ErrorDetails], content: Any) -> str:
-    """Say in one line what is wrong with the first key that is."""
-    located_errors = [(*_find(error, content), error) for error in errors]
-    # Of a value that may be of several types, each type has an error, and the deepest knows most.
+def _first_problem(errors: list[ErrorDetails], content: Any) -> str:
+    """Return in one line what is wrong with the first wrong key."""
+    located_errors = [(*_locate(error, content), error) for error in errors]
+    # A value that may have several types has an error for each type. The deepest says most.
     start = located_errors[0][0]
     path = max((p for p, _, _ in located_errors if p[: len(start)] == start), key=len)
     errors_of_key = [(value, error) for p, value, error in located_errors if p == path]
@@ -151,9 +154,9 @@ def _first(errors: list[ErrorDetails], content: Any) -> str:
             allowed_tags = context["expected_tags"].replace("'", "")
             return f"{kind}: is {_shown(value[name])}; must be one of {allowed_tags}"
     if error["loc"][-1:] == ("[key]",):
-        # Not of the path: rigs that are somebody else's folders are not in the content.
-        *above, name, _ = error["loc"]
-        return f"{'.'.join(map(str, above))}: {name!r} is no name; must {_allowed(error)}"
+        # `path` has no rigs that are somebody else's folders, so use the error's own location.
+        *parents, name, _ = error["loc"]
+        return f"{'.'.join(map(str, parents))}: {name!r} is no name; must {_allowed(error)}"
     allowed = dict.fromkeys(_allowed(error) for _, error in errors_of_key)
     return f"{prefix}is {_shown(value)}; must {' or '.join(allowed).replace(' or be ', ' or ')}"
 
@@ -164,12 +167,16 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _find(error: ErrorDetails, content: Any) -> tuple[tuple[int | str, ...], Any]:
-    """Return the keys that lead to a wrong value, without pydantic's names of types, and it."""
+def _locate(error: ErrorDetails, content: Any) -> tuple[tuple[int | str, ...], Any]:
+    """Return the keys that lead to a wrong value, and the value.
+
+    Leaves out pydantic's names of types, which are no keys of ``content``.
+    """
     path: list[int | str] = []
     for part in error["loc"]:
-        here = isinstance(content, Mapping) and part in content
-        if here or (isinstance(content, list) and isinstance(part, int) and part < len(content)):
+        is_key = isinstance(content, Mapping) and part in content
+        is_index = isinstance(content, list) and isinstance(part, int) and part < len(content)
+        if is_key or is_index:
             content = content[part]
             path.append(part)
     return tuple(path), content
@@ -179,7 +186,7 @@ _BOUNDS = {"ge": "at least", "gt": "above", "le": "at most", "lt": "below"}
 
 
 def _allowed(error: ErrorDetails) -> str:
-    """Return what pydantic allows, to follow after ``must``."""
+    """Return what pydantic allows, as text that follows ``must``."""
     match error["type"]:
         case "value_error":
             return str(error["ctx"]["error"]).removeprefix("must ")

@@ -1,7 +1,7 @@
-"""What a dataset takes from a user's .blend, and in words what it takes and what it does not.
+"""The settings that a dataset takes from a user's .blend, and notes on what it takes and ignores.
 
-What the .blend says is in the scene's inventory: under ``blend`` what `lightfield.rendering`'s
-``blend_facts`` found, and under ``missing`` which of its files are not there.
+The scene's inventory describes the .blend. Its key ``blend`` has what `lightfield.rendering`'s
+``blend_facts`` read. Its key ``missing`` has the files that the .blend lacks.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,14 +18,14 @@ ENGINES = {
     "BLENDER_WORKBENCH": "Workbench",
 }
 
-# Metres between which a new camera in Blender sees.
+# The clipping planes of a new camera in Blender, in metres.
 _BLENDERS_CLIP = (0.1, 1000)
-# Blender's name of the colours in which all datasets are.
+# Blender's name for the colour space of all datasets.
 REC_709 = "Linear Rec.709"
 
 
 def camera_of(blend: Settings) -> Settings:
-    """Return the .blend's camera; raises `UserError` where its scene has none."""
+    """Return the .blend's camera. Raises `UserError` if its scene has none."""
     if blend["camera"] is None:
         raise UserError(
             f"the .blend's scene {blend['scene']} has no camera, which blend_camera and "
@@ -49,9 +49,9 @@ def lens_of(blend: Settings, resolution: tuple[int, int]) -> RectilinearSettings
         )
     width, height = resolution
     fit = lens["sensor_fit"]
-    # AUTO fits the sensor's width, whichever side of the image is the longer.
-    across = fit == "HORIZONTAL" or (fit == "AUTO" and width >= height)
-    side = width if across else height
+    # AUTO fits the sensor's width to the longer side of the image.
+    fits_width = fit == "HORIZONTAL" or (fit == "AUTO" and width >= height)
+    side = width if fits_width else height
     millimetres = lens["sensor_height" if fit == "VERTICAL" else "sensor_width"] / side
     settings = RectilinearSettings(
         lens="rectilinear",
@@ -61,26 +61,26 @@ def lens_of(blend: Settings, resolution: tuple[int, int]) -> RectilinearSettings
     )
     if not lens["shift_x"] and not lens["shift_y"]:
         return settings
-    # Blender shifts by parts of the side that the sensor is fitted to, and up.
+    # Blender's shifts are parts of the fitted side, and point up.
     point = (width / 2 - lens["shift_x"] * side, height / 2 + lens["shift_y"] * side)
     return settings.model_copy(update={"principal_point": point})
 
 
-def taken(
+def usage_notes(
     inventory: Settings,
     frames: Sequence[int],
     render: Settings,
-    own_camera: bool,
+    uses_camera: bool,
 ) -> list[str]:
-    """Return in words, one entry a fact, what is taken of a .blend and what is not.
+    """Return notes on which settings of a .blend a dataset takes and which it ignores.
 
-    ``frames`` of it are rendered, as this ``render`` block has it; ``own_camera`` says whether by a
-    rig of the .blend's own camera.
+    ``frames`` and the ``render`` block say what is rendered. ``uses_camera`` says whether a rig
+    uses the .blend's own camera.
     """
     blend = inventory["blend"]
     return [
         *_scene(blend, frames, render),
-        *_camera(blend["camera"], own_camera),
+        *_camera(blend["camera"], uses_camera),
         *(f"{name} ignored" for name in ("compositor", "sequencer") if blend[name]),
         *_switches(blend, render),
         *_display(blend),
@@ -90,7 +90,7 @@ def taken(
 
 
 def _scene(blend: Settings, frames: Sequence[int], render: Settings) -> Iterator[str]:
-    """Yield which scene, frames and view layers are rendered, and with how many samples."""
+    """Yield notes on the rendered scene, frames, view layers, and samples."""
     layers = blend["layers"]
     if len(blend["scenes"]) > 1:
         yield f"scene {blend['scene']} of {len(blend['scenes'])}"
@@ -109,20 +109,20 @@ def _scene(blend: Settings, frames: Sequence[int], render: Settings) -> Iterator
 
 
 def _camera(camera: Settings | None, is_taken: bool) -> Iterator[str]:
-    """Yield what is taken of the .blend's own camera."""
+    """Yield notes on the .blend's own camera."""
     if not camera:
         return
     lens = camera["lens"]
     length = f" ({lens['lens']:g} mm)" if lens["type"] == "PERSP" else ""
     yield f"camera {camera['name']}{length} {'taken' if is_taken else 'ignored'}"
-    # An inventory from before this was looked at has none.
+    # Inventories of earlier versions lack this key.
     near, far = camera.get("clip", _BLENDERS_CLIP)
     if is_taken and (near > _BLENDERS_CLIP[0] or far < _BLENDERS_CLIP[1]):
         yield f"clip planes at {near:g} and {far:g} m ignored"
 
 
 def _switches(blend: Settings, render: Settings) -> Iterator[str]:
-    """Yield what is on or off here, of what is on here or in the .blend."""
+    """Yield notes on switches that are on in the dataset or in the .blend."""
     focus = bool(blend["camera"] and blend["camera"]["lens"]["depth_of_field"])
     for name, is_on, is_on_in_blend in (
         ("adaptive sampling", bool(render.get("adaptive_threshold")), blend["adaptive_sampling"]),
@@ -135,7 +135,7 @@ def _switches(blend: Settings, render: Settings) -> Iterator[str]:
 
 
 def _display(blend: Settings) -> Iterator[str]:
-    """Yield what Blender would change of the colours when it shows or saves a picture."""
+    """Yield notes on the .blend's changes of colours for display, which are ignored."""
     yield f"view transform {blend['view_transform']} ignored"
     if blend["look"] != "None":
         yield f"look {blend['look']} ignored"
@@ -148,12 +148,12 @@ def _display(blend: Settings) -> Iterator[str]:
 
 
 def _film(blend: Settings, render: Settings) -> Iterator[str]:
-    """Yield what the .blend says of the film, of units, and of what it runs."""
+    """Yield notes on the .blend's film, units and scripts."""
     if render.get("transparent"):
         yield "film transparent ON"
     elif blend["film_transparent"]:
         yield "film transparent on, ignored"
-    # An inventory from before this was looked at has none.
+    # Inventories of earlier versions lack this key.
     if blend.get("pixel_aspect", 1) != 1:
         yield f"pixel aspect {blend['pixel_aspect']:g} ignored, pixels are square"
     for name, title in (
@@ -173,25 +173,32 @@ def _film(blend: Settings, render: Settings) -> Iterator[str]:
         yield "scripts and drivers in Python not run"
 
 
-def _frames(frames: Sequence[int], own: int) -> str:
+def _frames(frames: Sequence[int], file_frame: int) -> str:
     text = f"frame {frames[0]}" if len(frames) == 1 else f"frames {frames[0]} to {frames[-1]}"
-    return f"{text}, the file's" if list(frames) == [own] else f"{text} (the file is at {own})"
+    if list(frames) == [file_frame]:
+        return f"{text}, the file's"
+    return f"{text} (the file is at {file_frame})"
 
 
-def _samples(samples: int, own: int) -> str:
+def _samples(samples: int, file_samples: int) -> str:
     text = f"{samples} {'sample' if samples == 1 else 'samples'} a pixel"
-    return f"{text}, the file's" if samples == own else f"{text} (the file has {own})"
+    return (
+        f"{text}, the file's"
+        if samples == file_samples
+        else f"{text} (the file has {file_samples})"
+    )
 
 
 def _missing(missing: Sequence[Settings]) -> list[str]:
-    """Return what is missing, or cannot be read, by kind: ``2 textures missing: a.png, b.png``."""
+    """Return a note for each kind of missing or broken file: ``2 textures missing: a.png, …``."""
     names: dict[tuple[str, str], list[str]] = {}
     for entry in missing:
         names.setdefault((entry["kind"], entry["problem"]), []).append(entry["path"])
-    return [
-        f"{len(paths)} {_plural(kind) if len(paths) > 1 else kind} {problem}: {', '.join(paths)}"
-        for (kind, problem), paths in names.items()
-    ]
+    notes = []
+    for (kind, problem), paths in names.items():
+        counted_kind = _plural(kind) if len(paths) > 1 else kind
+        notes.append(f"{len(paths)} {counted_kind} {problem}: {', '.join(paths)}")
+    return notes
 
 
 def _plural(kind: str) -> str:

@@ -1,7 +1,7 @@
-"""The scene YAML and the top-level configuration, as typed models: what each key may be.
+"""The scene YAML and the top-level configuration as typed models, which say what each key may be.
 
-From these models scripts/schema.py makes the JSON schemas in configs/schema/, by which editors
-complete and check the files. Nothing else in the project reads a scene YAML.
+scripts/schema.py makes the JSON schemas in configs/schema/ from these models. With the schemas,
+editors complete and check the files. Nothing else in the project reads a scene YAML.
 """
 
 import difflib
@@ -49,34 +49,48 @@ from lightfield.geometry.rigs.split_setting import PARTS, Chosen
 
 ROOT = Path(__file__).resolve().parents[3]
 SCENES = ROOT / "configs" / "scenes"
-# A user's own, in the folder that Snakemake works in.
+# The user's own scene YAMLs, relative to Snakemake's working folder.
 OWN_SCENES = Path("configs", "scenes")
 BUILDERS = ROOT / "scripts" / "scenes"
 
 FLOW_PLACES = "needs views from two or more places"
 
-# Folders of the project, of a user's inputs, and of the programs that both are used with.
+# Folders of the project, of a user's inputs, and of programs such as Snakemake.
 RESERVED = {
-    *(".ci", ".snakemake", ".venv", "benchmarks", "captions", "configs", "docs", "envs"),
-    *("profiles", "rules", "scripts", "tests"),
+    ".ci",
+    ".snakemake",
+    ".venv",
+    "benchmarks",
+    "captions",
+    "configs",
+    "docs",
+    "envs",
+    "profiles",
+    "rules",
+    "scripts",
+    "tests",
 }
-# What already has these names beside a scene's folder, a rig's, and a reprojection's.
+# Names that a scene's folder cannot have, because other folders beside it have them.
 SCENE_NEIGHBOURS = {"benchmarks", "logs", "removed", "tables"}
+# The same for a rig's folder.
 RIG_NEIGHBOURS = {"trials"}
+# The same for a reprojection's folder.
 REPROJECTION_NEIGHBOURS = {"exr", "exports", "panorama", "render", "report", FLOW.name, *PASSES}
-# Files lie there, too, and folders of a sequence's frames.
+# Names of files, and of a sequence's frames, beside the folders of rigs and reprojections.
 OTHER_NEIGHBOURS = re.compile(r"f\d{5,7}|.*\.(blend|html|json|txt)")
-# Of a camera in lightfield.json: Blender's least and most, the unit in words, and what it is.
+# For keys of a camera in lightfield.json: Blender's least and largest value, the unit of messages,
+# and the name in messages.
 BLENDER_LIMITS = {
     "focal_length": (1.0, 1e6, 1.0, "focal length in mm"),
     "fisheye_fov": (0.1745, 31.4159, math.pi / 180, "fov in degrees"),
     "fisheye_lens": (0.01, 100.0, 1.0, "focal length in mm"),
 }
-# More of them have no use, and planning them would take hours.
+# Planning more frames or views than these would take hours.
 MOST_FRAMES = 10_000
 MOST_VIEWS = 1_000_000
-# A scene YAML has some thousand bytes; its aliases may repeat what it says, within these nodes.
+# Bytes. A scene YAML has some thousand.
 LARGEST_YAML = 2**16
+# A YAML's nodes, with each alias counted as the nodes that it repeats.
 MOST_NODES = 20_000
 
 
@@ -85,8 +99,12 @@ def _listed(value: Any) -> Any:
 
 
 def _switch(value: Any) -> Any:
-    """Read what Snakemake leaves a text of `--config key=true`."""
-    return {"true": True, "false": False}.get(value, value) if isinstance(value, str) else value
+    """Return the truth value of `--config key=true`, which Snakemake leaves as text."""
+    if value == "true":
+        return True
+    if value == "false":
+        return False
+    return value
 
 
 def _unique(names: list[str]) -> list[str]:
@@ -95,7 +113,7 @@ def _unique(names: list[str]) -> list[str]:
     return names
 
 
-# A bare word on the command line is a list of one.
+# A single word on the command line is a list of one name.
 Names = Annotated[
     list[Name],
     BeforeValidator(_listed),
@@ -108,7 +126,7 @@ Auto = Literal["auto"]
 Address = Annotated[
     str, Field(pattern=pattern(r"^https?://", "an address that begins with http:// or https://"))
 ]
-# A path that the rules write into commands, with {wildcards} beside it.
+# The rules write this path into commands with {wildcards}.
 Folder = Annotated[
     str,
     Field(
@@ -118,27 +136,27 @@ Folder = Annotated[
         max_length=1000,
     ),
 ]
-# Of a path that is quoted there.
+# The characters of a path that the rules quote in commands.
 QUOTED = r"[^{}*?\[\]\x00-\x1f\x7f]{1,1000}"
 AtLeastOne = Annotated[int, Field(ge=1, le=2**31 - 1)]
 
 
 class Preset(Settings):
-    """Upper limits put on what a scene YAML says; one that is not given limits nothing."""
+    """Upper limits of a scene YAML's values. A key that is left out limits nothing."""
 
     resolution: AtLeastOne | None = Field(None, description="Pixels along an image's longer side.")
-    samples: AtLeastOne | None = Field(None, description="Paths a pixel.")
+    samples: AtLeastOne | None = Field(None, description="Paths for each pixel.")
     views: AtLeastOne | None = Field(None, description="Views of a rig.")
-    denoise: bool | None = Field(None, description="Denoise even where the scene does not.")
+    denoise: bool | None = Field(None, description="Denoise even if the scene YAML does not.")
 
 
 class Energy(Settings):
-    """From which report/costs.json has energy and price."""
+    """The power and price from which report/costs.json computes energy and costs."""
 
-    watts: float = Field(65, ge=0, le=1e6, description="Of a machine, while all its cores work.")
+    watts: float = Field(65, ge=0, le=1e6, description="Power of a machine whose cores all work.")
     cores: Auto | AtLeastOne = Field(
         "auto",
-        description="How many that machine has; auto is those of the machine that adds up.",
+        description="Cores of that machine. auto: those of the machine that computes the costs.",
     )
     price_per_kwh: float = Field(0.32, ge=0, le=1e6)
     currency: str = Field("EUR", max_length=20)
@@ -177,10 +195,10 @@ class Configuration(Settings):
     results: Folder = Field("results", description="Folder of the datasets.")
     work: Folder = Field(
         "work",
-        description="Folder of what is made on the way: scenes, lens maps, records, timings.",
+        description="Folder of intermediate files: scenes, lens maps, records, timings.",
     )
     device: Literal["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"] = Field(
-        "auto", description="What Cycles renders on."
+        "auto", description="The device that Cycles renders on."
     )
     views_per_shard: Auto | AtLeastOne = Field(
         "auto",
@@ -190,23 +208,25 @@ class Configuration(Settings):
     )
     accept_blend: Annotated[bool, BeforeValidator(_switch)] = Field(
         False,
-        description="Take each .blend as it is now: its lock file beside the scene YAML is written "
-        "anew.",
+        description="Accept each .blend as it is now. This rewrites its lock file beside the scene "
+        "YAML.",
     )
     package_gigabytes: Annotated[float, Field(gt=0)] | None = Field(
-        None, description="Size of a package's parts, at most; without it, a package is one file."
+        None, description="Largest size of a package's parts. Without it, a package is one file."
     )
     energy: Energy = Energy()
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if self.preset not in self.presets:
-            known = ", ".join(self.presets)
-            raise ValueError(f"preset: is {self.preset!r}; must be one of {known}")
+            names = ", ".join(self.presets)
+            raise ValueError(f"preset: is {self.preset!r}; must be one of {names}")
         for name in self.scenes:
             if "." in name or name in SCENE_NEIGHBOURS:
-                taken = ", ".join(sorted(SCENE_NEIGHBOURS))
-                raise ValueError(f"scenes: {name} is no name for a scene; no dots, and not {taken}")
+                used_names = ", ".join(sorted(SCENE_NEIGHBOURS))
+                raise ValueError(
+                    f"scenes: {name} is no name for a scene; no dots, and not {used_names}"
+                )
         for key in ("results", "work"):
             _check_folder(key, getattr(self, key))
         results = Path(self.results).resolve()
@@ -220,32 +240,32 @@ class Configuration(Settings):
 
 
 def _check_folder(key: str, folder: str) -> None:
-    """Refuse what is not a folder of its own: the project's, the user's inputs, and Git's."""
+    """Refuse a folder of the project, of the user's inputs, or of Git."""
     path = Path(os.path.normpath(Path(folder).absolute()))
-    above = [Path.cwd(), *Path.cwd().parents, ROOT, *ROOT.parents]
+    parents = [Path.cwd(), *Path.cwd().parents, ROOT, *ROOT.parents]
     reserved = {home / name for home in (Path.cwd(), ROOT) for name in RESERVED}
-    inside = not reserved.isdisjoint([path, *path.parents]) or ".git" in path.parts
-    if path in above or path.resolve() in above or inside:
+    is_inside = not reserved.isdisjoint([path, *path.parents]) or ".git" in path.parts
+    if path in parents or path.resolve() in parents or is_inside:
         raise ValueError(f"{key}: is {folder!r}; must be a folder of its own")
     if path.exists() and not path.is_dir():
         raise ValueError(f"{key}: is {folder!r}, which is a file; must be a folder")
 
 
 class Parameters(Settings):
-    """What a builder is given."""
+    """The parameters of a builder."""
 
     seed: int = Field(0, ge=0, le=2**63 - 1)
     detail: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] = Field(1.0, description="1 is full.")
 
 
-# What a value of the .blend's own is called, wherever the scene YAML may ask for it.
+# The word in a scene YAML that stands for the .blend's own value.
 FILE = "file"
-# Keys of `SceneSource` that a builder does not take.
-OF_A_BLEND = ("scene_name", "view_layers", "allow_missing", "sha256", "url", "page")
+# Keys of `SceneSource` that only a .blend takes.
+BLEND_KEYS = ("scene_name", "view_layers", "allow_missing", "sha256", "url", "page")
 
 
 class SceneSource(Settings):
-    """Where the scene comes from: a builder, a .blend file, or views that are there already."""
+    """The source of a scene: a builder, a .blend file, or views that exist already."""
 
     builder: str | None = Field(
         None,
@@ -268,32 +288,33 @@ class SceneSource(Settings):
         "(lightfield.json and exr/), or one with several such folders.",
     )
     scene_name: str | None = Field(
-        None, description="Of the .blend's scenes; without it, the one that was open when saved."
+        None,
+        description="The .blend's scene to render. Without it, the one that was open when saved.",
     )
     view_layers: Literal["all"] | list[str] | None = Field(
         None,
         min_length=1,
-        description="Of that scene's view layers, shown together in one picture; all are those in "
-        "use; without it, the first of them.",
+        description="That scene's view layers to render together in one picture. all: those in "
+        "use. Without it, the first in use.",
     )
     frame: Frame | Literal["file"] = Field(
         1,
-        description="Of the animation, the frame that is rendered; file is the one at which the "
-        ".blend was saved.",
+        description="The frame of the animation to render. file: the frame at which the .blend was "
+        "saved.",
     )
     allow_missing: bool | None = Field(
         None,
         description="Render although textures, fonts, libraries, volumes or caches are missing or "
-        "cannot be read; such a texture is magenta.",
+        "cannot be read. Such a texture is magenta.",
     )
     sha256: str | None = Field(
         None,
         pattern=pattern("^[0-9a-f]{64}$", "64 hexadecimal digits in small letters"),
-        description="The .blend file's SHA-256, as sha256sum prints it; "
-        "without it, the one recorded at first use.",
+        description="The .blend file's SHA-256, as sha256sum prints it. "
+        "Without it, the one recorded at first use.",
     )
     url: Address | None = Field(
-        None, description="Where the .blend file is downloaded from if it is not there."
+        None, description="The address to download the .blend file from if it is missing."
     )
     page: Address | None = Field(
         None, description="The page on which a person finds the .blend file."
@@ -304,106 +325,108 @@ class SceneSource(Settings):
         if [self.builder, self.blend, self.dataset].count(None) != 2:
             raise ValueError("must have one of builder, blend and dataset")
         if self.builder is not None:
-            known = builders()
-            if self.builder not in known:
-                raise ValueError(f"builder: is {self.builder!r}; must be one of {', '.join(known)}")
-            for name in OF_A_BLEND:
+            names = builders()
+            if self.builder not in names:
+                raise ValueError(f"builder: is {self.builder!r}; must be one of {', '.join(names)}")
+            for name in BLEND_KEYS:
                 if getattr(self, name) is not None:
                     raise ValueError(f"{name}: goes with blend, not with builder")
             if self.frame == FILE:
                 raise ValueError("frame: file goes with blend, not with builder")
         elif self.dataset is not None and len(self.model_fields_set) > 1:
             (name, *_) = self.model_fields_set - {"dataset"}
-            raise ValueError(f"{name}: goes without dataset")
+            raise ValueError(f"{name}: does not go with dataset")
         elif self.blend is not None and "parameters" in self.model_fields_set:
             raise ValueError("parameters: goes with builder, not with blend")
         return self
 
 
-# What a calibration chooses for a target error.
+# The keys of `Render` that a calibration chooses for a target error.
 CHOSEN = ("samples", "adaptive_threshold", "denoise")
 
 
 class TargetError(Settings):
-    """A target error, and what may be chosen to reach it."""
+    """A target error, and how it may be reached."""
 
     value: Annotated[float, Field(gt=0, le=1), AS_WRITTEN]
     denoise: Literal["auto", "never"] = Field(
-        "auto", description="never chooses among plain and adaptive sampling alone."
+        "auto", description="never: choose only between plain and adaptive sampling."
     )
 
 
 class Render(Settings):
-    """What Cycles is asked for.
+    """The settings of Cycles.
 
-    Of what is not given here, max_bounces, clamp_indirect, light_tree, guiding, filter_width and
-    motion_blur stay as the .blend has them; everything else has the default that stands here.
+    Without a value here, the .blend decides on max_bounces, clamp_indirect, light_tree, guiding,
+    filter_width and motion_blur. All other keys have the defaults of this model.
     """
 
     samples: AtLeastOne | Literal["file"] | None = Field(
-        None, description="Paths a pixel; file is as many as the .blend has."
+        None, description="Paths for each pixel. file: as many as in the .blend."
     )
     target_error: Annotated[float, Field(gt=0, le=1), AS_WRITTEN] | TargetError | None = Field(
         None,
-        description="Instead of samples: relative mean squared error, (x - r)^2 / (r^2 + 0.01) "
-        "with middle grey at 0.18, of all but the worst thousandth of pixels, for which samples, "
-        "adaptive_threshold and denoise are chosen on probe views.",
+        description="Instead of samples: choose samples, adaptive_threshold and denoise on probe "
+        "views for this error. It is the relative mean squared error, (x - r)^2 / (r^2 + 0.01) "
+        "with middle grey at 0.18, without the worst thousandth of pixels.",
     )
     max_bounces: int | None = Field(
         None, ge=0, le=1024, description="Bounces of a path, of any kind."
     )
     clamp_indirect: Annotated[float, Field(ge=0, le=1e9), AS_WRITTEN] | None = Field(
-        None, description="Largest value of one indirect sample; 0 does not clamp."
+        None, description="Largest value of one indirect sample. 0 does not clamp."
     )
     light_tree: bool | None = Field(
-        None, description="Choose lights for a place by a tree of all of them, or any alike."
+        None, description="Prefer lights that matter at a place, by a tree of all lights."
     )
     guiding: bool | None = Field(
-        None, description="Learn where light comes from while rendering; on processors alone."
+        None, description="Learn where light comes from while rendering. Only on CPUs."
     )
     filter_width: Annotated[float, Field(ge=0.01, le=10), AS_WRITTEN] | None = Field(
         None, description="Width of the pixel filter, in pixels."
     )
     adaptive_threshold: Annotated[float, Field(ge=0, le=1), AS_WRITTEN] = Field(
-        0, description="Noise at which adaptive sampling stops early; 0 takes every sample."
+        0, description="Noise at which adaptive sampling stops early. 0 takes every sample."
     )
     denoise: bool = Field(False, description="Denoise each view with OpenImageDenoise.")
     denoise_quality: Literal["high", "balanced", "fast"] | None = Field(
-        None, description="Of a denoiser's network; high unless given."
+        None, description="Quality of the denoiser's network. The default is high."
     )
     denoise_prefilter: Literal["accurate", "fast", "none"] | None = Field(
-        None, description="Of the albedo and normals that guide a denoiser; accurate unless given."
+        None,
+        description="Prefilter of the albedo and normals that guide the denoiser. The default is "
+        "accurate.",
     )
     motion_blur: bool | None = Field(
-        None, description="Blur what moves; without it, as the .blend has it."
+        None, description="Blur moving objects. Without it, as in the .blend."
     )
     depth_of_field: bool | None = Field(
         None,
-        description="Blur what is out of the focus of the .blend's own camera, with its aperture; "
-        "without it, everything is sharp.",
+        description="Use the focus and aperture of the .blend's own camera. Without it, everything "
+        "is sharp.",
     )
     seed: int = Field(
-        0, ge=0, le=2**63 - 1, description="From this and its name each view has its own seed."
+        0, ge=0, le=2**63 - 1, description="Each view's seed follows from this and its name."
     )
     depth: Literal["auto", "z", "distance", "none"] = Field(
         "auto",
-        description="Meaning of channel Z: auto is z up to 180 degrees and distance beyond.",
+        description="Meaning of channel Z. auto: z up to 180 degrees, and distance beyond.",
     )
     depth_precision: Literal["float", "rounded", "half"] = Field(
         "float",
-        description="Binary digits that are kept: float has 24, half 11; rounded is a float of "
-        "which 17 are kept, within 1e-5, in smaller files.",
+        description="Precision of depth. float has 24 binary digits, and half has 11. rounded is a "
+        "float with 17 digits, exact to 1e-5, in smaller files.",
     )
     compression: Literal["zip", "zips", "piz", "htj2k", "zstd"] | None = Field(
         None,
-        description="Of the views' EXR files, lossless: zip, which every program reads, unless "
-        "given. htj2k and zstd are smaller, for archives and scratch.",
+        description="Lossless compression of the views' EXR files. The default is zip, which every "
+        "program reads. htj2k and zstd are smaller, for archives and scratch.",
     )
     transparent: bool | None = Field(
-        None, description="Leave out the world behind the scene, and write how much is covered (A)."
+        None, description="Leave out the world behind the scene, and write the coverage as alpha."
     )
     passes: PassNames | None = Field(
-        None, description="What else of a view is written, each into a folder of its own."
+        None, description="Passes to write, each into a folder of its own."
     )
 
     @model_validator(mode="after")
@@ -412,7 +435,7 @@ class Render(Settings):
             raise ValueError("is missing the key samples (or target_error)")
         for name in CHOSEN:
             if self.target_error is not None and name in self.model_fields_set:
-                raise ValueError(f"{name}: goes without target_error, for which it is chosen")
+                raise ValueError(f"{name}: does not go with target_error, which chooses it")
         return self
 
 
@@ -420,14 +443,15 @@ class Reprojection(ReprojectionOptions):
     """The same views through another lens, or as other files."""
 
     rigs: list[str] | None = Field(
-        None, min_length=1, description="The rigs it is made for; without it, every one of them."
+        None, min_length=1, description="The rigs to reproject. Without it, all of them."
     )
-    format: Literal["png", "exr"] = Field("png", description="EXR has depth.")
+    format: Literal["png", "exr"] = Field("png", description="Only EXR has depth.")
     exposure: Stops | Annotated[list[Stops], Field(min_length=1, max_length=32)] = Field(
-        0, description="In stops; of a list each makes a folder, as in png_ev-2 and png_ev0."
+        0,
+        description="In stops. Each value of a list makes a folder, as in png_ev-2 and png_ev0.",
     )
     passes: PassNames | None = Field(
-        None, description="Those of render.passes that are reprojected, too, as EXR."
+        None, description="Passes of render.passes to reproject, too, as EXR."
     )
 
     @model_validator(mode="after")
@@ -441,13 +465,13 @@ class Reprojection(ReprojectionOptions):
 
     @property
     def suffix(self) -> str:
-        """Of the images' names."""
+        """The suffix of the images' names."""
         return f".{self.format}"
 
     @property
     def settings(self) -> ReprojectionSettings:
-        """What scripts/reproject.py is to do."""
-        # `Scene` has made a reprojection of each exposure.
+        """The settings of scripts/reproject.py."""
+        # `Scene` has made a reprojection for each exposure.
         assert not isinstance(self.exposure, list)
         options = self.model_dump(include={*ReprojectionOptions.model_fields}, exclude_none=True)
         return ReprojectionSettings(
@@ -459,36 +483,36 @@ class Reprojection(ReprojectionOptions):
 
 
 class Flow(Settings):
-    """Where another view sees what a view sees."""
+    """The optical flow between pairs of views."""
 
     pairs: Literal["neighbours"] = Field(
-        description="From each view to the one whose camera is nearest."
+        description="neighbours: from each view to the one whose camera is nearest."
     )
 
 
 class Report(Settings):
-    """What a dataset's page shows."""
+    """The contents of a dataset's page."""
 
     panorama: Auto | bool = Field(
         "auto",
-        description="A panorama from the rig's centre; auto makes one where the cameras look "
-        "outward, all round. Without it the view in the rig's middle is in its place.",
+        description="Show a panorama from the rig's centre. auto: if the cameras look outward, all "
+        "round. Without it, the page shows the view in the rig's middle.",
     )
 
 
 def _bracketed(reprojections: dict[str, Reprojection]) -> dict[str, Reprojection]:
-    """Return each reprojection of several exposures as so many, named by their stops."""
-    found: dict[str, Reprojection] = {}
+    """Replace each reprojection of several exposures by one for each, named by its stops."""
+    bracketed: dict[str, Reprojection] = {}
     for name, reprojection in reprojections.items():
         if not isinstance(reprojection.exposure, list):
-            found[name] = reprojection
+            bracketed[name] = reprojection
             continue
         for stops in reprojection.exposure:
             key = f"{name}_ev{stops:g}"
-            if key in found or key in reprojections:
+            if key in bracketed or key in reprojections:
                 raise ValueError(f"{name}.exposure: must not name {key} twice")
-            found[key] = reprojection.model_copy(update={"exposure": stops})
-    return found
+            bracketed[key] = reprojection.model_copy(update={"exposure": stops})
+    return bracketed
 
 
 class Scene(Settings):
@@ -498,18 +522,22 @@ class Scene(Settings):
     licence: str | None = Field(None, description="Of the scene, for a package's card.")
     credit: str | None = Field(None, description="How the scene's artist is to be cited.")
     scene: SceneSource
-    render: Render | None = Field(None, description="How; scene.dataset alone has none.")
+    render: Render | None = Field(
+        None, description="How Cycles renders. Required, except with scene.dataset."
+    )
     rigs: dict[Name, AnyRig] = Field(
         {},
         min_length=1,
-        description="The camera setups, by the names of their folders; scene.dataset has its own.",
+        description="The camera setups, by the names of their folders. scene.dataset has its own.",
     )
     reprojections: Annotated[dict[Name, Reprojection], AfterValidator(_bracketed)] = Field(
         {}, description="The same views through other lenses, by the names of their folders."
     )
-    flow: Flow | None = Field(None, description="From depth and poses, of what stands still.")
+    flow: Flow | None = Field(
+        None, description="Optical flow from depth and poses, for a scene that stands still."
+    )
     exports: Exports = Field(Exports(), description="Files for trainers.")
-    report: Report = Field(Report(), description="What a dataset's page shows.")
+    report: Report = Field(Report(), description="The contents of a dataset's page.")
 
     @model_validator(mode="before")
     @classmethod
@@ -518,7 +546,7 @@ class Scene(Settings):
             case {"scene": {"dataset": str(dataset)}}:
                 for key in ("render", "rigs"):
                     if key in content:
-                        raise ValueError(f"{key}: goes without scene.dataset, which has its own")
+                        raise ValueError(f"{key}: does not go with scene.dataset, which brings it")
                 try:
                     return {**content, "rigs": published.rigs(dataset)}
                 except UserError as error:
@@ -539,38 +567,45 @@ class Scene(Settings):
             if self.render.depth_of_field:
                 raise ValueError("render.depth_of_field: goes with scene.blend, for its camera")
         for name, reprojection in self.reprojections.items():
-            key = f"reprojections.{name}"
-            _check_name(key, name, REPROJECTION_NEIGHBOURS)
-            for rig_name in reprojection.rigs or ():
-                if rig_name not in self.rigs:
-                    hint = suggestion(rig_name, self.rigs)
-                    raise ValueError(f"{key}.rigs: there is no rig {rig_name!r}{hint}")
-            for pass_name in reprojection.passes or ():
-                if self.render is None or pass_name not in (self.render.passes or ()):
-                    raise ValueError(f"{key}.passes: {pass_name} is not in render.passes")
-                if PASSES[pass_name].kind == "motion":
-                    raise ValueError(f"{key}.passes: motion is in pixels of the rendered lens")
-        for name, export in self.exports.wanted.items():
+            _check_name(f"reprojections.{name}", name, REPROJECTION_NEIGHBOURS)
+            self._check_reprojection(f"reprojections.{name}", reprojection)
+        for name, export in self.exports.selected.items():
             self._check_export(f"exports.{name}.sources", export)
         if self.flow and self.render and self.render.depth == "none":
             raise ValueError("flow: follows from depth, but render.depth is none")
-        self._check_whole_rigs()
+        self._check_split_rigs()
         return self
 
-    def _check_whole_rigs(self) -> None:
-        """Check that rigs of which one trains and others test can be one dataset to a trainer."""
-        whole = {name: rig for name, rig in self.rigs.items() if rig.split in PARTS}
-        first = next((name for name, rig in whole.items() if rig.split == "train"), None)
-        if whole and (first is None or not any(rig.split == "test" for rig in whole.values())):
-            name, missing = (first, "tests") if first else (next(iter(whole)), "trains")
-            raise ValueError(f"rigs.{name}.split: is {whole[name].split}, but no rig {missing}")
-        for name, rig in whole.items():
+    def _check_reprojection(self, key: str, reprojection: Reprojection) -> None:
+        """Check that a reprojection's rigs and passes exist."""
+        for rig_name in reprojection.rigs or ():
+            if rig_name not in self.rigs:
+                hint = suggestion(rig_name, self.rigs)
+                raise ValueError(f"{key}.rigs: there is no rig {rig_name!r}{hint}")
+        for pass_name in reprojection.passes or ():
+            if self.render is None or pass_name not in (self.render.passes or ()):
+                raise ValueError(f"{key}.passes: {pass_name} is not in render.passes")
+            if PASSES[pass_name].kind == "motion":
+                raise ValueError(f"{key}.passes: motion is in pixels of the rendered lens")
+
+    def _check_split_rigs(self) -> None:
+        """Check rigs of which one trains and others test: trainers see them as one dataset."""
+        split_rigs = {name: rig for name, rig in self.rigs.items() if rig.split in PARTS}
+        if not split_rigs:
+            return
+        training = next((name for name, rig in split_rigs.items() if rig.split == "train"), None)
+        if training is None:
+            name = next(iter(split_rigs))
+            raise ValueError(f"rigs.{name}.split: is {split_rigs[name].split}, but no rig trains")
+        if not any(rig.split == "test" for rig in split_rigs.values()):
+            raise ValueError(f"rigs.{training}.split: is train, but no rig tests")
+        for name, rig in split_rigs.items():
             for key in ("camera", "frames"):
-                if getattr(rig, key) != getattr(whole[str(first)], key):
-                    raise ValueError(f"rigs.{name}.{key}: must be that of {first}, which trains")
+                if getattr(rig, key) != getattr(split_rigs[training], key):
+                    raise ValueError(f"rigs.{name}.{key}: must be that of {training}, which trains")
         for name, reprojection in self.reprojections.items():
-            missing_rigs = whole.keys() - set(reprojection.rigs or self.rigs)
-            if missing_rigs and missing_rigs != whole.keys():
+            missing_rigs = split_rigs.keys() - set(reprojection.rigs or self.rigs)
+            if missing_rigs and missing_rigs != split_rigs.keys():
                 rigs = ", ".join(sorted(missing_rigs))
                 raise ValueError(
                     f"reprojections.{name}.rigs: lacks {rigs}; must have all rigs "
@@ -578,17 +613,17 @@ class Scene(Settings):
                 )
 
     def _check_export(self, key: str, export: Export) -> None:
-        """Check that the sources are there, and that the consumer can take them."""
-        known = [VIEWS, *self.reprojections]
+        """Check that an export's sources exist, and that its consumer can take them."""
+        allowed_sources = [VIEWS, *self.reprojections]
         for source in export.sources:
-            if source not in known:
-                raise ValueError(f"{key}: is {source!r}; must be of {', '.join(known)}")
+            if source not in allowed_sources:
+                raise ValueError(f"{key}: is {source!r}; must be of {', '.join(allowed_sources)}")
             has_depth = self.render is None or self.render.depth != "none"
             reprojection = None if source == VIEWS else self.reprojections[source]
             if reprojection:
                 has_depth &= reprojection.format == "exr"
-            names = (reprojection and reprojection.rigs) or self.rigs
-            for name, rig in ((name, self.rigs[name]) for name in names):
+            for name in (reprojection and reprojection.rigs) or self.rigs:
+                rig = self.rigs[name]
                 camera = (reprojection and reprojection.camera) or rig.camera
                 if refusal := export.refusal(camera.make(), has_depth):
                     raise ValueError(f"{key}: {source} {refusal}")
@@ -598,7 +633,7 @@ class Scene(Settings):
                     raise ValueError(f"{key}: {source} is of the rig {name}, which {refusal}")
 
     def _check_rig(self, key: str, name: str, rig: Rig) -> None:
-        """Check what of a rig depends on its camera, its file and the depth."""
+        """Check a rig with its camera, its file and the depth."""
         camera = rig.camera
         if camera is None:
             raise ValueError(f"{key}: is missing the key camera")
@@ -618,13 +653,13 @@ class Scene(Settings):
             raise ValueError(f"{key}.split: there is no view {view!r}")
         lens = camera.make()
         if self.render and not lens.in_cycles:
-            known = ", ".join(name for name, lens in LENSES.items() if lens.in_cycles)
+            lenses = ", ".join(name for name, lens in LENSES.items() if lens.in_cycles)
             raise ValueError(
                 f"{key}.camera.lens: is {camera.lens!r}, which Cycles does not have; "
-                f"must be one of {known} (reproject for the others)"
+                f"must be one of {lenses} (reproject for the others)"
             )
         if self.render:
-            _check_blender_takes(f"{key}.camera", lens)
+            _check_blender_limits(f"{key}.camera", lens)
         if self.render and isinstance(lens, Rectilinear) and not lens.has_square_pixels:
             raise ValueError(
                 f"{key}.camera.sensor_size: is {list(lens.sensor)}, but the pixels of Cycles' "
@@ -642,33 +677,33 @@ class Scene(Settings):
             raise ValueError(f"flow: {FLOW_PLACES}, but all views of {key} are from one")
 
     def _check_without_centre(self, key: str, name: str) -> None:
-        """Check that nothing is asked of a rig's views for which they would need a centre."""
+        """Check that nothing needs a centre of a rig's views, which have none."""
         if self.rigs[name].camera.lens != "equirectangular":
             raise ValueError(f"{key}.stereo.omnidirectional: goes with the lens equirectangular")
-        without = f"without {key}.stereo.omnidirectional, whose views have no centre"
+        refusal = f"does not go with {key}.stereo.omnidirectional, whose views have no centre"
         if self.flow:
-            raise ValueError(f"flow: goes {without}")
+            raise ValueError(f"flow: {refusal}")
         if self.render and "motion" in (self.render.passes or ()):
-            raise ValueError(f"render.passes: motion goes {without}")
-        for other, reprojection in self.reprojections.items():
+            raise ValueError(f"render.passes: motion {refusal}")
+        for reprojection_name, reprojection in self.reprojections.items():
             if reprojection.camera and name in (reprojection.rigs or self.rigs):
-                raise ValueError(f"reprojections.{other}: goes {without}")
+                raise ValueError(f"reprojections.{reprojection_name}: {refusal}")
 
 
-def _check_blender_takes(key: str, lens: Lens) -> None:
-    """Refuse what Blender would change to the nearest value that it has."""
+def _check_blender_limits(key: str, lens: Lens) -> None:
+    """Refuse a value outside Blender's limits, which Blender would clamp."""
     camera = lens.to_lightfield()["camera"]
-    for name, (least, most, unit, words) in BLENDER_LIMITS.items():
+    for name, (least, most, unit, title) in BLENDER_LIMITS.items():
         value = camera.get(name, least)
         if not least <= value <= most:
             bound = f"at least {least / unit:.4g}" if value < least else f"at most {most / unit:g}"
-            raise ValueError(f"{key}: its {words} is {value / unit:.4g}; Blender has {bound}")
+            raise ValueError(f"{key}: its {title} is {value / unit:.4g}; Blender has {bound}")
     if max(lens.sensor) < 1:
         raise ValueError(f"{key}.sensor_size: is {lens.sensor[0]:g}; Blender has at least 1 mm")
 
 
 def _check_cube_map(key: str, rig: Rig) -> None:
-    """Check that a rig's camera can be that of a cube map's face, where it has to."""
+    """Check that the camera of a rig with cube maps can be a face's camera."""
     if rig.cube_map and (problem := face_problem(rig.camera)):
         raise ValueError(f"{key}.camera{problem}")
 
@@ -680,8 +715,10 @@ def _check_name(key: str, name: str, neighbours: set[str]) -> None:
 
 def _unknown_names(rig: Rig) -> list[str]:
     """Return the names in a rig's split that no view has."""
-    known_later = isinstance(rig, BlendCamera)
-    if known_later or not isinstance(rig.split, Chosen) or not rig.split.names:
+    if not isinstance(rig.split, Chosen) or not rig.split.names:
+        return []
+    # The .blend names the views of its camera. It has not been read yet.
+    if isinstance(rig, BlendCamera):
         return []
     return sorted({*rig.split.names} - {pose.name for pose in rig.poses()})
 
@@ -691,12 +728,12 @@ _SCENE = TypeAdapter(Scene)
 
 
 def load_config(content: Any) -> Configuration:
-    """Return the top-level configuration; raises `UserError`."""
+    """Return the top-level configuration. Raises `UserError`."""
     return checked(_CONFIGURATION, content, "config.yaml")
 
 
 def read_config(path: Path) -> dict[str, Any]:
-    """Read a config.yaml, unchecked but for being a mapping; raises `UserError`."""
+    """Read a config.yaml. Raises `UserError` if it is no mapping. Does not check its keys."""
     content = read_yaml(path, path.name)
     if not isinstance(content, dict):
         raise UserError(f"{path}: must be a mapping of keys to values")
@@ -704,22 +741,24 @@ def read_config(path: Path) -> dict[str, Any]:
 
 
 def load_scene(scene: str) -> Scene:
-    """Read and check one scene YAML; raises `UserError` with file, key, value and what is right."""
+    """Read and check one scene YAML. Raises `UserError` with file, key, value and what is right."""
     path = scene_path(scene)
     if not path.is_file():
         files = {*SCENES.glob("*.yaml"), *OWN_SCENES.glob("*.yaml")}
-        known = sorted({file.stem for file in files})
-        near = " or ".join(difflib.get_close_matches(scene, known))
-        hint = f"is {near} meant?" if near else f"there are {', '.join(known)}"
+        scenes = sorted({file.stem for file in files})
+        similar = " or ".join(difflib.get_close_matches(scene, scenes))
+        hint = f"is {similar} meant?" if similar else f"there are {', '.join(scenes)}"
         raise UserError(f"config.yaml: scenes: there is no scene {scene!r}; {hint}")
     return read_scene(path)
 
 
 def scene_path(scene: str) -> Path:
-    """Return the scene YAML of a name: the user's own, or else the repository's."""
-    own = OWN_SCENES / f"{scene}.yaml"
-    repository = OWN_SCENES.resolve() == ROOT / OWN_SCENES
-    return own if own.is_file() and not repository else SCENES / own.name
+    """Return the path of a scene's YAML: the user's own, or else the repository's."""
+    own_file = OWN_SCENES / f"{scene}.yaml"
+    is_in_repository = OWN_SCENES.resolve() == ROOT / OWN_SCENES
+    if own_file.is_file() and not is_in_repository:
+        return own_file
+    return SCENES / f"{scene}.yaml"
 
 
 def read_scene(path: Path) -> Scene:
@@ -729,15 +768,15 @@ def read_scene(path: Path) -> Scene:
 
 
 def builders() -> list[str]:
-    """Names of the scene builders, the folders of scripts/scenes/ that are not their library."""
+    """Return the names of the scene builders: the folders of scripts/scenes/ except library."""
     folders = (file.parent.name for file in BUILDERS.glob("*/__init__.py"))
     return sorted(name for name in folders if name != "library")
 
 
 def blend_sha256(scene: str, source: SceneSource) -> tuple[str | None, Path]:
-    """Return the SHA-256 that a scene's .blend must have, or None if no one knows it yet.
+    """Return the SHA-256 that a scene's .blend must have, or None if none is recorded yet.
 
-    The second value is the file that says so, or that shall: the scene YAML or its lock file.
+    The second value is the file that records it: the scene YAML or its lock file.
     """
     if source.sha256:
         return source.sha256, scene_path(scene)
@@ -751,9 +790,9 @@ def blend_sha256(scene: str, source: SceneSource) -> tuple[str | None, Path]:
 
 
 def expected_blend(scene: str, blend: Path, digest: str) -> Path | None:
-    """Check that a .blend has the SHA-256 that is meant.
+    """Check that a .blend has the recorded SHA-256. Raises `UserError` if not.
 
-    Returns None, or the lock file that shall say so where no one knows it yet. Raises `UserError`.
+    Returns None. If none is recorded yet, returns the lock file that should record it.
     """
     expected, origin = blend_sha256(scene, load_scene(scene).scene)
     if expected in (None, digest):
@@ -770,26 +809,26 @@ def expected_blend(scene: str, blend: Path, digest: str) -> Path | None:
 
 
 def accept_blend(scene: str) -> None:
-    """Record a scene's .blend as it is now as the one that is meant.
+    """Record the present SHA-256 of a scene's .blend.
 
-    Raises `UserError` where the scene YAML itself says which one that is.
+    Raises `UserError` if the scene YAML itself has another SHA-256.
     """
     source = load_scene(scene).scene
     if source.blend is None or not Path(source.blend).is_file():
         return
-    found = sha256(Path(source.blend))
+    digest = sha256(Path(source.blend))
     expected, origin = blend_sha256(scene, source)
-    if source.sha256 and found != expected:
+    if source.sha256 and digest != expected:
         raise UserError(
-            f"{origin}: scene.sha256: is {expected}, but {source.blend} has {found}; accept_blend "
+            f"{origin}: scene.sha256: is {expected}, but {source.blend} has {digest}; accept_blend "
             "writes no scene YAML: write it there"
         )
-    if found != expected:
-        record_blend(Path(source.blend), found, origin)
+    if digest != expected:
+        record_blend(Path(source.blend), digest, origin)
 
 
 def record_blend(blend: Path, digest: str, lock: Path) -> None:
-    """Record the SHA-256 of the .blend that is meant."""
+    """Record the SHA-256 that a .blend must have."""
     write_json(lock, {"blend": blend.name, "sha256": digest})
     print(f"note: {blend}: its sha256 {digest} is now recorded in {lock}")
 
@@ -798,24 +837,24 @@ class _UniqueKeyLoader(yaml.SafeLoader):
     """Safe YAML in which a key given twice is an error, not a silent overwrite."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        seen: set[Any] = set()
+        keys: set[Any] = set()
         for key_node, _ in node.value:
-            # `<<: *other`: what is given beside it counts, wherever both have a key.
+            # `<<: *other` merges a mapping. Keys beside it take precedence.
             if key_node.tag == "tag:yaml.org,2002:merge":
                 continue
             key = self.construct_object(key_node, deep=True)
             if not isinstance(key, str):
                 problem = f"the key {key!r} is not a text; put it in quotes"
                 raise yaml.MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
-            if key in seen:
+            if key in keys:
                 problem = f"the key {key!r} is given twice"
                 raise yaml.MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
-            seen.add(key)
+            keys.add(key)
         return super().construct_mapping(node, deep)
 
 
-# YAML 1.1 takes 12:30 for 750, 0123 for 83 and 0b11 for 3. Here they stay the texts that they look
-# like, which messages show as they were written. It takes 1e-3 for a text; here it is a number.
+# YAML 1.1 reads 12:30 as 750, 0123 as 83 and 0b11 as 3. Here they stay texts, so that messages show
+# them as written. YAML 1.1 reads 1e-3 as a text. Here it is a number.
 _UniqueKeyLoader.yaml_implicit_resolvers = {
     first: [(tag, form) for tag, form in resolvers if not tag.endswith((":int", ":float"))]
     for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
@@ -837,7 +876,7 @@ _UniqueKeyLoader.add_implicit_resolver(
 
 
 def as_written(content: dict[str, Any], written: Mapping[str, Any]) -> None:
-    """Replace in ``content`` what Snakemake has read of a file by our own reading, ``written``."""
+    """Replace Snakemake's reading of a file, ``content``, by this module's reading, ``written``."""
     for key, value in written.items():
         if isinstance(value, Mapping) and isinstance(content.get(key), dict):
             as_written(content[key], value)
@@ -846,9 +885,9 @@ def as_written(content: dict[str, Any], written: Mapping[str, Any]) -> None:
 
 
 def read_yaml(path: Path, file: str) -> Any:
-    """Read a YAML file, which errors name ``file``; raises `UserError` for what is none.
+    """Read a YAML file. Errors call it ``file``.
 
-    Refused, too, is one so large, or of aliases to so much, that it is no settings.
+    Raises `UserError` if it is no YAML, or too large. Repeated aliases count, too.
     """
     try:
         with path.open("rb") as stream:
@@ -874,21 +913,21 @@ def read_yaml(path: Path, file: str) -> Any:
 
 
 def _is_indented_by_tabs(content: bytes, line: int) -> bool:
-    """Return whether blanks with a tab among them begin a line, counted from 0."""
+    """Return whether a line's indentation has a tab. Lines count from 0."""
     text = dict(enumerate(content.splitlines())).get(line, b"")
     return b"\t" in text[: len(text) - len(text.lstrip())]
 
 
 def _size(node: yaml.Node | None, sizes: dict[int, float]) -> float:
-    """Return how many nodes there are below one, each alias counted as what it stands for.
+    """Return the number of nodes below a node. Each alias counts as the nodes that it repeats.
 
-    A node that holds itself is infinite.
+    The size of a node that contains itself is infinite.
     """
     if node is None or isinstance(node.value, str):
         return 1
     if id(node) not in sizes:
         sizes[id(node)] = math.inf
-        pairs = isinstance(node, yaml.MappingNode)
-        below = chain.from_iterable(node.value) if pairs else node.value
-        sizes[id(node)] = 1 + sum(_size(part, sizes) for part in below)
+        is_mapping = isinstance(node, yaml.MappingNode)
+        children = chain.from_iterable(node.value) if is_mapping else node.value
+        sizes[id(node)] = 1 + sum(_size(child, sizes) for child in children)
     return sizes[id(node)]

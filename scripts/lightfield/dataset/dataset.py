@@ -1,4 +1,4 @@
-"""A dataset as rules and programs know it: description, files, shards and estimates."""
+"""A dataset, as rules and programs use it: description, files, shards and estimates."""
 
 import math
 from dataclasses import dataclass
@@ -16,12 +16,15 @@ class Dataset(DatasetPaths):
 
     @cached_property
     def estimate(self) -> Estimate:
-        """What the dataset will take."""
+        """The estimated time, memory and disk space of the dataset."""
         return Estimate(self)
 
     @cached_property
     def shards(self) -> list[tuple[int, int]]:
-        """The views in runs (first, end) of nearly equal length, as many as there were before."""
+        """The views in runs (first, end) of nearly equal length.
+
+        A dataset that was begun keeps its number of shards.
+        """
         if self.views_per_shard == "auto":
             count = shard_counts.noted(self.work_root, self.name, self.view_count)
             count = count or self.estimate.shard_count
@@ -36,19 +39,22 @@ class Dataset(DatasetPaths):
     @property
     def stages(self) -> list[str]:
         """The stages that make the dataset's images, shard by shard."""
-        return ["render", *self.reprojections, *([passes.FLOW.name] if self.flow else [])]
+        stages = ["render", *self.reprojections]
+        if self.flow:
+            stages.append(passes.FLOW.name)
+        return stages
 
     @property
     def all_records(self) -> list[str]:
-        """The records of all of these."""
+        """The records of all stages."""
         return [file for stage in self.stages for file in self.records(stage)]
 
     @property
     def files(self) -> list[str]:
-        """All that the finished dataset consists of, as a target rule asks for it.
+        """All files of the finished dataset, as a target rule names them.
 
-        The records are named although later files follow from them, because Snakemake makes a
-        missing file anew only if a target rule names it.
+        The records are among them, although other files depend on them: Snakemake makes a missing
+        file again only if a target rule names it.
         """
         return [
             f"{self.folder}/validation.json",
@@ -63,20 +69,17 @@ class Dataset(DatasetPaths):
 
     @property
     def intermediates(self) -> list[str]:
-        """What is made on the way to the dataset, named so that a missing one is made anew, too."""
+        """The intermediate files, which a target rule names, too: a missing one is made again."""
         scene = self.blend if self.source.builder else self.blend_check
-        return [
-            *_paths(scene, self.inventory, self.calibration, self.places, self.cameras),
-            f"{self.work}/checksums.txt",
-            *(
-                [f"{self.work}/panorama/lightfield.json", self.panorama]
-                if isinstance(self.panorama, str)
-                else []
-            ),
-            *(path for name in self.reprojections for path in self.lens_maps(name)),
-        ]
+        files = _paths(scene, self.inventory, self.calibration, self.places, self.cameras)
+        files.append(f"{self.work}/checksums.txt")
+        if isinstance(self.panorama, str):
+            files += [f"{self.work}/panorama/lightfield.json", self.panorama]
+        for name in self.reprojections:
+            files += self.lens_maps(name)
+        return files
 
 
-def _paths(*perhaps: str | list[str]) -> list[str]:
-    """Return those of several files that there are; one that a dataset has not is an empty list."""
-    return [path for path in perhaps if isinstance(path, str)]
+def _paths(*paths_or_empty: str | list[str]) -> list[str]:
+    """Return the paths among several properties. A file that a dataset lacks is an empty list."""
+    return [path for path in paths_or_empty if isinstance(path, str)]

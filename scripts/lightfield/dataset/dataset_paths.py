@@ -1,4 +1,4 @@
-"""Where the files of a dataset lie."""
+"""The paths of a dataset's files."""
 
 from dataclasses import dataclass
 
@@ -11,8 +11,9 @@ from lightfield.geometry.lenses.cube_map import CUBE_FACES
 from lightfield.geometry.rigs import BlendCamera, Random, Rig
 from lightfield.geometry.rigs.split_setting import PARTS
 
-# Pictures of a report, those of them that are plots, which are .svg too, and all its files.
+# The pictures of a report.
 PICTURES = ("overview", "contact_sheet", "rig", "depth", "noise")
+# The pictures that are plots, and therefore also .svg files.
 PLOTS = ("rig", "depth", "noise")
 PICTURE_FILES = (*(f"{name}.png" for name in PICTURES), *(f"{name}.svg" for name in PLOTS))
 REPORT_FILES = (*PICTURE_FILES, "costs.json", "index.html")
@@ -20,7 +21,7 @@ REPORT_FILES = (*PICTURE_FILES, "costs.json", "index.html")
 
 @dataclass(frozen=True)
 class DatasetPaths(Description):
-    """The paths of a dataset's files. One that a dataset does not have is an empty list."""
+    """The paths of a dataset's files. A file that the dataset lacks is an empty list."""
 
     @property
     def scene_work(self) -> str:
@@ -28,39 +29,39 @@ class DatasetPaths(Description):
 
     @property
     def blend(self) -> str | list[str]:
-        """The .blend: what a builder makes, or what the user brought; none of an import."""
+        """The .blend of a builder or of the user. An import has none."""
         if self.imported:
             return []
         return self.source.blend or f"{self.scene_work}/scene.blend"
 
     @property
     def blend_check(self) -> str | list[str]:
-        """The proof that the user's own .blend is the one meant; a built one needs none."""
+        """The proof that the user's .blend has the recorded SHA-256. A built scene needs none."""
         return f"{self.scene_work}/blend.json" if self.source.blend else []
 
     @property
     def inventory(self) -> str | list[str]:
-        """The list of what the scene contains; none of an import."""
+        """The list of what the scene contains. An import has none."""
         return [] if self.imported else f"{self.scene_work}/inventory.json"
 
     @property
     def cameras(self) -> str | list[str]:
-        """What surrounds each camera; not known of an import."""
+        """The list of what surrounds each camera. An import has none."""
         return [] if self.imported else f"{self.work}/cameras.json"
 
     @property
     def blend_inventory(self) -> str | list[str]:
-        """The list of what the user's own .blend says, from which its datasets follow, too."""
+        """The inventory of the user's own .blend, on which its datasets depend."""
         return self.inventory if self.source.blend else []
 
     @property
     def trials(self) -> str:
-        """Where trial renders are kept."""
+        """The folder of trial renders."""
         return f"{self.scene_work}/trials"
 
     @property
     def calibration(self) -> str | list[str]:
-        """What was chosen for the scene's target error under the preset; none without one."""
+        """The settings chosen for the scene's target error under the preset, if it has one."""
         if "target_error" not in self.render:
             return []
         return f"{self.work_root}/{self.scene_folder}/calibration.json"
@@ -76,13 +77,15 @@ class DatasetPaths(Description):
         return f"{self.work_root}/{self.name}"
 
     def lens_maps(self, name: str) -> list[str]:
-        """Return the lens maps of a reprojection: one, or of a cube map one a face."""
-        faces = CUBE_FACES if self.reprojections[name].cube_map else ("",)
-        return [f"{self.work}/{name}/lens_map{face and f'_{face}'}.npy" for face in faces]
+        """Return the lens maps of a reprojection: one, or one for each face of a cube map."""
+        stem = f"{self.work}/{name}/lens_map"
+        if self.reprojections[name].cube_map:
+            return [f"{stem}_{face}.npy" for face in CUBE_FACES]
+        return [f"{stem}.npy"]
 
     @property
     def places(self) -> str | list[str]:
-        """Where the cameras of a random rig have free space; other rigs need no such file."""
+        """The free places for a random rig's cameras. Other rigs need no such file."""
         return f"{self.work}/places.json" if isinstance(self.rig, Random) else []
 
     @property
@@ -94,41 +97,44 @@ class DatasetPaths(Description):
     @property
     def image_folders(self) -> list[str]:
         """The folders in ``folder`` that hold views, their passes and reprojections."""
-        own = passes.wanted(self.render)
-        reprojected = [
-            f"{name}/{pass_name}"
-            for name, reprojection in self.reprojections.items()
-            for pass_name in reprojection.passes or ()
-        ]
-        own += [passes.FLOW] if self.flow else []
-        return ["exr", *(found.name for found in own), *self.reprojections, *reprojected]
+        folders = ["exr", *(view_pass.name for view_pass in passes.selected(self.render))]
+        if self.flow:
+            folders.append(passes.FLOW.name)
+        folders += self.reprojections
+        for name, reprojection in self.reprojections.items():
+            folders += [f"{name}/{pass_name}" for pass_name in reprojection.passes or ()]
+        return folders
 
     @property
     def exported(self) -> list[str]:
-        """The files by which each export for each of its sources is known to be there."""
-        return [
-            f"{self.folder}/{'' if source == VIEWS else f'{source}/'}"
-            + ("transforms.json" if name == "instant_ngp" else f"exports/{name}/{MANIFEST}")
-            for name, export in self.exports.wanted.items()
-            for source in export.sources
-        ]
+        """The file of each export and source that its job writes last."""
+        files = []
+        for name, export in self.exports.selected.items():
+            file = "transforms.json" if name == "instant_ngp" else f"exports/{name}/{MANIFEST}"
+            for source in export.sources:
+                folder = self.folder if source == VIEWS else f"{self.folder}/{source}"
+                files.append(f"{folder}/{file}")
+        return files
 
     @property
     def export_lists(self) -> list[str]:
-        """All files by which exports list what is theirs: of a split each part has one, too."""
-        own = [path for path in self.exported if not path.endswith(MANIFEST)]
-        parts = PARTS if self.rig.split else ()
-        more = [f"{path.removesuffix('.json')}_{part}.json" for path in own for part in parts]
-        return [*self.exported, *more]
+        """All files in which exports list their files. With a split, each part has one, too."""
+        lists = self.exported
+        if self.rig.split:
+            for path in self.exported:
+                if not path.endswith(MANIFEST):
+                    stem = path.removesuffix(".json")
+                    lists += [f"{stem}_{part}.json" for part in PARTS]
+        return lists
 
     @property
     def splits(self) -> str | list[str]:
-        """The list of what the views of all rigs are for, where this rig says it of its own."""
+        """The list of the views that train, validate and test, if this rig has a split."""
         return f"{self.results_root}/{self.scene_folder}/{SPLITS}" if self.rig.split else []
 
     @property
     def published(self) -> list[str]:
-        """The files that a job makes one by one, the views aside."""
+        """The files that have a job each: all but views and reports."""
         return [*self.lightfields, *self.exported]
 
     @property
@@ -137,9 +143,9 @@ class DatasetPaths(Description):
 
     @property
     def panorama(self) -> str | list[str]:
-        """The report's panorama; none of an import, of which there is no scene to render it."""
-        made = self.has_panorama and not self.imported
-        return f"{self.work}/panorama/exr/view_0000f.exr" if made else []
+        """The report's panorama. An import has none, because it has no scene to render."""
+        is_rendered = self.has_panorama and not self.imported
+        return f"{self.work}/panorama/exr/view_0000f.exr" if is_rendered else []
 
     @property
     def costs(self) -> str:
@@ -156,14 +162,14 @@ class DatasetPaths(Description):
 
     @property
     def package(self) -> str:
-        """A rig's dataset as one archive, all frames of a sequence in it, named as SILVR's are."""
+        """The archive of a rig's dataset with all frames of a sequence, named as SILVR's are."""
         return f"{self.results_root}/{self.scene_folder}/{self.scene_folder}_{self.rig_name}.tar"
 
-    # The rig, whose places a file may hold.
+    # The rig. A file may hold its places.
 
     @property
     def placed_rig(self) -> Rig:
-        """The rig; a random one and a .blend's camera know where their places are found."""
+        """The rig. A random rig and a .blend's camera have the path of the file of their places."""
         if isinstance(self.rig, BlendCamera):
             frame = self.source.frame
             return self.rig.placed(str(self.inventory), None if frame == FILE else int(frame))
@@ -173,11 +179,11 @@ class DatasetPaths(Description):
 
     @property
     def camera_frames(self) -> list[int | None]:
-        """The frames at which a rig of the .blend's camera needs it; None is the file's own."""
+        """The frames of a rig of the .blend's camera. None is the file's own frame."""
         rig = self.placed_rig
         return rig.path if isinstance(rig, BlendCamera) else []
 
     @property
     def rig_json(self) -> str:
-        """The rig, as the programs take it that make a report."""
+        """The rig, in the form that the programs of the report take."""
         return self.placed_rig.model_dump_json(exclude_unset=True, exclude_none=True)

@@ -1,4 +1,4 @@
-"""One scene seen by one rig: what is rendered, how, and by which cameras."""
+"""The description of a dataset: what is rendered, how, and by which cameras."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from lightfield.dataset.keys import scene_fingerprint
 from lightfield.dataset.lightfield import OMNIDIRECTIONAL
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
 
-# What of a scene YAML's `scene` block is written down: not where a file came from, nor where it is.
+# The keys of a scene YAML's `scene` block that lightfield.json records. Paths and URLs are none.
 SOURCE_KEYS = {"builder", "parameters", "scene_name", "view_layers", "frame"}
 
 
@@ -32,8 +32,8 @@ class Cluster:
 class Description:
     """One scene seen by one rig, with every default filled in and the preset applied.
 
-    ``scene_name`` is the scene YAML's name. ``rig_folder`` is the rig's name, in a sequence
-    followed by the frame's folder, as in LFSphere/f00001. ``render`` is what lightfield.json holds.
+    ``scene_name`` is the scene YAML's name. ``rig_folder`` is the rig's name. In a sequence the
+    frame's folder follows, as in LFSphere/f00001. ``render`` is the block of lightfield.json.
     """
 
     scene_name: str
@@ -46,58 +46,59 @@ class Description:
     reprojections: dict[str, config.Reprojection]
     flow: config.Flow | None
     exports: Exports
-    # For the report, from the rig's centre.
+    # Whether the report shows a panorama from the rig's centre.
     has_panorama: bool
     limits: Preset
-    # Folders of the rigs in which others test what is trained on this one, and that of the rig on
-    # which is trained what this one tests.
+    # The folders of the rigs that test what is trained on this rig.
     tested_by: tuple[str, ...] = ()
+    # The folder of the rig that trains what this rig tests.
     trained_by: str | None = None
     results_root: str = "results"
     work_root: str = "work"
     views_per_shard: int | Literal["auto"] = "auto"
-    # None where this machine renders.
+    # None if this machine renders.
     cluster: Cluster | None = None
-    # Path and SHA-256 of each file that a .blend reads, once its inventory is known.
+    # Path and SHA-256 of each file that a .blend reads. `resolved` fills them in.
     external_files: Sequence[tuple[str, str | None]] = ()
 
     def resolved(self, inventory: Path) -> Self:
-        """Return the dataset with what a user's .blend says, by its ``inventory``, filled in.
+        """Return the dataset with the values of a user's .blend, which its ``inventory`` lists.
 
-        Raises `UserError` where the .blend has not what the scene YAML asks of it.
+        Raises `UserError` if the .blend lacks something that the scene YAML needs.
         """
         if not self.source.blend:
             return self
-        found = read_inventory(inventory, "blend", "external_files")
+        content = read_inventory(inventory, "blend", "external_files")
         with reading(inventory, "inventory"):
-            said = found["blend"]
-            frame = int(said["frame"] if self.source.frame == FILE else self.source.frame)
+            facts = content["blend"]
+            external_files = [(file["path"], file["sha256"]) for file in content["external_files"]]
+            frame = int(facts["frame"] if self.source.frame == FILE else self.source.frame)
             render = dict(self.render)
             rig = self.rig
             if render.get("samples") == FILE:
-                most = render.pop("most_samples", said["samples"])
-                render["samples"] = min(said["samples"], most)
+                most = render.pop("most_samples", facts["samples"])
+                render["samples"] = min(facts["samples"], most)
             if render.get("depth_of_field"):
-                blend.camera_of(said)
+                blend.camera_of(facts)
             if isinstance(rig, BlendCamera):
-                blend.camera_of(said)
+                blend.camera_of(facts)
                 rig = rig.placed(inventory, frame)
             if rig.camera.lens == FILE:
-                camera = blend.lens_of(said, rig.camera.resolution)
+                camera = blend.lens_of(facts, rig.camera.resolution)
                 rig = rig.model_copy(update={"camera": camera})
             return replace(
                 self,
                 source=self.source.model_copy(update={"frame": frame}),
                 render=render,
                 rig=rig,
-                external_files=[(file["path"], file["sha256"]) for file in found["external_files"]],
+                external_files=external_files,
             )
 
     @property
     def scene_folder(self) -> str:
-        """The scene's name and the preset's unless it is ``full``: presets keep to themselves."""
-        full = self.preset == "full"
-        return self.scene_name if full else f"{self.scene_name}_{self.preset}"
+        """The folder of the scene under its preset: garden, or garden_tiny."""
+        is_full = self.preset == "full"
+        return self.scene_name if is_full else f"{self.scene_name}_{self.preset}"
 
     @cached_property
     def view_count(self) -> int:
@@ -106,9 +107,10 @@ class Description:
 
     @property
     def depth(self) -> str | None:
-        """What channel Z of the rendered views means: ``z``, ``distance``, or None for no depth.
+        """The meaning of the rendered views' channel Z: ``z``, ``distance``, or None for no depth.
 
-        Z-depth is unusable for lenses that see beyond 180 degrees, and depth without a centre.
+        Lenses that see beyond 180 degrees have no usable Z-depth. Views without a centre have no
+        depth at all.
         """
         if self.rig.is_omnidirectional:
             return None
@@ -127,50 +129,49 @@ class Description:
 
     @property
     def fingerprint(self) -> str:
-        """What the scene is identified by: see `scene_fingerprint`."""
+        """The identity of the scene: see `scene_fingerprint`."""
         return scene_fingerprint(self.source, self.external_files)
 
     def origin(self, render: dict[str, Any]) -> dict[str, Any]:
-        """Return what lightfield.json says of what is rendered, and how: by this ``render``."""
-        return {
-            "depth": self.depth,
-            **(
-                {OMNIDIRECTIONAL: self.rig.stereo.distance}
-                if self.rig.stereo and self.rig.is_omnidirectional
-                else {}
-            ),
-            "frame": self.source.frame,
-            "scene": {
-                "name": self.scene_name,
-                **self.source.model_dump(include=SOURCE_KEYS, exclude_none=True),
-                "fingerprint": self.fingerprint,
-            },
-            "render": render,
+        """Return the keys of lightfield.json that say what is rendered, and how.
+
+        ``render`` is its block `render`.
+        """
+        origin: dict[str, Any] = {"depth": self.depth}
+        if self.rig.stereo and self.rig.is_omnidirectional:
+            origin[OMNIDIRECTIONAL] = self.rig.stereo.distance
+        origin["frame"] = self.source.frame
+        origin["scene"] = {
+            "name": self.scene_name,
+            **self.source.model_dump(include=SOURCE_KEYS, exclude_none=True),
+            "fingerprint": self.fingerprint,
         }
+        origin["render"] = render
+        return origin
 
     @property
     def builder_fingerprint(self) -> str | None:
-        """What changes when a builder does; a user's .blend is a file, which is checked."""
+        """A value that changes when the builder does. A user's .blend needs none."""
         return None if self.source.blend else self.fingerprint
 
     @property
     def imported(self) -> str | None:
-        """The folder of a light field that somebody else has rendered."""
+        """The folder of a light field that somebody else has rendered. None for other datasets."""
         if isinstance(self.rig, Poses) and self.source.dataset:
             return str(Path(self.rig.file).parent)
         return None
 
     @property
     def limits_json(self) -> str:
-        """The preset's limits, as scripts/make_lightfield.py takes them."""
+        """The preset's limits, in the form that scripts/make_lightfield.py takes."""
         return self.limits.model_dump_json(exclude_none=True)
 
     @property
     def panorama_width(self) -> int:
-        """Twice a 180 degree fisheye view's angular resolution, within 4096 pixels."""
+        """The panorama's width: twice a 180 degree fisheye's angular resolution, at most 4096."""
         return min(4 * self.rig.camera.resolution[0], 4096)
 
     @property
     def pixels(self) -> int:
-        """Pixels of a view."""
+        """The number of pixels of a view."""
         return math.prod(self.rig.camera.resolution)

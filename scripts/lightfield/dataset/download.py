@@ -1,12 +1,13 @@
-"""Download large files over HTTP; an interrupted download continues where it stopped.
+"""Downloads large files over HTTP. An interrupted download continues where it stopped.
 
-pooch does not replace this: it gives its downloader an empty temporary file for each attempt and
-deletes what has arrived when an attempt fails. A downloader of our own for pooch would still need
-the kept part, Range and If-Range, and the answers 206 and 416. pooch would save only the check of
-the SHA-256 and the renaming, about seven lines of `fetch`, for one more copy of the file.
+pooch cannot replace this. It gives its downloader an empty temporary file for each attempt, and
+deletes the file when an attempt fails. A downloader for pooch would still need the partial file,
+Range and If-Range, and the answers 206 and 416. pooch would save only the check of the SHA-256 and
+the renaming, about seven lines of `fetch`.
 """
 
 import http.client
+import math
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -22,12 +23,12 @@ _TIMEOUT_SECONDS = 60
 
 
 def fetch(url: str, target: Path, expected: str | None, origin: str) -> None:
-    """Download ``url`` to ``target``, whole and with the right SHA-256, or not at all.
+    """Download ``url`` to ``target``. The file is complete with the right SHA-256, or absent.
 
-    What has arrived is kept in ``<target>.part`` and is asked for no more (RFC 9110, section 14),
-    unless the server does not serve ranges or its file has changed meanwhile: then it starts
-    anew. A transfer that breaks is taken up again as long as each attempt brings something.
-    ``expected`` may be None; ``origin`` says where it comes from. Raises `UserError`.
+    ``<target>.part`` holds the received bytes, which are not requested again (RFC 9110, section
+    14). The download starts anew if the server serves no ranges, or if its file has changed. A
+    broken transfer continues as long as each attempt receives something. ``expected`` is the
+    SHA-256 or None, and ``origin`` says where it is written. Raises `UserError`.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f"{target.name}.part")
@@ -41,35 +42,37 @@ def fetch(url: str, target: Path, expected: str | None, origin: str) -> None:
                 f"{url}: {problem}; {gigabytes(_size(part))} are kept in {part}, "
                 "and the same command goes on from there"
             )
-    found = sha256(part)
-    _mark(part).unlink(missing_ok=True)
-    if expected is not None and found != expected:
+    digest = sha256(part)
+    _version_file(part).unlink(missing_ok=True)
+    if expected is not None and digest != expected:
         part.unlink()
-        raise UserError(f"{url}: its sha256 is {found}, but {origin} says {expected}")
+        raise UserError(f"{url}: its sha256 is {digest}, but {origin} says {expected}")
     part.replace(target)
 
 
 def _attempt(url: str, part: Path) -> str | None:
-    """Ask once for what is missing of ``part``; return None if it is whole, else the problem."""
-    have = _size(part)
+    """Request the missing bytes of ``part`` once. Return the problem, or None if it is complete."""
+    received = _size(part)
     request = urllib.request.Request(url)
-    # The server's name for this version of the file: without it, no one knows if it has changed.
-    version = read_json(_mark(part))["version"] if have and _mark(part).exists() else None
+    # The server's name for this version of its file. Only this shows whether the file has changed.
+    version = None
+    if received and _version_file(part).exists():
+        version = read_json(_version_file(part))["version"]
     if version:
-        request.add_header("Range", f"bytes={have}-")
+        request.add_header("Range", f"bytes={received}-")
         request.add_header("If-Range", version)
     try:
         with urllib.request.urlopen(request, timeout=_TIMEOUT_SECONDS) as answer:
             if answer.status != http.HTTPStatus.PARTIAL_CONTENT:
                 return _receive(answer, part, 0)
             if _version(answer) == version:
-                return _receive(answer, part, have)
+                return _receive(answer, part, received)
             part.unlink()
             return _attempt(url, part)
     except urllib.error.HTTPError as error:
         if error.code == http.HTTPStatus.REQUESTED_RANGE_NOT_SATISFIABLE:
-            # There is nothing behind what we have: it is whole, or it is not this file's.
-            if error.headers.get("Content-Range") == f"bytes */{have}":
+            # The server has no more bytes. Either the file is complete, or it is another file.
+            if error.headers.get("Content-Range") == f"bytes */{received}":
                 return None
             part.unlink()
             return _attempt(url, part)
@@ -78,16 +81,16 @@ def _attempt(url: str, part: Path) -> str | None:
         return str(getattr(error, "reason", None) or error) or type(error).__name__
 
 
-def _receive(answer: Any, part: Path, have: int) -> str | None:
-    """Write an answer's body behind the first ``have`` bytes of ``part``."""
+def _receive(answer: Any, part: Path, received: int) -> str | None:
+    """Write an answer's body after the first ``received`` bytes of ``part``."""
     length = answer.headers.get("Content-Length")
-    total = None if length is None else have + int(length)
-    progress = Progress(-(-(total or _CHUNK) // _CHUNK), f"download {part.stem}", "MiB")
-    progress.count = have // _CHUNK
-    with part.open("r+b" if have else "wb") as file:
-        # Only now that nothing is left of another version.
-        write_json(_mark(part), {"version": _version(answer)})
-        file.seek(have)
+    total = None if length is None else received + int(length)
+    progress = Progress(math.ceil((total or _CHUNK) / _CHUNK), f"download {part.stem}", "MiB")
+    progress.count = received // _CHUNK
+    with part.open("r+b" if received else "wb") as file:
+        # Now the file holds no bytes of another version.
+        write_json(_version_file(part), {"version": _version(answer)})
+        file.seek(received)
         while chunk := answer.read(_CHUNK):
             file.write(chunk)
             if total is not None:
@@ -98,7 +101,7 @@ def _receive(answer: Any, part: Path, have: int) -> str | None:
 
 
 def _version(answer: Any) -> str | None:
-    """Return what If-Range takes: a strong ETag, or the date of the last change."""
+    """Return the value for If-Range: a strong ETag, or the date of the last change."""
     tag: str | None = answer.headers.get("ETag")
     date: str | None = answer.headers.get("Last-Modified")
     return tag if tag and tag.startswith('"') else date
@@ -108,6 +111,6 @@ def _size(path: Path) -> int:
     return path.stat().st_size if path.exists() else 0
 
 
-def _mark(part: Path) -> Path:
-    """Return the file beside a partial one that says which version of the server's file it is."""
+def _version_file(part: Path) -> Path:
+    """Return the file beside a partial file that names the version of the server's file."""
     return part.with_name(f"{part.name}.json")

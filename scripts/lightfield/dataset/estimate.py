@@ -1,8 +1,9 @@
-"""What a dataset will take: time, memory and bytes, as they are estimated before it is rendered."""
+"""Estimates a dataset's time, memory and disk space before it is rendered."""
 
 import json
 import math
 from functools import cached_property, lru_cache
+from itertools import chain
 from pathlib import Path
 from statistics import fmean
 
@@ -11,81 +12,84 @@ from lightfield.dataset import memory, passes
 from lightfield.dataset.config import FILE
 from lightfield.dataset.dataset_paths import DatasetPaths
 
-# For planning only, measured on one core of a 2-core x86-64 machine: path tracing of one sample of
-# one pixel, and start-up (bpy, the scene, and Cycles' acceleration structures).
+# These are only for planning. They were measured on one core of a 2-core x86-64 machine.
+# Path tracing of one sample of one pixel.
 SECONDS_PER_SAMPLE = 6e-6
+# Start-up of bpy, the scene, and Cycles' acceleration structures.
 START_UP_SECONDS = 3.0
-# The same of views that are taken over: reading a pixel, and one that it is reprojected to. Of EXR
-# with depth, in batches of 16 views of 2048², by benchmarks/reprojection.py.
+# Reading a pixel of an imported view: EXR with depth, by benchmarks/reprojection.py with batches of
+# 16 views of 2048².
 READ_SECONDS = 4e-8
+# Computing a pixel of a reprojected view, measured in the same way.
 REPROJECTION_SECONDS = 1.5e-7
-# A pixel's samples where a target error is given instead of them: an estimate for planning.
+# A pixel's samples if a target error is given instead.
 GUESSED_SAMPLES = 256
-# Start-up is kept under this part of a shard's time.
+# Start-up takes at most this part of a shard's time.
 START_UP_PART = 0.05
-# More jobs would make the plan long, and no more render at once; a cluster may take more.
+# More jobs would lengthen the plan, but not render faster. A cluster may get more.
 USUAL_SHARDS = 64
-# On a cluster no job is expected to render longer than this.
+# On a cluster each job is expected to take at most so long.
 CLUSTER_JOB_MINUTES = 20
-# A longer plan would take longer than it is worth.
+# Planning more shards than this takes too long.
 MOST_SHARDS = 10_000
-# Of the bytes of half-float colour and of depth, what an EXR takes: measured in the three scenes.
+# An EXR's size as a part of its uncompressed size, measured in the three scenes.
 COMPRESSED = 0.75
-# A pixel of an 8-bit PNG.
+# Bytes for a pixel of an 8-bit PNG.
 PNG_BYTES = 2
 
 
 class Estimate:
-    """Estimates for a dataset, from its settings and from what is measured of its scene."""
+    """Estimates for a dataset, from its settings and from measurements of its scene."""
 
     def __init__(self, dataset: DatasetPaths) -> None:
         self.dataset = dataset
 
     @cached_property
     def view_seconds(self) -> float:
-        """Seconds that one core takes to render a view, as a probe has measured or as guessed."""
+        """Seconds that one core takes to render a view, by a probe or as a guess."""
         if self._probe:
             return self._probe[0]
         return self.dataset.pixels * self._samples * SECONDS_PER_SAMPLE
 
     @cached_property
     def view_bytes(self) -> float:
-        """Bytes of a rendered view with its passes, as a probe has measured or as guessed."""
+        """Bytes of a rendered view with its passes, by a probe or as a guess."""
         if self._probe:
             return self._probe[1]
         render = self.dataset.render
-        width = 6 + sum(wanted.bytes for wanted in passes.wanted(render))
+        pixel_bytes = 6 + sum(view_pass.bytes for view_pass in passes.selected(render))
         if self.dataset.depth:
-            width += {"float": 4, "rounded": 3, "half": 2}[render["depth_precision"]]
-        return self.dataset.pixels * width * COMPRESSED
+            pixel_bytes += {"float": 4, "rounded": 3, "half": 2}[render["depth_precision"]]
+        return self.dataset.pixels * pixel_bytes * COMPRESSED
 
     @property
     def all_view_bytes(self) -> float:
-        """Bytes of a view, its flow, and everything that it is reprojected to."""
-        sizes = {"exr": 10 * COMPRESSED, "png": PNG_BYTES}
+        """Bytes of a view, its flow, and its reprojections."""
+        pixel_bytes = {"exr": 10 * COMPRESSED, "png": PNG_BYTES}
         size = self.view_bytes
         if self.dataset.flow:
             size += passes.FLOW.bytes * COMPRESSED * self.dataset.pixels
-        return size + sum(
-            self._reprojected_pixels(name) * sizes[reprojection.format] * (reprojection.bits / 8)
-            for name, reprojection in self.dataset.reprojections.items()
-        )
+        reprojected_size = 0.0
+        for name, reprojection in self.dataset.reprojections.items():
+            pixels = self._reprojected_pixels(name)
+            reprojected_size += pixels * pixel_bytes[reprojection.format] * (reprojection.bits / 8)
+        return size + reprojected_size
 
     def memory_bytes(self, pixels: int) -> int:
-        """Bytes of memory that a process takes which renders views of so many pixels.
+        """Return the memory in bytes of a process that renders views of so many pixels.
 
-        The scene's part is what the inventory has measured, as soon as it has, and a fifth more.
+        The inventory measures the scene's part, to which this adds a fifth.
         """
         scene = memory.UNKNOWN_SCENE
         inventory = Path(str(self.dataset.inventory))
         if inventory.is_file():
             scene = _scene_memory(inventory, inventory.stat().st_mtime_ns)
-        # Until the calibration has chosen, it may choose to denoise.
+        # Before the calibration, assume that it will choose to denoise.
         return memory.needed(scene, pixels, self.dataset.render.get("denoise", True))
 
     @property
     def view_memory_bytes(self) -> int:
-        """Bytes of memory that a process takes which renders the dataset's own views."""
+        """The memory in bytes of a process that renders the dataset's own views."""
         return self.memory_bytes(self.dataset.pixels)
 
     @property
@@ -96,10 +100,10 @@ class Estimate:
 
     @property
     def shard_count(self) -> int:
-        """How many shards a dataset gets of which none has been rendered.
+        """How many shards a dataset gets before the first is rendered.
 
-        A shard is as short as it can be while start-up stays a small part of its time: the
-        shorter, the more processes can work at once.
+        Shards are as short as possible, so that many processes can work at once. But start-up must
+        stay a small part of a shard's time.
         """
         dataset = self.dataset
         seconds = self._probe[0] if self._probe else self._planned_view_seconds
@@ -113,9 +117,9 @@ class Estimate:
 
     @property
     def _planned_samples(self) -> int:
-        """A pixel's samples; with a target error, or the .blend's own, a guess that stays the same.
+        """A pixel's samples. With a target error, or the .blend's own samples, it is a fixed guess.
 
-        Shards follow from it, whose bounds must follow from the configuration alone.
+        The bounds of shards depend on it, and must depend only on the configuration.
         """
         samples = self.dataset.render.get("samples", FILE)
         limit = self.dataset.render.get("most_samples", GUESSED_SAMPLES)
@@ -123,57 +127,63 @@ class Estimate:
 
     @property
     def _samples(self) -> float:
-        """A pixel's samples: those that the calibration has chosen, as soon as it has."""
+        """A pixel's samples, by the calibration if it has run."""
         if not isinstance(self.dataset.calibration, str):
             return self._planned_samples
         try:
             calibration = json.loads(Path(self.dataset.calibration).read_bytes())
             return float(calibration["cost_samples"])
         except (OSError, *DAMAGE):
-            # Not there yet, or broken, and then it is made anew.
+            # The file is missing, or broken, so that it will be made again.
             return self._planned_samples
 
     @property
     def _planned_view_seconds(self) -> float:
-        """Seconds that one core takes to render a view, or to take over and reproject one."""
+        """Seconds that one core takes to render a view, or to import and reproject one."""
         dataset = self.dataset
         if dataset.imported:
-            targets = sum(self._reprojected_pixels(name) for name in dataset.reprojections)
-            read = dataset.pixels * (1 + len(dataset.reprojections))
-            return read * READ_SECONDS + targets * REPROJECTION_SECONDS
+            computed_pixels = sum(self._reprojected_pixels(name) for name in dataset.reprojections)
+            read_pixels = dataset.pixels * (1 + len(dataset.reprojections))
+            return read_pixels * READ_SECONDS + computed_pixels * REPROJECTION_SECONDS
         return dataset.pixels * self._planned_samples * SECONDS_PER_SAMPLE
 
     @cached_property
     def _probe(self) -> tuple[float, float] | None:
-        """Seconds of one core that a view takes, and its bytes, as a probe measured; None if none.
+        """The seconds of one core and the bytes of a view, by a probe. None without a valid probe.
 
-        A sequence's first frame is probed for all.
+        The probe of a sequence's first frame counts for all frames.
         """
         dataset = self.dataset
+        rig_folder = Path(dataset.work_root, dataset.scene_folder, dataset.rig_name)
+        # Those of a sequence lie a folder deeper. A search of all folders would take too long.
+        paths = chain(rig_folder.glob("probe.json"), rig_folder.glob("f*/probe.json"))
+        path = next(paths, None)
+        if path is None:
+            return None
         try:
-            rig = Path(dataset.work_root, dataset.scene_folder, dataset.rig_name)
-            # A sequence's lie a folder deeper. The folders of the shards are too full to look into.
-            paths = (path for depth in ("", "f*/") for path in rig.glob(f"{depth}probe.json"))
-            probe = json.loads(next(paths).read_bytes())
+            probe = json.loads(path.read_bytes())
             samples = dataset.render.get("samples", probe["samples"])
             planned = [list(dataset.rig.camera.resolution), samples]
             if probe["device"] == "CPU" and planned == [probe["resolution"], probe["samples"]]:
                 seconds = fmean(probe["view_seconds"])
                 size = fmean(probe["view_bytes"])
                 return (seconds, size) if 0 < seconds < 1e9 and 0 < size < 1e12 else None
-        except (OSError, StopIteration, *DAMAGE):
+        except (OSError, *DAMAGE):
             pass
         return None
 
     def _reprojected_pixels(self, name: str) -> int:
-        """Pixels that one view is reprojected to; a cube map has six images of a view."""
+        """Return the pixels of a view's reprojection. A cube map has six images."""
         camera = self.dataset.reprojections[name].camera or self.dataset.rig.camera
         return math.prod(camera.resolution) * len(self.dataset.lens_maps(name))
 
 
 @lru_cache
 def _scene_memory(inventory: Path, _changed: int) -> int:
-    """Return what a scene's inventory says that it takes, and a fifth more."""
+    """Return the memory of a scene in bytes: a fifth more than its inventory measured.
+
+    ``_changed`` is the inventory's time, with which the cache notices a new inventory.
+    """
     try:
         return int(1.2 * json.loads(inventory.read_bytes())["memory_bytes"])
     except (OSError, *DAMAGE):

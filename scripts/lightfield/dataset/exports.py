@@ -1,7 +1,7 @@
-"""What a scene YAML's `exports` may ask of each exporter, and what each consumer can take.
+"""The options of each exporter in a scene YAML, and what each consumer accepts.
 
-One model an exporter: its options, and `refusal`, which says when a YAML is read what its consumer
-cannot open and how it can be had. What the options do is written in `lightfield.export`.
+Each exporter has a model of its options. Its `refusal` says what the consumer cannot open, and what
+to do instead. It is called when a YAML is read. `lightfield.export` says what the options do.
 """
 
 import math
@@ -20,23 +20,25 @@ from lightfield.geometry.rigs import Rig
 from lightfield.geometry.rigs.plane import Plane
 from lightfield.geometry.rigs.split_setting import PARTS
 
-# In `sources`, the rendered views themselves.
+# The name of the rendered views in `sources`.
 VIEWS = "views"
-# Written last into an export's folder: its files.
+# The list of an export's files, which is written last.
 MANIFEST = "export.json"
 
 FARTHEST = 999.9
-"""Metres: in disparity, where nothing is hit, and what is farther, is taken to be here."""
-BOUNDS_VIEWS, BOUNDS_PIXELS = 64, 64
-"""So many views, and pixels along the longer side of each, tell how far a scene reaches."""
+"""Metres. Disparity treats misses, and everything farther, as if they were at this distance."""
+BOUNDS_VIEWS = 64
+"""The extent of a scene is measured in so many views."""
+BOUNDS_PIXELS = 64
+"""The views that measure a scene's extent have so many pixels along the longer side."""
 
 TO_RECTILINEAR = "reproject to rectilinear"
 
 
 class Export(Settings):
-    """``exposure`` and ``reinhard`` are for EXR sources: a PNG is developed already."""
+    """The options that all exporters share."""
 
-    # Whether views of other rigs, which test what is trained on these, belong to it.
+    # Whether the export includes other rigs' views that test what is trained on these.
     is_for_training: ClassVar[bool] = False
 
     sources: list[str] = Field(
@@ -46,25 +48,25 @@ class Export(Settings):
 
     @property
     def recorded(self) -> dict[str, Any]:
-        """What the export itself says of its options."""
+        """The options that the export's own files record."""
         return self.model_dump(mode="json", exclude={"sources"})
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
-        """Say why the consumer cannot take views of a lens, and what to do; None if it can.
+        """Return why the consumer cannot take views of a lens, and what to do. None if it can.
 
-        ``has_depth`` is whether the source itself holds depth: EXR does and PNG does not.
+        ``has_depth`` says whether the source holds depth: EXR does, and PNG does not.
         """
         return None
 
     def rig_refusal(self, rig: Rig) -> str | None:
-        """Say why the consumer cannot take the views of a rig; None if it can."""
+        """Return why the consumer cannot take the views of a rig. None if it can."""
         if self.is_for_training and rig.view_count == 1 and rig.split not in PARTS:
             return "has one view, of which none is left to test with"
         return None
 
 
 class Developed(Export):
-    """An export of 8-bit pictures."""
+    """An export of 8-bit pictures. ``exposure`` and ``reinhard`` apply only to EXR sources."""
 
     exposure: float = Field(0.0, ge=-100, le=100, description="Of EXR sources, in stops.")
     reinhard: float = Field(
@@ -83,7 +85,7 @@ class InstantNgp(Export):
         None, description="World to unit cube; without it, fitted to the scene."
     )
     offset: Vector | None = Field(
-        None, description="Where the mean camera lies in the unit cube; 0.5 each without it."
+        None, description="The mean camera's place in the unit cube; without it, 0.5 each."
     )
     bounds: Literal["rig", "depth"] = Field(
         "rig",
@@ -100,7 +102,7 @@ class InstantNgp(Export):
     @model_validator(mode="after")
     def _one_placement(self) -> Self:
         if self.scale is not None and self.bounds == "depth":
-            raise ValueError("bounds: goes without scale, which it would find")
+            raise ValueError("bounds: does not go with scale, which it would determine")
         if self.scale is None and self.offset is not None:
             raise ValueError("offset: goes with scale; without it both are fitted")
         if self.render_aabb:
@@ -114,7 +116,7 @@ class InstantNgp(Export):
 
     def rig_refusal(self, rig: Rig) -> str | None:
         if self.scale is None and self.bounds == "rig" and rig.positions == 1:
-            return "has cameras at one place, which says no scale; give scale, or bounds: depth"
+            return "has cameras at one place, so no scale follows; give scale, or bounds: depth"
         return None
 
     @property
@@ -126,7 +128,7 @@ class InstantNgp(Export):
 
     @property
     def middle(self) -> tuple[float, float, float]:
-        """Where the mean camera lies in the unit cube, with a scale."""
+        """The mean camera's place in the unit cube, if a scale is given."""
         return self.offset or (0.5, 0.5, 0.5)
 
 
@@ -143,7 +145,7 @@ class Colmap(Developed):
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if isinstance(lens, Equidistant | KannalaBrandt):
-            # COLMAP projects points before the camera only.
+            # COLMAP projects only points in front of the camera.
             if lens.fov >= math.pi:
                 return "sees 180 degrees, where COLMAP's fisheye ends; give it a smaller fov"
         elif not isinstance(lens, Rectilinear):
@@ -158,7 +160,7 @@ class Nerfstudio(Developed):
 
     points: PointCount = Field(50000, description="Points of the point cloud, at most.")
     depth: bool = Field(False, description="Depth maps too, from sources with depth.")
-    # Changes nothing of what is written.
+    # This changes no file.
     splatfacto: bool = Field(
         False, exclude=True, description="Refuse what splatfacto cannot train on."
     )
@@ -167,8 +169,8 @@ class Nerfstudio(Developed):
         if self.splatfacto and not isinstance(lens, Rectilinear):
             return f"would be taken for a pinhole by splatfacto; {TO_RECTILINEAR}"
         if isinstance(lens, Equidistant | KannalaBrandt):
-            middle = lens.center[0] % 1 == 0.5 and lens.center[1] % 1 == 0.5
-            if middle:
+            has_pixel_on_axis = lens.center[0] % 1 == 0.5 and lens.center[1] % 1 == 0.5
+            if has_pixel_on_axis:
                 return "has a pixel on its optical axis, which is NaN to nerfstudio; use even sizes"
         elif isinstance(lens, Equirectangular):
             if not lens.is_full:
@@ -188,7 +190,7 @@ class NerfSynthetic(Developed):
 
 
 class OpenDibr(Developed):
-    """What OpenDIBR plays."""
+    """The views and list that OpenDIBR plays."""
 
     format: Literal["png", "h265"] = Field("png", description="h265 needs ffmpeg.")
 
@@ -200,8 +202,8 @@ class OpenDibr(Developed):
             return f"has a lens that OpenDIBR lacks; {TO_RECTILINEAR}, equidistant or a panorama"
         if self.format == "h265" and shutil.which("ffmpeg") is None:
             return "is to be H.265, for which ffmpeg must be installed; or give format: png"
-        odd = _odd(lens) if self.format == "h265" else None
-        return odd or (None if has_depth else NO_DEPTH)
+        refusal = _odd_size_refusal(lens) if self.format == "h265" else None
+        return refusal or (None if has_depth else NO_DEPTH)
 
 
 class Miv(Developed):
@@ -213,7 +215,7 @@ class Miv(Developed):
                 "has a lens that MIV lacks; reproject to rectilinear, or to equirectangular, "
                 "a fisheye of 180 degrees with longitude: [-90, 90], and format: exr"
             )
-        return _odd(lens) or (None if has_depth else NO_DEPTH)
+        return _odd_size_refusal(lens) or (None if has_depth else NO_DEPTH)
 
 
 class Hci(Developed):
@@ -225,7 +227,7 @@ class Hci(Developed):
     def rig_refusal(self, rig: Rig) -> str | None:
         if isinstance(rig, Plane) and not rig.cube_map and rig.look_at is None:
             return None
-        return "is no plane of parallel cameras, which HCI's light fields are; export planes alone"
+        return "is no plane of parallel cameras, which HCI's layout needs; export only planes"
 
 
 class ScanNetPP(Developed):
@@ -266,24 +268,24 @@ class Exports(Settings):
     point_cloud: PointCloud | None = None
 
     @property
-    def wanted(self) -> dict[str, Export]:
-        """The exports that are asked for, by name."""
+    def selected(self) -> dict[str, Export]:
+        """The exports that the scene YAML selects, by name."""
         return {name: export for name, export in self if export}
 
 
-def _odd(lens: Lens) -> str | None:
-    """Say that a lens's image has an odd side, where four pixels share a colour; None if not."""
+def _odd_size_refusal(lens: Lens) -> str | None:
+    """Return why YUV 4:2:0, where 2 × 2 pixels share a colour, cannot hold an image. Or None."""
     if lens.width % 2 or lens.height % 2:
         return "has an odd width or height, which YUV 4:2:0 cannot have; use even sizes"
     return None
 
 
 def _centred_pinhole(lens: Lens) -> str | None:
-    """Say why a lens is no pinhole with a centred axis and square pixels; None if it is."""
+    """Return why a lens is no pinhole with a centred axis and square pixels. None if it is."""
     if not isinstance(lens, Rectilinear):
-        return f"is no pinhole camera, which this layout knows alone; {TO_RECTILINEAR}"
+        return f"is no pinhole camera, the only one that this layout has; {TO_RECTILINEAR}"
     if lens.center != (lens.width / 2, lens.height / 2) or not lens.has_square_pixels:
-        return "has its axis off centre or oblong pixels, which this layout cannot say"
+        return "has its axis off centre or oblong pixels, which this layout cannot describe"
     return None
 
 
@@ -299,7 +301,7 @@ class ExportSettings(Settings, Generic[Options]):
         {}, description="Folders of the rigs' datasets whose views test what is trained on these."
     )
     trained_by: str | None = Field(
-        None, description="The transforms.json that these views test, whose scale is taken."
+        None, description="The training views' transforms.json, which gives these views its scale."
     )
 
     @model_validator(mode="after")
@@ -310,7 +312,7 @@ class ExportSettings(Settings, Generic[Options]):
 
     @property
     def source(self) -> str:
-        """The source's folder in the dataset's; empty for the rendered views."""
+        """The source's folder within the dataset's folder. Empty for the rendered views."""
         (name,) = self.options.sources
         return "" if name == VIEWS else name
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, TypeAdapter
 
-# That of Python 3.11 is not enough for pydantic.
+# Pydantic needs this one in Python 3.11.
 from typing_extensions import TypedDict
 
 from lightfield.core.files import read_keys
@@ -15,7 +15,7 @@ _Count = Annotated[int, Field(ge=0)]
 
 
 class _ExternalFile(TypedDict, total=False):
-    """A file that a .blend reads. Its size and sum are null where it was missing."""
+    """A file that a .blend reads. Size, time and SHA-256 of a missing file are null."""
 
     path: str
     bytes: _Count | None
@@ -24,7 +24,7 @@ class _ExternalFile(TypedDict, total=False):
 
 
 class _Inventory(TypedDict, total=False):
-    """The keys that programs read. Each program says which of them it needs."""
+    """The keys that programs read. Each program names the keys that it needs."""
 
     __pydantic_config__ = ConfigDict(strict=True)  # type: ignore[misc]
 
@@ -42,7 +42,7 @@ _INVENTORY = TypeAdapter(_Inventory)
 
 
 def read_inventory(path: Path | str, *keys: str) -> dict[str, Any]:
-    """Return the inventory of a scene. Raises `UserError` where a key is missing or wrong."""
+    """Return the inventory of a scene. Raises `UserError` if a key is missing or wrong."""
     content = read_keys(path, "inventory.py", *keys)
     checked(_INVENTORY, content, str(path))
     return content

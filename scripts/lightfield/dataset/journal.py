@@ -1,15 +1,16 @@
-"""Journals: what a shard's processes did and how fast, one JSON line each, kept through kills.
+"""Journals of shards: lines of JSON that say what each process did, and how fast.
 
-Every process that works on a shard appends to the shard's journal, so that it holds all the time
-that was really spent. Times of day are seconds since 1970. A process's lines are in this order:
+Every process that works on a shard appends to the shard's journal at once. So the journal holds all
+the time that was spent, even by killed processes. Times of day are seconds since 1970. The lines of
+a process are in this order:
 
 - ``started``, ``host``, ``pid``: when and where it began;
 - ``start_up_seconds``, ``start_up_cpu_seconds``, ``device``, ``threads``: the scene is open;
-- for each image ``view``, ``finished``, ``wall_seconds``, ``cpu_seconds`` and, of a rendered view,
-  Cycles' own ``render_seconds`` and ``synchronization_seconds``, ``geometry_seconds``, the part of
-  ``wall_seconds`` that depth took, and ``memory_bytes``;
-- ``ended``, ``wall_seconds``, ``cpu_seconds``, ``peak_memory_bytes``: of the whole process. A
-  process that was killed lacks this line.
+- for each image ``view``, ``finished``, ``wall_seconds`` and ``cpu_seconds``. A rendered view also
+  has Cycles' own ``render_seconds`` and ``synchronization_seconds``, ``memory_bytes``, and
+  ``geometry_seconds``, which is the part of ``wall_seconds`` for depth;
+- ``ended``, ``wall_seconds``, ``cpu_seconds``, ``peak_memory_bytes``: the totals of the process. A
+  killed process lacks this line.
 """
 
 import os
@@ -28,15 +29,17 @@ from lightfield.core import memory
 from lightfield.core.files import append_json_line, read_json_lines
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 
-# Of all shards in a folder: 0-6.journal.jsonl is of the views from 0 to 5.
+# The journals of all shards in a folder. 0-6.journal.jsonl is for the views from 0 to 5.
 JOURNALS = f"[0-9]*-[0-9]*{JOURNAL_SUFFIX}"
 
-# A machine that has failed so often, one time after the other, is avoided.
+# A machine that has failed so often in a row is avoided.
 MOST_FAILURES = 3
-# A view is suspect that was rendered in so small a part of the time of so many others at least.
-SUSPECT_PART, SUSPECT_AFTER = 0.02, 3
+# A view is suspect if it took less than this part of the median time of its shard's views.
+SUSPECT_PART = 0.02
+# This needs at least so many other views.
+SUSPECT_AFTER = 3
 
-# What every line of a kind has, after the key that says which kind it is.
+# The keys of each kind of line. The first key shows the kind.
 _LINES: dict[str, dict[str, type]] = {
     "started": {"started": float, "host": str, "pid": int},
     "start_up_seconds": {"start_up_seconds": float, "device": str, "threads": int},
@@ -52,11 +55,11 @@ _LINES: dict[str, dict[str, type]] = {
 
 
 class Journal:
-    """Appends the lines of this process to a journal; with ``path`` None it writes nothing."""
+    """Appends the lines of this process to a journal. With ``path`` None it writes nothing."""
 
     def __init__(self, path: Path | None) -> None:
         self.path = path
-        # Until here Python read its modules, which takes hardly longer than its processor time.
+        # Until now Python has loaded modules, which takes hardly longer than its processor time.
         self.started = round(time.time() - time.process_time(), 3)
         self.append({"started": self.started, "host": socket.gethostname(), "pid": os.getpid()})
 
@@ -80,7 +83,7 @@ class Journal:
 
 @dataclass
 class Run:
-    """One process's part of a journal: its first lines, its images, and whether it ended."""
+    """One process's part of a journal: its start, its images, and its end if it was not killed."""
 
     start: dict[str, Any]
     views: list[dict[str, Any]] = field(default_factory=list)
@@ -88,12 +91,12 @@ class Run:
 
     @property
     def later_views(self) -> list[dict[str, Any]]:
-        """All but the first, whose time holds some of the start-up; that one, if it is alone."""
+        """All views but the first, whose time includes some of the start-up. Or the only view."""
         return self.views[1:] or self.views
 
     @property
     def last_heard(self) -> float:
-        """When it last wrote, in seconds since 1970."""
+        """The time of its last line, in seconds since 1970."""
         if self.end:
             return float(self.end["ended"])
         if self.views:
@@ -102,34 +105,34 @@ class Run:
 
     @property
     def wall_seconds(self) -> float:
-        """How long it is known to have worked; what a killed one had begun last is not known."""
+        """Its working time until its last line. A killed process may have worked longer."""
         return round(self.last_heard - float(self.start["started"]), 3)
 
     @property
     def cpu_seconds(self) -> float:
-        """Processor time of the same."""
+        """Its processor time until its last line."""
         if self.end:
             return float(self.end["cpu_seconds"])
-        begun = float(self.start.get("start_up_cpu_seconds", 0))
-        return begun + sum(float(view["cpu_seconds"]) for view in self.views)
+        start_up = float(self.start.get("start_up_cpu_seconds", 0))
+        return start_up + sum(float(view["cpu_seconds"]) for view in self.views)
 
     @property
     def peak_memory_bytes(self) -> int:
-        """Most memory that it is known to have had."""
+        """The most memory in its lines."""
         if self.end:
             return int(self.end["peak_memory_bytes"])
         return max((view.get("memory_bytes", 0) for view in self.views), default=0)
 
     def is_running(self) -> bool | None:
-        """Whether it is at work now; None if that cannot be seen, being on another machine."""
+        """Return whether it works now. None if it is on another machine."""
         if self.end:
             return False
         if self.start["host"] != socket.gethostname():
             return None
         try:
-            # Another process may have got its number since; these times are good to 1 s or so.
-            begun = psutil.Process(self.start["pid"]).create_time()
-            return bool(begun < self.start["started"] + 2)
+            # A later process may have the same number. These times are exact to about 1 s.
+            created = psutil.Process(self.start["pid"]).create_time()
+            return bool(created < self.start["started"] + 2)
         except psutil.NoSuchProcess:
             return False
 
@@ -137,8 +140,7 @@ class Run:
 def read(path: Path) -> list[Run]:
     """Return the runs in a journal, in their order.
 
-    A line that a kill cut short is left out, and so is one that was damaged since, and what stands
-    before the first start.
+    Leaves out damaged lines, lines that a kill cut short, and lines before the first start.
     """
     runs: list[Run] = []
     for entry in read_json_lines(path):
@@ -157,37 +159,51 @@ def read(path: Path) -> list[Run]:
     return runs
 
 
-def avoided(shard: Sequence[Run], others: Iterable[Sequence[Run]]) -> list[str]:
-    """Return the hosts to avoid when a shard is submitted again, whose runs are all over.
+def avoided(shard: Sequence[Run], other_shards: Iterable[Sequence[Run]]) -> list[str]:
+    """Return the hosts to avoid when a shard is submitted again. All its runs have stopped.
 
-    That is where it failed last, and where the last `MOST_FAILURES` runs of all failed. Of the
-    ``others`` the last run may still be at work. No host is avoided while no other one has ended
-    a run: it may be the only one.
+    These are the host of its last failure, and hosts whose last `MOST_FAILURES` runs failed. The
+    last run of each of the ``other_shards`` may still be at work. Returns no hosts unless another
+    host has ended a run: there may be no other host.
     """
-    over = [(run.start["started"], run.start["host"], bool(run.end)) for run in shard]
-    for runs in others:
-        known = [*runs[:-1], *(run for run in runs[-1:] if run.end)]
-        over += [(run.start["started"], run.start["host"], bool(run.end)) for run in known]
-    ended: dict[str, list[bool]] = defaultdict(list)
-    for _, host, has_ended in sorted(over):
-        ended[host].append(has_ended)
-    failing = {host for host, past in ended.items() if not any(past[-MOST_FAILURES:])}
-    found = {host for host in failing if len(ended[host]) >= MOST_FAILURES}
-    found |= {run.start["host"] for run in shard[-1:] if not run.end}
-    return sorted(found) if any(any(ended[host]) for host in ended.keys() - found) else []
+    stopped_runs = list(shard)
+    for runs in other_shards:
+        stopped_runs += runs[:-1]
+        stopped_runs += [run for run in runs[-1:] if run.end]
+    outcomes: dict[str, list[bool]] = defaultdict(list)
+    for run in sorted(stopped_runs, key=_start_host_and_outcome):
+        outcomes[run.start["host"]].append(bool(run.end))
+    failing_hosts = {
+        host
+        for host, past in outcomes.items()
+        if len(past) >= MOST_FAILURES and not any(past[-MOST_FAILURES:])
+    }
+    failing_hosts |= {run.start["host"] for run in shard[-1:] if not run.end}
+    good_hosts = [host for host, past in outcomes.items() if any(past)]
+    return sorted(failing_hosts) if set(good_hosts) - failing_hosts else []
 
 
-def is_suspect(seconds: float, others: Sequence[float]) -> bool:
-    """Whether a view took implausibly few seconds, beside the ``others`` of its shard."""
-    return len(others) >= SUSPECT_AFTER and seconds < SUSPECT_PART * median(others)
+def _start_host_and_outcome(run: Run) -> tuple[float, str, bool]:
+    return run.start["started"], run.start["host"], bool(run.end)
+
+
+def is_suspect(seconds: float, other_seconds: Sequence[float]) -> bool:
+    """Return whether a view was implausibly fast, compared with its shard's other views."""
+    return len(other_seconds) >= SUSPECT_AFTER and seconds < SUSPECT_PART * median(other_seconds)
 
 
 def _is_sound(entry: dict[str, Any]) -> bool:
-    """Whether an entry is a journal's line, with all that such a line has."""
+    """Return whether an entry is a journal's line with all its keys."""
     kind = next((kind for kind in _LINES if kind in entry), None)
-    return kind is not None and all(
-        isinstance(entry.get(key), (int, float) if expected is float else expected)
-        # No time or memory is larger. NaN fails the comparison, too.
-        and (expected is str or abs(entry[key]) < 1e18)
-        for key, expected in _LINES[kind].items()
-    )
+    if kind is None:
+        return False
+    return all(_has_type(entry.get(key), expected) for key, expected in _LINES[kind].items())
+
+
+def _has_type(value: Any, expected: type) -> bool:
+    """Return whether a value of a line is plausible. A whole number may stand for a float."""
+    if expected is str:
+        return isinstance(value, str)
+    numbers = (int, float) if expected is float else (int,)
+    # No time or memory is larger. NaN fails this comparison, too.
+    return isinstance(value, numbers) and abs(value) < 1e18

@@ -1,10 +1,11 @@
-"""What a view's pixels follow from: the scene's fingerprint, the render key, and the seed.
+"""The keys that identify a view's pixels: the scene's fingerprint, the render key, and the seed.
 
-Two views with equal keys have equal pixels, so a finished view is recognised by its key and
-never rendered twice, and a change of settings is never mistaken for a finished view. What pruning
-leaves out changes no byte (see `lightfield.rendering.pruning`) and is therefore not in the key. Nor
-is the machine, which changes last digits (see `lightfield.core.machine`): a build goes on wherever
-it is resumed, each view names the machine that rendered it, and validation says if these differ.
+Two views with equal keys have equal pixels. So a finished view is recognised by its key, and never
+rendered twice. A view of other settings has another key.
+
+Two things are not in the key. Pruning changes no byte (see `lightfield.rendering.pruning`). The
+machine changes last digits (see `lightfield.core.machine`), but a build may be resumed on another.
+So each view names the machine that rendered it, and validation reports differences.
 """
 
 import hashlib
@@ -19,24 +20,23 @@ from lightfield.dataset import published
 from lightfield.dataset.config import BUILDERS, SceneSource
 from lightfield.dataset.lightfield import MACHINE, LightField, View
 
-# Raised when the program that renders changes what it writes for the same settings, and that which
-# computes flow.
+# Raise these when rendering, or the computation of flow, writes other files for equal settings.
 RENDER_VERSION = 4
 FLOW_VERSION = 1
 
 
-# Looked up in the package's files, which takes a millisecond.
+# Cached, because a look-up in a package's files takes a millisecond.
 version = cache(metadata.version)
 
 
 def scene_fingerprint(source: SceneSource, external: Sequence[tuple[str, str | None]] = ()) -> str:
-    """Return what identifies a scene YAML's ``scene`` block: 64 hexadecimal digits.
+    """Return the identity of a scene YAML's ``scene`` block: 64 hexadecimal digits.
 
-    A .blend is identified by its bytes and those of the ``external`` files that it reads, each
-    given by its path and SHA-256, None where it is missing; raises `UserError` while its own
-    SHA-256 is not known. Somebody else's views are by their lightfield.json. A built scene differs
-    from build to build (it holds memory addresses), so it is identified by the text of the builder
-    and of the library that all builders have in common, its parameters, and bpy's version.
+    - A .blend: its SHA-256, and the path and SHA-256 of each of the ``external`` files that it
+      reads. None stands for a missing file. Raises `UserError` if its own SHA-256 is unknown.
+    - Somebody else's views: their lightfield.json.
+    - A builder: its source code, that of the builders' library, the parameters, and bpy's version.
+      The built .blend does not count: it holds memory addresses, which differ between builds.
     """
     if source.blend:
         if source.sha256 is None:
@@ -45,11 +45,10 @@ def scene_fingerprint(source: SceneSource, external: Sequence[tuple[str, str | N
     if source.dataset:
         return _digest(published.fingerprint(source.dataset))
     assert source.builder
-    files = [
-        [file.relative_to(BUILDERS).as_posix(), _hash(file.read_bytes())]
-        for folder in ("library", source.builder)
-        for file in sorted((BUILDERS / folder).rglob("*.py"))
-    ]
+    files = []
+    for folder in ("library", source.builder):
+        for file in sorted((BUILDERS / folder).rglob("*.py")):
+            files.append([file.relative_to(BUILDERS).as_posix(), _hash(file.read_bytes())])
     return _digest([files, source.parameters.model_dump(), version("bpy")])
 
 
@@ -61,12 +60,12 @@ def render_key(lightfield: LightField, view: View) -> str:
 
 
 def names_key(lightfield: LightField) -> str:
-    """Return the key of the numbers that a light field's objects and materials have."""
+    """Return the key of the numbers of a light field's objects and materials."""
     return _digest([RENDER_VERSION, version("bpy"), lightfield.content.get("scene")])
 
 
 def flow_key(lightfield: LightField, view: View, other: View, sums: Sequence[str]) -> str:
-    """Return the key of the flow between two views of these SHA-256 checksums."""
+    """Return the key of the flow between two views, whose SHA-256 checksums are ``sums``."""
     poses = [view.matrix.tolist(), other.matrix.tolist()]
     return _digest([FLOW_VERSION, lightfield.lens.to_lightfield(), poses, list(sums)])
 

@@ -8,9 +8,9 @@ and a JSON mapping:
 - ``history``: the same for files that only grow, such as journals; no job can make them again;
 - ``inputs``: a `Stamp` for each file that the job read, taken before it started.
 
-A line counts until a later line names the same outputs. A line whose SHA-256 does not hold counts
-for nothing. So every file knows what it was made from, wherever Snakemake's own notes are, and a
-file that was damaged or made from something else is found when a run is planned.
+A line counts until a later line names the same outputs. A line with a wrong SHA-256 does not count.
+So the ledger knows what every file was made from, even without Snakemake's own notes. The plan of a
+run uses it to detect damaged files, and files that were made from other inputs.
 """
 
 import fcntl
@@ -35,15 +35,15 @@ from lightfield.core.files import (
 )
 
 NAME = "ledger.txt"
-# The ledger is written anew when more than this part of its lines counts no more.
+# The ledger is written anew when more than this part of its lines no longer counts.
 _OBSOLETE_PART = 0.5
 
 
 class Stamp(NamedTuple):
-    """What tells whether a file changed: its SHA-256, and what its file system says of it.
+    """A file's SHA-256, size and times, which show whether the file has changed.
 
-    ``changed_ns`` is the inode's change time, which no program can set back. A file of the same
-    size and times is taken for unchanged, as Git does.
+    ``changed_ns`` is the inode's change time, which no program can set back. As in Git, a file with
+    the same size and times counts as unchanged.
     """
 
     sha256: str
@@ -53,8 +53,8 @@ class Stamp(NamedTuple):
 
     @classmethod
     def of(cls, path: str | Path, digest: str | None = None) -> Self:
-        """Return the stamp of a file, whose SHA-256 is computed unless it is given."""
-        status = os.stat(path)  # noqa: PTH116, a `Path` for each of a hundred thousand is slow
+        """Return the stamp of a file. Computes the SHA-256 unless ``digest`` is given."""
+        status = os.stat(path)  # noqa: PTH116, a `Path` is slow for 100,000 files
         digest = digest or sha256(path)
         return cls(digest, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
 
@@ -77,32 +77,36 @@ class Job(NamedTuple):
 
 
 class Ledger:
-    """The ledger at ``path``, as it was when it was opened and as ``note`` has extended it.
+    """The ledger at ``path``, as it was when it was opened, with the jobs that ``note`` added.
 
-    Of jobs that ``is_current`` says nothing of, only the sums of their outputs are kept.
+    ``is_current`` says whether the present configuration has an output. The files of other jobs
+    are not checked for damage.
     """
 
     def __init__(self, path: Path, is_current: Callable[[str], bool] = lambda _: True) -> None:
         self._path = path
-        # By output: the SHA-256 of the file, and the stamps of what it was made from.
+        # The SHA-256 of each output.
         self.sums: dict[str, str] = {}
+        # The stamps of the inputs that each output was made from.
         self._inputs: dict[str, dict[str, Stamp]] = {}
-        # Jobs of which a file is not as it was noted.
+        # Jobs with a file whose size or times differ from its stamp.
         self._suspects: list[Job] = []
-        lines = obsolete = 0
+        line_count = 0
+        obsolete_count = 0
         for job in jobs(path):
-            lines += 1
+            line_count += 1
             if all(name in self._inputs for name in job.outputs):
-                obsolete += 1
+                obsolete_count += 1
                 continue
-            self._keep(job)
+            self._add_unless_known(job)
             if not any(map(is_current, job.outputs)):
                 continue
             if not all(stamp.is_current(name) for name, stamp in job.files.items()):
                 self._suspects.append(job)
-        self.is_cluttered = obsolete > _OBSOLETE_PART * lines
+        self.is_cluttered = obsolete_count > _OBSOLETE_PART * line_count
 
-    def _keep(self, job: Job) -> None:
+    def _add_unless_known(self, job: Job) -> None:
+        """Add the outputs of a job that no later job has made."""
         for name in job.outputs:
             if name not in self._inputs:
                 self._inputs[name] = job.inputs
@@ -123,10 +127,10 @@ class Ledger:
 
     @cached_property
     def damage(self) -> dict[str, tuple[str, list[str]]]:
-        """By path: what is wrong with a damaged file, and the outputs of the job that made it.
+        """For each damaged path: what is wrong with it, and the outputs of the job that made it.
 
-        A file of other times is compared with its SHA-256. A missing file counts only if its job
-        did not declare it: Snakemake sees the others.
+        A file with other times is compared by its SHA-256. A missing file counts only if its job
+        did not declare it, because Snakemake detects the others.
         """
         damage = {}
         for job in self._suspects:
@@ -138,7 +142,7 @@ class Ledger:
         return damage
 
     def refresh(self) -> None:
-        """Note the present times of files that have new times but their old content."""
+        """Note the present times of files that have new times, but the same content."""
         for job in self._suspects:
             if not self.damage.keys() & job.files.keys():
                 files = {
@@ -149,13 +153,13 @@ class Ledger:
                 _append(self._path, job._replace(files=files))
 
     def outdated_outputs(self) -> Iterator[str]:
-        """Yield the outputs that were made from something else than their jobs would read now."""
+        """Yield the outputs that were made from other content than their inputs have now."""
         return (output for output in self._inputs if self.changed_input(output) is not None)
 
     def has_other_inputs(self, output: str, names: set[str], *, may_lack: bool = False) -> bool:
-        """Return whether an output was made from other files than these, whatever they hold.
+        """Return whether an output was made from other paths than ``names``. Ignores their content.
 
-        With ``may_lack`` the ledger may lack some that were read.
+        With ``may_lack``, the ledger may lack some of ``names``.
         """
         noted = self._inputs.get(output)
         if noted is None:
@@ -163,9 +167,9 @@ class Ledger:
         return not noted.keys() <= names if may_lack else noted.keys() != names
 
     def changed_input(self, output: str) -> str | None:
-        """Return an input that is no longer the one from which an output was made; None if none.
+        """Return an input that has changed since an output was made from it, or None.
 
-        An input that no longer exists is Snakemake's to judge.
+        Ignores an input that no longer exists, because Snakemake handles it.
         """
         for name, stamp in self._inputs[output].items():
             if name in self.sums:
@@ -176,14 +180,14 @@ class Ledger:
         return None
 
     def last_read(self, name: str, digest: str) -> int | None:
-        """Return when a file of this SHA-256 was changed that a job has read, in nanoseconds."""
+        """Return the time in nanoseconds of an input with this SHA-256. None if no job read it."""
         for inputs in self._inputs.values():
             if name in inputs and inputs[name].sha256 == digest:
                 return inputs[name].modified_ns
         return None
 
     def input_stamps(self, names: Iterable[str]) -> dict[str, Stamp]:
-        """Return the stamps of the files that a job is about to read, those that exist."""
+        """Return the stamps of a job's inputs, before it starts. Skips files that do not exist."""
         stamps = {}
         for name in names:
             if Path(name).is_file():
@@ -191,34 +195,34 @@ class Ledger:
         return stamps
 
     def _trusted_sum(self, name: str) -> str | None:
-        """Return the noted SHA-256 of a file that no damage was found in; None if unknown."""
+        """Return the noted SHA-256 of an undamaged file. None if it is damaged or unknown."""
         return None if name in self.damage else self.sums.get(name)
 
     def compact(self) -> None:
-        """Write the ledger without the lines that count no more."""
+        """Write the ledger without the lines that no longer count."""
         with _locked(self._path):
-            kept: list[Job] = []
+            current_jobs: list[Job] = []
             outputs: set[str] = set()
             for job in jobs(self._path):
                 if not outputs.issuperset(job.outputs):
                     outputs.update(job.outputs)
-                    kept.append(job)
-            with atomic_path(self._path) as temporary:
-                temporary.write_bytes(b"".join(map(_line, reversed(kept))))
+                    current_jobs.append(job)
+            _write(self._path, current_jobs)
 
 
 def jobs(path: Path) -> Iterator[Job]:
-    """Yield the jobs of a ledger, the latest first; none where there is no ledger to read.
+    """Yield the jobs of a ledger, the latest first. Skips damaged lines.
 
-    Lines that are damaged are left out.
+    Yields nothing if there is no ledger.
     """
     for line in reversed(_lines(path)):
-        if (job := _parse(line)) is not None:
+        job = _parse(line)
+        if job is not None:
             yield job
 
 
 def damaged_lines(path: Path) -> list[int]:
-    """Return the numbers, from 1 on, of the lines whose SHA-256 does not hold."""
+    """Return the numbers, from 1 on, of the damaged lines."""
     return [number for number, line in enumerate(_lines(path), 1) if _parse(line) is None]
 
 
@@ -234,16 +238,21 @@ def read(path: Path) -> dict[str, str]:
 def forget(path: Path, name: str) -> None:
     """Remove a file of history from every line."""
     with _locked(path):
-        kept = []
+        changed_jobs = []
         for job in jobs(path):
             history = {other: stamp for other, stamp in job.history.items() if other != name}
-            kept.append(job._replace(history=history))
-        with atomic_path(path) as temporary:
-            temporary.write_bytes(b"".join(map(_line, reversed(kept))))
+            changed_jobs.append(job._replace(history=history))
+        _write(path, changed_jobs)
+
+
+def _write(path: Path, latest_first: list[Job]) -> None:
+    """Replace a ledger by the lines of these jobs."""
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(b"".join(map(_line, reversed(latest_first))))
 
 
 def _has_changed(name: str, stamp: Stamp) -> bool:
-    """Return whether a file has other bytes than its stamp; one that is gone has not."""
+    """Return whether a file has other bytes than its stamp. False for a missing file."""
     try:
         return _digest_now(name) != stamp.sha256
     except OSError:
@@ -251,7 +260,7 @@ def _has_changed(name: str, stamp: Stamp) -> bool:
 
 
 def _digest_now(name: str) -> str:
-    """Return the SHA-256 of a file, read once: thousands of shards are made from one .blend."""
+    """Return the SHA-256 of a file. Reads it once: thousands of shards may depend on one .blend."""
     status = os.stat(name)  # noqa: PTH116, as above
     return _digest(name, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
 
@@ -262,16 +271,16 @@ def _digest(name: str, _bytes: int, _modified_ns: int, _changed_ns: int) -> str:
 
 
 def _problem(name: str, stamp: Stamp) -> str | None:
-    """Say what is wrong with a file; None if it has the bytes of its stamp."""
+    """Return what is wrong with a file. None if it has the bytes of its stamp."""
     if not os.path.lexists(name):
         return "is missing"
     if problem := broken(Path(name)):
         return problem
     try:
-        same = sha256(name) == stamp.sha256
+        is_same = sha256(name) == stamp.sha256
     except OSError as error:
         return f"cannot be read: {read_problem(error)}"
-    return None if same else f"its sha256 is not the one in {NAME}"
+    return None if is_same else f"its sha256 is not the one in {NAME}"
 
 
 def _lines(path: Path) -> list[bytes]:
@@ -308,7 +317,7 @@ def _stamp(digest: Any, *numbers: Any) -> Stamp:
 
 
 def _checked(value: Any, kind: type) -> Any:
-    """Return a value of a kind; raises TypeError for any other."""
+    """Return a value of a type. Raises TypeError for a value of another type."""
     if not isinstance(value, kind):
         raise TypeError(f"is no {kind.__name__}")
     return value
@@ -335,7 +344,7 @@ def _append(path: Path, job: Job) -> None:
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Hold the lock of a ledger: two runs may note jobs at the same time."""
+    """Hold the lock of a ledger, because two runs may note jobs at the same time."""
     with path.with_name(f".{path.name}.lock").open("a") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield

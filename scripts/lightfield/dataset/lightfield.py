@@ -239,7 +239,7 @@ class LightField:
     @property
     def passes(self) -> list[Pass]:
         """What the views have beside colour and depth; of a reprojection, what it has itself."""
-        return passes.wanted(self.content if "passes" in self.content else self._render)
+        return passes.selected(self.content if "passes" in self.content else self._render)
 
     @property
     def transparent(self) -> bool:

@@ -1,4 +1,4 @@
-"""The datasets that a configuration and its scene YAMLs describe, within a preset's limits."""
+"""Resolves the datasets of a configuration and its scene YAMLs, within a preset's limits."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -22,48 +22,63 @@ from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.overview import sees_all_round
 from lightfield.geometry.rigs import Poses, Rig
 
-# Parts of a split that a rig may be as a whole beside one that trains.
+# A rig whose split is one of these tests what is trained on another rig.
 TESTED_WITH = ("validation", "test")
 
 
 def load_datasets(settings: Configuration, cluster: Cluster | None = None) -> list[Dataset]:
-    """Read the scene YAMLs that a configuration chooses and resolve their datasets.
+    """Read the scene YAMLs that a configuration chooses, and resolve their datasets.
 
-    ``cluster`` is the one that renders them, if any.
-    Raises `UserError` for a scene that is not there, not right, or without the rigs asked for, and
-    for one whose folder another scene has under another preset.
+    ``cluster`` is the cluster that renders them, if any. Raises `UserError` for a scene that is
+    missing, wrong, or without the chosen rigs. Also raises it for two scenes with equal folders.
     """
-    found: list[Dataset] = []
+    datasets: list[Dataset] = []
+    limits = settings.presets[settings.preset]
     for scene in settings.scenes:
-        full = settings.preset == "full"
-        folder = scene if full else f"{scene}_{settings.preset}"
-        base, _, preset = folder.rpartition("_")
-        other = base if full else folder
-        if preset in settings.presets.keys() - {"full"} and config.scene_path(other).is_file():
-            raise UserError(
-                f"config.yaml: scenes: {folder} would be the folder of both {base} with "
-                f"preset={preset} and {folder}; give one of these scene YAMLs another name"
-            )
-        limits = settings.presets[settings.preset]
-        found += scene_datasets(scene, settings.preset, limits, settings, cluster)
+        _check_scene_folder(scene, settings)
+        datasets += scene_datasets(scene, settings.preset, limits, settings, cluster)
     if settings.rigs == "all":
-        return found
-    known = {dataset.rig_name for dataset in found}
-    for rig in settings.rigs:
-        if rig not in known:
+        return datasets
+    _check_chosen_rigs(settings.rigs, settings.scenes, datasets)
+    return [dataset for dataset in datasets if dataset.rig_name in settings.rigs]
+
+
+def _check_scene_folder(scene: str, settings: Configuration) -> None:
+    """Raise `UserError` if another scene under another preset would have the same folder.
+
+    The scene garden_tiny has the folder of the scene garden under the preset tiny.
+    """
+    is_full = settings.preset == "full"
+    folder = scene if is_full else f"{scene}_{settings.preset}"
+    base, _, preset = folder.rpartition("_")
+    other_scene = base if is_full else folder
+    has_preset_suffix = preset in settings.presets.keys() - {"full"}
+    if has_preset_suffix and config.scene_path(other_scene).is_file():
+        raise UserError(
+            f"config.yaml: scenes: {folder} would be the folder of both {base} with "
+            f"preset={preset} and {folder}; give one of these scene YAMLs another name"
+        )
+
+
+def _check_chosen_rigs(chosen_rigs: list[str], scenes: list[str], datasets: list[Dataset]) -> None:
+    """Raise `UserError` for a chosen rig without a scene, or a scene without a chosen rig."""
+    existing_rigs = {dataset.rig_name for dataset in datasets}
+    for rig in chosen_rigs:
+        if rig not in existing_rigs:
             raise UserError(
-                f"config.yaml: rigs: {rig!r} is in none of the scenes {', '.join(settings.scenes)}"
-                f"; must be all or some of {', '.join(sorted(known))}"
+                f"config.yaml: rigs: {rig!r} is in none of the scenes {', '.join(scenes)}"
+                f"; must be all or some of {', '.join(sorted(existing_rigs))}"
             )
-    for scene in settings.scenes:
+    for scene in scenes:
         # A sequence has a dataset for each frame.
-        own = dict.fromkeys(dataset.rig_name for dataset in found if dataset.scene_name == scene)
-        if not own.keys() & set(settings.rigs):
+        rigs = dict.fromkeys(
+            dataset.rig_name for dataset in datasets if dataset.scene_name == scene
+        )
+        if not rigs.keys() & set(chosen_rigs):
             raise UserError(
-                f"config.yaml: rigs: none of {', '.join(settings.rigs)} is in {scene}; "
-                f"it has {', '.join(own)}; all takes them all"
+                f"config.yaml: rigs: none of {', '.join(chosen_rigs)} is in {scene}; "
+                f"it has {', '.join(rigs)}; all takes them all"
             )
-    return [dataset for dataset in found if dataset.rig_name in settings.rigs]
 
 
 def scene_datasets(
@@ -75,7 +90,7 @@ def scene_datasets(
 ) -> list[Dataset]:
     """Resolve every dataset of one scene YAML under the ``limits`` of a preset.
 
-    Of the ``settings``, folders and length of shards count. ``cluster`` is the one that renders.
+    Uses the folders and the length of shards of ``settings``. ``cluster`` renders the datasets.
     """
     limits = limits or Preset()
     written = config.load_scene(scene)
@@ -101,7 +116,7 @@ def scene_datasets(
                 has_panorama=_has_panorama(rig, written),
                 limits=limits,
                 **_split_partners(rig, written, folder.removeprefix(name)),
-                **_where_and_how_long(settings),
+                **_folders_and_shards(settings),
                 cluster=cluster,
             )
             datasets.append(dataset)
@@ -109,7 +124,7 @@ def scene_datasets(
 
 
 def _rig_of(scene: str, name: str, written: config.Scene, preset: str, limits: Preset) -> Rig:
-    """Return a rig under a preset's ``limits``; raises `UserError` where they leave too little."""
+    """Return a rig under a preset's ``limits``. Raises `UserError` if too few views remain."""
     file = f"{config.OWN_SCENES}/{scene}.yaml"
     try:
         rig = _limited_rig(written.rigs[name], limits, written.render is not None)
@@ -127,28 +142,28 @@ def _reprojections_of(
     name: str, written: config.Scene, limits: Preset
 ) -> dict[str, config.Reprojection]:
     """Return the reprojections of a rig's views."""
-    return {
-        key: reprojection.model_copy(
-            update={"camera": reprojection.camera and _limited(reprojection.camera, limits)}
-        )
-        for key, reprojection in written.reprojections.items()
-        if name in (reprojection.rigs or written.rigs)
-    }
+    reprojections = {}
+    for key, reprojection in written.reprojections.items():
+        if name in (reprojection.rigs or written.rigs):
+            camera = reprojection.camera and _limited(reprojection.camera, limits)
+            reprojections[key] = reprojection.model_copy(update={"camera": camera})
+    return reprojections
 
 
 def _exports_of(
     rig: Rig, written: config.Scene, reprojections: dict[str, config.Reprojection]
 ) -> Exports:
-    """Return the exports of a rig's views, and of those of its ``reprojections`` that they name.
+    """Return the exports of a rig's views and ``reprojections``.
 
-    What a rig tests is exported with what is trained on.
+    A rig that tests another rig's training has no training exports of its own. The other rig's
+    exports include its views.
     """
     is_tested_elsewhere = rig.split in TESTED_WITH
     exports = {}
-    for key, export in written.exports.wanted.items():
+    for key, export in written.exports.selected.items():
         sources = [source for source in export.sources if source in (VIEWS, *reprojections)]
-        is_left_out = is_tested_elsewhere and export.is_for_training
-        exports[key] = None if is_left_out else export.model_copy(update={"sources": sources})
+        belongs_elsewhere = is_tested_elsewhere and export.is_for_training
+        exports[key] = None if belongs_elsewhere else export.model_copy(update={"sources": sources})
     return written.exports.model_copy(update=exports)
 
 
@@ -158,17 +173,18 @@ def _has_panorama(rig: Rig, written: config.Scene) -> bool:
 
 
 def _split_partners(rig: Rig, written: config.Scene, frame_folder: str) -> dict[str, Any]:
-    """Return which rigs test what is trained on this one, and on which this one's are trained."""
+    """Return `Description.tested_by` of a rig that trains, or `trained_by` of one that tests."""
+    split_of_rig = {name: other_rig.split for name, other_rig in written.rigs.items()}
     if rig.split == "train":
-        testing = [name for name, other in written.rigs.items() if other.split in TESTED_WITH]
+        testing = [name for name, split in split_of_rig.items() if split in TESTED_WITH]
         return {"tested_by": tuple(f"{name}{frame_folder}" for name in testing)}
     if rig.split in TESTED_WITH:
-        training = next((n for n, other in written.rigs.items() if other.split == "train"), None)
+        training = next((name for name, split in split_of_rig.items() if split == "train"), None)
         return {"trained_by": f"{training}{frame_folder}"}
     return {}
 
 
-def _where_and_how_long(settings: Configuration | None) -> dict[str, Any]:
+def _folders_and_shards(settings: Configuration | None) -> dict[str, Any]:
     """Return the folders and the length of shards that a configuration chooses."""
     if settings is None:
         return {}
@@ -180,7 +196,7 @@ def _where_and_how_long(settings: Configuration | None) -> dict[str, Any]:
 
 
 def rendered_frames(datasets: Iterable[Dataset]) -> list[int | Literal["file"]]:
-    """Return the frames of a scene that its ``datasets`` render; FILE is the .blend's own."""
+    """Return the frames of a scene that its ``datasets`` render. FILE is the .blend's own."""
     frames = {dataset.source.frame for dataset in datasets}
     return sorted(frames, key=lambda frame: (frame == FILE, frame))
 
@@ -195,9 +211,9 @@ def _frames(name: str, rig: Rig, frame: int | str) -> Iterator[tuple[str, int | 
 
 
 def _limited_rig(rig: Rig, limits: Preset, is_rendered: bool) -> Rig:
-    """Return a rig of as many views at most, with a file of poses found from any folder.
+    """Return a rig within ``limits``. A file of poses gets an absolute path.
 
-    Views that are there already keep their resolution.
+    Views that exist already keep their resolution.
     """
     if isinstance(rig, Poses):
         rig = rig.model_copy(update={"file": str(Path(rig.file).resolve())})
@@ -211,34 +227,35 @@ def _limited_rig(rig: Rig, limits: Preset, is_rendered: bool) -> Rig:
 def _limited_render(render: Render | None, rig: Rig, limits: Preset) -> dict[str, Any]:
     """Return the ``render`` block under a preset's ``limits``.
 
-    Of views that are there already no more is known than what their depth means.
-
-    With a ``target_error``, samples, threshold and denoising are not known before the calibration;
-    what the preset says of them limits its choice: at most ``most_samples``, and ``denoise``.
+    With a ``target_error``, the calibration will choose samples, threshold and denoising. The
+    preset limits its choice by ``most_samples`` and ``denoise``. For views that exist already, only
+    the meaning of their depth is known.
     """
     if render is None:
         assert isinstance(rig, Poses)
         return {"depth": published.depth(rig)}
     content = render.model_dump(exclude_none=True)
-    denoise = {} if limits.denoise is None else {"denoise": limits.denoise}
+    if render.samples is None:
+        # The calibration chooses these.
+        for key in CHOSEN:
+            content.pop(key, None)
     if isinstance(render.samples, int):
-        samples = min(render.samples, limits.samples or render.samples)
-        return {**content, "samples": samples, **denoise}
-    most = {"most_samples": limits.samples} if limits.samples else {}
-    if render.samples == FILE:
-        return {**content, **most, **denoise}
+        content["samples"] = min(render.samples, limits.samples or render.samples)
+    elif limits.samples:
+        content["most_samples"] = limits.samples
+    if limits.denoise is not None:
+        content["denoise"] = limits.denoise
     if isinstance(render.target_error, TargetError):
         content["target_error"] = render.target_error.value
         if render.target_error.denoise == "never":
-            denoise = {"denoise": False}
-    kept = {key: value for key, value in content.items() if key not in CHOSEN}
-    return {**kept, **most, **denoise}
+            content["denoise"] = False
+    return content
 
 
 def _limited(camera: CameraSettings, limits: Preset) -> CameraSettings:
-    """Return the camera with its image's longer side at most ``limits.resolution`` pixels.
+    """Return the camera with an image whose longer side has at most ``limits.resolution`` pixels.
 
-    An even side stays even, which video and some trainers need.
+    An even side stays even, because video and some trainers need this.
     """
     longer = max(camera.resolution)
     most = limits.resolution or longer
@@ -260,6 +277,6 @@ def _limited(camera: CameraSettings, limits: Preset) -> CameraSettings:
     size = camera.sensor_size
     square = isinstance(lens, Rectilinear) and lens.has_square_pixels
     if square and isinstance(size, tuple):
-        # Pixels stay square where a side is rounded.
+        # Pixels stay square if a side was rounded.
         update["sensor_size"] = size[0]
     return camera.model_copy(update=update)

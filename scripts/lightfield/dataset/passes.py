@@ -1,7 +1,7 @@
 """The passes that a view can have beside its colour and depth, each in an EXR of its own.
 
-They lie in a folder of the pass's name beside lightfield.json: normal/view_0000f.exr. This table
-is the only one: settings, rendering, validation and reprojection follow it.
+A pass has a folder of its name beside lightfield.json: normal/view_0000f.exr. Settings, rendering,
+validation and reprojection all use this table.
 """
 
 import json
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-# Beside the images of ids: a JSON of names and the id of each.
+# The JSON beside images of ids, which maps names to ids.
 NAMES = "names.json"
 
 
@@ -18,12 +18,16 @@ NAMES = "names.json"
 class Pass:
     """One pass.
 
-    ``kind`` is how it is resampled: "light" as colour is, a "normal" too, but it is made a unit
-    vector again, an "id" and a "matte" are those of the source pixel that the ray falls in, and
-    "motion" and "flow", which count in pixels of their own lens, are not resampled at all.
-    ``cycles`` are the passes of Cycles that it is the sum of, times Cycles' pass ``factor`` if it
-    has one; a matte is made of them side by side. Those of colour are means over all samples, the
-    others are of the surface at the pixel's centre, as depth is.
+    ``kind`` says how reprojections resample it:
+
+    - "light": as colour;
+    - "normal": as colour, and scaled to a unit vector again;
+    - "id" and "matte": the value of the source pixel that the ray falls in;
+    - "motion" and "flow": not at all, because they are in pixels of their own lens.
+
+    Its values are the sum of the Cycles passes ``cycles``, times the Cycles pass ``factor`` if it
+    has one. A matte has them side by side. Light and mattes are means over all samples. Other
+    passes describe the surface at the pixel's centre, as depth does.
     """
 
     name: str
@@ -36,21 +40,21 @@ class Pass:
 
     @property
     def of_colour(self) -> bool:
-        """Whether it comes from the samples of the colour, and not from the geometry."""
+        """Whether it is a mean over all samples, and does not describe the pixel's centre."""
         return self.kind in ("light", "matte")
 
     @property
     def needed(self) -> tuple[str, ...]:
-        """All of Cycles' passes that it follows from."""
+        """All Cycles passes that it is computed from."""
         return (*self.cycles, self.factor) if self.factor else self.cycles
 
     @property
     def bytes(self) -> int:
-        """Of a pixel, uncompressed."""
+        """The bytes of a pixel, uncompressed."""
         return len(self.channels) * (2 if self.dtype == "float16" else 4)
 
     def path(self, folder: Path, view: str) -> Path:
-        """Return a view's file of this pass; ``folder`` is that of lightfield.json."""
+        """Return a view's file of this pass. ``folder`` is the folder of lightfield.json."""
         return folder / self.name / f"{view}.exr"
 
 
@@ -82,42 +86,40 @@ def _scattered(name: str) -> Pass:
     )
 
 
-PASSES = {
-    found.name: found
-    for found in (
-        Pass(
-            "normal",
-            "normal",
-            ("R", "G", "B"),
-            "float32",
-            "unit shading normal (x, y, z) in world space, on the camera's side; 0 for a miss",
-            ("Normal",),
-        ),
-        _id("object", "Object Index"),
-        _id("material", "Material Index"),
-        _id("instance", "Object Index"),
-        _matte("CryptoObject00", "CryptoObject01", "CryptoObject02"),
-        Pass(
-            "motion",
-            "motion",
-            ("previous.X", "previous.Y", "next.X", "next.Y"),
-            "float32",
-            "where the surface is in the previous and in the next frame, in pixels from here, "
-            "x to the right and y down",
-            ("Vector",),
-        ),
-        _light("albedo", "diffuse reflectance; black on metal and glass", "Diffuse Color"),
-        _scattered("diffuse"),
-        _scattered("glossy"),
-        _scattered("transmission"),
-        _light("volume_light", "light scattered by volumes", "Volume Direct", "Volume Indirect"),
-        _light("emission", "light that the surface itself emits", "Emission"),
-        _light("environment", "light of the world, seen directly", "Environment"),
-    )
-}
+_ALL_PASSES = (
+    Pass(
+        "normal",
+        "normal",
+        ("R", "G", "B"),
+        "float32",
+        "unit shading normal (x, y, z) in world space, on the camera's side; 0 for a miss",
+        ("Normal",),
+    ),
+    _id("object", "Object Index"),
+    _id("material", "Material Index"),
+    _id("instance", "Object Index"),
+    _matte("CryptoObject00", "CryptoObject01", "CryptoObject02"),
+    Pass(
+        "motion",
+        "motion",
+        ("previous.X", "previous.Y", "next.X", "next.Y"),
+        "float32",
+        "where the surface is in the previous and in the next frame, in pixels from here, "
+        "x to the right and y down",
+        ("Vector",),
+    ),
+    _light("albedo", "diffuse reflectance; black on metal and glass", "Diffuse Color"),
+    _scattered("diffuse"),
+    _scattered("glossy"),
+    _scattered("transmission"),
+    _light("volume_light", "light scattered by volumes", "Volume Direct", "Volume Indirect"),
+    _light("emission", "light that the surface itself emits", "Emission"),
+    _light("environment", "light of the world, seen directly", "Environment"),
+)
+PASSES = {view_pass.name: view_pass for view_pass in _ALL_PASSES}
 
-# Not rendered but made of depth and poses: see `lightfield.geometry.flow`. Its files have the names
-# of two views, as in view_0000f_to_view_0001f.exr.
+# Flow is computed from depth and poses: see `lightfield.geometry.flow`. Its files have the names of
+# two views, as in view_0000f_to_view_0001f.exr.
 FLOW = Pass(
     "flow",
     "flow",
@@ -128,14 +130,14 @@ FLOW = Pass(
     (),
 )
 
-# In the header of a matte, by the specification of Cryptomatte: a layer's key is the beginning of
-# the hash of its name, and the manifest a JSON of the objects' names and hashes.
+# The header of a matte, by the specification of Cryptomatte. A layer's key is the beginning of its
+# name's hash. The manifest is a JSON of the objects' names and hashes.
 _LAYER = "cryptomatte/3ae39a5/"
 MANIFEST = f"{_LAYER}manifest"
 
 
 def matte_header(manifest: Mapping[str, str]) -> dict[str, str | int | float]:
-    """Return the attributes of a matte's EXR, by which other programs read it."""
+    """Return the attributes of a matte's EXR, which other programs need to read it."""
     return {
         f"{_LAYER}name": "CryptoObject",
         f"{_LAYER}hash": "MurmurHash3_32",
@@ -144,25 +146,29 @@ def matte_header(manifest: Mapping[str, str]) -> dict[str, str | int | float]:
     }
 
 
-# Their sum is the view's colour.
+# The passes whose sum is the view's colour.
 PARTS_OF_LIGHT = (
-    *("diffuse_light", "glossy_light", "transmission_light"),
-    *("volume_light", "emission", "environment"),
+    "diffuse_light",
+    "glossy_light",
+    "transmission_light",
+    "volume_light",
+    "emission",
+    "environment",
 )
 
 
-def wanted(settings: Mapping[str, Any]) -> list[Pass]:
-    """Return the passes that ``settings``, with a key ``passes`` or without, ask for."""
+def selected(settings: Mapping[str, Any]) -> list[Pass]:
+    """Return the passes that the key ``passes`` of ``settings`` selects. None without the key."""
     return [PASSES[name] for name in settings.get("passes", ())]
 
 
 def without(render: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a ``render`` block that asks for no passes."""
+    """Return a ``render`` block without passes."""
     return {key: value for key, value in render.items() if key != "passes"}
 
 
 def in_order(names: list[str]) -> list[str]:
-    """Return names of passes in the table's order; a ValueError for a wrong or repeated one."""
+    """Return names of passes in the table's order. Raises ValueError for wrong or repeated ones."""
     unknown = [name for name in names if name not in PASSES]
     if unknown or not names or len(set(names)) < len(names):
         raise ValueError(f"must be a list, each once, of {', '.join(PASSES)}")

@@ -1,4 +1,4 @@
-"""What is there of a dataset now, and what of it can no longer be used."""
+"""Checks which files of a dataset exist, and which are broken or outdated."""
 
 import json
 import os
@@ -13,67 +13,73 @@ from lightfield.dataset.view_store import ViewStore
 
 
 def missing_views(dataset: Dataset) -> int:
-    """How many views are not there yet."""
-    there = sum(entry.name.endswith(".exr") for entry in _entries(dataset.folder, "exr"))
-    return max(0, dataset.view_count - there)
+    """Return how many views do not exist yet."""
+    existing = sum(entry.name.endswith(".exr") for entry in _entries(dataset.folder, "exr"))
+    return max(0, dataset.view_count - existing)
 
 
 def broken_files(dataset: Dataset) -> Iterator[tuple[str, str]]:
     """Yield each view and journal that cannot be read as a file, and why."""
-    views = (view for name in dataset.image_folders for view in _entries(dataset.folder, name))
-    journals = (journal for stage in dataset.stages for journal in _entries(dataset.work, stage))
-    for entry in (*views, *journals):
-        is_own = entry.name.endswith((".exr", ".png", ".jsonl"))
-        if is_own and (problem := unreadable(entry.path)):
+    entries = []
+    for name in dataset.image_folders:
+        entries += _entries(dataset.folder, name)
+    for stage in dataset.stages:
+        entries += _entries(dataset.work, stage)
+    for entry in entries:
+        is_view_or_journal = entry.name.endswith((".exr", ".png", ".jsonl"))
+        if is_view_or_journal and (problem := unreadable(entry.path)):
             yield entry.path, problem
 
 
 def outgrown_records(dataset: Dataset) -> list[str]:
-    """Return the records of imported views that were written anew since they were taken over.
-
-    So is one whose source has another size. A view that left its source is needed no more.
-    """
+    """Return the records of imported views whose source files have changed since the import."""
     if not dataset.imported:
         return []
     return [path for path in dataset.records("render") if _is_outgrown(dataset, Path(path))]
 
 
 def _is_outgrown(dataset: Dataset, record: Path) -> bool:
+    """Return whether a source file is newer than the record, or has another size.
+
+    A source file that no longer exists does not count, because the import has its copy.
+    """
     sizes = shard_files.recorded_sizes(record, dataset.folder)
     if not sizes:
         return False
-    taken = record.stat().st_mtime_ns
+    import_time = record.stat().st_mtime_ns
     for name, size in sizes.items():
-        source_size, changed = _size_and_time(Path(str(dataset.imported), name))
-        if changed and (source_size != size or changed > taken):
+        source_size, source_time = _size_and_time(Path(str(dataset.imported), name))
+        if source_time and (source_size != size or source_time > import_time):
             return True
     return False
 
 
 def external_changed(dataset: Dataset, store: ViewStore | None) -> bool:
-    """Whether a file that the user's .blend reads is no longer the one in its inventory.
+    """Return whether a file that the user's .blend reads differs from its inventory.
 
-    So is one that the view store has lost, if there is one.
+    With a view store, also return True if the store has lost such a file.
     """
     if not dataset.source.blend:
         return False
     home = Path(dataset.source.blend).parent
     try:
-        return any(
-            _size_and_time(home / file["path"]) != (file["bytes"], file["mtime_ns"])
-            or (store and file["bytes"] and not store.has(file["sha256"], file["bytes"]))
-            for file in json.loads(Path(str(dataset.inventory)).read_bytes())["external_files"]
-        )
+        inventory = json.loads(Path(str(dataset.inventory)).read_bytes())
+        for file in inventory["external_files"]:
+            if _size_and_time(home / file["path"]) != (file["bytes"], file["mtime_ns"]):
+                return True
+            if store and file["bytes"] and not store.has(file["sha256"], file["bytes"]):
+                return True
     except FileNotFoundError:
         return False
     except (OSError, *DAMAGE):
         return True
+    return False
 
 
 def check_presence(dataset: Dataset) -> None:
-    """Check that the user's .blend is where the scene YAML says, or can be downloaded.
+    """Check that the user's .blend exists, or can be downloaded. Raises `UserError`.
 
-    Raises `UserError`. Where machines see no common folder, only that of the user has the file.
+    On machines without a common folder, only the user's machine has the file.
     """
     source = dataset.source
     if source.blend and not source.url and not Path(source.blend).is_file():
@@ -85,54 +91,52 @@ def check_presence(dataset: Dataset) -> None:
 
 
 def check_external_files(dataset: Dataset) -> None:
-    """Check that the files are there which the user's .blend read when it was last listed.
+    """Check that the files in the inventory of the user's .blend exist. Raises `UserError`.
 
-    Raises `UserError`. Of a .blend that was never listed nothing is known.
+    Without an inventory, nothing is checked.
     """
     source = dataset.source
     if not source.blend or source.allow_missing:
         return
     try:
-        listed = json.loads(Path(str(dataset.inventory)).read_bytes())["external_files"]
+        inventory = json.loads(Path(str(dataset.inventory)).read_bytes())
         home = Path(source.blend).parent
         paths = [
             Path(os.path.normpath(home / file["path"]))
-            for file in listed
+            for file in inventory["external_files"]
             if file["bytes"] is not None
         ]
     except (OSError, *DAMAGE):
         return
-    # Path.exists() raises for a path that is too long; os.path.exists() does not.
-    missing = [str(path) for path in paths if not os.path.exists(path)]  # noqa: PTH110
-    if missing:
-        more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
+    # Path.exists() raises for a path that is too long. os.path.exists() does not.
+    missing_files = [str(path) for path in paths if not os.path.exists(path)]  # noqa: PTH110
+    if missing_files:
         raise UserError(
-            f"{source.blend}: files that it shows are missing: {', '.join(missing[:8])}{more}; put "
+            f"{source.blend}: files that it shows are missing: {_first_names(missing_files)}; put "
             "them back, or render without them: scene: {allow_missing: true}"
         )
 
 
 def check_imported(dataset: Dataset) -> None:
-    """Check that the views of a dataset to import are where its lightfield.json is.
-
-    Raises `UserError`.
-    """
+    """Check that the views of a dataset to import exist. Raises `UserError`."""
     folder = Path(str(dataset.imported), "exr")
-    missing = [
-        f"{pose.name}.exr"
-        for pose in dataset.rig.poses()
-        if not (folder / f"{pose.name}.exr").is_file()
-    ]
-    if missing:
-        more = f" and {len(missing) - 8} more" if len(missing) > 8 else ""
+    files = [f"{pose.name}.exr" for pose in dataset.rig.poses()]
+    missing_files = [file for file in files if not (folder / file).is_file()]
+    if missing_files:
         raise UserError(
-            f"{folder}: {', '.join(missing[:8])}{more}: no such file, but the dataset's "
+            f"{folder}: {_first_names(missing_files)}: no such file, but the dataset's "
             "lightfield.json has the view"
         )
 
 
+def _first_names(names: list[str]) -> str:
+    """Return the first eight names, and the number of the others."""
+    text = ", ".join(names[:8])
+    return text if len(names) <= 8 else f"{text} and {len(names) - 8} more"
+
+
 def _size_and_time(path: Path) -> tuple[int, int] | tuple[None, None]:
-    """Return a file's bytes and when it was changed, in nanoseconds; None where there is none."""
+    """Return a file's bytes and its time of change in nanoseconds. None if it does not exist."""
     if not path.is_file():
         return None, None
     status = path.stat()
@@ -140,7 +144,7 @@ def _size_and_time(path: Path) -> tuple[int, int] | tuple[None, None]:
 
 
 def _entries(folder: str, name: str) -> list[os.DirEntry[str]]:
-    """Return what lies in a folder in ``folder``; nothing where there is none."""
+    """Return the entries of the folder ``name`` in ``folder``. Empty if it does not exist."""
     try:
         with os.scandir(Path(folder, name)) as entries:
             return sorted(entries, key=lambda entry: entry.name)

@@ -1,7 +1,7 @@
-"""Light fields that somebody else has rendered, in the layout in which SILVR publishes its own.
+"""Light fields that somebody else has rendered, in the layout of SILVR's publications.
 
-Each is a folder, named for its rig, with lightfield.json and the views in exr/: R, G, B and Z as
-half floats, Z along the optical axis in metres. Source: the SILVR paper, section 3.2.
+Each is a folder that has its rig's name. It has lightfield.json, and the views in exr/: R, G, B and
+Z as half floats, Z along the optical axis in metres. Source: the SILVR paper, section 3.2.
 """
 
 from pathlib import Path
@@ -13,39 +13,35 @@ from lightfield.geometry.rigs import Poses
 
 
 def lightfields(dataset: str) -> dict[str, Path]:
-    """Return the lightfield.json of each rig in a folder, which may be such a rig's itself.
+    """Return the lightfield.json of each rig in a folder. The folder may also be a rig's own.
 
-    Raises `UserError` where there is none.
+    Raises `UserError` if there is none.
     """
     folder = Path(dataset)
     if (folder / NAME).is_file():
         return {folder.resolve().name: folder / NAME}
-    # A link has the name that was given to it: two may lead to folders of one name.
-    found = {path.parent.name: path for path in sorted(folder.glob(f"*/{NAME}"))}
-    if not found:
+    # Use the names of links: two links may lead to folders of equal names.
+    file_of_rig = {path.parent.name: path for path in sorted(folder.glob(f"*/{NAME}"))}
+    if not file_of_rig:
         raise UserError(f"there is no {NAME} in {dataset}, nor in a folder in it")
-    return found
+    return file_of_rig
 
 
 def rigs(dataset: str) -> dict[str, Poses]:
-    """Return the rigs of a folder of light fields by their names; raises `UserError`."""
-    return {
-        name: Poses.model_validate(
-            {
-                "type": "poses",
-                "file": str(path.resolve()),
-                "camera": LightField.read(path).lens.settings(),
-            }
-        )
-        for name, path in lightfields(dataset).items()
-    }
+    """Return the rigs of a folder of light fields by their names. Raises `UserError`."""
+    rigs = {}
+    for name, path in lightfields(dataset).items():
+        camera = LightField.read(path).lens.settings()
+        settings = {"type": "poses", "file": str(path.resolve()), "camera": camera}
+        rigs[name] = Poses.model_validate(settings)
+    return rigs
 
 
 def depth(rig: Poses) -> str:
-    """Return what channel Z of a rig's views holds: z, distance or none."""
+    """Return what channel Z of a rig's views holds: "z", "distance" or "none"."""
     return LightField.read(rig.file).depth or "none"
 
 
 def fingerprint(dataset: str) -> list[list[str]]:
-    """Return what identifies a folder of light fields: the SHA-256 of each lightfield.json."""
+    """Return the SHA-256 of each lightfield.json, which together identify a folder of them."""
     return [[name, sha256(path)] for name, path in lightfields(dataset).items()]

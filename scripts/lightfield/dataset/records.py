@@ -1,11 +1,13 @@
-"""A shard's record, and its log of checksums, by which a finished file is recognised.
+"""A shard's record and its log of checksums, which show what files are finished.
 
-The record is a JSON of the shard's files, written when all are finished: "files" gives each one's
-"bytes" and "sha256" by its path in the dataset. The log beside it, <record's name>.sums.jsonl, is
-one JSON line for each file, "file", "key" (of the settings that made it), "bytes" and "sha256",
-added at the moment when the file is finished. It outlives the record, which is removed when its
-files are no longer those on disk: a file is finished if its bytes are those that were logged.
-Where machines see no common folder, the view store takes the log's place.
+The record is a JSON that is written when all files of the shard are finished. Its key "files" has
+the "bytes" and "sha256" of each file, by its path in the dataset.
+
+The log beside it, <record's name>.sums.jsonl, gets a line of JSON when a file is finished: "file",
+"key" (of the settings that made it), "bytes" and "sha256". A file is finished if it still has the
+logged bytes. The log outlives the record, which is removed when its files change.
+
+On machines without a common folder, the view store takes the log's place.
 """
 
 import os
@@ -24,18 +26,19 @@ from lightfield.imaging import images
 class ShardRecord:
     """The record at ``path`` of a shard's files, in ``folder`` of a dataset or beside it.
 
-    With ``path`` None nothing is recorded, and a finished file is one that can be read whole and
-    has the key in its header.
+    With ``path`` None nothing is recorded. A file then counts as finished if it is complete, and
+    its header has the key.
     """
 
     def __init__(self, path: Path | None, folder: Path) -> None:
-        self._path, self._folder = path, folder
+        self._path = path
+        self._folder = folder
         self._dataset_folder = folder.resolve().name
         self._finished: dict[str, dict[str, Any]] = {}
         self._store = ViewStore.configured()
 
     def is_finished(self, file: Path, key: str) -> bool:
-        """Whether a file has the bytes that it had when it was made by the settings of ``key``."""
+        """Return whether a file still has the bytes that the settings of ``key`` made."""
         if self._path is None:
             return images.is_finished(file, key)
         if self._store:
@@ -51,10 +54,10 @@ class ShardRecord:
         return True
 
     def _is_logged_elsewhere(self, entry: tuple[Any, Any, Any]) -> bool:
-        """Whether another shard made this file, when shards had other bounds.
+        """Return whether another shard made this file, when shards had other bounds.
 
-        A file that this shard made by other settings is not looked for: thousands of shards would
-        each read the logs of all.
+        Does not read the other logs if this shard made the file by other settings. Otherwise
+        thousands of shards would each read the logs of all.
         """
         name, _, digest = entry
         return (name, digest) not in self._made_here and entry in self._logged_elsewhere
@@ -66,12 +69,12 @@ class ShardRecord:
         last = self._last_logged.get(self._name(file), {})
         if last.get("key") == key and last.get("sha256") != sha256(file):
             raise UserError(
-                f"{file}: has other bytes than when it was taken over, in the same file; put the "
-                f"right one where it came from, or remove {_log(self._path)} to take it as it is"
+                f"{file}: has other bytes than at its import; put the right file back at its "
+                f"source, or remove {_log(self._path)} to accept this one"
             )
 
     def add(self, file: Path, key: str) -> None:
-        """Log a file that has just been finished; a kill before that makes it once more."""
+        """Log a file that has just been finished. After a kill before this, it is made again."""
         if self._path is None:
             return
         name = self._name(file)
@@ -82,24 +85,26 @@ class ShardRecord:
         self._finished[name] = sums
 
     def _take(self, file: Path, key: str) -> None:
-        """Take the file from the store that the settings of ``key`` made, if there is one."""
+        """Take the file that the settings of ``key`` made from the store, if the store has it."""
         assert self._store and self._path
         name = self._name(file)
-        for other, digest in self._store.listed(key):
-            if other == name and self._store.take(digest, file):
+        for stored_name, digest in self._store.listed(key):
+            if stored_name == name and self._store.take(digest, file):
                 entry = (name, key, digest)
                 if entry not in self._logged_here:
                     append_json_line(_log(self._path), {"file": name, "key": key, **_sums(file)})
                     self._logged_here.add(entry)
                 return
 
-    def write(self, files: Iterable[Path], **more: Any) -> None:
-        """Write the record of ``files``, and what else it shall hold."""
+    def write(self, files: Iterable[Path], **more_keys: Any) -> None:
+        """Write the record of ``files``, with ``more_keys``."""
         if self._path is None:
             return
-        names = {self._name(file): file for file in files}
-        content = {name: self._finished.get(name) or _sums(file) for name, file in names.items()}
-        write_json(self._path, {"files": content, **more})
+        content = {}
+        for file in files:
+            name = self._name(file)
+            content[name] = self._finished.get(name) or _sums(file)
+        write_json(self._path, {"files": content, **more_keys})
 
     def _name(self, file: Path) -> str:
         # A view's passes lie beside the folder of the views.
@@ -107,7 +112,7 @@ class ShardRecord:
 
     @cached_property
     def _last_logged(self) -> dict[Any, dict[str, Any]]:
-        """The last line of the log on each file."""
+        """The last line of the log for each file."""
         assert self._path
         log = _log(self._path)
         return {line["file"]: line for line in _lines(log)} if log.exists() else {}
@@ -120,7 +125,7 @@ class ShardRecord:
 
     @cached_property
     def _made_here(self) -> set[tuple[Any, Any]]:
-        """Name and SHA-256 of the files that this shard made, by whatever settings."""
+        """Name and SHA-256 of all files that this shard made, by any settings."""
         return {(name, digest) for name, _, digest in self._logged_here}
 
     @cached_property
@@ -139,7 +144,7 @@ def _entries(logs: Iterable[Path]) -> set[tuple[Any, Any, Any]]:
 
 
 def _lines(log: Path) -> Iterator[dict[str, Any]]:
-    """Yield the complete lines of a log. A damaged line does not count."""
+    """Yield the complete lines of a log. Skips damaged lines."""
     for line in read_json_lines(log):
         if all(isinstance(line.get(key), str) for key in ("file", "key", "sha256")):
             yield line

@@ -1,4 +1,4 @@
-"""What a reprojection does to each view: a scene YAML's keys, and the settings of the programs.
+"""The settings of a reprojection, in a scene YAML and in the programs' settings files.
 
 A scene YAML's entry of `reprojections` becomes `ReprojectionSettings`. The plan writes them to a
 settings file, which scripts/reproject.py and scripts/lens_map.py read with --settings.
@@ -22,18 +22,19 @@ Stops = Annotated[float, Field(ge=-100, le=100)]
 
 
 class ReprojectionOptions(Settings):
-    """The options that a scene YAML has in common with the settings of the programs."""
+    """The options that a scene YAML shares with the programs' settings files."""
 
     camera: CameraSettings | None = Field(
-        None, description="Without it, the rig's own: the pixels are those of the views."
+        None,
+        description="The lens and image. Without it, those of the views: nothing is resampled.",
     )
     cube_map: bool = Field(False, description="Six faces of each view, each a 90 degree view.")
     rotation: Vector = Field((0.0, 0.0, 0.0), description="Pan, pitch and roll in degrees.")
     filter: Literal["nearest", "bilinear", "bicubic", "lanczos", "adaptive", "st_warp"] = Field(
         "adaptive", description="How colour is resampled."
     )
-    samples: int = Field(1, ge=1, le=MOST_SAMPLES, description="n x n samples a pixel.")
-    bits: Literal[8, 16] = Field(8, description="Of a PNG's values.")
+    samples: int = Field(1, ge=1, le=MOST_SAMPLES, description="n x n samples for each pixel.")
+    bits: Literal[8, 16] = Field(8, description="Bits of a PNG's values.")
     reinhard: float = Field(
         1.0,
         ge=1e-9,
@@ -52,7 +53,7 @@ class ReprojectionOptions(Settings):
         return self
 
     def lens(self, source: Lens) -> Lens:
-        """Return the lens of the images that are made of views through ``source``."""
+        """Return the lens of the new images. ``source`` is the lens of the views."""
         if self.camera is None:
             return source
         if self.cube_map:
@@ -62,15 +63,15 @@ class ReprojectionOptions(Settings):
 
 
 class ReprojectionSettings(ReprojectionOptions):
-    """The settings of scripts/reproject.py; scripts/lens_map.py needs `LENS_MAP_KEYS` alone."""
+    """The settings of scripts/reproject.py. scripts/lens_map.py needs only `LENS_MAP_KEYS`."""
 
     formats: list[Literal["exr", "png"]] = Field([], description="EXR holds depth, too.")
     exposure: Stops = Field(0.0, description="In stops.")
     depth_png: float | None = Field(
-        None, gt=0, description="Of 16-bit depth maps: steps to a metre. Without it, no such maps."
+        None, gt=0, description="Steps in a metre of 16-bit depth maps. Without it, no such maps."
     )
-    mask: bool = Field(False, description="Masks of the pixels without a source.")
-    passes: list[str] = Field([], description="Passes that are reprojected, too.")
+    mask: bool = Field(False, description="Also write masks of the pixels without a source.")
+    passes: list[str] = Field([], description="Passes to reproject, too.")
 
     @property
     def lens_map_settings(self) -> dict[str, Any]:
@@ -79,16 +80,19 @@ class ReprojectionSettings(ReprojectionOptions):
 
     @property
     def development(self) -> dict[str, Any]:
-        """How light becomes pixels. ``bits`` is left out for 8, so that existing keys hold."""
-        bits = {} if self.bits == 8 else {"bits": self.bits}
-        return {"exposure": self.exposure, "reinhard": self.reinhard, **bits}
+        """The settings that turn light into pixels."""
+        settings: dict[str, Any] = {"exposure": self.exposure, "reinhard": self.reinhard}
+        # 8 is left out, so that the keys of earlier versions stay valid.
+        if self.bits != 8:
+            settings["bits"] = self.bits
+        return settings
 
     @property
     def published(self) -> dict[str, Any]:
-        """What lightfield.json and the images' headers say beside the lens.
+        """The settings in lightfield.json and the images' headers, beside the lens.
 
-        ``rotation`` is pan, pitch and roll in degrees; `lightfield.imaging.tonemap` defines
-        ``exposure`` and ``reinhard``, by which the pixels of a PNG can be turned back into light.
+        ``rotation`` is pan, pitch and roll in degrees. `lightfield.imaging.tonemap` defines
+        ``exposure`` and ``reinhard``, with which a reader can turn a PNG back into light.
         """
         return {
             "rotation": list(self.rotation),
@@ -99,7 +103,7 @@ class ReprojectionSettings(ReprojectionOptions):
 
 
 def face_problem(camera: CameraSettings) -> str | None:
-    """Say why a camera cannot be a cube map's face, after its key; None if it can."""
+    """Return why a camera cannot be a cube map's face, as text after its key. None if it can."""
     if (camera.lens, getattr(camera, "fov", None)) != ("rectilinear", 90):
         return ": must be rectilinear with fov 90 with cube_map"
     if camera.resolution[0] != camera.resolution[1]:

@@ -1,8 +1,8 @@
-"""Into how many shards the views of each dataset are cut, noted when the first is rendered.
+"""Notes the number of shards of each dataset when the first shard is rendered.
 
-work/shards.json: "datasets" has "views" and "shards" of each, and "sha256" is of "datasets". A
-damaged file counts for nothing. What a count follows from may change later, such as --jobs or a
-probe, or be unknown where a job runs. So a dataset that was begun keeps its own.
+In work/shards.json, "datasets" has the "views" and "shards" of each dataset, and "sha256" is the
+checksum of "datasets". A damaged file is ignored. The count depends on --jobs or a probe, which may
+change later, or be unknown to a job. So a dataset that was begun keeps its count.
 """
 
 import hashlib
@@ -17,9 +17,9 @@ NAME = "shards.json"
 
 
 def noted(work: str, dataset: str, views: int) -> int | None:
-    """Return how many shards a dataset of so many views was given; None if none was begun.
+    """Return the noted number of shards of a dataset with so many views, or None.
 
-    ``work`` is the folder that has the note; one that is broken says nothing.
+    ``work`` is the folder of the note. A broken note is ignored.
     """
     path = Path(work, NAME)
     if not path.is_file():
@@ -32,20 +32,24 @@ def noted(work: str, dataset: str, views: int) -> int | None:
 
 
 def note(work: str, counts: dict[str, tuple[int, int]]) -> None:
-    """Note the views and the shards of these datasets, beside those of others."""
+    """Note the views and shards of these datasets. Keeps the notes of others."""
     path = Path(work, NAME)
     try:
-        known = dict(_read(path, path.stat().st_mtime_ns))
+        noted_datasets = dict(_read(path, path.stat().st_mtime_ns))
     except (OSError, *DAMAGE):
-        known = {}
-    new = {name: {"views": views, "shards": shards} for name, (views, shards) in counts.items()}
-    datasets = dict(sorted((known | new).items()))
+        noted_datasets = {}
+    for name, (views, shards) in counts.items():
+        noted_datasets[name] = {"views": views, "shards": shards}
+    datasets = dict(sorted(noted_datasets.items()))
     write_json_if_changed(path, {"datasets": datasets, "sha256": _digest(datasets)})
 
 
 @lru_cache(maxsize=1)
 def _read(path: Path, _changed: int) -> Any:
-    """Return what is noted of each dataset; raises ValueError for a file that is damaged."""
+    """Return the note of each dataset. Raises ValueError for a damaged file.
+
+    ``_changed`` is the file's time, with which the cache notices a new file.
+    """
     content = json.loads(path.read_bytes())
     if content.get("sha256") != _digest(content.get("datasets")):
         raise ValueError(f"{path}: is damaged")

@@ -1,4 +1,4 @@
-"""The files of a shard: what they are called, what its record holds, and whether it still does."""
+"""The files of a shard: their names, and the contents of its record."""
 
 import os
 from pathlib import Path
@@ -7,14 +7,15 @@ from stat import S_ISREG
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 
-# Of a shard's files beside its record, which have its name: what its processes did, and the
-# checksum of each view from the moment it was finished.
+# A shard's other files have the name of its record, and these suffixes.
+# The journal says what the shard's processes did.
 JOURNAL_SUFFIX = ".journal.jsonl"
+# The log has the checksum of each finished view.
 LOG_SUFFIX = ".sums.jsonl"
 
 
 def read_record(record: Path) -> dict[str, tuple[int, str]]:
-    """Return each file's bytes and SHA-256 by its path in the dataset; errors name the record."""
+    """Return each file's bytes and SHA-256 by its path in the dataset. Errors name the record."""
     content = read_json(record)
     try:
         return {path: (entry["bytes"], entry["sha256"]) for path, entry in content["files"].items()}
@@ -25,8 +26,7 @@ def read_record(record: Path) -> dict[str, tuple[int, str]]:
 def recorded_sizes(record: Path, folder: str) -> dict[str, int] | None:
     """Return the size of each of a record's files by its path in the dataset's ``folder``.
 
-    None where the record is broken or not there, and where a file is not there or of another size:
-    deleted, or cut short.
+    None if the record is missing or broken, or if a file is missing or has another size.
     """
     try:
         files = read_record(record)
@@ -34,8 +34,7 @@ def recorded_sizes(record: Path, folder: str) -> dict[str, int] | None:
         return None
     try:
         for name, (size, _) in files.items():
-            # A `Path` of each of a hundred thousand would take longer than all else.
-            status = os.stat(f"{folder}/{name}")  # noqa: PTH116
+            status = os.stat(f"{folder}/{name}")  # noqa: PTH116, a `Path` is slow for 100,000 files
             if status.st_size != size or not S_ISREG(status.st_mode):
                 return None
     except OSError:

@@ -1,15 +1,15 @@
-"""The view store: finished views where machines that see no common folder find them.
+"""The view store, which holds finished views for machines without a common folder.
 
-A shard's views are not among the outputs that Snakemake brings to and from a job. So each is put
-here the moment it is finished, and taken from here by whoever needs it. The store lies at a URL
+Snakemake does not transfer a shard's views, because they are not among its outputs. So a program
+puts each view here when it is finished, and any other program can take it. The store is at a URL
 such as s3://bucket/name, or in a folder:
 
 - ``views/sums/<SHA-256>`` is a file;
-- ``views/keys/<render key>/<its path in the dataset, with @ for />@<SHA-256>``, empty, says which
-  file these settings have made. It is written last, so that what is listed is there. Of what an
-  export wrote beside the file that names it, the SHA-256 of that file stands for the key.
+- ``views/keys/<render key>/<its path in the dataset, with @ for />@<SHA-256>`` is an empty note. It
+  says that these settings made the file. It is written last, so that a noted file exists. For files
+  of an export, the key is the SHA-256 of the file that lists them.
 
-A file that is taken is compared with its checksum, so that one cut short is none.
+A file that is taken is compared with its checksum, so a file that was cut short does not count.
 """
 
 import hashlib
@@ -24,7 +24,7 @@ from typing import Any, Self
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, sha256
 
-# The environment variable by which the workflow says to its programs where the store is.
+# The environment variable with which the workflow tells its programs where the store is.
 VARIABLE = "PLENOFORGE_STORE"
 
 
@@ -33,19 +33,19 @@ class _OtherBytesError(Exception):
 
 
 class ViewStore:
-    """The store at a URL or in a folder; each method raises `UserError` where it cannot be used."""
+    """The store at a URL or in a folder. Each method raises `UserError` if the store fails."""
 
     def __init__(self, url: str) -> None:
         self.url = url
 
     @classmethod
     def configured(cls) -> Self | None:
-        """Return the store of this process's environment; None where all see one folder."""
+        """Return the store in this process's environment. None if all machines share a folder."""
         url = os.environ.get(VARIABLE)
         return cls(url) if url else None
 
     def _place(self, name: str) -> Any:
-        """Return the place of that name, which has a path's methods."""
+        """Return the place of a name in the store. It has a path's methods."""
         if "://" not in self.url:
             return Path(self.url, name)
         from upath import UPath
@@ -57,13 +57,13 @@ class ViewStore:
         return self._place("views")
 
     def check(self) -> None:
-        """Raise `UserError` where the store cannot be read."""
+        """Raise `UserError` if the store cannot be read."""
         self.listed("")
 
     def bring(self, path: str) -> bool:
-        """Bring here what Snakemake has stored under a path, as old as it is.
+        """Copy a file that Snakemake has stored to the same path here, with its time.
 
-        Return False where there is nothing, or it is empty, as a log may be: then nothing changes.
+        Returns False, and changes nothing, if the stored file is missing, or empty as a log may be.
         """
         with self._answering():
             stored = self._place(path)
@@ -80,7 +80,7 @@ class ViewStore:
         return True
 
     def names(self, folder: str) -> list[str]:
-        """Return the names of what Snakemake has stored in a folder."""
+        """Return the names of the files that Snakemake has stored in a folder."""
         with self._answering():
             try:
                 return sorted(entry.name for entry in self._place(folder).iterdir())
@@ -93,19 +93,19 @@ class ViewStore:
             self._write(Path(path), self._place(path))
 
     def remove(self, path: str) -> None:
-        """Remove what Snakemake has stored under a path."""
+        """Remove the file that Snakemake has stored under a path."""
         with self._answering():
             self._place(path).unlink(missing_ok=True)
 
     def put(self, file: Path, digest: str) -> None:
-        """Put a file, whose SHA-256 is given, in place of what may be there, as one cut short."""
+        """Put a file with this SHA-256 into the store. Replaces a file that may be damaged."""
         with self._answering():
             self._write(file, self._root / "sums" / digest)
 
     def _write(self, file: Path, target: Any) -> None:
-        """Write a file to a place of the store, where others see all of it or none.
+        """Write a file to a place of the store, where others see it complete or not at all.
 
-        A folder's file is renamed. Object stores replace an object when all of it has arrived.
+        In a folder, the complete file is renamed. Object stores replace complete objects at once.
         """
         target.parent.mkdir(parents=True, exist_ok=True)
         if "://" in self.url:
@@ -123,7 +123,7 @@ class ViewStore:
             note.write_bytes(b"")
 
     def put_list(self, listing: Path, files: Iterable[Path]) -> None:
-        """Put the files that a job made beside the one that names them, by whose SHA-256."""
+        """Put the ``files`` that a job made, with the SHA-256 of their ``listing`` as the key."""
         key = sha256(listing)
         for file in files:
             name = os.path.relpath(file, listing.parent)
@@ -131,11 +131,15 @@ class ViewStore:
 
     def listed(self, key: str) -> list[tuple[str, str]]:
         """Return name and SHA-256 of each file that the settings of ``key`` have made."""
-        notes = (note.rpartition("@") for note in self.names(f"views/keys/{key}"))
-        return [(name.replace("@", "/"), digest) for name, separator, digest in notes if separator]
+        listed = []
+        for note in self.names(f"views/keys/{key}"):
+            name, separator, digest = note.rpartition("@")
+            if separator:
+                listed.append((name.replace("@", "/"), digest))
+        return listed
 
     def has(self, digest: str, size: int) -> bool:
-        """Return whether there is a file of a SHA-256, by its name and bytes alone."""
+        """Return whether the store has a file of this SHA-256, by its name and size only."""
         with self._answering():
             try:
                 return bool((self._root / "sums" / digest).stat().st_size == size)
@@ -143,7 +147,7 @@ class ViewStore:
                 return False
 
     def take(self, digest: str, target: Path) -> bool:
-        """Make ``target`` the file of a SHA-256, unless it is; return False where there is none."""
+        """Make ``target`` the file of a SHA-256, unless it is already. Return whether it exists."""
         if target.is_file() and sha256(target) == digest:
             return True
         with self._answering():
@@ -164,7 +168,7 @@ class ViewStore:
 
     @contextmanager
     def _answering(self) -> Iterator[None]:
-        """Turn what a storage's own package raises into a `UserError`."""
+        """Turn any exception of a storage's package into a `UserError`."""
         try:
             yield
         except UserError:

@@ -1,7 +1,7 @@
-"""Depth along the optical axis (Z-depth) and distance from the camera, each from the other.
+"""Converts between depth along the optical axis (Z-depth) and distance from the camera.
 
-A view stores one of them, as `LightField.depth` says: `Lens.usual_depth` where the user chose none.
-`conventional_depth` says which of them other programs mean.
+A view stores one of them, and `LightField.depth` says which. `Lens.usual_depth` is the default.
+`conventional_depth` is the one that other programs expect.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 
 def conventional_depth(lens: Lens) -> str:
-    """Return what other programs mean by the depth of a lens: "z" or "distance".
+    """Return which depth other programs expect of a lens: "z" or "distance".
 
     Cycles, instant-ngp, nerfstudio, OpenDIBR and TMIV share one convention: Z-depth for perspective
     cameras, distance for all others.
@@ -22,8 +22,8 @@ def conventional_depth(lens: Lens) -> str:
 def stored_distance(depth: Array, rays: Array, meaning: str | None) -> Array:
     """Return the distance (...) in metres of the ``depth`` (...) that a view stores.
 
-    ``meaning`` is what the view's depth means. Z-depth, "z", is converted with the unit ``rays``
-    (..., 3); "distance" is returned as it is.
+    If ``meaning`` is "z", the depth is Z-depth, and the unit ``rays`` (..., 3) convert it. If
+    ``meaning`` is "distance", the depth is returned unchanged.
     """
     return distance_from_z(depth, rays) if meaning == "z" else depth
 
@@ -31,8 +31,8 @@ def stored_distance(depth: Array, rays: Array, meaning: str | None) -> Array:
 def z_from_distance(distance: Array, rays: Array) -> Array:
     """Return the Z-depth of points at ``distance`` (...) metres along unit ``rays`` (..., 3).
 
-    z = distance · cos θ, negative behind the camera. A miss (inf) stays inf and NaN stays NaN;
-    the dtype is the wider of the two inputs.
+    z = distance · cos θ, negative behind the camera. A miss (inf) stays inf and NaN stays NaN.
+    The dtype is the wider of the two inputs.
     """
     with np.errstate(invalid="ignore"):
         z = distance * -rays[..., 2]
@@ -42,8 +42,8 @@ def z_from_distance(distance: Array, rays: Array) -> Array:
 def distance_from_z(z: Array, rays: Array) -> Array:
     """Return the distance of points at Z-depth ``z`` (...) metres along unit ``rays`` (..., 3).
 
-    distance = z / cos θ. A miss (inf) stays inf and NaN stays NaN. NaN also marks what no
-    Z-depth can say: rays in the camera plane, and a depth on the other side of that plane.
+    distance = z / cos θ. A miss (inf) stays inf and NaN stays NaN. Z-depth gives no distance for
+    rays in the camera plane, nor for a depth on the other side of that plane: both become NaN.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         distance = z / -rays[..., 2]
@@ -52,10 +52,11 @@ def distance_from_z(z: Array, rays: Array) -> Array:
 
 
 def with_precision(depth: Array, precision: str) -> Array:
-    """Return ``depth`` as a file holds it with one of ``render.depth_precision``.
+    """Return ``depth`` in the precision of ``render.depth_precision``.
 
-    "float" is float32, "half" float16. "rounded" is float32 of which 16 of the mantissa's 23 stored
-    bits are kept, rounded to nearest even: within 2⁻¹⁷ = 7.6e-6 of itself, and its zeros compress.
+    "float" is float32, and "half" is float16. "rounded" is float32 with 16 of the mantissa's 23
+    stored bits, rounded to nearest even. The relative error is at most 2⁻¹⁷ = 7.6e-6, and the zero
+    bits compress well.
     """
     if precision == "half":
         with np.errstate(over="ignore"):
@@ -65,5 +66,5 @@ def with_precision(depth: Array, precision: str) -> Array:
         return depth
     bits = depth.view(np.uint32)
     lowest_kept = (bits >> np.uint32(7)) & np.uint32(1)
-    kept = (bits + np.uint32(0x3F) + lowest_kept) & ~np.uint32(0x7F)
-    return np.where(np.isfinite(depth), kept.view(np.float32), depth)
+    rounded = (bits + np.uint32(0x3F) + lowest_kept) & ~np.uint32(0x7F)
+    return np.where(np.isfinite(depth), rounded.view(np.float32), depth)

@@ -37,30 +37,30 @@ def neighbours(matrices: Array) -> list[int]:
 
 
 def flow(
-    lens: Lens, here: Array, there: Array, distance: Array, distance_there: Array
+    lens: Lens, matrix: Array, other_matrix: Array, distance: Array, other_distance: Array
 ) -> tuple[Array, Array]:
-    """Return the flow (h, w, 2) in pixels, x right and y down, and where (h, w) it is visible.
+    """Return the flow (h, w, 2) from one view to another, and where (h, w) its point is visible.
 
-    ``here`` and ``there`` are (4, 4) camera-to-world; ``distance`` (h, w) of both views is along
-    the ray, in metres, inf where nothing is hit. Flow is NaN where the lens has no ray, or where
-    the other view has no ray to the point. A point is visible if it is in the other view's frame,
-    and if no surface hides it there.
+    Flow is in pixels, x right and y down. The matrices (4, 4) are camera-to-world. The distances
+    (h, w) are along the ray, in metres, and inf where a ray hits nothing. Flow is NaN where the
+    lens has no ray, or where the other view has no ray to the point. A point is visible if it is in
+    the other view's frame, and if no surface hides it there.
     """
-    rays = lens.pixel_rays() @ here[:3, :3].T
+    rays = lens.pixel_rays() @ matrix[:3, :3].T
     far = np.isinf(distance)
-    baseline = np.where(far[..., None], 0, here[:3, 3] - there[:3, 3])
+    baseline = np.where(far[..., None], 0, matrix[:3, 3] - other_matrix[:3, 3])
     offset = rays * np.where(far, 1, distance)[..., None] + baseline
-    pixels = lens.pixels(offset @ there[:3, :3])
+    pixels = lens.pixels(offset @ other_matrix[:3, :3])
     x, y = np.moveaxis(pixels, -1, 0)
     with np.errstate(invalid="ignore"):
         inside = (x >= 0) & (x < lens.width) & (y >= 0) & (y < lens.height)
-    # Take the farthest of the four pixels around: at an edge, what is behind it is visible, too.
+    # Take the farthest of the four pixels around: at an edge, the surface behind is visible, too.
     farthest = np.full(distance.shape, -np.inf)
     for dx in (-0.5, 0.5):
         for dy in (-0.5, 0.5):
             column = np.where(inside, x + dx, 0).astype(int).clip(0, lens.width - 1)
             row = np.where(inside, y + dy, 0).astype(int).clip(0, lens.height - 1)
-            farthest = np.fmax(farthest, distance_there[row, column])
+            farthest = np.fmax(farthest, other_distance[row, column])
     expected = np.where(far, np.inf, np.linalg.norm(offset, axis=-1))
     visible = inside & (expected <= (1 + HIDDEN) * farthest)
     motion = pixels - (np.indices(distance.shape)[::-1].transpose(1, 2, 0) + 0.5)
@@ -69,7 +69,7 @@ def flow(
 
 
 def shorter(lens: Lens, across: Array) -> Array:
-    """Return a motion to the right in pixels, along the shorter way around a panorama."""
+    """Return ``across``, a motion in x in pixels, by the shorter way around a panorama."""
     if not isinstance(lens, Equirectangular):
         return across
     return np.asarray(across - lens.turn * np.rint(across / lens.turn))

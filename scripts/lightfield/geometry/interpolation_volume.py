@@ -1,23 +1,22 @@
 """The immersive interpolation volume of a rig, and the spacing of its cameras.
 
-The SILVR paper (Courteaux et al. 2022, section "Related Datasets") defines the immersive
-interpolation volume as the points for which light rays in ANY direction can be obtained by
-interpolating what the cameras captured. Made exact here:
+The volume is the set of points at which interpolation gives a light ray of any direction. Source:
+Courteaux et al. 2022 (the SILVR paper), section "Related Datasets". This file makes it exact:
 
 - The cameras span a surface: a mesh of cells, each between neighbouring cameras (four of a grid,
   three of a sphere).
-- A ray is obtained by interpolation if it crosses a cell all of whose cameras see its direction.
-  Light reaches a point of the volume through the surface in front of the viewer where cameras
-  face outward, behind the viewer where they face inside.
-- So a point belongs to the volume if the surface surrounds it and, for every cell, all rays
-  between the point and the cell are within the view of each of the cell's cameras.
+- Interpolation gives a ray if the ray crosses a cell and all of the cell's cameras see its
+  direction. Where cameras face outward, light reaches a point through the surface in front of the
+  viewer. Where they face inside, it does so behind the viewer.
+- So a point belongs to the volume if two things hold. The surface surrounds the point. For every
+  cell, each of its cameras sees all rays between the point and the cell.
 
-A camera's field of view, as far as it lies within 90° of its axis, is a cone. Where the cone is
-convex it holds all rays to a cell if it holds those to the cell's corners. Each side of the cone
-and each corner then bound the point by a plane, and the volume is a convex polyhedron: nothing is
-sampled. For 180° fisheyes, as SILVR has, the result is exact. Other fields of view are
-`CONE_SIDES`-sided pyramids inside the cone, which takes less than 1e-4 off the volume; what a lens
-sees beyond 90° is not counted, unless it sees all round.
+Within 90° of its axis, a camera's field of view is a cone. A convex cone holds all rays to a cell
+if it holds those to the cell's corners. Each side of the cone and each corner then bound the point
+by a plane. So the volume is a convex polyhedron, and nothing is sampled. For 180° fisheyes, as
+SILVR has, the result is exact. Other fields of view become `CONE_SIDES`-sided pyramids inside the
+cone, which takes less than 1e-4 off the volume. What a lens sees beyond 90° does not count, unless
+it sees all round.
 """
 
 import math
@@ -41,7 +40,7 @@ Floats = NDArray[np.float64]
 class InterpolationVolume:
     """Volumes in m³: the immersive interpolation volume, and what the cameras' surface encloses.
 
-    Both are 0 where the surface has an opening, as a plane's and a cylinder's.
+    Both are 0 if the surface has an opening, as those of a plane and a cylinder have.
     """
 
     immersive: float
@@ -49,7 +48,7 @@ class InterpolationVolume:
 
 
 def interpolation_volume(rig: Rig, lens: Lens) -> InterpolationVolume | None:
-    """Return the volumes of a rig with a lens. None for poses of a file, which span no surface."""
+    """Return the volumes of a rig with a lens. None if the cameras span no surface."""
     mesh = rig.cells()
     if mesh is None:
         return None
@@ -60,7 +59,7 @@ def interpolation_volume(rig: Rig, lens: Lens) -> InterpolationVolume | None:
         return InterpolationVolume(0.0, 0.0)
     try:
         hull = ConvexHull(positions)
-    except QhullError:  # of cameras in a plane
+    except QhullError:  # All cameras are in a plane.
         return InterpolationVolume(0.0, 0.0)
     enclosed = float(hull.volume)
     if rig.cube_map or sees_all_round(lens):
@@ -78,8 +77,8 @@ def immersive_planes(
 ) -> Floats | None:
     """Return the planes (n, 4) around the immersive volume: n · p + c ≤ 0 within.
 
-    ``mesh`` are the cells of a closed surface between cameras (m, 4, 4), and ``hull`` is that of
-    their positions. None if the lens does not see its own axis: nothing is within.
+    ``mesh`` holds the cells of a closed surface between cameras (m, 4, 4). ``hull`` is the convex
+    hull of their positions. None if the lens does not see its own axis: the volume is empty.
     """
     positions = matrices[:, :3, 3]
     outside: Floats = hull.equations
@@ -88,7 +87,7 @@ def immersive_planes(
     sides = cone_sides(lens)
     if sides is None:
         return None
-    # Facing inside, a ray runs from the surface through the point: the cone opens towards it.
+    # If cameras face inside, a ray runs from the surface through the point.
     sign = -1.0 if face_inside else 1.0
     normals = sign * sides @ np.swapaxes(matrices[:, :3, :3], 1, 2)
     bounds = np.full(normals.shape[:2], np.inf)
@@ -102,9 +101,9 @@ def immersive_planes(
 def parts_to_edge(matrices: Floats, lens: Lens, places: Floats) -> Floats:
     """Return where places (n, 3) lie between the middle and the edge of the immersive volume.
 
-    0 is the middle of the cameras ``matrices`` (m, 4, 4), and 1 the edge in that direction. inf if
-    the middle itself is outside, as it is among cameras in a plane. The convex hull of the cameras
-    stands for the surface between them.
+    0 is the middle of the cameras ``matrices`` (m, 4, 4), and 1 is the edge in that direction. All
+    are inf if the middle itself is outside, as it is among cameras in a plane. The convex hull of
+    the cameras stands for the surface between them.
     """
     positions = matrices[:, :3, 3]
     middle = positions.mean(axis=0)
@@ -156,21 +155,21 @@ def is_closed(mesh: list[tuple[int, ...]], positions: Floats) -> bool:
 
 
 def neighbours(mesh: list[tuple[int, ...]]) -> list[tuple[int, int]]:
-    """Return all pairs (camera, corner) of a cell, also of a camera with itself."""
+    """Return all pairs (camera, corner) within a cell. A camera also pairs with itself."""
     return sorted({(camera, corner) for cell in mesh for camera in cell for corner in cell})
 
 
 def sees_all_round(lens: Lens) -> bool:
     """Return whether the lens's image shows all directions."""
     theta, azimuth = np.meshgrid(np.linspace(0, 3.1, 17), np.linspace(-3.1, 3.1, 17))
-    return bool(_seen(lens, _directions(theta, azimuth)).all())
+    return bool(_is_visible(lens, _directions(theta, azimuth)).all())
 
 
 def cone_sides(lens: Lens) -> Floats | None:
     """Return the inward normals (n, 3), in camera coordinates, of the field of view's sides.
 
-    A direction d is seen if normal · d ≥ 0 for all of them; None if the lens does not see its
-    own axis. For a field of view of 180° or more this is the one plane of the camera.
+    The lens sees a direction d if normal · d ≥ 0 for all of them. None if the lens does not see
+    its own axis. For a field of view of 180° or more the only side is the camera's plane.
     """
     azimuths = 2 * math.pi * np.arange(CONE_SIDES) / CONE_SIDES
     corners = [
@@ -179,18 +178,20 @@ def cone_sides(lens: Lens) -> Floats | None:
         for y in (0, lens.height)
     ]
     azimuths = np.unique(np.concatenate([azimuths, np.mod(corners, 2 * math.pi)]))
-    if not _seen(lens, _directions(np.zeros(1), azimuths[:1])).all():
+    if not _is_visible(lens, _directions(np.zeros(1), azimuths[:1])).all():
         return None
     low = np.zeros_like(azimuths)
     high = np.full_like(azimuths, math.pi / 2)
-    whole = _seen(lens, _directions(high, azimuths))
-    if whole.all():
+    is_right_angle_visible = _is_visible(lens, _directions(high, azimuths))
+    if is_right_angle_visible.all():
         return np.array([[0.0, 0.0, -1.0]])
+    # Bisect the angle of the rim at each azimuth.
     for _ in range(48):
         middle = (low + high) / 2
-        seen = _seen(lens, _directions(middle, azimuths))
-        low, high = np.where(seen, middle, low), np.where(seen, high, middle)
-    rim = _directions(np.where(whole, math.pi / 2, low), azimuths)
+        is_visible = _is_visible(lens, _directions(middle, azimuths))
+        low = np.where(is_visible, middle, low)
+        high = np.where(is_visible, high, middle)
+    rim = _directions(np.where(is_right_angle_visible, math.pi / 2, low), azimuths)
     normals = np.cross(np.roll(rim, -1, axis=0), rim)
     unit: Floats = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
     return unit
@@ -204,13 +205,13 @@ def _directions(theta: Floats, azimuth: Floats) -> Floats:
     return stacked
 
 
-def _seen(lens: Lens, directions: Floats) -> NDArray[np.bool_]:
-    """Return whether the image shows these directions, its edge and 1e-6 pixels included."""
+def _is_visible(lens: Lens, directions: Floats) -> NDArray[np.bool_]:
+    """Return whether the image shows these directions. The edge may be 1e-6 pixels outside."""
     pixels = lens.pixels(directions)
     with np.errstate(invalid="ignore"):
         inside = (pixels > -1e-6) & (pixels < np.array([lens.width, lens.height]) + 1e-6)
-    seen: NDArray[np.bool_] = inside.all(axis=-1)
-    return seen
+    is_visible: NDArray[np.bool_] = inside.all(axis=-1)
+    return is_visible
 
 
 def _edges(cell: tuple[int, ...]) -> list[tuple[int, int]]:
@@ -218,7 +219,7 @@ def _edges(cell: tuple[int, ...]) -> list[tuple[int, int]]:
 
 
 def _tightest(planes: Floats) -> Floats:
-    """Return only the tightest of parallel planes n · p + c ≤ 0, such as those of a flat side."""
+    """Keep only the tightest of parallel planes n · p + c ≤ 0. A flat side has many of them."""
     normals, group = np.unique(np.round(planes[:, :3], 9), axis=0, return_inverse=True)
     constants = np.full(len(normals), -np.inf)
     np.maximum.at(constants, group.ravel(), planes[:, 3])

@@ -34,14 +34,14 @@ class Cameras:
         count = min(count, len(self._positions) - 1)
         reach = self._distances(camera, min(count + 1, self._tree.n))[-1] + tie
         cameras = self._within(camera, reach, count + 1)
-        others: NDArray[np.int64] = cameras[cameras != camera]
-        return others
+        neighbours: NDArray[np.int64] = cameras[cameras != camera]
+        return neighbours
 
     def nearest_apart(self, camera: int, apart: float, tie: float) -> NDArray[np.int64]:
         """Return, in ascending order, all cameras as near as the nearest one elsewhere.
 
-        Elsewhere is at least ``apart`` metres away. Cameras that are farther by the part ``tie``
-        count as equally far.
+        "Elsewhere" means at least ``apart`` metres away. ``tie`` is a part of the distance: cameras
+        that are farther by no more than this count as equally far.
         """
         count = 2
         while True:

@@ -1,4 +1,4 @@
-"""What shows best what a rig sees: a panorama from its centre, or else the view in its middle."""
+"""Chooses the picture that shows a rig best: a panorama from its centre, or its middle view."""
 
 import numpy as np
 
@@ -6,18 +6,21 @@ from lightfield.geometry.rigs import BlendCamera, Path, Poses, Random, Rig
 from lightfield.geometry.rigs.hemisphere import GOLDEN_ANGLE
 from lightfield.geometry.rigs.orbit import on_sphere
 
-# Of so many directions, evenly spread, so large a part must be seen by some of the cameras.
-DIRECTIONS, PART = 200, 0.75
-# More cameras than this tell no more.
+# So many directions are tested, spread evenly.
+DIRECTIONS = 200
+# The cameras must see at least this part of the directions.
+SEEN_PART = 0.75
+# More cameras than this would not change the answer.
 MOST_CAMERAS = 200
 
 
 def sees_all_round(rig: Rig) -> bool:
     """Return whether the views show what a panorama from the rig's centre would.
 
-    They do if most directions are seen by a camera on that side of the centre. The cameras of a
-    plane see half of them at most, those that look at an object none: its inside would be the
-    panorama's place. Of loose poses, paths and random places nobody knows what is in the middle.
+    They do if for most directions a camera on that side of the centre sees the direction. The
+    cameras of a plane see at most half of the directions. Cameras that look at an object see none,
+    and the panorama would lie inside the object. Loose poses, paths and random places have no
+    meaningful centre.
     """
     if isinstance(rig, Poses | Path | Random | BlendCamera):
         return False
@@ -28,14 +31,14 @@ def sees_all_round(rig: Rig) -> bool:
     x, y = np.moveaxis(lens.pixels(directions @ cameras[:, :3, :3]), -1, 0)
     side = (cameras[:, :3, 3] - np.array(rig.center)) @ directions.T
     seen = (x >= 0) & (x <= lens.width) & (y >= 0) & (y <= lens.height) & (side >= -1e-9)
-    return bool(seen.any(axis=0).mean() >= PART)
+    return bool(seen.any(axis=0).mean() >= SEEN_PART)
 
 
 def middle_view(rig: Rig) -> int:
     """Return the number of a view in the middle of the rig.
 
-    It is that in the middle of the rig's middle row or, where this goes round, the one that looks
-    ahead, along +Y. Of a rig without rows it is that in the middle of the order.
+    This is the middle view of the rig's middle row. If the row goes round, it is the row's view
+    that looks along +Y. A rig without rows has the middle view of its order.
     """
     poses = rig.poses()[:: rig.views_a_position]
     places = (np.array([pose.position for pose in poses]) - np.array(rig.center)) @ rig.turn

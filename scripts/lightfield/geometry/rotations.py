@@ -23,7 +23,7 @@ def euler_to_matrix(euler: Floats) -> Floats:
 def matrix_to_euler(matrix: Floats) -> Floats:
     """Return the XYZ Euler angles (…, 3), in radians, of rotations (…, 3, 3).
 
-    Of the two sets of angles that give a rotation it takes the one with the smaller sum of
+    Two sets of angles give the same rotation. This returns the set with the smaller sum of
     magnitudes, as Blender's Matrix.to_euler does. At gimbal lock the rotation about Z is 0.
     """
     # A fresh zero is positive: rounding noise and -0 must not decide between +π and −π.
@@ -37,8 +37,8 @@ def matrix_to_euler(matrix: Floats) -> Floats:
             np.arctan2(-m[..., 1, 2], m[..., 1, 1]),
             np.arctan2(sign * m[..., 2, 1], sign * m[..., 2, 2]),
         )
-        # Z from what is left when the turn about X is undone, so that the two agree however
-        # near gimbal lock is (Day, "Extracting Euler angles from a rotation matrix").
+        # Undo the rotation about X, and take Z from the result. So X and Z agree even near gimbal
+        # lock. Source: Day, "Extracting Euler angles from a rotation matrix".
         sine = np.sin(x)
         cos = np.cos(x)
         z = np.arctan2(
@@ -63,7 +63,7 @@ def quaternion_to_matrix(quaternion: Floats) -> Floats:
 def looking_at(positions: Floats, target: Floats) -> Floats:
     """Return the rotations (n, 3, 3) of cameras at ``positions`` (n, 3) that look at a point (3,).
 
-    +Y is as near to the world's +Z as can be; a camera straight above or below the point has its
+    +Y is as near to the world's +Z as possible. A camera straight above or below the point has its
     +X along the world's +X. Raises `UserError` for a camera at the point itself.
     """
     back = positions - target

@@ -13,7 +13,7 @@ from lightfield.imaging.images import HALF_MAX
 
 
 def widen(red: Array, green: Array, blue: Array, alpha: Array | None = None) -> Array:
-    """Return (h, w) half or float channels as (h, w, 4) float32; without ``alpha`` it is 0."""
+    """Return (h, w) half or float channels as (h, w, 4) float32. The default alpha is 0."""
     out = np.empty((*red.shape, 4), np.float32)
     for index, channel in enumerate((red, green, blue, 0 if alpha is None else alpha)):
         out[:, :, index] = channel
@@ -28,7 +28,7 @@ def narrow(pixels: Array, count: int) -> Array:
 
 
 def to_half(values: Array) -> Array:
-    """Return (h, w) float32 values as half, those beyond its range as infinite."""
+    """Return (h, w) float32 values as half. Values beyond its range become infinite."""
     out = np.empty(values.shape, np.float16)
     _to_half(values, out.view(np.uint16))
     return out
@@ -55,6 +55,6 @@ def _narrow(values: Array, out: Array) -> None:
     for i in range(values.shape[0]):
         for j in range(values.shape[1]):
             for c in range(out.shape[0]):
-                # A filter may overshoot; beyond the half range lies infinity.
+                # A filter may overshoot the half range. Clamp, so that no value becomes infinite.
                 value = min(max(values[i, j, c], -np.float32(HALF_MAX)), np.float32(HALF_MAX))
                 out[c, i, j] = _float_to_half(value)

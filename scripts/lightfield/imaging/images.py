@@ -1,11 +1,10 @@
-"""Images in and out: always whole, and equal pixels give equal bytes.
+"""Reads and writes images. Files are always complete, and equal pixels give equal bytes.
 
-OpenImageIO reads and writes, but for EXR files of one part in scan lines, which the OpenEXR
-package reads twice as fast and writes in two thirds of the time, and with codecs that are newer.
-So OpenImageIO, which takes 33 MB of memory, is imported where a file needs it.
+The OpenEXR package handles EXR files of one part in scan lines. It has newer codecs, reads twice as
+fast as OpenImageIO, and writes in two thirds of the time. OpenImageIO handles all other images. It
+takes 33 MB of memory, so it is imported only for a file that needs it.
 """
 
-import functools
 import re
 import struct
 import zlib
@@ -22,14 +21,18 @@ from lightfield.core.files import atomic_path, check_readable
 
 Attribute = str | int | float
 
-# In a view's EXR header: what channel Z means, the key of the settings that made the pixels, the
-# version of bpy that did, on what machine, and how many values had to be clamped to the half range
-# or were not a number.
+# Attributes in a view's EXR header.
+# The meaning of channel Z.
 DEPTH_ATTRIBUTE = "plenoforge:depth"
+# The key of the settings that made the pixels.
 KEY_ATTRIBUTE = "plenoforge:key"
+# The version of bpy that rendered them.
 BPY_ATTRIBUTE = "plenoforge:bpy"
+# The machine that rendered them.
 MACHINE_ATTRIBUTE = "plenoforge:machine"
+# How many values were clamped to the half range.
 CLAMPED_ATTRIBUTE = "plenoforge:clamped"
+# How many values were not a number.
 NAN_ATTRIBUTE = "plenoforge:nan"
 
 HALF_MAX = 65504.0
@@ -43,8 +46,9 @@ CODECS = {
     "zstd": "ZSTD_COMPRESSION",
 }
 
-# How an EXR begins, and the bits of its version that mark tiles, deep pixels and several parts.
+# The number with which an EXR begins.
 _EXR_MAGIC = 20000630
+# The bits of an EXR's version that mark tiles, deep pixels and several parts.
 _EXR_OTHER_KINDS = 0x1A00
 _EXR_TYPES = {"HALF": np.float16, "FLOAT": np.float32, "UINT": np.uint32}
 
@@ -70,7 +74,7 @@ class Image:
 
 @dataclass(frozen=True)
 class Header:
-    """What a file says of its first subimage before any pixel is read; the size is in pixels."""
+    """The header of a file's first subimage. The size is in pixels."""
 
     width: int
     height: int
@@ -78,30 +82,30 @@ class Header:
     attributes: dict[str, Attribute]
 
 
-# What libjpeg says of a complete picture.
-_HARMLESS = re.compile("unknown JFIF revision|Unknown Adobe color|extraneous bytes")
+# Warnings of libjpeg about complete pictures.
+_HARMLESS_WARNINGS = re.compile("unknown JFIF revision|Unknown Adobe color|extraneous bytes")
 
 
-def is_whole(path: Path | str) -> bool:
+def is_readable(path: Path | str) -> bool:
     """Return whether a picture of any format can be read to its end.
 
-    Decoders of JPEG and TIFF go on with grey or black where the file ends too soon, and say so.
+    If a JPEG or TIFF ends too soon, its decoder fills the rest with grey or black, and warns.
     """
     import OpenImageIO as oiio
 
     file = oiio.ImageInput.open(str(path))
     if not file:
-        # Otherwise OpenImageIO prints it when the process ends.
+        # Fetch the error, or OpenImageIO prints it when the process ends.
         oiio.geterror()
         return False
     pixels = file.read_image(oiio.UNKNOWN)
-    said = file.geterror().splitlines()
+    warnings = file.geterror().splitlines()
     file.close()
-    return pixels is not None and all(_HARMLESS.search(line) for line in said)
+    return pixels is not None and all(_HARMLESS_WARNINGS.search(line) for line in warnings)
 
 
 def read_header(path: Path | str) -> Header:
-    """Read the header alone; raises `UserError` for a file that is no image."""
+    """Read only the header. Raises `UserError` for a file that is no image."""
     if header := _plain_exr_header(path):
         return header
     file = _open(path)
@@ -117,22 +121,24 @@ def read_image(
 ) -> Image:
     """Read every subimage's channels by name, or only the ``channels`` named, or only some rows.
 
-    ``rows`` are the first and the one after the last. A multi-part EXR's channels come together
-    under their own names. An alpha channel stays unassociated in files that store it so. The
-    arrays may be read-only. Raises `UserError` for a file that is missing, no image, cut short,
-    or without one of the ``channels``.
+    ``rows`` are the first row and the row after the last. The channels of a multi-part EXR keep
+    their own names. An alpha channel stays unassociated in files that store it so. The arrays may
+    be read-only. Raises `UserError` for a file that is missing, no image, cut short, or without one
+    of the ``channels``.
     """
     header = _plain_exr_header(path)
-    read = functools.partial(_read_plain_exr, header) if header else _read_other
-    image, names = read(path, channels, rows)
-    missing = [name for name in channels or () if name not in image.channels]
-    if missing:
-        raise UserError(f"{path}: has no channel {missing[0]}; it has {', '.join(names)}")
+    if header:
+        image, names = _read_plain_exr(header, path, channels, rows)
+    else:
+        image, names = _read_other(path, channels, rows)
+    missing_channels = [name for name in channels or () if name not in image.channels]
+    if missing_channels:
+        raise UserError(f"{path}: has no channel {missing_channels[0]}; it has {', '.join(names)}")
     return image
 
 
 def attribute(path: Path, name: str) -> Attribute | None:
-    """Return an attribute of a file's header, or None without it, or if the file is no image."""
+    """Return an attribute of a file's header. None if the file lacks it, or is no image."""
     try:
         return read_header(path).attributes.get(name)
     except UserError:
@@ -153,12 +159,12 @@ def is_finished(path: Path, key: str) -> bool:
 
 
 def check_codec(compression: str) -> None:
-    """Raise `UserError` for one of `CODECS` that this OpenEXR cannot write."""
+    """Raise `UserError` if this version of OpenEXR cannot write one of `CODECS`."""
     if not hasattr(OpenEXR, CODECS[compression]):
-        able = ", ".join(name for name, codec in CODECS.items() if hasattr(OpenEXR, codec))
+        writable = ", ".join(name for name, codec in CODECS.items() if hasattr(OpenEXR, codec))
         raise UserError(
             f"render.compression: is {compression!r}, which OpenEXR {OpenEXR.__version__} cannot "
-            f"write; must be one of {able}"
+            f"write; must be one of {writable}"
         )
 
 
@@ -262,9 +268,9 @@ def _open(path: Path | str) -> Any:
 
 
 def _plain_exr_header(path: Path | str) -> Header | None:
-    """Return the header of an EXR of one part, without tiles or deep pixels; None of other files.
+    """Return the header of an EXR of one part, without tiles or deep pixels. None for other files.
 
-    None, too, where it has text that is not UTF-8, at which OpenEXR's InputFile may crash.
+    Also None for a header with text that is not UTF-8: OpenEXR's InputFile may crash on it.
     """
     try:
         with Path(path).open("rb") as file:
@@ -293,31 +299,30 @@ def _read_plain_exr(
     channels: Sequence[str] | None,
     rows: tuple[int, int] | None,
 ) -> tuple[Image, list[str]]:
-    """Return the wanted channels of an EXR, and the names of all its channels."""
+    """Return an EXR's image with the ``channels`` or all, and the names of all its channels."""
     names = [name for name in header.channels if channels is None or name in channels]
     first, end = rows or (0, header.height)
     try:
         # OpenEXR.File, which will replace InputFile, can only read all rows.
         file = OpenEXR.InputFile(str(path))
-        raw = file.header()
-        kinds = [np.dtype(_EXR_TYPES[str(raw["channels"][name].type)]) for name in names]
-        top = raw["dataWindow"].min.y
-        read = file.channels(names, scanLine1=top + first, scanLine2=top + end - 1)
+        raw_header = file.header()
+        top = raw_header["dataWindow"].min.y
+        planes = file.channels(names, scanLine1=top + first, scanLine2=top + end - 1)
     except OSError as error:
         raise UserError(f"{path}: cannot be read whole: {error}") from None
-    found = {
-        name: np.frombuffer(values, kind).reshape(end - first, header.width)
-        for name, kind, values in zip(names, kinds, read, strict=True)
-    }
-    return Image(found, header.attributes), header.channels
+    plane_by_name = {}
+    for name, plane in zip(names, planes, strict=True):
+        dtype = np.dtype(_EXR_TYPES[str(raw_header["channels"][name].type)])
+        plane_by_name[name] = np.frombuffer(plane, dtype).reshape(end - first, header.width)
+    return Image(plane_by_name, header.attributes), header.channels
 
 
 def _read_other(
     path: Path | str, channels: Sequence[str] | None, rows: tuple[int, int] | None
 ) -> tuple[Image, list[str]]:
-    """Return the wanted channels of any image, and the names of all its channels."""
+    """Return any image with the ``channels`` or all, and the names of all its channels."""
     file = _open(path)
-    planes_by_name: dict[str, np.ndarray[Any, Any]] = {}
+    plane_by_name: dict[str, np.ndarray[Any, Any]] = {}
     attributes: dict[str, Attribute] = {}
     names: list[str] = []
     subimage = 0
@@ -325,22 +330,24 @@ def _read_other(
         spec = file.spec()
         attributes = _attributes(spec) | attributes
         channel_names = _channel_names(path, spec)
-        wanted = [
+        indices = [
             index
             for index, name in enumerate(channel_names)
             if channels is None or name in channels
         ]
-        for first, end, kind in _runs(spec, wanted):
+        for first, end, kind in _runs(spec, indices):
             pixels = file.read_image(subimage, 0, first, end, kind)
             if pixels is None:
                 raise UserError(f"{path}: cannot be read whole: {file.geterror()}")
             pixels = np.asarray(pixels).reshape(spec.height, spec.width, end - first)
-            planes = np.moveaxis(pixels[slice(*(rows or (None,)))], -1, 0)
-            planes_by_name |= dict(zip(channel_names[first:end], planes, strict=True))
+            if rows:
+                pixels = pixels[rows[0] : rows[1]]
+            planes = np.moveaxis(pixels, -1, 0)
+            plane_by_name |= dict(zip(channel_names[first:end], planes, strict=True))
         names += channel_names
         subimage += 1
     file.close()
-    return Image(planes_by_name, attributes), names
+    return Image(plane_by_name, attributes), names
 
 
 def _channel_names(path: Path | str, spec: Any) -> list[str]:
@@ -350,10 +357,10 @@ def _channel_names(path: Path | str, spec: Any) -> list[str]:
         raise UserError(f"{path}: is no image that can be read: {error}") from None
 
 
-def _runs(spec: Any, wanted: Sequence[int]) -> list[tuple[int, int, str]]:
+def _runs(spec: Any, indices: Sequence[int]) -> list[tuple[int, int, str]]:
     """Group channel indices into runs (first, end, type) that one call can read."""
     runs: list[tuple[int, int, str]] = []
-    for index in wanted:
+    for index in indices:
         kind = str(spec.channelformat(index))
         if runs and runs[-1][1] == index and runs[-1][2] == kind:
             runs[-1] = (runs[-1][0], index + 1, kind)
@@ -369,7 +376,7 @@ def _attributes(spec: Any) -> dict[str, Attribute]:
             name = parameter.name
             value = parameter.value
         except UnicodeDecodeError:
-            continue  # damaged: none of ours, which are ASCII
+            continue  # It is damaged. Plenoforge's own attributes are ASCII.
         if isinstance(value, str | int | float):
             attributes[name] = value
     return attributes

@@ -1,4 +1,4 @@
-"""Pictures of views, made to be looked at: exposed, tone-mapped, in sRGB."""
+"""Makes pictures of views for people: exposed, tone-mapped, in sRGB."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from lightfield.imaging.tonemap import to_8_bit, tone_map
 
 Array = np.ndarray[Any, Any]
 
-# Scene-linear grey that the eye takes as the middle between black and white.
+# The scene-linear grey that the eye sees as the middle between black and white.
 MIDDLE_GREY = 0.18
 # The brightest value that still shows as less than white, in multiples of middle grey's exposure.
 WHITE = 5.0
@@ -27,7 +27,7 @@ def exposure_for(colour: Array) -> float:
     """Return the exposure in stops that puts the typical pixel of (..., 3) at middle grey.
 
     Typical is the geometric mean of the luminance (Reinhard et al. 2002, equation 1) over pixels
-    that are not black, so that what lies outside an image circle does not count.
+    that are not black. So pixels outside an image circle do not count.
     """
     light = luminance(colour)
     lit = light[np.isfinite(light) & (light > 1e-6)]
@@ -50,5 +50,5 @@ def shrunk(colour: Array, width: int, height: int) -> Array:
 
 def shrunk_8_bit(pixels: Array, width: int, height: int) -> Array:
     """Return uint8 (…, …, 3) pixels resized as `shrunk` does."""
-    # Beside edges the filter overshoots.
+    # The filter overshoots at edges.
     return np.asarray(np.rint(shrunk(pixels, width, height).clip(max=255)), np.uint8)

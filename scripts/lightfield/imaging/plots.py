@@ -1,4 +1,4 @@
-"""One style for every plot: labelled, colour-blind safe, as SVG and PNG, equal bytes each time."""
+"""One style for all plots: safe for colour-blind readers, as SVG and PNG, with equal bytes."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,7 +9,7 @@ import matplotlib
 
 from lightfield.core.files import atomic_path
 
-# A picture is written to a file, never to a screen.
+# Plots go to files, never to a screen.
 matplotlib.use("agg")
 
 from matplotlib import pyplot, style
@@ -24,7 +24,7 @@ SKY = "#56b4e9"
 YELLOW = "#f0e442"
 GREY = "#777777"
 COLOURS = (BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, YELLOW, GREY)
-# With the colours, so that a line is known without them too.
+# Each colour has a marker, so that lines differ without colour, too.
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 
 _STYLE: dict[Any, Any] = {
@@ -39,7 +39,7 @@ _STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "lines.markersize": 5,
     "savefig.dpi": 130,
-    # Element names in an SVG would otherwise be random.
+    # Without a salt, the names of elements in an SVG are random.
     "svg.hashsalt": "plenoforge",
 }
 
@@ -50,9 +50,9 @@ def plot(
 ) -> Iterator[Any]:
     """Yield axes to draw on, then write ``stem``.svg and ``stem``.png.
 
-    One panel yields its axes, several an array of them. ``size`` is that of the figure, in inches.
+    Yields the axes of a single panel, or an array of axes. ``size`` is the figure's, in inches.
     """
-    # Whatever a user's matplotlibrc says.
+    # "default" overrides a user's matplotlibrc.
     with style.context(("default", _STYLE)):
         figure, axes = pyplot.subplots(rows, columns, figsize=size)
         try:

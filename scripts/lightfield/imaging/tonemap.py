@@ -1,4 +1,4 @@
-"""From scene-linear light to 8-bit and 16-bit pixels and back: exposure, Reinhard, sRGB."""
+"""Converts scene-linear light to 8-bit and 16-bit pixels, and back: exposure, Reinhard, sRGB."""
 
 import functools
 
@@ -12,9 +12,9 @@ from lightfield.geometry.lenses import Array
 def tone_map(color: Array, exposure: float, reinhard: float) -> Array:
     """Return linear ``color`` brightened by ``exposure`` stops, then compressed by Reinhard.
 
-    v ↦ v (1 + v / m²) / (1 + v) with m = ``reinhard``, the value that becomes 1, from 1e-9 to 1e9;
-    m = 1 leaves v as it is. Source: Reinhard et al. 2002, equation 4, a channel at a time as
-    SILVR's tool does. NaN stays NaN.
+    v ↦ v (1 + v / m²) / (1 + v) with m = ``reinhard``, from 1e-9 to 1e9. The value m becomes 1, and
+    m = 1 changes nothing. NaN stays NaN. Source: Reinhard et al. 2002, equation 4, applied to each
+    channel as in SILVR's tool.
     """
     if exposure == 0 and reinhard == 1:
         return color
@@ -27,12 +27,16 @@ def tone_map(color: Array, exposure: float, reinhard: float) -> Array:
 
 @kernel
 def _tone_map(values: Array, gain: np.float32, inverse_square: np.float32, out: Array) -> None:
-    one, huge = np.float32(1), np.float32(1e18)
+    one = np.float32(1)
+    huge = np.float32(1e18)
     for i in range(values.size):
-        # Below −1 the curve has a pole and then grows; no light is negative.
-        v = max(values[i] * gain, np.float32(0)) if values[i] == values[i] else values[i]
+        v = values[i]
+        # At −1 the curve has a pole. No light is negative, so clip it, but keep NaN.
+        if v == v:
+            v = max(v * gain, np.float32(0))
         if v > huge:
-            out[i] = one + v * inverse_square  # in which v / (1 + v) is 1 and v² may be infinite
+            # v / (1 + v) is 1 here, and v² may be infinite.
+            out[i] = one + v * inverse_square
         else:
             out[i] = v * (one + v * inverse_square) / (one + v)
 
@@ -47,7 +51,7 @@ def encode_srgb(linear: npt.ArrayLike) -> Array:
 
 
 def decode_srgb(encoded: npt.ArrayLike) -> Array:
-    """Return the linear values of sRGB-encoded ones in [0, 1]: the inverse of `encode_srgb`."""
+    """Return the linear values of sRGB-encoded values in [0, 1]: the inverse of `encode_srgb`."""
     v = np.asarray(encoded, np.float64)
     return np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
 
@@ -66,14 +70,14 @@ def _first_guess() -> Array:
 
 
 def to_8_bit(color: Array) -> Array:
-    """Return linear (..., C) float32 colour as sRGB uint8, rounded to nearest; NaN becomes 0."""
+    """Return linear (..., C) float32 colour as sRGB uint8, rounded to nearest. NaN becomes 0."""
     out = np.empty(color.shape, np.uint8)
     _encode(np.ascontiguousarray(color).reshape(-1), _thresholds(), _first_guess(), out.reshape(-1))
     return out
 
 
 def to_16_bit(color: Array) -> Array:
-    """Return linear (..., C) float32 colour as sRGB uint16, rounded to nearest; NaN becomes 0."""
+    """Return linear (..., C) float32 colour as sRGB uint16, rounded to nearest. NaN becomes 0."""
     encoded = encode_srgb(np.nan_to_num(color.astype(np.float64)))
     return np.asarray(np.rint(encoded * 65535), np.uint16)
 

@@ -1,4 +1,4 @@
-"""Pictures as a video, by ffmpeg where it is installed."""
+"""Writes pictures as a video, with ffmpeg."""
 
 import subprocess
 from collections.abc import Callable, Iterator
@@ -12,10 +12,10 @@ from lightfield.imaging.pictures import Array
 
 @contextmanager
 def video(path: Path, size: tuple[int, int], rate: int) -> Iterator[Callable[[Array], None]]:
-    """Yield what appends an sRGB picture (h, w, 3) uint8 to an MP4 (H.264) of ``size`` (w, h).
+    """Yield a function that appends a picture to an MP4 (H.264) of ``size`` (w, h).
 
-    The file is there once the block has ended without an error. Raises `UserError` where ffmpeg is
-    missing or cannot write it.
+    Pictures are sRGB, (h, w, 3) uint8. The file appears when the block ends without an error.
+    Raises `UserError` if ffmpeg is missing, or cannot write the file.
     """
     command = ["ffmpeg", "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"]
     command += ["-s", f"{size[0]}x{size[1]}", "-r", str(rate), "-i", "-"]
@@ -31,9 +31,9 @@ def video(path: Path, size: tuple[int, int], rate: int) -> Iterator[Callable[[Ar
             raise UserError(f"{path}: a video needs ffmpeg, which is not installed") from None
 
         def finish() -> None:
-            _, said = ffmpeg.communicate()
+            _, messages = ffmpeg.communicate()
             if ffmpeg.returncode:
-                problem = " ".join(said.decode(errors="replace").split())
+                problem = " ".join(messages.decode(errors="replace").split())
                 raise UserError(f"{path}: ffmpeg cannot write it: {problem}")
 
         def add(picture: Array) -> None:

@@ -12,7 +12,7 @@ import bpy
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.dataset.view_store import ViewStore
-from lightfield.imaging.images import is_whole
+from lightfield.imaging.images import is_readable
 from lightfield.rendering.blend_file import path_of
 from lightfield.rendering.quiet import quiet
 
@@ -206,7 +206,7 @@ def _problem(block: Any, path: Path) -> str | None:
     readable = True
     if isinstance(block, bpy.types.Image) and block.source != "MOVIE":
         # Not by Blender: 5.0 crashes at some broken EXRs.
-        readable = is_whole(path)
+        readable = is_readable(path)
     elif isinstance(block, bpy.types.Volume):
         readable = block.grids.load()
     elif isinstance(block, bpy.types.VectorFont):

@@ -102,7 +102,7 @@ def _taken(origin: Origin, lightfield: LightField) -> list[str]:
     if origin.inventory is None:
         return []
     own_camera = isinstance(origin.rig, rigs.BlendCamera)
-    return blend.taken(origin.inventory, [lightfield.frame], lightfield.render, own_camera)
+    return blend.usage_notes(origin.inventory, [lightfield.frame], lightfield.render, own_camera)
 
 
 def _failed(validation: Mapping[str, Any] | None) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -1,4 +1,4 @@
-"""Colour through a lens map."""
+"""Resamples colour through a lens map."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -15,7 +15,7 @@ _STRIP = 64  # rows, or rows of samples, resampled at a time
 
 
 def resample_colour(source: Array, lens_map: LensMap) -> Array:
-    """Resample a source window (h, w, 4) float32 to (H, W, 4); NaN where it has no source."""
+    """Resample a source window (h, w, 4) float32 to (H, W, 4). NaN where it has no source."""
     out = np.empty((*lens_map.target_cos.shape, 4), np.float32)
     for rows, strip in colour_strips(source, lens_map):
         out[rows] = strip
@@ -23,7 +23,7 @@ def resample_colour(source: Array, lens_map: LensMap) -> Array:
 
 
 def colour_strips(source: Array, lens_map: LensMap) -> Iterator[tuple[slice, Array]]:
-    """Yield the rows of what `resample_colour` returns, as many at a time as the caches hold."""
+    """Yield the result of `resample_colour` in strips of rows that fit into the caches."""
     height, width = lens_map.target_cos.shape
     source = _with_borders(source, lens_map)
     valid = lens_map.source_cos
@@ -33,10 +33,9 @@ def colour_strips(source: Array, lens_map: LensMap) -> Iterator[tuple[slice, Arr
             f"the source window has {source.shape[1]} × {source.shape[0]} pixels and the lens map "
             f"expects {valid.shape[1]} × {valid.shape[0]}"
         )
-    name = lens_map.settings["filter"]
     samples = lens_map.settings["samples"]
-    chosen = FILTERS[name]
-    if chosen.sample is None:
+    filter_ = FILTERS[lens_map.settings["filter"]]
+    if filter_.sample is None:
         yield slice(0, height), _st_warp(source, lens_map)
         return
     step = max(1, _STRIP // samples)
@@ -46,12 +45,12 @@ def colour_strips(source: Array, lens_map: LensMap) -> Iterator[tuple[slice, Arr
         coordinates = lens_map.coordinates[fine]
         flags = lens_map.flags[fine]
         out = np.empty((*flags.shape, 4), np.float32)
-        if chosen.cover and lens_map.footprints is not None and lens_map.counts is not None:
+        if filter_.cover and lens_map.footprints is not None and lens_map.counts is not None:
             footprints = lens_map.footprints[rows]
             counts = lens_map.counts[rows]
-            chosen.cover(source, valid, coordinates, footprints, counts, flags, topology, out)
+            filter_.cover(source, valid, coordinates, footprints, counts, flags, topology, out)
         else:
-            chosen.sample(source, valid, coordinates, flags, topology, out)
+            filter_.sample(source, valid, coordinates, flags, topology, out)
         if samples > 1:
             mean = np.empty((rows.stop - first, width, 4), np.float32)
             kernels.block_mean(out, samples, mean)
@@ -60,7 +59,7 @@ def colour_strips(source: Array, lens_map: LensMap) -> Iterator[tuple[slice, Arr
 
 
 def _with_borders(source: Array, lens_map: LensMap) -> Array:
-    """Return the window, of a cube map with what surrounds each face."""
+    """Return the window. Each face of a cube map gets a border from the faces around it."""
     if lens_map.strip is None:
         return source
     out = np.empty((*lens_map.strip.shape[:2], 4), np.float32)
@@ -79,10 +78,11 @@ def _st_warp(source: Array, lens_map: LensMap) -> Array:
     scale = np.array([source.shape[1], source.shape[0]], np.float32)
     st = np.where((lens_map.flags == kernels.NOTHING)[..., None], -1, lens_map.coordinates / scale)
     warped = _image_buffer(np.zeros((*st.shape[:2], 5), np.float32))
-    if not oiio.ImageBufAlgo.st_warp(
-        warped, _image_buffer(channels), _image_buffer(st.astype(np.float32)), "catmull-rom",
-        nthreads=1,
-    ):  # fmt: skip
+    coordinates = _image_buffer(st.astype(np.float32))
+    has_warped = oiio.ImageBufAlgo.st_warp(
+        warped, _image_buffer(channels), coordinates, "catmull-rom", nthreads=1
+    )
+    if not has_warped:
         raise UserError(f"filter: st_warp failed: {warped.geterror()}")
     samples = lens_map.settings["samples"]
     pixels = np.asarray(warped.get_pixels(oiio.FLOAT))

@@ -1,4 +1,4 @@
-"""Depth through a lens map: interpolated on a surface, never between two."""
+"""Resamples depth through a lens map. It interpolates on a surface, never between two."""
 
 from typing import Any
 
@@ -12,8 +12,8 @@ from lightfield.reprojection.lens_map import LensMap
 
 _STRIP = 64  # rows resampled at a time
 
-# Depth is interpolated where its third differences are below this fraction of it, so a step of
-# half as much may remain unseen: 1e-4, or for halves what their own steps are.
+# Depth is interpolated where its third differences are below this part of it. A step between
+# surfaces of half this size remains unseen: 1e-4, or for halves the size of their rounding.
 _SMOOTH = {np.dtype(np.float32): np.float32(2e-4), np.dtype(np.float16): np.float32(4e-3)}
 
 
@@ -22,17 +22,16 @@ def _inverse_distance(depth: Array, cos: Array, is_z: bool, out: Array) -> None:
     for i in range(depth.shape[0]):
         for j in range(depth.shape[1]):
             z = depth[i, j]
-            # The cosine is NaN outside the image circle, and marks what has no ray.
+            # The cosine is NaN for a pixel without a ray, outside the image circle.
             out[i, j] = (cos[i, j] if is_z else cos[i, j] * 0 + np.float32(1)) / z
 
 
 @kernel
 def _curvatures(a: Any, b: Any, c: Any, d: Any, tolerance: Any) -> tuple[Any, Any]:
-    """The second differences of four neighbours, about the second and the third.
+    """Return the second differences of four neighbours, at the second and the third.
 
-    NaN unless the four are of one smooth surface: where their third difference is small against
-    them, or where they curve one way, evenly, and not by much. A step between two surfaces curves
-    both ways.
+    NaN unless the four lie on one smooth surface. They do if their third difference is small, or if
+    they curve slightly, evenly, and in one direction. A step between two surfaces curves in both.
     """
     before, after = a - 2 * b + c, b - 2 * c + d
     third = abs(after - before)
@@ -51,11 +50,11 @@ def _cell(
     tolerance: Any,
     topology: Topology,
 ) -> Any:
-    """The four pixels whose first is (row, column), and their curvatures along the four sides."""
+    """Return the 2 × 2 pixels from (row, column) on, and the curvatures along their four sides."""
     height, width = inverse.shape
     within = row >= 1 and row < height - 2 and column >= 1 and column < width - 2
     if within:
-        # Unsigned, so that no index is checked for counting from the end.
+        # Unsigned, so that numba does not check whether an index counts from the end.
         one = np.uint64(1)
         two = np.uint64(2)
         i = np.uint64(row)
@@ -94,7 +93,7 @@ def _cell(
 
 @inline
 def _bend(before: Any, after: Any, f: Any) -> Any:
-    """What a cubic adds to a line at fraction ``f``, by Everett's interpolation formula."""
+    """Return what a cubic adds to a line at fraction ``f``, by Everett's interpolation formula."""
     one = np.float32(1)
     g = one - f
     return (g * (g * g - one) * before + f * (f * f - one) * after) * np.float32(1 / 6)
@@ -128,7 +127,7 @@ def _pick(
                 out[i, j] = np.nan
                 continue
             row, column = int(np.floor(y - half)), int(np.floor(x - half))
-            # Where pixels are magnified, neighbours share a cell.
+            # Neighbours of a magnified image often share a cell.
             if row != last_row or column != last_column:
                 cell = _cell(inverse, row, column, tolerance, topology)
                 last_row, last_column = row, column
@@ -146,7 +145,7 @@ def _pick(
                 nearest = min(int(y), height - 1), min(int(x), width - 1)
                 picked = inverse[nearest]
                 if valid[nearest] != valid[nearest]:
-                    # Beyond the rim of the image circle: the nearest of the four pixels around.
+                    # Beyond the rim of the image circle, take the nearest of the four pixels.
                     shortest = np.float32(4)
                     for q in range(2):
                         for p in range(2):
@@ -164,14 +163,15 @@ def _pick(
 def resample_depth(depth: Array, source_is_z: bool, target_is_z: bool, lens_map: LensMap) -> Array:
     """Resample a depth window (h, w), half or float, at the target pixels' centres.
 
-    ``source_is_z`` and ``target_is_z`` say which of Z-depth and distance the two images hold. On a
-    smooth surface 1 / distance is interpolated, which is nearly linear for a plane, within the
-    range of the four pixels around; elsewhere the pixel that the ray falls in is taken, or beyond
-    the rim of the image circle the nearest of those four, so no depth lies between two surfaces.
-    Returns (H, W), half or float; a miss (inf) stays inf, NaN marks a pixel without a source.
+    ``source_is_z`` and ``target_is_z`` say whether an image holds Z-depth or distance. On a smooth
+    surface, 1 / distance is interpolated, because it is nearly linear on a plane. The result stays
+    within the range of the four pixels around. Elsewhere the pixel is taken that the ray falls in.
+    Beyond the rim of the image circle the nearest of the four pixels is taken. So no depth lies
+    between two surfaces. Returns (H, W), half or float. A miss (inf) stays inf, and NaN marks a
+    pixel without a source.
     """
     if lens_map.strip is not None:
-        # A depth beyond its face's edge would be along another axis, or between two surfaces.
+        # Repeat the edge: depth on the next face would be along another axis.
         border = (lens_map.strip.shape[0] - depth.shape[0]) // 2
         depth = np.hstack([np.pad(face, border, mode="edge") for face in np.hsplit(depth, 6)])
     inverse = np.empty(depth.shape, np.float32)

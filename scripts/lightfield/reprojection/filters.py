@@ -1,7 +1,6 @@
-"""The filters to choose from. A new one is an entry here, with its kernel in kernels.py.
+"""The filters of a reprojection. A new filter is an entry here, and a kernel in kernels.py.
 
-Their arguments are those of the kernels: the source window, where it has rays, the samples'
-coordinates and flags, how the source continues, and what to fill.
+kernels.py explains the kernels' arguments.
 """
 
 from collections.abc import Callable
@@ -12,11 +11,11 @@ from lightfield.reprojection import kernels
 
 @dataclass(frozen=True)
 class Filter:
-    """A filter reads up to ``reach`` pixels on each side of the one that a sample falls in.
+    """A filter reads up to ``reach`` pixels on each side of the pixel that a sample falls in.
 
-    ``sample`` is the kernel that fills a pixel a sample; without one, OpenImageIO's st_warp does.
-    ``cover`` is that of a filter which takes as many samples as cover the whole pixel, for lens
-    maps in which any pixel needs more than one.
+    ``sample`` is the kernel that fills one output pixel for each sample. Without it, OpenImageIO's
+    st_warp does this. ``cover`` is the kernel that averages as many samples as cover the whole
+    pixel. It is used for lens maps in which some pixel needs more than one sample.
     """
 
     reach: int

@@ -1,6 +1,6 @@
-"""SILVR's flags: another way to give the settings of a reprojection than a settings file.
+"""SILVR's flags, which can replace the settings file of a reprojection.
 
-Lengths are in mm, the angles of lenses in radians or, as in 120deg, in degrees; a rotation is in
+Lengths are in mm. Angles of lenses are in radians, or in degrees as in 120deg. A rotation is in
 degrees.
 """
 
@@ -22,15 +22,15 @@ from lightfield.geometry.lenses.base import named_numbers
 from lightfield.geometry.lenses.cube_map import CubeMap
 from lightfield.reprojection.filters import DEFAULT_FILTER, FILTERS
 
-# Of an image's side: of a cube map's strip of faces, too.
+# The longest side of an image, or of a cube map's strip of faces.
 MOST_PIXELS = 2**19
 
 
 class FlagSettings(ReprojectionSettings):
-    """Settings whose lens is one that a scene YAML's camera may not be able to describe.
+    """Settings with a lens that a scene YAML's camera may not be able to describe.
 
-    Flags give angles in radians, and --no-reproject with --scale gives the source's lens in
-    another size.
+    Flags give angles in radians. --no-reproject with --scale gives the source's lens in another
+    size.
     """
 
     output_lens: InstanceOf[Lens]
@@ -114,7 +114,7 @@ def add_reproject_flags(parser: argparse.ArgumentParser) -> None:
         type=lambda text: text.split(","),
         default=[],
         metavar="NAME,…",
-        help="reproject these passes, too, which lie beside --input-cfg, into --output-dir/<pass>/",
+        help="also reproject these passes, which lie beside --input-cfg, to --output-dir/<pass>/",
     )
     colour = parser.add_argument_group("Colour")
     colour.add_argument("--exposure", type=stops, default=0.0, help="stops, default 0")
@@ -124,7 +124,7 @@ def add_reproject_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_lens_flags(parser: argparse.ArgumentParser, prefix: str, title: str) -> Any:
-    """Add a flag for each lens; return the group, in which one flag excludes the others."""
+    """Add a flag for each lens. Return their group, in which each flag excludes the others."""
     group = parser.add_argument_group(
         title, "Lengths in mm, angles in radians, or in degrees as in 120deg."
     )
@@ -136,7 +136,7 @@ def _add_lens_flags(parser: argparse.ArgumentParser, prefix: str, title: str) ->
 
 
 def read_source(arguments: argparse.Namespace) -> tuple[LightField, Lens]:
-    """Return the images' light field and lens, by the flags of `add_configuration_flags`."""
+    """Return the light field and lens that the flags of `add_configuration_flags` describe."""
     if arguments.no_configs:
         if arguments.input_cfg:
             raise UserError("--no-configs: excludes --input-cfg")
@@ -159,7 +159,7 @@ def read_source(arguments: argparse.Namespace) -> tuple[LightField, Lens]:
 
 
 def lens_map_settings(arguments: argparse.Namespace, source: Lens) -> ReprojectionSettings:
-    """Return the settings of a lens map: those of --settings, or those of the flags."""
+    """Return the settings of a lens map, from --settings or from the flags."""
     if arguments.settings:
         refuse_beside_settings(arguments, add_lens_map_flags)
         return read_settings(ReprojectionSettings, arguments.settings)
@@ -167,21 +167,22 @@ def lens_map_settings(arguments: argparse.Namespace, source: Lens) -> Reprojecti
 
 
 def reproject_settings(arguments: argparse.Namespace, source: Lens) -> ReprojectionSettings:
-    """Return the settings of a reprojection: those of --settings, or those of the flags."""
+    """Return the settings of a reprojection, from --settings or from the flags."""
     if arguments.settings:
         refuse_beside_settings(arguments, add_reproject_flags)
         settings = read_settings(ReprojectionSettings, arguments.settings)
         if not settings.formats:
             raise UserError(f"{arguments.settings}: formats: must be a list of exr, png, or both")
         return settings
-    formats = [name for name in ("exr", "png") if getattr(arguments, name)]
-    depth_png = {} if arguments.depth_png is None else {"depth_png": arguments.depth_png}
     content = _lens_map_content(arguments, source)
-    if not formats:
+    content["formats"] = [name for name in ("exr", "png") if getattr(arguments, name)]
+    if not content["formats"]:
         raise UserError("--exr, --png: give one of them, or both")
-    names = ("bits", "exposure", "reinhard", "mask", "passes")
-    development = {name: getattr(arguments, name) for name in names}
-    return _of_flags({**content, "formats": formats, **development, **depth_png})
+    for name in ("bits", "exposure", "reinhard", "mask", "passes"):
+        content[name] = getattr(arguments, name)
+    if arguments.depth_png is not None:
+        content["depth_png"] = arguments.depth_png
+    return _of_flags(content)
 
 
 def _of_flags(content: Mapping[str, Any]) -> ReprojectionSettings:
@@ -196,7 +197,7 @@ def _lens_map_content(arguments: argparse.Namespace, source: Lens) -> dict[str, 
         "output_lens": _output_lens(arguments, source),
         "cube_map": arguments.cubemap is not None,
         "rotation": _numbers(arguments.rotation, "--rotation", "PAN,PITCH,ROLL"),
-        # The adaptive filter covers the pixel by itself; samples are those of SILVR's default.
+        # The adaptive filter covers the pixel by itself. With --samples, use SILVR's default.
         "filter": arguments.filter or (DEFAULT_FILTER if arguments.samples == 1 else "bicubic"),
         "samples": arguments.samples,
     }
@@ -236,12 +237,12 @@ def _output_size(arguments: argparse.Namespace, source: Lens) -> tuple[int, int]
 
 
 def _lens(arguments: argparse.Namespace, prefix: str, width: int, height: int) -> Lens | None:
-    """Return the lens of the flag that was given, at ``width`` × ``height``; None without one."""
-    attribute = prefix.replace("-", "_")
+    """Return the lens that a flag gives, at ``width`` × ``height``. None without such a flag."""
     if prefix and arguments.i_cubemap:
         return CubeMap(width=width, height=height)
+    attribute_prefix = prefix.replace("-", "_")
     for lens in LENSES.values():
-        text = getattr(arguments, attribute + lens.name, None)
+        text = getattr(arguments, attribute_prefix + lens.name, None)
         if text is not None:
             try:
                 return lens.from_flag(text, width, height)

@@ -1,6 +1,6 @@
-"""Images that mirror themselves: of those a part is computed, and the rest unfolded from it."""
+"""Images with mirror symmetry: only a part is computed, and the image is unfolded from it."""
 
-import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -13,9 +13,9 @@ _Index = tuple[slice, slice]
 
 @dataclass(frozen=True)
 class Fold:
-    """An image of ``shape`` (H, W), of which two halves may mirror the others.
+    """An image of ``shape`` (H, W) whose halves may mirror each other.
 
-    ``mirrors`` says whether the lower half does the upper one, and the right half the left one.
+    ``mirrors`` says whether the lower half mirrors the upper half, and the right half the left.
     """
 
     shape: tuple[int, int]
@@ -23,49 +23,58 @@ class Fold:
 
     @classmethod
     def of_map(cls, source: Lens, target: Lens, rotation: Array) -> "Fold":
-        """Return the fold of where the target's pixels lie in the source.
+        """Return the symmetry of a lens map's coordinates.
 
-        A rotation (3, 3) keeps left and right, or up and down, apart where it leaves that axis
-        alone.
+        A map has a symmetry if both lenses have it, and the rotation (3, 3) does not move its axis.
         """
-        # Rows mirror y, and columns x.
-        kept = [not np.delete(rotation[axis], axis).any() for axis in (1, 0)]
-        down, across = (
-            all(three) for three in zip(source.mirrors, target.mirrors, kept, strict=True)
-        )
+        # Rows mirror y, and columns mirror x.
+        keeps_y = not np.delete(rotation[1], 1).any()
+        keeps_x = not np.delete(rotation[0], 0).any()
+        down = source.mirrors[0] and target.mirrors[0] and keeps_y
+        across = source.mirrors[1] and target.mirrors[1] and keeps_x
         return cls((target.height, target.width), (down, across))
 
     @property
     def part(self) -> tuple[int, int]:
-        """The height and width of the upper left part, from which the rest follows."""
-        height, width = (
-            -(-side // 2) if mirrored else side
-            for side, mirrored in zip(self.shape, self.mirrors, strict=True)
-        )
+        """The height and width of the upper left part, from which the image follows."""
+        height, width = self.shape
+        if self.mirrors[0]:
+            height = math.ceil(height / 2)
+        if self.mirrors[1]:
+            width = math.ceil(width / 2)
         return height, width
 
     def _pieces(self) -> Iterator[tuple[_Index, _Index, tuple[int, ...]]]:
-        """Yield a piece of the image, of what in the part it is an image, and the axes flipped."""
-        ways = [
-            [(slice(half), slice(half)), (slice(half, side), slice(side - half))]
-            for side, half in zip(self.shape, self.part, strict=True)
-        ]
-        for down, across in itertools.product(range(2), repeat=2):
-            (rows, from_rows), (columns, from_columns) = ways[0][down], ways[1][across]
-            flipped = tuple(axis for axis, is_flipped in enumerate((down, across)) if is_flipped)
+        """Yield the four pieces of the image: its place, its origin in the part, the flipped axes.
+
+        Pieces beyond an axis without symmetry are empty.
+        """
+        height, width = self.shape
+        part_height, part_width = self.part
+        upper = (slice(part_height), slice(part_height))
+        lower = (slice(part_height, height), slice(height - part_height))
+        left = (slice(part_width), slice(part_width))
+        right = (slice(part_width, width), slice(width - part_width))
+        for (rows, from_rows), (columns, from_columns), flipped in (
+            (upper, left, ()),
+            (upper, right, (1,)),
+            (lower, left, (0,)),
+            (lower, right, (0, 1)),
+        ):
             yield (rows, columns), (from_rows, from_columns), flipped
 
     def unfolded(self, part: Array) -> Array:
-        """Return the image of a part (h, w, …) whose values stay as they are."""
+        """Return the image of a part (h, w, …) whose values do not depend on the side."""
         out = np.empty((*self.shape, *part.shape[2:]), part.dtype)
         for piece, origin, flipped in self._pieces():
             out[piece] = np.flip(part[origin], flipped)
         return out
 
     def steps(self, part: Array) -> Array:
-        """Return the image of steps (h, w, 2, 2), the first index of which is x or y.
+        """Return the image of steps (h, w, 2, 2), whose first index is x or y.
 
-        Mirrored once, a step along a row has another y, and one along a column another x.
+        One reflection changes the sign of y in a step along a row, and of x in a step along a
+        column. Two reflections cancel.
         """
         out = self.unfolded(part)
         for piece, _, flipped in self._pieces():
@@ -74,14 +83,12 @@ class Fold:
         return out
 
     def placed(self, points: Array, corner: tuple[int, int], source: Lens) -> Array:
-        """Return the image of points (h, w, 2), (x, y), in float32 and counted from ``corner``."""
+        """Return the image of points (h, w, 2), in float32. x and y count from ``corner``."""
         out = np.empty((*self.shape, 2), np.float32)
         for piece, origin, flipped in self._pieces():
-            for axis, (first, side) in enumerate(
-                zip(corner, (source.width, source.height), strict=True)
-            ):
+            for axis, side in enumerate((source.width, source.height)):
                 values = np.flip(points[(*origin, axis)], flipped)
                 if 1 - axis in flipped:
                     values = side - values
-                np.subtract(values, first, out=out[(*piece, axis)], casting="same_kind")
+                np.subtract(values, corner[axis], out=out[(*piece, axis)], casting="same_kind")
         return out

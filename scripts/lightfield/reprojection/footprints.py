@@ -1,4 +1,4 @@
-"""The loops of a lens map: what each target pixel covers, and which samples need care."""
+"""The loops of a lens map: which area each target pixel covers, and which samples need care."""
 
 import math
 
@@ -8,12 +8,12 @@ from lightfield.core.compiled import inline, kernel
 from lightfield.geometry.lenses import Array
 from lightfield.reprojection.kernels import CAREFUL, INSIDE, NOTHING
 
-_MOST_SAMPLES = 256  # each way, of a footprint that meets a pole
+_MOST_SAMPLES = 256  # in each direction, for a footprint that meets a pole
 
 
 @inline
 def _difference(before: float, middle: float, after: float, period: float) -> float:
-    """Return the central difference: one-sided if one neighbour is missing, 0 if both are."""
+    """Return the central difference. One-sided if one neighbour is missing, and 0 if both are."""
     backward, forward = middle - before, after - middle
     if period > 0:
         backward -= period * np.rint(backward / period)
@@ -23,47 +23,47 @@ def _difference(before: float, middle: float, after: float, period: float) -> fl
     if backward != backward:
         backward = forward
     mean = (forward + backward) / 2
-    # A grazing ray moves beyond all bounds: as good as beyond every image.
+    # The difference of grazing rays has no bound. Limit it to a value larger than any image.
     return min(max(mean, -1e9), 1e9) if mean == mean else 0.0
 
 
 @kernel
 def extent(step: Array, counts: Array) -> int:
-    """Return how far a pixel's samples lie from its centre: the most in x or y, in source pixels.
+    """Return the largest distance in x or y of a pixel's samples from its centre, in source pixels.
 
     ``step`` is (2, 2) and ``counts`` (2,), as in a lens map.
     """
-    most = np.float32(0)
+    widest = np.float32(0)
     for axis in range(2):
-        reach = abs(step[axis, 0] * np.float32(counts[0] - 1))
-        reach += abs(step[axis, 1] * np.float32(counts[1] - 1))
-        most = max(most, reach)
-    return int(np.ceil(most / 2))
+        width = abs(step[axis, 0] * np.float32(counts[0] - 1))
+        width += abs(step[axis, 1] * np.float32(counts[1] - 1))
+        widest = max(widest, width)
+    return int(np.ceil(widest / 2))
 
 
 @inline
 def _fill_footprint(jacobian: Array, widest: float, steps: Array, counts: Array) -> int:
-    """Fill the ``steps`` (2, 2) between samples and their ``counts`` (2,); return the larger count.
+    """Fill the ``steps`` (2, 2) between samples and their ``counts`` (2,). Return the larger count.
 
-    A pixel is a mean over its area, in the source too, so what is missing to a target pixel that
-    spans s source pixels is a box of width √(s² − 1), by the variances. n samples at distance d
-    have the variance of a box of width d √(n² − 1), so that gives d; n is as small as the bicubic
-    kernel, under which d may exceed a pixel, allows. Where s is little above 1 or below it, one
-    sample is all: magnifying does not blur.
+    A pixel is the mean over its area, in the target and in the source. Let a target pixel span s
+    source pixels. By the variances, it needs a further box of width √(s² − 1). n samples at
+    distance d have the variance of a box of width d √(n² − 1), which gives d. The bicubic kernel
+    lets d exceed a pixel, so n can be small. If s is at most little above 1, one sample is enough:
+    magnifying does not blur.
     """
-    most = 1
-    for way in range(2):
-        squared = jacobian[0, way] ** 2 + jacobian[1, way] ** 2
+    largest_count = 1
+    for direction in range(2):
+        squared = jacobian[0, direction] ** 2 + jacobian[1, direction] ** 2
         box = min(math.sqrt(max(squared - 1, 0.0)), widest)
-        counts[way] = 1
+        counts[direction] = 1
         if box > 0.5:
             count = int(min(max(math.ceil(0.75 * box), 2), _MOST_SAMPLES))
             scale = box / math.sqrt(squared) / math.sqrt(count * count - 1)
-            counts[way] = count
-            steps[0, way] = jacobian[0, way] * scale
-            steps[1, way] = jacobian[1, way] * scale
-            most = max(most, count)
-    return most
+            counts[direction] = count
+            steps[0, direction] = jacobian[0, direction] * scale
+            steps[1, direction] = jacobian[1, direction] * scale
+            largest_count = max(largest_count, count)
+    return largest_count
 
 
 @kernel
@@ -83,15 +83,16 @@ def measure(
 ) -> int:
     """Measure what target pixels cover, from their coordinates (h, w, 2) and their neighbours'.
 
-    Fills ``centers``, NaN outside the source's ``size``, and ``magnification``, which is 1 / √|det|
-    of the Jacobian. ``period`` is the source's width if it wraps around, or else 0. Unless they are
-    empty it fills, for the adaptive filter, ``counts``, how many samples a pixel takes each way,
-    and ``footprints``, which are zeros, with the steps between them; returns the largest count.
-    No box is wider than ``widest``, in source pixels.
+    Fills ``centers``, which are NaN outside the source's ``size``. Fills ``magnification``, which
+    is 1 / √|det| of the Jacobian. ``period`` is the source's width if it wraps around, or else 0.
+
+    For the adaptive filter, ``counts`` and ``footprints`` are not empty. It fills ``counts`` with
+    the number of samples in each direction, and ``footprints``, which must be zeros, with the steps
+    between samples. No box is wider than ``widest``, in source pixels. Returns the largest count.
     """
     jacobian = np.empty((2, 2))
     fills_footprints = len(counts) > 0
-    most = 1
+    largest_count = 1
     for i in range(middle.shape[0]):
         for j in range(middle.shape[1]):
             x, y = middle[i, j, 0], middle[i, j, 1]
@@ -112,8 +113,8 @@ def measure(
             magnification[i, j] = 1 / math.sqrt(area)
             if fills_footprints:
                 count = _fill_footprint(jacobian, widest, footprints[i, j], counts[i, j])
-                most = max(most, count)
-    return most
+                largest_count = max(largest_count, count)
+    return largest_count
 
 
 @kernel
@@ -147,7 +148,7 @@ def mark(
     counts: Array,
     flags: Array,
 ) -> None:
-    """Fill the ``flags`` of samples whose filter reads ``reach`` pixels around, and footprints."""
+    """Fill the ``flags`` of samples, whose filter reads ``reach`` pixels around each footprint."""
     height, width = distance.shape
     for i in range(flags.shape[0]):
         for j in range(flags.shape[1]):
@@ -168,8 +169,8 @@ def bounds(
 ) -> tuple[float, float, float, float, int]:
     """Return the least and largest x and y that are read around ``points``, and the largest extent.
 
-    ``margin`` is added on each side, and the extent of each point that has a footprint. The
-    bounds are inf and −inf where no point has coordinates.
+    Adds ``margin`` on each side, and the extent of each point's footprint. The bounds are inf and
+    −inf if no point has coordinates.
     """
     left = top = np.inf
     right = bottom = -np.inf

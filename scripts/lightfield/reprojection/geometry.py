@@ -1,4 +1,4 @@
-"""The geometry of a reprojection: the lens of the views, and of each image to make of them."""
+"""The geometry of a reprojection: the lens of the views, and the lenses of their new images."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,9 +13,10 @@ from lightfield.reprojection import lens_map
 
 @dataclass(frozen=True)
 class Target:
-    """One image to make of each view: its lens, and how its rays turn into the source camera's.
+    """One image to make of each view.
 
-    ``suffix`` is what its name has after the view's; ``rotation`` is (3, 3).
+    Its name is the view's name and ``suffix``. ``rotation`` (3, 3) turns rays of its camera into
+    the source camera's.
     """
 
     suffix: str
@@ -60,10 +61,13 @@ def _targets(settings: ReprojectionSettings, source: Lens) -> list[Target]:
 
 
 def _is_seen(target: Target, source: Lens) -> bool:
-    """Whether the source sees anything of a target; a fisheye of 180° sees nothing behind it."""
+    """Return whether the source sees any part of a target.
+
+    A fisheye of 180°, for example, sees nothing of the face behind it.
+    """
     rays = target.lens.resized(64, 64).pixel_rays() @ target.rotation.T
     if np.isfinite(source.pixels(rays)).any():
         return True
-    # All that a narrow lens sees may lie between these rays.
+    # The whole image of a narrow lens may lie between these rays.
     pixels = target.lens.pixels(source.fitted(64).pixel_rays() @ target.rotation)
     return bool(((pixels >= 0) & (pixels <= target.lens.width)).all(axis=-1).any())

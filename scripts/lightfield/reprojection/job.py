@@ -1,4 +1,4 @@
-"""What a run of scripts/reproject.py does: its files, its views, and their keys."""
+"""A run of scripts/reproject.py: its files, its views, and their keys."""
 
 import argparse
 import hashlib
@@ -25,7 +25,8 @@ from lightfield.reprojection import lens_map
 from lightfield.reprojection.geometry import Geometry, Target
 from lightfield.reprojection.lens_map import LensMap
 
-VERSION = 3  # of the files: part of every key, raised when the same settings give others
+# The version of the files, which every key has. Raise it if equal settings give other files.
+VERSION = 3
 SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
 
 
@@ -41,13 +42,13 @@ def add_flags(parser: argparse.ArgumentParser) -> None:
         "--record", type=Path, metavar="JSON", help="list of the files, written last"
     )
     files.add_argument(
-        "--source-record", type=Path, metavar="JSON", help="record that the images must agree with"
+        "--source-record", type=Path, metavar="JSON", help="record that the images must match"
     )
     files.add_argument("--lens-map", type=Path, metavar="FILE", help="computed by lens_map.py")
-    chosen = parser.add_argument_group("Choice of files")
-    chosen.add_argument("--filter-prefix", default="", help="only names that start so")
-    chosen.add_argument("--filter-suffix", default="", help="only names that end so")
-    chosen.add_argument(
+    choice = parser.add_argument_group("Choice of files")
+    choice.add_argument("--filter-prefix", default="", help="only names that start with this")
+    choice.add_argument("--filter-suffix", default="", help="only names that end with this")
+    choice.add_argument(
         "--views",
         metavar="FIRST:END",
         help="only these frames of --input-cfg, from 0, END excluded",
@@ -67,7 +68,7 @@ class SourceView:
 
 
 class Job:
-    """What all views of a run have in common; a `UserError` names the wrong flag or key."""
+    """The settings that all views of a run share. Errors name the wrong flag or key."""
 
     def __init__(
         self,
@@ -88,13 +89,14 @@ class Job:
             self.lightfield.require_centre()
         self.passes = self._chosen_passes()
         self.record = ShardRecord(arguments.record, arguments.output_dir)
-        record = arguments.source_record
-        source_files = shard_files.read_record(record) if record else {}
         # The SHA-256 of each image, by its path in the dataset.
-        self.source_sums = {path: digest for path, (_, digest) in source_files.items()}
+        self.source_sums: dict[str, str] = {}
+        if arguments.source_record:
+            for path, (_, digest) in shard_files.read_record(arguments.source_record).items():
+                self.source_sums[path] = digest
 
     def _chosen_passes(self) -> list[Pass]:
-        """Return the passes to reproject; raises `UserError` for one that the views lack."""
+        """Return the passes to reproject. Raises `UserError` for a pass that the views lack."""
         available = [each.name for each in self.lightfield.passes if each.kind != "motion"]
         for name in self.settings.passes:
             if name not in available:
@@ -110,7 +112,7 @@ class Job:
 
     @cached_property
     def maps(self) -> list[LensMap]:
-        """The lens map of each target, from the file or computed."""
+        """The lens map of each target, from --lens-map or computed."""
         return [self._map(target) for target in self.targets]
 
     def _map(self, target: Target) -> LensMap:
@@ -128,17 +130,19 @@ class Job:
         return loaded
 
     @property
-    def depth_wanted(self) -> bool:
+    def needs_depth(self) -> bool:
+        """Whether an output holds depth."""
         return "exr" in self.settings.formats or self.settings.depth_png is not None
 
     @property
     def depth_precision(self) -> str:
-        """That of the source's floats, by its lightfield.json; others' may not say it."""
+        """The precision of the source's float depth, by its lightfield.json."""
+        # Other programs' lightfield.json has no such key.
         render = self.lightfield.content.get("render", {})
         return str(render.get("depth_precision", "float"))
 
     def key(self, target: Target, identity: str) -> str:
-        """Return the SHA-256 of all that an output's pixels depend on.
+        """Return the SHA-256 of everything that an output's pixels depend on.
 
         ``identity`` stands for the source's content.
         """
@@ -149,13 +153,14 @@ class Job:
             "depth_png": self.settings.depth_png,
             "depth": self.lightfield.content.get("depth"),
             "source": identity,
-            # Left out where it is false, so that existing keys hold.
-            **({"transparent": True} if self.lightfield.transparent else {}),
         }
+        # False is left out, so that the keys of earlier versions stay valid.
+        if self.lightfield.transparent:
+            content["transparent"] = True
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
     def outputs(self, view: SourceView, target: Target) -> dict[str, Path]:
-        """Return the files to make of a view, by kind."""
+        """Return the files of a view's image, by kind."""
         name = view.name + target.suffix
         files: dict[str, str] = {kind: f"{name}.{kind}" for kind in self.settings.formats}
         if self.settings.depth_png is not None:
@@ -166,12 +171,12 @@ class Job:
         return {kind: folder / file for kind, file in files.items()}
 
     def pass_outputs(self, view: SourceView, target: Target) -> dict[Pass, Path]:
-        """Return the files to make of a view's passes."""
+        """Return the files of a view's passes."""
         folder: Path = self.arguments.output_dir
         return {each: each.path(folder, view.name + target.suffix) for each in self.passes}
 
     def files(self, view: SourceView, target: Target) -> list[Path]:
-        """Return all files to make of a view."""
+        """Return all files that a target makes of a view."""
         return [*self.outputs(view, target).values(), *self.pass_outputs(view, target).values()]
 
     def sources(self, view: SourceView) -> list[Path]:
@@ -180,9 +185,9 @@ class Job:
         return [*view.paths, *(each.path(folder, view.name) for each in self.passes)]
 
     def output_lightfield(self) -> LightField:
-        """Return the input's lightfield.json with lens, depth and poses of what is written."""
+        """Return the input's lightfield.json with the lens, depth and poses of the new images."""
         lens = self.targets[0].lens
-        depth = lens.usual_depth if self.depth_wanted and self.lightfield.depth else None
+        depth = lens.usual_depth if self.needs_depth and self.lightfield.depth else None
         views = [
             _turned(view, target)
             for view in self.lightfield.views
@@ -243,18 +248,22 @@ class Job:
 
 
 def _find(folder: Path, name: str, lens: Lens) -> tuple[Path, ...]:
-    """Return the file of a view; of a missing one the name that it would have first."""
+    """Return the files of a view: one image, or the six faces of a cube map."""
     if isinstance(lens, CubeMap):
-        return tuple(
-            path for face in CUBE_FACES for path in _find(folder, f"{name}_{face}", lens.face)
-        )
+        return tuple(_find_image(folder, f"{name}_{face}") for face in CUBE_FACES)
+    return (_find_image(folder, name),)
+
+
+def _find_image(folder: Path, name: str) -> Path:
+    """Return the image of this name. A missing image gets the first of `SUFFIXES`."""
     candidates = [folder / f"{name}{suffix}" for suffix in SUFFIXES]
-    return (next((path for path in candidates if path.is_file()), candidates[0]),)
+    return next((path for path in candidates if path.is_file()), candidates[0])
 
 
 def _turned(view: lightfield.View, target: Target) -> lightfield.View:
+    """Return the view of a target's camera."""
     name = view.name + target.suffix
-    # Its flow counts in pixels of its own lens.
+    # Flow is in pixels of the source's lens.
     view = replace(view, others={k: v for k, v in view.others.items() if k != "flow"})
     if np.array_equal(target.rotation, np.eye(3)):
         return replace(view, name=name)

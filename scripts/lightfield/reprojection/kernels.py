@@ -1,9 +1,9 @@
 """The loops that resample colour: weights, samples that need care, and whole strips of pixels.
 
-Sources are (h, w, 4) float32; what is not finite is no sample: it is left out and the other
-weights are scaled up, and where nothing is left the result is NaN. ``valid`` (h, w) is NaN where
-the source has no ray. ``coordinates`` (H, W, 2) are a sample's (x, y) in the source, and ``flags``
-(H, W) say of each: `NOTHING`, `INSIDE` or `CAREFUL`. ``topology`` is that of a lens map.
+Sources are (h, w, 4) float32. A pixel that is not finite is left out, and the other weights are
+scaled up. If no pixel remains, the result is NaN. ``valid`` (h, w) is NaN where the source has no
+ray. ``coordinates`` (H, W, 2) are the (x, y) of each sample in the source. ``flags`` (H, W) are
+`NOTHING`, `INSIDE` or `CAREFUL`. ``topology`` is that of a lens map.
 """
 
 import math
@@ -15,10 +15,10 @@ import numpy as np
 from lightfield.core.compiled import inline, kernel, part
 from lightfield.geometry.lenses import Array
 
-# What a sample finds in the source.
-NOTHING = 0  # the source does not see the ray
-INSIDE = 1  # every source pixel that the filter reads exists
-CAREFUL = 2  # some may not: the image's edge, its seam or pole, the rim of the image circle
+# The flags of samples.
+NOTHING = 0  # The source does not see the ray.
+INSIDE = 1  # Every source pixel that the filter reads exists.
+CAREFUL = 2  # Some may be missing: at the image's edge, seam or pole, or the image circle's rim.
 
 Weights = Callable[[Any], tuple[Any, ...]]
 Topology = tuple[bool, bool, bool]
@@ -36,7 +36,8 @@ def cubic_weights(t: Any) -> tuple[Any, ...]:
 
     Source: Catmull and Rom 1974; the cubic convolution of third order of Keys 1981 (a = −1/2).
     """
-    half, one = np.float32(0.5), np.float32(1)
+    half = np.float32(0.5)
+    one = np.float32(1)
     return (
         t * (t * (one - half * t) - half),
         one + t * t * (np.float32(1.5) * t - np.float32(2.5)),
@@ -49,7 +50,7 @@ def cubic_weights(t: Any) -> tuple[Any, ...]:
 def lanczos_weights(t: Any) -> tuple[Any, ...]:
     """Return the weights of six pixels, for a point at ``t`` in [0, 1) past the third.
 
-    sinc(u) sinc(u / 3) (Turkowski 1990), made to sum to one.
+    sinc(u) sinc(u / 3) (Turkowski 1990), scaled to sum to one.
     """
     zero = np.float32(0)
     half = np.float32(0.5)
@@ -66,7 +67,7 @@ def lanczos_weights(t: Any) -> tuple[Any, ...]:
     w3 = (b - a) / ((t - 1) * (t - 1))
     w4 = -(b + a) / ((t - 2) * (t - 2))
     w5 = 2 * a / ((t - 3) * (t - 3))
-    # sin(π u) is the same in all but for the sign, which is in them, and drops out.
+    # |sin(π u)| is equal for all. The weights have its sign, and scaling cancels its size.
     scale = one / (w0 + w1 + w2 + w3 + w4 + w5)
     return w0 * scale, w1 * scale, w2 * scale, w3 * scale, w4 * scale, w5 * scale
 
@@ -75,10 +76,10 @@ def lanczos_weights(t: Any) -> tuple[Any, ...]:
 def source_index(
     row: int, column: int, height: int, width: int, topology: Topology
 ) -> tuple[int, int]:
-    """Return the pixel that continues the image at (row, column); row −1 if none does."""
+    """Return the pixel that continues the image at (row, column). The row is −1 if none does."""
     wraps, top, bottom = topology
     if wraps:
-        # Beyond a pole lies the same row, half a turn away.
+        # The same row continues beyond a pole, half a turn away.
         if row < 0 and top:
             row = -1 - row
             column = column + width // 2
@@ -94,7 +95,7 @@ def source_index(
 @inline
 def _sample(source: Array, row: int, column: int, wy: Any, wx: Any) -> tuple[Any, Any, Any, Any]:
     """Return the weighted sum of the pixels from (row, column) on, all of which exist."""
-    # Unsigned, so that no index is checked for counting from the end.
+    # Unsigned, so that numba does not check whether an index counts from the end.
     i: Any = np.uint64(row)
     j: Any = np.uint64(column)
     s0 = s1 = s2 = s3 = np.float32(0)
@@ -128,9 +129,9 @@ def _sum_of_present(
     topology: Topology,
     result: Array,
 ) -> tuple[Any, bool]:
-    """Sum the existing pixels from (row, column) on; return their weight, and if all exist.
+    """Sum the existing pixels from (row, column) on. Return their weight, and whether all exist.
 
-    ``result`` (2, 4) becomes the sum, and the least of the pixels and zero.
+    Fills ``result`` (2, 4) with the sum, and with the minimum of the pixels and zero.
     """
     height, width = source.shape[0], source.shape[1]
     complete = True
@@ -163,12 +164,12 @@ def _careful(
     topology: Topology,
     result: Array,
 ) -> bool:
-    """Sample where pixels may be missing or negative; return whether any exists.
+    """Sample where pixels may be missing or negative. Return whether any pixel exists.
 
-    The sample lies (``fy``, ``fx``) past pixel (``row``, ``column``). Where one is missing, the
-    answer is bilinear among those of the four nearest that are there: a kernel with negative lobes
-    does not survive the loss of a part of it. Nor do such lobes make light negative: what comes
-    out below zero is raised to the darkest of the pixels.
+    The sample lies (``fy``, ``fx``) past pixel (``row``, ``column``). A kernel with negative lobes
+    needs all its pixels. If one is missing, the result is bilinear among the existing ones of the
+    four nearest. Such lobes must not make light negative either. So a value below zero is raised
+    to the darkest pixel.
     """
     reach = len(wx) // 2 - 1
     total, complete = _sum_of_present(
@@ -177,7 +178,7 @@ def _careful(
     if not complete:
         ly, lx = linear_weights(fy), linear_weights(fx)
         total, _ = _sum_of_present(source, valid, row, column, ly, lx, topology, result)
-    # The bilinear weights of all that is there may be zero: the point lies on what is not.
+    # All existing pixels may have a weight of zero, if the sample lies on a missing pixel.
     if total < np.float32(1e-4):
         return False
     for c in range(4):
@@ -310,7 +311,7 @@ def covering(weights: Weights) -> Callable[..., None]:
 
 @kernel
 def block_mean(fine: Array, samples: int, out: Array) -> None:
-    """Average blocks of ``samples`` × ``samples`` pixels, of those that are numbers."""
+    """Average blocks of ``samples`` × ``samples`` pixels, without those that are NaN."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             a0 = a1 = a2 = a3 = np.float32(0)
@@ -332,7 +333,7 @@ def block_mean(fine: Array, samples: int, out: Array) -> None:
 
 @kernel
 def continue_faces(source: Array, strip: Array, out: Array) -> None:
-    """Give each face of a cube map a border, bicubic samples of the faces around it."""
+    """Give each face of a cube map a border: bicubic samples of the faces around it."""
     size, side = source.shape[0], strip.shape[0]
     border = (side - size) // 2
     for i in range(out.shape[0]):
@@ -356,5 +357,5 @@ def continue_faces(source: Array, strip: Array, out: Array) -> None:
                         q = min(max(column + b - 1, first), first + size - 1)
                         total += wy[a] * wx[b] * source[p, q, c]
                         darkest = min(darkest, source[p, q, c])
-                # NaN, which stays, marks what is no sample.
+                # NaN marks a missing pixel. This comparison keeps it.
                 out[i, j, c] = darkest if total < darkest else total

@@ -1,7 +1,7 @@
-"""The lens map: where in the source image each pixel of the target image looks.
+"""The lens map: the place in the source image at which each pixel of the target image looks.
 
 A map depends on the two lenses, their sizes, the rotation between them and the filter, but not on
-a view. It is computed once in float64, kept in float32, and applied to every view of a rig.
+a view. It is computed once in float64, stored in float32, and applied to every view of a rig.
 """
 
 import json
@@ -9,7 +9,7 @@ import math
 import sys
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import fmean
 from tokenize import TokenError
@@ -27,15 +27,15 @@ from lightfield.reprojection.footprints import bounds, distance_to_missing, mark
 from lightfield.reprojection.kernels import Topology
 
 _STRIP = 2**16  # pixels computed at a time, so that the temporary arrays stay in the caches
-_HEADER = 65536  # bytes kept for the description in a file
+_HEADER = 65536  # bytes reserved for the description in a file
 
 
 def rotation_matrix(pan: float, pitch: float, roll: float) -> Array:
-    """Return the (3, 3) rotation from target to source camera coordinates; angles in degrees.
+    """Return the (3, 3) rotation from target to source camera coordinates. Angles are in degrees.
 
-    The published tool's convention: Ry(pan) · Rx(pitch) · Rz(roll) in a frame whose y points
-    down, which are −pitch and −roll where y points up. So a positive pan turns the target
-    camera to the left, a positive pitch down, and a positive roll clockwise.
+    A positive pan turns the target camera to the left, a positive pitch down, and a positive roll
+    clockwise. SILVR's tool defines Ry(pan) · Rx(pitch) · Rz(roll) in a frame whose y points down.
+    In this frame, whose y points up, pitch and roll change their signs.
     """
     pan = math.radians(pan)
     pitch = math.radians(-pitch)
@@ -53,10 +53,10 @@ def rotation_matrix(pan: float, pitch: float, roll: float) -> Array:
 
 @dataclass(frozen=True)
 class LensMap:
-    """The arrays that resample a view; (H, W) is the target's size, (h, w) the window's.
+    """The arrays that resample a view. (H, W) is the target's size, and (h, w) the window's.
 
-    ``settings`` describes what the map is for. ``summary`` has the min, median and max of the
-    magnification, in target pixels to one of the source along a line, and the fraction of the
+    ``settings`` describes the purpose of the map. ``summary`` has the min, median and max of the
+    magnification: target pixels for one source pixel along a line. It also has the fraction of the
     image that has a source (covered). ``window`` is the part of the source that the map reads
     (row, end row, column, end column). Coordinates count in pixels from the window's corner.
     """
@@ -73,22 +73,22 @@ class LensMap:
     # (h, w) and (H, W) float32: cos θ at each pixel's centre; NaN where it has no ray.
     source_cos: Array
     target_cos: Array
-    # Only where the adaptive filter minifies. `counts` (H, W, 2) uint16 is how many samples a pixel
-    # takes along its row and its column. `footprints` (H, W, 2, 2) float32 is the step from one
-    # sample to the next: the first index is x or y, the second the row or the column.
+    # Only if the adaptive filter minifies. `counts` (H, W, 2) uint16 is the number of samples along
+    # a pixel's row and column. `footprints` (H, W, 2, 2) float32 is the step from sample to sample.
+    # Its first index is x or y, and its second is the row or the column.
     footprints: Array | None = None
     counts: Array | None = None
-    # Only of a cube map, whose faces get borders of b pixels: (h + 2b, 6 (h + 2b), 2) float32,
-    # where each pixel of the strip with borders lies in the strip without. The window is then the
-    # whole strip without borders. All other coordinates, `source_cos` and the flags are with them.
+    # Only for a cube map, whose faces get borders of b pixels: (h + 2b, 6 (h + 2b), 2) float32.
+    # For each pixel of the strip with borders, it has the place in the strip without borders. The
+    # window is then the whole strip without borders. All other arrays have borders.
     strip: Array | None = None
 
     @property
     def topology(self) -> Topology:
         """How the source continues beyond its frame.
 
-        Whether the last column is the neighbour of the first; whether the first and the last row
-        surround a pole.
+        The first value says whether the last column is the neighbour of the first. The others say
+        whether the first row, and the last row, surround a pole.
         """
         wraps, top, bottom, _ = self.settings["topology"]
         return wraps, top, bottom
@@ -97,7 +97,7 @@ class LensMap:
 def settings(
     source: Lens, target: Lens, rotation: Array, filter_name: str, samples: int
 ) -> dict[str, Any]:
-    """Return all that a lens map depends on, as JSON can hold it: a part of every view's key."""
+    """Return everything that a lens map depends on, as values of JSON. Each view's key has it."""
     return {
         "source": source.to_lightfield(),
         "target": target.to_lightfield(),
@@ -115,7 +115,7 @@ def compute(
     filter_name: str = DEFAULT_FILTER,
     samples: int = 1,
 ) -> LensMap:
-    """Compute the map from ``source`` to ``target``, ``samples`` × ``samples`` a target pixel.
+    """Compute the map from ``source`` to ``target``, with ``samples`` × ``samples`` for each pixel.
 
     ``rotation`` (3, 3) turns rays of the target camera into the source camera's.
     """
@@ -137,7 +137,7 @@ def compute(
     coordinates = centers
     if samples > 1:
         coordinates = sample_fold.placed(sample_points, part.corner, source)
-    # In float64 they are the largest arrays, and no longer needed.
+    # These are the largest arrays, in float64. Free them early.
     del points, sample_points
     target_cos = fold.unfolded(target_cos)
     has_footprints = len(counts) > 0
@@ -157,14 +157,14 @@ def compute(
         counts=counts if has_footprints else None,
         strip=part.strip,
     )
-    # Read-only, as `load` gives them, so that both use the same compiled kernels.
+    # Read-only, as after `load`, so that both cases use the same compiled kernels.
     for array in _arrays(lens_map).values():
         array.flags.writeable = False
     return lens_map
 
 
 def _check_sampling(filter_name: str, samples: int) -> None:
-    """Raise `UserError` for a filter or a number of samples that cannot be."""
+    """Raise `UserError` for an unknown filter, or a wrong number of samples."""
     if samples < 1:
         raise UserError(f"samples: {samples} must be at least 1")
     if filter_name not in FILTERS:
@@ -180,27 +180,27 @@ def _measure_pixels(
 ) -> tuple[Array, Array, Array, Array, Array, list[Any]]:
     """Measure the target pixels of the fold's part: where each lies in the source, and its extent.
 
-    Returns the points (h, w, 2) float64, cos θ in the target (h, w) and the magnification (h, w),
-    the footprints (h, w, 2, 2) and counts (h, w, 2) of `LensMap`, and the `bounds` of each strip of
-    rows. Footprints and counts are empty if the filter takes one sample of each pixel.
+    Returns the points (h, w, 2) float64, cos θ in the target (h, w), and the magnification (h, w).
+    Then come the footprints (h, w, 2, 2) and counts (h, w, 2) of `LensMap`, and the `bounds` of
+    each strip of rows. Footprints and counts are empty if every pixel takes one sample.
     """
     reach = FILTERS[filter_name].reach
     covers = FILTERS[filter_name].cover is not None
     period = float(source.width) if _topology(source)[0] else 0.0
-    # A cube map's faces continue only so far.
+    # A cube map's face continues by one face at most.
     widest = float(source.height) if isinstance(source, CubeMap) else math.inf
     height, width = fold.part
-    # In float64 until they count from the window's corner, which is not known before.
+    # In float64, until they count from the window's corner, which follows from them.
     points = np.empty((height, width, 2))
     target_cos = np.empty((height, width), np.float32)
     magnification = np.empty((height, width), np.float32)
-    # Zeros take no memory as long as nothing else is written.
+    # Zeros take no memory until something else is written.
     footprints = np.zeros((height, width, 2, 2) if covers else (0, 0, 2, 2), np.float32)
     counts = np.zeros((height, width, 2) if covers else (0, 0, 2), np.uint16)
     largest_count = 1
     areas = []
     for rows in _strips(height, width):
-        # One pixel more on every side, for central differences at the border too.
+        # One more pixel on every side, for central differences at the border.
         x = np.arange(-1, width + 1) + 0.5
         y = np.arange(rows.start - 1, rows.stop + 1) + 0.5
         rays = target.rays(x[None, :], y[:, None])
@@ -230,7 +230,7 @@ def _measure_pixels(
 
 @dataclass(frozen=True)
 class _SourcePart:
-    """The part of the source that a map reads; ``window``, ``cos``, ``strip`` as in `LensMap`.
+    """The part of the source that a map reads, with ``window``, ``cos``, ``strip`` of `LensMap`.
 
     Coordinates count from ``corner`` (x, y). A cube map's faces have borders of ``border`` pixels.
     """
@@ -243,9 +243,9 @@ class _SourcePart:
 
 
 def _source_part(source: Lens, areas: list[Any], fold: Fold, reach: int) -> _SourcePart:
-    """Return the part of the source that a filter reads within ``areas``, those of the fold's part.
+    """Return the part of the source that a filter reads. ``areas`` are those of the fold's part.
 
-    Of a cube map it is the whole strip, with borders as wide as the filter reaches.
+    For a cube map it is the whole strip, with borders as wide as the filter reaches.
     """
     if isinstance(source, CubeMap):
         border = _border(reach + max(area[4] for area in areas))
@@ -263,7 +263,7 @@ def _source_part(source: Lens, areas: list[Any], fold: Fold, reach: int) -> _Sou
 def _flags(
     coordinates: Array, source_cos: Array, reach: int, footprints: Array, counts: Array
 ) -> Array:
-    """Return the flags of a map's samples; see `LensMap.flags`."""
+    """Return `LensMap.flags`."""
     distance = np.empty(source_cos.shape, np.int32)
     distance_to_missing(source_cos, distance)
     flags = np.empty(coordinates.shape[:2], np.uint8)
@@ -272,7 +272,7 @@ def _flags(
 
 
 def save(path: Path | str, lens_map: LensMap) -> None:
-    """Write a lens map as one .npy record that `load` maps into memory; atomic."""
+    """Write a lens map atomically as one .npy record, which `load` can map into memory."""
     arrays = _arrays(lens_map)
     if lens_map.coordinates is lens_map.centers:
         del arrays["coordinates"]
@@ -295,28 +295,28 @@ def save(path: Path | str, lens_map: LensMap) -> None:
         with temporary.open("wb") as file:
             np.save(file, record)
         try:
-            # NumPy does not report what is lost when it closes the file.
+            # NumPy does not report an error when it closes the file, so check the result.
             np.load(temporary, mmap_mode="r")
         except ValueError as error:
             raise OSError(f"the file is cut short: {error}") from None
 
 
 def load(path: Path | str) -> LensMap:
-    """Map a file of `save` into memory, read-only; raises `UserError` for any other file."""
+    """Map a file of `save` into memory, read-only. Raises `UserError` for any other file."""
     try:
         record = np.load(path, mmap_mode="r")
         description = json.loads(bytes(record["description"][0]))
         arrays = {name: record[name][0] for name in record.dtype.names if name != "description"}
-        # Older files have the magnification, too.
-        field_names = {field.name for field in fields(LensMap)}
-        fields_read = {name: array for name, array in arrays.items() if name in field_names}
         if description.pop("checksum") != _checksum(description, arrays):
             raise ValueError("it is damaged: its checksum does not hold")
+        arrays.setdefault("coordinates", arrays["centers"])
+        # Files of earlier versions also have the magnification.
+        arrays.pop("magnification", None)
         return LensMap(
             settings=description["settings"],
             summary=description["summary"],
             window=tuple(description["window"]),
-            **{"coordinates": arrays["centers"]} | fields_read,
+            **arrays,
         )
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {read_problem(error)}") from None
@@ -325,7 +325,7 @@ def load(path: Path | str) -> LensMap:
 
 
 def _checksum(description: Mapping[str, Any], arrays: Mapping[str, Array]) -> int:
-    """Return the CRC-32 of a lens map's description and arrays: what damage changes, cheaply."""
+    """Return the CRC-32 of a lens map's description and arrays, which detects damage cheaply."""
     checksum = zlib.crc32(json.dumps(description, sort_keys=True).encode())
     for name in sorted(arrays):
         checksum = zlib.crc32(
@@ -335,7 +335,7 @@ def _checksum(description: Mapping[str, Any], arrays: Mapping[str, Array]) -> in
 
 
 def _arrays(lens_map: LensMap) -> dict[str, Array]:
-    """Return the arrays by name, those of the largest items first, so that all are aligned."""
+    """Return the arrays by name. The largest items come first, so that all are aligned."""
     arrays = {
         name: array for name, array in vars(lens_map).items() if isinstance(array, np.ndarray)
     }
@@ -368,11 +368,11 @@ def warnings(lens_map: LensMap) -> list[str]:
 def report(lens_maps: Sequence[LensMap]) -> None:
     """Print the magnification and the warnings to standard error, once for all targets."""
     summaries = [lens_map.summary for lens_map in lens_maps]
-    covered = [summary for summary in summaries if summary["covered"]] or summaries
+    with_source = [summary for summary in summaries if summary["covered"]] or summaries
     overall = {
-        "min": min(summary["min"] for summary in covered),
-        "max": max(summary["max"] for summary in covered),
-        "median": float(np.median([summary["median"] for summary in covered])),
+        "min": min(summary["min"] for summary in with_source),
+        "max": max(summary["max"] for summary in with_source),
+        "median": float(np.median([summary["median"] for summary in with_source])),
         "covered": fmean(summary["covered"] for summary in summaries),
     }
     print(
@@ -386,8 +386,8 @@ def report(lens_maps: Sequence[LensMap]) -> None:
 
 
 def _summary(magnification: Array) -> dict[str, float]:
-    """Return the summary of a lens map's magnification (H, W), NaN where it has no source."""
-    # A pixel without any neighbour has an infinite one.
+    """Return `LensMap.summary` of a magnification (H, W), which is NaN without a source."""
+    # A pixel without any neighbour has an infinite magnification.
     finite: Array = magnification[np.isfinite(magnification)]
     if not finite.size:
         finite = np.zeros(1)
@@ -400,13 +400,13 @@ def _summary(magnification: Array) -> dict[str, float]:
 
 
 def _topology(source: Lens) -> Topology:
-    """Find from its rays how a source continues; see `LensMap.topology`."""
+    """Derive `LensMap.topology` from the source's rays."""
     if isinstance(source, CubeMap):
         return False, False, False
     height = np.array([0.25, 0.5, 0.75]) * source.height
     width = np.array([0.0, 0.4, 0.8]) * source.width
     left, middle, right = (source.rays(x * source.width, height) for x in (0.0, 0.5, 1.0))
-    # A narrow lens has its edges near each other, too, but no nearer than its middle.
+    # The edges of a narrow lens are also near each other, but not nearer than its middle.
     wraps = bool(np.abs(left - right).max() < 1e-5 * np.abs(left - middle).max())
     ends = [source.rays(width, np.full(3, y)) for y in (0.0, float(source.height))]
     top, bottom = (wraps and bool(np.allclose(rays, rays[0], atol=1e-5)) for rays in ends)
@@ -414,14 +414,14 @@ def _topology(source: Lens) -> Topology:
 
 
 def _strips(height: int, width: int) -> Iterator[slice]:
-    """Yield the rows of an image, as many at a time as the caches hold."""
+    """Yield an image's rows in strips that fit into the caches."""
     step = max(_STRIP // width, 4)
     for first in range(0, height, step):
         yield slice(first, min(first + step, height))
 
 
 def _cosines(lens: Lens, window: tuple[int, int, int, int]) -> Array:
-    """Return cos θ (h, w) float32 at a window's pixel centres; NaN where there is no ray."""
+    """Return cos θ (h, w) float32 at a window's pixel centres. NaN where there is no ray."""
     row, end_row, column, end_column = window
     down, across = lens.mirrors
     fold = Fold(
@@ -437,20 +437,20 @@ def _cosines(lens: Lens, window: tuple[int, int, int, int]) -> Array:
 
 
 def _strip_with_borders(source: CubeMap, border: int) -> Array:
-    """Return where the pixels of the faces with borders lie in the strip; see `LensMap.strip`."""
+    """Return `LensMap.strip`."""
     places = np.arange(-border, source.height + border) + 0.5
     rays = source.face.rays(places[None, :], places[:, None])
     faces = [source.pixels(rays @ rotation.T) for rotation in CUBE_FACES.values()]
     exact = np.concatenate(faces, axis=1)
     strip = exact.astype(np.float32)
-    # Rounding must not carry a pixel to the next face of the strip, which is no neighbour in space.
+    # Rounding must not move a pixel to the strip's next face, which is no neighbour in space.
     end = ((np.floor(exact[..., 0] / source.height) + 1) * source.height).astype(np.float32)
     strip[..., 0] = np.minimum(strip[..., 0], np.nextafter(end, np.float32(0)))
     return strip
 
 
 def _face_cosines(source: CubeMap, border: int) -> Array:
-    """Return cos θ from each face's own axis, in the strip with borders, which repeat the edge."""
+    """Return cos θ from each face's axis, in the strip with borders. Borders repeat the edge."""
     places = np.arange(source.height) + 0.5
     cosines = -source.face.rays(places[None, :], places[:, None])[..., 2]
     return np.asarray(np.tile(np.pad(cosines.astype(np.float32), border, mode="edge"), 6))
@@ -459,15 +459,16 @@ def _face_cosines(source: CubeMap, border: int) -> Array:
 def _measure_samples(
     source: Lens, target: Lens, rotation: Array, samples: int, reach: int
 ) -> tuple[Array, list[Any]]:
-    """Return the coordinates of n × n samples a pixel in the source, and their bounds.
+    """Return the source coordinates of n × n samples for each pixel, and their bounds.
 
-    In float32 from the start: they are n² times as many as the pixels.
+    They are in float32 from the start, because they take n² times the memory of pixels.
     """
     height = target.height * samples
     width = target.width * samples
     fine = np.empty((height, width, 2), np.float32)
     x = (np.arange(width) + 0.5) / samples
-    none = np.zeros((0, 0, 2, 2), np.float32), np.zeros((0, 0, 2), np.uint16)
+    no_footprints = np.zeros((0, 0, 2, 2), np.float32)
+    no_counts = np.zeros((0, 0, 2), np.uint16)
     areas = []
     for rows in _strips(height, width):
         y = (np.arange(rows.start, rows.stop) + 0.5) / samples
@@ -476,26 +477,28 @@ def _measure_samples(
         if isinstance(source, CubeMap):
             pixels = _on_strip(pixels, source, _border(reach))
         fine[rows] = np.where(inside.all(axis=-1, keepdims=True), pixels, np.nan)
-        areas.append(bounds(fine[rows], reach + 1, *none))
+        areas.append(bounds(fine[rows], reach + 1, no_footprints, no_counts))
     return fine, areas
 
 
 def _border(reach: int) -> int:
-    """Return how far faces are continued; depth reads two pixels on each side of a ray's own."""
+    """Return the width of the borders of faces in pixels."""
+    # Depth reads two pixels on each side of a ray's own.
     return max(reach + 1, 2)
 
 
 def _on_strip(pixels: Array, source: CubeMap, border: int) -> Array:
-    """Return the coordinates among faces with a ``border`` of those among faces without."""
+    """Convert coordinates in the strip of faces to those in the strip with borders."""
     face = np.floor(pixels[..., 0] / source.height)
     shift = np.stack([(2 * face + 1) * border, np.full_like(face, border)], axis=-1)
     return np.asarray(pixels + shift)
 
 
 def _neighbours(padded: Array, source: Lens) -> tuple[Array, ...]:
-    """Return the coordinates left, right, above and below of those within a border of one pixel.
+    """Return the coordinates left, right, above and below each pixel of ``padded``'s inside.
 
-    Neighbours on another face of a cube map are continued onto the plane of the pixel's own.
+    ``padded`` has a border of one pixel. Neighbours on another face of a cube map are continued
+    onto the plane of the pixel's own face.
     """
     middle = padded[1:-1, 1:-1]
     around = (padded[1:-1, :-2], padded[1:-1, 2:], padded[:-2, 1:-1], padded[2:, 1:-1])
@@ -505,20 +508,21 @@ def _neighbours(padded: Array, source: Lens) -> tuple[Array, ...]:
 
 
 def _on_face_of(source: CubeMap, coordinates: Array, middle: Array) -> Array:
-    """Return the coordinates, those on another face than ``middle`` continued onto its plane."""
+    """Continue ``coordinates`` on another face than ``middle`` onto the plane of its face."""
     out = coordinates.copy()
-    here, there = (np.floor(c[..., 0] / source.height) for c in (middle, coordinates))
-    for index, turn in enumerate(CUBE_FACES.values()):
-        other = (here == index) & (there != index)
-        rays = source.rays(out[other, 0], out[other, 1]) @ turn
-        out[other] = source.face.pixels(rays) + np.array([index * source.height, 0])
+    face_of_middle = np.floor(middle[..., 0] / source.height)
+    face = np.floor(coordinates[..., 0] / source.height)
+    for index, rotation in enumerate(CUBE_FACES.values()):
+        on_other_face = (face_of_middle == index) & (face != index)
+        rays = source.rays(out[on_other_face, 0], out[on_other_face, 1]) @ rotation
+        out[on_other_face] = source.face.pixels(rays) + np.array([index * source.height, 0])
     return out
 
 
 def _window(areas: list[Any], fold: Fold, source: Lens) -> tuple[int, int, int, int]:
     """Return the rows and columns [row, end) × [column, end) that the filter may read.
 
-    ``areas`` are those of the fold's part. All columns if the source wraps around.
+    ``areas`` are those of the fold's part. A source that wraps around needs all its columns.
     """
     limits = np.array([area[:4] for area in areas])
     low = limits[:, :2].min(axis=0)

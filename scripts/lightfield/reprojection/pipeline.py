@@ -1,4 +1,4 @@
-"""Runs a reprojection: makes the missing views and writes a record of all of them."""
+"""Runs a reprojection: makes the missing views, and writes a record of all views."""
 
 import os
 import sys
@@ -20,7 +20,7 @@ from lightfield.reprojection.pixels import SourcePixels, write
 
 
 def run(job: Job) -> None:
-    """Reproject the chosen views; raises `UserError` with the number of views that failed."""
+    """Reproject the chosen views. Raises `UserError` with the number of views that failed."""
     arguments = job.arguments
     views = [] if arguments.dry_run else job.views()
     _check_apart(job, views)
@@ -28,10 +28,10 @@ def run(job: Job) -> None:
         job.output_lightfield().write(arguments.output_cfg)
     if arguments.dry_run:
         return
-    # Each view is one thread's work. OpenImageIO, which is imported later, must add no threads.
+    # One thread makes each view. OpenImageIO, which is imported later, must add no threads.
     os.environ["OPENIMAGEIO_THREADS"] = "1"
     maps = job.maps
-    # lens_map.py has reported the maps that it computed.
+    # lens_map.py has already reported the maps in files.
     if arguments.lens_map is None:
         lens_map.report(maps)
     label = f"reproject to {arguments.output_dir} {arguments.views or ''}".rstrip()
@@ -46,7 +46,7 @@ def run(job: Job) -> None:
             paths += result
         progress.done()
     if failed:
-        # The last line of a log is what is said of its job.
+        # The run's report quotes the last line of the log.
         raise UserError(
             f"{len(failed)} of {len(views)} views could not be reprojected, as {min(failed)}"
         )
@@ -54,22 +54,23 @@ def run(job: Job) -> None:
 
 
 def _check_apart(job: Job, views: list[SourceView]) -> None:
-    """Raise `UserError` if an output would replace a file that is read, by whatever path."""
+    """Raise `UserError` if an output would replace an input, even through another path."""
     if job.arguments.output_cfg and job.arguments.input_cfg:
         keep_apart("--output-cfg", job.arguments.output_cfg, job.arguments.input_cfg)
-    folder = cache(Path.resolve)
+    resolve_folder = cache(Path.resolve)
     for view in views:
-        read = {(folder(path.parent), path.name) for path in job.sources(view)}
-        for path in (path for target in job.targets for path in job.files(view, target)):
-            if (folder(path.parent), path.name) in read:
-                raise UserError(
-                    f"--output-dir {job.arguments.output_dir}: would replace {path}, which is "
-                    "read; give another folder"
-                )
+        inputs = {(resolve_folder(path.parent), path.name) for path in job.sources(view)}
+        for target in job.targets:
+            for path in job.files(view, target):
+                if (resolve_folder(path.parent), path.name) in inputs:
+                    raise UserError(
+                        f"--output-dir {job.arguments.output_dir}: would replace {path}, which is "
+                        "read; give another folder"
+                    )
 
 
 def _results(job: Job, views: list[SourceView]) -> Iterator[tuple[SourceView, Any]]:
-    """Yield each view with its files, or with the error that it ended in."""
+    """Yield each view with its files, or with the error that stopped it."""
     with ThreadPoolExecutor(max(1, job.arguments.parallel)) as pool:
         futures = {pool.submit(reproject_view, job, view): view for view in views}
         for future in as_completed(futures):
@@ -80,7 +81,7 @@ def _results(job: Job, views: list[SourceView]) -> Iterator[tuple[SourceView, An
 
 
 def reproject_view(job: Job, view: SourceView) -> list[Path]:
-    """Make a view's missing or outdated files; return all of its files."""
+    """Make a view's missing or outdated files. Return all of its files."""
     arguments = job.arguments
     paths_of_view: list[Path] = []
     todo: list[tuple[int, Target, str]] = []
@@ -99,8 +100,8 @@ def reproject_view(job: Job, view: SourceView) -> list[Path]:
         source = SourcePixels(job, view, [job.maps[index].window for index, *_ in todo])
         for index, target, key in todo:
             write(job, target, job.maps[index], source, job.outputs(view, target), key)
-            for wanted, path in job.pass_outputs(view, target).items():
-                write_pass(job, wanted, view, job.maps[index], path, key)
+            for view_pass, path in job.pass_outputs(view, target).items():
+                write_pass(job, view_pass, view, job.maps[index], path, key)
     return paths_of_view
 
 
@@ -110,8 +111,8 @@ def _check(job: Job, view: SourceView) -> None:
         expected = job.source_sums.get(f"{absolute_path(path).parent.name}/{path.name}")
         if expected and sha256(path) != expected:
             raise UserError(
-                f"{path}: is not as it was written, {job.arguments.source_record} says; "
-                "scripts/verify.py --mend has it made again"
+                f"{path}: is not as it was written (see {job.arguments.source_record}); "
+                "scripts/verify.py --mend makes it again"
             )
 
 

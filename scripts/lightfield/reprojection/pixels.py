@@ -1,4 +1,4 @@
-"""A view's pixels in and out: read as linear light, resampled, and written as asked for."""
+"""Reads a view's pixels as linear light, resamples them, and writes them in each format."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -29,9 +29,23 @@ from lightfield.reprojection.lens_map import LensMap
 
 Attributes = Mapping[str, Attribute]
 
-# A seventh of the time that zlib's own level and the choice of a filter for each row take, and
-# files as small: level 4, and libpng's PNG_FILTER_AVG for every row.
+# Level 4, and libpng's PNG_FILTER_AVG for every row. The defaults are zlib's level, and a choice of
+# filter for each row: they take seven times as long, and the files are no smaller.
 PNG_OPTIONS = {"png:compressionLevel": 4, "png:filter": 64}
+
+
+@dataclass(frozen=True)
+class _Face:
+    """One image file of a view: the whole view, or one face of a cube map.
+
+    ``colour`` (h, w, 4) is linear float32. ``meaning`` says whether ``depth`` (h, w) is "z" or
+    "distance".
+    """
+
+    colour: Array
+    depth: Array | None
+    has_alpha: bool
+    meaning: Attribute | None
 
 
 class SourcePixels:
@@ -45,15 +59,15 @@ class SourcePixels:
         self.rows = (int(low[0]), int(high[1]))
         self.columns = (int(low[2]), int(high[3]))
         faces = [self._read(job, path) for path in view.paths]
-        self.colour = _side_by_side([face[0] for face in faces])
-        depths = [face[1] for face in faces if face[1] is not None]
+        self.colour = _side_by_side([face.colour for face in faces])
+        depths = [face.depth for face in faces if face.depth is not None]
         self.depth = _side_by_side(depths) if len(depths) == len(faces) else None
-        self.has_alpha = faces[0][2]
-        # The file knows best; the configuration may be another program's.
-        meaning = faces[0][3] or job.lightfield.depth or job.source.usual_depth
+        self.has_alpha = faces[0].has_alpha
+        # Trust the file first: another program may have written the lightfield.json.
+        meaning = faces[0].meaning or job.lightfield.depth or job.source.usual_depth
         self.is_z = meaning == "z"
 
-    def _read(self, job: Job, path: Path) -> tuple[Array, Array | None, bool, Attribute | None]:
+    def _read(self, job: Job, path: Path) -> _Face:
         lens = job.source.face if isinstance(job.source, CubeMap) else job.source
         header = read_header(path)
         if (header.width, header.height) != (lens.width, lens.height):
@@ -65,18 +79,21 @@ class SourcePixels:
         colours = "RGB" if {"R", "G", "B"} <= set(names) else "YYY"
         if colours[0] not in names:
             raise UserError(f"{path}: has no colour: its channels are {', '.join(names)}")
-        wanted = {*colours, "A", "Z"} if job.depth_wanted else {*colours, "A"}
-        image = read_image(path, [name for name in names if name in wanted], self.rows)
+        needed = {*colours, "A"}
+        if job.needs_depth:
+            needed.add("Z")
+        image = read_image(path, [name for name in names if name in needed], self.rows)
         columns = slice(*self.columns)
         channels = {name: array[:, columns] for name, array in image.channels.items()}
-        alpha, depth = channels.get("A"), channels.get("Z")
+        alpha = channels.get("A")
+        depth = channels.get("Z")
         colour = _linear([channels[name] for name in colours], alpha)
         if alpha is not None and not job.lightfield.transparent:
-            # What is wholly transparent is no sample.
+            # A fully transparent pixel has no colour to resample.
             colour[alpha == 0] = np.nan
         if depth is not None and depth.dtype != np.float16:
             depth = depth.astype(np.float32, copy=False)
-        return colour, depth, alpha is not None, image.attributes.get(DEPTH_ATTRIBUTE)
+        return _Face(colour, depth, alpha is not None, image.attributes.get(DEPTH_ATTRIBUTE))
 
     def window(self, lens_map: LensMap) -> tuple[Array, Array | None]:
         """Return the colour and depth that a lens map reads."""
@@ -88,12 +105,12 @@ class SourcePixels:
 
 
 def _side_by_side(faces: list[Array]) -> Array:
-    """Return a cube map's faces as one strip; the one image of another lens as it is."""
+    """Return a cube map's faces as one strip, or the only image of another lens."""
     return faces[0] if len(faces) == 1 else np.concatenate(faces, axis=1)
 
 
 def _linear(planes: list[Array], alpha: Array | None) -> Array:
-    """Return pixels as (h, w, 4) float32 linear R G B A, colour associated with alpha."""
+    """Return pixels as (h, w, 4) float32 linear R G B A. Colour is associated with alpha."""
     if planes[0].dtype.kind == "u":
         largest = np.iinfo(planes[0].dtype).max
         table = decode_srgb(np.arange(largest + 1) / largest).astype(np.float32)
@@ -141,8 +158,9 @@ def write(
 class _Image:
     """A resampled view, as its files hold it.
 
-    ``half`` (3, h, w) is float16 R G B for an EXR, ``pixels`` (h, w, 3) sRGB for a PNG, ``alpha``
-    (h, w) float32 what is covered, and ``depth`` (h, w) metres. What has no source is ``empty``.
+    ``half`` (3, h, w) is float16 R G B for an EXR. ``pixels`` (h, w, 3) is sRGB for a PNG.
+    ``alpha`` (h, w) is float32, and ``depth`` (h, w) is in metres. ``empty`` (h, w) marks pixels
+    without a source.
     """
 
     half: Array
@@ -160,7 +178,7 @@ class _Image:
 def _developed(
     job: Job, target: Target, lens_map: LensMap, source: SourcePixels, outputs: Mapping[str, Path]
 ) -> _Image:
-    """Resample a view, and develop its colour for those ``outputs`` that hold it."""
+    """Resample a view, and develop its colour for those ``outputs`` that hold colour."""
     settings = job.settings
     transparent = job.lightfield.transparent
     encode = to_8_bit if settings.bits == 8 else to_16_bit
@@ -175,7 +193,7 @@ def _developed(
         alpha = strip[:, :, 3:]
         if transparent:
             covered[rows] = alpha[:, :, 0].clip(0, 1)
-            # Where there is light alone, nothing is covered.
+            # A pixel with light but without alpha keeps its colour.
             alpha = np.where(covered[rows] > 0, covered[rows], np.float32(1))[:, :, None]
         if source.has_alpha:
             with np.errstate(invalid="ignore", divide="ignore"):
@@ -194,7 +212,7 @@ def _developed(
 
 
 def _write_exr(path: Path, image: _Image, attributes: Attributes) -> None:
-    """Write R G B and Z, and A where the view is transparent or no Z tells what is empty."""
+    """Write R G B and Z. Write A if the view is transparent, or if no Z marks empty pixels."""
     channels = dict(zip("RGB", image.half, strict=True))
     if image.depth is not None:
         channels["Z"] = image.depth
@@ -215,13 +233,13 @@ def _write_png(path: Path, image: _Image, attributes: Attributes) -> None:
 
 
 def _write_depth(path: Path, image: _Image, scale: float, key: str) -> None:
-    """Write 16 bits of depth times ``scale``; 0 where there is none, or more than they hold."""
+    """Write depth times ``scale`` in 16 bits. 0 marks a missing depth, or one that is too large."""
     if image.depth is None:
         raise UserError("--depth-png: the image has no channel Z")
     scaled = np.rint(image.depth.astype(np.float64) * scale)
     # Comparisons with NaN are false.
-    is_held = (scaled > 0) & (scaled <= 65535)
-    write_png(path, np.where(is_held, scaled, 0).astype(np.uint16), {KEY_ATTRIBUTE: key})
+    fits = (scaled > 0) & (scaled <= 65535)
+    write_png(path, np.where(fits, scaled, 0).astype(np.uint16), {KEY_ATTRIBUTE: key})
 
 
 def _resampled(
@@ -231,12 +249,12 @@ def _resampled(
     colour, depth = source.window(lens_map)
     if job.copies and source.is_z == as_z:
         row, end_row, column, end_column = lens_map.window
-        # A channel that is no number makes a pixel none, as it does where pixels are resampled.
-        none = np.isnan(colour).any(axis=-1)
-        none |= np.isnan(lens_map.target_cos[row:end_row, column:end_column])
-        colour = np.where(none[:, :, None], np.float32(np.nan), colour)
-        copy = None if depth is None else _in_frame(depth, lens_map)
-        return [(np.s_[:], _in_frame(colour, lens_map))], copy
+        # As in resampling, a pixel with NaN in one channel is empty.
+        empty = np.isnan(colour).any(axis=-1)
+        empty |= np.isnan(lens_map.target_cos[row:end_row, column:end_column])
+        colour = np.where(empty[:, :, None], np.float32(np.nan), colour)
+        copied_depth = None if depth is None else _in_frame(depth, lens_map)
+        return [(np.s_[:], _in_frame(colour, lens_map))], copied_depth
     if depth is not None:
         depth = resample_depth(depth, source.is_z, as_z, lens_map)
         if depth.dtype != np.float16:
@@ -245,7 +263,7 @@ def _resampled(
 
 
 def _in_frame(window: Array, lens_map: LensMap) -> Array:
-    """Return the window's pixels in their place in the whole image, NaN around them."""
+    """Return the target's whole image with the window's pixels in place, and NaN around them."""
     out = np.full((*lens_map.target_cos.shape, *window.shape[2:]), np.nan, window.dtype)
     row, end_row, column, end_column = lens_map.window
     out[row:end_row, column:end_column] = window

@@ -1,4 +1,4 @@
-"""Every projection as a class of its own, in a file of its own that holds all there is to it."""
+"""All lenses. Each projection is a class in a file of its own, which holds everything about it."""
 
 import importlib
 import pkgutil
@@ -36,20 +36,20 @@ _SETTINGS: TypeAdapter[LensSettings] = TypeAdapter(
 def from_camera(camera: Mapping[str, Any] | LensSettings) -> Lens:
     """Return the lens of a scene YAML's ``camera`` mapping.
 
-    ``fov`` is in degrees: across the image's width for a rectilinear lens, that of the image
-    circle for a fisheye. ``sensor_size`` is its width, or both sides, in mm. Raises `UserError`,
-    also for the lens of a .blend's camera, which its inventory has.
+    ``fov`` is in degrees: across the image's width for a rectilinear lens, across the image circle
+    for a fisheye. ``sensor_size`` is its width, or both sides, in mm. Raises `UserError` for a
+    wrong key, and for ``lens: file``, which only the .blend's inventory can describe.
     """
     settings = checked(_SETTINGS, camera, "camera")
     if isinstance(settings, FileSettings):
-        raise UserError("camera: lens: is file, which goes with a rig of type blend_camera alone")
+        raise UserError("camera: lens: is file, which only goes with a rig of type blend_camera")
     return settings.make()
 
 
 def from_lightfield(content: Mapping[str, Any]) -> Lens:
-    """Return the lens of a lightfield.json, one of ours or one that SILVR's tools wrote.
+    """Return the lens of a lightfield.json, which Plenoforge or SILVR's tools wrote.
 
-    A key that is missing or has an unknown value is a `UserError` that names it.
+    Raises `UserError` that names the key if a key is missing or has an unknown value.
     """
     try:
         camera = content["camera"]
@@ -61,7 +61,7 @@ def from_lightfield(content: Mapping[str, Any]) -> Lens:
             image["principal_point"] = pair(camera["principal_point"])
         return _lens_of(camera).read(camera, image)
     except KeyError as error:
-        raise UserError(f"{error.args[0]}: is missing, so the lens is not known") from None
+        raise UserError(f"{error.args[0]}: is missing; the lens needs it") from None
     except (TypeError, ValueError, IndexError, ArithmeticError) as error:
         raise UserError(f"camera, resolution or sensor_size: {error}") from None
 

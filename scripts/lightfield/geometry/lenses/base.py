@@ -1,12 +1,12 @@
 """The base classes of lenses: pixels to rays and back, and how lenses are read and written.
 
 The camera looks along −Z with +Y up and +X right. Pixel coordinates run right (x) and down (y)
-from the image's top left corner, pixel centres at (i + 0.5). θ is a ray's angle from the optical
-axis, r the distance from the principal point. Conventions are those of Blender's Cycles, measured
-on its Position pass with bpy 5.0.1:
+from the image's top left corner. Pixel centres are at (i + 0.5). θ is a ray's angle from the
+optical axis, and r is the distance from the principal point. Conventions are those of Blender's
+Cycles, measured on its Position pass with bpy 5.0.1:
 
-- equidistant: on a non-square image the image circle is an ellipse that touches all four edges;
-  the sensor plays no part. So do the other lenses that a field of view alone describes.
+- equidistant: on a non-square image the image circle is an ellipse that touches all four edges.
+  The sensor plays no part. The same holds for all lenses that only a field of view describes.
 - equisolid and polynomial: r is in millimetres on the sensor, so circles stay circles when the
   sensor's pixels are square.
 - polynomial: θ = −(k0 + k1 r + k2 r² + k3 r³ + k4 r⁴). A usual lens has k1 < 0; k1 > 0 turns the
@@ -51,7 +51,7 @@ FocalLength = Annotated[Millimetres, Field(description="Millimetres.")]
 class LensSettings(Settings):
     """A camera's lens and image in a scene YAML. Each lens adds its own keys.
 
-    The lens itself checks what the schema cannot say. Its errors have the form
+    The lens itself checks what the schema cannot express. Its errors have the form
     ``key: what is wrong``.
     """
 
@@ -100,9 +100,9 @@ class Lens(ABC):
     ``sensor_size`` is in mm (default: 36 wide, square pixels), ``principal_point`` in pixels
     (default: the image's centre).
 
-    A lens's class has names and settings, too:
+    The class of each lens defines:
 
-    - ``name``: its name in a scene YAML, and its flag of a command;
+    - ``name``: its name in a scene YAML, and its flag on the command line;
     - ``title``: its name for people;
     - ``camera_types``: its ``panorama_type`` in lightfield.json, or its ``type`` for a perspective
       camera. The first is written, all are read;
@@ -261,12 +261,12 @@ class Lens(ABC):
 
     @classmethod
     def flag(cls) -> str:
-        """Return the lens's flag of a command, without its dashes."""
+        """Return the lens's flag on the command line, without its dashes."""
         return cls.name.replace("_", "-")
 
     @classmethod
     def from_flag(cls, text: str, width: int, height: int) -> Self:
-        """Return the lens of its flag's numbers. Raises `UserError` if they have another form."""
+        """Return the lens that a flag's numbers describe. Raises `UserError` for another form."""
         assert cls.form is not None
         numbers = named_numbers(text, cls.form)
         sensor = numbers.pop("SENSOR_WIDTH", None)
@@ -308,7 +308,7 @@ class RadialLens(Lens):
             sin, cos = self._sin_cos(r)
             # One plane after the other: numpy fills these much faster than vectors.
             ray = np.stack([sin * (u / r), sin * (v / r), -cos])
-            # The azimuth at r = 0 matters only where θ(0) ≠ 0: there Cycles takes "up".
+            # The azimuth at r = 0 matters only if θ(0) ≠ 0. There Cycles uses "up".
             axis = r == 0
             ray[0, axis] = 0
             ray[1, axis] = sin[axis]
@@ -328,7 +328,7 @@ class RadialLens(Lens):
             r = np.where(np.abs(r) <= self._limit * slack(rays.dtype), r, np.nan)
             u = r * (x / side)
             v = r * (y / side)
-            # The azimuth of the axis matters only behind the camera: "up" there, too.
+            # The azimuth of the axis matters only behind the camera. It is "up" there, too.
             axis = side == 0
             u[axis] = 0
             v[axis] = r[axis]
@@ -436,9 +436,9 @@ def pair(values: Sequence[float]) -> Pair:
 def named_numbers(text: str, form: str) -> dict[str, float]:
     """Return the comma-separated numbers of ``text`` by their names in ``form``.
 
-    Names in brackets, as B in ``A[,B]``, may be missing. Another form may follow a bar, and is not
-    read. Angles may end in ``deg``; angles of lenses without it are in radians. Raises `UserError`
-    if ``text`` has another form.
+    Names in brackets, as B in ``A[,B]``, may be missing. A form after a bar is ignored. Angles may
+    end in ``deg``. Without it, angles of lenses are in radians. Raises `UserError` if ``text`` has
+    another form.
     """
     names = re.findall(r"\w+", form.partition("|")[0])
     least = len(re.findall(r"\w+", form.partition("[")[0].partition("|")[0]))
@@ -453,14 +453,14 @@ def named_numbers(text: str, form: str) -> dict[str, float]:
 
 
 def _number(text: str, name: str) -> float:
-    """Return the number that a user wrote for ``name``. Raises ValueError if it is none."""
+    """Return the number that a user wrote for ``name``. Raises ValueError for other text."""
     if not text.endswith("deg"):
         return float(text)
     if name in ("FOV", "LONG_MIN", "LONG_MAX", "LAT_MIN", "LAT_MAX"):
         return math.radians(float(text.removesuffix("deg")))
     if name in ("PAN", "PITCH", "ROLL"):
         return float(text.removesuffix("deg"))
-    raise ValueError(f"{name} is no angle")
+    raise ValueError(f"{name} is not an angle")
 
 
 def _degrees(radians: float) -> float:

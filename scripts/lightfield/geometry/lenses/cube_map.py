@@ -20,9 +20,11 @@ CUBE_FACE_ANGLES = {
 }
 """Faces in order: the XYZ Euler angles that turn the cube map's camera to each.
 
-Faces are named as the sides of a cuboid rig, and turned as they are there: f looks along −Z,
-b along +Z, l along −X, r along +X, u along +Y and d along −Y; f, b, l and r have +Y up, u has
-+Z up and d has −Z up.
+Names and directions are those of a cuboid rig's sides:
+
+- f looks along −Z, b along +Z, l along −X and r along +X; these have +Y up;
+- u looks along +Y and has +Z up;
+- d looks along −Y and has −Z up.
 """
 CUBE_FACES: dict[str, Array] = {
     # Without noise such as 6e-17 or −0.
@@ -36,9 +38,9 @@ CUBE_FACES: dict[str, Array] = {
 class CubeMap(Lens):
     """Six square rectilinear faces of 90°, side by side in the order f b l r u d.
 
-    On disk each face is an image of its own; in memory they form one strip, six times as wide as
-    high, of which the columns from i · height on are face i. A kernel must not reach across a
-    face's border, where the strip's neighbours are no neighbours in space. Source: Greene 1986.
+    On disk each face is an image of its own. In memory they form one strip, six times as wide as
+    high. Face i begins at column i · height. A kernel must not reach across a face's border, where
+    the strip's neighbours are no neighbours in space. Source: Greene 1986.
     """
 
     name = "cube_map"
@@ -76,7 +78,7 @@ class CubeMap(Lens):
         rotations = [rotation.astype(rays.dtype) for rotation in CUBE_FACES.values()]
         out = np.full((*rays.shape[:-1], 2), np.nan, rays.dtype)
         with np.errstate(invalid="ignore"):
-            # The face that a ray meets is the one whose axis it is nearest.
+            # A ray meets the face whose axis is nearest to it.
             index = np.argmax(np.stack([-(rays @ r[:, 2]) for r in rotations]), axis=0)
             for i, rotation in enumerate(rotations):
                 chosen = index == i

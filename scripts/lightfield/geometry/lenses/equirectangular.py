@@ -38,8 +38,8 @@ class EquirectangularSettings(LensSettings):
 class Equirectangular(Lens):
     """Longitude linear in x, latitude linear in y, in radians. Source: Cycles' EQUIRECTANGULAR.
 
-    A ray outside a partial range of longitudes goes to the side of the frame that it is nearer;
-    a pole, which has every longitude, goes to longitude 0.
+    A ray outside a partial range of longitudes goes to the nearer side of the frame. A pole, which
+    has every longitude, goes to longitude 0.
     """
 
     name = "equirectangular"
@@ -72,13 +72,13 @@ class Equirectangular(Lens):
     @property
     def is_full(self) -> bool:
         """Whether it sees the whole sphere, the optical axis in its middle."""
-        given = [self.longitude, self.latitude]
-        full = math.pi * np.array([[-1, 1], [-0.5, 0.5]])
-        return bool((np.abs(given - full) <= ANGLE_SLACK).all())
+        ranges = np.array([self.longitude, self.latitude])
+        full_ranges = math.pi * np.array([[-1, 1], [-0.5, 0.5]])
+        return bool((np.abs(ranges - full_ranges) <= ANGLE_SLACK).all())
 
     @property
     def turn(self) -> float:
-        """The pixels that 360 degrees take."""
+        """The width of 360 degrees in pixels."""
         return self.width * 2 * math.pi / (self.longitude[1] - self.longitude[0])
 
     def _rays(self, x: Array, y: Array) -> Array:

@@ -1,4 +1,4 @@
-"""A polynomial where it increases, and its inverse there."""
+"""A polynomial on the interval where it increases, and its inverse there."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,8 @@ from lightfield.geometry.lenses.base import Array, slack
 class IncreasingPolynomial:
     """Σ c_i t^i on [0, end], where it increases.
 
-    It ends at its first turning point, at t = ``last`` or at the value ``last_value``.
+    ``end`` is the smallest of three: the first turning point, ``last``, and the t at which the
+    polynomial reaches ``last_value``.
     """
 
     def __init__(
@@ -25,7 +26,7 @@ class IncreasingPolynomial:
             while self.value(self.end) < last_value:
                 self.end *= 2
         if self.value(self.end) > last_value > self.value(0.0):
-            # Imported here because no other lens needs it, and it takes a quarter of a second.
+            # The import takes a quarter of a second, and no other lens needs it.
             from scipy.optimize import brentq
 
             self.end = float(brentq(lambda t: self.value(t) - last_value, 0, self.end, xtol=1e-300))
@@ -41,9 +42,9 @@ class IncreasingPolynomial:
         return float(falling[0]) if falling.size else math.inf
 
     def inverse(self, values: Array) -> Array:
-        """Return t in [0, end] with Σ c_i t^i = ``values``, in float64; NaN where there is none.
+        """Return t in [0, end] with Σ c_i t^i = ``values``, in float64. NaN where no t exists.
 
-        Newton's method, held by bisection inside a bracket that always contains the solution.
+        Newton's method. Bisection keeps it inside a bracket that always contains the solution.
         """
         last = self._values[-1]
         goal = values.astype(np.float64).ravel()

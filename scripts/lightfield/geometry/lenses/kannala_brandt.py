@@ -67,8 +67,10 @@ class KannalaBrandt(Fisheye):
 
     @cached_property
     def _increasing(self) -> IncreasingPolynomial:
-        odd = [c for k in (1.0, *self.coefficients) for c in (0.0, k)]
-        return IncreasingPolynomial(odd, last=self.fov / 2)
+        # θ + k1 θ³ + k2 θ⁵ + …: the even powers of θ have no coefficient.
+        coefficients = np.zeros(10)
+        coefficients[1::2] = (1.0, *self.coefficients)
+        return IncreasingPolynomial(coefficients.tolist(), last=self.fov / 2)
 
     @property
     def _unit(self) -> Pair:

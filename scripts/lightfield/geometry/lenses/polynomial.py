@@ -39,9 +39,9 @@ class PolynomialSettings(FisheyeSettings):
 class Polynomial(Fisheye):
     """θ = −(k0 + k1 r + k2 r² + k3 r³ + k4 r⁴), r in mm, out to ``fov`` / 2 radians.
 
-    ``coefficients`` are k0 to k4 as Blender has them. The lens ends where |θ| stops growing with
-    r. Where k0 leaves a hole around the axis that is smaller than a pixel, the centre takes it.
-    Source: Cycles' FISHEYE_LENS_POLYNOMIAL.
+    ``coefficients`` are k0 to k4 as in Blender. The lens ends where |θ| stops growing with r. k0
+    may leave a hole around the axis. If the hole is smaller than a pixel, its rays go to the
+    centre. Source: Cycles' FISHEYE_LENS_POLYNOMIAL.
     """
 
     name = "polynomial"

@@ -37,7 +37,7 @@ class RectilinearSettings(LensSettings):
         if self.fov is None:
             return {"focal_length": self.focal_length}
         if self.focal_length is not None:
-            raise UserError("focal_length: does not go with the rectilinear lens beside fov")
+            raise UserError("focal_length: does not go with fov; the lens needs only one of them")
         size = self.sensor_size or SENSOR_WIDTH
         width = size if isinstance(size, float) else size[0]
         return {"focal_length": width / 2 / math.tan(math.radians(self.fov) / 2)}
@@ -46,7 +46,7 @@ class RectilinearSettings(LensSettings):
 class FileSettings(LensSettings):
     """The perspective lens of a .blend's own camera.
 
-    Until that is read, 50 mm stand in for its focal length.
+    Until the .blend has been read, its focal length is taken to be 50 mm.
     """
 
     lens: Literal["file"]
@@ -102,7 +102,7 @@ class Rectilinear(RadialLens):
     def _to_camera(self) -> dict[str, Any]:
         near, far = CLIP
         unit = self._unit
-        # As Blender's calc_matrix_camera; a shifted principal point is in the third column.
+        # As in Blender's calc_matrix_camera. The third column holds a shifted principal point.
         return {
             "lens_unit": "MILLIMETERS",
             "focal_length": self.focal_length,
@@ -116,21 +116,21 @@ class Rectilinear(RadialLens):
 
     @classmethod
     def read(cls, camera: Mapping[str, Any], image: Mapping[str, Any]) -> Self:
-        # Only to learn the image's centre and sensor, which the file may leave to its defaults.
-        plain = cls(**image, focal_length=1)
+        # This lens only supplies the image's centre and sensor, which the file may leave out.
+        defaults = cls(**image, focal_length=1)
         matrix = camera.get("projection_matrix")
-        if matrix and plain.principal_point is None:
-            shift = (float(matrix[0][2]), float(matrix[1][2]))
-            if any(shift):
-                center = (plain.width / 2 * (1 - shift[0]), plain.height / 2 * (1 + shift[1]))
+        if matrix and defaults.principal_point is None:
+            right, up = float(matrix[0][2]), float(matrix[1][2])
+            if right or up:
+                center = (defaults.width / 2 * (1 - right), defaults.height / 2 * (1 + up))
                 image = {**image, "principal_point": center}
         if camera["lens_unit"] == "MILLIMETERS":
             focal_length = float(camera["focal_length"])
         elif camera["lens_unit"] == "FOV" and matrix:
-            focal_length = float(matrix[0][0]) * plain.sensor[0] / 2
+            focal_length = float(matrix[0][0]) * defaults.sensor[0] / 2
         elif camera["lens_unit"] == "FOV":
             # Blender's angle spans the sensor's longer side.
-            focal_length = max(plain.sensor) / 2 / math.tan(float(camera["angle"]) / 2)
+            focal_length = max(defaults.sensor) / 2 / math.tan(float(camera["angle"]) / 2)
         else:
             raise UserError(f"camera.lens_unit: {camera['lens_unit']!r} is not MILLIMETERS or FOV")
         return cls(**image, focal_length=focal_length)

@@ -34,5 +34,5 @@ class Stereographic(CircleFisheye):
         return 2 * half / (1 + square), (1 - half) * (1 + half) / (1 + square)
 
     def _radius(self, sin: Array, cos: Array) -> Array:
-        # Of the two forms of tan(θ/2), the one in which nothing cancels.
+        # tan(θ/2), in the form in which nothing cancels.
         return np.where(cos > 0, sin / (1 + cos), (1 - cos) / sin) / math.tan(self.fov / 4)

@@ -1,8 +1,8 @@
-"""Camera rigs: how many views a rig has, and the name and pose of each; one file a type of rig.
+"""Camera rigs: how many views a rig has, and the name and pose of each. Each type has a file.
 
 Order, names and orientations are those of the SILVR datasets and of the Blender addon that
-rendered them (https://github.com/IDLabMedia/blender-lightfield-addon, ``lightfield_*.py``). No
-Blender is needed here.
+rendered them (https://github.com/IDLabMedia/blender-lightfield-addon, ``lightfield_*.py``).
+Nothing here needs Blender.
 """
 
 from collections.abc import Mapping
@@ -58,8 +58,8 @@ _SETTINGS: TypeAdapter[Rig] = TypeAdapter(AnyRig, config=ConfigDict(defer_build=
 
 
 def from_settings(settings: Mapping[str, Any] | Rig, file: str = "rig") -> Rig:
-    """Return the rig that a scene YAML's mapping means; raises `UserError` for a wrong key.
+    """Return the rig that a scene YAML's mapping describes. A `Rig` is returned unchanged.
 
-    A rig is returned as it is. The error names the ``file``.
+    Raises `UserError` for a wrong key. The error names the ``file``.
     """
     return checked(_SETTINGS, settings, file)

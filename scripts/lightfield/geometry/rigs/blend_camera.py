@@ -1,4 +1,4 @@
-"""The .blend's own camera: where it is at each of some frames of the animation."""
+"""The .blend's own camera: its pose at each of some frames of the animation."""
 
 from pathlib import Path
 from typing import Literal, Self
@@ -16,8 +16,8 @@ from lightfield.geometry.rotations import Floats, matrix_to_euler
 class BlendCamera(Rig):
     """One view for each of the ``frames``, of a scene that stands still.
 
-    ``file``, ``rendered`` and ``max_views`` are for no scene YAML: the inventory of the .blend, the
-    frame that is rendered (None is the .blend's own), and what a preset has thinned the rig to.
+    Three fields are not for scene YAMLs. ``file`` is the inventory of the .blend. ``rendered`` is
+    the rendered frame, and None means the .blend's own. ``max_views`` is the limit of a preset.
     """
 
     shape = "PLANE"
@@ -26,8 +26,8 @@ class BlendCamera(Rig):
     type: Literal["blend_camera"]
     frames: Frames | None = Field(
         None,
-        description="The camera's path: where it is at each of these frames, of the scene at "
-        "scene.frame; without it, where it is at that frame.",
+        description="The camera's path: one view from its place at each of these frames. The scene "
+        "stays at scene.frame. Without it, one view from the camera's place at scene.frame.",
     )
     file: SkipJsonSchema[str | None] = None
     rendered: SkipJsonSchema[int | None] = None
@@ -56,23 +56,23 @@ class BlendCamera(Rig):
         return self.model_copy(update={"file": str(file), "rendered": rendered})
 
     def is_at_one_place(self) -> bool:
-        return self.view_count == 1  # Whether the camera moves is known once the .blend is read.
+        return self.view_count == 1  # Only the .blend can tell whether the camera moves.
 
     def unit_poses(self) -> UnitPoses:
-        """Return the views; raises `UserError` before the inventory is known."""
+        """Return the views. Raises `UserError` before the inventory has been set."""
         if self.file is None:
-            raise UserError("blend_camera: where it is, is known once the .blend has been read")
-        said = read_keys(self.file, "inventory.py", "blend")["blend"]
+            raise UserError("blend_camera: the camera's place is unknown until the .blend was read")
+        blend = read_keys(self.file, "inventory.py", "blend")["blend"]
         with reading(self.file, "inventory"):
-            frames = [said["frame"] if frame is None else frame for frame in self.path]
-            places = said["camera"]["matrices"]
+            frames = [blend["frame"] if frame is None else frame for frame in self.path]
+            matrix_at_frame = blend["camera"]["matrices"]
             for frame in frames:
-                if str(frame) not in places:
+                if str(frame) not in matrix_at_frame:
                     raise UserError(f"{self.file}: blend: has no camera at frame {frame}")
-            matrices: Floats = np.array([places[str(frame)] for frame in frames])
+            matrices: Floats = np.array([matrix_at_frame[str(frame)] for frame in frames])
             names = [f"view_{frame:04d}f" for frame in frames]
-            turns = matrix_to_euler(matrices[:, :3, :3])
-            return UnitPoses(names, np.arange(len(names)), matrices[:, :3, 3], turns)
+            rotations = matrix_to_euler(matrices[:, :3, :3])
+            return UnitPoses(names, np.arange(len(names)), matrices[:, :3, 3], rotations)
 
     def _thinned_to(self, positions: int) -> Self | None:
         return self.model_copy(update={"max_views": positions}) if positions else None

@@ -34,8 +34,11 @@ class Cuboid(Box):
 
     def _row(self) -> tuple[int, int]:
         nx, ny, nz = self.cameras
-        # Of the front, or where it is the longer one, the left side, which comes after the back.
-        return nz // 2 * max(nx, ny) + (0 if nx >= ny else 2 * nx * nz), max(nx, ny)
+        # The row is on the longer of the front and the left side.
+        if nx >= ny:
+            return nz // 2 * nx, nx
+        # The left side follows the front and the back, which have nx · nz cameras each.
+        return 2 * nx * nz + nz // 2 * ny, ny
 
     def cells(self) -> list[Cell]:
         nx, ny, nz = self.cameras

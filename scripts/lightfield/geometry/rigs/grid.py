@@ -1,4 +1,4 @@
-"""What the rigs that are given by their cameras along each axis have in common."""
+"""The base class of rigs that have a number of cameras along each axis."""
 
 import math
 from typing import Annotated, Any, ClassVar, Self
@@ -18,7 +18,7 @@ _SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5], [-0.5, -
 
 
 class Grid(Rig):
-    """A rig of ``cameras`` along each axis; thinned, it keeps ``fewest`` of them if it can."""
+    """A rig of ``cameras`` along each axis. A thinned rig keeps at least ``fewest`` if it can."""
 
     fewest: ClassVar[tuple[int, ...]]
 
@@ -26,7 +26,7 @@ class Grid(Rig):
 
     @staticmethod
     def count(cameras: tuple[int, ...]) -> int:
-        """Return how many positions as many cameras along each axis make."""
+        """Return the number of positions that so many cameras along each axis make."""
         return math.prod(cameras)
 
     @property
@@ -42,25 +42,27 @@ class Grid(Rig):
         return self.cameras[1] // 2 * self.cameras[0], self.cameras[0]
 
     def _thinned_to(self, positions: int) -> Self | None:
-        """Take cameras from the axis that has kept the largest part of its own.
+        """Remove cameras from the axis that has kept the largest part of its cameras.
 
-        So all axes thin alike; an axis keeps ``fewest`` as long as the number of views allows.
+        So all axes thin alike. Each axis keeps ``fewest`` as long as the number of views allows.
         """
         for fewest in (self.fewest, [1] * len(self.cameras)):
             counts = list(self.cameras)
             axes = range(len(counts))
             while self.count(tuple(counts)) > positions:
-                thick = [axis for axis in axes if counts[axis] > fewest[axis]]
-                if not thick:
+                shortenable = [axis for axis in axes if counts[axis] > fewest[axis]]
+                if not shortenable:
                     break
-                # Among equals the last axis, the vertical one, goes first.
-                counts[max(thick, key=lambda axis: (counts[axis] / self.cameras[axis], axis))] -= 1
+                parts = {axis: counts[axis] / self.cameras[axis] for axis in shortenable}
+                # Of equal parts the last axis, the vertical one, loses a camera first.
+                fullest = max(shortenable, key=lambda axis: (parts[axis], axis))
+                counts[fullest] -= 1
             else:
                 return self.model_copy(update={"cameras": self._filled(counts, positions)})
         return None
 
     def _filled(self, counts: list[int], positions: int) -> tuple[int, ...]:
-        """Return ``counts`` with as many cameras again as fit, axis by axis."""
+        """Return ``counts`` with as many cameras added back as fit, axis by axis."""
         for axis, full in enumerate(self.cameras):
             while counts[axis] < full:
                 counts[axis] += 1
@@ -84,7 +86,7 @@ class Box(Grid):
 
 
 def axis(count: int) -> Floats:
-    """Return evenly spaced places from −½ to ½; one camera sits in the middle."""
+    """Return evenly spaced places from −½ to ½. A single place is in the middle."""
     return np.linspace(-0.5, 0.5, count) if count > 1 else np.zeros(1)
 
 
@@ -94,13 +96,13 @@ def grid(columns: Floats, rows: Floats) -> tuple[Floats, Floats]:
 
 
 def quads(numbers: NDArray[Any]) -> list[Cell]:
-    """Return the cells of a grid (rows, columns) of positions' numbers."""
+    """Return the cells of a grid (rows, columns), which holds the numbers of positions."""
     corners = (numbers[:-1, :-1], numbers[:-1, 1:], numbers[1:, 1:], numbers[1:, :-1])
     return [tuple(map(int, cell)) for cell in np.stack(corners, axis=-1).reshape(-1, 4)]
 
 
 def square_outline() -> list[Floats]:
-    """Return an upright square across y."""
+    """Return an upright square, perpendicular to y."""
     return [np.stack([_SQUARE[:, 0], np.zeros(5), _SQUARE[:, 1]], axis=-1)]
 
 

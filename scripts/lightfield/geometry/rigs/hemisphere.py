@@ -32,7 +32,7 @@ class Hemisphere(Orbit):
         lowest, highest = np.radians(self.elevation)
         rows = max(1, round(math.sqrt(self.count * (highest - lowest) / (2 * math.pi))))
         elevations = np.linspace(lowest, highest, 2 * rows + 1)[1::2]
-        # As many cameras in each ring as its length asks for; rounding keeps their sum.
+        # Each ring has cameras in proportion to its length. Rounding keeps the sum.
         ends = np.round(self.count * np.cumsum(np.cos(elevations)) / np.cos(elevations).sum())
         counts = np.diff(ends, prepend=0).astype(int)
         azimuth = np.concatenate([2 * np.pi * np.arange(n) / n for n in counts if n])

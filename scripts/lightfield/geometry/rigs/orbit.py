@@ -1,4 +1,4 @@
-"""What rigs around an object have in common: cameras on a sphere that look at its middle."""
+"""The base class of rigs around an object: cameras on a sphere look at its middle."""
 
 from abc import abstractmethod
 from typing import Annotated, Self
@@ -31,7 +31,9 @@ class Orbit(CountedRig):
     @model_validator(mode="after")
     def _faces_inside_already(self) -> Self:
         if self.face_inside:
-            raise ValueError(f"face_inside: goes without type {self.type}, which looks inside")
+            raise ValueError(
+                f"face_inside: does not go with type {self.type}, whose cameras look inside already"
+            )
         return self
 
     @abstractmethod

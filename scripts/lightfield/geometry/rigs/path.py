@@ -11,7 +11,7 @@ from lightfield.core.settings import Settings, Vector, as_list
 from lightfield.geometry.rigs.rig import CountedRig, UnitPoses
 from lightfield.geometry.rotations import Floats, looking_at, matrix_to_euler
 
-# Pieces between two keys by which the curve's length is measured: it errs by less than 1e-6 of it.
+# The curve's length is measured over so many pieces between two keys. Its error is below 1e-6.
 _PIECES = 2000
 
 
@@ -25,7 +25,7 @@ class Key(Settings):
     @model_validator(mode="after")
     def _one_rotation(self) -> Self:
         if self.rotation is not None and self.quaternion_wxyz is not None:
-            raise ValueError("quaternion_wxyz: goes without rotation")
+            raise ValueError("quaternion_wxyz: does not go with rotation")
         if self.quaternion_wxyz and not 1e-9 < math.hypot(*self.quaternion_wxyz) < 1e9:
             raise ValueError("quaternion_wxyz: must have a length from 1e-9 to 1e9")
         return self
@@ -83,7 +83,7 @@ class Path(CountedRig):
         return [spline(fine[:: _PIECES // 20])]
 
     def _places(self) -> Floats:
-        """Return the keys' positions (n, 3), of a closed path the first one again at the end."""
+        """Return the keys' positions (n, 3). A closed path repeats the first one at the end."""
         keys = [*self.keys, self.keys[0]] if self.closed else self.keys
         return np.array([key.position for key in keys], float)
 
@@ -91,22 +91,24 @@ class Path(CountedRig):
         """Return the keys' rotations (n, 4), the scalar last as SciPy has it."""
         from scipy.spatial.transform import Rotation
 
-        turns = [
-            Rotation.from_euler("xyz", key.rotation or (0, 0, 0), degrees=True)
-            if key.quaternion_wxyz is None
-            else Rotation.from_quat(np.roll(key.quaternion_wxyz, -1))
-            for key in self.keys
-        ]
-        closing = turns[:1] if self.closed else []
-        quaternions: Floats = np.array([turn.as_quat() for turn in [*turns, *closing]])
+        rotations = []
+        for key in self.keys:
+            if key.quaternion_wxyz is None:
+                angles = key.rotation or (0, 0, 0)
+                rotations.append(Rotation.from_euler("xyz", angles, degrees=True))
+            else:
+                rotations.append(Rotation.from_quat(np.roll(key.quaternion_wxyz, -1)))
+        if self.closed:
+            rotations.append(rotations[0])
+        quaternions: Floats = np.array([rotation.as_quat() for rotation in rotations])
         return quaternions
 
     def _curve(self) -> tuple[Any, Floats, Floats]:
         """Return the curve, many values (n) of its parameter, and the length in metres up to each.
 
-        It is a cubic spline whose second derivative is continuous; its parameter grows by the root
-        of the distance between keys (centripetal), which avoids loops where these are uneven.
-        Source: Lee 1989, "Choosing nodes in parametric curve interpolation".
+        The curve is a cubic spline with a continuous second derivative. Between two keys its
+        parameter grows by the root of their distance (centripetal), which avoids loops between
+        unevenly spaced keys. Source: Lee 1989, "Choosing nodes in parametric curve interpolation".
         """
         from scipy.interpolate import CubicSpline
 

@@ -13,15 +13,15 @@ from lightfield.geometry.rigs.grid import box_outline
 from lightfield.geometry.rigs.rig import CountedRig, UnitPoses, stack
 from lightfield.geometry.rotations import Floats
 
-# What the places follow from, besides the scene.
+# The settings that determine the places, together with the scene.
 BOX = {"count", "seed", "clearance", "size", "center", "rotation"}
 
 
 class Random(CountedRig):
-    """Each view has a sequence of places of its own, so a thinned rig is the first of its views.
+    """Each view tries its own sequence of places, so a thinned rig has the full rig's first views.
 
-    ``file`` is for no scene YAML: there scripts/free_places.py writes the places that it found.
-    Before it has, the poses are those that would be taken in an empty scene.
+    ``file`` is not for scene YAMLs: scripts/free_places.py writes the free places to it. Without
+    it, the poses are those of an empty scene.
     """
 
     shape = "CUBOID"
@@ -37,16 +37,18 @@ class Random(CountedRig):
     @model_validator(mode="after")
     def _stands_still(self) -> Self:
         if self.frames is not None:
-            raise ValueError("frames: goes without type random, whose places are of one frame")
+            raise ValueError(
+                "frames: does not go with type random, whose places are free at one frame only"
+            )
         return self
 
     def placed(self, file: Path | str) -> Self:
-        """Return the rig with its cameras at the places that a file has."""
+        """Return the rig with its cameras at the places in a file."""
         return self.model_copy(update={"file": str(file)})
 
     @property
     def box(self) -> dict[str, Any]:
-        """The settings that the places follow from, as JSON has them."""
+        """The settings that determine the places, as values of JSON."""
         return self.model_dump(mode="json", include=BOX)
 
     def unit_poses(self) -> UnitPoses:
@@ -76,6 +78,6 @@ class Random(CountedRig):
         return self._numbers(view, number + 1)[-3:] - 0.5
 
     def _numbers(self, view: int, places: int = 0) -> Floats:
-        """Return a view's numbers from 0 to 1: the first for its direction, three for a place."""
+        """Return a view's random numbers from 0 to 1: one for its direction, three for a place."""
         numbers: Floats = np.random.default_rng([self.seed, view]).random(1 + 3 * places)
         return numbers

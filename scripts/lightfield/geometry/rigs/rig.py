@@ -37,8 +37,9 @@ ONE_PLACE = 1e-6
 class Pose:
     """One camera of a rig.
 
-    ``number`` is the sequence number within the view's name, ``position`` is in metres,
-    ``rotation`` holds Blender's XYZ Euler angles in radians, and ``split`` is what the view is for.
+    ``number`` is the sequence number within the view's name. ``position`` is in metres.
+    ``rotation`` holds Blender's XYZ Euler angles in radians. ``split`` says whether the view
+    trains, validates or tests.
     """
 
     name: str
@@ -48,7 +49,7 @@ class Pose:
     split: Part | None
 
     def matrix(self) -> Floats:
-        """Return the (4, 4) camera-to-world matrix; the camera looks along −Z, +Y is up."""
+        """Return the (4, 4) camera-to-world matrix. The camera looks along −Z, and +Y is up."""
         matrix = np.eye(4)
         matrix[:3, :3] = euler_to_matrix(np.array(self.rotation))
         matrix[:3, 3] = self.position
@@ -59,7 +60,7 @@ class Pose:
 class UnitPoses:
     """The cameras of a rig in the unit box, one in each entry.
 
-    ``positions`` (n, 3) reach from −½ to ½, ``rotations`` (n, 3) are XYZ Euler angles in radians.
+    ``positions`` (n, 3) reach from −½ to ½. ``rotations`` (n, 3) are XYZ Euler angles in radians.
     """
 
     names: Sequence[str]
@@ -100,7 +101,7 @@ class Frames(Settings):
         return {f"f{number:05d}": number for number in self.numbers}
 
 
-# The eyes of a stereo pair, and the side of the position on which each is, along the camera's +X.
+# The eyes of a stereo pair, and the side of each along the camera's +X.
 EYES = {"left": -1, "right": 1}
 
 
@@ -110,8 +111,8 @@ class Stereo(Settings):
     )
     omnidirectional: bool = Field(
         False,
-        description="Of panoramas: each eye goes round the position and looks along its circle, so "
-        "that to all sides the pair is right; such a view has no centre.",
+        description="For panoramas: each eye goes round the position and looks along its circle. "
+        "So the pair is right to all sides. Such a view has no centre.",
     )
 
 
@@ -122,7 +123,7 @@ def _require_camera(schema: dict[str, Any]) -> None:
 class Rig(Settings):
     """The keys that all rigs share. Each type of rig adds its own keys, and places the cameras.
 
-    ``shape`` is the nearest of the four types that SILVR knows.
+    ``shape`` is the type of rig that lightfield.json names: the nearest of SILVR's four.
     """
 
     shape: ClassVar[Literal["PLANE", "CUBOID", "CYLINDER", "SPHERE"]]
@@ -130,7 +131,7 @@ class Rig(Settings):
     is_round: ClassVar[bool] = False
     # Whether the rig is as large as the box around its cameras, whatever its ``size``.
     is_loose: ClassVar[bool] = False
-    # Of what the cameras stand on, in the unit box; None where it is open.
+    # The volume inside the cameras' surface, in the unit box. None if the surface is open.
     unit_volume: ClassVar[float | None] = None
 
     model_config = ConfigDict(json_schema_extra=_require_camera)
@@ -143,7 +144,9 @@ class Rig(Settings):
     )
     face_inside: bool = Field(False, description="Turn every camera round.")
     look_at: Vector | None = Field(
-        None, description="Where every camera looks, in the world, metres; instead of its own view."
+        None,
+        description="The point that every camera looks at, in world coordinates, metres. It "
+        "replaces the rig's own directions.",
     )
     cube_map: bool = Field(False, description="Six 90 degree views at each position.")
     stereo: Stereo | None = Field(None, description="A pair of views at each position.")
@@ -153,18 +156,18 @@ class Rig(Settings):
     )
     split: Split | None = Field(
         None,
-        description="What the views are for: odd tests with odd sequence numbers, every with each "
-        "n-th position, lists name views; train, validation and test say it of the whole rig.",
+        description="Which views train, validate and test. odd: odd sequence numbers test. train, "
+        "validation or test: all views do. A mapping: every n-th position tests, or views by name.",
     )
-    # A scene YAML's rigs all have one; where the places alone matter there may be none.
+    # Every rig of a scene YAML has a camera. Code that needs only the places may leave it out.
     camera: CameraSettings = None  # type: ignore[assignment]
 
     @model_validator(mode="after")
     def _looks_one_way(self) -> Self:
         if self.look_at is not None and (self.face_inside or self.cube_map):
-            raise ValueError("look_at: goes without face_inside and cube_map")
+            raise ValueError("look_at: does not go with face_inside or cube_map")
         if self.stereo is not None and self.cube_map:
-            raise ValueError("stereo: goes without cube_map")
+            raise ValueError("stereo: does not go with cube_map")
         return self
 
     @property
@@ -177,12 +180,12 @@ class Rig(Settings):
         raise NotImplementedError
 
     def _thinned_to(self, positions: int) -> Self | None:
-        """Return the densest such rig of at most as many positions; None where there is none."""
+        """Return the densest such rig of at most ``positions``. None if the smallest has more."""
         raise NotImplementedError
 
     @property
     def sequence(self) -> Frames | None:
-        """The frames, each of which is a dataset."""
+        """The frames of a sequence, each of which is a dataset."""
         return self.frames
 
     @property
@@ -228,9 +231,10 @@ class Rig(Settings):
         thinner = self._thinned_to(max_views // self.views_a_position)
         if thinner is None:
             raise UserError(f"a rig of type {self.type} cannot have as few as {max_views} views")
-        # A list is of the views of the full rig.
-        listed = isinstance(self.split, Chosen) and self.split.names
-        return thinner.model_copy(update={"split": None}) if listed else thinner
+        # Names in a split are those of the full rig's views.
+        if isinstance(self.split, Chosen) and self.split.names:
+            return thinner.model_copy(update={"split": None})
+        return thinner
 
     def to_world(self, points: Floats) -> Floats:
         """Return points (..., 3) of the unit box in world coordinates, in metres."""
@@ -280,28 +284,22 @@ class Rig(Settings):
             names = [f"{name}_{eye}" for name in names for eye in EYES]
             numbers = np.repeat(numbers, len(EYES))
             rotations = np.repeat(rotations, len(EYES), axis=0)
-        return [
-            Pose(
-                name,
-                number,
-                tuple(position),
-                tuple(rotation),
-                part_of(self.split, name, number, index // self.views_a_position),
-            )
-            for index, (name, number, position, rotation) in enumerate(
-                zip(names, numbers.tolist(), plain(positions), plain(rotations), strict=True)
-            )
-        ]
+        poses = []
+        views = zip(names, numbers.tolist(), plain(positions), plain(rotations), strict=True)
+        for index, (name, number, position, rotation) in enumerate(views):
+            part = part_of(self.split, name, number, index // self.views_a_position)
+            poses.append(Pose(name, number, tuple(position), tuple(rotation), part))
+        return poses
 
     def cells(self) -> list[tuple[int, ...]] | None:
         """Return the cells between neighbouring positions, as indices of the positions.
 
-        There are no cells for cameras that span no surface.
+        None if the cameras span no surface.
         """
         return None
 
     def middle_row(self, places: Floats) -> list[int]:
-        """Return the numbers of neighbouring positions in a row. No numbers if there is no row.
+        """Return the numbers of the positions in the rig's middle row. Empty without a row.
 
         ``places`` (n, 3) are the positions in metres, in the rig's own axes.
         """
@@ -322,7 +320,7 @@ def plain(values: Floats) -> Any:
 
 
 def stack(*coordinates: Floats | float) -> Floats:
-    """Return points (n, 3) from coordinates, each of which is (n,) or one number for all."""
+    """Return points (n, 3) from coordinates. Each coordinate is (n,), or one number for all."""
     stacked: Floats = np.stack(np.broadcast_arrays(*coordinates), axis=-1)
     return stacked
 
@@ -340,7 +338,7 @@ def ball_outline() -> list[Floats]:
 
 
 class CountedRig(Rig):
-    """A rig of any number of cameras, of which fewer are such a rig again."""
+    """A rig of any number of cameras. With fewer cameras it is still a rig of its type."""
 
     count: int = Field(ge=1, le=100000, description="Cameras.")
 

@@ -1,4 +1,4 @@
-"""A ring around an object: cameras at one elevation, evenly round it, looking at the middle."""
+"""A ring around an object: cameras at one elevation, spread evenly, look at the middle."""
 
 import math
 from typing import Literal

@@ -10,8 +10,8 @@ from pydantic import Field
 from lightfield.geometry.rigs.rig import Rig, UnitPoses, ball_outline
 from lightfield.geometry.rotations import Floats, matrix_to_euler
 
-# Cameras whose heights differ by less, as a part of the sphere's own, are in one ring: its vertices
-# follow from rounded ones.
+# Cameras are in one ring if their heights differ by less than this part of the sphere's height.
+# They differ at all because Blender's icosahedron has rounded coordinates.
 SAME_LEVEL = 1e-3
 
 
@@ -48,7 +48,7 @@ class Sphere(Rig):
         return None
 
     def middle_row(self, places: Floats) -> list[int]:
-        """Return the level of cameras nearest the equator."""
+        """Return the ring of cameras nearest to the equator."""
         order = np.argsort(places[:, 2], kind="stable")
         heights = places[order, 2]
         gaps = np.flatnonzero(np.diff(heights) > SAME_LEVEL * np.ptp(heights)) + 1
@@ -75,10 +75,10 @@ def vertices(subdivisions: int) -> int:
 def icosphere(subdivisions: int) -> Floats:
     """Return the vertices (n, 3) of Blender's icosphere of radius 1, in Blender's order.
 
-    Blender cuts each edge of an icosahedron into 2^(subdivisions−1) pieces, in the order of the
-    edges, then fills each face with rows between two of its edges, in the order of the faces;
-    every new point is projected to the sphere as soon as it is made. Agrees with Blender 5.0 to
-    1e-6 for 1 to 7 subdivisions. The first level keeps the icosahedron's rounded coordinates.
+    Blender first cuts each edge of an icosahedron into 2^(subdivisions−1) pieces, edge by edge.
+    Then it fills each face with rows between two of its edges, face by face. It projects every new
+    point to the sphere at once. The result agrees with Blender 5.0 to 1e-6 for 1 to 7 subdivisions.
+    The first level keeps the icosahedron's rounded coordinates.
     """
     base = np.array(_ICOSAHEDRON) / 200.0
     if subdivisions == 1:
@@ -98,22 +98,27 @@ def icosphere(subdivisions: int) -> Floats:
 
 
 def nested(count: int) -> list[NDArray[np.intp]]:
-    """Return the vertices that each coarser icosphere has, too, finest first, by their numbers.
+    """Return the vertices that an icosphere shares with each coarser icosphere, finest first.
 
-    ``count`` is that of the finest's vertices; what no icosphere has contains none.
+    Each array holds numbers of vertices. The icosphere has ``count`` vertices. The list is empty
+    if no icosphere has so many.
     """
     # SciPy takes long to import, and no plan needs it.
     from scipy.spatial import KDTree
 
-    counts = {vertices(level): level for level in range(1, 8)}
-    finest = counts.get(count, 1)
+    level_of_count = {vertices(level): level for level in range(1, 8)}
+    finest = level_of_count.get(count, 1)
     tree = KDTree(_unit(icosphere(finest)))
-    return [np.sort(tree.query(_unit(icosphere(level)))[1]) for level in range(finest - 1, 0, -1)]
+    shared = []
+    for level in range(finest - 1, 0, -1):
+        _, numbers = tree.query(_unit(icosphere(level)))
+        shared.append(np.sort(numbers))
+    return shared
 
 
-# The icosahedron that Blender starts from: coordinates as rounded in its source
-# (bmesh/operators/bmo_primitive.cc), and the orders in which its subdivision visits edges and
-# faces, each face from its apex. The tests compare the result with Blender's own.
+# The icosahedron that Blender starts from, with coordinates as rounded in its source
+# (bmesh/operators/bmo_primitive.cc). Edges and faces are in the order of Blender's subdivision,
+# each face from its apex. The tests compare the result with Blender's own.
 _ICOSAHEDRON = [
     (0.0, 0.0, -200.0),
     (144.72, -105.144, -89.443),

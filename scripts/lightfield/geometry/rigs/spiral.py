@@ -1,4 +1,4 @@
-"""A spiral around an object: cameras that rise while they go round it, looking at the middle."""
+"""A spiral around an object: cameras rise while they go round it, and look at the middle."""
 
 from typing import Literal
 

@@ -13,7 +13,7 @@ PARTS: tuple[Part, ...] = get_args(Part)
 class Chosen(Settings):
     """The views at each n-th position, or the views of given names. All others train."""
 
-    every: int | None = Field(None, ge=2, description="Of so many positions the first tests.")
+    every: int | None = Field(None, ge=2, description="Every n-th position tests, from the first.")
     validation: list[str] = Field([], description="Names of views.")
     test: list[str] = Field([], description="Names of views.")
 
