@@ -1,5 +1,7 @@
 """What several tests share: the programs in scripts/, run as a user runs them."""
 
+import compileall
+import fcntl
 import os
 import shutil
 import subprocess
@@ -18,6 +20,12 @@ SCRIPTS = ROOT / "scripts"
 
 # Fixtures that start programs, a browser, Blender or Snakemake, or compute for long.
 SLOW = {"run_program", "smoke", "blender", "browser", "cycles", "planned", "renders", "simulated"}
+
+
+def pytest_sessionstart(session):
+    """Compile the programs once, before there are workers: each checkout takes that with it."""
+    if not hasattr(session.config, "workerinput"):
+        compileall.compile_dir(SCRIPTS, quiet=2)
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -95,13 +103,37 @@ def room(tmp_path_factory, run_program):
     return path
 
 
-@pytest.fixture(scope="session")
-def smoke(tmp_path_factory):
-    """A checkout in which the smoke dataset has been built."""
-    folder = checkout(tmp_path_factory.mktemp("smoke") / "plenoforge")
+def built_once(build, name, config, tmp_path_factory):
+    """Return a worker's own copy of a folder that ``build(folder)`` makes once for all workers.
+
+    The first worker that asks builds it, and the others wait. Where it fails the next one tries.
+    """
+    is_worker = hasattr(config, "workerinput")
+    shared = tmp_path_factory.getbasetemp()
+    shared = shared.parent if is_worker else shared
+    finished = shared / f"{name}.finished"
+    with (shared / f"{name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not finished.exists():
+            folder = tmp_path_factory.mktemp(name) / "built"
+            build(folder)
+            finished.symlink_to(folder)
+    own = tmp_path_factory.mktemp(name) / "plenoforge"
+    # With its times: what was built stays up to date.
+    shutil.copytree(finished.resolve(), own, symlinks=True)
+    return own
+
+
+def build_smoke(folder):
+    checkout(folder)
     result = snakemake(folder, "--cores", "2", "smoke")
     assert result.returncode == 0, result.stdout + result.stderr
-    return folder
+
+
+@pytest.fixture(scope="session")
+def smoke(tmp_path_factory, request):
+    """A checkout in which the smoke dataset has been built."""
+    return built_once(build_smoke, "smoke", request.config, tmp_path_factory)
 
 
 @pytest.fixture(scope="session")
