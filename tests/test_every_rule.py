@@ -385,6 +385,13 @@ ROUNDS = {
     "another text of the builder": {
         ROOM: ('"""', '""" ', {f"built {rule}" for rule in {"build_scene"} | CAMERAS}),
     },
+    "the library of all builders": {
+        "scripts/scenes/library/lights.py": (
+            '"""',
+            '""" ',
+            {f"built {rule}" for rule in {"build_scene"} | CAMERAS},
+        ),
+    },
     "the resolution": {"built": ("[16, 16]", "[32, 32]", OF_PLANE | {"check_gpu"})},
     "a sequence": {
         "built": (
@@ -393,7 +400,8 @@ ROUNDS = {
             {"inventory", "probe_cameras", "check_gpu", "LFPlane pack"},
         ),
     },
-    "somebody's light field": {
+    "a description, and somebody's light field": {
+        "built": ("Cameras in a room", "Some cameras", {"pack"}),
         "published/LFPlane/lightfield.json": ("{", "{ ", {"imported lightfield"}),
     },
     "a measurement": {
