@@ -28,19 +28,26 @@ def pytest_sessionstart(session):
         compileall.compile_dir(SCRIPTS, quiet=2)
 
 
+# Each of these takes more than a minute.
+LONG = ("slurm", "every_rule", "workflow", "damage", "failures", "storage", "soak", "provenance")
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """Mark as slow what uses these fixtures; other tests say it themselves.
 
-    Files of few tests come first, which take long, and those without a slow one last, so that the
-    workers end together.
+    The longest files come first, then those of few tests, which take long, and those without a
+    slow one last, so that the workers end together.
     """
     tests = {item.path: [] for item in items}
     for item in items:
         if SLOW & set(item.fixturenames):
             item.add_marker("slow")
         tests[item.path].append(item.get_closest_marker("slow") is not None)
-    order = {path: (not any(slow), len(slow)) for path, slow in tests.items()}
+    long = [f"test_{name}.py" for name in LONG]
+    order = {
+        path: (path.name not in long, not any(slow), len(slow)) for path, slow in tests.items()
+    }
     items.sort(key=lambda item: order[item.path])
 
 
