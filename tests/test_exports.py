@@ -813,20 +813,13 @@ def test_a_settings_file_gives_source_and_rigs_that_test(run_program, dataset, t
     assert both == [*names, *(f"other_{name}" for name in names)]
 
 
-@pytest.mark.parametrize(
-    ("content", "problem"),
-    [
-        ({"options": {"sources": ["views"], "point": 5}}, "options.point: unknown key"),
-        ({"options": {"sources": ["views"], "points": 0}}, "options.points: is 0; must be"),
-        ({"options": {"sources": ["views"]}, "tested_by": ["other"]}, "tested_by: is "),
-    ],
-)
-def test_mistakes_in_a_settings_file_are_named(run_program, dataset, tmp_path, content, problem):
+def test_a_mistake_in_a_settings_file_is_named_and_nothing_made(run_program, dataset, tmp_path):
+    content = {"options": {"sources": ["views"], "point": 5}}
     settings = tmp_path / "settings.json"
     settings.write_text(json.dumps(content))
     words = ["--dataset", dataset, "--output", tmp_path / "made", "--settings", settings]
     refused = run_program("export.py", "colmap", *words, check=False)
-    assert refused.stderr.startswith(f"error: {settings}: {problem}")
+    assert refused.stderr.startswith(f"error: {settings}: options.point: unknown key")
     assert (refused.returncode, refused.stderr.count("\n")) == (1, 1)
     refused = run_program("export.py", "colmap", *words, "--suffix", ".png", check=False)
     assert "--settings: excludes --suffix" in refused.stderr
