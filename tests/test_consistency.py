@@ -194,7 +194,7 @@ def test_a_point_agrees_within_the_tolerance_of_both_surfaces(asked, depth, tole
 def test_a_residual_counts_in_footprints_and_comes_with_the_deviation_that_is_expected():
     asked = on_wall(ROW, away=AWAY - 0.2 * STEP, spread=0.3 * STEP, error=1.2 * STEP)
     found = consistency.compare(asked, at(), wall())
-    assert found.fine.all()
+    assert found.smooth.all()
     np.testing.assert_allclose(found.footprint, STEP, rtol=0.02)
     np.testing.assert_allclose(found.residual, 0.2, rtol=0.02)
     # Of an error evenly within its bound the deviation is a √12th.

@@ -1408,11 +1408,11 @@ def test_an_export_that_is_no_longer_wanted_is_moved_away(
     (manifest.parent / "poses.csv").write_text("name\n")
     write_json(manifest, {"files": {"poses.csv": sha256(manifest.parent / "poses.csv")}})
     # Every one that is there, those that are wanted, and none.
-    for wanted, moved in ((None, 0), ([small_dataset / "transforms.json", manifest], 1), ([], 5)):
-        assert check(validate(small_dataset, wanted=wanted), "files").passed == (not moved)
+    for lists, moved in ((None, 0), ([small_dataset / "transforms.json", manifest], 1), ([], 5)):
+        assert check(validate(small_dataset, export_lists=lists), "files").passed == (not moved)
         removed = tmp_path / "removed"
-        assert files.remove_strays(small_dataset, [], MANIFESTS, removed, wanted) == moved
-        assert check(validate(small_dataset, wanted=wanted), "files").passed
+        assert files.remove_strays(small_dataset, [], MANIFESTS, removed, lists) == moved
+        assert check(validate(small_dataset, export_lists=lists), "files").passed
     assert len(list((tmp_path / "removed").rglob("poses.csv"))) == 1
 
 
