@@ -33,6 +33,16 @@ from lightfield.dataset.config import accept_blend, load_config, load_scene, sce
 from lightfield.dataset.dataset_paths import PICTURES, PLOTS
 from lightfield.dataset.description import SOURCE_KEYS, Cluster
 from lightfield.dataset.exports import MANIFEST, VIEWS, InstantNgp, export_settings_of
+from lightfield.dataset.job_settings import (
+    BuildSettings,
+    FiguresSettings,
+    FreePlacesSettings,
+    Measurement,
+    PackSettings,
+    PageSettings,
+    SynthesisSettings,
+    ValidationSettings,
+)
 from lightfield.dataset.loading import load_datasets, rendered_frames, scene_datasets
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 from lightfield.dataset.splits_file import SPLITS

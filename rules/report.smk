@@ -73,7 +73,8 @@ rule render_panorama:
 rule figures:
     input:
         settings=settings_of(
-            "figures", lambda dataset: {"rig": json.loads(dataset.rig_json)}
+            "figures",
+            lambda dataset: FiguresSettings(rig=dataset.placed_rig).as_json(),
         ),
         records=records,
         lightfield=f"{DATASET}/lightfield.json",
@@ -96,12 +97,11 @@ rule figures:
     localrule: True
     params:
         dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
-        rig=of_dataset("rig_json"),
     message:
         "Drawing the pictures of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"{taking('input.records')}python {SCRIPTS}/report_figures.py"
-        " --dataset {params.dataset} --rig {params.rig:q}"
+        " --dataset {params.dataset} --settings {input.settings}"
         " --panorama {input.panorama} --output {params.dataset}/report > {log} 2>&1"
 
 
@@ -123,20 +123,13 @@ rule page:
     localrule: True
     params:
         dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
-        rig=of_dataset("rig_json"),
-        panorama=of_dataset("panorama"),
-        yaml=lambda wildcards: str(scene_path(dataset_of(wildcards).scene_name)),
-        command=rebuilding,
-        measurements=measurements,
         inventory=optional("inventory"),
     message:
         "Making the page of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"{taking('input')}python {SCRIPTS}/report_html.py"
         " --dataset {params.dataset}"
-        " --name {wildcards.scene}/{wildcards.rig} --rig {params.rig:q}"
-        " --yaml {params.yaml:q} --command {params.command:q}"
-        " --panorama {params.panorama} --measurements {params.measurements}"
+        " --name {wildcards.scene}/{wildcards.rig} --settings {input.settings}"
         " {params.inventory} --output {output} > {log} 2>&1"
 
 

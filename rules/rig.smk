@@ -7,16 +7,7 @@ include: "helpers/rig.smk"
 # Only a random rig's cameras have to know the scene.
 rule free_places:
     input:
-        settings=settings_of(
-            "free_places",
-            lambda dataset: {
-                "rig": free_rig(dataset),
-                "frame": dataset.source.frame,
-                "scene": dataset.source.model_dump(
-                    mode="json", include={"scene_name", "view_layers"}
-                ),
-            },
-        ),
+        settings=settings_of("free_places", free_places_settings),
         check=of_dataset("blend_check"),
         blend=of_dataset("blend"),
         inventory=of_dataset("blend_inventory"),
@@ -30,16 +21,12 @@ rule free_places:
         mem_mb=8000,
         runtime=60,
     params:
-        rig=lambda wildcards: json.dumps(free_rig(dataset_of(wildcards))),
-        name=of_dataset("scene_name"),
-        frame=lambda wildcards: dataset_of(wildcards).source.frame,
         inventory=optional("inventory"),
     message:
         "Looking for free places for the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/free_places.py"
-        " --blend {input.blend:q} --scene {params.name}"
-        " --rig {params.rig:q} --frame {params.frame} {params.inventory}"
+        " --blend {input.blend:q} --settings {input.settings} {params.inventory}"
         " --output {output} > {log} 2>&1"
 
 

@@ -413,8 +413,10 @@ ROUNDS = {
 }
 # The first two follow from the programs' versions, the third from where the scene YAML lies. Only a
 # .blend's camera has frames. For instant-ngp a rig that tests is placed as the trained one is;
-# other formats take its views. No scene YAML asks reproject.py for masks.
+# other formats take its views. No scene YAML asks reproject.py for masks, or says how many
+# synthesised views are compared.
 CONSTANT = {"version", "bpy", "command", "camera_frames", "reproject.json mask"}
+CONSTANT |= {"synthesis.json views"}
 CONSTANT |= {"nerfstudio.json trained_by", "instant_ngp.json tested_by"}
 
 

@@ -132,7 +132,9 @@ bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2])
 
 
 def free_places(blend, rig, output):
-    words = ["--blend", blend, "--rig", json.dumps(rig), "--output", output]
+    settings = blend.with_name("free_places.json")
+    settings.write_text(json.dumps({"rig": rig}))
+    words = ["--blend", blend, "--settings", settings, "--output", output]
     return subprocess.run(
         [sys.executable, SCRIPTS / "free_places.py", *words],
         capture_output=True,

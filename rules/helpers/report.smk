@@ -38,13 +38,14 @@ def rebuilding(wildcards):
 def page_settings(wildcards):
     """Return the settings file of a page: the scene YAML's text, and which measurements it shows."""
     dataset = dataset_of(wildcards)
-    content = {
-        "rig": json.loads(dataset.rig_json),
-        "yaml": scene_path(dataset.scene_name).read_text(),
-        "command": rebuilding(wildcards),
-        "panorama": dataset.panorama,
-        "measurements": [
-            [str(path), path.stat().st_mtime_ns] for path in measurements(wildcards)
+    settings = PageSettings(
+        rig=dataset.placed_rig,
+        yaml=scene_path(dataset.scene_name).read_text(),
+        command=rebuilding(wildcards),
+        panorama=bool(dataset.panorama),
+        measurements=[
+            Measurement(file=str(path), modified_ns=path.stat().st_mtime_ns)
+            for path in measurements(wildcards)
         ],
-    }
-    return dataset_settings(dataset, "page", content)
+    )
+    return dataset_settings(dataset, "page", settings.as_json())

@@ -1,11 +1,20 @@
 # What the rules of rig.smk ask of the configuration.
 
 
-def free_rig(dataset):
-    """Return what a random rig says of its places."""
-    return dataset.rig.model_dump(
-        mode="json", exclude_unset=True, exclude={"camera", "split"}
+def free_places_settings(dataset):
+    """Return the settings of a random rig's places; ends the run for another rig."""
+    if not dataset.places:
+        sys.exit(
+            f"error: {dataset.work}/places.json: is for rigs of type random; "
+            f"{dataset.rig_name} has type {dataset.rig.type}"
+        )
+    settings = FreePlacesSettings.of(
+        rig=dataset.rig,
+        frame=dataset.source.frame,
+        scene_name=dataset.source.scene_name,
+        view_layers=dataset.source.view_layers,
     )
+    return settings.as_json()
 
 
 def poses_sum(dataset):

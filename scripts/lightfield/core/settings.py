@@ -5,7 +5,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, TypeVar
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -54,6 +54,11 @@ class Settings(BaseModel):
             if value is None:
                 raise ValueError(f"{key}: is null; must have a value, or be left out")
         return content
+
+    @classmethod
+    def of(cls, **values: Any) -> Self:
+        """Return settings with these values. A value that is None is left out."""
+        return cls(**{key: value for key, value in values.items() if value is not None})
 
     def as_json(self, keys: set[str] | None = None) -> dict[str, Any]:
         """Return the content of a settings file: all keys that have a value, or some ``keys``."""

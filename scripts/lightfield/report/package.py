@@ -17,7 +17,7 @@ import jinja2
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, read_keys, sha256
 from lightfield.core.progress import Progress
-from lightfield.dataset.config import Scene
+from lightfield.dataset.config import Credits
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import PASSES
@@ -48,12 +48,12 @@ LOADERS = {
 }
 
 
-def card(folder: Path, name: str, scene: Scene) -> dict[str, Any]:
-    """Return what there is to say of a rig's folder, in which a sequence has one of each frame."""
-    own = sorted(folder.glob(f"**/{NAME}"), key=lambda path: (len(path.parts), path))
-    if not own:
+def card(folder: Path, name: str, scene: Credits) -> dict[str, Any]:
+    """Return the card of a rig's folder. The folder of a sequence has a dataset for each frame."""
+    lightfields = sorted(folder.glob(f"**/{NAME}"), key=lambda path: (len(path.parts), path))
+    if not lightfields:
         raise UserError(f"{folder}: has no {NAME}")
-    first = own[0].parent
+    first = lightfields[0].parent
     lightfield = LightField.read(first / NAME)
     view = lightfield.views[0].name
     bpy = images.attribute(first / IMAGES / f"{view}.exr", images.BPY_ATTRIBUTE)
