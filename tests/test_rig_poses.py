@@ -349,7 +349,7 @@ def test_what_no_format_has_is_refused(name, content, expected, tmp_path):
             ),
             0,
             1,
-            "position: must be within 1e.07 metres",
+            r"world_matrix\[0\]\[3\]: must be a finite number from -1e.07 to 1e.07",
         ),
     ],
 )
