@@ -1,4 +1,4 @@
-"""What users write in YAML: the base class of its models, and their mistakes in one line."""
+"""The base class of all settings, and messages of one line for mistakes in them."""
 
 import difflib
 import json
@@ -27,18 +27,18 @@ Model = TypeVar("Model")
 
 
 class Settings(BaseModel):
-    """A mapping of known keys: nothing is converted (4.0 is no whole number), nothing ignored.
+    """A mapping with known keys. No value is converted (4.0 is no whole number), no key ignored.
 
-    Null, which YAML makes of a key without a value, is none: a default would pass for a choice.
+    Null is refused. YAML makes it of a key without a value, and a default would pass for a choice.
 
-    A model's validator raises ``ValueError("key: what is wrong")``; the key may be dotted.
+    A model's validator raises ``ValueError("key: what is wrong")``. The key may be dotted.
     """
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True
     )
 
-    # Keys that earlier versions had, and what to do instead.
+    # Keys of earlier versions, with what to do instead.
     removed_keys: ClassVar[Mapping[str, str]] = {}
 
     @model_validator(mode="before")
@@ -61,12 +61,12 @@ class Settings(BaseModel):
         return cls(**{key: value for key, value in values.items() if value is not None})
 
     def as_json(self, keys: set[str] | None = None) -> dict[str, Any]:
-        """Return the content of a settings file: all keys that have a value, or some ``keys``."""
+        """Return the content of a settings file: all keys with a value, or those in ``keys``."""
         return self.model_dump(mode="json", include=keys, exclude_none=True)
 
 
 def as_list(count: int) -> BeforeValidator:
-    """Return what makes a tuple of a YAML list of ``count`` values."""
+    """Return the validator that makes a tuple of a YAML list of ``count`` values."""
 
     def check(value: Any) -> Any:
         if not isinstance(value, list | tuple) or len(value) != count:
@@ -81,25 +81,25 @@ def _unchanged(value: Any, check: Callable[[Any], Any]) -> Any:
     return value
 
 
-# Beside a number that a dataset's identity follows from: 10 stays 10, and does not become 10.0.
+# Keeps a number as it is written: 10 does not become 10.0. A dataset's identity depends on it.
 AS_WRITTEN = WrapValidator(_unchanged)
 
-# Metres, or degrees. Blender computes in 32 bits, which beyond that are coarser than a metre.
+# Metres or degrees. Blender computes in 32 bits, which are coarser than a metre beyond this.
 FARTHEST = 1e7
 Coordinate = Annotated[float, Field(strict=True, ge=-FARTHEST, le=FARTHEST)]
-# Named, so that the JSON schema has it once; a model's settings do not reach in there.
+# A named type, so that the JSON schema has it once. The model's strictness does not reach into it.
 Vector = TypeAliasType("Vector", Annotated[tuple[Coordinate, Coordinate, Coordinate], as_list(3)])
-# What a text of a pattern is, in words: nobody is shown a regular expression.
+# The meaning of each pattern, for messages. Users see no regular expression.
 _MEANINGS: dict[str, str] = {}
 
 
 def pattern(expression: str, meaning: str) -> str:
-    """Return a field's pattern; ``meaning`` says in messages what such a text is."""
+    """Return a field's pattern. ``meaning`` describes a matching text in messages."""
     _MEANINGS[expression] = meaning
     return expression
 
 
-# Of a folder that a key names.
+# The name of a folder, as a key.
 Name = Annotated[
     str,
     Field(
@@ -113,13 +113,13 @@ Name = Annotated[
 
 
 def suggestion(name: str, allowed: Iterable[str]) -> str:
-    """Return ``; did you mean …?``, or nothing where no name that is known is near."""
+    """Return ``; did you mean …?``, or an empty text if no allowed name is similar."""
     close = difflib.get_close_matches(name, list(allowed), n=1)
     return f"; did you mean {close[0]}?" if close else ""
 
 
 def checked(model: TypeAdapter[Model], content: Any, file: str) -> Model:
-    """Return a file's content as ``model``; raises `UserError` with file, key, value, and why."""
+    """Return a file's content as ``model``. Raises `UserError` with file, key, value and reason."""
     try:
         return model.validate_python(content)
     except ValidationError as error:
@@ -127,14 +127,14 @@ def checked(model: TypeAdapter[Model], content: Any, file: str) -> Model:
 
 
 def read_settings(model: type[Model], path: Path) -> Model:
-    """Read a settings file; raises `UserError` with file, key, value, and why."""
+    """Read a settings file. Raises `UserError` with file, key, value and reason."""
     return checked(TypeAdapter(model), read_json(path), str(path))
 
 
 def _first(errors: list[ErrorDetails], content: Any) -> str:
-    """Say in one line what is wrong with the first key that is."""
+    """Return one line that says what is wrong with the first wrong key."""
     located_errors = [(*_find(error, content), error) for error in errors]
-    # Of a value that may be of several types, each type has an error, and the deepest knows most.
+    # A value that may have several types has an error for each. The deepest one is most precise.
     start = located_errors[0][0]
     path = max((p for p, _, _ in located_errors if p[: len(start)] == start), key=len)
     errors_of_key = [(value, error) for p, value, error in located_errors if p == path]
@@ -156,7 +156,7 @@ def _first(errors: list[ErrorDetails], content: Any) -> str:
             allowed_tags = context["expected_tags"].replace("'", "")
             return f"{kind}: is {_shown(value[name])}; must be one of {allowed_tags}"
     if error["loc"][-1:] == ("[key]",):
-        # Not of the path: rigs that are somebody else's folders are not in the content.
+        # The path lacks the key if the rigs are folders of an imported light field.
         *above, name, _ = error["loc"]
         return f"{'.'.join(map(str, above))}: {name!r} is no name; must {_allowed(error)}"
     allowed = dict.fromkeys(_allowed(error) for _, error in errors_of_key)
@@ -164,17 +164,20 @@ def _first(errors: list[ErrorDetails], content: Any) -> str:
 
 
 def _shown(value: Any) -> str:
-    """Return a value as JSON, shortened where it is long."""
+    """Return a value as JSON. A long one is shortened."""
     text = json.dumps(value, default=str)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _find(error: ErrorDetails, content: Any) -> tuple[tuple[int | str, ...], Any]:
-    """Return the keys that lead to a wrong value, without pydantic's names of types, and it."""
+    """Return the keys that lead to a wrong value, and the value itself.
+
+    Pydantic's own names of types are left out of the keys.
+    """
     path: list[int | str] = []
     for part in error["loc"]:
-        here = isinstance(content, Mapping) and part in content
-        if here or (isinstance(content, list) and isinstance(part, int) and part < len(content)):
+        is_key = isinstance(content, Mapping) and part in content
+        if is_key or (isinstance(content, list) and isinstance(part, int) and part < len(content)):
             content = content[part]
             path.append(part)
     return tuple(path), content
@@ -184,7 +187,7 @@ _BOUNDS = {"ge": "at least", "gt": "above", "le": "at most", "lt": "below"}
 
 
 def _allowed(error: ErrorDetails) -> str:
-    """Return what pydantic allows, to follow after ``must``."""
+    """Return what pydantic allows, worded to follow ``must``."""
     match error["type"]:
         case "value_error":
             return str(error["ctx"]["error"]).removeprefix("must ")

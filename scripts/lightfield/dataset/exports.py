@@ -1,7 +1,7 @@
-"""What a scene YAML's `exports` may ask of each exporter, and what each consumer can take.
+"""The options of each exporter, as a scene YAML's `exports` gives them.
 
-One model an exporter: its options, and `refusal`, which says when a YAML is read what its consumer
-cannot open and how it can be had. What the options do is written in `lightfield.export`.
+There is one model for each exporter. Its `refusal` says what the consumer cannot open, and what to
+ask for instead. It is called when a YAML is read. `lightfield.export` does what the options say.
 """
 
 import math
@@ -20,23 +20,23 @@ from lightfield.geometry.rigs import Rig
 from lightfield.geometry.rigs.plane import Plane
 from lightfield.geometry.rigs.split_setting import PARTS
 
-# In `sources`, the rendered views themselves.
+# The name of the rendered views in `sources`.
 VIEWS = "views"
-# Written last into an export's folder: its files.
+# The list of an export's files, which is written last into its folder.
 MANIFEST = "export.json"
 
 FARTHEST = 1000.0
-"""Metres: in disparity, where nothing is hit, and what is farther, is taken to be here."""
+"""Metres. For disparity, what is farther, and what hits nothing, is taken to be here."""
 BOUNDS_VIEWS, BOUNDS_PIXELS = 64, 64
-"""So many views, and pixels along the longer side of each, tell how far a scene reaches."""
+"""Views, and pixels along the longer side of each, that measure how far a scene reaches."""
 
 TO_RECTILINEAR = "reproject to rectilinear"
 
 
 class Export(Settings):
-    """``exposure`` and ``reinhard`` are for EXR sources: a PNG is developed already."""
+    """The options that all exporters have."""
 
-    # Whether views of other rigs, which test what is trained on these, belong to it.
+    # Whether the export also holds views of other rigs, with which training on these is tested.
     is_for_training: ClassVar[bool] = False
 
     sources: list[str] = Field(
@@ -46,7 +46,7 @@ class Export(Settings):
 
     @property
     def recorded(self) -> dict[str, Any]:
-        """What the export itself says of its options."""
+        """The options that the export's own files record."""
         return self.model_dump(mode="json", exclude={"sources"})
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
@@ -64,7 +64,7 @@ class Export(Settings):
 
 
 class Developed(Export):
-    """An export of 8-bit pictures."""
+    """An export of 8-bit pictures. Only EXR sources are developed: a PNG is developed already."""
 
     exposure: float = Field(0.0, ge=-100, le=100, description="Of EXR sources, in stops.")
     reinhard: float = Field(
@@ -126,7 +126,7 @@ class InstantNgp(Export):
 
     @property
     def middle(self) -> tuple[float, float, float]:
-        """Where the mean camera lies in the unit cube, with a scale."""
+        """Where the mean camera lies in the unit cube. It is used with a scale."""
         return self.offset or (0.5, 0.5, 0.5)
 
 
@@ -158,7 +158,7 @@ class Nerfstudio(Developed):
 
     points: PointCount = Field(50000, description="Points of the point cloud, at most.")
     depth: bool = Field(False, description="Depth maps too, from sources with depth.")
-    # Changes nothing of what is written.
+    # It changes no file, so no file records it.
     splatfacto: bool = Field(
         False, exclude=True, description="Refuse what splatfacto cannot train on."
     )

@@ -1,4 +1,4 @@
-"""What a reprojection does to each view: a scene YAML's keys, and the settings of the programs.
+"""The settings of a reprojection, in a scene YAML and in the programs' settings files.
 
 A scene YAML's entry of `reprojections` becomes `ReprojectionSettings`. The plan writes them to a
 settings file, which scripts/reproject.py and scripts/lens_map.py read with --settings.
@@ -79,13 +79,13 @@ class ReprojectionSettings(ReprojectionOptions):
 
     @property
     def development(self) -> dict[str, Any]:
-        """How light becomes pixels. ``bits`` is left out for 8, so that existing keys hold."""
+        """How light becomes pixels. It lacks 8 ``bits``, so that older views keep their keys."""
         bits = {} if self.bits == 8 else {"bits": self.bits}
         return {"exposure": self.exposure, "reinhard": self.reinhard, **bits}
 
     @property
     def published(self) -> dict[str, Any]:
-        """What lightfield.json and the images' headers say beside the lens.
+        """What lightfield.json and the images' headers say in addition to the lens.
 
         ``rotation`` is pan, pitch and roll in degrees; `lightfield.imaging.tonemap` defines
         ``exposure`` and ``reinhard``, by which the pixels of a PNG can be turned back into light.
@@ -99,7 +99,7 @@ class ReprojectionSettings(ReprojectionOptions):
 
 
 def face_problem(camera: CameraSettings) -> str | None:
-    """Say why a camera cannot be a cube map's face, after its key; None if it can."""
+    """Return why a camera cannot be a cube map's face, worded to follow its key; None if it can."""
     if (camera.lens, getattr(camera, "fov", None)) != ("rectilinear", 90):
         return ": must be rectilinear with fov 90 with cube_map"
     if camera.resolution[0] != camera.resolution[1]:
