@@ -29,9 +29,10 @@ from lightfield.core.failures import (
 from lightfield.core.gpus import visible
 from lightfield.core.memory import available
 from lightfield.dataset import journal, ledger, memory, presence, shard_counts
+from lightfield.dataset.capture import LightfieldSettings
 from lightfield.dataset.config import accept_blend, load_config, load_scene, scene_path
 from lightfield.dataset.dataset_paths import PICTURES, PLOTS
-from lightfield.dataset.description import SOURCE_KEYS, Cluster
+from lightfield.dataset.description import Cluster
 from lightfield.dataset.exports import MANIFEST, VIEWS, InstantNgp, export_settings_of
 from lightfield.dataset.job_settings import (
     BuildSettings,

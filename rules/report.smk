@@ -6,18 +6,7 @@ include: "helpers/report.smk"
 
 rule panorama_lightfield:
     input:
-        settings=settings_of(
-            "panorama",
-            lambda dataset: {
-                "width": dataset.panorama_width,
-                "center": dataset.rig.center,
-                "render": dataset.render,
-                "frame": dataset.source.frame,
-                "scene": dataset.source.model_dump(mode="json", include=SOURCE_KEYS),
-                "fingerprint": dataset.builder_fingerprint,
-                "limits": dataset.limits.model_dump(mode="json", exclude_none=True),
-            },
-        ),
+        settings=settings_of("panorama", panorama_settings),
         inventory=of_dataset("blend_inventory"),
         calibration=of_dataset("calibration"),
     output:
@@ -28,18 +17,13 @@ rule panorama_lightfield:
         times_of("{scene}/{rig}/panorama/lightfield")
     localrule: True
     params:
-        name=of_dataset("scene_name"),
-        limits=of_dataset("limits_json"),
-        width=of_dataset("panorama_width"),
         calibration=optional("calibration"),
         inventory=optional("inventory"),
     message:
         "Placing the panorama of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/make_lightfield.py"
-        " --scene {params.name} --rig {wildcards.rig}"
-        " --limits {params.limits:q} --panorama {params.width} {params.calibration}"
-        " {params.inventory} --output {output} > {log} 2>&1"
+        " --settings {input.settings} {params.calibration} {params.inventory} --output {output} > {log} 2>&1"
 
 
 rule render_panorama:

@@ -32,20 +32,7 @@ rule free_places:
 
 rule lightfield:
     input:
-        settings=settings_of(
-            "lightfield",
-            lambda dataset: {
-                "rig": json.loads(dataset.rig_json),
-                "poses": poses_sum(dataset),
-                "depth": dataset.depth,
-                "render": dataset.render,
-                "frame": dataset.source.frame,
-                "scene": dataset.source.model_dump(mode="json", include=SOURCE_KEYS),
-                "fingerprint": dataset.builder_fingerprint,
-                "flow": bool(dataset.flow),
-                "limits": dataset.limits.model_dump(mode="json", exclude_none=True),
-            },
-        ),
+        settings=settings_of("lightfield", lightfield_settings),
         inventory=of_dataset("blend_inventory"),
         calibration=of_dataset("calibration"),
         places=of_dataset("places"),
@@ -57,8 +44,6 @@ rule lightfield:
         times_of("{scene}/{rig}/cameras/lightfield")
     localrule: True
     params:
-        name=of_dataset("scene_name"),
-        limits=of_dataset("limits_json"),
         calibration=optional("calibration"),
         places=optional("places"),
         inventory=optional("inventory"),
@@ -66,8 +51,7 @@ rule lightfield:
         "Placing the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/make_lightfield.py"
-        " --scene {params.name} --rig {wildcards.rig}"
-        " --limits {params.limits:q} {params.calibration} {params.places}"
+        " --settings {input.settings} {params.calibration} {params.places}"
         " {params.inventory} --output {output} > {log} 2>&1"
 
 

@@ -1,8 +1,18 @@
 # What the rules of report.smk ask of the configuration.
 
 
+def panorama_settings(dataset):
+    """Return the settings of the panorama's lightfield.json."""
+    settings = LightfieldSettings.of_capture(
+        dataset,
+        panorama_width=dataset.panorama_width,
+        fingerprint=dataset.builder_fingerprint,
+    )
+    return settings.as_json()
+
+
 def panorama_memory(wildcards, attempt):
-    """Ask for the same for the panorama."""
+    """Ask for the memory in MB that the panorama takes, and for more where that was too little."""
     dataset = dataset_of(wildcards)
     need = dataset.estimate.memory_bytes(dataset.panorama_width**2 // 2)
     return math.ceil(need / 1e6) * attempt

@@ -22,6 +22,17 @@ def poses_sum(dataset):
     return sha256(dataset.rig.file) if isinstance(dataset.rig, Poses) else None
 
 
+def lightfield_settings(dataset):
+    """Return the settings of a dataset's lightfield.json."""
+    settings = LightfieldSettings.of_capture(
+        dataset,
+        flow=bool(dataset.flow),
+        fingerprint=dataset.builder_fingerprint,
+        poses_sha256=poses_sum(dataset),
+    )
+    return settings.as_json()
+
+
 def split_rigs(wildcards):
     """Return the light fields of a scene whose rigs say what their views are for."""
     return [

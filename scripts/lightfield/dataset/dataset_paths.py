@@ -176,8 +176,3 @@ class DatasetPaths(Description):
         """The frames at which a rig of the .blend's camera needs it; None is the file's own."""
         rig = self.placed_rig
         return rig.path if isinstance(rig, BlendCamera) else []
-
-    @property
-    def rig_json(self) -> str:
-        """The rig, as the programs take it that make a report."""
-        return self.placed_rig.model_dump_json(exclude_unset=True, exclude_none=True)

@@ -1,7 +1,8 @@
 """The settings files of the smaller jobs.
 
 The plan writes each model as JSON to work/<scene>/<rig>/settings/<stage>.json. A program reads the
-file with --settings. Exports and reprojections have modules of their own.
+file with --settings. The settings of light fields are in `lightfield.dataset.capture`; those of
+reprojections and exports have modules of their own.
 """
 
 from typing import Annotated, Any, Literal
@@ -10,7 +11,7 @@ from pydantic import AfterValidator, Field, PlainSerializer
 
 from lightfield.core.settings import Settings
 from lightfield.dataset.config import FILE, AtLeastOne, Credits, Parameters, builders
-from lightfield.geometry.rigs import AnyRig, Random, Rig
+from lightfield.geometry.rigs import AnyRig, Random, as_written
 from lightfield.geometry.rigs.rig import Frame
 
 
@@ -20,14 +21,9 @@ def _known_builder(name: str) -> str:
     return name
 
 
-def _as_written(rig: Rig) -> dict[str, Any]:
-    """Return the keys of a rig that its scene YAML gives."""
-    return rig.model_dump(mode="json", exclude_unset=True, exclude_none=True)
-
-
 def _places_as_written(rig: Random) -> dict[str, Any]:
     """Return the keys of a rig that its scene YAML gives, but for those that move no camera."""
-    return {key: value for key, value in _as_written(rig).items() if key not in CAMERA_KEYS}
+    return {key: value for key, value in as_written(rig).items() if key not in CAMERA_KEYS}
 
 
 # The keys of a rig that say what a camera sees and what its view is for.
@@ -56,7 +52,7 @@ class FreePlacesSettings(Settings):
 class FiguresSettings(Settings):
     """The settings of scripts/report_figures.py."""
 
-    rig: Annotated[AnyRig, PlainSerializer(_as_written)]
+    rig: Annotated[AnyRig, PlainSerializer(as_written)]
 
 
 class Measurement(Settings):
@@ -71,7 +67,7 @@ class Measurement(Settings):
 class PageSettings(Settings):
     """The settings of scripts/report_html.py."""
 
-    rig: Annotated[AnyRig, PlainSerializer(_as_written)]
+    rig: Annotated[AnyRig, PlainSerializer(as_written)]
     yaml: str = Field(description="The scene YAML's text.")
     command: str = Field(description="What makes the dataset again.")
     panorama: bool = Field(
