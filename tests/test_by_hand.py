@@ -120,6 +120,7 @@ def test_what_a_machine_draws_and_the_full_size_are_checked(refused, tmp_path, c
 
 
 PAGE = ["--dataset", ".", "--name", "a/b", "--output", "made.html"]
+CAPTURE = {"scene": "a", "source": {"builder": "room"}, "render": {}, "rig": RIG}
 PACK = ["--folder", ".", "--output", "../made.tar"]
 GPU = ["--blend", "a", "--inventory", "b", "--lightfield", "c", "--cache", "d", "--output", "e"]
 
@@ -128,6 +129,8 @@ GPU = ["--blend", "a", "--inventory", "b", "--lightfield", "c", "--cache", "d", 
     ("program", "words", "content", "problem"),
     [
         ("report_figures.py", PAGE[:2] + PAGE[-2:], {"rig": 1}, "rig: is 1; must be a mapping"),
+        ("make_lightfield.py", PAGE[-2:], CAPTURE | {"rig": {"type": "x"}}, "rig.type: is"),
+        ("make_lightfield.py", PAGE[-2:], CAPTURE | {"source": {"frame": 1}}, "source: must"),
         ("report_html.py", PAGE, {"rig": RIG, "yaml": ""}, "is missing the key command"),
         ("package.py", PACK, {"gigabytes": 0}, "gigabytes: is 0; must be a number above 0"),
         ("package.py", PACK, {"scene": {"licence": 1}}, "scene.licence: is 1; must be a text"),
@@ -147,6 +150,7 @@ def test_a_mistake_in_a_settings_file_is_named(refused, tmp_path, program, words
 @pytest.mark.parametrize(
     ("program", "words", "flag"),
     [
+        ("make_lightfield.py", PAGE[-2:], ["--rig", "LFSphere"]),
         ("package.py", PACK, ["--gigabytes", "1"]),
         ("validate.py", ["."], ["--reprojection", "a"]),
         ("synthesis_quality.py", [".", "--output", "a"], ["--truth", "b"]),

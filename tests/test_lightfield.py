@@ -12,8 +12,10 @@ import pytest
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import keys
+from lightfield.dataset.capture import LightfieldSettings
 from lightfield.dataset.config import SceneSource
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import lenses, rigs, rotations
 
 FISHEYE = lenses.from_camera({"lens": "equidistant", "resolution": [64, 64], "fov": 180})
@@ -327,3 +329,29 @@ def test_keys_stay_what_they_were(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     ]
     with pytest.raises(ValueError, match="not JSON compliant"):
         keys.render_key(first.changed(render={"exposure": math.nan}), first.views[0])
+
+
+def test_settings_do_not_change_when_a_job_records_the_checksum_of_a_blend(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    camera = {"lens": "equidistant", "resolution": [8, 8], "fov": 180}
+    scene = {
+        "scene": {"blend": "mine.blend"},
+        "render": {"samples": 1},
+        "rigs": {"LFPlane": PLANE | {"camera": camera}},
+    }
+    write_json(tmp_path / "configs/scenes/mine.yaml", scene)
+
+    def settings() -> LightfieldSettings:
+        (dataset,) = scene_datasets("mine")
+        return LightfieldSettings.of_capture(dataset)
+
+    before = settings()
+    recorded = {"blend": "mine.blend", "sha256": "a" * 64}
+    write_json(tmp_path / "configs/scenes/mine.lock.json", recorded)
+    after = settings()
+    assert after.as_json() == before.as_json()
+    # The job looks it up when it runs.
+    for planned in (before, after):
+        assert planned.capture.source.sha256 == "a" * 64
