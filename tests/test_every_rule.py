@@ -282,6 +282,8 @@ ROUNDS = {
     "the lens, and the view layers": {
         "built": ("lens: equidistant", "lens: equisolid, focal_length: 3", OF_PLANE),
         "brought": ("view_layers: [One]", "view_layers: [Two]", {"inventory"}),
+    },
+    "the samples of a preset": {
         "config.yaml": ("  full: {}", "  full: {samples: 3}", CAMERAS),
     },
     "the frame, and the scene": {
