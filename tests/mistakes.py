@@ -35,7 +35,8 @@ RIGHT = {
     "exports": {"instant_ngp": {"sources": ["perspective"]}},
 }
 
-REMOVE = object()
+# In place of a value: the key is left out. Its text is the same in each process of the tests.
+REMOVE = ...
 
 
 def changed(path, value):

@@ -283,7 +283,9 @@ ROUNDS = {
     "the lens, and the view layers": {
         "built": ("lens: equidistant", "lens: equisolid, focal_length: 3", OF_PLANE),
         "brought": ("view_layers: [One]", "view_layers: [Two]", {"inventory"}),
-        # Nothing limits the samples of views that are imported.
+    },
+    # Nothing limits the samples of views that are imported.
+    "the samples of a preset": {
         "config.yaml": ("  full: {}", "  full: {samples: 3}", RENDERED_CAMERAS),
     },
     "the frame, and the scene": {
