@@ -15,7 +15,8 @@ cannot read lightfield.json.
 # How instant-ngp's loader reads poses (``src/nerf_loader.cu``, ``common_device.cuh``). It negates
 # the Y and Z axes of each camera. It maps a position p to p · ``scale`` + ``offset``. Then it
 # cycles the axes (x, y, z) to (y, z, x). This module writes world points in SILVR's orientation:
-# (x, y, z) becomes (y, −x, z). Training happens in a cube around (½, ½, ½).
+# (x, y, z) becomes (y, −x, z). Training happens in the cube of side ``aabb_scale`` around
+# (½, ½, ½).
 
 import argparse
 import math

@@ -1,8 +1,8 @@
-"""A barbershop: a closed room in which no patch is bare, whatever way a camera looks.
+"""A barbershop: a closed room without a bare patch in any direction.
 
-The middle of the room is the world's origin and the floor z = 0. An aisle is kept free for the
-camera rigs. The left wall (−X) has the barbers' stations, the right wall (+X) the waiting bench,
-the front wall (+Y) the shop window and the door, the back wall (−Y) the reception desk.
+The middle of the room is the world's origin and the floor z = 0. An aisle is free for the camera
+rigs. The left wall (−X) has the barbers' stations, the right wall (+X) the waiting bench. The front
+wall (+Y) has the shop window and the door, the back wall (−Y) the reception desk.
 """
 
 from functools import partial
@@ -26,10 +26,11 @@ from scenes.library.scene import Scene, fill
 
 
 def stocked(scene: Scene) -> None:
-    """What stands full of goods."""
-    wares = bottles(scene), pots(scene)
+    """The furniture that holds goods."""
+    bottle_meshes = bottles(scene)
+    pot_meshes = pots(scene)
     for element in (stations.station_goods, stations.racks, furniture.stocked, plants.plants):
-        element(scene, *wares)
+        element(scene, bottle_meshes, pot_meshes)
 
 
 ELEMENTS = (

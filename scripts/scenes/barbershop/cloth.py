@@ -1,4 +1,4 @@
-"""What is of cloth: coats and hats on the rack, umbrellas, towels, and their shelves."""
+"""Coats and hats on the rack, umbrellas, towels, and their shelves."""
 
 import bpy
 import numpy as np

@@ -1,4 +1,4 @@
-"""What is fixed to the walls, the clock, the pole, the radiator, and what stands in corners."""
+"""Fittings on the walls, the clock, the pole, the radiator, and objects in corners."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What is sold and used: bottles, jars and tins, and the shelves that they stand on."""
+"""Bottles, jars, tins and tools, and the shelves that they stand on."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""The light: daylight and the lamps' own, and the lamps that are seen."""
+"""The light of the day and of the lamps, and the visible lamps."""
 
 import numpy as np
 

@@ -262,7 +262,7 @@ def valance(scene: Scene) -> None:
 
 
 def street(scene: Scene) -> None:
-    """What the window shows: pavement, road, a row of brick houses with shops."""
+    """The view through the window: pavement, road, a row of brick houses with shops."""
     model = Model(scene)
     _houses(model)
     for i, x in enumerate(HOUSES):

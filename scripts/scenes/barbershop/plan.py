@@ -45,7 +45,7 @@ def against(
 
 
 def hanging(wall: Wall, along: float = 0, away: float = 0, z: float = 0) -> Matrix:
-    """A frame for what is flat and hangs on a wall: its z points into the room, its y upwards."""
+    """A frame for flat objects on a wall: its z points into the room, its y upwards."""
     return _at_wall(wall, along, away, z) @ transform(rotation=(np.pi / 2, 0, np.pi))
 
 

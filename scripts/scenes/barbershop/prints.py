@@ -12,7 +12,7 @@ from scenes.library.shapes import Shape, prism, transform
 
 Picture = Callable[[Model], None]
 INK = 0.0005
-"""Metres between the inks, so that no two faces coincide. In what is printed z counts the inks."""
+"""Metres between the inks, so that no two faces coincide. In a print, z counts the inks."""
 
 PRICES = (
     ("Haircut", "1.50"),
@@ -222,7 +222,7 @@ def portrait(model: Model) -> None:
     model.add(moustache(scene, 0), hair, (0, -0.018, 4), scale=(0.07, 0.07, 1))
 
 
-PICTURES = (  # what is on it, its name, the frame's material, the size
+PICTURES = (  # the print, its name, the frame's material, the size
     (masters, "Picture masters", "Ebony", (0.6, 0.8)),
     (moustaches, "Picture moustaches", "Gilt", (0.5, 0.7)),
     (prices, "Picture prices", "Oak", (0.7, 1.0)),
@@ -271,7 +271,7 @@ def printed(model: Model, surface: float) -> Model:
 
 
 def _frame(model: Model, border: str, size: tuple[float, float]) -> None:
-    """Paper and a frame round what is printed."""
+    """The print's paper and frame."""
     model.box(size=(*size, 0.01), at=(0, 0, 0.006), material="Paper")
     model.frame(
         size=size,
@@ -288,16 +288,16 @@ def _frame(model: Model, border: str, size: tuple[float, float]) -> None:
 
 
 def pictures(scene: Scene) -> None:
-    """The framed prints, hung where the walls were bare."""
-    made = {}
+    """The framed prints on the walls."""
+    meshes = {}
     for picture, name, border, size in PICTURES:
         model = Model(scene)
         picture(model)
         printed(model, 0.011)
         _frame(model, border, size)
-        made[picture] = model.mesh(name)
+        meshes[picture] = model.mesh(name)
     for picture, wall, along, z in HUNG:
-        put(made[picture], hanging(wall, along=along, away=0.001, z=z))
+        put(meshes[picture], hanging(wall, along=along, away=0.001, z=z))
 
 
 def magazine(scene: Scene, number: int) -> bpy.types.Mesh:

@@ -1,4 +1,4 @@
-"""The reception desk and what lies on it."""
+"""The reception desk and the objects on it."""
 
 from scenes.barbershop.goods import scattered
 from scenes.barbershop.plan import INKS, put, standing

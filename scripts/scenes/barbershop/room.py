@@ -24,9 +24,13 @@ from scenes.library.shapes import box, copies, grid, lettering, prism, tube
 
 TILE = 0.3125
 MOSAIC_HEIGHT = 0.0015
-GREEN, CREAM = ([f"{color} glaze {i}" for i in range(3)] for color in ("Green", "Cream"))
+GREEN = ["Green glaze 0", "Green glaze 1", "Green glaze 2"]
+CREAM = ["Cream glaze 0", "Cream glaze 1", "Cream glaze 2"]
 MOSAIC_RINGS = (  # inner and outer radius, glazes
-    *((0.74, 0.79, GREEN), (0.68, 0.735, CREAM), (0.47, 0.515, CREAM), (0.42, 0.465, GREEN)),
+    (0.74, 0.79, GREEN),
+    (0.68, 0.735, CREAM),
+    (0.47, 0.515, CREAM),
+    (0.42, 0.465, GREEN),
     (0.36, 0.415, ["Red", "Ochre"]),
 )
 PETAL = [(0.03, 0), (0.03, 0.0005)]  # of a palmette, before it is narrowed
@@ -50,7 +54,7 @@ def walls(scene: Scene) -> None:
 
 
 def wall_lettering(scene: Scene) -> None:
-    """What the shop offers, over the mirrors."""
+    """The shop's services, over the mirrors."""
     lettering = Model(scene)
     lettering.word(
         letters="HAIRCUTS  ·  HOT TOWELS  ·  SHAVES", size=0.18, depth=0.018, material="Gilt"
@@ -157,7 +161,8 @@ def palmette(scene: Scene) -> None:
 
 def _frieze() -> list[Matrix]:
     """Frames side by side below the ceiling, on all four walls."""
-    height, away = 2.765, 0.001
+    height = 2.765
+    away = 0.001
     sides = [
         hanging(wall, along=y, away=away, z=height)
         for wall in ("left", "right")
@@ -172,7 +177,7 @@ def _frieze() -> list[Matrix]:
 
 
 def entrance_mat(scene: Scene) -> None:
-    """A mat that welcomes who comes in."""
+    """A mat that says welcome."""
     mat = Model(scene)
     mat.box(size=(0.9, 0.55, 0.014), bevel=0.005, at=(0, 0, 0.007), material="Bristle")
     mat.box(size=(0.84, 0.49, 0.004), bevel=0.001, at=(0, 0, 0.0145), material="Rug navy")
@@ -222,9 +227,9 @@ def medallion(scene: Scene) -> None:
     model = Model(scene)
     _mosaic_bed(model)
     _mosaic_stones(scene, model, random)
-    words = "BARBER SHOP  ·  EST. 1927  ·  "
-    for k, letter in enumerate(words):
-        turn = -360 * k / len(words)
+    text = "BARBER SHOP  ·  EST. 1927  ·  "
+    for k, letter in enumerate(text):
+        turn = -360 * k / len(text)
         if letter != " ":
             at = polar(0.595, np.radians(turn + 90), MOSAIC_HEIGHT + 0.0004)
             model.add(lettering(letter, 0.0005), "Brass", at, (0, 0, turn), (0.13, 0.13, 1))
@@ -305,12 +310,10 @@ def hair_clippings(scene: Scene) -> None:
     for hair, y in zip(HAIR, STATIONS, strict=True):
         model = Model(scene)
         for _ in range(scene.count(60, 6)):
-            bow, half = random.uniform(0.004, 0.014), random.uniform(0.008, 0.022)
-            path = np.array([(-1, 0, 0), (-0.33, 0.7, 3), (0.5, 1, 3), (1, 0, 1)]) * (
-                half,
-                bow,
-                0.0004,
-            )
+            bow = random.uniform(0.004, 0.014)
+            half = random.uniform(0.008, 0.022)
+            curve = np.array([(-1, 0, 0), (-0.33, 0.7, 3), (0.5, 1, 3), (1, 0, 1)])
+            path = curve * (half, bow, 0.0004)
             strand = tube(path, (0.0003, 0.0006, 0.0006, 0.0002), 3)
             at = (*random.normal(0, 0.05, 2), 0.0012)
             turn = (0, 0, random.uniform(0, 360))
@@ -339,9 +342,10 @@ def metro_tiles(scene: Scene) -> None:
     sizes = xyz(x1 - x0 - gap, 0.012, height - gap)
     glaze = random.integers(3, size=len(row))
     for k in range(6):
-        here = (glaze == k % 3) & ((row < green_rows) == (k < 3)) & (x1 - x0 > 0.02)
-        material = f"{'Green' if k < 3 else 'Cream'} glaze {k % 3}"
-        model.add(blocks(centers[here], sizes[here], 0.004), material)
+        is_green = k < 3
+        of_glaze = (glaze == k % 3) & ((row < green_rows) == is_green) & (x1 - x0 > 0.02)
+        material = f"{'Green' if is_green else 'Cream'} glaze {k % 3}"
+        model.add(blocks(centers[of_glaze], sizes[of_glaze], 0.004), material)
     put(model.mesh(name="Metro tiles"), where=against("left"))
 
 

@@ -92,7 +92,7 @@ def raked_height(x: Array, y: Array, stones: Sequence[Flagstone]) -> Array:
 
 
 def gravel(scene: Scene) -> None:
-    """The court's raked gravel, modelled furrow by furrow; its grains are in the shader."""
+    """The court's raked gravel, modelled furrow by furrow. The shader adds the grains."""
     x0, y0, x1, y1 = COURT
     x = np.linspace(x0, x1, scene.segments((x1 - x0) / 0.024))
     y = np.linspace(y0, y1, scene.segments((y1 - y0) / 0.020))

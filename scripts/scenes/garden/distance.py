@@ -1,4 +1,4 @@
-"""The sky at sunrise, and what stands at the horizon: mountains, and fog before them."""
+"""The sky at sunrise, the mountains at the horizon, and fog before them."""
 
 import numpy as np
 
@@ -8,13 +8,13 @@ from scenes.library.points import noise, points, polar, smoothstep, xyz
 from scenes.library.scene import Scene, place
 from scenes.library.shapes import facets, join, sheet, transform
 
-# Where the sun stands in sunrise.exr: the sky is turned so that it stands where ours does.
+# The sun's azimuth in sunrise.exr. The sky is turned so that its sun has SUN_AZIMUTH.
 SKY_SUN_AZIMUTH = np.radians(-35.5)
 FOG_ARCS = 10
 
 
 def sky(scene: Scene) -> None:
-    """The sunrise that ships with bpy; a sun lamp, higher up, takes the place of its sun."""
+    """The sunrise that ships with bpy. A sun lamp, higher up, replaces its sun."""
     hdri_world("sunrise.exr", 2.0, SUN_AZIMUTH - SKY_SUN_AZIMUTH, brightest=8.0)
     sun_light("Sun", SUN_AZIMUTH, np.radians(35.0), 5.5, (1.0, 0.80, 0.58), np.radians(1.5))
 
@@ -34,8 +34,8 @@ def mountains(scene: Scene) -> None:
 def fog(scene: Scene) -> None:
     """A ring of morning fog before the mountains.
 
-    It is made of arcs, none of whose bounding boxes holds the viewer: in the box of a whole ring,
-    each camera ray would first be asked whether it starts in the fog.
+    It consists of arcs, so that no bounding box holds the viewer. In the box of a full ring, Cycles
+    would first test for each camera ray whether it starts in the fog.
     """
     arc = np.linspace(0, TAU / FOG_ARCS, scene.segments(12))[:, None]
     radius, height = points([(85, 17), (165, 21), (165, -2), (85, -2)]).T
@@ -43,5 +43,6 @@ def fog(scene: Scene) -> None:
     ends = (facets(rows[0], (3, 2, 1, 0)), facets(rows[-1], (0, 1, 2, 3)))
     bank = scene.mesh("Fog", join([sheet(rows, closed=True), *ends]), "Fog", smooth=False)
     for k in range(FOG_ARCS):
-        thing = place(f"Fog.{k}", bank, transform(rotation=(0, 0, k * TAU / FOG_ARCS)))
-        thing.visible_diffuse = thing.visible_shadow = False
+        bank_object = place(f"Fog.{k}", bank, transform(rotation=(0, 0, k * TAU / FOG_ARCS)))
+        bank_object.visible_diffuse = False
+        bank_object.visible_shadow = False

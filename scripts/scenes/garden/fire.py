@@ -1,4 +1,4 @@
-"""The fire in its bowl, and candles: seen flames glow, lamps beside them give their light."""
+"""The fire in its bowl, and candles. The flames glow, and lamps beside them give their light."""
 
 import bpy
 import numpy as np
@@ -73,14 +73,15 @@ def fire(scene: Scene) -> None:
 def flames(scene: Scene, x: float, y: float, z: float) -> None:
     """Tongues of glowing gas, up to 1 m high, bent by noise that rises with the frames.
 
-    Each is a few nested shells of evenly glowing gas, which Cycles integrates exactly: a flame of
-    procedural density would need a grid of it made anew for each view.
+    Each consists of a few nested shells of evenly glowing gas, which Cycles integrates exactly. For
+    a flame of procedural density, Cycles would make a new grid for each view.
     """
     random = scene.random("flames")
     licks = []
     for axis in "XY":
         texture = bpy.data.textures.new(f"Flame noise {axis}", "CLOUDS")
-        texture.noise_scale, texture.noise_depth = 0.3, 1
+        texture.noise_scale = 0.3
+        texture.noise_depth = 1
         carrier = place(f"Flame carrier {axis}", None, transform((x, y + ord(axis), z)))
         animate(carrier, "location", 0.05, 2)
         licks.append((axis, texture, carrier))
@@ -98,7 +99,8 @@ def flames(scene: Scene, x: float, y: float, z: float) -> None:
             profile = np.column_stack([width * size**1.3 * body, height * size * t])
             gas = scene.lathe(profile, 28)
             tongue = scene.add(f"Flame.{k}.{shell}", gas, f"Flame gas {shell}", matrix=spot)
-            tongue.visible_diffuse = tongue.visible_shadow = False
+            tongue.visible_diffuse = False
+            tongue.visible_shadow = False
             higher = tongue.vertex_groups.new(name="Height")
             for vertex in tongue.data.vertices:
                 higher.add([vertex.index], min(1.0, vertex.co.z + 0.1), "REPLACE")
@@ -136,8 +138,9 @@ def candles(scene: Scene) -> None:
         turn = (0, 0, random.uniform(0, TAU))
         place(f"Candle.{i:02d}", candle, transform((x, y, base), turn, (size, size, tall)))
         foot = transform((x, y, base + 0.2 * (tall - 1.0)))
-        seen = place(f"Candle flame.{i:02d}", burning, foot)
-        seen.visible_diffuse = seen.visible_shadow = False
+        flame_object = place(f"Candle flame.{i:02d}", burning, foot)
+        flame_object.visible_diffuse = False
+        flame_object.visible_shadow = False
         if afloat:
             place(f"Candle cup.{i:02d}", cup, transform((x, y, base)))
     for i, spot in enumerate(points(CANDLE_LIGHTS)):

@@ -64,7 +64,7 @@ BODY = [
     (0, 0.02, 1.42, 0.172, 0.180, 0.180),
     (0, 0.03, 1.60, 0.085, 0.085, 0.075),
 ]
-# Hand, ear and brow of the left; the right is their mirror image, as it is of arm and leg.
+# Hand, ear and brow on the left. The right side mirrors these, and the arm and the leg.
 LEFT = [
     (0.06, -0.35, 0.32, 0.13, 0.075, 0.05),
     (0.165, 0, 1.31, 0.022, 0.042, 0.11),
@@ -83,15 +83,15 @@ def figure(scene: Scene) -> Shape:
     for mirror in ((-1, 1, 1), (1, 1, 1)):
         parts += [ellipsoid(part[:3] * mirror, part[3:]) for part in points(LEFT)]
         parts += [limb(points(ARM) * mirror, ARM_RADII), limb(points(LEG) * mirror, LEG_RADII)]
-    whole = scene.add("Statue parts", join(parts))
-    remesh = whole.modifiers.new("Melt", "REMESH")
+    body = scene.add("Statue parts", join(parts))
+    remesh = body.modifiers.new("Melt", "REMESH")
     remesh.mode = "VOXEL"
     remesh.voxel_size = 0.011 / scene.detail**0.5
-    smooth = whole.modifiers.new("Smooth", "SMOOTH")
+    smooth = body.modifiers.new("Smooth", "SMOOTH")
     smooth.factor, smooth.iterations = 0.5, 4
-    melted = whole.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    melted = body.evaluated_get(bpy.context.evaluated_depsgraph_get())
     skin = shapes.mesh_shape(melted.data)
-    bpy.data.batch_remove([whole, whole.data])
+    bpy.data.batch_remove([body, body.data])
     # Folds of cloth pressed into the robe: over the left shoulder, and around arms and legs.
     x, y, z = skin.vertices.T
     outward = skin.vertices - xyz(0.5 * x, 0.05, np.clip(z, 0.2, 0.8))

@@ -32,7 +32,7 @@ SUN_AZIMUTH = np.radians(-174.0)
 
 
 def pond_distance(x: ArrayLike, y: ArrayLike) -> Array:
-    """Distance outside the pond's shore, negative within (about, in metres)."""
+    """Approximate distance in metres outside the pond's shore, negative within."""
     dx = x - POND_CENTER[0]
     dy = (y - POND_CENTER[1]) * 0.8
     angle = np.arctan2(dy, dx)
@@ -41,7 +41,7 @@ def pond_distance(x: ArrayLike, y: ArrayLike) -> Array:
 
 
 def pond_shore(angle: Array) -> Array:
-    """The pond's outline (n, 2) where `pond_distance` is 0, by angle."""
+    """The pond's outline (n, 2) by angle. `pond_distance` is 0 on it."""
     reach = np.full(len(angle), POND_RADIUS)
     for _ in range(30):
         points = POND_CENTER + polar(reach, angle)[:, :2]
@@ -52,7 +52,8 @@ def pond_shore(angle: Array) -> Array:
 def court_distance(x: ArrayLike, y: ArrayLike) -> Array:
     """Distance outside the court's rectangle, negative within."""
     x0, y0, x1, y1 = COURT
-    dx, dy = np.maximum(x0 - x, x - x1), np.maximum(y0 - y, y - y1)
+    dx = np.maximum(x0 - x, x - x1)
+    dy = np.maximum(y0 - y, y - y1)
     return np.hypot(np.maximum(dx, 0), np.maximum(dy, 0)) + np.minimum(np.maximum(dx, dy), 0)
 
 
@@ -109,9 +110,11 @@ def standing(
 ) -> list[Matrix]:
     """Places on the ground at spots (n, 2), each turned and scaled at random.
 
-    Upright but for a random tilt in radians, or square to the slope. sink: metres at scale 1.
+    Each is upright with a random tilt in radians, or perpendicular to the slope. sink: metres at
+    scale 1.
     """
-    (x, y), step = spots.T, 0.25
+    x, y = spots.T
+    step = 0.25
     rise_x = ground_height(x + step, y) - ground_height(x - step, y)
     rise_y = ground_height(x, y + step) - ground_height(x, y - step)
     ups = xyz(-rise_x, -rise_y, 2 * step) if sloping else xyz(0 * x, 0, 1)

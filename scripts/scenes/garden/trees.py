@@ -45,7 +45,8 @@ def bamboo_culm(scene: Scene, number: int) -> Shape:
     levels[0] = -0.2
     thick = 0.042 * (1 - 0.75 * (joints[:, None] / height) ** 1.5) * (1, 1.14, 0.98, 1)
     parts = [scene.tube(middle(levels), thick.ravel(), 10)]
-    spots, forward = [], []
+    spots = []
+    forward = []
     for z in joints[joints > 1.7]:
         for _ in range(random.integers(1, 4)):
             length = random.uniform(0.35, 0.8) * (1.1 - 0.5 * z / height)
@@ -71,8 +72,10 @@ def maple_leaf() -> Shape:
     tips = points([(-0.55, 0.12), (-0.5, 0.6), (0, 1), (0.5, 0.6), (0.55, 0.12)])
     notches = 0.21 * (tips[:-1] + tips[1:]) + (0, 0.12)
     rim = np.zeros((10, 3))  # the stalk, then tips and notches in turn
-    rim[1::2, :2], rim[2::2, :2] = tips, notches
-    rim[1::2, 2], rim[2::2, 2] = -0.10 * (np.abs(tips[:, 0]) + tips[:, 1]), 0.02
+    rim[1::2, :2] = tips
+    rim[2::2, :2] = notches
+    rim[1::2, 2] = -0.10 * (np.abs(tips[:, 0]) + tips[:, 1])
+    rim[2::2, 2] = 0.02
     fan = [(10, (i + 1) % 10, i) for i in range(10)]
     return facets([*rim, (0.0, 0.25, 0.03)], *fan)
 
@@ -86,7 +89,7 @@ def maple(scene: Scene) -> None:
     z = float(ground_height(*MAPLE))
     spot = transform((*MAPLE, z), (0.0, 0.14, np.arctan2(-MAPLE[1], -MAPLE[0])))
     shape = join([wood, leaves.painted(1)]).transformed(spot)
-    # Where the crown hangs over the rigs, what would be below 2.2 m is lifted to above it.
+    # Lift the parts of the crown over the rigs above 2.2 m.
     x, y, height = shape.vertices.T
     over = smoothstep(2.9, 1.9, np.hypot(x, y))
     raised = np.where(height < 3.2, 2.2 + np.maximum(height, 0.0) / 3.2, height)

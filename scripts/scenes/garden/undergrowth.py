@@ -1,4 +1,4 @@
-"""What grows and lies on the ground: azaleas, grass, and the maple's fallen leaves."""
+"""The plants on the ground: azaleas, grass, and the maple's fallen leaves."""
 
 import numpy as np
 
@@ -72,14 +72,14 @@ def fallen_leaves(scene: Scene) -> None:
     spots = spots[court_distance(*spots.T) < -0.2]
     stones = flagstone_layout(scene)
     heights = raked_height(*spots.T, stones) + 0.012
-    kept = np.ones(len(spots), dtype=bool)
+    is_kept = np.ones(len(spots), dtype=bool)
     for outline, height in stones:
         reach = np.hypot(*(spots - outline.mean(0)).T)
         radius = np.hypot(*(outline - outline.mean(0)).T)
         on_stone = reach < 0.72 * radius.min()
         heights[on_stone] = height + 0.008
-        kept &= on_stone | (reach > radius.max() + 0.04)  # none across a stone's rim
-    at = xyz(*spots[kept].T, heights[kept])
+        is_kept &= on_stone | (reach > radius.max() + 0.04)  # none across a stone's rim
+    at = xyz(*spots[is_kept].T, heights[is_kept])
     count = len(at)
     forward = polar(1, random.uniform(0, TAU, count), random.normal(0, 0.05, count))
     up = random.normal((0, 0, 1), (0.12, 0.12, 0.0), (count, 3))

@@ -43,7 +43,7 @@ def ring_of_stones(
 
 
 def upright(shape: Shape) -> Shape:
-    """A shape drawn in the XY plane put up into the XZ plane; its +Z now faces the court, −Y."""
+    """A shape in the XY plane turned upright into the XZ plane. Its +Z then points to −Y."""
     return shape.transformed(transform(rotation=(np.pi / 2, 0, 0)))
 
 
@@ -66,8 +66,8 @@ def arch_outline(
 def panel(width: float, bottom: float, top: float, opening: Array, thickness: float) -> Shape:
     """A wall round an opening: width along x about 0, front at y = 0, back at y = thickness.
 
-    opening: an outline (n, 2) in x and z, counter-clockwise, that every ray from its middle meets
-    once. It may touch the panel's edge. Both faces and the reveal are made.
+    opening: an outline (n, 2) in x and z, counter-clockwise. Every ray from its middle meets it
+    once. It may touch the panel's edge. The shape has both faces and the reveal.
     """
     middle = np.array([0.0, (opening[:, 1].min() + opening[:, 1].max()) / 2])
     corners = np.array([[1, bottom], [1, top], [-1, top], [-1, bottom]]) * [width / 2, 1] - middle
@@ -77,12 +77,14 @@ def panel(width: float, bottom: float, top: float, opening: Array, thickness: fl
     across = np.abs(inner[:, 0]) / (width / 2)
     along = inner[:, 1] / (np.where(inner[:, 1] > 0, top, bottom) - middle[1])
     outer = inner / np.maximum(across, along)[:, None]
-    outlines = (inner + middle).T, (outer + middle).T
-    front, back = ([xyz(x, y, z) for x, z in outlines] for y in (0, thickness))
-    pairs = front, back[::-1], (back[0], front[0])
-    faces = [sheet(np.stack(pair), closed=True) for pair in pairs]
+    inner_x, inner_z = (inner + middle).T
+    outer_x, outer_z = (outer + middle).T
+    front = [xyz(inner_x, 0, inner_z), xyz(outer_x, 0, outer_z)]
+    back = [xyz(inner_x, thickness, inner_z), xyz(outer_x, thickness, outer_z)]
+    reveal = [back[0], front[0]]
+    faces = [sheet(np.stack(pair), closed=True) for pair in (front, back[::-1], reveal)]
     on_edge = np.isclose(np.maximum(across, along), 1)
-    walled = ~(on_edge & np.roll(on_edge, -1))  # where the opening runs along the panel's edge
+    walled = ~(on_edge & np.roll(on_edge, -1))  # no wall where the opening runs along the edge
     return join(Shape(face.vertices, face.quads[walled]) for face in faces)
 
 

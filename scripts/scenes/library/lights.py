@@ -15,13 +15,15 @@ from scenes.library.shapes import transform
 def point_light(
     name: str, location: Sequence[float], watts: float, color: Color, radius: float
 ) -> bpy.types.Object:
-    """A spherical lamp that lights but is not itself seen: give it a flame or bulb to be seen."""
+    """A spherical lamp that is invisible itself. Put a visible flame or bulb beside it."""
     light = bpy.data.lights.new(name, "POINT")
     light.energy = watts
     light.color = color
     light.shadow_soft_size = radius
     lamp = place(name, light, transform(location))
-    lamp.visible_camera = lamp.visible_glossy = lamp.visible_transmission = False
+    lamp.visible_camera = False
+    lamp.visible_glossy = False
+    lamp.visible_transmission = False
     return lamp
 
 
@@ -30,15 +32,18 @@ def area_light(
 ) -> bpy.types.Object:
     """A rectangular lamp that shines along its −Z."""
     light = bpy.data.lights.new(name, "AREA")
-    light.shape, light.size, light.size_y = "RECTANGLE", *size
-    light.energy, light.color = watts, color
+    light.shape = "RECTANGLE"
+    light.size = size[0]
+    light.size_y = size[1]
+    light.energy = watts
+    light.color = color
     return place(name, light, matrix)
 
 
 def sun_light(
     name: str, azimuth: float, elevation: float, strength: float, color: Color, angle: float
 ) -> bpy.types.Object:
-    """A sun: azimuth from +X towards +Y, elevation above the horizon, angular diameter; radians."""
+    """A sun. azimuth: from +X towards +Y. angle: its diameter. All angles are in radians."""
     light = bpy.data.lights.new(name, "SUN")
     light.energy = strength
     light.color = color
@@ -51,13 +56,13 @@ def hdri_world(
 ) -> None:
     """The scene's world: an environment that ships with bpy, packed into the .blend.
 
-    filename: one of datafiles/studiolights/world, "sunrise.exr" for example. rotation: radians
-    about Z. brightest: the radiance to cut the sun's disc to, so its reflections make no fireflies.
+    filename: a file in datafiles/studiolights/world, such as "sunrise.exr". rotation: radians about
+    Z. brightest: an upper limit of the radiance, so that the sun's reflections make no fireflies.
     """
     folder = Path(bpy.utils.system_resource("DATAFILES")) / "studiolights" / "world"
     image = bpy.data.images.load(str(folder / filename))
     image.pack()
-    image.filepath = f"//{filename}"  # the path on the building machine is nobody's business
+    image.filepath = f"//{filename}"  # keep the building machine's path out of the .blend
     graph = SkyGraph()
     coordinates = graph.add("TexCoord").outputs["Generated"]
     turned = graph.add("Mapping", {"Vector": coordinates, "Rotation": (0.0, 0.0, -rotation)})

@@ -65,15 +65,28 @@ def tuft(
 
 @dataclass
 class Growth:
-    """How a tree grows. Each list has one entry a generation of branches, the trunk first."""
+    """How a tree grows. Each list has one entry per generation of branches, the trunk first."""
 
-    lengths: Sequence[float]  # metres
-    children: Sequence[int]  # side branches of each branch; the last generation bears the leaves
-    angles: Sequence[float]  # radians between a branch and its parent
-    upward: Sequence[float]  # how strongly a branch turns up (down where negative)
-    radius: float  # of the trunk's foot, metres
-    wander: float = 0.16  # how crooked the branches are
-    bare: float = 0.4  # part of a branch before its first side branch
+    # Metres.
+    lengths: Sequence[float]
+
+    # The number of side branches of each branch. The last generation bears the leaves.
+    children: Sequence[int]
+
+    # Radians between a branch and its parent.
+    angles: Sequence[float]
+
+    # How strongly a branch turns up. Negative values turn it down.
+    upward: Sequence[float]
+
+    # The radius of the trunk's foot in metres.
+    radius: float
+
+    # How crooked the branches are.
+    wander: float = 0.16
+
+    # The part of the trunk below its first side branch.
+    bare: float = 0.4
 
 
 def branches(scene: Scene, random: Generator, growth: Growth) -> tuple[Shape, Array]:
@@ -113,9 +126,9 @@ def branches(scene: Scene, random: Generator, growth: Growth) -> tuple[Shape, Ar
 def leaves_on(
     random: Generator, twigs: Array, leaf: Shape, count: int, size: tuple, droop: float, off: float
 ) -> Shape:
-    """`count` leaves on each of the twigs (n, k, 3), flat side up, their stalks near the twig.
+    """`count` leaves on each of the twigs (n, k, 3), flat side up, with their stalks near the twig.
 
-    size: from and to, metres. droop: how much they point down. off: metres from the twig.
+    size: from and to, in metres. droop: how much they point down. off: metres from the twig.
     """
     number = len(twigs) * count
     which = np.repeat(np.arange(len(twigs)), count)

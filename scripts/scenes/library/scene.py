@@ -1,4 +1,4 @@
-"""`Scene`, which every element of a scene is a function of; `Model`, a mesh of several shapes."""
+"""`Scene`, the argument of every element of a scene, and `Model`, a mesh of several shapes."""
 
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -22,31 +22,32 @@ SHARP = np.radians(35)  # the usual angle between faces above which an edge stay
 class Scene:
     """The seed and the level of detail (1 is full).
 
-    An element is a function of it that puts objects into Blender's scene. Shapes that Scene makes
-    have fewer segments at less detail: triangles go with `detail`, segments with its square root.
+    An element is a function that takes a Scene and puts objects into Blender's scene. The shapes of
+    a Scene have fewer segments at less detail. The number of triangles is proportional to `detail`,
+    that of segments to its square root.
     """
 
     seed: int
     detail: float
 
     def random(self, element: str) -> np.random.Generator:
-        """Random numbers of an element's own, so that a change to it leaves the others alone."""
+        """An element's own random numbers, so that its changes do not affect other elements."""
         return np.random.default_rng([self.seed, zlib.crc32(element.encode())])
 
     def segments(self, full: float, least: int = 3) -> int:
-        """How many segments to divide a curve into that has `full` at detail 1."""
+        """The number of segments of a curve that has `full` segments at detail 1."""
         return max(least, round(full * self.detail**0.5))
 
     def count(self, full: float, least: int = 1) -> int:
-        """How many small things (leaves, blades, props) to make of `full` at detail 1."""
+        """The number of small objects (leaves, blades, props), of which detail 1 has `full`."""
         return max(least, round(full * self.detail))
 
     def lathe(self, profile: Points, segments: float = 24, capped: bool = True) -> Shape:
-        """`shapes.lathe` with segments by detail."""
+        """`shapes.lathe` with the number of segments by detail."""
         return shapes.lathe(profile, self.segments(segments, 6), capped)
 
     def tube(self, path: Points, radius: ArrayLike, sides: float = 8) -> Shape:
-        """`shapes.tube` with sides by detail."""
+        """`shapes.tube` with the number of sides by detail."""
         return shapes.tube(path, radius, self.segments(sides, 4))
 
     def bend(self, path: Points, radius: float, steps: float = 24, sides: float = 8) -> Shape:
@@ -72,21 +73,25 @@ class Scene:
         `smooth` may be an angle in radians, above which edges stay sharp.
         """
         data = bpy.data.meshes.new(name)
-        nq = len(shape.quads)
-        nt = len(shape.triangles)
+        quads = len(shape.quads)
+        triangles = len(shape.triangles)
         corners = np.concatenate([shape.quads.ravel(), shape.triangles.ravel()]).astype(np.int32)
-        starts = np.concatenate([np.arange(nq) * 4, nq * 4 + np.arange(nt) * 3]).astype(np.int32)
+        triangle_starts = quads * 4 + np.arange(triangles) * 3
+        starts = np.concatenate([np.arange(quads) * 4, triangle_starts]).astype(np.int32)
         data.vertices.add(len(shape.vertices))
         data.vertices.foreach_set("co", shape.vertices.astype(np.float32).ravel())
         data.loops.add(len(corners))
         data.loops.foreach_set("vertex_index", corners)
-        data.polygons.add(nq + nt)
+        data.polygons.add(quads + triangles)
         data.polygons.foreach_set("loop_start", starts)
         for material in materials:
             data.materials.append(bpy.data.materials[material])
         data.polygons.foreach_set("material_index", shape.face_slots().astype(np.int32))
         data.update(calc_edges=True)
-        (data.shade_smooth if smooth else data.shade_flat)()
+        if smooth:
+            data.shade_smooth()
+        else:
+            data.shade_flat()
         if not isinstance(smooth, bool):
             data.set_sharp_from_angle(angle=float(smooth))
         return data
@@ -94,12 +99,12 @@ class Scene:
     def add(
         self, name: str, shape: Shape, *materials: str, matrix: Matrix | None = None, **smooth: Any
     ) -> bpy.types.Object:
-        """One object of a mesh of its own (see `mesh`)."""
+        """An object with its own mesh (see `mesh`)."""
         return place(name, self.mesh(name, shape, *materials, **smooth), matrix)
 
 
 def fill(palette: Callable, elements: Iterable[Callable], parameters: Mapping[str, Any]) -> None:
-    """Fill the empty scene. parameters: `seed` (int), `detail` (1.0 is all of it)."""
+    """Fill the empty scene. parameters: `seed` (int), `detail` (1.0 is full)."""
     palette()
     scene = Scene(int(parameters["seed"]), float(parameters["detail"]))
     for element in elements:
@@ -107,15 +112,15 @@ def fill(palette: Callable, elements: Iterable[Callable], parameters: Mapping[st
 
 
 def place(name: str, data: bpy.types.ID | None, matrix: Matrix | None = None) -> bpy.types.Object:
-    """An object of a mesh, light or curve in the scene, by default at its origin.
+    """Put an object with a mesh, light or curve into the scene, by default at the origin.
 
     Objects that share one mesh are instances: Cycles keeps it in memory once.
     """
-    thing = bpy.data.objects.new(name, data)
-    bpy.context.scene.collection.objects.link(thing)
+    obj = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(obj)
     if matrix is not None:
-        thing.matrix_world = matrix
-    return thing
+        obj.matrix_world = matrix
+    return obj
 
 
 def scatter(name: str, meshes: Sequence[bpy.types.Mesh], matrices: Iterable[Matrix]) -> None:
@@ -125,10 +130,10 @@ def scatter(name: str, meshes: Sequence[bpy.types.Mesh], matrices: Iterable[Matr
 
 
 def animate(owner: bpy.types.bpy_struct, path: str, per_frame: float, index: int = -1) -> None:
-    """Let a property grow by `per_frame` each frame for ever, from its present value at frame 1.
+    """Make a property grow by `per_frame` each frame, from its present value at frame 1.
 
-    owner is the struct that holds it (a node's input socket with path "default_value", an object
-    with "location" and an index). Keyframes, not a driver: drivers need scripts enabled.
+    owner: the struct that holds it, such as a node's input socket with path "default_value", or an
+    object with "location" and an index. Uses keyframes, because drivers need enabled scripts.
     """
     start = np.array(getattr(owner, path))
     step = per_frame if index < 0 else per_frame * np.eye(3)[index]
@@ -143,7 +148,7 @@ def animate(owner: bpy.types.bpy_struct, path: str, per_frame: float, index: int
 
 
 class Placement(TypedDict, total=False):
-    """Where a part of a model is; each key may be left out.
+    """The placement of a part of a model. Each key is optional.
 
     at: a place (3,), or places (n, 3) of n copies. turned: XYZ Euler angles in degrees. scaled: one
     factor, or one for each axis. A part is scaled first, then turned, then moved.
@@ -192,7 +197,7 @@ class Model:
         segments: int = 1,
         **placement: Unpack[Placement],
     ) -> None:
-        """Add a box of a size (3,) about the origin; `segments` round its bevelled edges."""
+        """Add a box of a size (3,) about the origin. `segments` round its bevelled edges."""
         self._put(box(tuple(size), bevel, segments), material, placement)
 
     def ball(self, *, radius: float, material: str, **placement: Unpack[Placement]) -> None:
@@ -207,12 +212,12 @@ class Model:
         self._put(ring, material, placement)
 
     def lathe(self, *, profile: Points, material: str, **placement: Unpack[Placement]) -> None:
-        """Add a solid of revolution about Z; profile (n, 2) is radius and height, upwards."""
+        """Add a solid of revolution about Z. profile (n, 2) is radius and height, upwards."""
         radius = points(profile)[:, 0].max()
         self._put(self.scene.lathe(profile, _segments(radius)), material, placement)
 
     def pipe(self, *, profile: Points, material: str, **placement: Unpack[Placement]) -> None:
-        """Add what `lathe` does, but open at both ends."""
+        """Add a solid like `lathe`, but open at both ends."""
         radius = points(profile)[:, 0].max()
         pipe = self.scene.lathe(profile, _segments(radius), capped=False)
         self._put(pipe, material, placement)
@@ -273,7 +278,7 @@ class Model:
         self.add(shape, material, at, turned, placement.get("scaled", 1.0))
 
     def mesh(self, name: str, smooth: bool | float = SHARP) -> bpy.types.Mesh:
-        """The mesh of all that was added; `place` puts it into the scene."""
+        """The mesh of all added shapes. `place` puts it into the scene."""
         return self.scene.mesh(name, join(self.parts), *self.materials, smooth=smooth)
 
 

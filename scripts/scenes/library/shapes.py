@@ -23,7 +23,10 @@ def transform(
 
 
 def towards(location: ArrayLike, direction: ArrayLike, axis: str = "-Z") -> Matrix:
-    """The matrix that moves what is at the origin to a location and turns its axis, Y upwards."""
+    """The matrix that moves the origin to a location and turns an axis to a direction.
+
+    The Y axis points upwards.
+    """
     turn = Vector(direction).to_track_quat(axis, "Y").to_matrix().to_4x4()
     return Matrix.Translation(location) @ turn
 
@@ -64,23 +67,24 @@ class Shape(NamedTuple):
 
 
 def join(shapes: Iterable[Shape]) -> Shape:
-    """One shape of many; material slots are kept."""
+    """One shape of many. Keeps the material slots."""
     parts = list(shapes)
     starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
-    slots = [np.split(part.face_slots(), [len(part.quads)]) for part in parts]
+    quad_slots = [part.face_slots()[: len(part.quads)] for part in parts]
+    triangle_slots = [part.face_slots()[len(part.quads) :] for part in parts]
     return Shape(
         np.concatenate([part.vertices for part in parts]),
         np.concatenate([part.quads + start for part, start in zip(parts, starts, strict=True)]),
         np.concatenate([part.triangles + start for part, start in zip(parts, starts, strict=True)]),
-        np.concatenate([*(of_quads for of_quads, _ in slots), *(rest for _, rest in slots)]),
+        np.concatenate([*quad_slots, *triangle_slots]),
     )
 
 
 def facets(vertices: Points, *faces: Sequence[int]) -> Shape:
     """A shape of few faces, each given by the numbers of its three or four vertices."""
-    quads, triangles = ([face for face in faces if len(face) == n] for n in (4, 3))
-    corners = np.reshape(quads, (-1, 4)), np.reshape(triangles, (-1, 3))
-    return Shape(points(vertices), *(each.astype(np.int32) for each in corners))
+    quads = np.reshape([face for face in faces if len(face) == 4], (-1, 4))
+    triangles = np.reshape([face for face in faces if len(face) == 3], (-1, 3))
+    return Shape(points(vertices), quads.astype(np.int32), triangles.astype(np.int32))
 
 
 def copies(
@@ -90,12 +94,15 @@ def copies(
     up: ArrayLike = (0, 0, 1),
     size: ArrayLike = 1.0,
 ) -> Shape:
-    """One shape that holds a copy at each place (n, 3). For what is many and small: leaves, tiles.
+    """One shape with a copy at each place (n, 3). For many small objects, such as leaves or tiles.
 
-    forward, up: one direction for all or (n, 3); +Y of the copy points forward, +Z as near to up
-    as can be. size: a number, one for each (n), or one for each axis of each (n, 3).
+    forward, up: one direction for all, or (n, 3). The +Y axis of a copy points forward, and its +Z
+    axis as near to up as possible.
+
+    size: one number, one for each copy (n,), or one for each of its axes (n, 3).
     """
-    places, scale = np.asarray(at, float), np.asarray(size, float)
+    places = np.asarray(at, float)
+    scale = np.asarray(size, float)
     scale = np.broadcast_to(scale[:, None] if scale.ndim == 1 else scale, places.shape)
     turns = frames(forward, np.broadcast_to(up, places.shape)) * scale[:, None, :]
     vertices = np.einsum("nij,vj->nvi", turns, shape.vertices) + places[:, None]
@@ -111,7 +118,7 @@ def copies(
 
 
 def frames(forward: ArrayLike, up: ArrayLike) -> Array:
-    """Rotations (n, 3, 3) that take +Y to `forward` (n, 3), and +Z as near `up` as can be."""
+    """Rotations (n, 3, 3) that take +Y to `forward` (n, 3), and +Z as near to `up` as possible."""
     y, upwards = np.broadcast_arrays(unit(forward), np.asarray(up, float))
     x = unit(np.cross(y, upwards))
     return np.stack([x, y, np.cross(x, y)], axis=-1)
@@ -167,10 +174,10 @@ def lettering(text: str, depth: float) -> Shape:
     curve.align_y = "CENTER"
     curve.resolution_u = 3
     curve.extrude = depth / 2
-    thing = bpy.data.objects.new("lettering", curve)
-    data = bpy.data.meshes.new_from_object(thing)
+    obj = bpy.data.objects.new("lettering", curve)
+    data = bpy.data.meshes.new_from_object(obj)
     shape = mesh_shape(data)
-    bpy.data.batch_remove([thing, curve, data])
+    bpy.data.batch_remove([obj, curve, data])
     return shape
 
 

@@ -1,6 +1,6 @@
 """Lone Monk: the courtyard of a cloister with a well, four vaulted walks, and one monk.
 
-After the scene of that name by Carlo Bergonzini that SILVR used; every stone here is made by code.
+It follows the scene of that name by Carlo Bergonzini that SILVR used. Code makes every stone here.
 """
 
 from functools import partial

@@ -121,12 +121,12 @@ def pillar(section: Points) -> Shape:
 
 
 def twin_column(scene: Scene) -> Shape:
-    """Two slender columns, one behind the other, under one impost; stands on its origin."""
-    one = [scene.lathe(SHAFT, 20), scene.lathe(BELL, 16), stones(COLUMN_BLOCKS, 0.009)]
+    """Two slender columns, one behind the other, under one impost. They stand on the origin."""
+    column = [scene.lathe(SHAFT, 20), scene.lathe(BELL, 16), stones(COLUMN_BLOCKS, 0.009)]
     for count, first, foot, height, reach in points(LEAVES):
         out = polar(1, (np.arange(count) + first) * 2 * np.pi / count)
-        one.append(copies(leaf(scene, height, reach), out * 0 + (0, 0, foot), out))
-    pair = [join(one).moved(0, y, 0) for y in (-0.15, 0.15)]
+        column.append(copies(leaf(scene, height, reach), out * 0 + (0, 0, foot), out))
+    pair = [join(column).moved(0, y, 0) for y in (-0.15, 0.15)]
     return join([*pair, stones([(0, 0, 0.03, 0.32, 0.60, 0.06)]), pillar(IMPOST)])
 
 

@@ -10,7 +10,8 @@ from scenes.lone_monk.plan import BACK, EAST, LEAN_TO_TOP, NORTH, SIDES, on_side
 from scenes.lone_monk.roofs import EXPOSED, PITCH, house, lay_tiles
 from scenes.lone_monk.walls import glaze, wall
 
-TOP, BAYS = 9.4, 7
+TOP = 9.4
+BAYS = 7
 WIDTH = 2 * BACK / BAYS
 LANCET = (0.42, 6.2, 7.75, 0.62)  # an arch, as in `walls`
 ROSE = (1.15, 7.3)  # its radius and height
@@ -32,7 +33,7 @@ BELL = [
     (0.12, -0.15),
     (0.05, -0.1),
 ]
-# Of the clock: middle x, y, z and width, depth, height.
+# Parts of the clock: middle x, y, z and width, depth, height.
 MARK = [(0, -0.035, 0.58, 0.05, 0.02, 0.14)]
 HOUR_HAND = [(0, -0.05, 0.13, 0.035, 0.015, 0.36)]
 MINUTE_HAND = [(0, -0.05, 0.22, 0.035, 0.015, 0.54)]
@@ -74,7 +75,7 @@ def church(scene: Scene) -> None:
 
 
 def in_row(count: int) -> Array:
-    """The x of things a bay's width apart, symmetric about 0."""
+    """The x of `count` objects a bay's width apart, symmetric about 0."""
     return (np.arange(count) - (count - 1) / 2) * WIDTH
 
 
@@ -100,7 +101,7 @@ def tower(scene: Scene) -> None:
 
 
 def tower_side(scene: Scene) -> Model:
-    """What each side has, facing −Y: strings, quoins, a clock, and the tiles on a hip."""
+    """The parts of each side, facing −Y: strings, quoins, a clock, and the tiles on a hip."""
     model = Model(scene)
     clock = (0, -HALF, 11.1)
     for z, out, height in ((9.9, 0.07, 0.14), (BELFRY, 0.12, 0.2), (TOWER_TOP - 0.1, 0.14, 0.16)):
@@ -121,7 +122,7 @@ def tower_side(scene: Scene) -> Model:
 
 
 def core(scene: Scene) -> Model:
-    """What the tower has but once: its shaft, the bell, the roof's boards, and a cross."""
+    """The parts that the tower has once: its shaft, the bell, the roof's boards, and a cross."""
     model = Model(scene)
     yoke = (0, 0, BELFRY + 2.3)
     summit = (0, 0, TOWER_TOP + ROOF_HEIGHT - 0.05)
@@ -132,9 +133,9 @@ def core(scene: Scene) -> Model:
     boards = lathe([(ROOF_HALF * 2**0.5, 0), (0, ROOF_HEIGHT)], 4)
     model.add(boards, "Wood", (0, 0, TOWER_TOP), (0, 0, 45))
     ball = scene.lathe([(0.16, 0), (0.06, 0.2), (0.15, 0.32), (0.15, 0.42), (0.05, 0.55)], 16)
-    cross = (
-        scene.tube(line, 0.03)
-        for line in ([(0, 0, 0.4), (0, 0, 1.7)], [(-0.35, 0, 1.3), (0.35, 0, 1.3)])
-    )
+    cross = [
+        scene.tube([(0, 0, 0.4), (0, 0, 1.7)], 0.03),
+        scene.tube([(-0.35, 0, 1.3), (0.35, 0, 1.3)], 0.03),
+    ]
     model.add(join([ball, *cross]), "Iron", summit)
     return model

@@ -1,4 +1,4 @@
-"""The well, and what the monks use: benches, lanterns, jars, a chair with a book, a broom."""
+"""The well, and the monks' objects: benches, lanterns, jars, a chair with a book, a broom."""
 
 import numpy as np
 
@@ -109,7 +109,7 @@ def well(scene: Scene) -> None:
 
 
 def bucket(scene: Scene) -> Model:
-    """A wooden bucket of staves with iron hoops and a handle; stands on its origin."""
+    """A wooden bucket of staves with iron hoops and a handle. It stands on its origin."""
     model = Model(scene)
     staves = ring_of_stones(14, 0.12, 0.018, 0.13, 0.26)
     flare = 1 + 0.35 * staves.vertices[:, 2:] * (1, 1, 0)

@@ -1,4 +1,4 @@
-"""What the cloister is made of: warm limestone, ochre plaster, brick and terracotta, and greens.
+"""The cloister's materials: warm limestone, ochre plaster, brick and terracotta, and greens.
 
 Textures are in world space, so that no two instances are alike.
 """
@@ -38,7 +38,7 @@ LEAVES = [
 
 
 def palette() -> None:
-    """Every material of the cloister; colours are linear."""
+    """Every material of the cloister. Colours are linear."""
     for row in MATTE:
         matte(*row)
     courses("Brick", (0.33, 0.14, 0.08), (0.50, 0.27, 0.16), (0.42, 0.36, 0.28), 0.30, 0.075)

@@ -47,7 +47,7 @@ HAIR = [
 
 
 def monk(scene: Scene) -> None:
-    """He is 1.8 m high and faces +X."""
+    """The monk, 1.8 m high, facing +X."""
     model = Model(scene)
     around = np.linspace(0, 2 * np.pi, scene.segments(72, 12), endpoint=False)
     z = points(ROBE)[:, :1]

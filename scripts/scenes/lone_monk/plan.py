@@ -1,9 +1,9 @@
-"""Where things are in the cloister, in metres from the middle of its court.
+"""The plan of the cloister, in metres from the middle of its court.
 
-The rigs stand round the world's origin, on the south-eastern lawn: a cuboid of 4 × 4 × 3 m and a
-sphere of 4 m, both centred 2.2 m above the ground. Nothing but grass is in them. The four sides of
-the court are built alike in a frame of their own, in which the court's middle, with the well, is
-the origin, x runs along the side, and y points out of the court.
+The rigs stand round the world's origin, on the south-eastern lawn. They are a cuboid of 4 × 4 × 3 m
+and a sphere of 4 m, both centred 2.2 m above the ground. Only grass is in them. The four sides of
+the court have the same parts. Each side has its own frame. Its origin is the court's middle with
+the well, x runs along the side, and y points out of the court.
 """
 
 from collections.abc import Iterable, Sequence
@@ -17,7 +17,7 @@ from scenes.library.scene import place
 from scenes.library.shapes import transform
 
 CENTER = (-1.2, 3.6)  # in the world, so that the rigs at the origin stand beside the well
-# of each arcade, from column to column; the middle one is the gate
+# A bay of an arcade, from column to column. The middle one is the gate.
 BAY = 2.2
 BAYS = 7
 ARCADE = BAY * BAYS / 2  # axis of the arcade's wall
@@ -57,8 +57,8 @@ def on_sides(
 ) -> None:
     """Instances of the meshes, taken in turn, at the same places in each of the sides' frames.
 
-    at: up to five of x, y, z (metres), turn (degrees about Z) and size, each a number for all
-    places or one for each; what is not given leaves the mesh as it is.
+    at: up to five of x, y, z (metres), turn (degrees about Z) and size. Each is one number for all
+    places, or one for each. Missing values leave the mesh as it is.
     """
     columns = np.atleast_1d(*at, *(0.0, 0.0, 0.0, 0.0, 1.0)[len(at) :])
     for number in sides:

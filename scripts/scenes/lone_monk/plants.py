@@ -1,4 +1,4 @@
-"""What grows in and over the court, and the leaves that have fallen."""
+"""The plants in and over the court, and fallen leaves."""
 
 import numpy as np
 

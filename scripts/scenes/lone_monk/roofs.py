@@ -13,10 +13,12 @@ from scenes.lone_monk import plan
 from scenes.lone_monk.plan import BACK, EAVE, EAVE_OUT, FRONT, LEAN_TO_TOP, SLOPE, on_sides, side
 
 PITCH = 0.215  # from cover to cover
-EXPOSED, LENGTH = 0.36, 0.43  # of a tile
+EXPOSED = 0.36  # the visible length of a tile
+LENGTH = 0.43  # of a tile
+
 UP = EXPOSED * np.cos(SLOPE)  # from row to row, seen from above
-# A column's covers and pans: outer radius below and above, x, z, how far the lower end lies over
-# the row below, and which side is up.
+# A column's covers and pans: outer radius below and above, x, z, lift, and which side is up. The
+# lift is the height of the lower end over the row below.
 TILES = [(0.09, 0.072, 0, 0.11, 0.035, 1), (0.074, 0.088, PITCH / 2, 0.13, 0.03, -1)]
 # A downpipe from the trough: how far towards the pier, and how far below the eaves or above ground.
 PIPE_HEAD = [(0, -0.05), (0, -0.16), (0.29, -0.5)]
@@ -95,13 +97,16 @@ def lean_to_roofs(scene: Scene) -> None:
     x = np.arange(-BACK + 0.1, BACK, PITCH)
     rows = round((BACK - y) / UP)
     first = np.maximum(0, np.ceil((np.abs(x) - y) / UP))
-    x, first = x[first < rows], first[first < rows]
+    is_laid = first < rows
+    x = x[is_laid]
+    first = first[is_laid]
     for number in plan.SIDES:
         slope = side(number, (0, y, EAVE + 0.01)) @ transform(rotation=(SLOPE, 0, 0))
         lay_tiles(scene, f"Lean-to {number}", slope, x, first, rows)
-    left, top = (-BACK, BACK, LEAN_TO_TOP), (BACK, BACK, LEAN_TO_TOP)
-    model.add(deck([(-y, y, EAVE), (y, y, EAVE), top, left]), "Wood")
-    model.add(scene.tube([(0.05 - y, y - 0.05, EAVE + 0.03), left], 0.09), "Lead")
+    top_left = (-BACK, BACK, LEAN_TO_TOP)
+    top_right = (BACK, BACK, LEAN_TO_TOP)
+    model.add(deck([(-y, y, EAVE), (y, y, EAVE), top_right, top_left]), "Wood")
+    model.add(scene.tube([(0.05 - y, y - 0.05, EAVE + 0.03), top_left], 0.09), "Lead")
     flashing = [(0, BACK - 0.05, LEAN_TO_TOP + 0.07, 2 * BACK, 0.14, 0.14)]
     model.add(stones(flashing, 0.03), "Limestone")
     eaves(model, (0.2 - y, y - 0.2), y, EAVE)
@@ -126,8 +131,10 @@ def gutter(scene: Scene, y: float) -> Shape:
 def house(
     scene: Scene, number: int, ends: tuple[float, float], top: float, rows: int, stuff: str
 ) -> None:
-    """What stands behind an upper wall: its body, gables, tiled slope, ridge, and eaves."""
-    model, (left, right), edge = Model(scene), ends, top - 0.02
+    """The house behind an upper wall: its body, gables, tiled slope, ridge, and eaves."""
+    model = Model(scene)
+    left, right = ends
+    edge = top - 0.02
     y = BACK - EAVE_OUT
     middle = (left + right) / 2
     length = right - left
@@ -139,8 +146,9 @@ def house(
     gable = [(near, 0), (far, 0), (far, top - 0.1), (ridge_y, ridge_z - 0.25), (near, top - 0.1)]
     model.add(prism(gable, length), stuff, (left, 0, 0), (90, 0, 90))
     for x0, x1, eave in ((left - 0.1, right + 0.1, y), (right + 0.1, left - 0.1, far_eave)):
-        low, high = (eave, edge), (ridge_y, ridge_z)
-        model.add(deck([(x0, *low), (x1, *low), (x1, *high), (x0, *high)]), "Wood")
+        lower_edge = [(x0, eave, edge), (x1, eave, edge)]
+        upper_edge = [(x1, ridge_y, ridge_z), (x0, ridge_y, ridge_z)]
+        model.add(deck([*lower_edge, *upper_edge]), "Wood")
     eaves(model, ends, y, edge)
     model.add(ridge(scene, ends, 0.13), "Roof tile", (0, ridge_y, ridge_z))
     strings = [(BACK - 0.04, top - 0.2, length, 0.16, 0.12)]

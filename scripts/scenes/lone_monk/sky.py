@@ -8,7 +8,8 @@ from scenes.library.scene import Scene, scatter
 from scenes.library.shapes import facets, join, transform
 from scenes.lone_monk.plan import NORTH, side
 
-SUN_AZIMUTH, SUN_ELEVATION = np.radians(204), np.radians(30)
+SUN_AZIMUTH = np.radians(204)
+SUN_ELEVATION = np.radians(30)
 
 
 def sky(scene: Scene) -> None:

@@ -34,7 +34,8 @@ def wall(
 
     area: its width, foot, top and thickness. frame: how wide it is, and how far it stands out.
     """
-    model, (wide, proud) = Model(scene), frame
+    model = Model(scene)
+    wide, proud = frame
     model.add(panel(*area[:3], opening, area[3]), stuff)
     middle = (opening.min(0) + opening.max(0)) / 2
     around = middle + (opening - middle) * (1 + 2 * wide / np.ptp(opening, axis=0))
@@ -56,8 +57,8 @@ def glaze(model: Model, opening: Array, y: float, bars: int, stuff: str) -> None
 
 def doorway(scene: Scene, y: float) -> Model:
     """A wall of the walks with a door of planks, iron straps, nails and a ring at depth y."""
-    (half, sill, springing, rise), n = DOORWAY, scene.segments(16)
-    hole = arch_outline(*DOORWAY, n)
+    half, sill, springing, rise = DOORWAY
+    hole = arch_outline(*DOORWAY, scene.segments(16))
     model = wall(scene, "Whitewash", WALK_WALL, hole, (0.16, 0.05))
     model.add(filled(hole, y + 0.03), "Wood")
     edges = np.linspace(-half, half, 8)

@@ -1,4 +1,4 @@
-"""The small scene of the smoke build: a closed room of plain shapes, rendered in no time."""
+"""The small scene of the smoke build: a closed room of plain shapes, which renders fast."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,7 +10,7 @@ from scenes.library.materials import MaterialGraph, plains
 from scenes.library.scene import Scene
 from scenes.library.shapes import box, transform
 
-# Inner size of the room in metres; its floor is at z = 0 and it is centred on x = y = 0.
+# Inner size of the room in metres. Its floor is at z = 0, and it is centred on x = y = 0.
 SIZE = (6.0, 6.0, 3.0)
 PAINTS = [
     ("sphere", (0.7, 0.15, 0.1), 0.6),
@@ -22,7 +22,7 @@ PAINTS = [
 
 
 def build(parameters: Mapping[str, Any]) -> None:
-    """Fill the empty scene; the room has nothing random, so the parameters change nothing."""
+    """Fill the empty scene. The room has nothing random, so the parameters change nothing."""
     scene = Scene(0, 1.0)
     walls = box(SIZE)
     plains(PAINTS)

@@ -1,8 +1,8 @@
-"""A still life on a round walnut board: an object to walk around, of all that is hard to render.
+"""A still life on a round walnut board: an object to walk around, of materials hard to render.
 
-Copper, brass and silver, glass with wine in it, linen, wax, porcelain, fruit, pearls, and a chick
-of down. The middle of the board's top is the world's origin; the board's radius is 0.3 m, and
-nothing is higher than 0.25 m. Lamps are seen by no camera.
+It has copper, brass and silver, glass with wine, linen, wax, porcelain, fruit, pearls, and a downy
+chick. The middle of the board's top is the world's origin. The board's radius is 0.3 m. Nothing is
+higher than 0.25 m. No camera sees the lamps.
 """
 
 from functools import partial

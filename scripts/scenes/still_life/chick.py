@@ -1,4 +1,4 @@
-"""A chick, of balls and some thousand hairs of down."""
+"""A chick made of balls, and thousands of hairs of down."""
 
 import bpy
 import numpy as np
@@ -7,7 +7,7 @@ from scenes.library.points import mirrored, points, unit
 from scenes.library.scene import Model, Scene, place
 from scenes.library.shapes import transform
 
-# Middle, half axes, hairs and their length; the chick looks along −Y.
+# Middle, half axes, number of hairs, and their length. The chick looks along −Y.
 PARTS = (
     ((0, 0.004, 0.044), (0.036, 0.041, 0.033), 9000, 0.0125),
     ((0, -0.022, 0.092), (0.0245, 0.0245, 0.0235), 5200, 0.0085),
@@ -15,7 +15,7 @@ PARTS = (
     ((-0.031, 0.008, 0.047), (0.010, 0.025, 0.019), 1800, 0.0105),
     ((0, 0.043, 0.055), (0.012, 0.014, 0.011), 900, 0.0125),
 )
-# Of the right foot: leg and middle toe, and the toes beside it; with their radii.
+# The right foot's leg with the middle toe, and the toes beside it. Each has its radius.
 FOOT = (
     (
         [
@@ -29,7 +29,7 @@ FOOT = (
     ([(0.0155, -0.01, 0.003), (0.021, -0.018, 0.0018), (0.025, -0.025, 0.0015)], 0.0017),
     ([(0.0155, -0.01, 0.003), (0.010, -0.018, 0.0018), (0.007, -0.025, 0.0015)], 0.0017),
 )
-# without down
+# No down grows near these places.
 EYES_AND_BEAK = [
     (0.0128, -0.0455, 0.0975),
     (-0.0128, -0.0455, 0.0975),
@@ -39,10 +39,10 @@ STEPS = 6
 
 
 def chick(scene: Scene) -> None:
-    """Its hairs point outwards, backwards and down, each a little curled."""
+    """The chick. Its hairs point outwards, backwards and down, each a little curled."""
     matrix = transform((-0.105, -0.145, 0), (0, 0, np.radians(-22)))
     model = Model(scene)
-    found = []
+    hair_groups = []
     t = np.linspace(0, 1, STEPS)[:, None]
     model.lathe(
         profile=[(0.0052, 0), (0.0044, 0.005), (0.0018, 0.0105), (0.0003, 0.0135)],
@@ -65,9 +65,9 @@ def chick(scene: Scene) -> None:
         curl = 0.35 * random.normal(size=(count, 3)) + (0, 0.1, -0.35)
         reach = length * random.uniform(0.65, 1.15, count)[:, None, None]
         roots = (middle + outward * axes)[:, None]
-        found.append(roots + reach * (t * lean[:, None] + 0.5 * t**2 * curl[:, None]))
+        hair_groups.append(roots + reach * (t * lean[:, None] + 0.5 * t**2 * curl[:, None]))
     place("Chick", model.mesh("Chick", True), matrix)
-    hairs = np.concatenate(found)
+    hairs = np.concatenate(hair_groups)
     hairs[..., 2] = np.maximum(hairs[..., 2], 0.002)
     away = np.linalg.norm(hairs[:, 0, None] - points(EYES_AND_BEAK), axis=-1)
     hairs = hairs[(away > (0.0062, 0.0062, 0.0075)).all(axis=1)]

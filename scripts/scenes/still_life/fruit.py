@@ -64,13 +64,14 @@ def grapes(scene: Scene) -> None:
     random = scene.random("grapes")
     path = smooth_path(BUNCH, 60)
     widths = np.interp(np.linspace(0, 1, 61), np.linspace(0, 1, 5), WIDTHS)
-    found: list[np.ndarray] = []
+    accepted: list[np.ndarray] = []
     for _ in range(2600):
         index = random.integers(61)
         at = path[index] + directions(random, 1)[0] * widths[index] * random.random() ** 0.4
-        if at[2] > GRAPE and all(np.linalg.norm(at - other) > 1.78 * GRAPE for other in found):
-            found.append(at)
-    places = np.array(found)
+        is_free = all(np.linalg.norm(at - place) > 1.78 * GRAPE for place in accepted)
+        if at[2] > GRAPE and is_free:
+            accepted.append(at)
+    places = np.array(accepted)
     towards = directions(random, len(places))
     size = GRAPE * random.uniform(0.9, 1.06, len(places))
     up = unit(np.cross(towards, directions(random, len(places))))
@@ -101,8 +102,8 @@ def _leaf(scene: Scene) -> Shape:
 def lemons(scene: Scene) -> None:
     """A whole lemon, and one cut in two."""
     profile = smooth_path(LEMON, scene.segments(56, 14))
-    whole = scene.mesh("Lemon", scene.lathe(profile, 64), "Lemon")
-    place("Lemon", whole, transform((0.19, -0.125, 0.0275), np.radians((90, 0, 50))))
+    lemon_mesh = scene.mesh("Lemon", scene.lathe(profile, 64), "Lemon")
+    place("Lemon", lemon_mesh, transform((0.19, -0.125, 0.0275), np.radians((90, 0, 50))))
     half = profile[profile[:, 1] < 0.036]
     radius, height = half[-1]
     rings = radius * np.linspace(1, 0.002, scene.segments(24, 6))

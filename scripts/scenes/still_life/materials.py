@@ -1,10 +1,10 @@
-"""What the still life is made of; colours are linear."""
+"""The still life's materials. Colours are linear."""
 
 import numpy as np
 
 from scenes.library.materials import Color, MaterialGraph, emissive, foliage, plain, plains, wood
 
-# Under the surface red light goes farthest: metres are these times the scale.
+# Red light goes farthest under the surface. These factors times the scale are metres.
 FLESH = {"Subsurface_Radius": (1.0, 0.5, 0.22)}
 
 
@@ -47,7 +47,7 @@ def palette() -> None:
 
 
 def clear(name: str, color: Color, ior: float) -> None:
-    """Glass or wine that lamps shine through: their light would otherwise come as noise alone."""
+    """Glass or wine that lamps shine through. Caustics instead would be noise only."""
     graph = MaterialGraph(name)
     body = graph.principled(Base_Color=color, IOR=ior, Roughness=0.0, Transmission_Weight=1.0)
     through = graph.add("BsdfTransparent", {"Color": color})
