@@ -27,7 +27,7 @@ def main() -> None:
     if arguments.inventory:
         capture = capture.resolved(arguments.inventory)
     elif capture.source.blend:
-        raise UserError("--inventory: is missing; scripts/inventory.py says what the .blend has")
+        raise UserError("--inventory: is missing; scripts/inventory.py writes it for a .blend")
     render = capture.render
     if settings.panorama_width:
         capture = replace(capture, rig=panorama_rig(capture.rig, settings.panorama_width))
