@@ -30,7 +30,7 @@ def main() -> None:
         render = passes.without(render)
     elif isinstance(dataset.rig, rigs.Random):
         if arguments.places is None:
-            raise UserError("--places: is missing; scripts/free_places.py finds them")
+            raise UserError("--places: is missing; scripts/free_places.py writes it")
         dataset = replace(dataset, rig=dataset.rig.placed(arguments.places))
     if arguments.calibration:
         render = calibrated(render, arguments.calibration)
@@ -49,7 +49,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--scene", required=True, help="name of a file in configs/scenes/")
     parser.add_argument(
         "--rig",
-        help="name of a rig in the scene YAML; for a frame of a sequence with /f00001 behind it "
+        help="name of a rig in the scene YAML; /f00001 after it chooses a frame of a sequence "
         "(default: the first)",
     )
     parser.add_argument(
@@ -67,20 +67,20 @@ def parse() -> argparse.Namespace:
     parser.add_argument(
         "--calibration",
         type=Path,
-        help="what scripts/calibrate.py chose for the scene's target_error",
+        help="JSON of scripts/calibrate.py, for a scene with target_error",
     )
     parser.add_argument(
-        "--inventory", type=Path, help="JSON of what the scene contains: for a .blend"
+        "--inventory", type=Path, help="JSON of scripts/inventory.py, for a user's .blend"
     )
     parser.add_argument(
-        "--places", type=Path, help="what scripts/free_places.py found for a random rig"
+        "--places", type=Path, help="JSON of scripts/free_places.py, for a random rig"
     )
     parser.add_argument("--output", required=True, type=Path, help="lightfield.json to write")
     return parser.parse_args()
 
 
 def chosen_dataset(arguments: argparse.Namespace) -> Dataset:
-    """Return the dataset of --scene and --rig, with what the inventory says of a .blend.
+    """Return the dataset of --scene and --rig, with the values of a .blend from its inventory.
 
     Raises `UserError` for a rig that the scene lacks, and for a .blend without an inventory.
     """
@@ -93,7 +93,7 @@ def chosen_dataset(arguments: argparse.Namespace) -> Dataset:
     if arguments.inventory:
         return dataset.resolved(arguments.inventory)
     if dataset.source.blend:
-        raise UserError("--inventory: is missing; scripts/inventory.py says what the .blend has")
+        raise UserError("--inventory: is missing; scripts/inventory.py writes it for a .blend")
     return dataset
 
 

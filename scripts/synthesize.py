@@ -1,14 +1,14 @@
-"""Synthesise views from anywhere in a dataset, from the nearest of its views and their depth.
+"""Synthesise views from anywhere in a dataset, from its nearest views and their depth.
 
-OUTPUT gets lightfield.json, exr/<view>.exr (R, G, B, A, and Z as a dataset has it) and
-png/<view>.png. What no view of the dataset sees is a hole: black, alpha 0, Z NaN.
+OUTPUT gets lightfield.json, exr/<view>.exr (R, G, B, A, and Z as in a dataset) and png/<view>.png.
+A surface that no view of the dataset sees is a hole: black, alpha 0, Z NaN.
 
 Examples:
 
-  # what the evaluation sphere saw, as far as the views of the dataset show it
+  # the views of the evaluation sphere, from the dataset's views
   synthesize.py results/garden/LFSphere_e100cm_d170cm --output work/walk \\
     --poses results/garden/LFSphere_e100cm_d50cm/lightfield.json
-  # a walk: rig.yaml has type: path, count, keys, and a camera, in the words of a scene YAML
+  # a walk: rig.yaml has type: path, count, keys, and a camera, as in a scene YAML
   synthesize.py results/garden/LFSphere_e100cm_d170cm --poses rig.yaml --video --output work/walk
 """
 
