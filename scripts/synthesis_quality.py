@@ -56,7 +56,9 @@ def main() -> None:
     for row in means:
         print(
             f"{row['truth']:<24} {row['variant']:>10} {row['value']:<18} PSNR {row['psnr']:5.2f} "
-            f"dB  SSIM {row['ssim']:.3f}  FLIP {row['flip']:.3f}  holes {row['holes']:.2%}"
+            f"dB, holes black {row['psnr_black']:5.2f}  WS-PSNR {row['ws_psnr']:5.2f}  "
+            f"IV-PSNR {row['iv_psnr']:5.2f}  SSIM {row['ssim']:.3f}  FLIP {row['flip']:.3f}, "
+            f"black {row['flip_black']:.3f}  holes {row['holes']:.2%}"
         )
 
 

@@ -1,7 +1,8 @@
 """Synthesise views from anywhere in a dataset, from its nearest views and their depth.
 
 OUTPUT gets lightfield.json, exr/<view>.exr (R, G, B, A, and Z as in a dataset) and png/<view>.png.
-A surface that no view of the dataset sees is a hole: black, alpha 0, Z NaN.
+A surface that no view of the dataset sees is a hole. Its colour is that of its surroundings and of
+what is behind it. In the EXR its alpha is 0, and its Z is NaN.
 
 Examples:
 
@@ -62,7 +63,13 @@ def main() -> None:
         parts = splits(source.lightfield)
         views = parts.train
         targets = source.lightfield.changed(views=parts.test)
-    sources = Sources(source.lens, views, reader(source), most=4 * arguments.best)
+    sources = Sources(
+        source.lens,
+        views,
+        reader(source),
+        fills_holes=not source.lightfield.transparent,
+        most=4 * arguments.best,
+    )
     lens = targets.lens
     depth = targets.lens.usual_depth
     targets.changed(depth=depth).write(arguments.output / NAME)
@@ -81,7 +88,7 @@ def main() -> None:
                 arguments.output / "exr" / f"{view.name}.exr", made.channels(depth, rays)
             )
             picture = pictures.develop(np.nan_to_num(made.colour), exposure)
-            opaque = np.where(made.holes, 0, 255).astype(np.uint8)
+            opaque = np.where(np.isfinite(made.colour[..., 0]), 255, 0).astype(np.uint8)
             images.write_png(
                 arguments.output / "png" / f"{view.name}.png", np.dstack([picture, opaque])
             )

@@ -1,5 +1,7 @@
 """What several tests share: the programs in scripts/, run as a user runs them."""
 
+import compileall
+import fcntl
 import os
 import shutil
 import subprocess
@@ -20,19 +22,32 @@ SCRIPTS = ROOT / "scripts"
 SLOW = {"run_program", "smoke", "blender", "browser", "cycles", "planned", "renders", "simulated"}
 
 
+def pytest_sessionstart(session):
+    """Compile the programs once, before there are workers: each checkout takes that with it."""
+    if not hasattr(session.config, "workerinput"):
+        compileall.compile_dir(SCRIPTS, quiet=2)
+
+
+# Each of these takes more than a minute.
+LONG = ("slurm", "every_rule", "workflow", "damage", "failures", "storage", "soak", "provenance")
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """Mark as slow what uses these fixtures; other tests say it themselves.
 
-    Files of few tests come first, which take long, and those without a slow one last, so that the
-    workers end together.
+    The longest files come first, then those of few tests, which take long, and those without a
+    slow one last, so that the workers end together.
     """
     tests = {item.path: [] for item in items}
     for item in items:
         if SLOW & set(item.fixturenames):
             item.add_marker("slow")
         tests[item.path].append(item.get_closest_marker("slow") is not None)
-    order = {path: (not any(slow), len(slow)) for path, slow in tests.items()}
+    long = [f"test_{name}.py" for name in LONG]
+    order = {
+        path: (path.name not in long, not any(slow), len(slow)) for path, slow in tests.items()
+    }
     items.sort(key=lambda item: order[item.path])
 
 
@@ -95,13 +110,37 @@ def room(tmp_path_factory, run_program):
     return path
 
 
-@pytest.fixture(scope="session")
-def smoke(tmp_path_factory):
-    """A checkout in which the smoke dataset has been built."""
-    folder = checkout(tmp_path_factory.mktemp("smoke") / "plenoforge")
+def built_once(build, name, config, tmp_path_factory):
+    """Return a worker's own copy of a folder that ``build(folder)`` makes once for all workers.
+
+    The first worker that asks builds it, and the others wait. Where it fails the next one tries.
+    """
+    is_worker = hasattr(config, "workerinput")
+    shared = tmp_path_factory.getbasetemp()
+    shared = shared.parent if is_worker else shared
+    finished = shared / f"{name}.finished"
+    with (shared / f"{name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not finished.exists():
+            folder = tmp_path_factory.mktemp(name) / "built"
+            build(folder)
+            finished.symlink_to(folder)
+    own = tmp_path_factory.mktemp(name) / "plenoforge"
+    # With its times: what was built stays up to date.
+    shutil.copytree(finished.resolve(), own, symlinks=True)
+    return own
+
+
+def build_smoke(folder):
+    checkout(folder)
     result = snakemake(folder, "--cores", "2", "smoke")
     assert result.returncode == 0, result.stdout + result.stderr
-    return folder
+
+
+@pytest.fixture(scope="session")
+def smoke(tmp_path_factory, request):
+    """A checkout in which the smoke dataset has been built."""
+    return built_once(build_smoke, "smoke", request.config, tmp_path_factory)
 
 
 @pytest.fixture(scope="session")

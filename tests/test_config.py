@@ -1,6 +1,5 @@
 """The configuration: what is right is resolved, what is wrong is told in one line."""
 
-import copy
 import json
 import re
 import subprocess
@@ -11,6 +10,7 @@ import jsonschema
 import numpy as np
 import pytest
 import yaml
+from mistakes import REMOVE, RIGHT, changed
 
 import schema
 from lightfield.core.errors import UserError
@@ -18,284 +18,7 @@ from lightfield.dataset import config
 from lightfield.dataset.config import Preset
 from lightfield.dataset.loading import load_datasets, scene_datasets
 
-RIGHT = {
-    "scene": {"builder": "room"},
-    "render": {"samples": 64},
-    "rigs": {
-        "LFSphere": {
-            "type": "sphere",
-            "subdivisions": 4,
-            "camera": {"lens": "equidistant", "fov": 180, "resolution": [2048, 2048]},
-        },
-        "LFCuboid": {
-            "type": "cuboid",
-            "cameras": [10, 30, 10],
-            "camera": {"lens": "equirectangular", "resolution": [4096, 2048]},
-        },
-    },
-    "reprojections": {
-        "perspective": {
-            "rigs": ["LFSphere"],
-            "camera": {"lens": "rectilinear", "focal_length": 18, "resolution": [256, 256]},
-        }
-    },
-    "exports": {"instant_ngp": {"sources": ["perspective"]}},
-}
-
-REMOVE = object()
 SNAKEMAKE = Path(sys.executable).with_name("snakemake")
-
-
-def changed(path, value):
-    """Return the right YAML's content with the value at a dotted path replaced or removed."""
-    content = copy.deepcopy(RIGHT)
-    *parents, last = path.split(".")
-    part = content
-    for key in parents:
-        part = part.setdefault(key, {})
-    if value is REMOVE:
-        del part[last]
-    else:
-        part[last] = value
-    return content
-
-
-BROKEN = {
-    # key path: (value, what the message must hold beside the key path)
-    "no samples": ("render.samples", REMOVE, "render: is missing the key samples"),
-    "no value": (
-        "exports.nerfstudio",
-        None,
-        "exports.nerfstudio: is null; must have a value, or be left out",
-    ),
-    "no rig": (
-        "rigs.LFSphere",
-        None,
-        "rigs.LFSphere: is null; must be a mapping of keys to values",
-    ),
-    "text for length": (
-        "rigs.LFSphere.size",
-        "1m",
-        'size: is "1m"; must be a number or a list of 3',
-    ),
-    "mistyped parameter": (
-        "scene.parameters",
-        {"sede": 7},
-        "scene.parameters.sede: unknown key; did you mean seed?",
-    ),
-    "parameters of a .blend": (
-        "scene",
-        {"blend": "a.blend", "parameters": {"seed": 1}},
-        "scene.parameters: goes with builder, not with blend",
-    ),
-    "text for number": ("render.samples", "many", 'render.samples: is "many"; must be a whole'),
-    "true for number": ("render.samples", True, "render.samples: is true; must be a whole number"),
-    "text of a number": ("render.clamp_indirect", "10", 'clamp_indirect: is "10"; must be a'),
-    "no number": ("render.clamp_indirect", float("inf"), "clamp_indirect: is Infinity; must be a"),
-    "fraction": ("render.samples", 1.5, "render.samples: is 1.5; must be a whole number"),
-    "zero samples": (
-        "render.samples",
-        0,
-        "render.samples: is 0; must be a whole number at least 1",
-    ),
-    "too many samples": (
-        "render.samples",
-        2**31,
-        "render.samples: is 2147483648; must be a whole number at most 2147483647",
-    ),
-    "misspelt key": ("render.sample", 4, "render.sample: unknown key; did you mean samples?"),
-    "unknown key": ("render.xyzzy", 4, "render.xyzzy: unknown key; allowed here: samples, "),
-    "unknown builder": ("scene.builder", "nowhere", "'nowhere'; must be one of"),
-    "two sources": ("scene.blend", "a.blend", "scene: must have one of builder, blend and dataset"),
-    "address of a builder": (
-        "scene.url",
-        "https://example.org/a.blend",
-        "scene.url: goes with blend, not with builder",
-    ),
-    "frame of a builder": (
-        "scene.frame",
-        "file",
-        "scene.frame: file goes with blend, not with builder",
-    ),
-    "samples of a builder": (
-        "render.samples",
-        "file",
-        "render.samples: file goes with scene.blend",
-    ),
-    "camera of a builder": (
-        "rigs.LFSphere",
-        {"type": "blend_camera", "camera": {"lens": "file", "resolution": [8, 8]}},
-        "rigs.LFSphere.type: blend_camera goes with scene.blend",
-    ),
-    "lens of a file": (
-        "rigs.LFSphere.camera",
-        {"lens": "file", "resolution": [8, 8]},
-        "rigs.LFSphere.camera.lens: file goes with a rig of type blend_camera",
-    ),
-    "oblong pixels": (
-        "rigs.LFSphere.camera",
-        {
-            "lens": "rectilinear",
-            "focal_length": 50,
-            "sensor_size": [36, 24],
-            "resolution": [1920, 1080],
-        },
-        "rigs.LFSphere.camera.sensor_size: is [36.0, 24.0], but the pixels of Cycles' persp",
-    ),
-    "bad sum": (
-        "scene",
-        {"blend": "a.blend", "sha256": "123"},
-        'scene.sha256: is "123"; must be 64 hexadecimal digits in small letters',
-    ),
-    "sum that is a number": (
-        "scene",
-        {"blend": "a.blend", "sha256": 7},
-        "scene.sha256: is 7; must be a text: put it in quotes",
-    ),
-    "no .blend": (
-        "scene",
-        {"blend": "a.obj"},
-        'scene.blend: is "a.obj"; must be a path that ends in .blend',
-    ),
-    "no address": (
-        "scene",
-        {"blend": "a.blend", "url": "example.org"},
-        'scene.url: is "example.org"; must be an address that begins with http',
-    ),
-    "focal length of nothing": (
-        "reprojections.perspective.camera.focal_length",
-        1e-300,
-        "camera.focal_length: is 1e-300; must be a number at least 0.001",
-    ),
-    "focal length below Blender's": (
-        "rigs.LFSphere.camera",
-        {"lens": "rectilinear", "fov": 175, "resolution": [9, 9]},
-        "rigs.LFSphere.camera: its focal length in mm is 0.7859; Blender has at least 1",
-    ),
-    "fisheye below Blender's": (
-        "rigs.LFSphere.camera.fov",
-        5,
-        "rigs.LFSphere.camera: its fov in degrees is 5; Blender has at least 9.998",
-    ),
-    "fisheye beyond Blender's": (
-        "rigs.LFSphere.camera",
-        {"lens": "equisolid", "focal_length": 200, "fov": 20, "resolution": [9, 9]},
-        "rigs.LFSphere.camera: its focal length in mm is 200; Blender has at most 100",
-    ),
-    "sensor below Blender's": (
-        "rigs.LFSphere.camera",
-        {"lens": "rectilinear", "focal_length": 2, "sensor_size": 0.5, "resolution": [9, 9]},
-        "rigs.LFSphere.camera.sensor_size: is 0.5; Blender has at least 1 mm",
-    ),
-    "unknown rig type": (
-        "rigs.LFSphere.type",
-        "ball",
-        'rigs.LFSphere.type: is "ball"; must be one of plane, cuboid,',
-    ),
-    "too many subdivisions": (
-        "rigs.LFSphere.subdivisions",
-        12,
-        "rigs.LFSphere.subdivisions: is 12; must be a whole number at most 7",
-    ),
-    "wrong placement": (
-        "rigs.LFSphere.cameras",
-        [3, 3],
-        "rigs.LFSphere.cameras: unknown key; did you mean camera?",
-    ),
-    "cameras of a cuboid": (
-        "rigs.LFCuboid.cameras",
-        [3, 3],
-        "rigs.LFCuboid.cameras: is [3, 3]; must be a list of 3 values",
-    ),
-    "negative size": (
-        "rigs.LFCuboid.size",
-        -1,
-        "rigs.LFCuboid.size: is -1; must be a number at least 0",
-    ),
-    "centre of two": ("rigs.LFCuboid.center", [0, 1], "rigs.LFCuboid.center: is [0, 1]; must be a"),
-    "no rigs": ("rigs", {}, "rigs: is {}; must have at least 1 item"),
-    "rig name": ("rigs", {"../out": RIGHT["rigs"]["LFSphere"]}, "rigs: '../out' is no name"),
-    "fov beyond the lens": (
-        "reprojections.perspective.camera",
-        {"lens": "rectilinear", "fov": 180, "resolution": [9, 9]},
-        "reprojections.perspective.camera.fov: is 180; must be a number below 180",
-    ),
-    "fisheye without fov": (
-        "rigs.LFSphere.camera",
-        {"lens": "equidistant", "resolution": [9, 9]},
-        "rigs.LFSphere.camera: is missing the key fov",
-    ),
-    "lens that Cycles lacks": (
-        "rigs.LFSphere.camera",
-        {"lens": "stereographic", "fov": 180, "resolution": [9, 9]},
-        "rigs.LFSphere.camera.lens: is 'stereographic', which Cycles does not have",
-    ),
-    "Z-depth of a panorama": (
-        "render.depth",
-        "z",
-        "render.depth: is 'z', but rigs.LFCuboid.camera",
-    ),
-    "reprojection of no rig": (
-        "reprojections.perspective.rigs",
-        ["LFSpher"],
-        "reprojections.perspective.rigs: there is no rig 'LFSpher'; did you mean LFSphere?",
-    ),
-    "reserved name": (
-        "reprojections.exr",
-        RIGHT["reprojections"]["perspective"],
-        "reprojections.exr: the name exr is taken",
-    ),
-    "export of nothing": (
-        "exports.instant_ngp.sources",
-        ["fisheye"],
-        "exports.instant_ngp.sources: is 'fisheye'; must be of views, perspective",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", BROKEN)
-def test_every_mistake_names_file_key_value_and_what_is_right(name, tmp_path):
-    path, value, expected = BROKEN[name]
-    file = tmp_path / "broken.yaml"
-    file.write_text(yaml.safe_dump(changed(path, value)))
-    with pytest.raises(UserError) as caught:
-        config.read_scene(file)
-    message = str(caught.value)
-    assert message.startswith(str(file))
-    assert expected in message
-    assert "\n" not in message
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("render: {samples: 4\n", "line 2, column 1"),
-        ("render: {samples: 4}\nrender: {samples: 5}\n", "the key 'render' is given twice"),
-        ("1: 2\n", "the key 1 is not a text"),
-        ("- a\n- b\n", 'is ["a", "b"]; must be a mapping'),
-        ("scene:\n\tbuilder: room\n", "line 2, column 1: is indented with a tab; use spaces"),
-        ("a:\n  - b\n\t- c\n", "line 3, column 1: is indented with a tab; use spaces"),
-        ("scene: {blend: a.blend, sha256: 0123}\n", 'scene.sha256: is "0123"; must be 64 hex'),
-        ("render: {samples: 12:30:45}\n", 'render.samples: is "12:30:45"; must be a whole number'),
-        ("render: {samples: 010}\n", 'render.samples: is "010"; must be a whole number'),
-        ("render: {samples: 0b11}\n", 'render.samples: is "0b11"; must be a whole number'),
-        (
-            "scene: {builder: room}\n"
-            "render: {samples: 1}\n"
-            "reprojections: {flat: {camera: {lens: rectilinear, focal_length: 1e-300}}}\n",
-            "flat.camera.focal_length: is 1e-300; must be a number at least 0.001",
-        ),
-        ("render: {clamp_indirect: 1:30.5}\n", 'clamp_indirect: is "1:30.5"; must be a number'),
-        ("scene: !!python/object/apply:os.getcwd []\n", "could not determine a constructor"),
-    ],
-)
-def test_text_that_is_no_scene_is_told_so(text, expected, tmp_path):
-    file = tmp_path / "broken.yaml"
-    file.write_text(text)
-    with pytest.raises(UserError, match=f"^{file}: ") as caught:
-        config.read_scene(file)
-    assert expected in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [8, 8]}
@@ -549,17 +272,10 @@ def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
     ("arguments", "expected"),
     [
         (["preset=best"], "preset: is 'best'; must be one of tiny, preview, full"),
-        (["scenes=[gardn]"], "there is no scene 'gardn'; is garden meant?"),
-        (["scenes=nowhere"], "there is no scene 'nowhere'; there are barbershop, "),
-        (["work=results/smoke"], "work: is 'results/smoke', and results is 'results'; must be two"),
-        (["rigs=[LFSpher]"], "rigs: 'LFSpher' is in none of the scenes garden"),
         (
             ["scenes=[garden, lone_monk]", "rigs=LFSphere_e100cm_d170cm"],
             "none of LFSphere_e100cm_d170cm is in lone_monk; it has ",
         ),
-        (["device=quantum"], 'device: is "quantum"; must be auto, cpu, optix,'),
-        (["views_per_shard=0"], "views_per_shard: is 0; must be auto or a whole number at least 1"),
-        (["results=."], "results: is '.'; must be a folder of its own"),
     ],
 )
 @pytest.mark.slow
@@ -577,13 +293,6 @@ def test_snakemake_ends_with_one_line_and_no_job(arguments, expected, tmp_path):
     assert expected in told[0]
     assert "Traceback" not in result.stderr
     assert "rule " not in result.stdout + result.stderr
-
-
-@pytest.mark.parametrize("key", ["most_shards", "shard_minutes"])
-def test_a_removed_key_names_the_key_that_answers_its_question(key):
-    content = {"scenes": ["garden"], "preset": "full", "presets": {"full": {}}, key: 100}
-    with pytest.raises(UserError, match=f"config.yaml: {key}: .*views_per_shard"):
-        config.load_config(content)
 
 
 def test_no_two_scenes_have_one_folder(tmp_path, monkeypatch):

@@ -109,13 +109,13 @@ def test_smooth_is_what_is_so_for_the_size_of_its_pixels():
 
 
 def test_spread_is_the_deviation_of_depth_from_a_plane():
-    noisy = np.random.default_rng(2).normal(AWAY, 0.1 * STEP, (64, 64))
-    found = consistency.sample(at(), noisy, 10**6)
-    # Each is the smoothest of its cell, so all of them are asked for one by one.
-    everywhere, smooth = consistency._patches(at(), noisy, *np.mgrid[1:63, 1:63].reshape(2, -1))
-    assert smooth.all() and len(found) == 1024
-    mean = np.sqrt((everywhere.spread**2).mean())
-    assert mean == pytest.approx(0.1 * STEP, rel=0.03)
+    chequered = AWAY + 0.1 * STEP * (-1.0) ** np.indices((64, 64)).sum(axis=0)
+    found = consistency.sample(at(), chequered, 10**6)
+    assert len(found) == 1024
+    # Five of nine pixels are farther than the other four, about a plane of three unknowns.
+    heights = np.array([1, -1, 1, -1, 1, -1, 1, -1, 1]) * 0.1 * STEP
+    expected = np.sqrt(((heights - heights.mean()) ** 2).sum() / 6)
+    np.testing.assert_allclose(found.spread, expected, rtol=0.01)
 
 
 @pytest.mark.parametrize("depth", ["z", "distance"])
@@ -194,7 +194,7 @@ def test_a_point_agrees_within_the_tolerance_of_both_surfaces(asked, depth, tole
 def test_a_residual_counts_in_footprints_and_comes_with_the_deviation_that_is_expected():
     asked = on_wall(ROW, away=AWAY - 0.2 * STEP, spread=0.3 * STEP, error=1.2 * STEP)
     found = consistency.compare(asked, at(), wall())
-    assert found.fine.all()
+    assert found.smooth.all()
     np.testing.assert_allclose(found.footprint, STEP, rtol=0.02)
     np.testing.assert_allclose(found.residual, 0.2, rtol=0.02)
     # Of an error evenly within its bound the deviation is a √12th.

@@ -9,8 +9,7 @@ import numpy as np
 import psutil
 import pytest
 
-from lightfield.core.errors import UserError
-from lightfield.dataset import config, journal
+from lightfield.dataset import journal
 from lightfield.dataset.lightfield import LightField, View
 from lightfield.geometry import lenses
 from lightfield.measurement import costs
@@ -256,19 +255,3 @@ def test_a_processes_peak_memory_is_in_bytes(tmp_path):
     (run,) = journal.read(file)
     # The system counts a little behind; a peak is never below what is held now.
     assert 0.9 * now < run.peak_memory_bytes < psutil.virtual_memory().total
-
-
-@pytest.mark.parametrize(
-    "energy, expected",
-    [
-        ({"watts": -5}, "energy.watts: is -5; must be a number at least 0"),
-        ({"watt": 65}, "energy.watt: unknown key; did you mean watts?"),
-        ({"cores": 0}, "energy.cores: is 0; must be auto or a whole number at least 1"),
-        ({"currency": 3}, "energy.currency: is 3; must be a text: put it in quotes"),
-    ],
-)
-def test_a_wrong_tariff_is_told(energy, expected):
-    content = config.read_yaml(config.ROOT / "config.yaml", "config.yaml")
-    with pytest.raises(UserError) as caught:
-        config.load_config(content | {"energy": energy})
-    assert str(caught.value) == f"config.yaml: {expected}"

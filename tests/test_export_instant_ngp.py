@@ -513,28 +513,13 @@ def test_the_yaml_asks_for_all_that_the_program_can_do(dataset: Dataset) -> None
         TypeAdapter(InstantNgp).validate_python(settings | {"offset": [0, 0, 0]})
 
 
-@pytest.mark.parametrize(
-    ("settings", "problem"),
-    [
-        ({}, "is missing the key options"),
-        ({"options": {"sources": ["views"], "scal": 1}}, "options.scal: unknown key; did you mean"),
-        (
-            {"options": {"sources": ["views"], "scale": -1}},
-            "options.scale: is -1; must be a number",
-        ),
-        ({"options": {"sources": ["views", "flat"]}}, "options.sources: must name one source"),
-        ({"options": {"sources": ["views"]}, "suffix": ".jpg"}, "suffix: is "),
-    ],
-)
-def test_mistakes_in_a_settings_file_are_named(
-    settings: Any, problem: str, dataset: Dataset
-) -> None:
+def test_a_settings_file_names_one_source(dataset: Dataset) -> None:
     dataset.write(FISHEYE)
     file = dataset.folder / "settings.json"
-    file.write_text(json.dumps(settings))
+    file.write_text(json.dumps({"options": {"sources": ["views", "flat"]}}))
     with pytest.raises(UserError) as error:
         dataset.export("--settings", file)
-    assert str(error.value).startswith(f"{file}: {problem}")
+    assert str(error.value).startswith(f"{file}: options.sources: must name one source")
 
 
 @pytest.mark.parametrize(

@@ -453,6 +453,13 @@ def test_pixels_without_a_source_and_misses_are_none_and_far_to_miv():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("depths", [[[np.inf, np.inf]], [[2.0, np.inf]], [[5000.0, 3000.0]]])
+def test_no_far_limit_is_read_as_infinity(depths):
+    # MPEG's Reference View Synthesizer takes 1000 m and more for infinity.
+    near, far = disparity.depth_range(np.array(depths))
+    assert 0 < near < far < 1000
+
+
 def test_opendibr_takes_lossless_h265_where_there_is_ffmpeg(dataset, tmp_path, monkeypatch):
     lens = LightField.read(dataset / "perspective" / "lightfield.json").lens
     settings = settings_of("opendibr").model_validate({"sources": ["views"], "format": "h265"})
@@ -806,20 +813,13 @@ def test_a_settings_file_gives_source_and_rigs_that_test(run_program, dataset, t
     assert both == [*names, *(f"other_{name}" for name in names)]
 
 
-@pytest.mark.parametrize(
-    ("content", "problem"),
-    [
-        ({"options": {"sources": ["views"], "point": 5}}, "options.point: unknown key"),
-        ({"options": {"sources": ["views"], "points": 0}}, "options.points: is 0; must be"),
-        ({"options": {"sources": ["views"]}, "tested_by": ["other"]}, "tested_by: is "),
-    ],
-)
-def test_mistakes_in_a_settings_file_are_named(run_program, dataset, tmp_path, content, problem):
+def test_a_mistake_in_a_settings_file_is_named_and_nothing_made(run_program, dataset, tmp_path):
+    content = {"options": {"sources": ["views"], "point": 5}}
     settings = tmp_path / "settings.json"
     settings.write_text(json.dumps(content))
     words = ["--dataset", dataset, "--output", tmp_path / "made", "--settings", settings]
     refused = run_program("export.py", "colmap", *words, check=False)
-    assert refused.stderr.startswith(f"error: {settings}: {problem}")
+    assert refused.stderr.startswith(f"error: {settings}: options.point: unknown key")
     assert (refused.returncode, refused.stderr.count("\n")) == (1, 1)
     refused = run_program("export.py", "colmap", *words, "--suffix", ".png", check=False)
     assert "--settings: excludes --suffix" in refused.stderr

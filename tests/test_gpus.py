@@ -113,16 +113,26 @@ def test_the_gpus_are_those_that_are_left_to_the_process(
     assert gpus.visible(environment) == expected
 
 
-def test_a_process_sees_the_gpu_alone_that_it_took(tmp_path, monkeypatch):
-    monkeypatch.setattr(gpus, "_locks", [])
-    monkeypatch.setattr(gpus.tempfile, "gettempdir", lambda: str(tmp_path))
-    monkeypatch.setenv(CUDA, "GPU-a,GPU-b")
-    monkeypatch.setenv(HIP, "0")
+USER = """
+import os
+from lightfield.core.gpus import CUDA, HIP, use_one
+use_one()
+print(os.environ[CUDA], os.environ[HIP])
+"""
+
+
+def test_a_process_sees_the_gpu_alone_that_it_took(tmp_path):
     _, lock = gpus.take(FAKE[:1], tmp_path)
-    gpus.use_one()
-    assert (gpus.os.environ[CUDA], gpus.os.environ[HIP]) == ("GPU-b", "-1")
-    for taken in (lock, *gpus._locks):
-        taken.close()
+    environment = {CUDA: "GPU-a,GPU-b", HIP: "0", "TMPDIR": str(tmp_path)}
+    process = subprocess.run(
+        [sys.executable, "-c", USER],
+        env=os.environ | environment | {"PYTHONPATH": str(SCRIPTS)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    lock.close()
+    assert process.stdout == "GPU-b -1\n"
 
 
 @pytest.mark.parametrize(

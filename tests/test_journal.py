@@ -71,28 +71,23 @@ def test_what_stands_before_the_first_start_is_of_no_run(tmp_path):
 
 
 HANG = """
-import sys, time, types
+import sys, time
 from pathlib import Path
-def hang(*_): time.sleep(60)
-for name, said in (("colour_pass", "render_colour"), ("geometry_pass", "render_geometry")):
-    sys.modules[f"lightfield.rendering.{name}"] = types.SimpleNamespace(**{said: hang})
-from lightfield.core.progress import Progress
-from lightfield.dataset.journal import Journal
 from lightfield.dataset.lightfield import LightField
-from lightfield.dataset.records import ShardRecord
-from lightfield.rendering import shard
-lightfield = LightField.read(Path(sys.argv[1]))
-record, journal = ShardRecord(None, Path("exr")), Journal(None)
-views = lightfield.views
-shard._render_views(views, lightfield, Path("exr"), record, journal, Progress(1, "render"), 1)
+from lightfield.rendering import colour_pass, geometry_pass, shard
+def hang(*_): time.sleep(60)
+colour_pass.render_colour = geometry_pass.render_geometry = hang
+lightfield, blend = map(Path, sys.argv[1:])
+options = {"blend": blend, "inventory": None, "device": "cpu", "threads": 1, "stall": 1}
+shard.render(LightField.read(lightfield), ":", lightfield.with_name("exr"), **options)
 """
 
 
-def test_a_view_that_hangs_ends_its_process(run_program, tmp_path):
+def test_a_view_that_hangs_ends_its_process(run_program, room, tmp_path):
     words = ("--scene", "smoke", "--rig", "LFCuboid_1x1x1")
     run_program("make_lightfield.py", *words, "--output", tmp_path / "lightfield.json")
     run = subprocess.run(
-        [sys.executable, "-c", HANG, tmp_path / "lightfield.json"],
+        [sys.executable, "-c", HANG, tmp_path / "lightfield.json", room],
         env={"PYTHONPATH": str(SCRIPTS)},
         check=False,
     )

@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import linregress
 from skimage.metrics import structural_similarity
 
+from lightfield.geometry import lenses
 from lightfield.measurement import metrics
 
 SIZE = 64
@@ -214,3 +215,56 @@ def test_independent_errors_disagree_fully_and_common_ones_not_at_all():
     assert apart.added**2 == pytest.approx(2 * expected(truth, 0.03, one.exposure), rel=0.1)
     assert apart.total**2 == pytest.approx(apart.added**2 + apart.floor**2, rel=0.05)
     assert alike.total == pytest.approx(alike.floor, rel=1e-3)
+
+
+def test_pixels_have_the_solid_angles_of_their_lens():
+    panorama = lenses.from_camera({"lens": "equirectangular", "resolution": [256, 128]})
+    angles = metrics.solid_angles(panorama)
+    assert angles.sum() == pytest.approx(4 * np.pi, rel=1e-3)
+    latitude = (np.arange(128) + 0.5 - 64) * np.pi / 128
+    expected = np.cos(latitude) / np.cos(latitude).max()
+    np.testing.assert_allclose(angles[:, 0] / angles.max(), expected, atol=1e-3)
+    fisheye = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [200, 200]})
+    angles = metrics.solid_angles(fisheye)
+    assert angles.sum() == pytest.approx(2 * np.pi, rel=0.02)
+    # sin θ / θ at 60 degrees from the axis.
+    expected = np.sin(np.pi / 3) / (np.pi / 3)
+    assert angles[100, 166] / angles[100, 100] == pytest.approx(expected, rel=0.02)
+
+
+def test_ws_psnr_counts_the_sphere_and_not_the_picture():
+    lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
+    truth = np.full((32, 64, 3), 0.5)
+    angles = metrics.solid_angles(lens)
+    pole, equator = truth.copy(), truth.copy()
+    pole[:2] += 0.1
+    equator[15:17] += 0.1
+    everywhere = truth + 0.1
+    assert metrics.ws_psnr(truth, everywhere, angles) == pytest.approx(20)
+    # A sixteenth of the rows is 1 − sin(90° · 14/16) of a hemisphere's height at a pole.
+    part = (1 - np.sin(np.pi / 2 * 14 / 16)) / 2
+    assert metrics.ws_psnr(truth, pole, angles) == pytest.approx(20 - 10 * np.log10(part), abs=0.05)
+    part = np.sin(np.pi / 32)
+    assert metrics.ws_psnr(truth, equator, angles) == pytest.approx(
+        20 - 10 * np.log10(part), abs=0.05
+    )
+
+
+def test_iv_psnr_forgives_two_pixels_and_a_hundredth_and_no_more():
+    random = np.random.default_rng(2)
+    truth = random.uniform(0.2, 0.8, (40, 40, 3))
+    counted = np.zeros((40, 40), bool)
+    counted[4:-4, 4:-4] = True
+
+    def measured(shown):
+        return metrics.iv_psnr(truth, shown, counted)
+
+    assert measured(truth) == 100
+    assert measured(np.roll(truth, (2, -1), (0, 1))) > 50
+    assert measured(np.roll(truth, 3, 0)) < 40
+    assert measured(truth + 0.01) > 90
+    # Of a hundredth and 0.02, the hundredth is forgiven; grey has no colour differences.
+    grey = np.full((40, 40, 3), 0.5)
+    luma = -10 * np.log10(0.02**2)
+    expected = (4 * luma + 2 * 100) / 6
+    assert metrics.iv_psnr(grey, grey + 0.03, counted) == pytest.approx(expected, abs=0.01)

@@ -1,4 +1,4 @@
-"""What is told before anything is rendered: the number of views, hours and gigabytes."""
+"""What is told before anything is rendered: the number of views, time and disk space."""
 
 import json
 import re
@@ -126,18 +126,20 @@ def test_the_table_adds_up_what_the_probes_measured():
     datasets = [("garden/LFSphere", 3, fisheye), ("garden/LFCuboid_8panos", 1, panoramas)]
     text = plan.table(datasets, {})
     # 300 views of 36 ± 12/√12 s are 3 h, and of 11 MB 3.3 GB.
-    assert "| garden/LFSphere | 300 | 2048 × 2048 | 256 | 36 ± 3 | 3 | — | — | 3.3 |" in text
-    assert "| garden/LFCuboid_8panos | 8 | 4096 × 2048 | 256 | 90 ± 0 | 0 | — | — | 0.1 |" in text
-    assert "| all | 308 | | | | 3 ± 0 | — | — | 3 |" in text
-    assert "Hours of one processor core" in text
-    # Under the table: 300 × 36 / 3600 = 3.
-    assert "hours = views × s a view / 3600" in text.split("| all |")[1]
-    assert "Hours of the graphics card." in plan.table(
+    assert "| garden/LFSphere | 300 | 2048 × 2048 | 256 | 36 ± 3 | 3 h | — | — | 3.3 GB |" in text
+    assert (
+        "| garden/LFCuboid_8panos | 8 | 4096 × 2048 | 256 | 90 ± 0 | 12 min | — | — | 88 MB |"
+        in text
+    )
+    assert "| all | 308 | | | | 3.2 h ± 17 min | — | — | 3.4 GB |" in text
+    assert "Times of one processor core" in text
+    assert "time = views × s a view" in text.split("| all |")[1]
+    assert "Times of the graphics card." in plan.table(
         [("a/b", 1, fisheye | {"device": "GPU"})], {}
     )
 
 
-def test_denoised_and_calibrated_hours_stand_beside_the_plain_ones():
+def test_denoised_and_calibrated_times_stand_beside_the_plain_ones():
     """Path tracing has 1 / N, denoised renders half of it at once, and cost three samples more."""
     unchanged = {
         way: [{"samples": n, "seconds": n + more, "error": part / n} for n in (4, 8, 16)]
@@ -161,7 +163,7 @@ def test_denoised_and_calibrated_hours_stand_beside_the_plain_ones():
     probe = {"resolution": [64, 64], "samples": 256, "device": "CPU", "views": 100}
     probe |= {"view_seconds": [3600.0], "view_bytes": [1e9]}
     text = plan.table([("a/b", 1, probe)], {"a/b": advice})
-    assert "| 100 | 51 | 21 | 100.0 |" in text
+    assert "| 100 h | 51 h | 21 h | 100 GB |" in text
 
 
 def test_a_probe_foretells_the_size_of_the_views(run_program, room, tmp_path):

@@ -53,119 +53,12 @@ def in_builder(folder):
     path.write_text(path.read_text().replace("0.7 0.15 0.1 0.6", "0.1 0.15 0.7 0.6"))
 
 
-def in_library(folder):
-    path = folder / "scripts/scenes/library/lights.py"
-    path.write_text(path.read_text() + "\n# Another light.\n")
-
-
-def in_config(old, new):
-    def change(folder):
-        path = folder / "config.yaml"
-        text = path.read_text()
-        assert old in text
-        path.write_text(text.replace(old, new, 1))
-
-    return change
-
-
-def a_measurement(folder):
-    path = folder / "results/benchmarks/reprojection.csv"
-    path.parent.mkdir()
-    path.write_text("method,seconds\n")
-
-
-SCENE = {"build_scene", "inventory", "lightfield", "render", "page"}
 VIEWS = {"lightfield", "check_cameras", "render", "reproject", "validate", "checksums", "page"}
-OPTICS = {"lens_map", "reprojected_lightfield", "reproject", "export_to_instant_ngp", "validate"}
-# What is changed, the jobs that must run again, and those that must not.
-CHANGES = {
-    "a colour in the builder": (in_builder, SCENE, set()),
-    "the library of all builders": (in_library, SCENE, set()),
-    "scene.parameters": (
-        in_yaml("builder: room", "builder: room\n  parameters: {seed: 2}"),
-        SCENE,
-        set(),
-    ),
-    "scene.frame": (
-        in_yaml("builder: room", "builder: room\n  frame: 5"),
-        VIEWS | {"inventory"},
-        {"build_scene"},
-    ),
-    "render.samples": (in_yaml("samples: 4", "samples: 5"), VIEWS, {"build_scene", "inventory"}),
-    "render.motion_blur": (
-        in_yaml("samples: 4", "samples: 4\n  motion_blur: true"),
-        VIEWS | {"inventory"},
-        {"build_scene"},
-    ),
-    "render.passes": (
-        in_yaml("samples: 4", "samples: 4\n  passes: [normal]"),
-        VIEWS,
-        {"build_scene"},
-    ),
-    "a rig's size": (in_yaml("size: 1\n", "size: 1.1\n"), VIEWS, {"build_scene", "inventory"}),
-    "a rig's split": (
-        in_yaml("split: odd", "split: {every: 3}"),
-        {"lightfield", "splits"},
-        {"inventory"},
-    ),
-    "a rig's lens": (in_yaml("fov: 180, res", "fov: 170, res"), VIEWS, {"build_scene"}),
-    "a reprojection's lens": (in_yaml("focal_length: 18", "focal_length: 17"), OPTICS, {"render"}),
-    "a reprojection's development": (
-        in_yaml("exposure: -1", "exposure: -2"),
-        OPTICS - {"lens_map"},
-        {"render", "lens_map"},
-    ),
-    "a reprojection less": (
-        in_yaml(
-            "rigs: [LFCuboid_1x1x1, LFPlane_3x2_equisolid, LFLattice_2panos]",
-            "rigs: [LFCuboid_1x1x1]",
-        ),
-        {"validate", "costs", "page"},
-        {"render", "lens_map"},
-    ),
-    "an export's options": (
-        in_yaml("points: 2000, depth", "points: 1000, depth"),
-        {"export"},
-        {"render", "reproject"},
-    ),
-    "instant-ngp's options": (
-        in_yaml("instant_ngp:\n", "instant_ngp:\n    scale: 0.5\n"),
-        {"export_to_instant_ngp"},
-        {"render", "export"},
-    ),
-    "an export less": (
-        in_yaml("  nerf_synthetic: {sources: [perspective_hdr]}\n", ""),
-        {"validate"},
-        {"render", "export"},
-    ),
-    "flow": (
-        in_yaml("exports:", "flow: {pairs: neighbours}\n\nexports:"),
-        {"lightfield", "flow"},
-        {"build_scene"},
-    ),
-    "the description": (in_yaml("A tiny rig", "A small rig"), {"page"}, {"render", "lightfield"}),
-    "the price of energy": (
-        in_config("price_per_kwh: 0.32", "price_per_kwh: 0.4"),
-        {"costs", "page"},
-        {"render"},
-    ),
-    # A page has no checksum: it shows what there is to see, and is no part of the dataset.
-    "a measurement": (a_measurement, {"page"}, {"render", "validate", "checksums"}),
-}
 
 
 def test_a_fresh_clone_beside_an_old_build_has_nothing_to_do(built):
     result = snakemake(built, "--dry-run", "smoke")
     assert "Nothing to be done" in result.stdout + result.stderr
-
-
-@pytest.mark.parametrize("change", CHANGES)
-def test_what_was_made_from_something_else_is_made_again(folder, change):
-    apply, again, untouched = CHANGES[change]
-    apply(folder)
-    jobs = planned(folder, "smoke").keys()
-    assert again <= jobs
-    assert not untouched & jobs
 
 
 def test_views_of_an_old_scene_are_not_published_as_those_of_a_new_one(folder):

@@ -368,9 +368,14 @@ def test_each_pass_of_the_middle_view_is_shown(show, tmp_path):
     assert "normal/" in tab.locator("#files").inner_text()
 
 
-def test_what_stands_still_is_a_white_picture_of_motion():
-    noise = np.full((2, 2, 4), 1e-5, np.float32)
-    assert (pass_pictures._picture(PASSES["motion"], noise, 0) >= 254).all()
+def test_what_stands_still_is_a_white_picture_of_motion(tmp_path):
+    lightfield = write_dataset(tmp_path, LINE)
+    lightfield = lightfield.changed(render={**lightfield.render, "passes": ["motion"]})
+    view, motion = lightfield.views[0], PASSES["motion"]
+    noise = np.full((lightfield.lens.height, lightfield.lens.width), 1e-5, np.float32)
+    images.write_exr(motion.path(tmp_path, view.name), dict.fromkeys(motion.channels, noise))
+    ((_, _, picture),) = pass_pictures.collect(tmp_path, lightfield, view, 0)
+    assert (decoded(picture) >= 252).all()
 
 
 def test_an_index_leads_to_every_page(sphere, run_program, show):

@@ -600,17 +600,11 @@ def test_a_settings_file_gives_the_bytes_of_the_flags(dataset, run, tmp_path, fl
 @pytest.mark.parametrize(
     ("settings", "told"),
     [
-        ({"formats": ["png"], "exposur": 1}, "exposur: unknown key; did you mean exposure?"),
-        ({"formats": ["png"], "exposure": 101}, "exposure: is 101; must be a number at most 100"),
-        ({"formats": ["jpg"]}, "formats.[0]: is "),
         ({"bits": 16}, "formats: must be a list of exr, png, or both"),
-        ({"formats": ["png"], "camera": CAMERA | {"fov": "90"}}, "camera.fov: is "),
-        ({"formats": ["png"], "camera": CAMERA, "cube_map": True}, "camera.resolution: is [24, 16"),
         ({"formats": ["png"], "passes": ["normal"]}, "passes: is normal; "),
-        ([], "must be a mapping"),
     ],
 )
-def test_mistakes_in_a_settings_file_are_named(dataset, run, tmp_path, settings, told):
+def test_settings_that_fit_no_run_are_named(dataset, run, tmp_path, settings, told):
     (tmp_path / "settings.json").write_text(json.dumps(settings))
     with pytest.raises(UserError) as error:
         run("--settings", str(tmp_path / "settings.json"))

@@ -226,5 +226,5 @@ def test_validation_finds_what_is_not_as_the_split_says(scene, tmp_path):
     write_json(path, {"train": []})
     with pytest.raises(UserError, match="must map train, validation, test to names of views"):
         problems()
-    with pytest.raises(UserError, match=r"splits\.json: is of the rigs in .*, and .* is not in it"):
+    with pytest.raises(UserError, match=r"splits\.json: belongs to the rigs in .*, but .* is not"):
         splits_check.check(path, tmp_path / "copy", [])

@@ -8,7 +8,7 @@ import subprocess
 import numpy as np
 import pytest
 import yaml
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, binary_erosion
 from sphere import look, look_at_ball, write_views
 
 from lightfield.core.errors import UserError
@@ -126,9 +126,12 @@ def test_the_colour_of_an_edge_counts_where_no_other_view_sees_the_surface():
 
     field = Sources(lens, views, edge)
     alone = field.blended(views[0].matrix, lens, [0]).colour[8:40, green_column]
-    np.testing.assert_allclose(alone, np.broadcast_to([0, 0.8, 0], alone.shape), atol=0.05)
+    assert (alone[:, 1] > 0.6).all()
+    assert (alone[:, 0] < 0.03).all()
     both = field.blended(views[0].matrix, lens, [0, 1]).colour[8:40, green_column]
-    np.testing.assert_allclose(both, np.broadcast_to([0.8, 0, 0], both.shape), atol=0.01)
+    # The harmonic mean darkens where views disagree, but what shows is the wall.
+    assert (both[:, 0] > 100 * both[:, 1]).all()
+    assert (both[:, 0] > 0.02).all()
 
 
 def test_a_wall_does_not_shine_through_a_panel_close_before_it():
@@ -140,7 +143,7 @@ def test_a_wall_does_not_shine_through_a_panel_close_before_it():
     made = field.blended(field.matrices[0], target, [0, 1])
     assert not made.holes.any()
     np.testing.assert_allclose(made.colour[..., 0], 0.8, atol=1e-3)
-    assert (made.colour[..., 1:] == 0).all()
+    np.testing.assert_allclose(made.colour[..., 1:], 0, atol=1e-6)
     np.testing.assert_allclose(made.distance * -target.pixel_rays()[..., 2], 2, rtol=1e-3)
 
 
@@ -159,10 +162,80 @@ def test_a_view_at_a_source_is_that_source(times):
     field = sources(look_at_ball)
     made = field.blended(field.matrices[3], field.lens, [3] * times)
     colour, distance = look_at_ball(field.lens, field.matrices[3])
-    amid = ~field.surface(3).torn & ~made.holes
+    torn = binary_dilation(field.surface(3).torn, np.ones((3, 3)))
+    # Of a pixel at the rim, not all samples are seen.
+    inside = binary_erosion(np.isfinite(field.rays[..., 0]), np.ones((3, 3)))
+    amid = inside & ~torn & ~made.holes
     assert amid.mean() > 0.6
-    np.testing.assert_allclose(made.colour[amid], colour[amid], atol=1e-4)
+    # Not half an 8-bit step apart.
+    difference = encode_srgb(made.colour[amid]) - encode_srgb(colour[amid])
+    assert np.abs(difference).max() < 0.5 / 255
     np.testing.assert_allclose(made.distance[amid], distance[amid], rtol=1e-4)
+
+
+def test_from_a_views_own_place_nothing_is_missing():
+    field = sources(look_at_ball)
+    made = field.blended(field.matrices[3], field.lens, [3])
+    # At the rim a triangle has no place for the corner that the lens does not see.
+    seen = binary_erosion(np.isfinite(field.rays[..., 0]), np.ones((3, 3)), 2)
+    assert not made.holes[seen].any()
+
+
+def test_a_single_pixel_before_a_wall_leaves_no_gap_around_it():
+    # Diagonal neighbours of what is alone before a wall have no triangle towards it.
+    def see(lens, matrix):
+        colour, distance = look(lens, matrix)
+        distance[30:60:6, 30:60:6] = 0.5
+        return colour, distance
+
+    field = sources(see)
+    made = field.blended(field.matrices[3], field.lens, [3])
+    assert not made.holes[28:62, 28:62].any()
+
+
+def test_holes_are_filled_with_what_is_around_and_behind():
+    def see(lens, matrix):
+        """A wall that is blue, and before its middle a red strip."""
+        x = np.linspace(-1, 1, lens.width)
+        strip = np.broadcast_to(np.abs(x) < 0.2, (lens.height, lens.width))
+        ahead = -lens.pixel_rays()[..., 2]
+        return np.where(strip[..., None], [0.8, 0, 0], [0, 0, 0.8]), np.where(strip, 1, 3) / ahead
+
+    camera = {"lens": "rectilinear", "fov": 90, "resolution": [64, 64]}
+    field = sources(see, camera, {"type": "plane", "cameras": [1, 1], "size": 0})
+    beside = field.matrices[0].copy()
+    beside[:3, 3] += 0.4 * beside[:3, 0]
+    made = field.synthesise(beside, field.lens)
+    middle = made.holes[32]
+    assert middle[:48].sum() > 4
+    row = made.colour[32, :48][middle[:48]]
+    # Between strip and wall, and more of the wall than of the strip.
+    assert row[:, 2].mean() > 1.5 * row[:, 0].mean()
+    assert row[-1, 2] > 5 * row[-1, 0] or row[0, 2] > 5 * row[0, 0]
+    channels = made.channels("z", field.rays)
+    assert (channels["A"][32][middle] == 0).all()
+    assert np.isnan(channels["Z"][32][middle]).all()
+    # Of views without a background, what none of them sees is most likely nothing.
+    field.fills_holes = False
+    black = field.synthesise(beside, field.lens)
+    assert (black.holes == made.holes).all()
+    assert (black.colour[made.holes] == 0).all()
+    np.testing.assert_array_equal(black.colour[~made.holes], made.colour[~made.holes])
+
+
+def test_a_highlight_that_one_view_sees_counts_little():
+    rig = {"type": "plane", "cameras": [3, 1], "size": 0.2}
+
+    def see(lens, matrix):
+        colour, distance = look(lens, matrix)
+        return (50 * colour if matrix[0, 3] < -0.05 else colour), distance
+
+    target = sources(look, FISHEYE, rig).matrices[1]
+    lens = lenses.from_camera(EYES["perspective"])
+    made = sources(see, FISHEYE, rig).blended(target, lens, [0, 1, 2])
+    colour, _ = look(lens, target)
+    # In the mean it would be ten times as bright.
+    assert np.median(made.colour / colour) < 2
 
 
 def test_a_slanted_plane_does_not_tear():

@@ -8,8 +8,9 @@ import json
 import math
 import re
 import shutil
-import signal
 import subprocess
+import threading
+import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 from scipy.ndimage import binary_dilation, binary_erosion
 
@@ -30,7 +32,6 @@ from lightfield.geometry import lenses, rotations
 from lightfield.imaging import images
 from lightfield.validation import consistency, files, geometry
 from lightfield.validation import validate as validation
-from lightfield.validation.pixels import Examiner
 from lightfield.validation.result import Check, Result
 
 validate = partial(validation.validate, manifests=MANIFESTS)
@@ -1352,12 +1353,23 @@ def test_an_image_without_inner_pixels_has_no_surfaces(size: tuple[int, int]) ->
     assert len(consistency.sample(camera, depth, 400)) == 0
 
 
-def test_a_killed_worker_is_an_error_of_one_line(tmp_path: Path) -> None:
-    with (
-        pytest.raises(UserError, match="room: a process that reads it was killed; most likely"),
-        validation._workers(Examiner(tmp_path / "room", []), 2) as mapped,
-    ):
-        list(mapped(signal.raise_signal, [signal.SIGKILL]))
+def kill_workers() -> None:
+    """Kill the processes that this one starts, once they are there."""
+    workers: list[psutil.Process] = []
+    while not workers:
+        children = psutil.Process().children()
+        workers = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+        time.sleep(0.01)
+    for worker in workers:
+        worker.kill()
+
+
+def test_a_killed_worker_is_an_error_of_one_line(dataset: Path) -> None:
+    killer = threading.Thread(target=kill_workers, daemon=True)
+    killer.start()
+    with pytest.raises(UserError, match="a process that reads it was killed; most likely"):
+        validate(dataset, processes=2)
+    killer.join()
 
 
 def test_strays_are_moved_before_they_make_a_dataset_invalid(
@@ -1396,11 +1408,11 @@ def test_an_export_that_is_no_longer_wanted_is_moved_away(
     (manifest.parent / "poses.csv").write_text("name\n")
     write_json(manifest, {"files": {"poses.csv": sha256(manifest.parent / "poses.csv")}})
     # Every one that is there, those that are wanted, and none.
-    for wanted, moved in ((None, 0), ([small_dataset / "transforms.json", manifest], 1), ([], 5)):
-        assert check(validate(small_dataset, wanted=wanted), "files").passed == (not moved)
+    for lists, moved in ((None, 0), ([small_dataset / "transforms.json", manifest], 1), ([], 5)):
+        assert check(validate(small_dataset, export_lists=lists), "files").passed == (not moved)
         removed = tmp_path / "removed"
-        assert files.remove_strays(small_dataset, [], MANIFESTS, removed, wanted) == moved
-        assert check(validate(small_dataset, wanted=wanted), "files").passed
+        assert files.remove_strays(small_dataset, [], MANIFESTS, removed, lists) == moved
+        assert check(validate(small_dataset, export_lists=lists), "files").passed
     assert len(list((tmp_path / "removed").rglob("poses.csv"))) == 1
 
 

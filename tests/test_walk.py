@@ -78,7 +78,7 @@ def look_from(tab, place, yaw, pitch):
     """Return what the canvas shows, (HEIGHT, WIDTH, 3) in sRGB from 0 to 1."""
     uri = tab.evaluate(
         """([at, yaw, pitch, width, height]) => {
-            Object.assign(walk.canvas, { width, height });
+            walk.size = [width, height];
             Object.assign(walk, { at, yaw, pitch });
             drawWalk();
             return walk.canvas.toDataURL("image/png");
@@ -265,7 +265,7 @@ def test_a_thousand_frames_leak_nothing(tab):
     opened = tab()
     look_from(opened, [0, 0, 0], 0, 0)
     walk_on = """(frames) => {
-        Object.assign(walk.canvas, { width: 32, height: 18 });
+        walk.size = [32, 18];
         walk.sources = 1;
         for (let frame = 0; frame < frames; frame++) {
             walk.yaw += 0.02;
@@ -287,3 +287,41 @@ def test_a_phone_has_it_too(tab):
     assert box["x"] >= 0
     assert box["x"] + box["width"] <= 390
     assert opened.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_views_are_chosen_only_once_the_eye_has_moved(tab):
+    opened = tab()
+    opened.evaluate("clearTimeout(walk.rest)")
+    count = """(moves) => {
+        drawWalk();
+        const before = walk.choices;
+        for (const [yaw, isInMotion] of moves) {
+            walk.yaw += yaw;
+            drawWalk(isInMotion);
+        }
+        return walk.choices - before;
+    }"""
+    assert opened.evaluate(count, [[0, False], [0, False]]) == 0
+    assert opened.evaluate(count, [[0.001, False]]) == 1
+    # The first picture in motion is made of fewer views.
+    assert opened.evaluate(count, [[0.001, True], [0.001, True], [0.001, True]]) == 1
+    assert opened.evaluate(count, [[0.1, True], [0.1, True]]) == 2
+
+
+@pytest.mark.parametrize(("width", "widest"), [(160, 80), (300, 120), (4000, 120)])
+def test_the_default_field_of_view_keeps_source_pixels_small(tab, width, widest):
+    opened = tab()
+    wide = opened.evaluate("(width) => fieldOfView(width, width / 2)", width)
+    assert math.radians(80) - 1e-9 <= wide <= math.radians(widest) + 1e-9
+    # A pixel of a source is π / 128 radians.
+    pixels = width / 2 / math.tan(wide / 2) * math.pi / 128
+    assert pixels <= 3 + 1e-6 or wide == pytest.approx(math.radians(120))
+
+
+def test_keys_zoom_in_and_back(tab):
+    opened = tab()
+    before = opened.evaluate("scales(160, 90)")
+    opened.evaluate("zoomed(2)")
+    assert opened.evaluate("scales(160, 90)") == pytest.approx([2 * scale for scale in before])
+    opened.evaluate("zoomed(0.01)")
+    assert opened.evaluate("scales(160, 90)") == pytest.approx(before)

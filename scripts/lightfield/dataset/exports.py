@@ -25,7 +25,7 @@ VIEWS = "views"
 # The list of an export's files, which is written last.
 MANIFEST = "export.json"
 
-FARTHEST = 1000.0
+FARTHEST = 999.9
 """Metres. Disparity treats misses, and everything farther, as if they were at this distance."""
 BOUNDS_VIEWS = 64
 """The extent of a scene is measured in so many views."""

@@ -1,4 +1,4 @@
-"""The files with which each consumer opens a dataset: one module a format.
+"""Writes the files with which consumers open a dataset: one module for each format.
 
 Each module has ``export(source, settings, folder)``, which writes the views of a
 `source.SourceDataset` into ``folder``. Its settings are in `lightfield.dataset.exports`. `run`
@@ -28,7 +28,8 @@ def run(name: str, source: SourceDataset, settings: Export, folder: Path) -> dic
     Replaces an earlier export. Leaves no files behind if it fails. Raises `UserError` if the folder
     holds other files, or if the consumer cannot take these views.
     """
-    if reason := settings.refusal(source.lens, source.has_depth):
+    reason = settings.refusal(source.lens, source.has_depth)
+    if reason:
         raise UserError(f"{source.lightfield.path}: {reason}")
     # If the folder is a link, replace what it leads to, and keep the link.
     folder = folder.resolve()
@@ -44,7 +45,8 @@ def run(name: str, source: SourceDataset, settings: Export, folder: Path) -> dic
     paths = sorted(path for path in folder.rglob("*") if path.is_file())
     files = {path.relative_to(folder).as_posix(): sha256(path) for path in paths}
     write_json(folder / MANIFEST, {"format": name, "options": settings.recorded, "files": files})
-    if store := ViewStore.configured():
+    store = ViewStore.configured()
+    if store:
         store.put_list(folder / MANIFEST, paths)
     return files
 
@@ -52,7 +54,9 @@ def run(name: str, source: SourceDataset, settings: Export, folder: Path) -> dic
 def _check_replaceable(folder: Path) -> None:
     """Raise `UserError` if a folder holds a file that no earlier export wrote."""
     listing = folder / MANIFEST
-    exported = {MANIFEST, *(_files(listing) if listing.is_file() else ())}
+    exported = {MANIFEST}
+    if listing.is_file():
+        exported.update(_files(listing))
     for path in folder.rglob("*"):
         name = path.relative_to(folder).as_posix()
         if name not in exported and not path.is_dir():
@@ -62,7 +66,7 @@ def _check_replaceable(folder: Path) -> None:
 def transforms(folder: Path) -> list[Path]:
     """Return the transforms.json that instant-ngp's exports wrote for the dataset in ``folder``.
 
-    Those of nerfstudio have the same name, but lie deeper.
+    nerfstudio's files have the same name, but lie deeper.
     """
     return sorted([*folder.glob("transforms.json"), *folder.glob("*/transforms.json")])
 

@@ -1,4 +1,4 @@
-"""A lens as other programs' camera models have it, in pixels."""
+"""Converts a lens to other programs' camera models, in pixels."""
 
 import math
 
@@ -10,7 +10,7 @@ from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 
 def focal_pixels(lens: Rectilinear | KannalaBrandt) -> tuple[float, float]:
-    """Return a focal length in mm in pixels across and down."""
+    """Return a lens's focal length in pixels, across and down."""
     return (
         lens.focal_length * lens.width / lens.sensor[0],
         lens.focal_length * lens.height / lens.sensor[1],
@@ -20,7 +20,7 @@ def focal_pixels(lens: Rectilinear | KannalaBrandt) -> tuple[float, float]:
 def opencv_fisheye(lens: Lens) -> tuple[float, ...]:
     """Return fx, fy in pixels and k1 to k4 of OpenCV's fisheye: r = f (θ + k1 θ³ + …).
 
-    Raises TypeError for a lens that is none: `lightfield.dataset.exports` refuses it before.
+    Raises TypeError for any other lens: `lightfield.dataset.exports` refuses it before.
     """
     if isinstance(lens, KannalaBrandt):
         return (*focal_pixels(lens), *lens.coefficients)
@@ -30,11 +30,11 @@ def opencv_fisheye(lens: Lens) -> tuple[float, ...]:
 
 
 def misreading(lens: Lens) -> str | None:
-    """Say what 3DGRUT misreads of a fisheye in a COLMAP model; None if nothing.
+    """Return how 3DGRUT misreads a fisheye in a COLMAP model, or None if it does not.
 
-    For the largest angle θ it takes the corner's distance from the axis divided by the focal
-    length. It projects points up to there, and inverts r(θ) by Newton's method from an angle in
-    proportion to r. So r(θ) must grow that far, and no pixel may see farther. Source: 3DGRUT's
+    3DGRUT's largest angle θ is the corner's distance from the axis divided by the focal length. It
+    projects points up to there. It inverts r(θ) by Newton's method, starting from an angle
+    proportional to r. So r(θ) must grow that far, and no pixel may see farther. Source: 3DGRUT's
     dataset_colmap.py and cameraProjections.cuh, and OpenCVFisheyeCameraModel in NCore.
     """
     if not isinstance(lens, Equidistant | KannalaBrandt):
@@ -43,7 +43,10 @@ def misreading(lens: Lens) -> str | None:
     across = max(lens.center[0], lens.width - lens.center[0])
     down = max(lens.center[1], lens.height - lens.center[1])
     largest = math.hypot(across, down) / min(fx, fy)
-    coefficients = [coefficient for k in (1.0, *distortion) for coefficient in (0.0, k)]
+    # r / f as a polynomial of θ, which has only odd powers.
+    coefficients: list[float] = []
+    for coefficient in (1.0, *distortion):
+        coefficients += [0.0, coefficient]
     corner = math.hypot((across - 0.5) / fx, (down - 0.5) / fy)
     visible = IncreasingPolynomial(coefficients, last=lens.fov / 2, last_value=corner)
     side = max(lens.width / 2 / fx, lens.height / 2 / fy)

@@ -1,11 +1,13 @@
-"""A COLMAP model, from which gsplat, 3DGRUT and the original 3D Gaussian splatting start.
+"""Writes a COLMAP model, for gsplat, 3DGRUT and the original 3D Gaussian splatting.
 
-``sparse/0/`` holds cameras, images and points3D, in binary or as text, ``images/`` the views as
-8-bit PNG, ``masks/<image>.png`` (0 is ignored) of views with pixels that show nothing, and on
-demand ``stereo/depth_maps/<image>.geometric.bin``, Z-depth in metres. Poses are world to camera,
-with x right, y down and z forward. Points are lifted from depth; each has the views that see it,
-which may be one alone: depth says where it is, and no second view is needed.
-Source: COLMAP's format.rst and scene/reconstruction_io.
+- ``sparse/0/``: cameras, images and points3D, in binary or as text.
+- ``images/``: the views as 8-bit PNG.
+- ``masks/<image>.png``: for views with pixels that show nothing. 0 means ignored.
+- ``stereo/depth_maps/<image>.geometric.bin``: Z-depth in metres, if the settings ask for it.
+
+Poses are world to camera, with x right, y down and z forward. Points are lifted from depth. Each
+has the views that see it. One view is enough, because depth says where the point is. Source:
+COLMAP's format.rst and scene/reconstruction_io.
 """
 
 import struct
@@ -37,16 +39,18 @@ from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
 
-PINHOLE, OPENCV_FISHEYE = (1, "PINHOLE"), (5, "OPENCV_FISHEYE")
+PINHOLE = (1, "PINHOLE")
+OPENCV_FISHEYE = (5, "OPENCV_FISHEYE")
 
-# Beside the model, where the scene has a split: names of the images to test with, one a line, as
-# the original 3D Gaussian splatting reads them.
+# A file beside the model, if the scene has a split: the names of the test images, one per line. The
+# original 3D Gaussian splatting reads it.
 TESTS = "test.txt"
 
 
 def export(source: SourceDataset, settings: Colmap, folder: Path) -> None:
     """Write the model of a source's views into ``folder``."""
-    if problem := cameras.misreading(source.lens):
+    problem = cameras.misreading(source.lens)
+    if problem:
         print(f"warning: {source.lightfield.path}: camera: {problem}", file=sys.stderr)
     views = source.lightfield.views
     if any(view.split for view in views):
@@ -68,26 +72,29 @@ def export(source: SourceDataset, settings: Colmap, folder: Path) -> None:
 
 
 def model(source: SourceDataset, count: int) -> "Model":
-    """Lift ``count`` points, and return them with the views that see each; print how many.
+    """Lift ``count`` points. Return them with the views that see each. Print their number.
 
-    A view that sees none of them gets one more of its own surface, for gsplat's depth loss ends in
-    a KeyError at an image without points.
+    A view that sees none of them gets one more point, of its own surface. Without it, gsplat's
+    depth loss ends in a KeyError.
     """
     points = lift(source, count=count)
-    seen = observations(source, points)
-    views = source.lightfield.views
-    blind_views = [view for view, o in zip(views, seen, strict=True) if not len(o.indices)]
+    seen_points = observations(source, points)
+    blind_views = [
+        view
+        for view, seen in zip(source.lightfield.views, seen_points, strict=True)
+        if not len(seen.indices)
+    ]
     missing_points = lift_one_each(source, blind_views)
     if len(missing_points.positions):
         points = joined([points, missing_points])
-        seen = observations(source, points)
-    views_of_each = np.bincount(
-        np.concatenate([o.indices for o in seen]), minlength=len(points.positions)
+        seen_points = observations(source, points)
+    view_counts = np.bincount(
+        np.concatenate([seen.indices for seen in seen_points]), minlength=len(points.positions)
     )
-    kept = np.flatnonzero(views_of_each)
-    alone = int((views_of_each == 1).sum())
-    print(f"{len(kept):,} points, of which one view alone sees {alone:,}")
-    return Model(source, points, seen, kept)
+    visible = np.flatnonzero(view_counts)
+    seen_once = int((view_counts == 1).sum())
+    print(f"{len(visible):,} points, of which one view alone sees {seen_once:,}")
+    return Model(source, points, seen_points, visible)
 
 
 def camera(lens: Lens) -> tuple[tuple[int, str], list[float]]:
@@ -99,25 +106,25 @@ def camera(lens: Lens) -> tuple[tuple[int, str], list[float]]:
 
 
 class Model:
-    """The points that are kept, numbered from 1, and who sees them: images from 1, in order."""
+    """The ``visible`` points, numbered from 1, and the images that see them, from 1 in order."""
 
     def __init__(
         self,
         source: SourceDataset,
         points: Points,
-        seen: Sequence[Observations],
-        kept: NDArray[np.intp],
+        seen_points: Sequence[Observations],
+        visible: NDArray[np.intp],
     ) -> None:
         self.lens = source.lens
         self.views = source.lightfield.views
-        self.points = points.chosen(kept)
+        self.points = points.chosen(visible)
         number = np.zeros(len(points.positions), np.int64)
-        number[kept] = np.arange(1, len(kept) + 1)
+        number[visible] = np.arange(1, len(visible) + 1)
         self.seen = []
-        for of_view in seen:
-            numbers = number[of_view.indices]
-            is_kept = numbers > 0
-            self.seen.append(Observations(numbers[is_kept], of_view.pixels[is_kept]))
+        for seen in seen_points:
+            numbers = number[seen.indices]
+            is_visible = numbers > 0
+            self.seen.append(Observations(numbers[is_visible], seen.pixels[is_visible]))
 
     def tracks(self) -> Iterator[list[tuple[int, int]]]:
         """Yield each point's (image, index among the image's points)."""
@@ -154,7 +161,8 @@ class Model:
             yield struct.pack("<i7di", number, *quaternion, *translation, 1)
             yield f"{view.name}.png".encode() + b"\0" + struct.pack("<Q", len(seen.indices))
             table = np.empty(len(seen.indices), [("pixel", "<f8", 2), ("point", "<i8")])
-            table["pixel"], table["point"] = seen.pixels, seen.indices
+            table["pixel"] = seen.pixels
+            table["point"] = seen.indices
             yield table.tobytes()
 
     def _binary_points(self) -> Iterator[bytes]:
@@ -166,7 +174,7 @@ class Model:
     def write_text(self, folder: Path) -> None:
         (_, model), parameters = camera(self.lens)
         size = f"{self.lens.width} {self.lens.height}"
-        _write(folder / "cameras.txt", [f"1 {model} {size} {_words(parameters)}\n".encode()])
+        _write(folder / "cameras.txt", [f"1 {model} {size} {_text(parameters)}\n".encode()])
         _write(folder / "images.txt", self._text_images())
         _write(folder / "points3D.txt", self._text_points())
 
@@ -174,18 +182,18 @@ class Model:
         # Without a point the file would be empty.
         yield b"# number, x, y, z, red, green, blue, error, image and place of each view\n"
         for number, position, colour, track in self.rows():
-            places = _words(part for pair in track for part in pair)
-            yield f"{number} {_words(position)} {_words(colour)} 0 {places}\n".encode()
+            places = _text(part for pair in track for part in pair)
+            yield f"{number} {_text(position)} {_text(colour)} 0 {places}\n".encode()
 
     def _text_images(self) -> Iterator[bytes]:
         for number, (view, seen) in enumerate(zip(self.views, self.seen, strict=True), 1):
             quaternion, translation = pose(view.matrix)
-            yield f"{number} {_words(quaternion + translation)} 1 {view.name}.png\n".encode()
+            yield f"{number} {_text(quaternion + translation)} 1 {view.name}.png\n".encode()
             points = zip(seen.pixels.tolist(), seen.indices.tolist(), strict=True)
             yield (" ".join(f"{x!r} {y!r} {index}" for (x, y), index in points) + "\n").encode()
 
 
-def _words(numbers: Iterable[float]) -> str:
+def _text(numbers: Iterable[float]) -> str:
     return " ".join(map(repr, numbers))
 
 

@@ -10,8 +10,8 @@ from lightfield.export.source import Floats
 def depth_range(depth: Floats) -> tuple[float, float]:
     """Return the nearest and the farthest depth in metres of a view, NaN being unknown."""
     depths = np.minimum(depth[depth > 0], FARTHEST)
-    near = float(depths.min(initial=FARTHEST))
-    # A plane seen head on has one depth, and a range needs two.
+    # A plane seen head on has one depth, and a range needs two. Neither is beyond the farthest.
+    near = min(float(depths.min(initial=FARTHEST)), FARTHEST / 1.001)
     return near, max(float(depths.max(initial=near)), 1.001 * near)
 
 

@@ -1,10 +1,13 @@
-"""The layout of the HCI 4D light field benchmark, for a plane of parallel pinhole cameras.
+"""Writes the layout of the HCI 4D light field benchmark, for a plane of parallel pinhole cameras.
 
-``input_Cam000.png`` and so on, row by row from the top left as the cameras see it,
-``parameters.cfg``, and for each view ``gt_depth_lowres_Cam….pfm`` (Z in metres) and
-``gt_disp_lowres_Cam….pfm``; the middle view's are there without a number, too. A disparity is how
-many pixels a point moves between neighbours, d = b f (1 / Z − 1 / F). Cameras that look in parallel
-have F = ∞, for which `FOCUS` stands. Source: Honauer et al. 2016, and the benchmark's parameters.
+- ``input_Cam000.png`` and so on: the views row by row, from the top left as the cameras see it.
+- ``parameters.cfg``: the cameras.
+- ``gt_depth_lowres_Cam….pfm``: Z in metres, for each view.
+- ``gt_disp_lowres_Cam….pfm``: disparity, for each view.
+
+The middle view's maps also exist without a number. A disparity is the number of pixels that a point
+moves between neighbours, d = b f (1 / Z − 1 / F). Parallel cameras have F = ∞, written as `FOCUS`.
+Source: Honauer et al. 2016, and the benchmark's parameters.
 """
 
 from pathlib import Path
@@ -39,8 +42,9 @@ def export(source: SourceDataset, settings: Hci, folder: Path) -> None:
             disparity = np.nan_to_num(baseline * cameras.focal_pixels(lens)[0] / depth)
         maps = {"depth": np.where(np.isfinite(depth), depth, 0), "disp": disparity}
         for name, values in maps.items():
-            for end in (f"_Cam{number:03}", *([""] if number == middle else [])):
-                write_pfm(folder / f"gt_{name}_lowres{end}.pfm", values)
+            write_pfm(folder / f"gt_{name}_lowres_Cam{number:03}.pfm", values)
+            if number == middle:
+                write_pfm(folder / f"gt_{name}_lowres.pfm", values)
         disparities += [float(np.min(disparity)), float(np.max(disparity))]
         progress.done()
     write_text(
@@ -50,17 +54,17 @@ def export(source: SourceDataset, settings: Hci, folder: Path) -> None:
 
 
 def grid(lightfield: LightField) -> tuple[list[View], int, float]:
-    """Return the views row by row, how many a row has, and their distance in metres.
+    """Return the views row by row, the number in a row, and their distance in metres.
 
-    Raises `UserError` for views that are no regular grid in the plane of their images.
+    Raises `UserError` if the views are no regular grid in the plane of their images.
     """
     views = list(lightfield.views)
-    turn = lightfield.matrices[:, :3, :3]
-    places = lightfield.matrices[:, :3, 3] @ turn[0]
+    rotations = lightfield.matrices[:, :3, :3]
+    places = lightfield.matrices[:, :3, 3] @ rotations[0]
     x, y, z = (np.unique(np.round(places[:, axis], 9)) for axis in range(3))
     steps = np.concatenate([np.diff(x), np.diff(y)])
     regular = (
-        np.allclose(turn, turn[0], atol=1e-6)
+        np.allclose(rotations, rotations[0], atol=1e-6)
         and np.ptp(z) < 1e-6
         and len(x) * len(y) == len(views) > 1
         and np.ptp(steps) < 1e-6 * steps.max()
@@ -81,7 +85,7 @@ def parameters(
     baseline: float,
     disparities: list[float],
 ) -> str:
-    """Return the text of parameters.cfg; ``baseline`` is in metres."""
+    """Return the text of parameters.cfg. ``baseline`` is in metres."""
     lens = source.lens
     assert isinstance(lens, Rectilinear)
     scene = source.lightfield.content.get("scene", {}).get(
@@ -116,10 +120,11 @@ def parameters(
             "depth_map_scale": 1.0,
         },
     }
-    return "\n".join(
-        "".join([f"[{name}]\n", *(f"{key} = {value}\n" for key, value in section.items())])
-        for name, section in sections.items()
-    )
+    texts = []
+    for name, section in sections.items():
+        lines = [f"{key} = {value}\n" for key, value in section.items()]
+        texts.append("".join([f"[{name}]\n", *lines]))
+    return "\n".join(texts)
 
 
 def write_pfm(path: Path, values: Floats | NDArray[np.float32]) -> None:

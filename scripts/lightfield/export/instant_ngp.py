@@ -8,14 +8,14 @@ such pixels get a dynamic_mask_<name>.png beside them. instant-ngp refuses EXR f
 differ in type, as half colour and float depth do. It hides pixels of an EXR only if their colour is
 negative. So EXR views are copied to --exr-dir with R, G and B alone.
 
-Give instant-ngp the transforms.json itself. Given a folder it opens every .json in it, also
-lightfield.json, which it cannot read.
+Give instant-ngp the transforms.json itself. If it gets a folder, it opens every .json in it. It
+cannot read lightfield.json.
 """
 
-# How instant-ngp's loader reads poses (``src/nerf_loader.cu``, ``common_device.cuh``): it negates
-# the Y and Z axes of each camera, maps a position p to p · ``scale`` + ``offset``, and cycles the
-# axes (x, y, z) to (y, z, x). This module writes world points in SILVR's orientation: (x, y, z)
-# becomes (y, −x, z). Training happens in the cube of side ``aabb_scale`` around (½, ½, ½).
+# How instant-ngp's loader reads poses (``src/nerf_loader.cu``, ``common_device.cuh``). It negates
+# the Y and Z axes of each camera. It maps a position p to p · ``scale`` + ``offset``. Then it
+# cycles the axes (x, y, z) to (y, z, x). This module writes world points in SILVR's orientation:
+# (x, y, z) becomes (y, −x, z). Training happens in the cube of side ``aabb_scale`` around (½, ½, ½).
 
 import argparse
 import math
@@ -55,10 +55,10 @@ from lightfield.imaging import images
 from lightfield.validation.files import Manifest
 
 TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-"""World to NeRF coordinates, as SILVR's generate_NERF_transforms.py turns its scenes."""
+"""The rotation from world to NeRF coordinates in SILVR's generate_NERF_transforms.py."""
 
 RIG_PART = 0.2
-"""The part of the unit cube's side that the rig fills if nothing says how large the scene is."""
+"""The part of the unit cube's side that the rig fills if the scene's size is unknown."""
 
 MASK = "dynamic_mask_{view}.png"
 """The mask beside a PNG view. The loader does not train on pixels where it is above 0."""
@@ -95,7 +95,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the flags that stand for the settings."""
+    """Add the flags that replace a settings file."""
     add = parser.add_argument_group("Instead of --settings").add_argument
     add("--image-suffix", choices=[".png", ".exr"], default=".png")
     add(
@@ -114,8 +114,8 @@ def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     add(
         "--depth-bounds",
         action="store_true",
-        help="fit to what channel Z of the .exr views sees: cameras and nine tenths of the points "
-        "fill the unit cube (default: the rig fills a fifth of it, or all if it looks inward)",
+        help="fit the unit cube to the cameras and nine tenths of the points in channel Z of the "
+        ".exr views (default: the rig fills a fifth of the cube, or all if it looks inward)",
     )
     add(
         "--aabb-scale",
@@ -133,12 +133,12 @@ def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     add(
         "--placed-as",
         metavar="TRANSFORMS",
-        help="take scale and offset from there: the transforms.json that these views test",
+        help="take scale and offset from this transforms.json, which lists the training views",
     )
 
 
 def settings_from(arguments: argparse.Namespace) -> ExportSettings[InstantNgp]:
-    """Return the settings of --settings, or those of the flags."""
+    """Return the settings from --settings, or from the flags."""
     if arguments.settings:
         refuse_beside_settings(arguments, add_settings_flags)
         return read_settings(ExportSettings[InstantNgp], arguments.settings)
@@ -164,14 +164,15 @@ def settings_from(arguments: argparse.Namespace) -> ExportSettings[InstantNgp]:
 
 
 def export(arguments: argparse.Namespace) -> None:
-    """Write a dataset's transforms.json and what it names, as the command line says."""
+    """Write a dataset's transforms.json, and the files that it names."""
     settings = settings_from(arguments)
     options = settings.options
     lightfield = LightField.read(arguments.input_cfg)
     lightfield.require_centre()
     view_names = {arguments.output: [view.name for view in lightfield.views]}
     for part in PARTS:
-        if names := [view.name for view in lightfield.views if view.split == part]:
+        names = [view.name for view in lightfield.views if view.split == part]
+        if names:
             view_names[arguments.output.with_stem(f"{arguments.output.stem}_{part}")] = names
     writer = _Writer(arguments, settings, lightfield)
     scale, offset = writer.placement()
@@ -187,7 +188,8 @@ def export(arguments: argparse.Namespace) -> None:
     for path, names in view_names.items():
         write_json(path, common | {"frames": [frames[name] for name in names]})
         print(f"{path}: {len(names)} frames, scale {scale:.6g}, offset {offset}")
-    if store := ViewStore.configured():
+    store = ViewStore.configured()
+    if store:
         store.put_list(arguments.output, [*writer.pictures, *list(view_names)[1:]])
 
 
@@ -225,7 +227,7 @@ class _Writer:
             keep_apart("--depth-dir", self.depth_dir, self.image_dir)
 
     def placement(self) -> tuple[float, list[float]]:
-        """Return scale and offset: as given, or fitted to what the views see, or to the rig."""
+        """Return scale and offset: those of the settings, or fitted to depth, or to the rig."""
         if self.trained_by:
             training = read_json(self.trained_by)
             try:
@@ -243,7 +245,7 @@ class _Writer:
         return fitted(*scene_bounds(cameras, points))
 
     def seen_points(self) -> Iterator[Floats]:
-        """Yield world points (n, 3) in metres that some views, spread over the rig, see."""
+        """Yield the world points (n, 3) in metres that some views see. They spread over the rig."""
         views = self.lightfield.views
         step = max(1, max(self.lens.width, self.lens.height) // BOUNDS_PIXELS)
         part = np.s_[step // 2 :: step, step // 2 :: step]
@@ -256,8 +258,8 @@ class _Writer:
     def frames(self) -> dict[str, dict[str, Any]]:
         """Write the files of all views. Return their frames by the views' names."""
         progress = Progress(len(self.lightfield.views), "export")
-        # The loader multiplies depth with the length of the ray. A perspective ray is 1 long along
-        # the axis, and all other rays have length 1. To the loader a depth of 0 is none.
+        # The loader multiplies depth by the length of the ray. A perspective ray has length 1 along
+        # the axis. All other rays have length 1. The loader ignores a depth of 0.
         meaning = conventional_depth(self.lens)
         frames = {}
         missing = []
@@ -266,7 +268,8 @@ class _Writer:
             if self.suffix == ".exr":
                 image = self.copied_exr(image)
             else:
-                missing += [] if image.is_file() else [image]
+                if not image.is_file():
+                    missing.append(image)
                 self.write_mask(view, image)
             frame: dict[str, Any] = {
                 "file_path": self.relative(image),
@@ -287,7 +290,7 @@ class _Writer:
         return frames
 
     def relative(self, path: Path) -> str:
-        """Return a path as seen from the transforms.json."""
+        """Return a path relative to the transforms.json."""
         start = self.output.parent.resolve()
         return Path(os.path.relpath(path.resolve(), start)).as_posix()
 
@@ -297,7 +300,7 @@ class _Writer:
         return depth_of(path, self.lightfield, self.rays, meaning)
 
     def copied_exr(self, source: Path) -> Path:
-        """Copy R, G, B as half floats, with −1 in pixels that instant-ngp must not train on.
+        """Copy R, G, B as half floats. Pixels that instant-ngp must not train on become −1.
 
         Transparent views keep their channel A. Their colour stays premultiplied by it.
         """
@@ -335,8 +338,8 @@ class _Writer:
 def transform_matrix(view: View) -> Floats:
     """Return the (4, 4) camera-to-world matrix of a view in NeRF coordinates.
 
-    It is computed from the angles, as in all files published so far. ``world_matrix`` is rounded,
-    and differs from it by 1e-12.
+    It is computed from the angles, as in all files published so far. The rounded ``world_matrix``
+    differs from it by 1e-12.
     """
     turn = np.eye(4)
     turn[:3, :3] = TURN
@@ -397,7 +400,7 @@ def scene_bounds(cameras: Floats, points: Floats) -> tuple[Floats, Floats]:
     """Return the corners (3,), (3,) in metres of the box that becomes the unit cube.
 
     It holds all ``cameras`` (n, 3) and, along each axis, the middle nine tenths of the ``points``
-    (n, 3). ``aabb_scale`` takes in sky, hills and other far things.
+    (n, 3). Sky, hills and other far points lie outside, within ``aabb_scale``.
     """
     low, high = np.percentile(points, [5, 95], axis=0)
     return np.minimum(low, cameras.min(axis=0)), np.maximum(high, cameras.max(axis=0))
@@ -466,11 +469,11 @@ def _ftheta(lens: Lens) -> list[float]:
     corners = np.array([[0, 0], [lens.width, 0], [0, lens.height], [lens.width, lens.height]])
     reach = float(np.hypot(*(corners - lens.center).T).max())
     radius = np.linspace(0, reach, 4001)
-    seen = radius[np.abs(_angles(lens, radius)[0]) <= math.pi / 2]
-    if len(seen) < 5:
+    in_front = radius[np.abs(_angles(lens, radius)[0]) <= math.pi / 2]
+    if len(in_front) < 5:
         raise UserError(_not_followed("its view is no fisheye's"))
     # Chebyshev's nodes keep the largest error of a polynomial fit near its minimum.
-    nodes = seen[-1] * (0.5 - 0.5 * np.cos(np.linspace(0, math.pi, 1001)))
+    nodes = in_front[-1] * (0.5 - 0.5 * np.cos(np.linspace(0, math.pi, 1001)))
     across, down = _angles(lens, nodes)
     # If the angle at the centre is not 0, the centre looks up, and no pixel beside it does.
     usable = np.isfinite(across) & ((nodes > 0) | (down == 0))
@@ -479,7 +482,7 @@ def _ftheta(lens: Lens) -> list[float]:
     down = down[usable]
     for degree in (1, 4):
         fit = Polynomial.fit(  # type: ignore[no-untyped-call, unused-ignore]
-            nodes, across, degree, domain=[0, seen[-1]], window=[0, 1]
+            nodes, across, degree, domain=[0, in_front[-1]], window=[0, 1]
         )
         if np.abs(fit(nodes) - across).max() < 1e-9:
             break
@@ -505,7 +508,7 @@ def _angles(lens: Lens, radius: Floats) -> tuple[Floats, Floats]:
 
 
 def _beside_diagonal(lens: Lens, radius: Floats, angle: Floats) -> Floats:
-    """Return the angles (n,) between the lens's rays towards a corner and those of a fisheye.
+    """Return the angles (n,) between the rays of the lens and of a fisheye, towards a corner.
 
     The fisheye has ``angle`` (n,) at ``radius`` (n,). NaN where the lens has no ray.
     """
@@ -513,8 +516,8 @@ def _beside_diagonal(lens: Lens, radius: Floats, angle: Floats) -> Floats:
     rays = lens.rays(x + radius * math.sqrt(0.5), y + radius * math.sqrt(0.5))
     side = np.sin(angle) * math.sqrt(0.5)
     expected = np.stack([side, -side, -np.cos(angle)], axis=-1)
-    apart: Floats = 2 * np.arcsin((np.linalg.norm(rays - expected, axis=-1) / 2).clip(max=1))
-    return apart
+    angles: Floats = 2 * np.arcsin((np.linalg.norm(rays - expected, axis=-1) / 2).clip(max=1))
+    return angles
 
 
 def _not_followed(reason: str) -> str:

@@ -1,9 +1,12 @@
-"""A sequence of MPEG immersive video's test model, of one frame, to be coded by TMIV.
+"""Writes a sequence of one frame for TMIV, the test model of MPEG immersive video.
 
-A JSON of cameras, and for each ``<name>_texture_<W>x<H>_yuv420p10le.yuv`` and
-``<name>_depth_<W>x<H>_yuv420p16le.yuv``: normalised disparity, of Z for perspective views and of
-distance for panoramas; level 0 is none. Axes are OMAF's: x forward, y left, z up, and a rotation is
-yaw, pitch and roll in degrees. Source: TMIV's sequence configurations.
+- ``sequence.json``: the cameras.
+- ``<name>_texture_<W>x<H>_yuv420p10le.yuv``: colour, for each camera.
+- ``<name>_depth_<W>x<H>_yuv420p16le.yuv``: normalised disparity, for each camera. It is that of Z
+  for perspective views, and of distance for panoramas. Level 0 means none.
+
+Axes are OMAF's: x forward, y left, z up. A rotation is yaw, pitch and roll in degrees. Source:
+TMIV's sequence configurations.
 """
 
 from pathlib import Path
@@ -21,9 +24,10 @@ from lightfield.export.source import Floats, SourceDataset
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.rotations import matrix_to_euler
 
-COLOUR_BITS, DEPTH_BITS = 10, 16
+COLOUR_BITS = 10
+DEPTH_BITS = 16
 
-# Columns: what a camera of OMAF's has as forward, left and up, in ours (looks along −z, y up).
+# Columns: forward, left and up of OMAF's camera in our camera's axes (looks along −z, y up).
 FROM_OMAF = np.array([[0.0, -1, 0], [0, 0, 1], [-1, 0, 0]])
 
 

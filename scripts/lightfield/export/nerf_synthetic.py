@@ -1,8 +1,8 @@
-"""The layout of NeRF's synthetic scenes: RGBA pictures, and a list for train, val and test each.
+"""Writes the layout of NeRF's synthetic scenes: RGBA pictures, and a list for each part.
 
-``transforms_train.json``, ``_val`` and ``_test`` name pictures without their suffix, beside
-``camera_angle_x``; poses are camera-to-world with OpenGL axes and Z up, as ours. The test views
-validate, too. Source: load_blender.py of the original NeRF.
+``transforms_train.json``, ``_val`` and ``_test`` hold ``camera_angle_x``, and name pictures without
+their suffix. Poses are camera-to-world with OpenGL axes and Z up, as in lightfield.json. Without
+views for validation, the test views validate. Source: load_blender.py of the original NeRF.
 """
 
 import math
@@ -28,7 +28,7 @@ def export(source: SourceDataset, settings: NerfSynthetic, folder: Path) -> None
     angle = 2 * math.atan(lens.width / 2 / cameras.focal_pixels(lens)[0])
     parts = splits(source.lightfield)
     progress = Progress(len(source.lightfield.views), "nerf_synthetic", "views")
-    # Without views of its own, val has those of test.
+    # Write the pictures of test before val: without views of its own, val lists those of test.
     lists = {"train": parts.train, "test": parts.test, "val": parts.validation}
     frames: dict[str, Any] = {}
     for part, part_views in lists.items():

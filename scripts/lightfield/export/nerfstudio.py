@@ -1,10 +1,15 @@
-"""A nerfstudio dataset: perspective views, fisheyes past 180 degrees too, and full panoramas.
+"""Writes a nerfstudio dataset: perspective views, fisheyes past 180° too, and full panoramas.
 
-``transforms.json`` with camera-to-world matrices as they are (OpenGL axes, Z up), ``images/``,
-``masks/`` (0 is ignored; on all frames or on none), on demand ``depths/`` in 16-bit millimetres (Z
-for perspective views, distance for the others, whose rays have unit length there), a point cloud,
-and three lists of file names. Splatfacto takes every camera for a pinhole: give it perspective
-views. Source: nerfstudio's nerfstudio_dataparser.py and cameras.py.
+- ``transforms.json``: camera-to-world matrices as in lightfield.json (OpenGL axes, Z up), and a
+  list of files for each part.
+- ``images/``: the views.
+- ``masks/``: 0 means ignored. Either all frames have a mask, or none.
+- ``depths/``: 16-bit millimetres, if the settings ask for them. Z for perspective views. Distance
+  for all others, whose rays have unit length in nerfstudio.
+- ``points.ply``: a point cloud.
+
+Splatfacto treats every camera as a pinhole: give it perspective views. Source: nerfstudio's
+nerfstudio_dataparser.py and cameras.py.
 """
 
 from pathlib import Path
@@ -59,17 +64,15 @@ def export(source: SourceDataset, settings: Nerfstudio, folder: Path) -> None:
         **camera(source.lens),
         "applied_transform": np.eye(4)[:3].tolist(),
         "ply_file_path": POINT_CLOUD,
-        **{
-            f"{part}_filenames": [paths[view.name] for view in part_views]
-            for part, part_views in lists.items()
-        },
-        "frames": frames,
     }
+    for part, part_views in lists.items():
+        content[f"{part}_filenames"] = [paths[view.name] for view in part_views]
+    content["frames"] = frames
     write_json(folder / "transforms.json", content)
 
 
 def camera(lens: Lens) -> dict[str, Any]:
-    """Return the keys by which nerfstudio knows a lens."""
+    """Return the keys that describe a lens to nerfstudio."""
     size = {"w": lens.width, "h": lens.height}
     if isinstance(lens, Equirectangular):
         focal = {"fl_x": lens.width / 2, "fl_y": float(lens.height)}

@@ -1,4 +1,4 @@
-"""What OpenDIBR plays: a JSON of cameras, and for each its colour and its normalised disparity.
+"""Writes what OpenDIBR plays: a JSON of cameras, and for each its colour and normalised disparity.
 
 Both are PNG (8 and 16 bit) or H.265 (10 and 12 bit, lossless). Depth is Z for perspective views and
 distance for fisheyes and panoramas. Poses are in OpenGL's axes, y up: world coordinates (x, y, z)
@@ -25,7 +25,9 @@ from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rotations import matrix_to_euler
 from lightfield.imaging import images
 
+# Rows: the axes of OpenGL's world in ours.
 TO_OPENGL = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+# Bits of colour and of depth.
 BITS = {"png": (8, 16), "h265": (10, 12)}
 
 
@@ -43,15 +45,16 @@ def export(source: SourceDataset, settings: OpenDibr, folder: Path) -> None:
         limits = depth_range(depth)
         disparity = levels(depth, limits, depth_bits, 0)
         names = [f"{view.name}_{kind}{suffix}" for kind in ("texture", "depth")]
-        texture, map_of_depth = (folder / name for name in names)
+        texture = folder / names[0]
+        depth_map = folder / names[1]
         if settings.format == "png":
             source.write_image(view, texture)
-            images.write_png(map_of_depth, disparity)
+            images.write_png(depth_map, disparity)
         else:
             size = (lens.width, lens.height)
             frame = yuv.of_colour(source.encoded(view), colour_bits)
             yuv.write_hevc(texture, frame, size, colour_bits)
-            yuv.write_hevc(map_of_depth, yuv.of_levels(disparity, depth_bits), size, depth_bits)
+            yuv.write_hevc(depth_map, yuv.of_levels(disparity, depth_bits), size, depth_bits)
         camera_entries.append(
             {
                 "NameColor": names[0],
@@ -78,23 +81,23 @@ def pose(matrix: Floats) -> dict[str, list[float]]:
 
 
 def projection(lens: Lens) -> dict[str, Any]:
-    """Return the keys of a lens; of a panorama's longitudes those to the left are positive."""
+    """Return the keys of a lens. A panorama's longitudes are positive to the left."""
     if isinstance(lens, Rectilinear):
         focal = list(cameras.focal_pixels(lens))
         return {"Projection": "Perspective", "Focal": focal, "Principle_point": list(lens.center)}
     if isinstance(lens, Equirectangular):
-        (west, east), latitude = np.degrees(lens.longitude), np.degrees(lens.latitude)
+        west, east = np.degrees(lens.longitude)
         return {
             "Projection": "Equirectangular",
             "Hor_range": [float(-east), float(-west)],
-            "Ver_range": latitude.tolist(),
+            "Ver_range": np.degrees(lens.latitude).tolist(),
         }
     assert isinstance(lens, Equidistant)
     return {"Projection": "Fisheye_Equidistant", "Fov": math.degrees(lens.fov)}
 
 
 def viewport(matrices: Floats) -> dict[str, Any]:
-    """Return the camera that is shown at first: in the rig's middle, turned as the first view."""
+    """Return the viewport at the start: the mean of the positions, the first view's rotation."""
     middle = matrices[0].copy()
     middle[:3, 3] = matrices[:, :3, 3].mean(axis=0)
     return {

@@ -1,4 +1,4 @@
-"""One point cloud of all surfaces that the views see, with colours and normals, as a binary PLY."""
+"""Writes a point cloud of all visible surfaces: a binary PLY with colours and normals."""
 
 from pathlib import Path
 

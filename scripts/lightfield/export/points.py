@@ -1,4 +1,4 @@
-"""World points on the surfaces that views see, evenly spread, and the views that see them."""
+"""Lifts evenly spread world points from the views' depth, and finds the views that see them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from lightfield.core.progress import Progress
 from lightfield.dataset.lightfield import View
 from lightfield.export.source import Floats, SourceDataset, Surface, pixel_indices
 
-# How many points are lifted for each wanted point. An even selection of them is kept.
+# This many candidates are lifted for each point. An even selection of them is kept.
 _CANDIDATES = 8
 
 
@@ -42,11 +42,11 @@ def lift(source: SourceDataset, count: int | None = None, voxel: float | None = 
     Points come from all views, or from the training views if the rig has a split. Each point has
     the colour that its view shows there.
     """
-    every = source.lightfield.views
-    views = [view for view in every if view.split in (None, "train")] or every
+    all_views = source.lightfield.views
+    views = [view for view in all_views if view.split in (None, "train")] or all_views
     size = source.rendered.lens.width * source.rendered.lens.height
-    wanted = _CANDIDATES * count / len(views) if count else size
-    step = max(1, int((size / wanted) ** 0.5))
+    points_a_view = _CANDIDATES * count / len(views) if count else size
+    step = max(1, int((size / points_a_view) ** 0.5))
     progress = Progress(len(views), "points", "views")
     kept: Points | None = None
     for view, surface in source.surfaces(views):
@@ -137,7 +137,7 @@ def _one_a_voxel(positions: Floats, voxel: float) -> NDArray[np.intp]:
 
 
 def _voxel_for(positions: Floats, count: int) -> float:
-    """Return the side of voxels of which at most ``count`` hold points, to a percent."""
+    """Return the side of voxels so that at most ``count`` of them hold points, to a percent."""
     low = 0.0
     high = float(np.max(positions.max(axis=0) - positions.min(axis=0)))
     while high - low > 0.01 * high:

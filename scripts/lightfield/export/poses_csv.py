@@ -1,4 +1,4 @@
-"""Poses as a table, which a rig of type ``poses`` reads: metres, and XYZ Euler radians."""
+"""Writes poses as a table for rigs of type ``poses``: metres, and XYZ Euler radians."""
 
 from pathlib import Path
 

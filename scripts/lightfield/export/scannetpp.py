@@ -1,12 +1,15 @@
-"""ScanNet++'s layout of a fisheye camera, from which 3DGRUT and Fisheye-GS start.
+"""Writes ScanNet++'s layout of a fisheye camera, for 3DGRUT and Fisheye-GS.
 
-``colmap/`` is a COLMAP model as text, ``image_undistorted_fisheye/`` the views, each an ideal
-equidistant fisheye, beside them ``<view>_mask.png`` (0 is ignored) of views with pixels that show
-nothing, and ``train_test_lists.json`` says what the views are for. Source: ScanNet++'s
-documentation, and 3DGRUT's reader of it.
+- ``colmap/``: a COLMAP model as text.
+- ``image_undistorted_fisheye/``: the views, each an ideal equidistant fisheye. Views with pixels
+  that show nothing have a ``<view>_mask.png`` beside them. 0 means ignored.
+- ``train_test_lists.json``: the views to train and to test with.
+
+Source: ScanNet++'s documentation, and 3DGRUT's reader of it.
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +40,8 @@ def export(source: SourceDataset, settings: ScanNetPP, folder: Path) -> None:
         progress.done()
     parts = splits(source.lightfield)
     lists = {"train": parts.train, "test": parts.test}
-    content = {
-        part: [f"{view.name}.png" for view in part_views] for part, part_views in lists.items()
-    }
-    write_json(folder / "train_test_lists.json", {**content, "has_masks": masked})
+    content: dict[str, Any] = {}
+    for part, part_views in lists.items():
+        content[part] = [f"{view.name}.png" for view in part_views]
+    content["has_masks"] = masked
+    write_json(folder / "train_test_lists.json", content)

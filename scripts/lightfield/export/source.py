@@ -1,4 +1,4 @@
-"""What an exporter reads: the views of a lightfield.json, and the surfaces that they see."""
+"""Reads a dataset for an exporter: the views of a lightfield.json, and the surfaces they see."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,22 +20,22 @@ from lightfield.imaging.tonemap import encode_srgb, to_8_bit, tone_map
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-# Two distances are of one surface if they differ by less than this part. One is that of a pixel's
-# centre, the other that of a point anywhere in the pixel.
+# Two distances belong to the same surface if they differ by less than this part. One is that of a
+# pixel's centre, the other that of a point anywhere in the pixel.
 SAME_SURFACE = 0.01
 
 DEPTH_UNIT = 0.001
-"""The metres of one step in a 16-bit depth map, which has no depth beyond 65.535 m."""
+"""The metres of one step in a 16-bit depth map. Its depths end at 65.535 m."""
 
 
 @dataclass(frozen=True)
 class SourceDataset:
     """The views of a dataset: the rendered ones (``name`` ""), or those of a reprojection.
 
-    ``beside`` maps the names of other rigs to their datasets. Their views test what is trained on
-    these, and their names begin with the rig's: spiral_view_0000f.
-    EXR views are developed with ``exposure`` (stops) and ``reinhard`` (the value that becomes
-    white; 1 leaves light as it is). PNG views are taken as they are.
+    - ``beside``: the datasets of other rigs, by the rigs' names. Their views are test views for
+      these. Their names begin with the rig's name: spiral_view_0000f.
+    - ``exposure``, ``reinhard``: how EXR views are developed: stops, and the value that becomes
+      white. ``reinhard`` 1 leaves light as it is. PNG views are used as they are.
     """
 
     dataset: Path
@@ -109,7 +109,7 @@ class SourceDataset:
         return to_8_bit(tone_map(colour, self.exposure, self.reinhard))
 
     def alpha(self, view: View) -> NDArray[np.uint8]:
-        """Return how much of each pixel (h, w) is covered, 0 to 255. 0 where no light is."""
+        """Return the coverage of each pixel (height, width), 0 to 255. 0 where it has no light."""
         covered = self.valid(view).astype(np.float32)
         if self.lightfield.transparent:
             alpha = self._image(view, ["A"]).channels["A"]
@@ -125,7 +125,7 @@ class SourceDataset:
         return np.asarray(encode_srgb(developed), np.float64)
 
     def valid(self, view: View) -> Bools:
-        """Return which pixels (height, width) hold light: they have a ray, and a source."""
+        """Return which pixels (height, width) hold light. They have a ray and a source."""
         inside: Bools = np.isfinite(self._rays[..., 0])
         if self.name:
             channels = self._image(view).channels
@@ -138,8 +138,7 @@ class SourceDataset:
     def depth(self, view: View, meaning: str) -> Floats:
         """Return a view's depth (height, width) in metres. ``meaning`` is "z" or "distance".
 
-        inf where nothing was hit, NaN where there is no depth. Raises `UserError` if the views have
-        no depth.
+        inf for a miss, NaN for pixels without depth. Raises `UserError` if the views have no depth.
         """
         if not self.has_depth:
             raise UserError(f"{self.path(view)}: has no depth; reproject with format: exr")
@@ -166,7 +165,7 @@ class SourceDataset:
         return self.lens.pixel_rays()
 
     def surfaces(self, views: Iterable[View]) -> Iterator[tuple[View, "Surface"]]:
-        """Yield each view with the surface that it sees, which is that of its rendered view."""
+        """Yield each view with the surface that it sees: that of its rendered view."""
         if self.rendered.depth is None:
             raise UserError(
                 f"{self.rendered.path}: depth: is null; points need it (render.depth in the YAML)"
@@ -174,7 +173,7 @@ class SourceDataset:
         by_name = {view.name: view for view in self.rendered.views}
         rays = self.rendered.lens.pixel_rays()
         for view in views:
-            # A face of a cube map is named after its view: view_0000f_l.
+            # The name of a cube map's face begins with its view's: view_0000f_l.
             rendered = by_name.get(view.name) or by_name[view.name.rpartition("_")[0]]
             path = self._path(rendered, "exr", ".exr")
             distance = depth_of(path, self.rendered, rays, "distance")
@@ -200,7 +199,8 @@ class Surface:
         part = np.s_[first::step, first::step]
         with np.errstate(invalid="ignore"):
             world = self.rays * self.distance[..., None] @ self.view.matrix[:3, :3].T
-            right, below = np.full_like(world, np.nan), np.full_like(world, np.nan)
+            right = np.full_like(world, np.nan)
+            below = np.full_like(world, np.nan)
             right[:, :-1] = world[:, 1:] - world[:, :-1]
             below[:-1] = world[1:] - world[:-1]
             normal = np.cross(below, right)
@@ -208,8 +208,8 @@ class Surface:
             normal[~(near < 0.1 * self.distance)] = np.nan
             normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
             normal *= -np.sign((normal * world).sum(axis=-1, keepdims=True))
-        seen = np.isfinite(self.distance[part]) & (self.distance[part] > 0)
-        return world[part][seen] + self.view.matrix[:3, 3], normal[part][seen]
+        hits = np.isfinite(self.distance[part]) & (self.distance[part] > 0)
+        return world[part][hits] + self.view.matrix[:3, 3], normal[part][hits]
 
     def sees(self, points: Floats) -> Bools:
         """Return which world points (n, 3) lie on this surface, so that nothing hides them."""
@@ -235,7 +235,7 @@ def pixel_indices(lens: Lens, rays: Floats) -> tuple[NDArray[np.intp], NDArray[n
 
 
 def millimetres(depth: Floats) -> NDArray[np.uint16]:
-    """Return depth (h, w) in metres as 16-bit steps of `DEPTH_UNIT`. 0 is none, or too far."""
+    """Return depth (h, w) in metres as 16-bit steps of `DEPTH_UNIT`. 0 means none, or too far."""
     steps = np.round(depth / DEPTH_UNIT)
     valid = np.isfinite(steps) & (steps >= 1) & (steps <= np.iinfo(np.uint16).max)
     return np.where(valid, steps, 0).astype(np.uint16)
@@ -265,7 +265,8 @@ def depth_of(path: Path, lightfield: LightField, rays: Floats, meaning: str) -> 
 
 def check_size(path: Path, lightfield: LightField, pixels: NDArray[Any]) -> None:
     """Raise `UserError` if a view's pixels (h, w, …) do not have the size of the lens."""
-    (height, width), lens = pixels.shape[:2], lightfield.lens
+    height, width = pixels.shape[:2]
+    lens = lightfield.lens
     if (width, height) != (lens.width, lens.height):
         raise UserError(
             f"{path}: is {width} × {height}, but {lightfield.path} says "

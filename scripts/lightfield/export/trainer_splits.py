@@ -1,4 +1,4 @@
-"""Which views a trainer gets for training, validation and testing."""
+"""Chooses the views for training, validation and testing."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -12,7 +12,7 @@ EVERY = 8
 
 
 class Splits(NamedTuple):
-    """The views of each part. ``validation`` holds the test views if the rig has none for it."""
+    """The views of each part. Without views for validation, ``validation`` has the test views."""
 
     train: Sequence[View]
     validation: Sequence[View]
@@ -20,7 +20,7 @@ class Splits(NamedTuple):
 
 
 def splits(lightfield: LightField) -> Splits:
-    """Return the views of each part: those of the rig's split, or else every eighth to test with.
+    """Return the views of each part of the rig's split. Without a split, every eighth view tests.
 
     Raises `UserError` if no view trains, or no view tests.
     """

@@ -25,9 +25,9 @@ WINDOW_SECONDS = 0.07
 
 # The formulas of the columns, which stand under the table.
 FORMULAS = f"""\
-CPU hours = (views × pixels × samples × {1e6 * SECONDS_PER_SAMPLE:g} µs \
-+ jobs × {START_UP_SECONDS:g} s) / 3600, with the report's panorama.
-GB = views × pixels × bytes of a pixel × {COMPRESSED:g}, with the reprojections.
+CPU time = views × pixels × samples × {1e6 * SECONDS_PER_SAMPLE:g} µs \
++ jobs × {START_UP_SECONDS:g} s, with the report's panorama.
+Size = views × pixels × bytes of a pixel × {COMPRESSED:g}, with the reprojections.
 After `snakemake plan`, the seconds and bytes of a view are those that its probes measured."""
 
 
@@ -50,11 +50,11 @@ def forecast(works: Sequence[Work]) -> str:
         sum(work.size for work in works),
     )
     rows = [
-        f"{work.name:<40} {work.views or '':>8} {figure(work.seconds / 3600):>10} "
-        f"{figure(work.size / 1e9) if work.size else '':>8}"
+        f"{work.name:<40} {work.views or '':>8} {time_text(work.seconds):>12} "
+        f"{size_text(work.size) if work.size else '':>8}"
         for work in [*works, *([total] if len(works) > 1 else [])]
     ]
-    head = f"{'to render':<40} {'views':>8} {'CPU hours':>10} {'GB':>8}"
+    head = f"{'to render':<40} {'views':>8} {'CPU time':>12} {'size':>8}"
     return "\n".join([head, *rows, FORMULAS])
 
 
@@ -77,6 +77,23 @@ def calibration_seconds(target: float, size: int, most: int | None = None) -> fl
     return START_UP_SECONDS + PROBES * window
 
 
-def figure(value: float) -> str:
+def time_text(seconds: float) -> str:
+    """Return a time as a person reads it: ``19 s``, ``4 min``, ``2.3 h``, or ``1,153 h``."""
+    if seconds < 100:
+        return f"{_figure(seconds)} s"
+    if seconds < 6000:
+        return f"{_figure(seconds / 60)} min"
+    return f"{_figure(seconds / 3600)} h"
+
+
+def size_text(size: float) -> str:
+    """Return a number of bytes as a person reads it: ``73 kB``, ``5.1 MB``, or ``172 GB``."""
+    for unit, bytes_of_unit in (("kB", 1e3), ("MB", 1e6)):
+        if size < 999.5 * bytes_of_unit:
+            return f"{_figure(size / bytes_of_unit)} {unit}"
+    return f"{_figure(size / 1e9)} GB"
+
+
+def _figure(value: float) -> str:
     """Return a number with two digits, or from 10 on as a whole number with commas."""
-    return f"{value:.2g}" if value < 10 else f"{value:,.0f}"
+    return f"{value:.2g}" if value < 9.95 else f"{value:,.0f}"

@@ -37,6 +37,7 @@ from numpy.typing import NDArray
 from scipy.stats import linregress
 from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
+from lightfield.geometry.lenses import Lens
 from lightfield.imaging.pictures import WHITE, exposure_for
 from lightfield.imaging.tonemap import encode_srgb, tone_map
 
@@ -46,6 +47,14 @@ Mask = NDArray[np.bool_]
 EPSILON = 0.01
 # The part of the pixels that does not count, those with the largest errors.
 OUTLIERS = 0.001
+# From sRGB to luma and two differences of colour. Source: ITU-R BT.709.
+TO_YCBCR = np.array(
+    [[0.2126, 0.7152, 0.0722], [-0.1146, -0.3854, 0.5], [0.5, -0.4542, -0.0458]], np.float64
+)
+# Of IV-PSNR: the weights of luma and of both colours, pixels of shift, and the difference of means.
+IV_WEIGHTS = np.array([4.0, 1.0, 1.0]) / 6
+SHIFT = 2
+MOST_OFFSET = 0.01
 
 
 @dataclass(frozen=True)
@@ -186,6 +195,61 @@ def flip_map(truth: Array, shown: Array) -> Array:
         truth.astype(np.float32), shown.astype(np.float32), "LDR", applyMagma=False
     )[0]
     return flip.reshape(truth.shape[:2])
+
+
+def solid_angles(lens: Lens) -> Array:
+    """Return the solid angle (h, w) of each pixel of a lens in steradians; 0 where it has no ray.
+
+    That of the plane between the pixel's corners: a corner beyond the lens's edge leaves nothing.
+    """
+    rays = lens.rays(np.arange(lens.width + 1.0)[None, :], np.arange(lens.height + 1.0)[:, None])
+    falling = rays[1:, 1:] - rays[:-1, :-1]
+    rising = rays[:-1, 1:] - rays[1:, :-1]
+    angles: Array = np.linalg.norm(np.cross(falling, rising), axis=-1) / 2
+    return np.nan_to_num(angles)
+
+
+def ws_psnr(truth: Array, shown: Array, weights: Array) -> float:
+    """Return the PSNR in decibel of pictures (h, w, 3) in [0, 1], by ``weights`` (h, w) of pixels.
+
+    With `solid_angles` it is WS-PSNR. Source: Sun, Lu and Yu 2017, "Weighted-to-Spherically-Uniform
+    Quality Evaluation for Omnidirectional Video". A difference of nothing counts as 1e-10.
+    """
+    errors = ((truth - shown) ** 2).mean(axis=-1)
+    return -10 * math.log10(max(float((weights * errors).sum() / weights.sum()), 1e-10))
+
+
+def iv_psnr(truth: Array, shown: Array, counted: NDArray[np.bool_]) -> float:
+    """Return the IV-PSNR in decibel of sRGB pictures (h, w, 3) in [0, 1], of pixels ``counted``.
+
+    It forgives shifts of up to two pixels, and a difference of the mean colour of up to a
+    hundredth. Source: Dziembowski, Mieloch, Stankowski and Grzelka 2022, "IV-PSNR – The Objective
+    Quality Metric for Immersive Video Applications".
+    """
+    pictures = [picture @ TO_YCBCR.T for picture in (truth, shown)]
+    one, other = pictures
+    offset = (one - other)[counted].mean(axis=0).clip(-MOST_OFFSET, MOST_OFFSET)
+    return min(
+        _iv_psnr(one, other + offset, counted),
+        _iv_psnr(other + offset, one, counted),
+    )
+
+
+def _iv_psnr(picture: Array, other: Array, counted: NDArray[np.bool_]) -> float:
+    """Return the PSNR of one direction: each pixel of a ``picture`` beside its best match."""
+    height, width = counted.shape
+    padded = np.pad(other, ((SHIFT, SHIFT), (SHIFT, SHIFT), (0, 0)), mode="edge")
+    least = np.full(counted.shape, np.inf)
+    best = np.zeros_like(picture)
+    for row in range(2 * SHIFT + 1):
+        for column in range(2 * SHIFT + 1):
+            squares = (picture - padded[row : row + height, column : column + width]) ** 2
+            error = squares @ IV_WEIGHTS
+            nearer = error < least
+            least[nearer] = error[nearer]
+            best[nearer] = squares[nearer]
+    means = best[counted].mean(axis=0)
+    return float(IV_WEIGHTS @ (-10 * np.log10(np.maximum(means, 1e-10))))
 
 
 def relative_mse(

@@ -1,4 +1,4 @@
-"""What the chosen datasets will take on this machine: views, hours and gigabytes."""
+"""What the chosen datasets will take on this machine: views, time and disk space."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ from scipy.stats import linregress
 from lightfield.core import processors
 from lightfield.core.files import read_keys, reading
 from lightfield.measurement import metrics
-from lightfield.measurement.forecast import figure
+from lightfield.measurement.forecast import size_text, time_text
 from lightfield.measurement.sampling import DENOISED, TRACED, standard_error
 
 COLUMNS = (
@@ -21,36 +21,36 @@ COLUMNS = (
     "resolution",
     "samples",
     "s a view",
-    "hours",
+    "time",
     "denoised",
     "calibrated",
-    "GB",
+    "size",
 )
 
 # The keys of a probe that `read_probe` needs.
 PROBED = ("views", "resolution", "samples", "device", "view_seconds", "view_bytes")
 
-# The error that the calibrated hours are for.
+# The error that the calibrated time is for.
 TARGET_ERROR = 0.01
 # A method that takes this many times as long as plain path tracing does not reach its error.
 OUT_OF_REACH = 1e4
 
 # The formulas of the columns, which stand under the table.
 FORMULAS = f"""\
-- hours = views × s a view / 3600
+- time = views × s a view
 - s a view = mean over the probes of seconds of the probe × pixels of a view / pixels of the \
 probe, ± its standard error
-- denoised = hours × seconds to the same error with the denoiser / seconds without it
-- calibrated = hours × seconds to the error {TARGET_ERROR:g}, by the cheaper of both / seconds of \
+- denoised = time × seconds to the same error with the denoiser / seconds without it
+- calibrated = time × seconds to the error {TARGET_ERROR:g}, by the cheaper of both / seconds of \
 the samples
-- GB = views × mean over the probes of bytes of the probe × pixels of a view / pixels of the probe \
-/ 10⁹
+- size = views × mean over the probes of bytes of the probe × pixels of a view / pixels of the \
+probe
 """
 
 
 @dataclass(frozen=True)
 class Expected:
-    """What one dataset will take. Seconds and hours are those of one core or of the GPU.
+    """What one dataset will take. Seconds are those of one core or of the GPU.
 
     ``parts`` are those of `cheaper_parts`.
     """
@@ -71,14 +71,14 @@ class Expected:
         return standard_error(self.probe["view_seconds"])
 
     @property
-    def hours(self) -> float:
-        """The hours of all views."""
-        return self.views * self.view_seconds / 3600
+    def seconds(self) -> float:
+        """The seconds of all views."""
+        return self.views * self.view_seconds
 
     @property
-    def cheaper_hours(self) -> list[float | None]:
-        """The hours of all views denoised and calibrated; None if they are not known."""
-        return [None if part is None else part * self.hours for part in self.parts]
+    def cheaper_seconds(self) -> list[float | None]:
+        """The seconds of all views denoised and calibrated; None if they are not known."""
+        return [None if part is None else part * self.seconds for part in self.parts]
 
     @property
     def bytes(self) -> float:
@@ -91,8 +91,8 @@ class Expected:
         width, height = self.probe["resolution"]
         return (
             f"| {self.name} | {self.views} | {width} × {height} | {self.probe['samples']} "
-            f"| {self.view_seconds:.0f} ± {self.view_error:.0f} | {self.hours:.0f} "
-            f"| {_hours(self.cheaper_hours)} | {self.bytes / 1e9:.1f} |"
+            f"| {self.view_seconds:.3g} ± {self.view_error:.1g} | {time_text(self.seconds)} "
+            f"| {_times(self.cheaper_seconds)} | {size_text(self.bytes)} |"
         )
 
 
@@ -134,7 +134,7 @@ def table(datasets: list[tuple[str, int, dict[str, Any]]], advice: Mapping[str, 
         *(dataset.row for dataset in expected),
         sums_row(expected),
         "",
-        hours_of(expected),
+        device_of(expected),
         "",
         FORMULAS,
         "Probes are a few of the views, small, with all their samples. The seconds to an error",
@@ -149,23 +149,24 @@ def table(datasets: list[tuple[str, int, dict[str, Any]]], advice: Mapping[str, 
 def sums_row(expected: Sequence[Expected]) -> str:
     """Return the table's last row: the sums over all datasets."""
     views = sum(dataset.views for dataset in expected)
-    hours = sum(dataset.hours for dataset in expected)
-    error = math.hypot(*(dataset.views * dataset.view_error / 3600 for dataset in expected))
-    gigabytes = sum(dataset.bytes for dataset in expected) / 1e9
-    columns = zip(*(dataset.cheaper_hours for dataset in expected), strict=True)
+    seconds = sum(dataset.seconds for dataset in expected)
+    error = math.hypot(*(dataset.views * dataset.view_error for dataset in expected))
+    size = sum(dataset.bytes for dataset in expected)
+    columns = zip(*(dataset.cheaper_seconds for dataset in expected), strict=True)
     cheaper = [None if None in column else sum(column) for column in columns]
     return (
-        f"| all | {views} | | | | {hours:.0f} ± {error:.0f} | {_hours(cheaper)} | {gigabytes:.0f} |"
+        f"| all | {views} | | | | {time_text(seconds)} ± {time_text(error)} "
+        f"| {_times(cheaper)} | {size_text(size)} |"
     )
 
 
-def hours_of(expected: Sequence[Expected]) -> str:
-    """Say what device the hours are of, and how many days this machine's cores take."""
+def device_of(expected: Sequence[Expected]) -> str:
+    """Say what device the times are of, and how long this machine's cores take."""
     if any(dataset.probe["device"] != "CPU" for dataset in expected):
-        return "Hours of the graphics card."
+        return "Times of the graphics card."
     cores = processors.available()
-    days = sum(dataset.hours for dataset in expected) / cores / 24
-    return f"Hours of one processor core; this machine's {cores} take {days:.1f} days."
+    seconds = sum(dataset.seconds for dataset in expected) / cores
+    return f"Times of one processor core; this machine's {cores} take {time_text(seconds)}."
 
 
 def cheaper_parts(
@@ -203,5 +204,5 @@ def cheaper_parts(
     )
 
 
-def _hours(values: Sequence[float | None]) -> str:
-    return " | ".join("—" if value is None else figure(value) for value in values)
+def _times(values: Sequence[float | None]) -> str:
+    return " | ".join("—" if value is None else time_text(value) for value in values)

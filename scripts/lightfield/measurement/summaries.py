@@ -7,7 +7,10 @@ import numpy as np
 
 # The columns that name a row, and those of which rows have means: held-out views, synthesised.
 COLUMNS = ("truth", "variant", "value")
-MEANS = ("psnr", "ssim", "flip", "holes", "source_bytes")
+MEANS = (
+    *("psnr", "psnr_black", "ws_psnr", "iv_psnr", "ssim", "flip", "flip_black"),
+    *("holes", "source_bytes"),
+)
 # The places of views, by the largest part of the way from the middle of the cameras to the edge of
 # their interpolation volume.
 PLACES = {"inside": 0.5, "edge": 1.0, "beyond": np.inf}

@@ -7,6 +7,7 @@ nearest view without its depth, and views with the depth of other views.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -47,10 +48,12 @@ def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[Variant]:
     read = reader(source)
     sizes = {view.name: source.path(view).stat().st_size for view in views}
     size = sum(sizes.values())
-    all_views = Sources(lens, views, read)
+    fills_holes = not source.lightfield.transparent
+    make = partial(Sources, lens, fills_holes=fills_holes)
+    all_views = make(views, read)
     yield Variant("all", str(len(views)), all_views, BEST, size)
     for subset in subsets(source.lightfield, views):
-        fewer = Sources(lens, subset, read)
+        fewer = make(subset, read)
         yield Variant("views", str(len(subset)), fewer, BEST, sum(sizes[v.name] for v in subset))
     for best in (1, 2, 4, 8):
         yield Variant("best", str(best), all_views, best, size)
@@ -64,7 +67,7 @@ def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[Variant]:
                 first::part, first::part
             ][: small.height, : small.width]
 
-        coarse = Sources(small, views, shrunk)
+        coarse = Sources(small, views, shrunk, fills_holes=fills_holes)
         yield Variant(
             "resolution", f"{small.width} × {small.height}", coarse, BEST, size // part**2
         )
@@ -74,13 +77,13 @@ def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[Variant]:
             colour, distance = read(view)
             return colour, with_precision(distance, precision)
 
-        yield Variant("depth", precision, Sources(lens, views, with_depth), BEST, size)
+        yield Variant("depth", precision, make(views, with_depth), BEST, size)
 
     def flat(view: View) -> tuple[Array, Array]:
         colour, distance = read(view)
         return colour, np.where(np.isnan(distance), np.nan, np.inf)
 
-    nearest = Sources(lens, views, flat)
+    nearest = make(views, flat)
     nearest.distances = all_views.distances
     yield Variant("control", "nearest view alone", nearest, 1, size)
     after = dict(zip([view.name for view in views], [*views[1:], views[0]], strict=True))
@@ -88,7 +91,7 @@ def variants(source: SourceDataset, views: Sequence[View]) -> Iterator[Variant]:
     def mixed(view: View) -> tuple[Array, Array]:
         return read(view)[0], read(after[view.name])[1]
 
-    yield Variant("control", "shuffled depth", Sources(lens, views, mixed), BEST, size)
+    yield Variant("control", "shuffled depth", make(views, mixed), BEST, size)
 
 
 def subsets(lightfield: LightField, views: Sequence[View]) -> Iterator[Sequence[View]]:
@@ -123,11 +126,13 @@ def compare(
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for each region of each of the ``views`` of the ``truth``.
 
-    A row has psnr in decibel, ssim, flip and the part of holes, which are black and count. ``part``
-    is the region's part of the picture. ``to_edge`` is the view's distance from the middle of the
-    views ``around`` it, over the distance to the edge of their volume.
+    A row has psnr, ws_psnr and iv_psnr in decibel, ssim, flip and the part of holes. Holes count as
+    they are filled; psnr_black and flip_black are those of the picture whose holes are black.
+    ``part`` is the region's part of the picture. ``to_edge`` is the view's distance from the middle
+    of the views ``around`` it, over the distance to the edge of their volume.
     """
     inside = np.isfinite(truth.lens.pixel_rays()[..., 0])
+    angles = metrics.solid_angles(truth.lens)
     cameras = np.array([view.matrix for view in around])
     eyes = np.array([view.matrix for view in views])
     parts = parts_to_edge(cameras, variant.sources.lens, eyes[:, :3, 3])
@@ -136,9 +141,10 @@ def compare(
         true = images.read_image(truth.path(view), "RGB").colour
         true_picture = _developed(true, exposure, inside)
         picture = _developed(made.colour, exposure, inside)
-        errors = (true_picture - picture) ** 2
+        black = np.where(made.holes[..., None], 0, picture)
         similar = metrics.ssim_map(true_picture, picture)
         flips = metrics.flip_map(true_picture, picture)
+        black_flips = metrics.flip_map(true_picture, black)
         for region, pixels in regions(truth, view, inside).items():
             yield {
                 "variant": variant.name,
@@ -149,9 +155,13 @@ def compare(
                 "place": next(name for name, most in PLACES.items() if to_edge <= most),
                 "region": region,
                 "part": float(pixels[inside].mean()),
-                "psnr": -10 * float(np.log10(max(errors[pixels].mean(), 1e-10))),
+                "psnr": metrics.ws_psnr(true_picture, picture, pixels),
+                "psnr_black": metrics.ws_psnr(true_picture, black, pixels),
+                "ws_psnr": metrics.ws_psnr(true_picture, picture, np.where(pixels, angles, 0)),
+                "iv_psnr": metrics.iv_psnr(true_picture, picture, pixels),
                 "ssim": float(similar[pixels].mean()),
                 "flip": float(flips[pixels].mean()),
+                "flip_black": float(black_flips[pixels].mean()),
                 "holes": float(made.holes[pixels].mean()),
                 "source_bytes": variant.size,
             }

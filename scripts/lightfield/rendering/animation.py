@@ -1,4 +1,4 @@
-"""What of a .blend may change from one frame to the next, or within a frame.
+"""Finds what may change in a .blend from one frame to the next, or within a frame.
 
 Nothing here depends on the frame that the .blend was saved at. Keyframes and drivers may give a
 property any value.
@@ -10,7 +10,7 @@ from typing import Any
 
 import bpy
 
-# Modifiers that do not change with time by themselves. Any other one may, such as a simulation.
+# Modifiers that do not change with time by themselves. Any other may, such as a simulation.
 _STEADY_MODIFIERS = {
     *("ARMATURE", "ARRAY", "BEVEL", "BOOLEAN", "CAST", "COLLISION", "CORRECTIVE_SMOOTH", "CURVE"),
     *("DATA_TRANSFER", "DECIMATE", "DISPLACE", "EDGE_SPLIT", "HOOK", "LAPLACIANDEFORM"),
@@ -20,9 +20,9 @@ _STEADY_MODIFIERS = {
     *("VERTEX_WEIGHT_EDIT", "VERTEX_WEIGHT_MIX", "VERTEX_WEIGHT_PROXIMITY", "VOLUME_DISPLACE"),
     *("VOLUME_TO_MESH", "WARP", "WEIGHTED_NORMAL", "WELD", "WIREFRAME"),
 }
-# Geometry nodes that know the time, keep a state, or read files that may.
+# Geometry nodes that read the time, keep a state, or import files that may do either.
 _TIMED_NODES = re.compile(r"GeometryNode(InputSceneTime|Simulation|Bake|Import)")
-# Cycles blurs what has an attribute of this name, even where nothing moves.
+# Cycles blurs geometry that has an attribute of this name, even if nothing moves.
 _VELOCITY = "velocity"
 _STORING_NODES = (
     *("GeometryNodeStoreNamedAttribute", "GeometryNodeStoreNamedGrid"),
@@ -31,9 +31,9 @@ _STORING_NODES = (
 
 
 def animated() -> Iterator[tuple[Any, Any]]:
-    """Yield every data-block with keyframes or drivers, and what has them: it, or its node tree."""
+    """Yield every data-block with keyframes or drivers, and their owner: it, or its node tree."""
     for name, collection in bpy.data.bl_rna.properties.items():
-        # Blender 5.2 lists everything once more in `all_ids`.
+        # Blender 5.2 repeats everything in `all_ids`.
         if collection.type != "COLLECTION" or name == "all_ids":
             continue
         for owner in getattr(bpy.data, name):
@@ -66,31 +66,31 @@ def paths(block: Any) -> set[str]:
 
 
 def mute(block: Any, prefixes: tuple[str, ...]) -> None:
-    """Let a data-block's animation no longer set the properties whose paths begin like these."""
+    """Stop a data-block's animation from setting properties whose paths begin with a prefix."""
     for curve in curves(block):
         if curve.data_path.startswith(prefixes):
             curve.mute = True
 
 
 def uses_visibility() -> list[str]:
-    """Return the names of what depends on which objects the viewport shows.
+    """Return the names of the data-blocks that depend on which objects the viewport shows.
 
-    These have drivers that ask for it, or curves that set the visibility of other blocks. Blender
-    takes notice of such curves only when the viewport changes.
+    They have drivers that read it, or curves that set the visibility of other blocks. Blender
+    notices such curves only when the viewport changes.
     """
     names = set()
     for owner, block in animated():
-        asks = any(path.endswith("hide_viewport") for _, path in _driver_inputs(block))
-        if asks or any(re.search(r"\.hide_(viewport|render)$", path) for path in paths(block)):
+        reads_it = any(path.endswith("hide_viewport") for _, path in _driver_inputs(block))
+        if reads_it or any(re.search(r"\.hide_(viewport|render)$", path) for path in paths(block)):
             names.add(str(owner.name_full))
     return sorted(names)
 
 
 def reached() -> set[Any]:
-    """Return the objects that some animation sets or reads by a path that leads through them.
+    """Return the objects that an animation sets or reads through a property path.
 
-    Such a path may begin at a scene. Blender counts the scene as a user of all its objects, so its
-    list of users does not tell which of them the animation needs.
+    Such a path may begin at a scene. Blender counts the scene as a user of all its objects. So its
+    list of users does not tell which objects the animation needs.
     """
     objects: set[Any] = set()
     for _, block in animated():
@@ -101,11 +101,11 @@ def reached() -> set[Any]:
 
 
 def simulated() -> list[str]:
-    """Return the names of what may change with time, or be blurred, without keyframes or drivers.
+    """Return the data-blocks that may change or be blurred without keyframes or drivers, by name.
 
-    These are simulations, drawings, sequences of files, caches, and what has velocities.
+    These are simulations, drawings, sequences of files, caches, and geometry with velocities.
     """
-    blocks = [thing for thing in bpy.data.objects if is_simulated(thing)]
+    blocks = [obj for obj in bpy.data.objects if is_simulated(obj)]
     blocks += [*bpy.data.cache_files, *bpy.data.movieclips, *bpy.data.volumes]
     blocks += [image for image in bpy.data.images if image.source in ("SEQUENCE", "MOVIE")]
     for group in (bpy.data.meshes, bpy.data.hair_curves, bpy.data.pointclouds):
@@ -114,18 +114,18 @@ def simulated() -> list[str]:
     return sorted({str(block.name_full) for block in blocks})
 
 
-def is_simulated(thing: Any) -> bool:
+def is_simulated(obj: Any) -> bool:
     """Return whether an object may change with time without keyframes or drivers."""
     return (
         # Drawings have frames of their own.
-        thing.type == "GREASEPENCIL"
-        or bool(thing.rigid_body or thing.rigid_body_constraint)
-        or any(modifier.type not in _STEADY_MODIFIERS for modifier in thing.modifiers)
+        obj.type == "GREASEPENCIL"
+        or bool(obj.rigid_body or obj.rigid_body_constraint)
+        or any(modifier.type not in _STEADY_MODIFIERS for modifier in obj.modifiers)
     )
 
 
 def _keyframes(source: Any) -> Iterator[Any]:
-    """Yield the curves that a block's action, or that of an NLA strip, has for the block."""
+    """Yield the curves for a block in its action, or in an NLA strip's action."""
     for layer in source.action.layers if source.action else ():
         for strip in layer.strips:
             for bag in strip.channelbags:
@@ -134,19 +134,19 @@ def _keyframes(source: Any) -> Iterator[Any]:
 
 
 def _all_strips(strips: Iterable[Any]) -> Iterator[Any]:
-    """Yield NLA strips, and those that lie in them."""
+    """Yield NLA strips, and the strips inside them."""
     for strip in strips:
         yield strip
         yield from _all_strips(strip.strips)
 
 
 def _driver_inputs(block: Any) -> Iterator[tuple[Any, str]]:
-    """Yield what the drivers of a data-block read: where a path begins, and the path."""
+    """Yield the inputs of a data-block's drivers: where a path begins, and the path."""
     data = getattr(block, "animation_data", None)
     for curve in data.drivers if data else ():
         for variable in curve.driver.variables:
             for target in variable.targets:
-                # Without a block of its own it reads the present scene.
+                # A target without a block reads the current scene.
                 yield target.id or bpy.context.scene, str(target.data_path)
 
 
@@ -156,7 +156,7 @@ def _objects_on(start: Any, path: str) -> Iterator[Any]:
         try:
             place = start.path_resolve(path[: step.start()])
         except ValueError:
-            # The path leads nowhere, or this is no end of a step.
+            # The path leads nowhere, or the string is cut inside a step.
             continue
         if isinstance(place, bpy.types.Object):
             yield place
@@ -167,7 +167,7 @@ def _is_timed(tree: Any) -> bool:
     if tree.bl_idname != "GeometryNodeTree":
         return False
     sockets = [item for item in tree.interface.items_tree if item.item_type == "SOCKET"]
-    # What else than geometry a modifier's nodes return becomes an attribute of any name.
+    # Any output besides the geometry becomes an attribute, whose name may be "velocity".
     returns_attributes = sum(socket.in_out == "OUTPUT" for socket in sockets) > 1
     return returns_attributes or any(
         _TIMED_NODES.match(node.bl_idname) or _may_store_velocity(node) for node in tree.nodes

@@ -1,4 +1,4 @@
-"""What a .blend says of its rendering: `lightfield.dataset.blend` takes it, or says it does not."""
+"""Reads a .blend's render settings. `lightfield.dataset.blend` decides which of them to use."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -10,9 +10,10 @@ from lightfield.rendering.cycles import view_layer
 
 
 def facts(frames: Iterable[int | None]) -> dict[str, Any]:
-    """Return what the open .blend says, with its camera at ``frames``; None is the file's own.
+    """Return the open .blend's render settings, and its camera at ``frames``.
 
-    Raises `UserError` where the camera has not the same lens at all of them.
+    None stands for the frame that the file was saved at. Raises `UserError` if the camera does not
+    have the same lens at all frames.
     """
     scene = bpy.context.scene
     layer = view_layer(scene)
@@ -56,7 +57,7 @@ def facts(frames: Iterable[int | None]) -> dict[str, Any]:
 
 
 def _samples(cycles: Any, layer: Any) -> int:
-    """Return the samples of a pixel. A view layer may set another number, or a bound."""
+    """Return the samples per pixel. A view layer may set another number, or an upper bound."""
     layer_samples = int(layer.samples)
     scene_samples = int(cycles.samples)
     if not layer_samples or cycles.use_layer_samples == "IGNORE":
@@ -71,7 +72,7 @@ def _samples(cycles: Any, layer: Any) -> int:
 def _camera(frames: list[int]) -> dict[str, Any] | None:
     """Return the camera's lens, and its camera-to-world matrices (4, 4) by frame.
 
-    None where the scene has no camera. A marker may change the camera with the frame.
+    Return None if the scene has no camera. A marker may change the camera with the frame.
     """
     scene = bpy.context.scene
     lenses = []

@@ -56,27 +56,29 @@ def open_scene(
 ) -> list[str]:
     """Open a .blend with its scripts disabled. Return the names of the view layers to render.
 
-    ``chosen`` is a scene YAML's ``scene`` block, whose ``scene_name`` and ``view_layers`` choose
-    the scene and its view layers. With a view store, the external files in ``inventory`` are taken
-    from there. Raises `UserError` if Blender cannot read the file, if the scene or a view layer is
-    missing, or if a newer version saved the file or a library that it links: Blender would lose
-    what it does not know.
+    ``chosen`` is a scene YAML's ``scene`` block. Its ``scene_name`` and ``view_layers`` choose the
+    scene and its view layers. A view store, if there is one, provides the external files in
+    ``inventory``.
+
+    Raises `UserError` if Blender cannot read the file, or if the scene or a view layer is missing.
+    Also raises it if a newer Blender saved the file or a linked library: this one would lose data.
     """
     _take_files(path, inventory or {})
-    here = bpy.app.version_string
+    this_version = bpy.app.version_string
     try:
         with quiet():
             bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
     except RuntimeError as error:
         check_readable(path)
-        raise UserError(f"{path}: Blender {here} cannot open it: {str(error).strip()}") from None
+        problem = str(error).strip()
+        raise UserError(f"{path}: Blender {this_version} cannot open it: {problem}") from None
     libraries = [(path_of(library), library.version) for library in bpy.data.libraries]
     for file, saved in [(path, bpy.data.version), *libraries]:
         if tuple(saved[:2]) > bpy.app.version[:2]:
             newer = f"{saved[0]}.{saved[1]}"
             raise UserError(
-                f"{file}: was saved by Blender {newer}, and Blender {here} would lose what is "
-                f"new in it; build with bpy {newer}, or save it with Blender "
+                f"{file}: was saved by Blender {newer}, and Blender {this_version} would lose what "
+                f"is new in it; build with bpy {newer}, or save it with Blender "
                 f"{bpy.app.version[0]}.{bpy.app.version[1]}"
             )
     try:
@@ -155,7 +157,8 @@ def _join(layers: Sequence[Any]) -> None:
     for part, exclude, holdout, indirect in settings:
         if part.exclude != exclude:
             part.exclude = exclude
-        part.holdout, part.indirect_only = holdout, indirect
+        part.holdout = holdout
+        part.indirect_only = indirect
 
 
 def path_of(block: Any) -> Path:

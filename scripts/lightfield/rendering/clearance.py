@@ -1,4 +1,4 @@
-"""How near each camera is to geometry, and which objects enclose it."""
+"""Measures how near each camera is to geometry, and which objects enclose it."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -20,31 +20,32 @@ from lightfield.rendering.volumes import alone
 
 Floats = NDArray[np.float64]
 
-# How far from a camera geometry is looked for, in metres.
+# Geometry farther than this from a camera is ignored, in metres.
 REACH = 0.5
 # Geometry nearer than this touches the camera.
 TOUCHING = 0.001
-# How many places each camera of a random rig tries, and how many samples say what encloses the box.
+# Each camera of a random rig tries at most this many places.
 _TRIES = 100
+# This many samples in the rig's box find the objects that enclose most of it.
 _SAMPLES = 64
-# How many rays from a camera find out what encloses it.
+# The number of rays from a camera that find the object around it.
 _RAYS = len(icosphere(1))
 
 
 def show_what_is_rendered() -> None:
     """Make the viewport show what a render of the current frame shows, without its volumes.
 
-    The functions below look for geometry in the viewport.
+    The functions below find geometry in the viewport.
     """
     shown = in_render(_shown) - alone()
     layer = bpy.context.view_layer
-    for thing in bpy.data.objects:
-        animation.mute(thing, ("hide_viewport",))
-        thing.hide_viewport = thing.name_full not in shown
+    for obj in bpy.data.objects:
+        animation.mute(obj, ("hide_viewport",))
+        obj.hide_viewport = obj.name_full not in shown
     for settings in bpy.data.particles:
         settings.display_percentage = 100
-    for thing in layer.objects:
-        thing.hide_set(False)
+    for obj in layer.objects:
+        obj.hide_set(False)
     for collection in bpy.data.collections:
         collection.hide_viewport = collection.hide_render
     parts = [layer.layer_collection]
@@ -55,8 +56,8 @@ def show_what_is_rendered() -> None:
 
 def _shown(depsgraph: Any) -> set[str]:
     """Return the full names of the objects that are not hidden in a render."""
-    things = (entry.object for entry in depsgraph.object_instances)
-    return {str(thing.original.name_full) for thing in things if not thing.hide_render}
+    objects = (entry.object for entry in depsgraph.object_instances)
+    return {str(obj.original.name_full) for obj in objects if not obj.hide_render}
 
 
 def clearances(positions: Floats, reach: float = REACH) -> Floats:
@@ -83,19 +84,19 @@ def instances() -> Iterator[tuple[Any, Any, Floats, Floats]]:
     """Yield every rendered mesh: mesh, world matrix, and corners of its world bounding box."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for instance in depsgraph.object_instances:
-        thing = instance.object
-        if not instance.show_self or thing.type != "MESH":
+        obj = instance.object
+        if not instance.show_self or obj.type != "MESH":
             continue
-        # Particles place copies of an object that is hidden itself.
-        if thing.hide_render and not instance.is_instance:
+        # Particles may show copies of an object that is hidden itself.
+        if obj.hide_render and not instance.is_instance:
             continue
         matrix = instance.matrix_world.copy()
-        corners = np.array([matrix @ Vector(corner) for corner in thing.bound_box])
-        yield thing.data, matrix, corners.min(axis=0), corners.max(axis=0)
+        corners = np.array([matrix @ Vector(corner) for corner in obj.bound_box])
+        yield obj.data, matrix, corners.min(axis=0), corners.max(axis=0)
 
 
 class Enclosure(NamedTuple):
-    """An object that encloses a camera, so that the camera sees the backs of its faces.
+    """An object around a camera: the camera sees the backs of its faces.
 
     ``share`` is the part of all directions in which the camera sees such a back first. An open mesh
     may be a room without a wall, a dome, a backdrop, or an obstacle.
@@ -140,7 +141,7 @@ def _objects_around(enclosures: Sequence[Enclosure | None]) -> list[str | None]:
 
 
 def free_places(rig: Random) -> Floats:
-    """Return the places (n, 3) in the unit box of a rig's cameras: the first free one of each.
+    """Return each camera's first free place (n, 3) in the rig's unit box.
 
     An object that encloses most of the box is a room, not an obstacle. Raises `UserError` if a
     camera finds no free place.
@@ -151,13 +152,13 @@ def free_places(rig: Random) -> Floats:
     places = np.full((rig.count, 3), np.nan)
     progress = Progress(rig.count, "places", "cameras")
     for number in range(_TRIES):
-        left = np.flatnonzero(np.isnan(places[:, 0]))
-        candidates = np.array([rig.candidate(int(view), number) for view in left])
+        unplaced = np.flatnonzero(np.isnan(places[:, 0]))
+        candidates = np.array([rig.candidate(int(view), number) for view in unplaced])
         world = rig.to_world(candidates)
         free = clearances(world, rig.clearance) >= rig.clearance
         inside = [name not in {None, *rooms} for name in _objects_around(enclosures(world))]
         free &= ~np.array(inside)
-        places[left[free]] = candidates[free]
+        places[unplaced[free]] = candidates[free]
         progress.done(int(free.sum()))
         if free.all():
             return places
@@ -168,20 +169,20 @@ def free_places(rig: Random) -> Floats:
 
 
 def enclosures(positions: Floats) -> list[Enclosure | None]:
-    """Return for each camera the object, or room, that encloses it, or None.
+    """Return the object, or room, around each camera, or None.
 
     An object encloses a camera if most rays from the camera meet the object's back first. For an
-    open mesh a third of the rays suffices, if few others meet its fronts: leaves would show both.
-    The camera must then lie in the mesh's bounding box, which is flat for a plane, and some ray
-    must miss the mesh.
+    open mesh a third of the rays suffices, if few others meet its fronts: leaves show both. The
+    camera must then lie in the mesh's bounding box, which is flat for a plane. Some ray must miss
+    the mesh.
     """
     depsgraph = bpy.context.evaluated_depsgraph_get()
     around_each: list[Enclosure | None] = []
     for position in positions:
         hits = _first_hits(position, depsgraph)
-        backs = Counter(hit.thing.name for hit in hits if hit.is_back)
+        backs = Counter(hit.obj.name for hit in hits if hit.is_back)
         name, count = backs.most_common(1)[0] if backs else ("", 0)
-        of_object = [hit for hit in hits if hit.thing.name == name]
+        of_object = [hit for hit in hits if hit.obj.name == name]
         share = count / _RAYS
         sees_backs = share >= 1 / 3 and count >= 0.75 * len(of_object)
         is_open = sees_backs and _is_within_open(position, of_object[0], depsgraph)
@@ -191,33 +192,33 @@ def enclosures(positions: Floats) -> list[Enclosure | None]:
 
 
 class _Hit(NamedTuple):
-    """What a ray meets first: an object, or an instance of it, with its world matrix."""
+    """The first hit of a ray: an object, or an instance of it, with its world matrix."""
 
-    thing: Any
+    obj: Any
     matrix: Any
     is_back: bool
 
 
 def _first_hits(position: Floats, depsgraph: Any) -> list[_Hit]:
-    """Return what `_RAYS` rays from a camera in all directions meet first."""
+    """Return the first hits of `_RAYS` rays from a camera in all directions."""
     hits = []
     for vertex in icosphere(1):
         direction = Vector(vertex).normalized()
-        hit, _, normal, _, thing, matrix = bpy.context.scene.ray_cast(
+        hit, _, normal, _, obj, matrix = bpy.context.scene.ray_cast(
             depsgraph, Vector(position), direction
         )
         if hit:
-            hits.append(_Hit(thing, matrix, normal.dot(direction) > 0))
+            hits.append(_Hit(obj, matrix, normal.dot(direction) > 0))
     return hits
 
 
 def _is_within_open(position: Floats, hit: _Hit, depsgraph: Any) -> bool:
     """Return whether a camera is in an object's bounding box, and some ray does not meet it."""
-    thing = hit.thing.evaluated_get(depsgraph)
+    obj = hit.obj.evaluated_get(depsgraph)
     inverse = hit.matrix.inverted_safe()
     local = inverse @ Vector(position)
-    corners = np.array(thing.bound_box)
+    corners = np.array(obj.bound_box)
     if not np.all(np.abs(np.array(local) - corners.mean(axis=0)) < np.ptp(corners, axis=0) / 2):
         return False
     directions = (inverse.to_3x3() @ Vector(vertex) for vertex in icosphere(2))
-    return any(not thing.ray_cast(local, direction)[0] for direction in directions)
+    return any(not obj.ray_cast(local, direction)[0] for direction in directions)

@@ -1,4 +1,4 @@
-"""The colour of a view, with as many samples as the scene YAML asks for."""
+"""Renders the colour of a view, with the samples of the scene YAML."""
 
 import re
 import time
@@ -20,13 +20,15 @@ _COUNTS = "Debug Sample Count"
 
 @dataclass(frozen=True)
 class Colour:
-    """The colour of a view, (height, width, 3 or 4) float32, linear Rec. 709, alpha associated.
+    """The colour of a view.
 
-    ``passes`` are those that were asked for, by name, each as the colour itself; ``manifest`` has
-    the hashes of the objects in a matte.
-    ``render_seconds`` and ``synchronization_seconds`` are Cycles' own. ``samples``,
-    (height, width), is how many each pixel took, and ``worked_seconds`` the processor time, of all
-    threads, of those ``render_seconds``; None unless `watch_samples` asked for them.
+    - ``pixels`` (height, width, 3 or 4): float32, linear Rec. 709, alpha associated.
+    - ``passes``: the requested passes by name, each like ``pixels``.
+    - ``manifest``: the hashes of the objects in a matte.
+    - ``samples`` (height, width): the samples of each pixel. None without `watch_samples`.
+    - ``render_seconds``, ``synchronization_seconds``: as Cycles measured them.
+    - ``worked_seconds``: the processor time of all threads in ``render_seconds``. None without
+      `watch_samples`.
     """
 
     pixels: Array
@@ -43,29 +45,34 @@ def render_colour(
 ) -> Colour:
     """Render the view of a camera at ``world_matrix``, (4, 4) camera-to-world.
 
-    Of the ``passes`` those are made that are of colour, for which Cycles has been set up.
+    Returns those of the ``passes`` that belong to colour. Cycles must be set up for them.
     """
-    watched = view_layer(bpy.context.scene).cycles.pass_debug_sample_count
+    counts_samples = view_layer(bpy.context.scene).cycles.pass_debug_sample_count
     _reports.clear()
-    wanted = [rendered for rendered in passes if rendered.of_colour]
-    needed = {
-        name: "rgba" if each.kind == "matte" else "RGB" for each in wanted for name in each.needed
-    }
-    needed |= {"Combined": "RGBA" if alpha else "RGB"} | ({_COUNTS: "X"} if watched else {})
+    colour_passes = [view_pass for view_pass in passes if view_pass.of_colour]
+    needed: dict[str, str] = {}
+    for view_pass in colour_passes:
+        channels = "rgba" if view_pass.kind == "matte" else "RGB"
+        needed |= dict.fromkeys(view_pass.needed, channels)
+    needed["Combined"] = "RGBA" if alpha else "RGB"
+    if counts_samples:
+        needed[_COUNTS] = "X"
     rendered = render_view(world_matrix, seed, needed)
     samples = None
-    if watched:
+    if counts_samples:
         # The pass holds each pixel's part of all samples.
         samples = np.rint(rendered.passes[_COUNTS][..., 0] * max(count for _, count in _reports))
-    made = {each.name: _composed(each, rendered.passes) for each in wanted}
+    composed = {
+        view_pass.name: _composed(view_pass, rendered.passes) for view_pass in colour_passes
+    }
     to_rec_709 = _to_rec_709()
     if to_rec_709 is not None:
-        lights = [made[each.name] for each in wanted if each.kind == "light"]
+        lights = [composed[each.name] for each in colour_passes if each.kind == "light"]
         for pixels in (rendered.passes["Combined"], *lights):
             pixels[..., :3] = pixels[..., :3] @ to_rec_709.T
     return Colour(
         pixels=rendered.passes["Combined"],
-        passes=made,
+        passes=composed,
         manifest=_manifest(rendered.attributes),
         samples=samples,
         worked_seconds=_reports[-1][0] - _reports[0][0] if _reports else None,
@@ -75,38 +82,38 @@ def render_colour(
 
 
 def _to_rec_709() -> Array | None:
-    """Return what takes colours (3,) of the .blend's working space to linear Rec. 709; (3, 3).
+    """Return the matrix (3, 3) from the .blend's working space to linear Rec. 709.
 
-    None where it is that.
+    Return None if the working space is linear Rec. 709.
     """
     units = [mathutils.Color(unit) for unit in np.eye(3)]
     matrix = np.array([unit.from_scene_linear_to_rec709_linear() for unit in units], np.float32).T
     return None if np.allclose(matrix, np.eye(3), atol=1e-6) else matrix
 
 
-def _composed(wanted: Pass, passes: Mapping[str, Array]) -> Array:
-    """Return a pass of ours from those of Cycles, by name."""
-    parts = [passes[name] for name in wanted.cycles]
-    if wanted.kind == "matte":
+def _composed(view_pass: Pass, passes: Mapping[str, Array]) -> Array:
+    """Return a pass of the dataset, composed from Cycles' ``passes`` by name."""
+    parts = [passes[name] for name in view_pass.cycles]
+    if view_pass.kind == "matte":
         return np.concatenate(parts, axis=-1)
     total = np.sum(parts, axis=0)
-    return np.asarray(total * passes[wanted.factor] if wanted.factor else total)
+    return np.asarray(total * passes[view_pass.factor] if view_pass.factor else total)
 
 
 def _manifest(attributes: Mapping[str, Attribute]) -> dict[str, str]:
-    """Return the objects' names and hashes, which Cycles writes without escaping a quote."""
+    """Return the objects' names and hashes. Cycles writes them without escaping quotes."""
     text = next((str(text) for name, text in attributes.items() if name.endswith("/manifest")), "")
     return dict(sorted(re.findall(r'"(.*?)":"([0-9a-f]{8})"(?:,|}$)', text)))
 
 
 def watch_samples() -> None:
-    """Let every view that follows say how many samples its pixels took, and the work they were."""
+    """Count the samples and the processor time of all following views."""
     view_layer(bpy.context.scene).cycles.pass_debug_sample_count = True
     bpy.app.handlers.render_stats.append(_watch)
 
 
-# What Cycles reports in its progress about the view that is being rendered, as `… | Sample 80/256`
-# and at last `Finished`: when, in processor seconds, and how many samples.
+# Cycles' progress reports on the current view: processor seconds, and the number of samples. Cycles
+# reports `… | Sample 80/256`, and at last `Finished`.
 _reports: list[tuple[float, int]] = []
 
 

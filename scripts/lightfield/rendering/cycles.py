@@ -14,12 +14,12 @@ from lightfield.dataset.passes import Pass
 from lightfield.geometry.rigs.rig import EYES
 from lightfield.rendering import animation, blend_file, drawings, ids, instances, pruning, volumes
 
-# `auto` tries them in this order.
+# `auto` tries the kinds of GPU in this order.
 GPU_DEVICES = ("optix", "cuda", "hip", "oneapi", "metal")
 
 CAMERA_NAME = "plenoforge_camera"
 
-# Cycles' settings by the keys of ``render`` blocks. Without a key the .blend's own value stays.
+# Cycles' settings by the keys of ``render`` blocks. Without a key, the .blend's value stays.
 SAMPLING = {
     "max_bounces": "max_bounces",
     "clamp_indirect": "sample_clamp_indirect",
@@ -40,8 +40,8 @@ def set_up(
 ) -> str:
     """Open a scene and set it up for the views of a light field. Return its device: CPU or GPU.
 
-    Leaves out what no pixel depends on, as the scene's ``inventory`` says. Raises `UserError` if
-    the scene cannot be opened, or if the ``device`` is missing.
+    Leaves out what no pixel depends on, according to the scene's ``inventory``. Raises `UserError`
+    if the scene cannot be opened, or if the ``device`` is missing.
     """
     left_out = inventory["left_out"] if inventory else []
     blend_file.open_scene(blend, lightfield.content.get("scene", {}), inventory)
@@ -50,17 +50,17 @@ def set_up(
     if inventory and "hidden_objects" in left_out:
         pruning.remove_objects(inventory["hidden"])
     elif numbered and not inventory:
-        # So that their numbers are the same.
+        # Remove the same objects as with an inventory, so that the numbers are the same.
         pruning.remove_objects(pruning.removable_objects())
     for kind in {"object" if kind == "instance" else kind for kind in numbered}:
         ids.assign(kind)
     scene = bpy.context.scene
-    # A marker may choose the artist's camera at this frame. From here on none may choose another.
+    # A marker may choose the artist's camera at this frame. Remove all markers' cameras afterwards.
     scene.frame_set(lightfield.frame)
     focused = scene.camera if lightfield.render.get("depth_of_field") else None
     for marker in scene.timeline_markers:
         marker.camera = None
-    # What is not set here keeps the value that it has at this frame.
+    # Settings that are not set below keep their values of this frame.
     animation.mute(scene, ("render.", "cycles."))
     scene.render.engine = "CYCLES"
     _set_quality(lightfield.render)
@@ -99,7 +99,7 @@ def _set_quality(settings: Mapping[str, Any]) -> None:
 
 
 def _set_output(scene: Any, lightfield: LightField, threads: int) -> None:
-    """Make Cycles keep the scene in memory, and write all passes complete, in 32-bit floats."""
+    """Make Cycles keep the scene in memory, and write all passes in full, as 32-bit floats."""
     render = scene.render
     render.use_persistent_data = True
     render.threads_mode = "FIXED"
@@ -125,8 +125,8 @@ def _set_output(scene: Any, lightfield: LightField, threads: int) -> None:
 def _set_passes(scene: Any, passes: Iterable[Pass]) -> None:
     """Turn on colour and the passes of Cycles that ``passes`` need, and turn all others off.
 
-    If there are ``passes``, geometry and colour are rendered with the same passes of Cycles. Cycles
-    keeps the scene, and mixes passes up if others come and go: with denoising, normals and numbers.
+    If there are ``passes``, geometry and colour use the same passes of Cycles. Cycles keeps the
+    scene, and confuses passes if some come and go: with denoising, normals and numbers.
     """
     layer = view_layer(scene)
     for owner in (layer, layer.cycles):
@@ -136,18 +136,18 @@ def _set_passes(scene: Any, passes: Iterable[Pass]) -> None:
     needed = [name for each in passes for name in each.needed]
     for name in ("Combined", *needed, *(GEOMETRY_PASSES if needed else ())):
         setattr(*pass_property(layer, name), True)
-    # Each of its passes holds two objects.
+    # A cryptomatte pass holds two objects: 6 gives three passes.
     layer.pass_cryptomatte_depth = 6
     layer.cycles.denoising_store_passes = False
     layer.cycles.pass_debug_sample_count = False
-    # Passes of the artist's own, and those of light groups.
+    # Remove the artist's own passes, and those of light groups.
     for group in (layer.aovs, layer.lightgroups):
         for entry in list(group):
             group.remove(entry)
 
 
 def pass_property(layer: Any, name: str) -> tuple[Any, str]:
-    """Return the property that turns a pass of Cycles on: its owner, and its name there."""
+    """Return the property that turns a pass of Cycles on: its owner and its name."""
     owner = layer.cycles if name.startswith("Volume ") else layer
     if name.startswith("CryptoObject"):
         return owner, "use_pass_cryptomatte_object"
@@ -163,7 +163,7 @@ def set_sampling(settings: Mapping[str, Any]) -> None:
     cycles.adaptive_threshold = settings["adaptive_threshold"]
     cycles.use_denoising = settings["denoise"]
     cycles.denoiser = "OPENIMAGEDENOISE"
-    # Guided by the surfaces' albedo and normals, which are denoised themselves first.
+    # Denoise with albedo and normals, which are denoised themselves first.
     cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
     cycles.denoising_prefilter = settings.get("denoise_prefilter", "accurate").upper()
     cycles.denoising_quality = settings.get("denoise_quality", "high").upper()
@@ -179,7 +179,7 @@ def sampling() -> dict[str, Any]:
 
 
 def set_window(x: int, y: int, width: int, height: int) -> None:
-    """Render only these pixels of all following views. (0, 0) is the top left one."""
+    """Render only these pixels of all following views. (0, 0) is the top left pixel."""
     render = bpy.context.scene.render
     render.use_border = render.use_crop_to_border = True
     across = render.resolution_x
@@ -217,7 +217,7 @@ def gpu(device: str) -> str | None:
 
 
 def device_name(device: str) -> str:
-    """Return what a ``device`` means on this machine: cpu, or the kind and model of the GPU.
+    """Return the name of a ``device`` on this machine: cpu, or the kind and model of the GPU.
 
     Raises `UserError` if the machine has no such GPU.
     """
@@ -251,34 +251,36 @@ def _use_device(scene: Any, device: str) -> None:
 
 
 def machine(denoise: bool) -> str:
-    """Return what of this machine changes bytes, and the GPU that Cycles renders on, if any."""
-    here = describe(denoise)
+    """Describe what of this machine affects the pixels' bytes, with the GPU, if Cycles uses one."""
+    processor = describe(denoise)
     if bpy.context.scene.cycles.device == "CPU":
-        return here
+        return processor
     preferences = bpy.context.preferences.addons["cycles"].preferences
     gpus_in_use = sorted({entry.name for entry in preferences.devices if entry.use})
-    return f"{preferences.compute_device_type} {' + '.join(gpus_in_use)}, {here}"
+    return f"{preferences.compute_device_type} {' + '.join(gpus_in_use)}, {processor}"
 
 
 def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
-    """Set the camera up as the ``camera`` and sizes of a lightfield.json say."""
+    """Set the camera up from the ``camera`` and the sizes in a lightfield.json."""
     intrinsics = lightfield["camera"]
     camera = bpy.data.cameras.new(CAMERA_NAME)
     camera.type = intrinsics["type"]
     sensor_width, sensor_height = lightfield["sensor_size"]
     camera.sensor_fit = "HORIZONTAL" if sensor_width >= sensor_height else "VERTICAL"
-    camera.sensor_width, camera.sensor_height = sensor_width, sensor_height
+    camera.sensor_width = sensor_width
+    camera.sensor_height = sensor_height
     if "principal_point" in intrinsics:
         width, height = lightfield["resolution"]
-        # Blender counts a perspective camera's shift in sides of the image that sensor_fit names,
-        # and a panoramic one's in widths and heights.
+        # The unit of a perspective camera's shift is the side of the image that sensor_fit names.
+        # The units of a panoramic camera's shift are the width and the height.
         side = width if sensor_width >= sensor_height else height
         across, up = (side, side) if intrinsics["type"] == "PERSP" else (width, height)
         x, y = intrinsics["principal_point"]
         camera.shift_x = (width / 2 - x) / across
         camera.shift_y = (y - height / 2) / up
-    # Cycles clips a perspective view between these. They must not cut anything away.
-    camera.clip_start, camera.clip_end = 1e-4, 1e9
+    # Cycles clips a perspective view at these distances. They must not cut anything away.
+    camera.clip_start = 1e-4
+    camera.clip_end = 1e9
     if intrinsics["type"] == "PERSP":
         camera.lens_unit = "MILLIMETERS"
         camera.lens = intrinsics["focal_length"]
@@ -306,7 +308,7 @@ def _set_eyes(scene: Any, distance: float) -> None:
 
 
 def choose_eye(name: str) -> None:
-    """Make the next render one of the eye of view ``name``, if the rig has eyes."""
+    """Make the next render that of the eye in the view's ``name``, if the rig has eyes."""
     render = bpy.context.scene.render
     for eye in EYES if render.use_multiview else ():
         render.views[eye].use = name.endswith(f"_{eye}")
@@ -316,7 +318,7 @@ def _set_focus(lens: Any, camera: Any) -> None:
     """Give a camera the aperture and focus of the artist's ``camera`` at the current frame."""
     evaluated = camera.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     if lens.type == "PANO":
-        # For a panorama, Cycles computes only the width of the aperture from it.
+        # Cycles uses a panorama's focal length only for the width of the aperture.
         lens.lens = evaluated.lens
     for name in ("aperture_fstop", "aperture_blades", "aperture_rotation", "aperture_ratio"):
         setattr(lens.dof, name, getattr(evaluated.dof, name))
@@ -327,7 +329,7 @@ def _set_focus(lens: Any, camera: Any) -> None:
 
 
 def view_layer(scene: Any) -> Any:
-    """Return the view layer to render, the first that the .blend uses, and turn the others off."""
+    """Return the view layer to render: the first that the .blend uses. Turn all others off."""
     layer = next((layer for layer in scene.view_layers if layer.use), scene.view_layers[0])
     for other in scene.view_layers:
         other.use = other == layer

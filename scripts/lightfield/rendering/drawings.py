@@ -1,4 +1,4 @@
-"""Drawings with Grease Pencil, which Blender draws over what Cycles has rendered."""
+"""Handles Grease Pencil drawings. Blender draws them over what Cycles has rendered."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -7,10 +7,10 @@ import bpy
 
 
 def set_up(layer: Any, camera_type: str) -> None:
-    """Show drawings in perspective views alone, and there hide them behind surfaces.
+    """Show drawings only in perspective views, and hide them behind surfaces there.
 
-    Blender draws them as a perspective camera sees them, whatever the lens. It hides them behind
-    surfaces only where the view layer has the pass of depth.
+    Blender draws them in perspective, whatever the lens. It hides them behind surfaces only if the
+    view layer has a depth pass.
     """
     if camera_type == "PANO":
         layer.use_grease_pencil = False
@@ -21,9 +21,9 @@ def set_up(layer: Any, camera_type: str) -> None:
 def warnings(camera_type: str) -> Iterator[str]:
     """Yield a line if the views of a PANO or PERSP camera lack drawings, or passes of them.
 
-    The viewport must have what is rendered: see `clearance.show_what_is_rendered`.
+    The viewport must show what is rendered: see `clearance.show_what_is_rendered`.
     """
-    shown = sorted(str(thing.name_full) for thing in _drawings() if not thing.hide_viewport)
+    shown = sorted(str(obj.name_full) for obj in _drawings() if not obj.hide_viewport)
     if not shown:
         return
     names = f"{', '.join(shown[:8])}{' …' if len(shown) > 8 else ''}"
@@ -40,4 +40,4 @@ def warnings(camera_type: str) -> Iterator[str]:
 
 
 def _drawings() -> list[Any]:
-    return [thing for thing in bpy.data.objects if thing.type == "GREASEPENCIL"]
+    return [obj for obj in bpy.data.objects if obj.type == "GREASEPENCIL"]

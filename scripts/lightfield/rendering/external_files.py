@@ -1,4 +1,4 @@
-"""Files beside a .blend of which its pixels are made, and what is wrong with them."""
+"""Lists the files that a .blend reads for its pixels, and finds what is wrong with them."""
 
 import glob
 import os
@@ -16,8 +16,8 @@ from lightfield.imaging.images import is_readable
 from lightfield.rendering.blend_file import path_of
 from lightfield.rendering.quiet import quiet
 
-# What a file is called by the type of the data-block that reads it. Sounds, texts (scripts) and
-# movie clips make no pixel.
+# The kind of a file by the type of the data-block that reads it. Sounds, texts (scripts) and movie
+# clips affect no pixel.
 KINDS = {
     "Image": "texture",
     "Volume": "volume",
@@ -25,9 +25,9 @@ KINDS = {
     "Library": "library",
     "CacheFile": "cache",
     "Object": "modifier's file",
-    # What its nodes import, such as an STL.
+    # Files that its nodes import, such as an STL.
     "GeometryNodeTree": "geometry",
-    # Of a multiresolution modifier.
+    # A multiresolution modifier saves its details in a file.
     "Mesh": "sculpted detail",
     # Light profiles (IES).
     "PointLight": "light profile",
@@ -43,18 +43,21 @@ KINDS = {
 def external_files() -> list[dict[str, Any]]:
     """Return each file that the open .blend reads: ``path`` from its folder, size, time, SHA-256.
 
-    A file that is not there has None for these: that it has come is noticed, too.
+    A missing file is listed with None for these, so that its arrival is noticed.
     """
     home = Path(bpy.data.filepath).parent
-    files = {file for block, path in _read() for file in _files(block, path)}
+    files: set[Path] = set()
+    for block, path in _blocks_and_absolute_paths():
+        files.update(_files(block, path))
     return [_entry(file, home) for file in sorted(files)]
 
 
 def problems(images: Collection[Any]) -> list[dict[str, str]]:
-    """Return what of the scene's files is missing or cannot be read.
+    """Return the scene's files that are missing or cannot be read.
 
-    Each has ``kind`` and ``name`` of what reads it, its ``path`` from the .blend's folder, and
-    ``problem``. Of images count those that shading reads, ``images``, and those of modifiers.
+    Each entry has the ``kind`` and ``name`` of the data-block that reads the file. It also has the
+    ``path`` from the .blend's folder, and the ``problem``. Of images, only those in ``images``
+    (read by shading) and those of modifiers count.
     """
     home = Path(bpy.data.filepath).parent
     users = bpy.data.user_map()
@@ -64,7 +67,7 @@ def problems(images: Collection[Any]) -> list[dict[str, str]]:
         name = {"kind": kind, "name": block.name}
         problem_entries.append(name | {"path": _from(home, path), "problem": problem})
 
-    for block, path in _read():
+    for block, path in _blocks_and_absolute_paths():
         if not _is_needed(block, images, users):
             continue
         for file in _files(block, path):
@@ -79,90 +82,98 @@ def problems(images: Collection[Any]) -> list[dict[str, str]]:
 
 
 def put(blend: Path, files: Iterable[Mapping[str, Any]], store: ViewStore) -> None:
-    """Put the ``files`` of `external_files` into a view store, for who opens a copy of ``blend``.
+    """Put the ``files`` of `external_files` into a view store.
 
-    Raises `UserError` where a copy, which lies in another folder at the same path, would not find
-    them: the open .blend names one from the root of the disk, or one is outside this folder.
+    Other jobs open a copy of ``blend``, and fetch the files from there. A copy lies in another
+    folder, at the same relative path. Raises `UserError` if the copy would not find a file: its
+    path in the .blend is absolute, or it lies outside this folder.
     """
-    there = [file for file in files if file["bytes"]]
-    far = [path for block, path in _named() if _is_far(block, path)]
-    paths = (os.path.normpath(blend.parent / file["path"]) for file in there)
-    far += [path for path in paths if path.startswith("..")]
-    if far:
+    existing_files = [file for file in files if file["bytes"]]
+    unreachable = [path for block, path in _blocks_and_paths() if _is_absolute(block, path)]
+    paths = (os.path.normpath(blend.parent / file["path"]) for file in existing_files)
+    unreachable += [path for path in paths if path.startswith("..")]
+    if unreachable:
+        count = f" and {len(unreachable) - 1} more" if unreachable[1:] else ""
         raise UserError(
-            f"{blend}: reads {far[0]}{f' and {len(far) - 1} more' if far[1:] else ''}; with a "
+            f"{blend}: reads {unreachable[0]}{count}; with a "
             "storage, what a .blend reads must lie in this folder and be named from the .blend (in "
             "Blender: File, External Data, Make Paths Relative), or be packed into it"
         )
-    for file in there:
+    for file in existing_files:
         store.put(blend.parent / file["path"], file["sha256"])
 
 
-def _is_far(block: Any, path: str) -> bool:
-    """Whether a file that is there is named from the root of the disk."""
+def _is_absolute(block: Any, path: str) -> bool:
+    """Return whether the path of an existing file is absolute in the .blend."""
     return not path.startswith("//") and any(file.is_file() for file in _files(block, path))
 
 
-def _named() -> Iterator[tuple[Any, str]]:
-    """Yield each data-block that reads a file, and the path as it stands in the .blend."""
+def _blocks_and_paths() -> Iterator[tuple[Any, str]]:
+    """Yield each data-block that reads a file, and the path as the .blend has it."""
     for library in bpy.data.libraries:
         if not library.packed_file:
             yield library, library.filepath
     for block, paths in bpy.data.file_path_map().items():
         if type(block).__name__ in KINDS and not _is_packed(block):
             for path in sorted(paths):
-                # Blender lists it for all particles, also where their cache is in the .blend.
+                # Blender lists this folder for all particles, even if their cache is in the .blend.
                 if not (isinstance(block, bpy.types.Object) and _is_cache_folder(block, path)):
                     yield block, path
-    # Blender lists the names that stand in a node, and not those that a modifier gives to it.
-    for thing in bpy.data.objects:
-        for modifier in _nodes(thing):
+    # Blender lists paths inside nodes, but not those in the inputs of a modifier.
+    for obj in bpy.data.objects:
+        for modifier in _node_modifiers(obj):
             tree = modifier.node_group
             for item in tree.interface.items_tree if tree else ():
-                is_path = getattr(item, "subtype", None) == "FILE_PATH"
-                if is_path and (path := _given(modifier, item.identifier)):
-                    yield thing, path
+                if getattr(item, "subtype", None) != "FILE_PATH":
+                    continue
+                path = _modifier_input(modifier, item.identifier)
+                if path:
+                    yield obj, path
 
 
-def _nodes(thing: Any) -> list[Any]:
-    return [modifier for modifier in thing.modifiers if modifier.type == "NODES"]
+def _node_modifiers(obj: Any) -> list[Any]:
+    return [modifier for modifier in obj.modifiers if modifier.type == "NODES"]
 
 
-def _given(modifier: Any, identifier: str) -> str:
-    """Return the text that a geometry nodes modifier has for an input."""
-    # Blender 5.2 has its inputs in a place of their own.
+def _modifier_input(modifier: Any, identifier: str) -> str:
+    """Return the text of an input of a geometry nodes modifier."""
+    # Blender 5.2 keeps the inputs in `properties`.
     inputs = getattr(modifier, "properties", None)
     return str(getattr(inputs.inputs, identifier).value if inputs else modifier[identifier])
 
 
-def _read() -> Iterator[tuple[Any, str]]:
-    """Yield each data-block that reads a file, and the path as Blender has it, absolute."""
-    for block, path in _named():
+def _blocks_and_absolute_paths() -> Iterator[tuple[Any, str]]:
+    """Yield each data-block that reads a file or a cache's folder, and the absolute path."""
+    for block, path in _blocks_and_paths():
         yield block, bpy.path.abspath(path, library=block.library)
-    for thing in bpy.data.objects:
-        folder = _cache_folder(thing)
-        caches = [getattr(modifier, "point_cache", None) for modifier in thing.modifiers]
-        caches += [system.point_cache for system in thing.particle_systems]
+    for obj in bpy.data.objects:
+        folder = _cache_folder(obj)
+        caches = [getattr(modifier, "point_cache", None) for modifier in obj.modifiers]
+        caches += [system.point_cache for system in obj.particle_systems]
         if any(cache and cache.use_disk_cache and not cache.use_external for cache in caches):
-            yield thing, str(folder)
-        for modifier in _nodes(thing):
-            baked = {modifier.bake_directory, *(bake.directory for bake in modifier.bakes)} - {""}
-            baked |= {str(folder)} if modifier.bakes else set()
-            for path in (bpy.path.abspath(path, library=thing.library) for path in sorted(baked)):
+            yield obj, str(folder)
+        for modifier in _node_modifiers(obj):
+            bake_folders = {modifier.bake_directory}
+            bake_folders.update(bake.directory for bake in modifier.bakes)
+            bake_folders.discard("")
+            if modifier.bakes:
+                bake_folders.add(str(folder))
+            for bake_folder in sorted(bake_folders):
+                path = bpy.path.abspath(bake_folder, library=obj.library)
                 # A bake may be in the .blend itself.
                 if Path(path).is_dir():
-                    yield thing, path
+                    yield obj, path
 
 
-def _cache_folder(thing: Any) -> Path:
+def _cache_folder(obj: Any) -> Path:
     """Return the folder beside an object's .blend where Blender keeps its caches on disk."""
-    blend = path_of(thing.library) if thing.library else Path(bpy.data.filepath)
+    blend = path_of(obj.library) if obj.library else Path(bpy.data.filepath)
     return blend.parent / f"blendcache_{blend.stem}"
 
 
-def _is_cache_folder(thing: Any, path: str) -> bool:
-    absolute = bpy.path.abspath(path, library=thing.library)
-    return bool(os.path.normpath(absolute) == os.path.normpath(_cache_folder(thing)))
+def _is_cache_folder(obj: Any, path: str) -> bool:
+    absolute = bpy.path.abspath(path, library=obj.library)
+    return bool(os.path.normpath(absolute) == os.path.normpath(_cache_folder(obj)))
 
 
 def _is_packed(block: Any) -> bool:
@@ -179,7 +190,7 @@ def _is_needed(block: Any, images: Collection[Any], users: Mapping[Any, Any]) ->
 
 
 def _files(block: Any, path: str) -> list[Path]:
-    """Return the files that a path stands for: itself, where there is none of them."""
+    """Return the files that a path stands for. Return the path itself if they do not exist."""
     folder = Path(path)
     if folder.is_dir():
         return sorted(file for file in folder.rglob("*") if file.is_file()) or [folder]
@@ -193,19 +204,19 @@ def _files(block: Any, path: str) -> list[Path]:
 
 
 def _tile(path: str, number: int) -> Path:
-    """Return the file of one tile, of which there are ten in a row from 1001 on."""
+    """Return the file of a UDIM tile. The numbers begin at 1001, with ten tiles in a row."""
     row, column = divmod(number - 1001, 10)
     name = path.replace("<UDIM>", str(number))
     return Path(name.replace("<UVTILE>", f"u{column + 1}_v{row + 1}"))
 
 
 def _problem(block: Any, path: Path) -> str | None:
-    """Return what is wrong with a file, as far as Blender would only say it to its terminal."""
+    """Return what is wrong with a file, or None. Blender itself would only print it."""
     if not path.exists():
         return "missing"
     readable = True
     if isinstance(block, bpy.types.Image) and block.source != "MOVIE":
-        # Not by Blender: 5.0 crashes at some broken EXRs.
+        # Do not let Blender read it: 5.0 crashes on some broken EXRs.
         readable = is_readable(path)
     elif isinstance(block, bpy.types.Volume):
         readable = block.grids.load()

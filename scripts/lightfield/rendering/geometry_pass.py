@@ -1,8 +1,8 @@
-"""The geometry of a view: the first surface that the ray through each pixel's centre meets.
+"""Renders the geometry of a view: the first surface on the ray through each pixel's centre.
 
-One render of one sample. Cycles takes a pixel's first sample from the middle of the pixel filter,
-and with the narrowest filter that is the pixel's centre. What transparency cuts out is no surface,
-as in the colour; glass is one, and fog, smoke and every other volume is none.
+This is one render with one sample. Cycles takes a pixel's first sample from the middle of the pixel
+filter. With the narrowest filter that is the pixel's centre. Glass counts as a surface. Parts that
+transparency cuts out do not, as in the colour. Neither do fog, smoke and other volumes.
 """
 
 from collections.abc import Iterable, Iterator
@@ -21,7 +21,7 @@ from lightfield.rendering.view import Array, render_view
 # Cycles gives this depth to a ray that hits nothing.
 MISS = 1e10
 
-# A surface of less opacity than this is none: it is what transparency has cut out.
+# A surface with less opacity than this is cut out by transparency.
 OPACITY = 1e-3
 
 _SAMPLING = {
@@ -34,22 +34,25 @@ _SAMPLING = {
     "max_bounces": 0,
 }
 _MOTION = {"Vector": "XYZW"}
-# Cycles has the next place with the other sign, and y upwards.
+# Cycles negates the motion to the next frame, and its y points up.
 _MOTION_SIGNS = np.array([1, -1, -1, 1], np.float32)
 
 
 @dataclass(frozen=True)
 class Geometry:
-    """What a view's pixels see at their centres; all of it is of the same surface.
+    """What a view's pixels see at their centres. All of it belongs to the same surface.
 
-    ``depth``, (height, width) float32 in metres, is inf where nothing is hit: Z-depth for a
-    perspective camera and distance for any other. ``normal``, (height, width, 3) float32, is the
-    shading normal in world space on the camera's side. ``objects`` and ``materials``,
-    (height, width) uint16, are their pass indices. Of what may be asked for, ``instances``,
-    (height, width) uint32, are the numbers of `lightfield.rendering.instances`, and ``motion``,
-    (height, width, 4) float32, is where the surface is in the previous and in the next frame: x and
-    y of both in pixels from here, to the right and down. These are 0 where nothing is hit.
-    ``render_seconds`` and ``synchronization_seconds`` are Cycles' own.
+    - ``depth`` (height, width): float32 in metres, inf for a miss. Z-depth for a perspective
+      camera, distance for any other.
+    - ``normal`` (height, width, 3): float32, the shading normal in world space, towards the camera.
+    - ``objects``, ``materials`` (height, width): uint16, their pass indices.
+    - ``instances`` (height, width): uint32, the numbers of `lightfield.rendering.instances`. None
+      if not requested.
+    - ``motion`` (height, width, 4): float32, the offsets x, y to the surface's places in the
+      previous and in the next frame. In pixels, to the right and down. None if not requested.
+    - ``render_seconds``, ``synchronization_seconds``: as Cycles measured them.
+
+    All but the depth are 0 for a miss.
     """
 
     depth: Array
@@ -65,14 +68,16 @@ class Geometry:
 def render_geometry(world_matrix: Array, motion: bool = False, apart: bool = False) -> Geometry:
     """Render the geometry that a camera at ``world_matrix``, (4, 4) camera-to-world, sees.
 
-    With ``motion``, and with instances ``apart``, for which Cycles has been set up.
+    ``motion`` adds the motion, ``apart`` the instances. Cycles must be set up for both.
     """
-    wanted = GEOMETRY_PASSES | (_MOTION if motion else {})
-    with _geometry_settings(wanted):
-        cycles_passes = wanted | (instances.CYCLES_PASSES if apart else {})
+    geometry_passes = dict(GEOMETRY_PASSES)
+    if motion:
+        geometry_passes |= _MOTION
+    with _geometry_settings(geometry_passes):
+        cycles_passes = geometry_passes | (instances.CYCLES_PASSES if apart else {})
         rendered = render_view(world_matrix, 0, cycles_passes)
     depth = rendered.passes["Depth"]
-    # Cycles leaves values that are not a number where the lens sees nothing.
+    # Cycles leaves NaN where the lens sees nothing.
     hit = depth < MISS
     normal, objects, materials = (
         np.where(hit, rendered.passes[name], np.float32(0))
@@ -91,24 +96,24 @@ def render_geometry(world_matrix: Array, motion: bool = False, apart: bool = Fal
 
 
 @contextmanager
-def _geometry_settings(wanted: Iterable[str]) -> Iterator[None]:
-    """Let Cycles render the passes ``wanted``, and then what it was set up for."""
+def _geometry_settings(passes: Iterable[str]) -> Iterator[None]:
+    """Set Cycles up for geometry with these ``passes``. Restore all settings afterwards."""
     scene = bpy.context.scene
     layer = view_layer(scene)
     with ExitStack() as stack:
         for name, value in _SAMPLING.items():
             stack.enter_context(changed(scene.cycles, name, value))
-        # Blender's drawings would change all depths a little, and have none of the other passes.
+        # Drawings would change all depths a little, and they are in no other pass.
         stack.enter_context(changed(layer, "use_grease_pencil", False))
         stack.enter_context(changed(scene.render, "use_motion_blur", False))
         stack.enter_context(changed(scene.camera.data.dof, "use_dof", False))
-        for name in wanted:
+        for name in passes:
             stack.enter_context(changed(*pass_property(layer, name), True))
         stack.enter_context(changed(layer, "pass_alpha_threshold", OPACITY))
         stack.enter_context(changed(layer.cycles, "pass_debug_sample_count", False))
-        for thing in bpy.data.objects:
-            if thing.visible_camera and thing.name_full in volumes.alone():
-                stack.enter_context(changed(thing, "visible_camera", False))
+        for obj in bpy.data.objects:
+            if obj.visible_camera and obj.name_full in volumes.alone():
+                stack.enter_context(changed(obj, "visible_camera", False))
         for shader in (*bpy.data.materials, scene.world):
             if shader and volumes.has_volume(shader) and volumes.has_surface(shader):
                 stack.enter_context(_without_volume(shader.node_tree))

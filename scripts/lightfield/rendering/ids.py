@@ -1,8 +1,8 @@
-"""The numbers by which the passes of objects and materials name them: the same in every view.
+"""Numbers the objects and materials for their passes: the same in every view.
 
-They are places in the sorted list of full names, from 1, and so follow from the .blend alone.
-Cycles gives all instances of one object the number of that object; what keeps them apart is in
-`lightfield.rendering.instances`.
+A number is the place in the sorted list of full names, from 1. So it depends on the .blend alone.
+Cycles gives all instances of an object the object's number. `lightfield.rendering.instances` tells
+them apart.
 """
 
 from typing import Any
@@ -12,14 +12,14 @@ import bpy
 from lightfield.core.errors import UserError
 from lightfield.rendering import animation
 
-# Blender's greatest index.
+# Blender's greatest pass index.
 MOST = 32767
-# What these are has no surface.
+# Types of objects without a surface.
 _WITHOUT_SURFACE = ("ARMATURE", "CAMERA", "EMPTY", "LATTICE", "LIGHT", "LIGHT_PROBE", "SPEAKER")
 
 
 def assign(kind: str) -> None:
-    """Number the blocks of a ``kind``, "object" or "material"; `UserError` for too many."""
+    """Number the blocks of a ``kind``, "object" or "material". Raises `UserError` for too many."""
     blocks = sorted(_blocks(kind), key=lambda block: str(block.name_full))
     if len(blocks) > MOST:
         raise UserError(
@@ -32,7 +32,7 @@ def assign(kind: str) -> None:
 
 
 def names(kind: str) -> dict[str, int]:
-    """Return the numbers that `assign` has given, by full name."""
+    """Return the numbers from `assign`, by full name."""
     numbers = {str(block.name_full): int(block.pass_index) for block in _blocks(kind)}
     return dict(sorted(numbers.items(), key=lambda item: item[1]))
 
@@ -40,9 +40,9 @@ def names(kind: str) -> dict[str, int]:
 def _blocks(kind: str) -> list[Any]:
     if kind == "material":
         return list(bpy.data.materials)
-    return [thing for thing in bpy.data.objects if not has_no_surface(thing)]
+    return [obj for obj in bpy.data.objects if not has_no_surface(obj)]
 
 
-def has_no_surface(thing: Any) -> bool:
-    """Whether an object is of a type that no ray can meet."""
-    return thing.type in _WITHOUT_SURFACE
+def has_no_surface(obj: Any) -> bool:
+    """Return whether no ray can meet an object of this type."""
+    return obj.type in _WITHOUT_SURFACE

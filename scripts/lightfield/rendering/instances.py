@@ -1,10 +1,10 @@
-"""The numbers that keep instances apart: those of collections, particles and geometry nodes, too.
+"""Numbers the instances of objects: those of collections, particles and geometry nodes, too.
 
-Blender gives each instance a random number, made of the names and places in lists that lead to it,
-and Cycles hands it to the shader as Object Info's Random. Here every material writes it into passes
-of its own, and so it is the same in every view, frame, process and machine. As a float it has 24
-bits: of n instances of an object some n² / 5e7 pairs have one number. An object that is no instance
-has its own.
+Blender gives each instance a random number. It depends only on the names and the places in lists
+that lead to the instance. So it is the same in every view, frame, process and machine. Cycles
+passes it to shaders as Object Info's Random. Here every material writes it into extra passes. As a
+float it has 24 bits: of n instances of an object, about n² / 5e7 pairs share a number. An object
+that is no instance has its pass index as number.
 """
 
 from dataclasses import dataclass
@@ -20,11 +20,12 @@ from lightfield.rendering.render_graph import in_render
 
 Array = NDArray[Any]
 
-# A ray goes through what is cut out, and each layer writes: so many, each a channel of its own.
+# A ray passes through surfaces that transparency cuts out, and each of them writes a number. There
+# are channels for this many layers.
 LAYERS = 12
 _COLOURS = [f"plenoforge_instance_{number}" for number in range(LAYERS // 3)]
 _COUNT = "plenoforge_layers"
-# What of Cycles' passes has the numbers.
+# The passes of Cycles with the numbers, and their channels.
 CYCLES_PASSES = {**dict.fromkeys(_COLOURS, "RGB"), _COUNT: "X"}
 _LARGEST = 2**32 - 2**8
 _NO_INDEX = 2**31 - 1
@@ -32,11 +33,12 @@ _NO_INDEX = 2**31 - 1
 
 @dataclass(frozen=True)
 class Instances:
-    """What the scene shows at a frame: objects themselves, and instances of them.
+    """The objects and the instances that the scene shows at a frame.
 
-    ``names`` maps the name of each to its number. ``numbers`` (n,) are the same numbers in order,
-    and ``objects`` (n,) the indices of their objects. ``shown_itself`` holds, by the index of an
-    object, the number of the object that is shown itself, or 0.
+    - ``names``: the number of each by its name.
+    - ``numbers`` (n,): the same numbers in order.
+    - ``objects`` (n,): the indices of their objects.
+    - ``shown_itself``: by an object's index, its number if the object itself is shown, else 0.
     """
 
     names: dict[str, int]
@@ -46,7 +48,7 @@ class Instances:
 
 
 def set_up(layer: Any) -> None:
-    """Let every material of the scene write the numbers, and the layer have passes for them."""
+    """Make every material of the scene write the numbers into new passes of the layer."""
     shown.cache_clear()
     group = _node_group()
     for material in bpy.data.materials:
@@ -59,7 +61,7 @@ def set_up(layer: Any) -> None:
 
 
 def _node_group() -> Any:
-    """Return nodes that write the number into the channel of the layer that the ray has come to."""
+    """Return nodes that write the number into the channel of the ray's current layer."""
     tree = bpy.data.node_groups.new("plenoforge_instance", "ShaderNodeTree")
     nodes = tree.nodes
     link = tree.links.new
@@ -73,7 +75,8 @@ def _node_group() -> Any:
         for place in range(3):
             is_here = nodes.new("ShaderNodeMath")
             number = nodes.new("ShaderNodeMath")
-            is_here.operation, number.operation = "COMPARE", "MULTIPLY"
+            is_here.operation = "COMPARE"
+            number.operation = "MULTIPLY"
             link(depth, is_here.inputs[0])
             is_here.inputs[1].default_value = 3 * first + place
             is_here.inputs[2].default_value = 0.5
@@ -88,10 +91,10 @@ def _node_group() -> Any:
 
 @cache
 def shown() -> Instances:
-    """Return what the opened scene shows at its frame."""
+    """Return what the open scene shows at its frame."""
     entries = in_render(_entries)
     shown_itself = np.zeros(
-        max((thing.pass_index for thing in bpy.data.objects), default=0) + 1, np.uint32
+        max((obj.pass_index for obj in bpy.data.objects), default=0) + 1, np.uint32
     )
     for number, index, is_instance in entries.values():
         if not is_instance:
@@ -103,36 +106,36 @@ def shown() -> Instances:
 
 
 def _entries(depsgraph: Any) -> dict[str, tuple[int, int, bool]]:
-    """Return by name each thing's number, its object's index, and whether it is an instance."""
+    """Return by name the number, the object's index, and whether it is an instance."""
     entries = {}
     for entry in depsgraph.object_instances:
-        thing = entry.object.original
-        if has_no_surface(thing):
+        obj = entry.object.original
+        if has_no_surface(obj):
             continue
-        name = str(thing.name_full)
-        number = int(thing.pass_index)
+        name = str(obj.name_full)
+        number = int(obj.pass_index)
         if entry.is_instance:
             places = [str(place) for place in entry.persistent_id if place != _NO_INDEX]
             name = f"{entry.parent.name_full} > {name} {' '.join(places)}"
             number = min(int(np.float32(entry.random_id & 0xFFFFFFFF)), _LARGEST)
-        entries[name] = (number, int(thing.pass_index), bool(entry.is_instance))
+        entries[name] = (number, int(obj.pass_index), bool(entry.is_instance))
     return entries
 
 
 def decoded(passes: dict[str, Array], objects: Array) -> Array:
-    """Return the number (h, w) uint32 of what each pixel shows; 0 where it is not known.
+    """Return the number (height, width) uint32 of what each pixel shows. 0 if unknown.
 
-    ``passes`` are those of `CYCLES_PASSES`, ``objects`` (h, w) the objects' indices. What a surface
-    without a material shows is not written, nor beyond the last layer: there it is the object, if
-    that is shown itself.
+    ``passes`` are those of `CYCLES_PASSES`. ``objects`` (height, width) are the objects' indices.
+    Surfaces without a material, and those beyond the last layer, write no number. They get the
+    object's number, if the object itself is shown.
     """
     instances = shown()
     layers = np.concatenate([passes[name] for name in _COLOURS], axis=-1).astype(np.float64)
     last = passes[_COUNT].astype(int).clip(1, LAYERS) - 1
     random = np.take_along_axis(layers, last, axis=-1)[..., 0]
     numbers = np.rint(random * 2.0**32).clip(0, _LARGEST).astype(np.uint32)
-    # Only where it is a number of this object.
+    # Accept a number only if it is one of this object's.
     keys = instances.numbers * 2**16 + instances.objects
-    wanted = numbers.astype(np.int64) * 2**16 + objects
-    place = np.searchsorted(keys, wanted).clip(0, len(keys) - 1)
-    return np.where(keys[place] == wanted, numbers, instances.shown_itself[objects])
+    pixel_keys = numbers.astype(np.int64) * 2**16 + objects
+    place = np.searchsorted(keys, pixel_keys).clip(0, len(keys) - 1)
+    return np.where(keys[place] == pixel_keys, numbers, instances.shown_itself[objects])

@@ -1,4 +1,4 @@
-"""What a scene contains: geometry, materials, textures, what moves, and which files it reads."""
+"""Lists what a scene contains: geometry, materials, textures, animation, and external files."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -10,7 +10,7 @@ from lightfield.rendering import animation, cycles, pruning
 from lightfield.rendering.external_files import external_files, problems
 from lightfield.rendering.render_graph import in_render
 
-# Shader nodes by the feature that they give a material; the Principled BSDF by its inputs.
+# The feature that a shader node gives a material. The Principled BSDF gives them by its inputs.
 SHADERS = {
     "ShaderNodeBsdfGlass": "transmission",
     "ShaderNodeBsdfRefraction": "transmission",
@@ -36,14 +36,14 @@ FEATURES = sorted(
     {*SHADERS.values(), *OUTPUT_INPUTS.values(), *(name for name, _ in PRINCIPLED_INPUTS.values())}
 )
 IMAGE_NODES = ("ShaderNodeTexImage", "ShaderNodeTexEnvironment")
-# So many of the frames are counted.
+# Triangles are counted in at most this many frames.
 MOST_FRAMES = 8
 
 
 def inventory(frames: Sequence[int]) -> dict[str, Any]:
-    """Return what the open scene contains at any frame; the file is left with that alone.
+    """Return what the open scene contains at any frame. Removes all else from the open file.
 
-    Objects and triangles are counted at the ``frames`` that are rendered.
+    Objects and triangles are counted at the rendered ``frames``.
     """
     scene = bpy.context.scene
     hidden = pruning.removable_objects()
@@ -62,21 +62,21 @@ def inventory(frames: Sequence[int]) -> dict[str, Any]:
     pruning.remove_objects(hidden)
     objects = list(bpy.data.objects)
     materials = rendered_materials()
-    lights = {thing.data for thing in objects if thing.type == "LIGHT"}
+    lights = {obj.data for obj in objects if obj.type == "LIGHT"}
     features: dict[str, set[str]] = {name: set() for name in FEATURES}
     images = set()
     for shader in (*materials, *([scene.world] if scene.world else []), *lights):
         for feature, image in surface_features(shader):
-            # A light emits by nature, whether it has nodes (as each has since Blender 5.2) or not.
+            # A light always emits, so its nodes' features do not count.
             if feature and shader not in lights:
                 features[feature].add(shader.name_full)
             if image:
                 images.add(image)
-    if any(thing.type == "CURVES" for thing in objects) or any(
-        system.settings.type == "HAIR" for thing in objects for system in thing.particle_systems
+    if any(obj.type == "CURVES" for obj in objects) or any(
+        system.settings.type == "HAIR" for obj in objects for system in obj.particle_systems
     ):
         features["hair"].add("objects")
-    features["volumes"] |= {thing.name_full for thing in objects if thing.type == "VOLUME"}
+    features["volumes"] |= {obj.name_full for obj in objects if obj.type == "VOLUME"}
     return {
         "frames": list(frames),
         **_fullest(frames),
@@ -93,9 +93,9 @@ def inventory(frames: Sequence[int]) -> dict[str, Any]:
 
 
 def _fullest(frames: Sequence[int]) -> dict[str, int]:
-    """Return the frame of most triangles as ``fullest_frame``, and what it shows.
+    """Return the frame with most triangles as ``fullest_frame``, and its counts.
 
-    Of many frames `MOST_FRAMES` are looked at, because each one has to be evaluated.
+    Evaluates at most `MOST_FRAMES` frames, because each takes time.
     """
     counts = []
     for place in np.linspace(0, len(frames) - 1, min(len(frames), MOST_FRAMES)):
@@ -125,7 +125,7 @@ def _triangles(depsgraph: Any) -> dict[str, int]:
 
 def rendered_materials() -> list[Any]:
     """Return the materials of all objects, by name."""
-    slots = [slot for thing in bpy.data.objects for slot in thing.material_slots]
+    slots = [slot for obj in bpy.data.objects for slot in obj.material_slots]
     materials = {slot.material for slot in slots if slot.material} | set_by_nodes()
     return sorted(materials, key=lambda material: str(material.name_full))
 
@@ -161,18 +161,18 @@ def surface_features(shader: Any) -> Iterator[tuple[str | None, Any]]:
 
 
 def contributing(node: Any) -> Iterator[Any]:
-    """Yield every node whose result can reach ``node``, those inside groups too."""
-    seen = set()
-    waiting = [node]
-    while waiting:
-        node = waiting.pop()
-        if node in seen:
+    """Yield every node whose result can reach ``node``, also nodes inside groups."""
+    visited = set()
+    pending = [node]
+    while pending:
+        node = pending.pop()
+        if node in visited:
             continue
-        seen.add(node)
+        visited.add(node)
         yield node
-        waiting += [link.from_node for socket in node.inputs for link in socket.links]
+        pending += [link.from_node for socket in node.inputs for link in socket.links]
         if getattr(node, "node_tree", None):
-            waiting += [n for n in node.node_tree.nodes if n.bl_idname == "NodeGroupOutput"]
+            pending += [n for n in node.node_tree.nodes if n.bl_idname == "NodeGroupOutput"]
 
 
 def _is_animated(socket: Any) -> bool:

@@ -1,4 +1,4 @@
-"""Whether anything gives light to a scene. Without light every view is black."""
+"""Tells whether a scene has any light. Without light every view is black."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ import numpy as np
 from lightfield.rendering import animation
 from lightfield.rendering.inventory import contributing, rendered_materials
 
-# What of a shader node gives light if neither of two inputs is 0: its colour and its strength.
+# The inputs of shader nodes that emit light if none of them is 0: colour and strength.
 _EMISSIONS: dict[str, list[tuple[str, ...]]] = {
     "ShaderNodeEmission": [("Color", "Strength")],
     "ShaderNodeBackground": [("Color", "Strength")],
@@ -29,7 +29,7 @@ def may_be_lit() -> bool:
     """
     scene = bpy.context.scene
     objects = bpy.data.objects
-    if any(thing.type == "GREASEPENCIL" or _is_shining_lamp(thing) for thing in objects):
+    if any(obj.type == "GREASEPENCIL" or _is_shining_lamp(obj) for obj in objects):
         return True
     shaders = [scene.world, *rendered_materials()]
     for layer in scene.view_layers:
@@ -37,10 +37,10 @@ def may_be_lit() -> bool:
     return any(_emits(shader) for shader in shaders if shader)
 
 
-def _is_shining_lamp(thing: Any) -> bool:
-    if thing.type != "LIGHT":
+def _is_shining_lamp(obj: Any) -> bool:
+    if obj.type != "LIGHT":
         return False
-    lamp = thing.data
+    lamp = obj.data
     return animation.is_animated(lamp) or bool(lamp.energy and any(lamp.color))
 
 
@@ -56,18 +56,18 @@ def _emits(shader: Any) -> bool:
 def _is_emitting(node: Any) -> bool:
     if node.bl_idname == "ShaderNodeScript":
         return True
-    # Cycles takes a colour in the place of a shader for emission.
+    # Cycles treats a colour in place of a shader as emission.
     shaders = [socket for socket in node.inputs if socket.type == "SHADER"]
     if any(link.from_socket.type != "SHADER" for socket in shaders for link in socket.links):
         return True
-    return any(
-        all(_may_be_bright(node.inputs[name]) for name in names)
-        for names in _EMISSIONS.get(node.bl_idname, ())
-    )
+    for names in _EMISSIONS.get(node.bl_idname, ()):
+        if all(_may_be_bright(node.inputs[name]) for name in names):
+            return True
+    return False
 
 
 def _may_be_bright(socket: Any) -> bool:
-    """Return whether a node's input may be another number or colour than 0."""
+    """Return whether a node's input may be a number or colour other than 0."""
     if socket.is_linked or animation.is_animated(socket.id_data):
         return True
     return bool(np.any(np.ravel(socket.default_value)[:3]))

@@ -1,4 +1,4 @@
-"""What Cycles renders wrong without a word: far from the origin, behind layers, through glass."""
+"""Warns about scenes that Cycles renders incorrectly without an error."""
 
 from collections.abc import Collection, Iterator
 from typing import Any
@@ -14,17 +14,19 @@ from lightfield.rendering.inventory import surface_features
 
 Floats = NDArray[np.float64]
 
-# Decimal digits that a depth shall have at least.
+# A depth must have at least this many decimal digits.
 DIGITS = 3
-# Of so many cameras the rays are followed through what is transparent.
+# The rays of at most this many cameras are followed through transparent surfaces.
 MOST_CAMERAS = 8
 
 
 def warnings(positions: Floats, distances: Floats) -> Iterator[str]:
-    """Yield a line for each thing in the open scene that the views will show wrong.
+    """Yield a line for each problem of the open scene that the views will show.
 
-    ``positions`` (n, 3) are the cameras', and ``distances`` (n,) those to their nearest surfaces,
-    inf beyond `REACH`. The viewport must have what is rendered: see `show_what_is_rendered`.
+    Cycles has problems far from the origin, behind many transparent layers, and with some lights
+    behind glass. ``positions`` (n, 3) are those of the cameras. ``distances`` (n,) are those to
+    their nearest surfaces, inf beyond `REACH`. The viewport must show what is rendered: see
+    `show_what_is_rendered`.
     """
     # Cycles computes in float32, in world space.
     steps = np.spacing(np.abs(positions).max(axis=1).astype(np.float32)).astype(np.float64)
@@ -40,15 +42,15 @@ def warnings(positions: Floats, distances: Floats) -> Iterator[str]:
     limit = bpy.context.scene.cycles.transparent_max_bounces
     step = max(1, len(positions) // MOST_CAMERAS)
     clear = _materials("transparency")
-    some = positions[::step][:MOST_CAMERAS]
-    if clear and any(_meets_more(limit, position, clear) for position in some):
+    tested_positions = positions[::step][:MOST_CAMERAS]
+    if clear and any(_meets_more(limit, position, clear) for position in tested_positions):
         yield (
             f"more than {limit} transparent surfaces lie behind each other, and what is behind "
             f"{limit} may be black: raise Max Bounces: Transparent in the .blend's Light Paths"
         )
     glass = _materials("transmission")
-    small = sorted(thing.name_full for thing in bpy.context.scene.objects if _has_no_size(thing))
-    # Filter Glossy lets it through, and more dimly.
+    small = sorted(obj.name_full for obj in bpy.context.scene.objects if _has_no_size(obj))
+    # Filter Glossy lets such light through, but dims it.
     if glass and small and not bpy.context.scene.cycles.blur_glossy:
         yield (
             f"{', '.join(small[:8])}: lights without a size, whose light comes through no glass "
@@ -63,25 +65,25 @@ def _meets_more(limit: int, position: Floats, clear: Collection[str]) -> bool:
         place = Vector(position)
         direction = Vector(vertex).normalized()
         for _ in range(limit + 1):
-            hit, place, _, index, thing, _ = bpy.context.scene.ray_cast(depsgraph, place, direction)
-            if not hit or _material(thing.evaluated_get(depsgraph), index) not in clear:
+            hit, place, _, index, obj, _ = bpy.context.scene.ray_cast(depsgraph, place, direction)
+            if not hit or _material(obj.evaluated_get(depsgraph), index) not in clear:
                 break
-            # On from just behind it.
+            # Continue from just behind the surface.
             place = place + direction * 1e-5 * (1 + place.length)
         else:
             return True
     return False
 
 
-def _material(thing: Any, index: int) -> str | None:
+def _material(obj: Any, index: int) -> str | None:
     """Return the full name of the material of an object's face.
 
-    None where it has none, and where the face is none of its mesh: of a text, or an instance.
+    Return None if it has none, or if the face is not in its mesh, as for a text or an instance.
     """
-    mesh = thing.data
+    mesh = obj.data
     if not isinstance(mesh, bpy.types.Mesh) or index >= len(mesh.polygons) or not mesh.materials:
         return None
-    # As Cycles takes it.
+    # Cycles limits the index in the same way.
     last = len(mesh.materials) - 1
     material = mesh.materials[min(mesh.polygons[index].material_index, last)]
     return str(material.name_full) if material else None
@@ -92,14 +94,14 @@ def _materials(feature: str) -> list[str]:
     return sorted(
         material.name_full
         for material in bpy.data.materials
-        if feature in (found for found, _ in surface_features(material))
+        if feature in dict(surface_features(material))
     )
 
 
-def _has_no_size(thing: Any) -> bool:
-    """Whether an object is a light that is shown and shines from a point or a direction alone."""
-    if thing.type != "LIGHT" or not thing.visible_get():
+def _has_no_size(obj: Any) -> bool:
+    """Return whether an object is a visible light that shines from a point or one direction."""
+    if obj.type != "LIGHT" or not obj.visible_get():
         return False
-    light = thing.data
+    light = obj.data
     size = {"SUN": "angle", "POINT": "shadow_soft_size", "SPOT": "shadow_soft_size"}.get(light.type)
     return size is not None and getattr(light, size) == 0

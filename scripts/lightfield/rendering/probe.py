@@ -1,8 +1,8 @@
-"""Probes: what a dataset's views will cost, from a few of them, small, with all their samples.
+"""Estimates the cost of a dataset's views from probes: a few small views with all their samples.
 
-The time of a sample hardly depends on the resolution, so the time of a full view follows from the
-number of pixels. So does the size of its file, as an upper estimate: smaller views show more
-detail a pixel, and compress worse.
+The time of a sample hardly depends on the resolution. So the time of a full view follows from the
+number of pixels. So does the size of its file, as an upper estimate: smaller views have more detail
+in a pixel, and compress worse.
 """
 
 from pathlib import Path
@@ -19,30 +19,30 @@ def measure(
 ) -> dict[str, Any]:
     """Render ``count`` probes with a longer side of ``size`` pixels on one core, or on the device.
 
-    Returns the dataset's ``views``, ``resolution`` and ``samples``, the ``device``, CPU or GPU, and
-    for each probe what its view would take: ``view_seconds`` and ``view_bytes``.
+    Returns the dataset's ``views``, ``resolution`` and ``samples``, and the ``device``, CPU or GPU.
+    ``view_seconds`` and ``view_bytes`` are what each probe's view would take at full size.
     """
     views = lightfield.views
     lens = lightfield.lens
     small = lens.fitted(size)
-    # One more than are counted.
+    # Render one more than are counted: the first is left out.
     step = max(1, len(views) // (count + 1))
     probes = lightfield.changed(lens=small, views=views[::step][: count + 1])
     with temporary_folder() as temporary:
         run = rendered(probes, blend, inventory, device, 1, temporary)
-        sizes = [
-            sum(file.stat().st_size for file in temporary.rglob(f"{view['view']}.exr"))
-            for view in run.later_views
-        ]
-    # On a processor the time that it worked, whatever else it did meanwhile.
-    busy = "cpu_seconds" if run.start["device"] == "CPU" else "render_seconds"
+        sizes = []
+        for view in run.later_views:
+            files = temporary.rglob(f"{view['view']}.exr")
+            sizes.append(sum(file.stat().st_size for file in files))
+    # On a CPU count processor time, which does not depend on other processes.
+    time_key = "cpu_seconds" if run.start["device"] == "CPU" else "render_seconds"
     factor = lens.width * lens.height / (small.width * small.height)
     return {
         "views": len(views),
         "resolution": [lens.width, lens.height],
         "samples": lightfield.render["samples"],
         "device": run.start["device"],
-        "view_seconds": [view[busy] * factor for view in run.later_views],
+        "view_seconds": [view[time_key] * factor for view in run.later_views],
         "view_bytes": [size * factor for size in sizes],
     }
 
@@ -50,7 +50,7 @@ def measure(
 def rendered(
     lightfield: LightField, blend: Path, inventory: Path, device: str, threads: int, folder: Path
 ) -> journal.Run:
-    """Render a dataset into a ``folder`` that is new; return what its journal says."""
+    """Render a dataset into a new ``folder``. Return its run from the journal."""
     log = folder / "journal.jsonl"
     shard.render(
         lightfield,

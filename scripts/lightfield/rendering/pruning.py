@@ -1,11 +1,11 @@
 """Leaves out of a render what no pixel depends on.
 
-Leaving something out must not change a byte of any view, so the render key does not name it. It
-must save measurably: benchmarks/pruning.py measures each of these. Fewer bounces for volumes,
-transmission and transparency that a scene does not have saved nothing, and are not here.
+Leaving something out must not change a byte of any view. So the render key does not name it. It
+must save measurable time: benchmarks/pruning.py measures each of these. Fewer bounces for volumes,
+transmission and transparency that a scene does not have saved nothing.
 
-What is left out is left out of every frame. So values that keyframes, a driver or a simulation may
-change decide nothing.
+What is left out is left out of every frame. So the decision never depends on values that keyframes,
+a driver or a simulation may change.
 """
 
 from collections.abc import Collection, Mapping
@@ -32,8 +32,7 @@ def left_out(inventory: Mapping[str, Any]) -> list[str]:
         "viewport": not inventory["uses_visibility"],
         "hidden_objects": bool(inventory["hidden"]),
         "motion_blur": inventory["motion_blur"] and not changes,
-        # What is blurred has to move while its view is rendered. A simulation may ask where things
-        # were at earlier frames.
+        # Blurred objects must move during a render. A simulation may read earlier frames.
         "animation": bool(inventory["animated"])
         and not inventory["motion_blur"]
         and not inventory["simulated"],
@@ -44,11 +43,10 @@ def left_out(inventory: Mapping[str, Any]) -> list[str]:
 def removable_objects() -> list[str]:
     """Return the names of the objects that no frame shows, and that nothing but the scene uses.
 
-    An object may be hidden by itself, by its collections, or because all kinds of rays are turned
-    off for it. Objects with keyframes or drivers are not removable, because these may show them.
-    Blender cannot animate the visibility of collections, nor what a modifier, a constraint or an
-    instancer refers to. Objects that these, a physics simulation or drivers may use are not
-    removable.
+    An object may be hidden by itself, by its collections, or because all its kinds of rays are
+    turned off. Objects with keyframes or drivers stay, because these may show them. Blender cannot
+    animate the visibility of collections, nor the object that a modifier, a constraint or an
+    instancer refers to. Objects that these, a physics simulation or drivers may use stay, too.
     """
     scene = bpy.context.scene
     shown: set[Any] = set()
@@ -61,39 +59,46 @@ def removable_objects() -> list[str]:
         if any(not isinstance(user, _HOLDS_ONLY) for user in users[collection]):
             needed.update(collection.all_objects)
     removable = {
-        thing
-        for thing in scene.objects
-        if (thing not in shown or not _meets_rays(thing))
-        and thing not in needed
-        and thing.type != "CAMERA"
-        and not animation.is_animated(thing)
-        and not _is_physical(thing)
+        obj
+        for obj in scene.objects
+        if (obj not in shown or not _meets_rays(obj))
+        and obj not in needed
+        and obj.type != "CAMERA"
+        and not animation.is_animated(obj)
+        and not _is_physical(obj)
         # Blender cannot remove objects from a collection of a linked file.
-        and not any(collection.library for collection in thing.users_collection)
+        and not any(collection.library for collection in obj.users_collection)
     }
-    while used := {
-        thing
-        for thing in removable
-        if any(not isinstance(u, _HOLDS_ONLY) and u not in removable for u in users[thing])
-    }:
+    # Keep what a kept object uses, until nothing changes.
+    while True:
+        used = {obj for obj in removable if _is_used(users[obj], removable)}
+        if not used:
+            break
         removable -= used
-    return sorted(thing.name_full for thing in removable)
+    return sorted(obj.name_full for obj in removable)
+
+
+def _is_used(users: Collection[Any], removable: Collection[Any]) -> bool:
+    """Return whether any of an object's users needs it, and is not removable itself."""
+    return any(not isinstance(user, _HOLDS_ONLY) and user not in removable for user in users)
 
 
 def background_scenes(scene: Any) -> list[Any]:
     """Return a scene's background scene, the background scene of that one, and so on."""
     backgrounds: list[Any] = []
-    while (scene := scene.background_set) and scene not in backgrounds:
-        backgrounds.append(scene)
+    background = scene.background_set
+    while background and background not in backgrounds:
+        backgrounds.append(background)
+        background = background.background_set
     return backgrounds
 
 
 def remove_objects(names: Collection[str]) -> None:
-    """Unload objects of the scene, and all that only they use."""
-    for thing in list(bpy.context.scene.objects):
-        if thing.name_full in names:
-            for collection in thing.users_collection:
-                collection.objects.unlink(thing)
+    """Unload objects of the scene, and all data that only they use."""
+    for obj in list(bpy.context.scene.objects):
+        if obj.name_full in names:
+            for collection in obj.users_collection:
+                collection.objects.unlink(obj)
     if names:
         remove_unused()
 
@@ -105,7 +110,7 @@ def remove_unused() -> None:
 
 
 def leave_out(names: Collection[str]) -> None:
-    """Leave out what `left_out` names. The scene must be set up for its frame."""
+    """Leave out what ``names`` from `left_out` say. The scene must be set up for its frame."""
     scene = bpy.context.scene
     if "motion_blur" in names:
         scene.render.use_motion_blur = False
@@ -113,12 +118,12 @@ def leave_out(names: Collection[str]) -> None:
         for block in in_render(_standing):
             block.animation_data_clear()
     if "viewport" in names:
-        for thing in scene.objects:
-            thing.hide_viewport = True
+        for obj in scene.objects:
+            obj.hide_viewport = True
         bpy.context.view_layer.update()
 
 
-# What lists objects without making anything of them.
+# Types that hold objects without using them.
 _HOLDS_ONLY = (
     bpy.types.Scene,
     bpy.types.Collection,
@@ -137,28 +142,28 @@ def _collect_shown(layer_collection: Any, shown: set[Any]) -> None:
         _collect_shown(child, shown)
 
 
-def _meets_rays(thing: Any) -> bool:
+def _meets_rays(obj: Any) -> bool:
     """Return whether an object has any kind of ray turned on. Empties may place other objects."""
-    return thing.type == "EMPTY" or any(
-        getattr(thing, f"visible_{kind}")
+    return obj.type == "EMPTY" or any(
+        getattr(obj, f"visible_{kind}")
         for kind in ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
     )
 
 
-def _is_physical(thing: Any) -> bool:
+def _is_physical(obj: Any) -> bool:
     """Return whether a physics simulation may use an object that it does not refer to."""
     return (
-        animation.is_simulated(thing)
-        or (thing.field is not None and thing.field.type != "NONE")
-        or any(modifier.type == "COLLISION" for modifier in thing.modifiers)
+        animation.is_simulated(obj)
+        or (obj.field is not None and obj.field.type != "NONE")
+        or any(modifier.type == "COLLISION" for modifier in obj.modifiers)
     )
 
 
 def _standing(depsgraph: Any) -> list[Any]:
-    """Return what can go without its animation: its properties already hold this frame's values.
+    """Return data-blocks and node trees whose properties already hold this frame's values.
 
-    These are data-blocks and node trees. What drivers make of variables may depend on more than the
-    frame, such as the camera or a render's levels of detail.
+    Their animation is not needed. Drivers with variables stay: their values may depend on more than
+    the frame, such as the camera or a render's levels of detail.
     """
     blocks = []
     for owner, block in animation.animated():
@@ -177,10 +182,10 @@ def _standing(depsgraph: Any) -> list[Any]:
 
 
 def _value(block: Any, curve: Any) -> Any:
-    """Return the property of a block that an animation curve sets; the block itself if none."""
+    """Return the value of the property that a curve sets. Return the block if there is none."""
     try:
         value = block.path_resolve(curve.data_path)
-        # Where a path leads to another block, Blender does not always take it there.
+        # Blender does not always follow a path into another block.
         place = block.path_resolve(curve.data_path, False)
         if getattr(place, "id_data", block) != block:
             return block

@@ -1,4 +1,4 @@
-"""Blender prints to standard output what concerns no user."""
+"""Silences Blender, which prints to standard output what concerns no user."""
 
 import os
 import sys
@@ -9,7 +9,7 @@ from pathlib import Path
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Keep what Blender itself prints to standard output out of ours."""
+    """Discard what Blender itself prints to standard output."""
     sys.stdout.flush()
     saved = os.dup(1)
     with Path(os.devnull).open("w") as nothing:

@@ -1,7 +1,7 @@
-"""What a render shows at the scene's present frame, as Blender evaluates it for the render.
+"""Reads the dependency graph that Blender evaluates for a render of the current frame.
 
 The viewport may show other objects, other levels of detail and fewer particles. Blender gives a
-render's dependency graph only to the engine that renders.
+render's dependency graph only to the render engine.
 """
 
 from collections.abc import Callable, Iterator
@@ -14,12 +14,12 @@ from lightfield.rendering.quiet import quiet
 
 Result = TypeVar("Result")
 
-# What a render may do beside, by its settings.
-_BESIDE = ("use_border", "use_compositing", "use_freestyle", "use_multiview", "use_sequencer")
+# Settings for additional work of a render. They are off while the graph is read.
+_EXTRAS = ("use_border", "use_compositing", "use_freestyle", "use_multiview", "use_sequencer")
 
 
 class _Reader(bpy.types.RenderEngine):  # type: ignore[misc]
-    """A render engine that hands the dependency graph to a function, and makes no picture."""
+    """A render engine that passes the dependency graph to a function, and makes no picture."""
 
     bl_idname = "PLENOFORGE_READER"
     bl_label = "Plenoforge Reader"
@@ -33,18 +33,18 @@ class _Reader(bpy.types.RenderEngine):  # type: ignore[misc]
 bpy.utils.register_class(_Reader)
 
 
-def in_render(look: Callable[[Any], Result]) -> Result:
-    """Return what ``look`` makes of the dependency graph of a render of the open scene.
+def in_render(read: Callable[[Any], Result]) -> Result:
+    """Call ``read`` with the dependency graph of a render of the open scene. Return its result.
 
-    It must return nothing of the graph itself, which ends with the render.
+    The result must not refer to the graph, which ends with the render.
     """
     results: list[Result] = []
-    _Reader.read = lambda depsgraph: results.append(look(depsgraph))
+    _Reader.read = lambda depsgraph: results.append(read(depsgraph))
     render = bpy.context.scene.render
     with ExitStack() as stack:
         stack.enter_context(_some_camera())
         stack.enter_context(changed(render, "engine", _Reader.bl_idname))
-        for name in _BESIDE:
+        for name in _EXTRAS:
             stack.enter_context(changed(render, name, False))
         with quiet():
             bpy.ops.render.render()
@@ -54,7 +54,7 @@ def in_render(look: Callable[[Any], Result]) -> Result:
 
 @contextmanager
 def changed(owner: Any, name: str, value: Any) -> Iterator[None]:
-    """Give a property another value for a while."""
+    """Change a property, and restore it afterwards."""
     before = getattr(owner, name)
     setattr(owner, name, value)
     try:
@@ -65,7 +65,7 @@ def changed(owner: Any, name: str, value: Any) -> Iterator[None]:
 
 @contextmanager
 def _some_camera() -> Iterator[None]:
-    """Let the scene have a camera for a while, without which Blender renders nothing."""
+    """Make sure that the scene has a camera: without one Blender renders nothing."""
     scene = bpy.context.scene
     if scene.camera:
         yield

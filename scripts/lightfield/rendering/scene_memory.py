@@ -1,4 +1,4 @@
-"""How much memory a scene takes: measured on one view of hardly any pixels."""
+"""Measures how much memory a scene takes, on one view of very few pixels."""
 
 import subprocess
 import sys
@@ -21,21 +21,23 @@ RENDER = {"samples": 1, "adaptive_threshold": 0, "denoise": False, "seed": 0}
 
 
 def measure(blend: Path, inventory: Mapping[str, Any], chosen: Mapping[str, Any]) -> int:
-    """Return the most bytes that a process has which renders one small panorama of a scene.
+    """Return the peak memory in bytes of a process that renders one small panorama of a scene.
 
-    The panorama shows the fullest frame of its ``inventory``. ``chosen`` is a scene YAML's
-    ``scene`` block, as far as there is one. The process has nothing else in its memory. Raises
-    `UserError` where the scene does not fit into the machine's memory, or cannot be rendered.
+    The panorama shows the fullest frame of the ``inventory``. ``chosen`` is a scene YAML's
+    ``scene`` block, or empty. Raises `UserError` if the scene does not fit into the machine's
+    memory, or cannot be rendered.
     """
     scene = {key: chosen[key] for key in ("scene_name", "view_layers") if chosen.get(key)}
     with temporary_folder() as folder:
         content = {
             **Equirectangular(width=32, height=16).to_lightfield(),
-            **{"depth": "distance", "frame": inventory["fullest_frame"], "scene": scene},
+            "depth": "distance",
+            "frame": inventory["fullest_frame"],
+            "scene": scene,
             "render": {**RENDER, "depth_precision": "float"},
         }
         LightField(content, [View.placed("view", np.eye(4))]).write(folder / "lightfield.json")
-        # What the .blend reads is where it is: nothing is taken from a view store.
+        # The .blend's files are in their places: fetch nothing from a view store.
         write_json(folder / "inventory.json", {**inventory, "external_files": []})
         command: list[Any] = [
             *("--blend", blend, "--lightfield", folder / "lightfield.json"),

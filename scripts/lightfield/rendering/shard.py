@@ -1,10 +1,10 @@
 """Renders a shard: some views of a dataset, in one process.
 
-Each view is written as soon as it is rendered, and the checksums of its files are logged beside the
+Each view is written as soon as it is rendered. The checksums of its files are logged beside the
 shard's record. A view has one file, and one for each pass. It is finished if its files have the
-bytes that were logged for the view's present render key. Finished views are kept, so that a shard
-that was killed renders only the missing views. The journal gets one JSON line for each rendered
-view: when it was finished, and how long it took.
+bytes that were logged for the view's current render key. Finished views are kept: a killed shard
+renders only the missing views. The journal gets one JSON line for each rendered view: when it was
+finished, and how long it took.
 """
 
 import signal
@@ -59,10 +59,11 @@ def render(
 ) -> None:
     """Render those of the ``views``, FIRST:END, that are missing in ``folder``.
 
-    Passes go into folders beside it, and so do the names of the objects, materials and instances
-    that passes number. ``blend`` is the scene, and ``inventory`` a JSON of what it contains.
-    ``threads`` None means all processors. ``record`` and ``journal`` are files to write, or None.
-    A view that takes more than ``stall`` seconds ends the process by SIGALRM; 0 sets no limit.
+    Passes go into folders beside it. So do the names of the objects, materials and instances that
+    passes number. ``blend`` is the scene, and ``inventory`` a JSON of what it contains. ``threads``
+    None means all processors. ``record`` and ``journal`` are files to write, or None. A view that
+    takes more than ``stall`` seconds ends the process by SIGALRM. 0 sets no limit.
+
     Raises `UserError` if the scene cannot be opened, if the ``device`` is missing, or if a file
     cannot be written.
     """
@@ -98,21 +99,21 @@ def render(
 
 
 def _is_finished(view: View, lightfield: LightField, folder: Path, record: ShardRecord) -> bool:
-    """Return whether all files of a view are as the view's render key and the record say."""
+    """Return whether all files of a view match its render key and the record."""
     key = keys.render_key(lightfield, view)
     return all(record.is_finished(path, key) for path in _files(folder, view, lightfield.passes))
 
 
-def _files(folder: Path, view: View, wanted: Iterable[Pass]) -> list[Path]:
+def _files(folder: Path, view: View, view_passes: Iterable[Pass]) -> list[Path]:
     """Return all files of a view: its own, and one for each pass."""
     return [
         folder / f"{view.name}.exr",
-        *(view_pass.path(folder.parent, view.name) for view_pass in wanted),
+        *(view_pass.path(folder.parent, view.name) for view_pass in view_passes),
     ]
 
 
 def _name_files(lightfield: LightField, folder: Path) -> list[Path]:
-    """Return the files that say which object, material or instance has which number."""
+    """Return the files with the names of the numbered objects, materials and instances."""
     return [
         folder.parent / view_pass.name / passes.NAMES
         for view_pass in lightfield.passes
@@ -154,7 +155,10 @@ def _open_scene(
 
 
 def _check_memory(blend: Path, inventory: Mapping[str, Any], lightfield: LightField) -> None:
-    """Raise `UserError` if the scene, as the inventory measured it, and a view need more memory."""
+    """Raise `UserError` if the scene and a view need more memory than the machine has.
+
+    The inventory has the measured memory of the scene.
+    """
     lens = lightfield.lens
     denoise = lightfield.render["denoise"]
     needed = memory.needed(inventory.get("memory_bytes", 0), lens.width * lens.height, denoise)
@@ -192,7 +196,7 @@ def _render_views(
     earlier_seconds: list[float] = []
     progress.begin()
     for view in views:
-        # A timer of the system, because a process that hangs may run no Python.
+        # Use a timer of the system, because a process that hangs may run no Python.
         signal.alarm(stall)
         began = time.perf_counter()
         began_cpu = time.process_time()
@@ -222,9 +226,9 @@ def _render_views(
 
 @dataclass(frozen=True)
 class _Rendered:
-    """What Cycles rendered of one view. ``geometry`` is None if neither depth nor a pass needs it.
+    """One view as Cycles rendered it. ``geometry`` is None if neither depth nor a pass needs it.
 
-    ``geometry_seconds`` is the time that rendering the geometry took.
+    ``geometry_seconds`` is the time of the geometry's render.
     """
 
     colour: "Colour"
@@ -245,25 +249,23 @@ class _Rendered:
 
 
 def _render_view(view: View, lightfield: LightField) -> _Rendered:
-    """Render the geometry of a view, if it is wanted, and then its colour."""
+    """Render the geometry of a view, if depth or a pass needs it, and then its colour."""
     from lightfield.rendering.colour_pass import render_colour
     from lightfield.rendering.cycles import choose_eye
     from lightfield.rendering.geometry_pass import render_geometry
 
-    wanted = lightfield.passes
-    names = {view_pass.name for view_pass in wanted}
-    has_geometry = lightfield.depth or not all(view_pass.of_colour for view_pass in wanted)
+    view_passes = lightfield.passes
+    names = {view_pass.name for view_pass in view_passes}
+    has_geometry = lightfield.depth or not all(view_pass.of_colour for view_pass in view_passes)
     began = time.perf_counter()
     choose_eye(view.name)
     # Render both at the same pose, one after the other, so that Cycles does not update the scene.
-    geometry = (
-        render_geometry(view.matrix, "motion" in names, "instance" in names)
-        if has_geometry
-        else None
-    )
+    geometry = None
+    if has_geometry:
+        geometry = render_geometry(view.matrix, "motion" in names, "instance" in names)
     geometry_seconds = time.perf_counter() - began
     seed = keys.view_seed(lightfield.render["seed"], view.name)
-    colour = render_colour(view.matrix, seed, wanted, lightfield.transparent)
+    colour = render_colour(view.matrix, seed, view_passes, lightfield.transparent)
     return _Rendered(colour, geometry, geometry_seconds)
 
 
@@ -291,7 +293,7 @@ class _ViewFiles:
         colour = rendered.colour
         geometry = rendered.geometry
         if lightfield.transparent:
-            # Cycles makes pixels opaque for which the lens has no ray.
+            # Cycles makes pixels opaque if the lens has no ray for them.
             colour.pixels[self.pixels_without_ray, 3] = 0
         channels, attributes = colour_channels(colour.pixels)
         if geometry and lightfield.depth:
@@ -303,10 +305,10 @@ class _ViewFiles:
             for view_pass in lightfield.passes
         ]
         key = keys.render_key(lightfield, view)
-        made = {images.KEY_ATTRIBUTE: key, **self.attributes}
+        view_attributes = {images.KEY_ATTRIBUTE: key, **self.attributes}
         paths = _files(self.folder, view, lightfield.passes)
         for path, (channels, attributes) in zip(paths, contents, strict=True):
-            images.write_exr(path, channels, attributes | made, self.compression)
+            images.write_exr(path, channels, attributes | view_attributes, self.compression)
             self.record.add(path, key)
 
 
@@ -334,22 +336,22 @@ def colour_channels(colour: Array) -> tuple[dict[str, Array], dict[str, images.A
 
 
 def pass_channels(
-    wanted: Pass, geometry: "Geometry | None", colour: "Colour", lens: Lens
+    view_pass: Pass, geometry: "Geometry | None", colour: "Colour", lens: Lens
 ) -> tuple[dict[str, Array], dict[str, images.Attribute]]:
     """Return the channels and attributes of the EXR of one of a view's passes.
 
     NaNs are counted and become 0: Cycles leaves them out of the colour, but not out of passes.
     """
-    if wanted.kind == "matte":
-        planes = np.moveaxis(colour.passes[wanted.name], -1, 0)
-        named = dict(zip(wanted.channels, planes, strict=True))
+    if view_pass.kind == "matte":
+        planes = np.moveaxis(colour.passes[view_pass.name], -1, 0)
+        named = dict(zip(view_pass.channels, planes, strict=True))
         return named, passes.matte_header(colour.manifest)
-    if wanted.of_colour:
-        channels, attributes = colour_channels(colour.passes[wanted.name])
+    if view_pass.of_colour:
+        channels, attributes = colour_channels(colour.passes[view_pass.name])
         return {name: np.nan_to_num(plane, nan=0) for name, plane in channels.items()}, attributes
     assert geometry
     attributes = {}
-    match wanted.name:
+    match view_pass.name:
         case "normal":
             pixels = np.nan_to_num(geometry.normal, nan=0)
             attributes[images.NAN_ATTRIBUTE] = int(np.isnan(geometry.normal).sum())
@@ -364,8 +366,8 @@ def pass_channels(
             assert geometry.motion is not None
             pixels = geometry.motion.copy()
             pixels[..., ::2] = shorter(lens, pixels[..., ::2])
-    planes = np.moveaxis(pixels.astype(wanted.dtype), -1, 0)
-    return dict(zip(wanted.channels, planes, strict=True)), attributes
+    planes = np.moveaxis(pixels.astype(view_pass.dtype), -1, 0)
+    return dict(zip(view_pass.channels, planes, strict=True)), attributes
 
 
 def depth_channel(cycles_depth: Array, lightfield: LightField, rays: Array | None) -> Array:

@@ -1,4 +1,4 @@
-"""Simulations that are not baked, which Blender does not run up to the frame that is rendered."""
+"""Finds unbaked simulations. Blender does not run them up to the rendered frame."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -10,18 +10,18 @@ from lightfield.rendering.render_graph import in_render
 
 
 def unbaked_fluids() -> list[str]:
-    """Return the names of the objects that a render shows with a fluid that is not baked.
+    """Return the names of the rendered objects with an unbaked fluid.
 
-    Blender as a Python module has no fluid solver that works: it aborts when it evaluates them.
+    Blender as a Python module has no working fluid solver: it aborts when it evaluates a fluid.
     """
     return sorted(
-        str(thing.name_full)
-        for thing in bpy.context.view_layer.objects
-        for modifier in thing.modifiers
+        str(obj.name_full)
+        for obj in bpy.context.view_layer.objects
+        for modifier in obj.modifiers
         if modifier.type == "FLUID"
         and modifier.fluid_type == "DOMAIN"
         and modifier.show_render
-        and (not thing.hide_render or animation.is_animated(thing))
+        and (not obj.hide_render or animation.is_animated(obj))
         and not _is_fluid_baked(modifier.domain_settings)
     )
 
@@ -36,10 +36,10 @@ def warnings(frames: Sequence[int]) -> Iterator[str]:
     """Yield a line if rendered objects of the open scene have unbaked simulations.
 
     Blender goes to each of the ``frames`` directly. A simulation has no past there: its object
-    stays where it was, or falls in one step. At a simulation's first frame nothing is wrong.
+    stays in place, or falls in one step. A simulation's first frame is right.
     """
     last = max(frames)
-    unbaked = {str(thing.name_full): kind for thing, kind, first in _unbaked(last) if last > first}
+    unbaked = {str(obj.name_full): kind for obj, kind, first in _unbaked(last) if last > first}
     if not unbaked:
         return
     bpy.context.scene.frame_set(last)
@@ -58,26 +58,26 @@ def _unbaked(frame: int) -> Iterator[tuple[Any, str, int]]:
     """Yield each object with an unbaked simulation, the simulation's kind, and its first frame."""
     world = bpy.context.scene.rigidbody_world
     if world and world.enabled and world.collection and not world.point_cache.is_baked:
-        for thing in world.collection.objects:
-            if thing.rigid_body and _is_moved(thing):
-                yield thing, "rigid body", world.point_cache.frame_start
-    for thing in bpy.data.objects:
-        for modifier in thing.modifiers:
+        for obj in world.collection.objects:
+            if obj.rigid_body and _is_moved(obj):
+                yield obj, "rigid body", world.point_cache.frame_start
+    for obj in bpy.data.objects:
+        for modifier in obj.modifiers:
             if not modifier.show_render:
                 continue
             for kind, cache in _point_caches(modifier):
                 if not cache.is_baked:
-                    yield thing, kind, cache.frame_start
+                    yield obj, kind, cache.frame_start
             if modifier.type == "NODES":
                 first = _first_simulated_frame(modifier)
-                if first is not None and _depends_on_way(thing, first, frame):
-                    yield thing, "simulation nodes", first
+                if first is not None and _depends_on_history(obj, first, frame):
+                    yield obj, "simulation nodes", first
 
 
-def _is_moved(thing: Any) -> bool:
+def _is_moved(obj: Any) -> bool:
     """Return whether the rigid-body simulation moves an object at some frame."""
-    body = thing.rigid_body
-    return body.type == "ACTIVE" and (not body.kinematic or animation.is_animated(thing))
+    body = obj.rigid_body
+    return body.type == "ACTIVE" and (not body.kinematic or animation.is_animated(obj))
 
 
 def _point_caches(modifier: Any) -> Iterator[tuple[str, Any]]:
@@ -113,16 +113,16 @@ def _is_simulation(node: Any) -> bool:
     return node is not None and node.bl_idname == "GeometryNodeSimulationOutput"
 
 
-def _depends_on_way(thing: Any, first: int, frame: int) -> bool:
+def _depends_on_history(obj: Any, first: int, frame: int) -> bool:
     """Return whether an object's extent at a frame depends on the frames before.
 
-    Blender does not tell whether geometry nodes are baked. Baked ones have one result a frame.
+    Blender does not tell whether geometry nodes are baked. Baked nodes have one result per frame.
     """
     extents = []
-    for way in ((first, frame), (first, frame - 1, frame)):
-        for step in way:
+    for history in ((first, frame), (first, frame - 1, frame)):
+        for step in history:
             bpy.context.scene.frame_set(step)
-        extents.append(in_render(lambda depsgraph: _extents(depsgraph, thing.name_full)))
+        extents.append(in_render(lambda depsgraph: _extents(depsgraph, obj.name_full)))
     return extents[0] != extents[1]
 
 
@@ -138,8 +138,8 @@ def _extents(depsgraph: Any, name: str) -> list[Any]:
 def _rendered_objects(depsgraph: Any) -> set[str]:
     """Return the full names of the objects that a render shows, and of those that place them."""
     return {
-        str(thing.original.name_full)
+        str(obj.original.name_full)
         for entry in depsgraph.object_instances
-        for thing in (entry.object, entry.parent)
-        if thing and not thing.hide_render
+        for obj in (entry.object, entry.parent)
+        if obj and not obj.hide_render
     }

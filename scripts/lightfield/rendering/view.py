@@ -1,4 +1,4 @@
-"""Renders one view with Cycles, which `lightfield.rendering.cycles` has set up."""
+"""Renders one view with Cycles. `lightfield.rendering.cycles` sets Cycles up before."""
 
 import math
 import shutil
@@ -24,10 +24,10 @@ Array = np.ndarray[Any, Any]
 
 @dataclass(frozen=True)
 class Rendered:
-    """What Cycles rendered of a view, in float32.
+    """A view as Cycles rendered it, in float32.
 
-    ``passes`` are (height, width, channels) by Cycles' names for them, ``attributes`` the header.
-    ``render_seconds`` and ``synchronization_seconds`` are Cycles' own.
+    ``passes`` are (height, width, channels) by Cycles' names. ``attributes`` is the EXR's header.
+    ``render_seconds`` and ``synchronization_seconds`` are as Cycles measured them.
     """
 
     passes: dict[str, Array]
@@ -56,14 +56,14 @@ def render_view(world_matrix: Array, seed: int, passes: Mapping[str, str]) -> Re
             with quiet():
                 bpy.ops.render.render(write_still=True)
         except RuntimeError as error:
-            # Cycles prints its errors itself, and Blender again at the end of the render.
+            # Blender repeats Cycles' errors at the end of the render.
             lines = [line.removeprefix("Error:").strip() for line in str(error).splitlines()]
             text = "; ".join(dict.fromkeys(filter(None, lines)))
-            on_gpu = scene.cycles.device == "GPU"
-            advice = f": {LESS_GPU_MEMORY if on_gpu else LESS_MEMORY}"
-            raise UserError(
-                f"Cycles cannot render the view: {text}{advice if 'memory' in text.lower() else ''}"
-            ) from None
+            advice = ""
+            if "memory" in text.lower():
+                on_gpu = scene.cycles.device == "GPU"
+                advice = f": {LESS_GPU_MEMORY if on_gpu else LESS_MEMORY}"
+            raise UserError(f"Cycles cannot render the view: {text}{advice}") from None
         try:
             # One eye of a stereo pair is in view_L.exr or view_R.exr.
             path = next(folder.glob("*.exr"), folder / "view.exr")

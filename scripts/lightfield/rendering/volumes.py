@@ -1,4 +1,4 @@
-"""Volumes such as fog and smoke: which objects of a scene have no surface."""
+"""Finds the objects of a scene that are only volumes, such as fog and smoke."""
 
 from collections.abc import Iterator
 from functools import cache
@@ -12,20 +12,22 @@ from lightfield.rendering.render_graph import in_render
 @cache
 def alone() -> frozenset[str]:
     """Return the full names of the open scene's objects that are only volumes at its frame."""
-    by_nodes = [t for t in bpy.data.objects if any(m.type == "NODES" for m in t.modifiers)]
+    objects = bpy.data.objects
+    with_nodes = [obj for obj in objects if any(m.type == "NODES" for m in obj.modifiers)]
 
-    def made(depsgraph: Any) -> dict[Any, bool]:
-        evaluated = {thing: thing.evaluated_get(depsgraph) for thing in by_nodes}
-        return {
-            thing: all(map(_is_volume, _parts(now.evaluated_geometry())))
-            for thing, now in evaluated.items()
-            if now.is_evaluated
-        }
+    def evaluated_volumes(depsgraph: Any) -> dict[Any, bool]:
+        are_volumes = {}
+        for obj in with_nodes:
+            evaluated = obj.evaluated_get(depsgraph)
+            if evaluated.is_evaluated:
+                parts = _parts(evaluated.evaluated_geometry())
+                are_volumes[obj] = all(_is_volume(part) for part in parts)
+        return are_volumes
 
-    is_volume = {thing: _is_volume(thing) for thing in bpy.data.objects}
-    if by_nodes:
-        is_volume |= in_render(made)
-    return frozenset(str(thing.name_full) for thing in is_volume if is_volume[thing])
+    is_volume = {obj: _is_volume(obj) for obj in objects}
+    if with_nodes:
+        is_volume |= in_render(evaluated_volumes)
+    return frozenset(str(obj.name_full) for obj in is_volume if is_volume[obj])
 
 
 def _parts(geometry: Any) -> Iterator[Any]:
@@ -33,8 +35,9 @@ def _parts(geometry: Any) -> Iterator[Any]:
     # Replacing a mesh leaves an empty one behind.
     if geometry.mesh and geometry.mesh.polygons:
         yield geometry.mesh
-    others = (geometry.curves, geometry.pointcloud, geometry.grease_pencil, geometry.volume)
-    yield from filter(None, others)
+    for part in (geometry.curves, geometry.pointcloud, geometry.grease_pencil, geometry.volume):
+        if part:
+            yield part
     for placed in geometry.instance_references():
         yield from _parts(placed) if isinstance(placed, bpy.types.GeometrySet) else (placed,)
 

@@ -1,4 +1,4 @@
-"""Many views on one sheet, small, in their order and at one exposure."""
+"""Draws many views on one sheet: small, in their order, at one exposure."""
 
 import math
 import sys
@@ -20,20 +20,19 @@ GAP = 4
 CAPTION = 14
 BACKGROUND = 24
 INK = (0.8, 0.8, 0.8)
-# Matplotlib brings its font along, so that captions look alike on every machine.
+# The font comes with Matplotlib, so that captions look the same on every machine.
 FONT = Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf")
 
 
 def sheet(views: Sequence[Path], width: int, height: int) -> Array:
-    """Return the sheet's 8-bit pixels; each view has its name beneath.
+    """Return the sheet's 8-bit pixels (height, width, 3). Each view has its name beneath.
 
-    The views are EXRs, which are developed, or PNGs, which are. Their size is ``width`` ×
-    ``height``.
+    The views are EXRs, which are developed here, or PNGs. Their size is ``width`` × ``height``.
     """
     columns = max(1, min(len(views), round(math.sqrt(len(views) * 1.6 * height / width))))
     rows = math.ceil(len(views) / columns)
     cell_width = min(max(width, LEAST_CELL), (SHEET_WIDTH - GAP) // columns - GAP)
-    # A single tall view would make a sheet that no WebP can be of.
+    # Limit the height too: a single tall view would exceed the largest WebP.
     cell_width = max(1, min(cell_width, SHEET_WIDTH * width // height))
     cell_height = max(1, round(cell_width * height / width))
     cells = [small_view(path, cell_width, cell_height) for path in views]
@@ -63,9 +62,9 @@ def sheet(views: Sequence[Path], width: int, height: int) -> Array:
 
 
 def small_view(path: Path, width: int, height: int) -> Array:
-    """Return a view's colour at a cell's size; black where there is none, as validation will say.
+    """Return a view's colour (height, width, 3) at a cell's size.
 
-    Pixels that hold no number are black too.
+    A view that cannot be read is black: validation reports it. Pixels that are no number are black.
     """
     try:
         image = images.read_image(path, "RGB")

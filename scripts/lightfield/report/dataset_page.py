@@ -1,4 +1,4 @@
-"""A dataset's page: one file that shows what it looks like, how good it is, what it cost."""
+"""Writes a dataset's page: one file with its pictures, its quality and its cost."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,7 +25,7 @@ from lightfield.validation.files import IMAGES, REPORT, SUMS
 PICTURES = ("overview", "contact_sheet")
 PLOTS = ("depth", "noise")
 WIDEST = 1600
-# Of each reprojection so many views are shown.
+# The page shows at most this many views of each reprojection.
 MOST_REPROJECTED = 24
 SHEET_QUALITY = 84
 DEPTHS = {"z": "Z-depth, metres", "distance": "distance, metres"}
@@ -33,54 +33,51 @@ DEPTHS = {"z": "Z-depth, metres", "distance": "distance, metres"}
 
 @dataclass(frozen=True)
 class Origin:
-    """What the page says of how the dataset came about, beside what its files do."""
+    """How the dataset was made, as far as its files do not say it.
+
+    - ``yaml``: the text of the scene YAML.
+    - ``command``: the command that makes the dataset.
+    - ``has_panorama``: whether the overview is a panorama from the rig's centre.
+    - ``measurements``: files of measurements to show.
+    - ``inventory``: the inventory of a user's own .blend. None for scenes that are built.
+    """
 
     rig: rigs.Rig
-    # Of the scene YAML, the text; and what makes the dataset from it.
     yaml: str
     command: str
     has_panorama: bool
     measurements: Sequence[Path] = ()
-    # What the scene's .blend says, for a user's own.
     inventory: Mapping[str, Any] | None = None
 
 
 def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
     """Write the page of the dataset in ``folder``, which is called ``name``: scene/rig.
 
-    What is not there (validation, measurements, depth, costs) has no section.
+    Leaves out the sections for which files are missing: validation, measurements, depth, costs.
     """
     lightfield = LightField.read(folder / NAME)
     rig = origin.rig
     lightfield.require_rig(rig)
     validation = tables.validation(folder / "validation.json")
-    looks = views.collect(folder / IMAGES, lightfield, rig, _unreadable(validation))
+    packed = views.collect(folder / IMAGES, lightfield, rig, _unreadable(validation))
     middle = lightfield.views[middle_view(rig)]
     report = folder / REPORT
-    found = origin.measurements
-    own = absolute_path(folder)
-    measured = {
-        "error_vs_time": tables.error_vs_time(found, str(lightfield.scene["name"])),
-        "synthesis": tables.synthesis(found, f"{own.parent.name}/{own.name}"),
-        "learning": tables.learning(found, f"{own.parent.name}/{own.name}"),
-        "reprojection": tables.reprojection(found),
-        "stability": tables.stability(found),
-    }
+    measurements = _measurements(origin, folder, lightfield)
     page.write(
         output,
         "page.html.j2",
         name=name,
         home="../" * (name.count("/") + 2) + "index.html",
-        facts=facts(folder, lightfield, rig, looks.missed),
+        facts=facts(folder, lightfield, rig, packed.missed),
         middle=None if origin.has_panorama else middle.name,
         passes_of=middle.name,
         pictures={stem: page.photo(report / f"{stem}.png", WIDEST) for stem in PICTURES},
         plots={stem: page.plot(report / stem) for stem in PLOTS},
         taken=_taken(origin, lightfield),
-        looks=looks,
+        packed=packed,
         frames=list(rig.sequence.folders) if rig.sequence else [],
-        frame=own.name,
-        passes=list(pass_pictures.collect(folder, lightfield, middle, looks.data["exposure"])),
+        frame=absolute_path(folder).name,
+        passes=list(pass_pictures.collect(folder, lightfield, middle, packed.data["exposure"])),
         reprojected=list(_reprojected(folder)),
         render=lightfield.render,
         validation=validation,
@@ -88,7 +85,7 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
             (group, check["short"]): faults.collect(folder / (group or IMAGES), check["views"])
             for group, check in _failed(validation)
         },
-        measured={title: one for title, one in measured.items() if one},
+        measured=measurements,
         costs=tables.costs(report / "costs.json"),
         files=files(folder, lightfield, valid=not validation or validation["valid"]),
         transforms=[path.relative_to(folder).as_posix() for path in transforms(folder)],
@@ -97,34 +94,54 @@ def write(output: Path, folder: Path, name: str, origin: Origin) -> None:
     )
 
 
+def _measurements(
+    origin: Origin, folder: Path, lightfield: LightField
+) -> dict[str, tables.Measurement]:
+    """Return the measurements that exist, by their names in the template."""
+    files = origin.measurements
+    dataset = absolute_path(folder)
+    name = f"{dataset.parent.name}/{dataset.name}"
+    candidates = {
+        "error_vs_time": tables.error_vs_time(files, str(lightfield.scene["name"])),
+        "synthesis": tables.synthesis(files, name),
+        "learning": tables.learning(files, name),
+        "reprojection": tables.reprojection(files),
+        "stability": tables.stability(files),
+    }
+    return {title: measurement for title, measurement in candidates.items() if measurement}
+
+
 def _taken(origin: Origin, lightfield: LightField) -> list[str]:
-    """Return what was taken of the user's own .blend and what was not; nothing without one."""
+    """Return which settings came from the user's own .blend. Empty for scenes that are built."""
     if origin.inventory is None:
         return []
-    own_camera = isinstance(origin.rig, rigs.BlendCamera)
-    return blend.usage_notes(origin.inventory, [lightfield.frame], lightfield.render, own_camera)
+    uses_camera = isinstance(origin.rig, rigs.BlendCamera)
+    return blend.usage_notes(origin.inventory, [lightfield.frame], lightfield.render, uses_camera)
 
 
 def _failed(validation: Mapping[str, Any] | None) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield each failed check with the image set that it is of, "" for the views."""
-    for group, checks in (validation or {"groups": {}})["groups"].items():
-        yield from ((group, check) for check in checks if check["passed"] is False)
+    """Yield the image set of each failed check ("" for the views), and the check."""
+    if validation is None:
+        return
+    for group, checks in validation["groups"].items():
+        for check in checks:
+            if check["passed"] is False:
+                yield group, check
 
 
 def _unreadable(validation: Mapping[str, Any] | None) -> set[str]:
-    """Return the views of which validation says that they are missing or no whole images."""
-    return {
-        view
-        for group, check in _failed(validation)
-        if not group and check["short"] in ("views", "images")
-        for view in check["views"]
-    }
+    """Return the rendered views that are missing or damaged, according to the validation."""
+    views = set()
+    for group, check in _failed(validation):
+        if not group and check["short"] in ("views", "images"):
+            views.update(check["views"])
+    return views
 
 
 def facts(
     folder: Path, lightfield: LightField, rig: rigs.Rig, missed: float | None
 ) -> list[tuple[str, str]]:
-    """Return what one wants to know first of a dataset, each with its title.
+    """Return the most important facts about a dataset, as pairs of title and text.
 
     ``missed`` is the part of the depths that are inf.
     """
@@ -132,7 +149,7 @@ def facts(
     render = lightfield.render
     parts = [view.split for view in lightfield.views]
     counts = [f"{parts.count(part)} {part}" for part in dict.fromkeys(parts) if part]
-    # Views that others made say nothing of theirs.
+    # Imported views have no known samples.
     samples = f"{render['samples']} a pixel" if "samples" in render else None
     if render.get("adaptive_threshold"):
         samples = f"up to {samples}, adaptive"
@@ -141,7 +158,7 @@ def facts(
     exrs = list((folder / IMAGES).glob("*.exr"))
     first = folder / IMAGES / f"{lightfield.views[0].name}.exr"
     bpy = images.attribute(first, images.BPY_ATTRIBUTE)
-    found = {
+    texts = {
         "Views": f"{len(parts)}" + (f" ({', '.join(counts)})" if counts else ""),
         "Rig": rig_text(rig, lightfield.matrices[:, :3, 3]),
         "Lens": lens.description,
@@ -154,13 +171,13 @@ def facts(
         "Size of the views": page.bytes_(sum(path.stat().st_size for path in exrs)),
         "Rendered by": bpy and f"Cycles in bpy {bpy}",
     }
-    return [(title, text) for title, text in found.items() if text]
+    return [(title, text) for title, text in texts.items() if text]
 
 
 def rig_text(rig: rigs.Rig, places: views.Array) -> str:
-    """Return a rig in words: its type, its cameras along each axis, and its size.
+    """Describe a rig: its type, its cameras along each axis, and its size.
 
-    Loose poses and paths are as large as the box around their ``places`` (n, 3).
+    The size of loose poses and paths is that of the box around their ``places`` (n, 3).
     """
     kind = rig.type
     if isinstance(rig, rigs.Grid):
@@ -180,27 +197,27 @@ def field_of_view(lens: Lens) -> str:
     )
     angles = []
     for rays in lines:
-        seen = rays[np.isfinite(rays[:, 0])]
-        chords = np.linalg.norm(np.diff(seen, axis=0), axis=1)
+        visible_rays = rays[np.isfinite(rays[:, 0])]
+        chords = np.linalg.norm(np.diff(visible_rays, axis=0), axis=1)
         angles.append(math.degrees(2 * np.arcsin(chords / 2).sum()))
     return " × ".join(f"{angle:.4g}°" for angle in angles)
 
 
 def _reprojected(folder: Path) -> Iterator[tuple[str, str, int, int, str]]:
-    """Yield name, lens, number of views and of those shown, and sheet of each reprojection."""
+    """Yield name, lens, number of views, number of shown views, and sheet of each reprojection."""
     for path in sorted(folder.glob(f"*/{NAME}")):
         lightfield = LightField.read(path)
         lens = lightfield.lens
         count = len(lightfield.views)
         shown = lightfield.views[:: math.ceil(count / MOST_REPROJECTED)]
-        suffix = next((one.suffix for one in path.parent.glob(f"{shown[0].name}.*")), ".exr")
+        suffix = next((file.suffix for file in path.parent.glob(f"{shown[0].name}.*")), ".exr")
         paths = [path.with_name(f"{view.name}{suffix}") for view in shown]
         sheet = webp(contact_sheet.sheet(paths, lens.width, lens.height), SHEET_QUALITY)
         yield path.parent.name, lens.description, count, len(shown), sheet
 
 
 def files(folder: Path, lightfield: LightField, valid: bool) -> list[tuple[str, str]]:
-    """Return the dataset's files and what each is; only a valid one has checksums."""
+    """Return the dataset's files, and what each holds. Only a valid dataset has checksums."""
     depth = {
         "z": ", and Z: metres along the optical axis",
         "distance": ", and Z: metres from the camera",
@@ -208,18 +225,21 @@ def files(folder: Path, lightfield: LightField, valid: bool) -> list[tuple[str, 
     if depth:
         depth += "; inf where a ray hit nothing"
     first = lightfield.views[0].name
-    found = [
+    meanings = [
         (f"{IMAGES}/{first}.exr …", f"the views: scene-linear Rec. 709 R, G, B as half{depth}"),
         ("lightfield.json", "the lens once; position, rotation, and world_matrix of each view"),
     ]
-    wanted = [*lightfield.passes, *([FLOW] if lightfield.views[0].flow else [])]
-    found += [(f"{one.name}/", one.meaning) for one in wanted]
+    passes = [*lightfield.passes]
+    if lightfield.views[0].flow:
+        passes.append(FLOW)
+    meanings += [(f"{view_pass.name}/", view_pass.meaning) for view_pass in passes]
     if (folder.parent / SPLITS).is_file():
-        found.append((f"../{SPLITS}", "which of the scene's views train, and which test"))
-    for inner in sorted(folder.glob(f"*/{NAME}")):
-        lens = LightField.read(inner).lens.description
-        found.append((f"{inner.parent.name}/", f"the same views through another lens: {lens}"))
-    found.append(("validation.json", "what was checked, and what came out"))
+        meanings.append((f"../{SPLITS}", "which of the scene's views train, and which test"))
+    for reprojection in sorted(folder.glob(f"*/{NAME}")):
+        lens = LightField.read(reprojection).lens.description
+        name = f"{reprojection.parent.name}/"
+        meanings.append((name, f"the same views through another lens: {lens}"))
+    meanings.append(("validation.json", "the checks and their results"))
     if valid:
-        found.append((SUMS, f"checksums of all of these: sha256sum -c {SUMS}"))
-    return found
+        meanings.append((SUMS, f"checksums of all files: sha256sum -c {SUMS}"))
+    return meanings

@@ -1,10 +1,10 @@
-"""Epipolar-plane images: one line of sight of every camera of a row, beneath each other.
+"""Makes epipolar-plane images: one line of pixels from every camera of a row, beneath each other.
 
 Bolles, Baker and Marimont, *Epipolar-plane image analysis*, 1987. Cameras of a straight row share
-the planes through their baseline. In such a plane, with u the tangent of the angle from the
-perpendicular to the baseline, a point at the perpendicular distance D draws a straight line that
-shifts by 1/D in u for each metre along the baseline. Cameras of a level ring share only the plane
-of the ring; there, over the azimuth in the world, the endlessly far stands still.
+the planes through their baseline. Let u be the tangent of the angle from the perpendicular to the
+baseline. In such a plane, a point at the perpendicular distance D draws a straight line. It shifts
+by 1/D in u for each metre along the baseline. Cameras of a level ring share only the plane of the
+ring. Over the azimuth in the world, infinitely far points stand still there.
 """
 
 import math
@@ -24,9 +24,9 @@ Array = NDArray[Any]
 
 FEWEST_CAMERAS = 3
 TILTS = tuple(range(-40, 41, 10))
-"""Degrees by which an image's plane, or cone round a ring, is raised above the level one."""
+"""Degrees by which an image's plane, or a ring's cone, is raised above the level one."""
 COLUMNS = {"line": 512, "ring": 720}
-# A straight row's images end at this angle, where tangents grow faster than there are pixels.
+# A straight row's images end at this angle. Beyond it, tangents grow too fast for the pixels.
 WIDEST = math.radians(60)
 
 
@@ -34,9 +34,10 @@ WIDEST = math.radians(60)
 class Row:
     """Cameras in a straight ``line`` or a level ``ring``, in order.
 
-    ``views`` are their numbers; ``axes`` (3, 3) are in its rows: of a line its direction, the
-    direction that the cameras look in, and up; of a ring the directions at azimuth 90° and 0°,
-    and up. ``places`` are metres along a line, or the azimuth in radians round a ring.
+    - ``views``: their numbers.
+    - ``axes`` (3, 3), in rows. For a line: its direction, the cameras' viewing direction, and up.
+      For a ring: the directions at azimuth 90° and 0°, and up.
+    - ``places``: metres along a line, or the azimuth in radians round a ring.
     """
 
     kind: Literal["line", "ring"]
@@ -46,10 +47,10 @@ class Row:
 
 
 def find_row(rig: Rig, matrices: Array) -> Row | None:
-    """Return the row in the middle of a rig, or None where no three cameras are in one.
+    """Return the row in the middle of a rig, or None if no three cameras are in a row.
 
-    ``matrices`` (views, 4, 4) are the poses of all its views. A grid's is its front's middle row;
-    a sphere's is the level of cameras nearest the equator.
+    ``matrices`` (views, 4, 4) are the poses of all its views. A grid has the middle row of its
+    front. A sphere has the level of cameras nearest the equator.
     """
     if rig.is_omnidirectional:
         return None
@@ -83,8 +84,8 @@ def find_row(rig: Rig, matrices: Array) -> Row | None:
 def directions(row: Row, tilt: float, columns: int) -> Array:
     """Return the world directions (columns, 3) of an image whose plane is raised by ``tilt``.
 
-    A line's have the length 1 perpendicular to it, so that they times D reach the depth D; a
-    ring's have the length 1.
+    For a line, their part perpendicular to it has the length 1: D times a direction reaches the
+    depth D. For a ring they are unit vectors.
     """
     side, ahead, up = row.axes
     middle = (np.arange(columns) + 0.5) / columns
@@ -109,31 +110,31 @@ def sample(
 ) -> tuple[Array, Array]:
     """Return the light (n, 3) and depth (n,) that a view has along world ``rays`` (n, 3).
 
-    ``depth`` is what the view stores, ``meaning`` says which; the result is in lengths of the
-    rays: a point lies at position + depth · ray. Light is interpolated, depth is the nearest
-    pixel's. NaN depth marks what the lens does not see.
+    ``depth`` is the stored depth with this ``meaning``. The returned depth is in lengths of the
+    rays: a point lies at position + depth · ray. Light is interpolated. Depth is that of the
+    nearest pixel. NaN depth marks rays that the lens does not see.
     """
     height, width = colour.shape[:2]
-    own = rays @ matrix[:3, :3]
-    x, y = np.moveaxis(lens.pixels(own), -1, 0)
+    camera_rays = rays @ matrix[:3, :3]
+    x, y = np.moveaxis(lens.pixels(camera_rays), -1, 0)
     with np.errstate(invalid="ignore"):
-        seen = (x >= 0) & (x <= width) & (y >= 0) & (y <= height)
+        visible = (x >= 0) & (x <= width) & (y >= 0) & (y <= height)
     light = np.zeros((len(rays), 3), np.float32)
-    at = (y[seen] - 0.5, x[seen] - 0.5)
+    at = (y[visible] - 0.5, x[visible] - 0.5)
     for channel in range(3):
-        light[seen, channel] = map_coordinates(colour[..., channel], at, order=1, mode="nearest")
+        light[visible, channel] = map_coordinates(colour[..., channel], at, order=1, mode="nearest")
     reach = np.full(len(rays), np.nan)
-    reach[seen] = np.inf
+    reach[visible] = np.inf
     if depth is not None:
-        column = np.minimum(x[seen].astype(int), width - 1)
-        line = np.minimum(y[seen].astype(int), height - 1)
-        found = depth[line, column].astype(np.float64)
-        found = stored_distance(found, lens.rays(column + 0.5, line + 0.5), meaning)
-        reach[seen] = found / np.linalg.norm(own[seen], axis=-1)
+        column = np.minimum(x[visible].astype(int), width - 1)
+        line = np.minimum(y[visible].astype(int), height - 1)
+        stored = depth[line, column].astype(np.float64)
+        distance = stored_distance(stored, lens.rays(column + 0.5, line + 0.5), meaning)
+        reach[visible] = distance / np.linalg.norm(camera_rays[visible], axis=-1)
     return light, reach
 
 
 def thinned(views: Sequence[int], most: int) -> list[int]:
-    """Return at most ``most`` positions in ``views``, evenly spread, first and last among them."""
+    """Return at most ``most`` positions in ``views``: evenly spread, with the first and last."""
     count = min(len(views), most)
     return [round(i) for i in np.linspace(0, len(views) - 1, count).tolist()]

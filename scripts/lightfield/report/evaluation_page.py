@@ -1,4 +1,4 @@
-"""The errors of somebody's views as a table and as a page, which shows them beside the truth."""
+"""Writes the errors of rendered test views as a table, and as a page with the pictures."""
 
 import sys
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from lightfield.imaging import images
 from lightfield.measurement import evaluation, metrics
 from lightfield.report import page
 
-# More views than this are in the table alone.
+# The page shows pictures of at most this many views. The table has all.
 SHOWN_VIEWS = 24
 WIDEST = 1500
 
@@ -29,11 +29,11 @@ def write(
     masks: Path | None,
     background: Floats,
 ) -> dict[str, Any]:
-    """Write the table, the page and the pictures of the views to test with; return all's means.
+    """Write the table, the page and the pictures of the test views. Return the means over all.
 
-    What has alpha is composited over ``background`` (3,) in sRGB, 0 to 1. Warns of renders whose
-    alpha or background is another than the truth's. Raises `UserError` for one that the folder
-    ``renders`` lacks, or that cannot be compared.
+    Pictures with alpha are composited over ``background`` (3,) in sRGB, 0 to 1. Warns about renders
+    whose alpha or background differs from the truth's. Raises `UserError` for a render that is
+    missing in the folder ``renders``, or that cannot be compared.
     """
     paths = {view.name: evaluation.find(renders, source, view) for view in tests}
     rows: list[dict[str, Any]] = []
@@ -48,8 +48,8 @@ def write(
             problems.append(f"{paths[view.name]}: {problem}")
         progress.done()
     if problems:
-        others = f" (and {len(problems) - 1} more of {len(tests)})" if problems[1:] else ""
-        print(f"warning: {problems[0]}{others}", file=sys.stderr)
+        count = f" (and {len(problems) - 1} more of {len(tests)})" if problems[1:] else ""
+        print(f"warning: {problems[0]}{count}", file=sys.stderr)
     means = evaluation.means(rows)
     write_csv(output / "evaluation.csv", [*rows, *means])
     page.write(
@@ -77,9 +77,9 @@ def _compare(
     background: Floats,
     picture: Path,
 ) -> tuple[list[dict[str, Any]], str | None]:
-    """Return a row of errors for each region of the render at ``path``, and what to warn of.
+    """Return a row of errors for each region of the render at ``path``, and a warning or None.
 
-    Writes to ``picture`` the truth, the render and the FLIP map beside each other.
+    Writes the truth, the render and the FLIP map beside each other to ``picture``.
     """
     shown = evaluation.rendered(path, source, background)
     true = evaluation.truth(source, view, path, background)

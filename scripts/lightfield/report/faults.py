@@ -1,4 +1,4 @@
-"""Pictures of the views that validation found fault with."""
+"""Makes pictures of the views that fail a validation check."""
 
 import math
 from collections.abc import Sequence
@@ -16,16 +16,18 @@ from lightfield.report.packing import webp
 
 Array = NDArray[Any]
 
-# Of each check so many views are shown, their longer side at most so many pixels.
-MOST, SIDE = 6, 256
+# At most this many views of each check are shown.
+MOST = 6
+# The longer side of a picture in pixels, at most.
+SIDE = 256
 WRONG = (255, 0, 255)
-"""The colour of pixels that hold no value, or one that cannot be."""
+"""The colour of pixels with an impossible value."""
 MISS = (176, 176, 176)
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One view: colour and depth as data URIs; None where the file has no depth."""
+    """One view: colour and depth as data URIs. ``depth`` is None if the file has none."""
 
     name: str
     colour: str
@@ -33,13 +35,14 @@ class Fault:
 
 
 def collect(folder: Path, views: Sequence[str]) -> list[Fault]:
-    """Return pictures of the first of the ``views`` in ``folder``, but not of what is no image."""
-    found = (_fault(folder, view) for view in views[:MOST])
-    return [fault for fault in found if fault]
+    """Return pictures of the first of the ``views`` in ``folder``. Leaves out unreadable files."""
+    candidates = (_fault(folder, view) for view in views[:MOST])
+    return [fault for fault in candidates if fault]
 
 
 def _fault(folder: Path, view: str) -> Fault | None:
-    exr, png = folder / f"{view}.exr", folder / f"{view}.png"
+    exr = folder / f"{view}.exr"
+    png = folder / f"{view}.png"
     path = exr if exr.is_file() or not png.is_file() else png
     try:
         image = images.read_image(path)
@@ -51,7 +54,7 @@ def _fault(folder: Path, view: str) -> Fault | None:
 
 
 def _colour(colour: Array) -> Array:
-    """Return (height, width, 3) scene-linear colour developed and thinned, marked where wrong."""
+    """Return scene-linear colour (height, width, 3) developed and thinned, marked where wrong."""
     wrong = ~np.isfinite(colour).all(axis=-1)
     right = np.where(wrong[..., None], 0, colour).clip(min=0).astype(np.float32)
     step = _step(wrong)
@@ -60,7 +63,7 @@ def _colour(colour: Array) -> Array:
 
 
 def _depth(depth: Array) -> Array:
-    """Return (height, width) metres from near (light) to far (dark), marked where wrong."""
+    """Return depth (height, width) in colours: near is light, far is dark, wrong is marked."""
     wrong = np.isneginf(depth) | (depth <= 0)
     hit = np.isfinite(depth) & ~wrong
     thinned = depth[:: _step(wrong), :: _step(wrong)]
@@ -81,7 +84,7 @@ def _step(pixels: Array) -> int:
 
 
 def _marked(shown: Array, wrong: Array) -> Array:
-    """Return thinned pixels, each marked if any of those that it stands for is ``wrong``."""
+    """Return thinned pixels. A pixel is marked if any pixel in its block is ``wrong``."""
     step = _step(wrong)
     for axis in (0, 1):
         wrong = np.logical_or.reduceat(wrong, range(0, wrong.shape[axis], step), axis=axis)

@@ -1,6 +1,6 @@
-"""A dataset's stills: overview, contact sheet, the rig, and what the overview says in numbers.
+"""Draws a dataset's stills: overview, contact sheet, the rig, and maps of depth and noise.
 
-The overview is a panorama from the rig's centre or, without one, the view in the rig's middle.
+The overview is a panorama from the rig's centre. Without a panorama it is the middle view.
 """
 
 import math
@@ -27,8 +27,9 @@ from lightfield.measurement import noise
 from lightfield.report import contact_sheet
 from lightfield.validation.files import IMAGES
 
-# From where the rig is looked at: degrees round it from −Y, and above the ground.
-AZIMUTH, ELEVATION = 30.0, 24.0
+# The viewpoint of the rig's drawing, in degrees: round the rig from −Y, and above the ground.
+AZIMUTH = 30.0
+ELEVATION = 24.0
 MISS = "#b0b0b0"
 # The noise map has about this many blocks across.
 NOISE_BLOCKS = 128
@@ -38,7 +39,7 @@ DEPTHS = {"z": "Z-depth", "distance": "distance from the camera", None: "no dept
 
 @dataclass(frozen=True)
 class Overview:
-    """Linear ``colour`` (height, width, 3); ``depth`` (height, width) in metres, NaN for none."""
+    """Linear ``colour`` (height, width, 3), and ``depth`` (height, width) in metres or NaN."""
 
     colour: Array
     depth: Array
@@ -75,7 +76,7 @@ def read_panorama(path: Path) -> Overview:
 
 
 def read_view(path: Path, lightfield: LightField) -> Overview:
-    """Read a view; where it is no image, as validation will say, its overview is black."""
+    """Read a view. Return a black overview if it cannot be read: validation reports that."""
     lens = lightfield.lens
     label = DEPTHS[lightfield.depth]
     unknown = np.full((lens.height, lens.width), np.nan, np.float32)
@@ -91,20 +92,22 @@ def read_view(path: Path, lightfield: LightField) -> Overview:
 
 
 def draw_rig(stem: Path, rig: Rig, poses: Array, parts: Sequence[str | None]) -> None:
-    """Draw each camera as a dot and an arrow along its view, as Figure 2 of the SILVR paper.
+    """Draw each camera as a dot with an arrow along its view, as Figure 2 of the SILVR paper does.
 
-    ``poses`` are (n, 4, 4); ``parts`` (n) of the dataset, as train and test, have their colours.
+    ``poses`` are (n, 4, 4). ``parts`` (n,) of the split, such as train and test, have colours.
     """
-    turn, rise = np.radians(AZIMUTH), np.radians(ELEVATION)
+    turn = np.radians(AZIMUTH)
+    rise = np.radians(ELEVATION)
     right = np.array([np.cos(turn), np.sin(turn), 0.0])
     ahead = np.array([-np.sin(turn) * np.cos(rise), np.cos(turn) * np.cos(rise), -np.sin(rise)])
     screen = np.stack([right, np.cross(right, ahead)], axis=-1)
-    places, forwards = poses[:, :3, 3], -poses[:, :3, 2]
+    places = poses[:, :3, 3]
+    forwards = -poses[:, :3, 2]
     drawn = np.concatenate([places, *rig.outline()])
     extent = float(np.linalg.norm(np.ptp(drawn, axis=0))) or 1.0
     arrow = min(0.09, 0.5 / np.sqrt(len(poses))) * extent
     order = np.argsort(-(places @ ahead), kind="stable")
-    # What is nearer is drawn later and darker.
+    # Draw nearer cameras later and darker.
     near = np.linspace(0.35, 1.0, len(poses))
     ends = places[order] + arrow * forwards[order]
     lines = [line @ screen for line in rig.outline()]
@@ -138,7 +141,7 @@ def draw_rig(stem: Path, rig: Rig, poses: Array, parts: Sequence[str | None]) ->
 
 
 def draw_axes(axes: Any, screen: Array, drawn: Array, extent: float) -> None:
-    """Draw X, Y and Z below left of what is ``drawn``, each of a round length, and say which."""
+    """Draw the axes X, Y and Z below left of the points ``drawn``. Their length is round."""
     length = 10.0 ** np.floor(np.log10(0.3 * extent))
     length *= max(step for step in (1, 2, 5) if step * length <= 0.3 * extent)
     corner = drawn.min(axis=0) - 0.12 * extent
@@ -156,11 +159,11 @@ def draw_axes(axes: Any, screen: Array, drawn: Array, extent: float) -> None:
 
 
 def draw_depth(stem: Path, overview: Overview) -> None:
-    """Draw depth in metres; what no ray hit is grey."""
+    """Draw depth in metres. Misses are grey."""
     depth = overview.depth
     hit = np.where(np.isfinite(depth) & (depth > 0), depth, np.nan)
-    known = hit[np.isfinite(hit)]
-    low, high = np.percentile(known, [0.1, 99.9]) if known.size else (1.0, 2.0)
+    depths = hit[np.isfinite(hit)]
+    low, high = np.percentile(depths, [0.1, 99.9]) if depths.size else (1.0, 2.0)
     label = f"{overview.depth_label} (m)"
     draw_map(stem, hit, (low, max(high, 1.01 * low)), "viridis_r", label, overview.is_panorama)
 
@@ -172,8 +175,8 @@ def draw_noise(stem: Path, overview: Overview) -> None:
     if not percent.size:
         # The picture is smaller than a block.
         percent = np.full((1, 1), np.nan)
-    known = percent[np.isfinite(percent) & (percent > 0)]
-    low, high = np.percentile(known, [2, 99]) if known.size else (1.0, 2.0)
+    measured = percent[np.isfinite(percent) & (percent > 0)]
+    low, high = np.percentile(measured, [2, 99]) if measured.size else (1.0, 2.0)
     limits = (max(low, high / 1e3), max(high, 1.01 * low))
     draw_map(stem, percent, limits, "magma", "noise of luminance (%)", overview.is_panorama)
 
@@ -186,7 +189,7 @@ def draw_map(
     label: str,
     is_panorama: bool,
 ) -> None:
-    """Draw an image's values with a logarithmic scale bar; NaN is grey."""
+    """Draw an image's values with a logarithmic scale bar. NaN is grey."""
     height, width = values.shape
     size = (10, 5) if is_panorama else (6, 1 + min(6, 6 * height / width))
     with plot(stem, size=size) as axes:
@@ -209,7 +212,8 @@ def draw_map(
             picture, ax=axes, orientation="horizontal", shrink=0.73, aspect=40
         )
         bar.set_label(f"{label}; grey: nothing there")
-        shown = FuncFormatter(lambda value, _: f"{value:g}")
-        bar.ax.xaxis.set_major_formatter(shown)
-        few = limits[1] / limits[0] < 30
-        bar.ax.xaxis.set_minor_formatter(shown if few else FuncFormatter(lambda *_: ""))
+        labels = FuncFormatter(lambda value, _: f"{value:g}")
+        bar.ax.xaxis.set_major_formatter(labels)
+        has_few_labels = limits[1] / limits[0] < 30
+        no_labels = FuncFormatter(lambda *_: "")
+        bar.ax.xaxis.set_minor_formatter(labels if has_few_labels else no_labels)

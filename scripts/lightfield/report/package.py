@@ -1,7 +1,7 @@
-"""A dataset as archives that anybody can make again byte by byte, with a card that explains it.
+"""Packs a dataset into reproducible archives, with a card that explains it.
 
-Each part is a tar by itself; all unfold into one folder, which is named <scene>_<rig> as SILVR's
-are. Names, order, times, owners and modes follow from the files alone.
+Each part is a tar by itself. All parts unpack into one folder, <scene>_<rig> as in SILVR. Names,
+order, times, owners and modes depend on the files alone.
 """
 
 import json
@@ -31,7 +31,7 @@ SILVR = (
     "Large-Volume Plenoptic Dataset, MMSys 2022, doi:10.1145/3524273.3532890"
 )
 
-# How each format is loaded, {} being the folder that holds it.
+# How to load each format. {} stands for the folder that holds it.
 LOADERS = {
     "exr": "import OpenEXR\npixels = OpenEXR.File('{}/exr/{view}.exr').channels()",
     "colmap": "import pycolmap\nmodel = pycolmap.Reconstruction('{}/sparse/0')",
@@ -49,11 +49,14 @@ LOADERS = {
 
 
 def card(folder: Path, name: str, scene: Scene) -> dict[str, Any]:
-    """Return what there is to say of a rig's folder, in which a sequence has one of each frame."""
-    own = sorted(folder.glob(f"**/{NAME}"), key=lambda path: (len(path.parts), path))
-    if not own:
+    """Return the content of card.json for a rig's folder.
+
+    The folder of a sequence has a folder for each frame. The first one counts.
+    """
+    lightfields = sorted(folder.glob(f"**/{NAME}"), key=lambda path: (len(path.parts), path))
+    if not lightfields:
         raise UserError(f"{folder}: has no {NAME}")
-    first = own[0].parent
+    first = lightfields[0].parent
     lightfield = LightField.read(first / NAME)
     view = lightfield.views[0].name
     bpy = images.attribute(first / IMAGES / f"{view}.exr", images.BPY_ATTRIBUTE)
@@ -79,7 +82,7 @@ def card(folder: Path, name: str, scene: Scene) -> dict[str, Any]:
 
 
 def _loaders(folder: Path, view: str) -> Iterator[tuple[str, str]]:
-    """Yield how the views and each export are loaded, by their folders."""
+    """Yield the folder of the views and of each export, and how to load it."""
     yield ".", LOADERS["exr"].replace("{view}", view).replace("{}", ".")
     for path in transforms(folder):
         place = path.parent.relative_to(folder).as_posix()
@@ -93,9 +96,9 @@ def _loaders(folder: Path, view: str) -> Iterator[tuple[str, str]]:
 
 
 def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None) -> list[Path]:
-    """Write a folder as ``target`` and, where that would be over ``most`` bytes, further parts.
+    """Write a folder as ``target``, and as further parts if that would exceed ``most`` bytes.
 
-    These are named <target's stem>.2.tar and so on; those of an earlier package are removed.
+    Further parts are named <target's stem>.2.tar and so on. Removes those of an earlier package.
     """
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(TEMPLATES), trim_blocks=True, lstrip_blocks=True
@@ -108,7 +111,7 @@ def pack(folder: Path, content: dict[str, Any], target: Path, most: float | None
         if path.is_file() and REPORT not in path.relative_to(folder).parts[:2]
     )
     for old in target.parent.glob(f"{target.stem}.*.tar"):
-        # Another rig's name may begin as this one's does.
+        # Another rig's name may begin with this rig's name.
         if re.fullmatch(r"\.\d+", old.name[len(target.stem) : -len(".tar")]):
             old.unlink()
     written = []
@@ -133,7 +136,7 @@ def listed(paths: Sequence[Path]) -> list[dict[str, Any]]:
 
 
 def _parts(paths: Sequence[Path], most: float | None, first: int) -> Iterator[list[Path]]:
-    """Yield runs of files whose tar has at most so many bytes, or of one file that has more.
+    """Yield runs of files whose tar has at most ``most`` bytes. A larger file gets its own tar.
 
     The first tar holds ``first`` bytes beside its files.
     """
@@ -151,12 +154,12 @@ def _parts(paths: Sequence[Path], most: float | None, first: int) -> Iterator[li
 
 
 def _size(content: int) -> int:
-    """Return how many bytes of a tar a file takes at most: with its header, in whole blocks."""
+    """Return the most bytes that a file takes in a tar: its header, and its content in blocks."""
     return content + 2 * tarfile.BLOCKSIZE
 
 
 def _add(archive: tarfile.TarFile, name: str, content: Path | bytes) -> None:
-    """Add a file with nothing of this machine, user or time."""
+    """Add a file without any trace of this machine, user or time."""
     entry = tarfile.TarInfo(name)
     if isinstance(content, bytes):
         entry.size = len(content)

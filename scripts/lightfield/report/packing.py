@@ -1,7 +1,7 @@
-"""Light and depth in the 8-bit pixels of a web page's pictures, with more range than a display has.
+"""Packs light and depth into the 8-bit pixels of pictures, with more range than a display has.
 
-A page decodes them in the browser (templates/page/packing.js), so that exposure and depth can be
-looked at there. Both are logarithmic, so that every stop, near or far, has as many steps.
+A page decodes them in the browser (templates/page/packing.js), to show exposure and depth. Both are
+logarithmic: every stop of light, and every doubling of depth, has the same number of steps.
 """
 
 import base64
@@ -14,19 +14,19 @@ from PIL import Image
 
 Array = NDArray[Any]
 
-# More than a scene's light usually spans; a step is then 4 to 5 percent, as fine as 8-bit sRGB's
-# in its darker half.
+# More than a scene's light usually spans. A step is then 4 to 5 percent, as in the darker half of
+# 8-bit sRGB.
 MOST_STOPS = 18.0
-# Steps of depth: 12 bits, which is 0.3 percent over a scene from centimetres to hundreds of metres.
+# 12 bits of depth: a step is 0.3 percent in a scene from centimetres to hundreds of metres.
 DEPTH_STEPS = 4096
 NO_DEPTH = 0
 MISS = DEPTH_STEPS - 1
 
 
 def light_range(colour: Array) -> tuple[float, float]:
-    """Return (low, high), in stops (log2), of all that is worth keeping of (..., 3) light.
+    """Return the range (low, high) of light (..., 3) to keep, in stops (log2).
 
-    From its 0.1 percentile to its highest value, but at most `MOST_STOPS` of it.
+    It goes from the 0.1 percentile to the highest value, but over at most `MOST_STOPS`.
     """
     lit = colour[np.isfinite(colour) & (colour > 0)]
     if not lit.size:
@@ -38,7 +38,7 @@ def light_range(colour: Array) -> tuple[float, float]:
 
 
 def pack_light(colour: Array, limits: tuple[float, float]) -> NDArray[np.uint8]:
-    """Return light (...) as codes: 0 is none, 1 to 255 are ``limits`` in equal steps of log2."""
+    """Return light (...) as codes. 0 is black, 1 to 255 are ``limits`` in equal steps of log2."""
     low, high = limits
     with np.errstate(divide="ignore", invalid="ignore"):
         steps = (np.log2(colour) - low) / (high - low) * 254
@@ -71,14 +71,15 @@ def pack_depth(depth: Array, limits: tuple[float, float]) -> NDArray[np.uint8]:
     steps = np.nan_to_num(steps, nan=0.0, posinf=0.0, neginf=0.0)
     codes = np.clip(np.round(steps) + 1, 1, MISS - 1)
     codes = np.where(np.isposinf(depth), MISS, np.where(np.isnan(depth), NO_DEPTH, codes))
-    words = (codes * 16).astype(np.uint16)
-    packed = np.zeros((*words.shape, 3), np.uint8)
-    packed[..., 0], packed[..., 1] = words >> 8, words & 255
+    numbers = (codes * 16).astype(np.uint16)
+    packed = np.zeros((*numbers.shape, 3), np.uint8)
+    packed[..., 0] = numbers >> 8
+    packed[..., 1] = numbers & 255
     return packed
 
 
 def webp(pixels: NDArray[np.uint8], quality: int | None = None) -> str:
-    """Return (height, width, 3) pixels as the data URI of a WebP; without ``quality``, lossless."""
+    """Return pixels (height, width, 3) as the data URI of a WebP. Lossless without ``quality``."""
     file = io.BytesIO()
     picture = Image.fromarray(np.ascontiguousarray(pixels))
     if quality is None:

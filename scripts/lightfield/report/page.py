@@ -1,4 +1,4 @@
-"""Pages that are one file each: templates filled in, with styles, programs and pictures inside."""
+"""Writes pages from templates. A page is one file, with styles, programs and pictures inside."""
 
 import math
 from collections.abc import Callable
@@ -16,13 +16,13 @@ from lightfield.report.packing import data_uri, webp
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 
-# A plot stays sharp as SVG; one of thousands of points is smaller as PNG.
+# A plot stays sharp as SVG. A plot of thousands of points is smaller as PNG.
 LARGEST_SVG = 300_000
 PHOTO_QUALITY = 84
 
 
 def write(output: Path, template: str, **content: Any) -> None:
-    """Fill in one of `TEMPLATES`, whatever ``content`` holds escaped, and write it atomically."""
+    """Fill in one of `TEMPLATES`, and write the page atomically. Escapes all of ``content``."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(TEMPLATES),
         autoescape=True,
@@ -31,9 +31,10 @@ def write(output: Path, template: str, **content: Any) -> None:
         lstrip_blocks=True,
     )
     environment.filters |= {"number": number, "cell": cell, "measure": measure, "named": title}
-    # These are the project's own files, not somebody's text.
+    # These are the project's own files: they need no escaping.
     page_modules = scripts.modules(TEMPLATES / "page/main.js")
     walk_modules = scripts.modules(TEMPLATES / "walk/main.js")
+    # A page has the modules that both share only once.
     only_of_walk = [module for module in walk_modules if module not in page_modules]
     environment.globals |= {
         "page_css": Markup((TEMPLATES / "page.css").read_text("utf-8")),
@@ -44,7 +45,7 @@ def write(output: Path, template: str, **content: Any) -> None:
 
 
 def photo(path: Path, widest: int) -> str | None:
-    """Return a picture as a data URI, at most ``widest`` pixels wide; None where there is none."""
+    """Return a picture as a data URI, at most ``widest`` pixels wide. None if it does not exist."""
     if not path.is_file():
         return None
     shown = images.read_image(path).srgb
@@ -55,7 +56,7 @@ def photo(path: Path, widest: int) -> str | None:
 
 
 def plot(stem: Path) -> str | None:
-    """Return the plot ``stem``.svg or .png as a data URI, or None where there is neither."""
+    """Return the plot ``stem``.svg or .png as a data URI. None if neither exists."""
     svg = stem.with_name(f"{stem.name}.svg")
     png = stem.with_name(f"{stem.name}.png")
     if svg.is_file() and (svg.stat().st_size <= LARGEST_SVG or not png.is_file()):
@@ -64,7 +65,7 @@ def plot(stem: Path) -> str | None:
 
 
 def bytes_(value: float) -> str:
-    """Return a number of bytes in words: 12.3 MB."""
+    """Return a number of bytes as text: 12.3 MB."""
     for unit in ("bytes", "kB", "MB", "GB"):
         if value < 999.5:
             return f"{value:.3g} {unit}"
@@ -73,12 +74,12 @@ def bytes_(value: float) -> str:
 
 
 def seconds(value: float) -> str:
-    """Return a duration in words, a short one to three digits: 4.22 s, 3 min 20 s, 5 h 12 min."""
+    """Return a duration as text: 4.22 s, 3 min 20 s, 5 h 12 min."""
     return f"{value:.3g} s" if value < 99.5 else duration(value)
 
 
 def number(value: float) -> str:
-    """Return a number to three digits, in powers of ten where it is very small or large."""
+    """Return a number as text with a few digits, in powers of ten if it is very small or large."""
     if not math.isfinite(value):
         return "∞" if value > 0 else "–"
     if value != 0 and not 1e-3 <= abs(value) < 1e5:
@@ -88,7 +89,7 @@ def number(value: float) -> str:
 
 
 def cell(value: Any) -> str:
-    """Return a table's cell as text: numbers shortened, lists joined, None as a dash."""
+    """Return a table's cell as text. Shortens numbers, joins lists, and shows None as a dash."""
     if value is None or value == "":
         return "–"
     if isinstance(value, bool):
@@ -117,23 +118,32 @@ UNITS: dict[str, Callable[[float], str]] = {
 }
 
 
-# How some words of keys are written.
-WRITTEN = {"mse": "MSE", "psnr": "PSNR", "ssim": "SSIM", "flip": "FLIP", "cpu": "CPU", "kwh": "kWh"}
+# How to write some words of keys.
+SPELLINGS = {
+    "mse": "MSE",
+    "psnr": "PSNR",
+    "ssim": "SSIM",
+    "flip": "FLIP",
+    "cpu": "CPU",
+    "kwh": "kWh",
+}
 
 
 def measure(value: Any, name: str) -> str:
-    """Return a cell of what is called ``name``, in the unit that the name ends in."""
-    unit = UNITS.get(name.rpartition("_")[2])
-    plain = isinstance(value, int | float) and not isinstance(value, bool)
-    return unit(value) if unit and plain and "_per_" not in name else cell(value)
+    """Return the cell of a quantity called ``name``, in the unit at the end of the name."""
+    with_unit = UNITS.get(name.rpartition("_")[2])
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if with_unit and is_number and "_per_" not in name:
+        return with_unit(value)
+    return cell(value)
 
 
 def title(name: str) -> str:
-    """Return a key as words, without the unit that `measure` writes with its value."""
-    words = name.split("_")
-    if len(words) > 1 and words[-1] in UNITS and words[-1] != "hours" and "per" not in words:
-        words.pop()
-    text = " ".join(WRITTEN.get(word, word) for word in words)
+    """Return a key as a title, without the unit that `measure` writes beside the value."""
+    parts = name.split("_")
+    if len(parts) > 1 and parts[-1] in UNITS and parts[-1] != "hours" and "per" not in parts:
+        parts.pop()
+    text = " ".join(SPELLINGS.get(part, part) for part in parts)
     return {"bytes": "size", "gigabytes": "size", "watts": "power"}.get(name, text)
 
 

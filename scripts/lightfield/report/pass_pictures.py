@@ -1,4 +1,4 @@
-"""Pictures of a view's passes: one of each that the dataset has."""
+"""Makes a picture of each pass of a view."""
 
 import math
 from collections.abc import Iterator
@@ -17,37 +17,38 @@ from lightfield.report.packing import webp
 
 # The longer side of a picture in pixels, at most.
 SIDE = 320
-# A motion of fewer pixels is none.
+# A motion of fewer pixels counts as none.
 STILL = 0.01
-# Neighbouring numbers have hues as far apart as can be.
+# Steps of the golden ratio give neighbouring numbers very different hues.
 GOLDEN = (math.sqrt(5) - 1) / 2
 
 
 def collect(
     folder: Path, lightfield: LightField, view: View, exposure: float
 ) -> Iterator[tuple[str, str, str]]:
-    """Yield name, meaning and picture of each pass of a view, of those that can be read.
+    """Yield name, meaning and picture of each readable pass of a view.
 
-    ``exposure`` is that of light, in stops.
+    ``exposure`` in stops applies to passes of light.
     """
     step = math.ceil(max(lightfield.lens.width, lightfield.lens.height) / SIDE)
-    wanted = [(found, view.name) for found in lightfield.passes]
-    wanted += [(FLOW, view.flow)] if view.flow else []
-    for found, name in wanted:
+    passes = [(view_pass, view.name) for view_pass in lightfield.passes]
+    if view.flow:
+        passes.append((FLOW, view.flow))
+    for view_pass, name in passes:
         try:
-            channels = images.read_image(found.path(folder, name), found.channels).channels
+            channels = images.read_image(view_pass.path(folder, name), view_pass.channels).channels
         except UserError:
-            continue  # which validation says
-        planes = [channels[channel][::step, ::step] for channel in found.channels]
-        shown = _picture(found, np.stack(planes, axis=-1), exposure)
-        yield found.name, found.meaning, webp(shown)
+            continue  # Validation reports it.
+        planes = [channels[channel][::step, ::step] for channel in view_pass.channels]
+        picture = _picture(view_pass, np.stack(planes, axis=-1), exposure)
+        yield view_pass.name, view_pass.meaning, webp(picture)
 
 
-def _picture(found: Pass, pixels: Array, exposure: float) -> Array:
-    """Return a pass's pixels (h, w, channels) as 8-bit sRGB (h, w, 3)."""
-    match found.kind:
-        case "light" if found.name == "albedo":
-            # From 0 to 1, whatever the light.
+def _picture(view_pass: Pass, pixels: Array, exposure: float) -> Array:
+    """Return a pass's pixels (height, width, channels) as 8-bit sRGB (height, width, 3)."""
+    match view_pass.kind:
+        case "light" if view_pass.name == "albedo":
+            # Albedo lies between 0 and 1, so it needs no exposure.
             return to_8_bit(np.ascontiguousarray(pixels, np.float32))
         case "light":
             return pictures.develop(pixels.astype(np.float32), exposure)
@@ -61,7 +62,7 @@ def _picture(found: Pass, pixels: Array, exposure: float) -> Array:
             colours = np.sum(_distinct(hashes) * parts[..., None], axis=-2)
         case _:
             colours = _directions(*np.moveaxis(pixels[..., -2:], -1, 0))
-            if found == FLOW:
+            if view_pass == FLOW:
                 x, y, visible = np.moveaxis(pixels, -1, 0)
                 colours = _directions(x, y) * np.where(visible > 0, 1, 0.4)[..., None]
     return np.asarray(np.rint(colours.clip(0, 1) * 255), np.uint8)
@@ -74,9 +75,9 @@ def _distinct(numbers: Array) -> Array:
 
 
 def _directions(x: Array, y: Array) -> Array:
-    """Return a colour (…, 3) for each motion: its hue is where to, its saturation how far."""
+    """Return a colour (…, 3) for each motion: hue is direction, saturation is length."""
     length = np.hypot(x, y)
-    # What stands still moves by rounding alone.
+    # Still pixels move only by rounding errors. Do not amplify those.
     far = max(np.quantile(length, 0.99), STILL)
     hue = np.arctan2(-y, x) / (2 * np.pi) % 1
     return np.asarray(hsv_to_rgb(np.stack([hue, (length / far).clip(0, 1), np.ones_like(hue)], -1)))

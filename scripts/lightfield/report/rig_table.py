@@ -1,4 +1,4 @@
-"""Table of camera setups, as Table 2 of the SILVR paper has them, beside its figures."""
+"""Writes a table of camera setups, like Table 2 of the SILVR paper, beside its printed figures."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from lightfield.geometry.interpolation_volume import (
     spacing,
 )
 
-# Views and mean distance in centimetres as printed in the paper's Table 2, by the published names.
+# Views and mean distance in centimetres from the paper's Table 2, by the published names.
 PRINTED = {
     "LFCuboid_1mx3mx1m": (1400, 11),
     "LFSphere_e105cm_d145cm": (642, 9),
@@ -50,7 +50,7 @@ only formally: the paper counts cameras metres apart as too sparse to interpolat
 
 @dataclass(frozen=True)
 class Setup:
-    """One rig; lengths in metres, volumes in m³, NaN or None where a figure has no meaning."""
+    """One rig. Lengths in metres, volumes in m³. NaN or None where a figure has no meaning."""
 
     scene: str
     rig: str
@@ -97,7 +97,7 @@ def read_setups(scenes: Sequence[Path]) -> list[Setup]:
 
 def _setup(scene: str, name: str, rig: rigs.Rig) -> Setup:
     if isinstance(rig, rigs.BlendCamera):
-        # Where it is, only the .blend says.
+        # Only the .blend has its position.
         return Setup(scene, name, rig.view_count, "–", "–", math.nan, math.nan, None, None, None)
     positions = np.array([view.position for view in rig.poses()[:: rig.views_a_position]])
     volume = interpolation_volume(rig, rig.camera.make())
@@ -121,32 +121,39 @@ def _setup(scene: str, name: str, rig: rigs.Rig) -> Setup:
 
 
 def markdown(setups: Sequence[Setup]) -> str:
-    """Return the table, and in words where a computed figure is not the printed one."""
+    """Return the table, and a line for each figure that differs from the printed one."""
     lines = []
     for setup in setups:
         views, distance = setup.printed or ("–", None)
         cells = (
-            *(setup.scene, setup.rig, f"{setup.views} ({views})", setup.along, setup.size),
-            *(_centimetres(setup.nearest), _centimetres(setup.neighbours)),
+            setup.scene,
+            setup.rig,
+            f"{setup.views} ({views})",
+            setup.along,
+            setup.size,
+            _centimetres(setup.nearest),
+            _centimetres(setup.neighbours),
             f"{distance} cm" if distance else "–",
-            *map(_cubic_metres, (setup.immersive, setup.enclosed, setup.formula)),
+            _cubic_metres(setup.immersive),
+            _cubic_metres(setup.enclosed),
+            _cubic_metres(setup.formula),
         )
         lines.append(f"| {' | '.join(cells)} |\n")
     return HEAD + "".join(lines) + NOTES + "\n".join(_differences(setups) or ["None."]) + "\n"
 
 
 def _differences(setups: Sequence[Setup]) -> list[str]:
-    found = []
+    differences = []
     published = [setup for setup in setups if setup.printed]
     for setup in published:
         assert setup.printed
         views, distance = setup.printed
         where = f"- {setup.scene}/{setup.rig}:"
         if setup.views != views:
-            found.append(f"{where} {setup.views} views, printed {views}.")
+            differences.append(f"{where} {setup.views} views, printed {views}.")
         if round(100 * setup.nearest) != distance:
             same = round(100 * setup.neighbours) == distance
-            found.append(
+            differences.append(
                 f"{where} the nearest camera is {_centimetres(setup.nearest)} away on average, "
                 f"printed {distance} cm; the mean over all neighbours, "
                 f"{_centimetres(setup.neighbours)}, "
@@ -156,11 +163,11 @@ def _differences(setups: Sequence[Setup]) -> list[str]:
     if {setup.rig for setup in published} == set(PRINTED):
         low, high = PRINTED_VOLUMES
         if round(min(volumes), 1) != low or round(max(volumes)) != high:
-            found.append(
+            differences.append(
                 f"- The paper's abstract gives volumes of {low} to {high:g} m³; computed, they are "
                 f"{min(volumes):.3g} to {max(volumes):.3g} m³."
             )
-    return found
+    return differences
 
 
 def _centimetres(metres: float) -> str:

@@ -1,7 +1,7 @@
-"""The page's programs: modules that a browser's editor follows, joined into one script of a page.
+"""Joins the ES modules of the templates into one script of a page.
 
-The templates hold ES modules, and shaders in files of their own. A page is one file, and a browser
-that opens it from a disk loads no module beside it. So `joined` puts modules one after the other.
+The modules and shaders are files of their own, so that editors understand them. A page is one file:
+a browser that opens it from a disk loads no module beside it. So `joined` concatenates the modules.
 """
 
 import json
@@ -14,7 +14,7 @@ _EXPORT = re.compile(r"^export (?=async|const|function)", re.MULTILINE)
 
 
 def modules(entry: Path) -> list[Path]:
-    """Return ``entry`` and all modules that it imports, each after those that it imports itself."""
+    """Return ``entry`` and all modules that it imports. Each comes after its own imports."""
     ordered: list[Path] = []
     visited: set[Path] = set()
 
@@ -35,7 +35,7 @@ def modules(entry: Path) -> list[Path]:
 def joined(ordered: list[Path]) -> str:
     """Return one script that does what these modules do.
 
-    They share one scope: two modules must not give the same name to different things.
+    The modules share one scope: a name must not have two meanings.
     """
     return '"use strict";\n' + "\n".join(_as_script(module) for module in ordered)
 

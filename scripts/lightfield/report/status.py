@@ -1,7 +1,7 @@
-"""How far a dataset is, also while it is being built: from its files alone.
+"""Tells the progress of a dataset from its files alone, also during a build.
 
-A rendered view counts if its shard's record has it, or if its file carries the key of the settings
-that lightfield.json gives; a reprojected one if it is no older than the view it was made from.
+A rendered view counts if its shard's record lists it, or if its file has the key of the settings in
+lightfield.json. A reprojected view counts if it is no older than its source.
 """
 
 import os
@@ -18,18 +18,22 @@ from lightfield.dataset.lightfield import NAME, LightField, View
 from lightfield.imaging import images
 from lightfield.validation.files import IMAGES
 
-# The rate is that of so many seconds.
+# The rate is measured over this many seconds.
 WINDOW = 600.0
-# A process on another machine that has been silent for so long is taken for dead.
+# A process on another machine counts as dead after this many silent seconds.
 SILENCE = 3600.0
 
 
 @dataclass
 class Rendering:
-    """Of one dataset: the views that are rendered, and what its shards' processes are doing."""
+    """The rendering of one dataset.
+
+    - ``finished``: the names of the rendered views.
+    - ``recent``: the number of views finished in the last ``seconds``, at most `WINDOW`.
+    - ``running``, ``silent``, ``killed``: the shards by the state of their processes.
+    """
 
     finished: set[str] = field(default_factory=set)
-    # When views were finished, and the span over which that was looked at, both within `WINDOW`.
     recent: int = 0
     seconds: float = 0.0
     running: list[str] = field(default_factory=list)
@@ -38,42 +42,47 @@ class Rendering:
 
 
 def look(folder: Path, work: Path, count: int, now: float) -> Rendering:
-    """Find out how far the rendering of ``count`` views is at ``now``, in seconds since 1970."""
-    found = Rendering()
+    """Return the progress of the rendering of ``count`` views at ``now``, in seconds since 1970."""
+    rendering = Rendering()
     views: Sequence[View] = ()
     try:
         if (folder / NAME).exists():
-            found.finished = _recorded(folder, work)
-            # A finished dataset's poses need not be read.
-            if len(found.finished) < count:
+            rendering.finished = _recorded(folder, work)
+            # A finished dataset does not need the views.
+            if len(rendering.finished) < count:
                 lightfield = LightField.read(folder / NAME)
                 views = lightfield.views
-                found.finished |= _keyed(folder, lightfield, found.finished)
+                rendering.finished |= _keyed(folder, lightfield, rendering.finished)
     except UserError as error:
         print(f"{error}; it is made anew", file=sys.stderr)
     journals = filter(Path.is_file, (work / "render").glob(journal.JOURNALS))
     for bounds, path in sorted((_bounds(path), path) for path in journals):
-        if runs := journal.read(path):
+        runs = journal.read(path)
+        if runs:
             first, end = bounds
-            missing = any(view.name not in found.finished for view in views[first:end])
-            _add_shard(found, f"{first}:{end}", runs, missing, now)
-    if not found.running:
-        found.recent = 0
-    return found
+            missing = any(view.name not in rendering.finished for view in views[first:end])
+            _add_shard(rendering, f"{first}:{end}", runs, missing, now)
+    if not rendering.running:
+        rendering.recent = 0
+    return rendering
 
 
 def _recorded(folder: Path, work: Path) -> set[str]:
-    """Return the views that records have which are no older than lightfield.json."""
+    """Return the views in the records that are no older than lightfield.json."""
     written = (folder / NAME).stat().st_mtime_ns
-    records = (work / "render").glob("*-*.json")
-    current = (path for path in records if path.stat().st_mtime_ns >= written)
-    files = (shard_files.recorded_sizes(path, str(folder)) for path in current)
-    # Beside the views a record has their passes, and the names of what these number.
-    return {_stem(name) for sizes in files for name in sizes or () if name.startswith(f"{IMAGES}/")}
+    views = set()
+    for record in (work / "render").glob("*-*.json"):
+        if record.stat().st_mtime_ns < written:
+            continue
+        # A record also lists passes, and the files with the names of their numbers.
+        for name in shard_files.recorded_sizes(record, str(folder)) or ():
+            if name.startswith(f"{IMAGES}/"):
+                views.add(_stem(name))
+    return views
 
 
 def _keyed(folder: Path, lightfield: LightField, recorded: set[str]) -> set[str]:
-    """Return those of the other views whose files carry the key of their settings."""
+    """Return the views without a record whose files have the key of their settings."""
     present = {path.stem for path in _file(folder, "").parent.glob("*.exr")} - recorded
     return {
         view.name
@@ -84,35 +93,39 @@ def _keyed(folder: Path, lightfield: LightField, recorded: set[str]) -> set[str]
 
 
 def _add_shard(
-    found: Rendering, name: str, runs: Sequence[journal.Run], missing: bool, now: float
+    rendering: Rendering, name: str, runs: Sequence[journal.Run], missing: bool, now: float
 ) -> None:
-    """Note what the processes of a shard, of which views are ``missing``, are doing."""
+    """Add the state of a shard's processes. ``missing`` says whether it lacks views."""
     last = runs[-1]
-    at_work = last.is_running()
+    # None for a process on another machine: it cannot be asked.
+    is_running = last.is_running()
     silence = now - last.last_heard
-    if at_work:
-        found.running.append(name)
-    elif at_work is None and silence < SILENCE:
+    if is_running:
+        rendering.running.append(name)
+    elif is_running is None and silence < SILENCE:
         host = last.start["host"]
-        found.running.append(f"{name} on {host} (heard of {duration(silence)} ago)")
+        rendering.running.append(f"{name} on {host} (heard of {duration(silence)} ago)")
     elif missing and last.end is None:
-        (found.silent if at_work is None else found.killed).append(name)
+        if is_running is None:
+            rendering.silent.append(name)
+        else:
+            rendering.killed.append(name)
     for run in runs:
-        found.recent += sum(view["finished"] > now - WINDOW for view in run.views)
-        # What works now counts until now, although its next view is not yet finished.
-        until = now if run is last and at_work is not False else run.last_heard
+        rendering.recent += sum(view["finished"] > now - WINDOW for view in run.views)
+        # A running process counts until now, although its next view is not yet finished.
+        until = now if run is last and is_running is not False else run.last_heard
         if until > now - WINDOW:
             span = min(WINDOW, now - float(run.start["started"]))
-            found.seconds = max(found.seconds, span)
+            rendering.seconds = max(rendering.seconds, span)
 
 
 def lines(
     name: str, folder: Path, count: int, reprojections: Sequence[str], rendering: Rendering
 ) -> list[str]:
-    """Say in lines how far a dataset of ``count`` views is."""
-    done = len(rendering.finished)
-    left = outlook(count - done, rendering.recent, rendering.seconds)
-    parts = [name, f"  rendered: {done} of {count}{left}"]
+    """Return lines about the progress of a dataset of ``count`` views."""
+    rendered = len(rendering.finished)
+    rate = outlook(count - rendered, rendering.recent, rendering.seconds)
+    parts = [name, f"  rendered: {rendered} of {count}{rate}"]
     for reprojection in reprojections:
         reprojected = _reprojected(folder, reprojection, rendering.finished)
         parts.append(f"  {reprojection}: {reprojected} of {count}")
@@ -127,31 +140,33 @@ def lines(
     return parts
 
 
-def outlook(left: int, recent: int, seconds: float) -> str:
-    """Say the rate of ``recent`` views in so many ``seconds``, and how long the others take."""
-    if not left:
+def outlook(remaining: int, recent: int, seconds: float) -> str:
+    """Return the rate of ``recent`` views in ``seconds``, and the time for the remaining ones."""
+    if not remaining:
         return ""
     # A node's clock may be ahead.
     if not recent or seconds <= 0:
         return ", no rate yet"
     return (
-        f", {recent / seconds * 60:.3g} a minute, {duration(left / recent * seconds)} left"
+        f", {recent / seconds * 60:.3g} a minute, {duration(remaining / recent * seconds)} left"
         f" at the rate of the last {duration(seconds)}"
     )
 
 
 def _reprojected(folder: Path, reprojection: str, finished: set[str]) -> int:
     """Count the finished views that are reprojected too."""
-    made = (p for p in (folder / reprojection).glob("*") if p.suffix in (".png", ".exr"))
-    times = {path.stem: path.stat().st_mtime for path in made}
-    # Of a cube map the last face counts.
-    last = times.keys() & {f"{name}_d" for name in finished}
-    times |= {name.removesuffix("_d"): times[name] for name in last}
+    times = {}
+    for path in (folder / reprojection).glob("*"):
+        if path.suffix in (".png", ".exr"):
+            times[path.stem] = path.stat().st_mtime
+    # A cube map is finished with its last face.
+    last_faces = times.keys() & {f"{name}_d" for name in finished}
+    times |= {face.removesuffix("_d"): times[face] for face in last_faces}
     return sum(times.get(name, -1) >= _file(folder, name).stat().st_mtime for name in finished)
 
 
 def _validated(folder: Path, count: int, finished: set[str]) -> str:
-    """Say whether a dataset's validation has been made of its views, and what came out."""
+    """Return whether a dataset's current views were validated, and the result."""
     path = folder / "validation.json"
     if len(finished) < count or not path.exists():
         return "no"
@@ -162,19 +177,20 @@ def _validated(folder: Path, count: int, finished: set[str]) -> str:
     )
     if path.stat().st_mtime < newest:
         return "not since its views were made"
-    if problem := broken(path):
+    problem = broken(path)
+    if problem:
         return f"no: {path} {problem}, and is made anew"
     return "yes" if read_json(path).get("valid") else f"yes, and it is not valid: see {path}"
 
 
 def _bounds(path: Path) -> tuple[int, int]:
-    """Return the first view and the end of the shard that a journal is of."""
+    """Return the first view of a journal's shard, and the view after its last."""
     first, end = path.name.partition(".")[0].split("-")
     return int(first), int(end)
 
 
 def _stem(path: str) -> str:
-    """Return a file's name without its ending: quicker than a `Path` where there are many."""
+    """Return a file's name without its suffix. Faster than `Path` for many files."""
     return path.rpartition("/")[2].rpartition(".")[0]
 
 

@@ -1,4 +1,4 @@
-"""What a dataset's page says in tables: checks, measurements and costs, each from its file."""
+"""Reads the tables of a dataset's page from files: checks, measurements and costs."""
 
 import csv
 import math
@@ -13,11 +13,11 @@ from lightfield.core.files import read_json, read_problem
 from lightfield.measurement import summaries
 from lightfield.report import page
 
-# Of the stability table, so many of the cases that use most of their bound are shown at once.
+# The page shows this many of the cases that use most of their bound. The full table is folded.
 WORST_CASES = 12
 
 CHECK_KEYS = ("passed", "detail", "views", "problems", "warnings", "figures")
-# The tables of error_vs_time that are shown at once, in this order, by their names there.
+# The unfolded tables of error_vs_time, in this order, by their names in its file.
 ERROR_TABLES = {
     "slopes": "Slope of the error, both axes logarithmic; plain path tracing's is −1 in theory",
     "settings": "This scene's settings",
@@ -27,7 +27,7 @@ ERROR_TABLES = {
 
 @dataclass(frozen=True)
 class Table:
-    """Column titles and rows of cells; ``rows`` may hold numbers, text, or None."""
+    """Column titles and rows of cells. A cell is a number, text, or None."""
 
     columns: Sequence[str]
     rows: Sequence[Sequence[Any]]
@@ -35,16 +35,19 @@ class Table:
 
 @dataclass(frozen=True)
 class Measurement:
-    """One measurement: its plot as a data URI, and tables by their titles; whole ones apart."""
+    """One measurement: its plot as a data URI, and tables by their titles.
+
+    The page folds the ``full_tables``.
+    """
 
     plot: str | None
     tables: dict[str, Table] = field(default_factory=dict)
-    whole: dict[str, Table] = field(default_factory=dict)
+    full_tables: dict[str, Table] = field(default_factory=dict)
     facts: Sequence[tuple[str, str]] = ()
 
 
 def validation(path: Path) -> dict[str, Any] | None:
-    """Return validation.json's content with its checks grouped by the image set they are of."""
+    """Return the content of validation.json, with its checks grouped by image set."""
     if not path.is_file():
         return None
     content = read_json(path)
@@ -77,12 +80,12 @@ def reprojection(files: Sequence[Path]) -> Measurement | None:
     return Measurement(
         page.plot(path.with_suffix("")),
         {"On the Pareto front: no other method is both faster and better": best},
-        {f"All {len(rows)} measurements": _whole(rows)},
+        {f"All {len(rows)} measurements": _full_table(rows)},
     )
 
 
 def stability(files: Sequence[Path]) -> Measurement | None:
-    """Return what the lenses' extremes showed: counts of verdicts, and the worst cases."""
+    """Return the measurement of lenses at their extremes: counts of verdicts, and worst cases."""
     path = _named(files, "stability.csv")
     if path is None:
         return None
@@ -91,13 +94,11 @@ def stability(files: Sequence[Path]) -> Measurement | None:
     kinds = sorted(
         {verdict for _, _, verdict in counts}, key=lambda verdict: (len(verdict), verdict)
     )
-    summary = Table(
-        ["cases", "precision", *kinds],
-        [
-            [*case, *(counts[*case, kind] for kind in kinds)]
-            for case in dict.fromkeys(key[:2] for key in counts)
-        ],
-    )
+    summary_rows = []
+    for group, precision in dict.fromkeys(key[:2] for key in counts):
+        numbers = [counts[group, precision, kind] for kind in kinds]
+        summary_rows.append([group, precision, *numbers])
+    summary = Table(["cases", "precision", *kinds], summary_rows)
     worst = sorted(rows, key=_bound_used, reverse=True)[:WORST_CASES]
     names = ("case", "dtype", "condition", "error", "error_bound", "unit", "verdict")
     shown = [[*map(row.get, names), f"{_bound_used(row):.0%}"] for row in worst]
@@ -111,13 +112,13 @@ def stability(files: Sequence[Path]) -> Measurement | None:
                 shown,
             ),
         },
-        {f"All {len(rows)} cases": _whole(rows)},
+        {f"All {len(rows)} cases": _full_table(rows)},
         [("cases", str(len(rows))), ("outside their bound", str(failed))],
     )
 
 
 def synthesis(files: Sequence[Path], folder: str) -> Measurement | None:
-    """Return how well views are synthesised from a dataset, which is in ``folder``: scene/rig."""
+    """Return how well views are synthesised from a dataset. ``folder`` is scene/rig."""
     path = _named(files, f"synthesis/{folder}.csv")
     if path is None:
         return None
@@ -125,31 +126,30 @@ def synthesis(files: Sequence[Path], folder: str) -> Measurement | None:
     columns = [*summaries.COLUMNS, *names]
     rows = _read_csv(path, *columns, "place", "region")
     means = [[row[name] for name in columns] for row in summaries.means(rows)]
-    plain = [row for row in rows if row["variant"] == "all"]
-    by_place = [
-        [mean["truth"], place, *(mean[name] for name in names)]
-        for place in summaries.PLACES
-        for mean in summaries.means([row for row in plain if row["place"] == place])
-    ]
-    by_region = [
-        [mean["truth"], region, *(mean[name] for name in ("part", *names))]
-        for region in dict.fromkeys(row["region"] for row in plain)
-        for mean in summaries.means(plain, region)
-    ]
-    found = {
-        "Views that were held out, synthesised from this dataset's": Table(columns, means),
+    all_views = [row for row in rows if row["variant"] == "all"]
+    by_place = []
+    for place in summaries.PLACES:
+        rows_of_place = [row for row in all_views if row["place"] == place]
+        for mean in summaries.means(rows_of_place):
+            by_place.append([mean["truth"], place, *(mean[name] for name in names)])
+    by_region = []
+    for region in dict.fromkeys(row["region"] for row in all_views):
+        for mean in summaries.means(all_views, region):
+            by_region.append([mean["truth"], region, *(mean[name] for name in ("part", *names))])
+    tables = {
+        "Held-out views, synthesised from this dataset's views": Table(columns, means),
         "Inside, and towards the edge of the interpolation volume": Table(
             ["truth", "place", *names], by_place
         ),
     }
-    if {row["region"] for row in plain} > {summaries.WHOLE}:
-        title = "Apart for the kind of light that a pixel shows most of"
-        found[title] = Table(["truth", "region", "part", *names], by_region)
-    return Measurement(page.plot(path.with_suffix("")), found)
+    if {row["region"] for row in all_views} > {summaries.WHOLE}:
+        title = "By the kind of light that dominates a pixel"
+        tables[title] = Table(["truth", "region", "part", *names], by_region)
+    return Measurement(page.plot(path.with_suffix("")), tables)
 
 
 def learning(files: Sequence[Path], folder: str) -> Measurement | None:
-    """Return how well fields are learned from the exports of a dataset in ``folder``: scene/rig."""
+    """Return how well fields are learned from a dataset's exports. ``folder`` is scene/rig."""
     path = _named(files, f"learn/{folder}.csv")
     if path is None:
         return None
@@ -170,7 +170,7 @@ def learning(files: Sequence[Path], folder: str) -> Measurement | None:
 
 
 def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
-    """Return the error of a scene's renders against their run time, as far as it was measured."""
+    """Return the error of a scene's renders against their run time. None if it was not measured."""
     path = _named(files, f"error_vs_time/{scene}.json")
     if path is None:
         return None
@@ -179,18 +179,18 @@ def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
         raise UserError(f"{path}: must be a mapping")
     # Strata have tables of their own.
     tables, _ = _tables({name: part for name, part in content.items() if name != "strata"})
-    known = {name: table for name, table in tables.items() if name in ERROR_TABLES}
-    whole = {name: table for name, table in tables.items() if name not in known}
-    whole.pop("measured on", None)
-    if "slopes" in known:
+    unfolded = {name: table for name, table in tables.items() if name in ERROR_TABLES}
+    folded = {name: table for name, table in tables.items() if name not in unfolded}
+    folded.pop("measured on", None)
+    if "slopes" in unfolded:
         try:
-            known["slopes"] = _slopes(content["slopes"])
+            unfolded["slopes"] = _slopes(content["slopes"])
         except (TypeError, ValueError):
             raise UserError(
                 f"{path}: slopes: is not what scripts/error_vs_time.py writes"
             ) from None
     measured_on = content.get("measured_on")
-    shown = {ERROR_TABLES[name]: known[name] for name in ERROR_TABLES if name in known}
+    shown = {ERROR_TABLES[name]: unfolded[name] for name in ERROR_TABLES if name in unfolded}
     if content.get("strata"):
         try:
             shown["By what pixels show"] = Table(*summaries.strata_table(content))
@@ -199,13 +199,13 @@ def error_vs_time(files: Sequence[Path], scene: str) -> Measurement | None:
     return Measurement(
         page.plot(path.with_suffix("")),
         shown,
-        {name.capitalize(): table for name, table in whole.items()},
+        {name.capitalize(): table for name, table in folded.items()},
         _with_units(measured_on, "") if isinstance(measured_on, Mapping) else [],
     )
 
 
 def _slopes(slopes: Mapping[str, Any]) -> Table:
-    """Return each method's slopes, ± their standard errors."""
+    """Return each method's slopes, with their standard errors."""
     over = (
         "over_time",
         "over_samples",
@@ -218,21 +218,19 @@ def _slopes(slopes: Mapping[str, Any]) -> Table:
             return None
         return f"{fit['slope']:.2f} ± {fit.get('slope_error', math.nan):.2f}".replace("-", "−")
 
-    return Table(
-        ["method", *(name.replace("_", " ") for name in over)],
-        [
-            [method, *(text(fits.get(name)) for name in over)]
-            for method, fits in slopes.items()
-            if isinstance(fits, Mapping)
-        ],
-    )
+    rows = []
+    for method, fits in slopes.items():
+        if isinstance(fits, Mapping):
+            rows.append([method, *(text(fits.get(name)) for name in over)])
+    return Table(["method", *(name.replace("_", " ") for name in over)], rows)
 
 
 def costs(path: Path) -> dict[str, Any] | None:
-    """Return what costs.json says, or None where no costs were counted.
+    """Return the content of costs.json for the page, or None without the file.
 
-    ``tables`` by title; ``facts`` and ``full`` (of the dataset at full size, extrapolated) as
-    pairs of title and text; ``notes`` and ``basis``, how they were counted.
+    - ``tables``: by their titles.
+    - ``facts``, ``full``: pairs of title and text. ``full`` is extrapolated to the full size.
+    - ``notes``, ``basis``: how ``facts`` and ``full`` were counted.
     """
     if not path.is_file():
         return None
@@ -249,26 +247,30 @@ def costs(path: Path) -> dict[str, Any] | None:
         "tables": tables,
         "facts": _with_units(facts, currency),
         "notes": _sentences(facts),
-        # Renders of another size say no more than two digits of it.
-        "full": _with_units(
-            {k: float(f"{v:.2g}") if isinstance(v, float) else v for k, v in full.items()}, currency
-        ),
+        # An extrapolation is exact to two digits at most.
+        "full": _with_units({name: _two_digits(value) for name, value in full.items()}, currency),
         "basis": _sentences(full),
     }
 
 
+def _two_digits(value: Any) -> Any:
+    return float(f"{value:.2g}") if isinstance(value, float) else value
+
+
 def _with_units(facts: Mapping[str, Any], currency: str) -> list[tuple[str, str]]:
-    """Return titles and figures in the units that their names end in."""
-    found = []
+    """Return titles and figures. A figure has the unit at the end of its name."""
+    titled_figures = []
     for name, value in facts.items():
         if name.endswith("_uncertainty") or name == "currency" or _is_sentence(value):
             continue
-        sides = name == "resolution" and isinstance(value, list)
-        text = " × ".join(map(str, value)) if sides else page.measure(value, name)
+        if name == "resolution" and isinstance(value, list):
+            text = " × ".join(map(str, value))
+        else:
+            text = page.measure(value, name)
         if "price" in name:
             text = f"{text} {currency}"
-        found.append((page.title(name), text))
-    return found
+        titled_figures.append((page.title(name), text))
+    return titled_figures
 
 
 def _sentences(facts: Mapping[str, Any]) -> list[str]:
@@ -280,14 +282,17 @@ def _is_sentence(value: Any) -> bool:
 
 
 def _tables(content: Mapping[str, Any]) -> tuple[dict[str, Table], dict[str, Any]]:
-    """Split a JSON mapping into tables (lists of mappings, mappings of mappings) and the rest."""
-    tables, facts = {}, {}
+    """Split a JSON mapping into tables (lists or mappings of mappings) and single facts."""
+    tables = {}
+    facts = {}
     for name, value in content.items():
         title = str(name).replace("_", " ")
         rows = value
         if isinstance(value, Mapping) and value:
-            of_rows = all(isinstance(row, Mapping) for row in value.values())
-            rows = [{"": key, **row} for key, row in value.items()] if of_rows else [value]
+            if all(isinstance(row, Mapping) for row in value.values()):
+                rows = [{"": key, **row} for key, row in value.items()]
+            else:
+                rows = [value]
         if isinstance(rows, list) and rows and all(isinstance(row, Mapping) for row in rows):
             columns = list(dict.fromkeys(str(key) for row in rows for key in row))
             tables[title] = Table(
@@ -303,7 +308,7 @@ def _named(files: Sequence[Path], ending: str) -> Path | None:
 
 
 def _read_csv(path: Path, *columns: str) -> list[dict[str, str]]:
-    """Return the rows of a CSV; one without a row, or one of the ``columns``, is a `UserError`."""
+    """Return the rows of a CSV. Raises `UserError` if it has no row, or lacks a column."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
             rows = [
@@ -322,22 +327,22 @@ def _read_csv(path: Path, *columns: str) -> list[dict[str, str]]:
     return rows
 
 
-def _whole(rows: Sequence[Mapping[str, str]]) -> Table:
-    """Return a CSV's rows as they are."""
+def _full_table(rows: Sequence[Mapping[str, str]]) -> Table:
+    """Return all rows of a CSV."""
     return Table(list(rows[0]), [list(row.values()) for row in rows])
 
 
 def _bound_used(row: Mapping[str, str]) -> float:
-    """Return the largest part of its bounds that a case of the stability table uses."""
-    used = []
+    """Return the largest ratio of error to bound of a case of the stability table."""
+    ratios = []
     for error, bound in (("error", "error_bound"), ("round_trip_error", "round_trip_bound")):
         try:
-            part = float(row.get(error, "")) / float(row.get(bound, ""))
+            ratio = float(row.get(error, "")) / float(row.get(bound, ""))
         except (ValueError, ZeroDivisionError):
             continue
-        if math.isfinite(part):
-            used.append(part)
-    return max(used, default=0.0)
+        if math.isfinite(ratio):
+            ratios.append(ratio)
+    return max(ratios, default=0.0)
 
 
 def _milliseconds(text: str | None) -> str | None:

@@ -1,4 +1,4 @@
-"""What a dataset's page shows of the views themselves, packed to be looked at in a browser."""
+"""Packs the views of a dataset's page, so that a browser can show their light and depth."""
 
 import math
 from collections.abc import Callable, Collection
@@ -31,22 +31,24 @@ from lightfield.report.packing import (
 
 Array = NDArray[Any]
 
-# The longer side of an embedded view in pixels; smaller where many views would make a heavy page.
-SIDE, SMALLER_SIDE = 256, 192
+# The longer side of an embedded view in pixels. Smaller if the page has more than MANY_VIEWS.
+SIDE = 256
+SMALLER_SIDE = 192
 MANY_VIEWS = 60
 LIGHT_QUALITY = 88
-# Views are sampled for epipolar-plane images at this size, which their columns have too.
+# The longer side in pixels of the views that epipolar-plane images sample: their columns' number.
 EPIPOLAR_SIDE = 512
 MOST_ROWS = 48
-# Points of the scene, as the views' depth has them, and of how many they are chosen.
-POINTS, CANDIDATES = 8_000, 30_000
-# A view's noise is measured in its middle.
+# The page shows POINTS points of the scene, chosen from CANDIDATES.
+POINTS = 8_000
+CANDIDATES = 30_000
+# The side in pixels of the square in a view's middle where its noise is measured.
 NOISE_SIDE = 512
 
 
 @dataclass(frozen=True)
 class View:
-    """One view as the page needs it: linear colour and depth as stored, both small; its noise."""
+    """One view for the page: small linear colour, small depth as stored, and its noise."""
 
     colour: Array
     depth: Array | None
@@ -54,11 +56,15 @@ class View:
 
 
 @dataclass(frozen=True)
-class Looks:
-    """What `collect` found: ``data`` for the page's program, and numbers for its text.
+class PackedViews:
+    """The views of a page.
 
-    ``noise`` is that of the least, the median and the worst view, ``missed`` the part of depths
-    that are inf, ``parts`` are those of the dataset, as train and test.
+    - ``data``: for the page's program.
+    - ``embedded``, ``views``: the numbers of views in the page, and of all views.
+    - ``parts``: the parts of the split that the dataset has, such as train and test.
+    - ``noise``: that of the best, the median and the worst view.
+    - ``missed``: the part of depths that are inf.
+    - ``row``, ``row_shown``: the row of the epipolar-plane image, and the number of its views.
     """
 
     data: dict[str, Any]
@@ -73,11 +79,11 @@ class Looks:
 
 def collect(
     folder: Path, lightfield: LightField, rig: Rig, unreadable: Collection[str] = ()
-) -> Looks:
-    """Read the views that the page shows and pack them.
+) -> PackedViews:
+    """Read the views that the page shows, and pack them.
 
-    ``folder`` holds the views of ``lightfield``, and ``rig`` holds its cameras. The views known to
-    be ``unreadable`` are black; raises `UserError` for any other that cannot be read.
+    ``folder`` holds the views of ``lightfield``, whose cameras are those of ``rig``. The
+    ``unreadable`` views are black. Raises `UserError` for any other view that cannot be read.
     """
     names = [view.name for view in lightfield.views]
     lens = lightfield.lens
@@ -103,13 +109,13 @@ def collect(
         "resolution": [lens.width, lens.height],
         "size": [small.width, small.height],
         "white": pictures.WHITE,
-        # The one most like that in the middle.
+        # The view with the pose most similar to the middle view's.
         "first": int(np.argmin(distances)),
         "row": _epipolar_images(load, lightfield, row, row_views, shown["light"]) if row else None,
         **shown,
     }
     noises = [view.noise for view in views if math.isfinite(view.noise)]
-    return Looks(
+    return PackedViews(
         data=data,
         embedded=len(embedded),
         views=len(names),
@@ -122,7 +128,7 @@ def collect(
 
 
 def _cameras(lightfield: LightField) -> list[dict[str, Any]]:
-    """Return where each view's camera is and how it is turned."""
+    """Return the position and the axes of each view's camera."""
     return [
         {
             "name": view.name,
@@ -137,7 +143,7 @@ def _cameras(lightfield: LightField) -> list[dict[str, Any]]:
 
 
 def _depths(views: list[View], small: Lens) -> Array | None:
-    """Return the depth of the views, NaN where ``small`` sees nothing; None if they have none."""
+    """Return the depth of the views, NaN where ``small`` sees nothing. None if they have none."""
     stored = [view.depth for view in views if view.depth is not None]
     if not stored:
         return None
@@ -151,7 +157,7 @@ def _pictures(
     lightfield: LightField,
     small: Lens,
 ) -> dict[str, Any]:
-    """Return the packed pictures of the ``embedded`` views, seen through the lens ``small``."""
+    """Return the packed pictures of the ``embedded`` views, through the lens ``small``."""
     light = np.stack([view.colour for view in views])
     limits = light_range(light)
     exposure = round(pictures.exposure_for(light), 2)
@@ -172,24 +178,26 @@ def _pictures(
     return shown | {
         "points": _points(distances, rays, matrices[embedded], colours),
         "depth": _depth_scale(depths, reach, lightfield.depth),
-        "walk": walk.collect(small, matrices[:, :3, 3], distances),
+        "walk": walk.collect(
+            small, matrices[:, :3, 3], distances, fills_holes=not lightfield.transparent
+        ),
     }
 
 
 def _missed(depths: Array) -> float | None:
-    """Return the part of the depths that are inf; None without any depth."""
-    known = depths[~np.isnan(depths)]
-    return float(np.isposinf(known).mean()) if known.size else None
+    """Return the part of the depths that are inf. None without any depth."""
+    defined = depths[~np.isnan(depths)]
+    return float(np.isposinf(defined).mean()) if defined.size else None
 
 
 def read(path: Path, small: Lens, meaning: str | None) -> View:
-    """Read a view at the resolution of ``small``: colour averaged, depth that of one pixel."""
+    """Read a view at the resolution of ``small``. Averages colour, takes depth from one pixel."""
     image = images.read_image(path, "RGBZ" if meaning else "RGB")
     colour = np.nan_to_num(image.colour, posinf=0, neginf=0)
     height, width = colour.shape[:2]
     middle = colour[_middle(height), _middle(width)]
     ratio = relative_noise(pictures.luminance(middle))
-    known = ratio[np.isfinite(ratio)]
+    noise = ratio[np.isfinite(ratio)]
     if (width, height) != (small.width, small.height):
         colour = pictures.shrunk(colour, small.width, small.height)
     depth = None
@@ -199,11 +207,11 @@ def read(path: Path, small: Lens, meaning: str | None) -> View:
         depth = image.channels["Z"][np.ix_(rows.astype(int), columns.astype(int))].astype(
             np.float32
         )
-    return View(colour, depth, float(np.median(known)) if known.size else math.nan)
+    return View(colour, depth, float(np.median(noise)) if noise.size else math.nan)
 
 
 def _black(lens: Lens, meaning: str | None) -> View:
-    """Return a view in which nothing is seen, in place of one that cannot be read."""
+    """Return a black view in place of one that cannot be read."""
     shape = (lens.height, lens.width)
     depth = np.full(shape, np.nan, np.float32) if meaning else None
     return View(np.zeros((*shape, 3), np.float32), depth, math.nan)
@@ -217,11 +225,11 @@ def _middle(length: int) -> slice:
 def _points(
     distances: Array, rays: Array, matrices: Array, colours: Array
 ) -> dict[str, Any] | None:
-    """Return some of the points that views see: places and sRGB colours, packed.
+    """Return some of the points that the views see: places and sRGB colours, packed.
 
-    ``distances`` (views, height, width) are along ``rays`` (height, width, 3), ``colours`` (views,
-    height, width, 3). The farther from the cameras, the farther apart the points are. Places are
-    16 bits between the corners of the box around all of them.
+    ``distances`` (views, height, width) are along ``rays`` (height, width, 3). ``colours`` are
+    (views, height, width, 3). Points far from the cameras are farther apart. Places are 16 bits
+    between the corners of the box around all points.
     """
     view, row, column = np.nonzero(np.isfinite(distances) & (distances > 0))
     if not len(view):
@@ -230,7 +238,7 @@ def _points(
     at = view[picked], row[picked], column[picked]
     turned = np.einsum("nij,nj->ni", matrices[at[0], :3, :3], rays[at[1:]])
     places = matrices[at[0], :3, 3] + distances[at][:, None] * turned
-    # The few that are farthest would cost the others their precision.
+    # Drop the farthest points: they would cost all others their precision.
     way = places - matrices[:, :3, 3].mean(axis=0)
     away = np.linalg.norm(way, axis=1)
     near = np.flatnonzero(away <= np.percentile(away, 98))
@@ -252,7 +260,7 @@ def _rounded(values: Array) -> list[float]:
 
 
 def _depth_scale(depths: Array, reach: tuple[float, float], meaning: str | None) -> dict[str, Any]:
-    """Return what depth codes mean, and which colours, from near to far, depths are shown in."""
+    """Return the meaning of depth codes, and the colours of depths from near to far."""
     hit = depths[np.isfinite(depths) & (depths > 0)]
     near, far = np.log2(np.percentile(hit, [5, 98])).tolist() if hit.size else reach
     palette = matplotlib.colormaps["viridis_r"](np.arange(256), bytes=True)[:, :3]
@@ -272,9 +280,9 @@ def _epipolar_images(
     kept: list[int],
     limits: tuple[float, float],
 ) -> dict[str, Any]:
-    """Return a row's epipolar-plane images, all tilts beneath each other in one picture.
+    """Return a row's epipolar-plane images: one picture, with all tilts beneath each other.
 
-    ``kept`` are the positions in the row of the views that are shown.
+    ``kept`` are the positions of the shown views in the row.
     """
     matrices = lightfield.matrices
     fitted = lightfield.lens.fitted(EPIPOLAR_SIDE)
@@ -294,7 +302,8 @@ def _epipolar_images(
     sight = np.isfinite(depth) | np.isposinf(depth)
     used = np.flatnonzero(sight.any(axis=(0, 1)))
     first, last = (int(used[0]), int(used[-1]) + 1) if used.size else (0, columns)
-    light, depth = light[:, :, first:last], depth[:, :, first:last]
+    light = light[:, :, first:last]
+    depth = depth[:, :, first:last]
     centers = matrices[[row.views[i] for i in kept], :3, 3] @ row.axes.T
     return {
         "kind": row.kind,
@@ -314,5 +323,5 @@ def _epipolar_images(
 
 
 def _stacked(values: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return (tilts, rows, columns, 3) as one picture, the tilts beneath each other."""
+    """Return (tilts, rows, columns, 3) as one picture, with the tilts beneath each other."""
     return values.reshape(-1, *values.shape[2:])

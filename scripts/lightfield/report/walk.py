@@ -1,7 +1,7 @@
-"""What the page's walk inside a light field needs beside the views: their rays, and their room.
+"""Collects what the page's walk needs beside the views: their rays, and the volume between them.
 
-How views are chosen, drawn and blended is that of `synthesis.view`, once more in a browser
-(templates/walk/): its constants are handed over here.
+The walk in the browser (templates/walk/) chooses, draws and blends views as `synthesis.view` does.
+This module passes it the same constants.
 """
 
 from typing import Any
@@ -18,42 +18,54 @@ from lightfield.synthesis import view as synthesis
 
 Array = NDArray[Any]
 
-# The side of the octahedral map in which directions are that the lens sees, in pixels.
+# The side in pixels of the octahedral map of the directions that the lens sees.
 SIGHT = 64
 
 
-def collect(lens: Lens, places: Array, distances: Array) -> dict[str, Any]:
-    """Return what the walk needs of the embedded views' ``lens`` and of all ``places`` (n, 3).
+def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -> dict[str, Any]:
+    """Return the data of the walk.
 
-    ``distances`` (m, h, w) are what embedded views see, in metres.
-    ``rays`` are those of the pixels, row by row, octahedral in two times 16 bits; ``sight`` has a
-    byte for each direction of an octahedral map, 1 where the lens sees it; ``planes`` (m, 4) bound
-    the volume between the cameras: n · p + c ≤ 0. ``nearest`` is how near to a camera, in metres,
-    its surroundings are, but for the nearest hundredth of them.
+    ``lens`` is that of the embedded views. ``places`` (n, 3) are the positions of all cameras.
+    ``distances`` (m, height, width) are what the embedded views see, in metres.
+    ``fills_holes`` is as of `lightfield.synthesis.view.Sources`. Some of the keys:
+
+    - ``rays``: the pixels' rays row by row, octahedral in two times 16 bits.
+    - ``sight``: a byte for each direction of an octahedral map, 1 where the lens sees it.
+    - ``planes`` (m, 4): they bound the volume between the cameras, n · p + c ≤ 0.
+    - ``toRim``: a byte for each pixel, 255 where it is far from the edge of what the lens sees.
+    - ``pixel``: the angle between two pixels, in radians.
+    - ``nearest``: the first percentile of the distances.
     """
     steps = (np.arange(SIGHT) + 0.5) / SIGHT
     x, y = np.meshgrid(steps, steps)
-    _, _, sees = pixel_indices(lens, _direction(np.stack([x, y], axis=-1)).reshape(-1, 3))
-    some = distances[:: max(1, len(distances) // 4)]
-    seen = some[some > 0]
-    hit = seen[np.isfinite(seen)]
+    _, _, is_seen = pixel_indices(lens, _direction(np.stack([x, y], axis=-1)).reshape(-1, 3))
+    sample = distances[:: max(1, len(distances) // 4)]
+    positive = sample[sample > 0]
+    hit = positive[np.isfinite(positive)]
     coded = np.round(_octahedral(np.nan_to_num(lens.pixel_rays())) * 65535).astype("<u2")
     return {
         "rays": packed_bytes(coded.tobytes()),
-        "sight": packed_bytes(sees.astype(np.uint8).tobytes()),
+        "sight": packed_bytes(is_seen.astype(np.uint8).tobytes()),
         "side": SIGHT,
         "planes": np.round(_bounds(places), 6).tolist(),
+        "toRim": packed_bytes(np.round(255 * synthesis.to_rim(lens)).astype(np.uint8).tobytes()),
+        "pixel": synthesis.pixel_angle(lens),
         "steepest": float(synthesis.steepest(lens)),
-        "distances": synthesis.typical(1 / seen).tolist() if seen.size else [1.0, 1.0],
+        "distances": synthesis.typical(1 / positive).tolist() if positive.size else [1.0, 1.0],
         "nearest": float(np.percentile(hit, 1)) if hit.size else 1.0,
         "best": synthesis.BEST,
         "directions": synthesis.DIRECTIONS,
         "distance": synthesis.DISTANCE,
         "sharp": synthesis.SHARP,
         "torn": synthesis.TORN_WEIGHT,
+        "sharpened": synthesis.SHARPENED,
+        "dark": float(kernels.DARK),
         "even": float(kernels.EVEN),
         "same": float(kernels.SAME),
+        "hidden": float(kernels.HIDDEN),
+        "certain": float(kernels.CERTAIN),
         "far": float(kernels.FAR),
+        "fillsHoles": fills_holes,
     }
 
 
@@ -71,7 +83,7 @@ def _octahedral(rays: Array) -> Array:
 
 
 def _direction(points: Array) -> Array:
-    """Return the vectors (..., 3), not of unit length, of `_octahedral` points (..., 2)."""
+    """Return the vectors (..., 3) of `_octahedral` points (..., 2). They are no unit vectors."""
     plane = 2 * points - 1
     z = 1 - np.abs(plane).sum(axis=-1)
     folded = (1 - np.abs(plane[..., ::-1])) * np.where(plane >= 0, 1, -1)
@@ -81,7 +93,7 @@ def _direction(points: Array) -> Array:
 
 
 def _bounds(places: Array) -> Array:
-    """Return the planes (n, 4) around all places (m, 3): their hull, or a box where it is flat."""
+    """Return the planes (n, 4) around all places (m, 3): their hull, or a box if they are flat."""
     try:
         planes: Array = np.unique(np.round(ConvexHull(places).equations, 9), axis=0)
         return planes

@@ -1,8 +1,8 @@
 """The loops of view synthesis: where a surface tears, how it is drawn, how drawings are blended.
 
 A view is a surface: a vertex at each pixel's centre, a triangle between neighbours that belong
-together. Pixels beside a tear are drawn one by one, too. ``inverse`` is 1 / distance in 1/m: 0
-where nothing was hit, NaN where there is no ray.
+together. Pixels beside a tear are drawn one by one, too, as large as they are. ``inverse`` is
+1 / distance in 1/m: 0 where nothing was hit, NaN where there is no ray.
 """
 
 import math
@@ -19,6 +19,12 @@ from lightfield.geometry.lenses import Array
 EVEN = np.float32(0.5)
 # Drawings at one pixel are of one surface if their inverse distances differ by less than this part.
 SAME = np.float32(0.03)
+# What is farther than a surface by this part is hidden by it; in between, it counts less and less.
+HIDDEN = np.float32(0.1)
+# A surface hides what is behind it if its vertices are at least so certain.
+CERTAIN = np.float32(0.5)
+# Added to roots of colours before they are inverted, so that black has an inverse.
+DARK = np.float32(0.03)
 # What is this small, in 1/m, is as far as the sky.
 FAR = np.float32(1e-4)
 # A triangle that is larger than this part of the picture is an artefact at a lens's rim.
@@ -66,6 +72,13 @@ def link(inverse: Array, steepest: np.float32, right: Array, down: Array) -> Non
 
 
 @kernel
+def _signed_weight(certainty: Any, worth: Any) -> Any:
+    """Return the weight of a drawn pixel, negative if it hides nothing behind it."""
+    weight = certainty * worth
+    return weight if certainty >= CERTAIN else -weight
+
+
+@kernel
 def _draw_pole(top: Any, bottom: Any, values: Array, inverse: Array, drawn: Array) -> None:
     """Draw a triangle around a panorama's pole where nothing is drawn yet, in one colour."""
     height, width = inverse.shape
@@ -78,8 +91,9 @@ def _draw_pole(top: Any, bottom: Any, values: Array, inverse: Array, drawn: Arra
         for j in range(width):
             if inverse[i, j] < 0:
                 inverse[i, j] = np.mean(values[:, 0])
-                for c in range(4):
+                for c in range(3):
                     drawn[i, j, c] = np.mean(values[:, c + 1])
+                drawn[i, j, 3] = _signed_weight(np.mean(values[:, 4]), np.mean(values[:, 5]))
 
 
 @kernel
@@ -88,7 +102,7 @@ def _draw_triangle(
 ) -> None:
     """Draw a triangle where nothing nearer is drawn yet.
 
-    ``corners`` (3, 2) are pixels, ``values`` (3, 5) inverse distance, R, G, B and weight.
+    ``corners`` (3, 2) are pixels, ``values`` (3, 6) inverse distance, R, G, B, certainty, worth.
     """
     height, width = inverse.shape
     zero, half = np.float32(0), np.float32(0.5)
@@ -134,10 +148,13 @@ def _draw_triangle(
             near = w0 * values[0, 0] + w1 * values[1, 0] + w2 * values[2, 0]
             if near > inverse[i, j]:
                 inverse[i, j] = near
-                for c in range(4):
+                for c in range(3):
                     drawn[i, j, c] = (
                         w0 * values[0, c + 1] + w1 * values[1, c + 1] + w2 * values[2, c + 1]
                     )
+                certainty = w0 * values[0, 4] + w1 * values[1, 4] + w2 * values[2, 4]
+                worth = w0 * values[0, 5] + w1 * values[1, 5] + w2 * values[2, 5]
+                drawn[i, j, 3] = _signed_weight(certainty, worth)
 
 
 @kernel
@@ -152,13 +169,14 @@ def draw(
 ) -> None:
     """Draw a surface whose vertices (h, w) fall on ``pixels`` (h, w, 2).
 
-    ``values`` (h, w, 5) are as in `_draw_triangle`, ``inverse`` (H, W) and ``drawn`` (H, W, 4) what
-    is drawn: inverse distance, −1 where nothing is, and R, G, B, weight. ``wraps`` is whether the
-    picture's left edge continues its right one.
+    ``values`` (h, w, 6) are as in `_draw_triangle`. ``inverse`` (H, W) is the inverse distance of
+    what is drawn, −1 where nothing is. ``drawn`` (H, W, 4) is R, G, B, and the weight: certainty
+    times worth, negative if the pixel hides nothing. ``wraps`` is whether the picture's left edge
+    continues its right one.
     """
     height, width = pixels.shape[:2]
     corners = np.empty((3, 2), np.float32)
-    corner_values = np.empty((3, 5), np.float32)
+    corner_values = np.empty((3, 6), np.float32)
     for i in range(height - 1):
         for j in range(width - 1):
             for lower in range(2):
@@ -182,10 +200,10 @@ def draw(
 def draw_pixels(pixels: Array, values: Array, wraps: bool, inverse: Array, drawn: Array) -> None:
     """Draw single pixels of a view, whose corners (n, 4, 2) run clockwise from the upper left.
 
-    ``values`` (n, 5) and the others are as in `draw`.
+    ``values`` (n, 6) and the others are as in `draw`.
     """
     corners = np.empty((3, 2), np.float32)
-    corner_values = np.empty((3, 5), np.float32)
+    corner_values = np.empty((3, 6), np.float32)
     for n in range(len(pixels)):
         corner_values[:] = values[n]
         for second in range(2):
@@ -196,33 +214,204 @@ def draw_pixels(pixels: Array, values: Array, wraps: bool, inverse: Array, drawn
 
 
 @kernel
-def blend(inverses: Array, drawn: Array, colour: Array, inverse: Array, holes: Array) -> None:
-    """Blend drawings (k, H, W) of which the nearest surface counts, by their weights.
+def sharpen(root: Array, right: Array, down: Array, amount: np.float32, sharp: Array) -> None:
+    """Subtract from each colour (h, w, 3) ``amount`` / 4 of its neighbours' differences from it.
 
-    ``colour`` (H, W, 3) and ``inverse`` (H, W) become NaN where no drawing has anything: there are
-    ``holes`` (H, W).
+    Only neighbours on one surface count, as `link` marks them.
     """
-    number, height, width = inverses.shape
+    height, width = right.shape
+    part = amount / np.float32(4)
     for i in range(height):
         for j in range(width):
-            nearest = np.float32(-1)
-            for k in range(number):
-                nearest = max(nearest, inverses[k, i, j])
-            holes[i, j] = nearest < 0
-            if holes[i, j]:
-                colour[i, j], inverse[i, j] = np.nan, np.nan
+            for c in range(3):
+                here = root[i, j, c]
+                apart = np.float32(0)
+                if right[i, j]:
+                    apart += root[i, j + 1, c] - here
+                if j > 0 and right[i, j - 1]:
+                    apart += root[i, j - 1, c] - here
+                if down[i, j]:
+                    apart += root[i + 1, j, c] - here
+                if i > 0 and down[i - 1, j]:
+                    apart += root[i - 1, j, c] - here
+                sharp[i, j, c] = max(here - part * apart, np.float32(0))
+
+
+@kernel
+def _hidden_part(near: Any, front: Any) -> Any:
+    """Return how much of what is drawn at ``near`` a surface at ``front`` hides, from 0 to 1."""
+    behind = (front - near) / max(front, FAR)
+    return min(max((behind - SAME) / (HIDDEN - SAME), np.float32(0)), np.float32(1))
+
+
+@kernel
+def _blend_sample(inverses: Array, drawn: Array, row: int, column: int, light: Array) -> Any:
+    """Add a sample's colour to ``light`` (3,); return its inverse distance, −1 if none sees it.
+
+    A weight is that of the drawing, divided by the squared distance: what is near hides what is
+    far, but at an edge no view alone decides what is near. Where a view is certain of a surface, it
+    hides what is behind. Colours are summed as the inverses of their roots: a highlight that one
+    view sees counts little.
+    """
+    count = len(inverses)
+    nearest = front = np.float32(-1)
+    for k in range(count):
+        near = inverses[k, row, column]
+        nearest = max(nearest, near)
+        if drawn[k, row, column, 3] > 0:
+            front = max(front, near)
+    if nearest < 0:
+        return nearest
+    total = red = green = blue = np.float32(0)
+    parts = mean = np.float32(0)
+    slack = max(SAME * nearest, FAR)
+    for k in range(count):
+        near = inverses[k, row, column]
+        if near < 0:
+            continue
+        weight = abs(drawn[k, row, column, 3])
+        if near >= nearest - slack:
+            parts += weight
+            mean += weight * near
+        weight *= max(near, FAR) * max(near, FAR) * (1 - _hidden_part(near, front))
+        red += weight / (drawn[k, row, column, 0] + DARK)
+        green += weight / (drawn[k, row, column, 1] + DARK)
+        blue += weight / (drawn[k, row, column, 2] + DARK)
+        total += weight
+    light[0] += (total / red - DARK) ** 2
+    light[1] += (total / green - DARK) ** 2
+    light[2] += (total / blue - DARK) ** 2
+    return mean / parts
+
+
+@kernel
+def _second(a: Any, b: Any, c: Any, d: Any) -> Any:
+    """Return the second largest of four numbers."""
+    return max(min(max(a, b), max(c, d)), min(a, b), min(c, d))
+
+
+@kernel
+def _of_one_surface(nears: Array) -> Any:
+    """Return the mean of those inverse distances (4,) that are of one surface, −1 being none.
+
+    It is that of the second nearest: distances are not blended across an edge.
+    """
+    middle = _second(nears[0], nears[1], nears[2], nears[3])
+    if middle < 0:
+        middle = max(nears[0], nears[1], nears[2], nears[3])
+    mean = number = np.float32(0)
+    for k in range(4):
+        if nears[k] >= 0 and abs(nears[k] - middle) <= max(SAME * middle, FAR):
+            mean += nears[k]
+            number += 1
+    return mean / number
+
+
+@kernel
+def blend(inverses: Array, drawn: Array, colour: Array, inverse: Array, seen: Array) -> None:
+    """Blend drawings (n, 2h, 2w), as `draw` makes them, to ``colour`` (h, w, 3).
+
+    A pixel is the mean of 2 × 2 samples. ``inverse`` (h, w) is its inverse distance, ``seen``
+    (h, w) the part of its samples that any of the n views sees.
+    """
+    height, width = seen.shape
+    nears = np.empty(4, np.float32)
+    light = np.empty(3, np.float32)
+    for i in range(height):
+        for j in range(width):
+            count = 0
+            light[:] = 0
+            for k in range(4):
+                nears[k] = _blend_sample(inverses, drawn, 2 * i + k // 2, 2 * j + k % 2, light)
+                if nears[k] >= 0:
+                    count += 1
+            seen[i, j] = np.float32(0.25) * count
+            if count == 0:
+                colour[i, j] = inverse[i, j] = np.nan
                 continue
-            total = mean = red = green = blue = np.float32(0)
-            for k in range(number):
-                if inverses[k, i, j] < nearest - max(SAME * nearest, FAR):
-                    continue
-                weight = drawn[k, i, j, 3]
+            for c in range(3):
+                colour[i, j, c] = light[c] / count
+            inverse[i, j] = _of_one_surface(nears)
+
+
+@kernel
+def shrink(
+    colour: Array,
+    inverse: Array,
+    seen: Array,
+    small: Array,
+    small_inverse: Array,
+    small_seen: Array,
+) -> None:
+    """Average 2 × 2 pixels to one of the next coarser level: what is behind counts most.
+
+    ``seen`` (h, w) is how much is known of a pixel, from 0 to 1.
+    """
+    height, width = seen.shape
+    for i in range(small_seen.shape[0]):
+        for j in range(small_seen.shape[1]):
+            behind = np.float32(np.inf)
+            for row in range(2 * i, min(2 * i + 2, height)):
+                for column in range(2 * j, min(2 * j + 2, width)):
+                    if seen[row, column] > 0:
+                        behind = min(behind, inverse[row, column] + FAR)
+            total = parts = near = red = green = blue = np.float32(0)
+            for row in range(2 * i, min(2 * i + 2, height)):
+                for column in range(2 * j, min(2 * j + 2, width)):
+                    if seen[row, column] > 0:
+                        weight = seen[row, column] * (behind / (inverse[row, column] + FAR)) ** 2
+                        total += weight
+                        parts += seen[row, column]
+                        near += weight * inverse[row, column]
+                        red += weight * colour[row, column, 0]
+                        green += weight * colour[row, column, 1]
+                        blue += weight * colour[row, column, 2]
+            small_seen[i, j] = min(parts, np.float32(1))
+            if total > 0:
+                small_inverse[i, j] = near / total
+                small[i, j, 0] = red / total
+                small[i, j, 1] = green / total
+                small[i, j, 2] = blue / total
+
+
+@kernel
+def enlarge(
+    small: Array, small_inverse: Array, wraps: bool, colour: Array, inverse: Array, seen: Array
+) -> None:
+    """Fill pixels of which not all is known from the next coarser level, which is full.
+
+    Of the four nearest coarse pixels, what is behind counts most, as in `shrink`.
+    """
+    height, width = seen.shape
+    rows, columns = small_inverse.shape
+    one, near_part, far_part = np.float32(1), np.float32(0.75), np.float32(0.25)
+    for i in range(height):
+        for j in range(width):
+            known = seen[i, j]
+            if known >= one:
+                continue
+            row, column = i // 2, j // 2
+            other_row = min(max(row + 2 * (i % 2) - 1, 0), rows - 1)
+            other_column = column + 2 * (j % 2) - 1
+            if wraps:
+                other_column %= columns
+            other_column = min(max(other_column, 0), columns - 1)
+            total = near = red = green = blue = np.float32(0)
+            for k in range(4):
+                y = other_row if k // 2 else row
+                x = other_column if k % 2 else column
+                weight = (far_part if k // 2 else near_part) * (far_part if k % 2 else near_part)
+                weight /= (small_inverse[y, x] + FAR) ** 2
                 total += weight
-                red += weight * drawn[k, i, j, 0]
-                green += weight * drawn[k, i, j, 1]
-                blue += weight * drawn[k, i, j, 2]
-                mean += weight * inverses[k, i, j]
-            inverse[i, j] = mean / total
-            colour[i, j, 0] = red / total
-            colour[i, j, 1] = green / total
-            colour[i, j, 2] = blue / total
+                near += weight * small_inverse[y, x]
+                red += weight * small[y, x, 0]
+                green += weight * small[y, x, 1]
+                blue += weight * small[y, x, 2]
+            if known == 0:
+                colour[i, j] = inverse[i, j] = np.float32(0)
+            rest = one - known
+            inverse[i, j] = known * inverse[i, j] + rest * near / total
+            colour[i, j, 0] = known * colour[i, j, 0] + rest * red / total
+            colour[i, j, 1] = known * colour[i, j, 1] + rest * green / total
+            colour[i, j, 2] = known * colour[i, j, 2] + rest * blue / total
+            seen[i, j] = one

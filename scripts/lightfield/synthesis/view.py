@@ -1,8 +1,9 @@
 """A view from anywhere: the surfaces that the best of a dataset's views see, drawn and blended.
 
-Each of the chosen views is drawn as a surface that is torn where depth jumps; at each pixel the
-nearest surface counts, and the views that see it are blended by angle and distance, as in Buehler
-et al. 2001, "Unstructured Lumigraph Rendering". What no view sees stays a hole.
+Each of the chosen views is drawn as a surface that is torn where depth jumps. At each of 2 × 2
+samples a pixel, the views are blended by angle and distance, as in Buehler et al. 2001,
+"Unstructured Lumigraph Rendering". Pixels that no view sees are marked, and filled with what is
+around and behind them (push-pull: Gortler et al. 1996, "The Lumigraph").
 """
 
 from collections import OrderedDict
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.ndimage import distance_transform_cdt
 
 from lightfield.core.errors import UserError
 from lightfield.dataset.lightfield import View
@@ -29,17 +31,27 @@ DIRECTIONS = 12
 # Of a source's penalty: the weight of its distance from the surface beside that of its angle.
 DISTANCE = 0.1
 # An angle in radians that is as good as none.
-SHARP = 0.01
+SHARP = 0.05
 # The tangent of the angle of incidence beyond which neighbours are taken for different surfaces.
 STEEPEST = 6.0
-# Vertices beside a tear have the colour of two surfaces: they count where there is nothing else.
-TORN_WEIGHT = 1e-3
+# Vertices beside a tear have the colour of two surfaces: they count less, and most where nothing
+# else is.
+TORN_WEIGHT = 0.1
+# Towards its edge, over so many pixels, a view counts less and less: its edge is not seen.
+RIM = 12
+# So much of a colour's difference from its neighbours is added to it: interpolation takes it away.
+SHARPENED = 0.7
+# Samples across and down a pixel.
+SAMPLES = 2
 
 
 @dataclass(frozen=True)
 class Synthesised:
-    """A picture: linear ``colour`` (h, w, 3), NaN in its holes; ``distance`` (h, w) in metres, inf
-    where nothing was hit; ``holes`` (h, w), which pixels no view sees, or the lens does not.
+    """A picture: linear ``colour`` (h, w, 3); ``distance`` (h, w) in metres, inf where nothing was
+    hit, NaN in holes; ``holes`` (h, w), which pixels no view sees, or the lens does not.
+
+    Holes that the lens sees have the colour of what is around and behind them, or are black; others
+    are NaN. If no view sees anything, all are black.
     """
 
     colour: Array
@@ -61,14 +73,16 @@ class Synthesised:
 
 @dataclass(frozen=True)
 class Surface:
-    """A view as it is drawn: ``inverse`` distance (h, w) and ``colour`` (h, w, 3).
+    """A view as it is drawn: ``inverse`` distance (h, w), the ``root`` of colour (h, w, 3), and
+    ``certainty`` (h, w), how much each vertex counts.
 
     ``right`` and ``down`` (h, w) are where neighbours are of one surface. The vertices ``torn``
     (h, w) have one that is not; ``corners`` (n, 4, 3) are the rays of their pixels' corners.
     """
 
     inverse: Array
-    colour: Array
+    root: Array
+    certainty: Array
     right: Array
     down: Array
     torn: Array
@@ -93,15 +107,23 @@ def reader(source: SourceDataset) -> Reader:
 class Sources:
     """The ``views`` that pictures are made of, through one ``lens``; ``most`` are held in memory.
 
-    ``read`` returns a view's linear colour (h, w, 3), and its distances (h, w) in metres.
+    ``read`` returns a view's linear colour (h, w, 3), and its distances (h, w) in metres. Holes are
+    black unless ``fills_holes``: what views without a background do not see is most often nothing.
     """
 
     def __init__(
-        self, lens: Lens, views: Sequence[View], read: Reader, most: int = 2 * BEST
+        self,
+        lens: Lens,
+        views: Sequence[View],
+        read: Reader,
+        *,
+        fills_holes: bool = True,
+        most: int = 2 * BEST,
     ) -> None:
         self.lens = lens
         self.views = views
         self.read = read
+        self.fills_holes = fills_holes
         self.most = most
         self.matrices: Array = np.array([view.matrix for view in views])
         self._held: OrderedDict[int, Surface] = OrderedDict()
@@ -133,11 +155,22 @@ class Sources:
         down = np.empty(inverse.shape, bool)
         kernels.link(inverse, steepest(self.lens), right, down)
         torn = np.isfinite(inverse) & ~_is_amid(right, down)
+        certainty = np.where(torn, TORN_WEIGHT, 1) * self._to_rim
+        root = np.sqrt(np.nan_to_num(colour).clip(min=0)).astype(np.float32)
+        sharp = np.empty_like(root)
+        kernels.sharpen(root, right, down, np.float32(SHARPENED), sharp)
+        # Sharpened, the mixed colours beside a tear would be farther from those of their surface.
+        sharp[torn] = root[torn]
         row, column = np.nonzero(torn)
         corners = self.lens.rays(
             column[:, None] + np.array([0.0, 1, 1, 0]), row[:, None] + np.array([0.0, 0, 1, 1])
         )
-        return Surface(inverse, colour, right, down, torn, corners.astype(np.float32))
+        corners = corners.astype(np.float32)
+        return Surface(inverse, sharp, certainty.astype(np.float32), right, down, torn, corners)
+
+    @cached_property
+    def _to_rim(self) -> Array:
+        return to_rim(self.lens)
 
     def best(self, target: Array, lens: Lens, count: int) -> list[int]:
         """Return the ``count`` views that together see best what a ``target`` (4, 4) looks at.
@@ -172,20 +205,29 @@ class Sources:
 
     def blended(self, target: Array, lens: Lens, chosen: Sequence[int]) -> Synthesised:
         """Return the picture of a camera at ``target`` (4, 4), made of the ``chosen`` views."""
-        shape = (lens.height, lens.width)
-        inverses = np.full((len(chosen), *shape), -1, np.float32)
-        drawn = np.zeros((len(chosen), *shape, 4), np.float32)
+        fine = lens.resized(SAMPLES * lens.width, SAMPLES * lens.height)
+        shape = (len(chosen), fine.height, fine.width)
+        inverses = np.full(shape, -1, np.float32)
+        drawn = np.zeros((*shape, 4), np.float32)
         for place, index in enumerate(chosen):
             surface = self.surface(index)
-            self._draw(surface, self.matrices[index], target, lens, inverses[place], drawn[place])
-        colour = np.empty((*shape, 3), np.float32)
-        inverse = np.empty(shape, np.float32)
-        holes = np.empty(shape, bool)
-        kernels.blend(inverses, drawn, colour, inverse, holes)
+            self._draw(surface, self.matrices[index], target, fine, inverses[place], drawn[place])
+        colour = np.empty((lens.height, lens.width, 3), np.float32)
+        inverse = np.empty((lens.height, lens.width), np.float32)
+        seen = np.empty((lens.height, lens.width), np.float32)
+        kernels.blend(inverses, drawn, colour, inverse, seen)
         outside = np.isnan(lens.pixel_rays()[..., 0])
-        colour[outside], inverse[outside], holes[outside] = np.nan, np.nan, True
+        seen[outside] = 0
+        holes = seen == 0
+        inverse[holes] = np.nan
         with np.errstate(divide="ignore"):
-            return Synthesised(colour, 1 / inverse, holes)
+            distance = 1 / inverse
+        if self.fills_holes:
+            fill(colour, inverse, (~holes).astype(np.float32), _wraps(lens))
+        else:
+            colour[holes] = 0
+        colour[outside] = np.nan
+        return Synthesised(colour, distance, holes)
 
     def _draw(
         self,
@@ -197,12 +239,11 @@ class Sources:
         drawn: Array,
     ) -> None:
         """Draw what a view ``here`` (4, 4) sees; ``inverse`` and ``drawn`` as in `kernels.draw`."""
-        wraps = isinstance(lens, Equirectangular) and lens.is_full
+        wraps = _wraps(lens)
         pixels, seen = self._projected(self.rays, surface.inverse, here, target, lens)
         length = np.linalg.norm(seen, axis=-1)
-        certainty = np.where(surface.torn, TORN_WEIGHT, 1).astype(np.float32)
-        weight = certainty / penalty(seen, self.rays @ _turn(here)) ** 2
-        values = np.dstack([surface.inverse / length, surface.colour, weight])
+        worth = 1 / penalty(seen, self.rays @ _turn(here)) ** 2
+        values = np.dstack([surface.inverse / length, surface.root, surface.certainty, worth])
         values = values.astype(np.float32, copy=False)
         kernels.draw(pixels, values, surface.right, surface.down, wraps, inverse, drawn)
         corners, _ = self._projected(
@@ -224,6 +265,25 @@ class Sources:
         return pixels.astype(np.float32, copy=False), seen
 
 
+def fill(colour: Array, inverse: Array, seen: Array, wraps: bool) -> None:
+    """Fill pixels of which only a part, or nothing, is ``seen`` (h, w) from coarser levels.
+
+    ``colour`` (h, w, 3) and ``inverse`` (h, w), the inverse distance, are filled in place. Source:
+    Gortler et al. 1996, section 3.4; what is behind a hole's edge counts more than what is before.
+    """
+    if (seen >= 1).all():
+        return
+    if seen.size == 1:
+        colour[seen == 0] = inverse[seen == 0] = 0
+        return
+    shape = tuple(-(-side // 2) for side in seen.shape)
+    small, small_inverse = np.zeros((*shape, 3), np.float32), np.zeros(shape, np.float32)
+    small_seen = np.zeros(shape, np.float32)
+    kernels.shrink(colour, inverse, seen, small, small_inverse, small_seen)
+    fill(small, small_inverse, small_seen, wraps)
+    kernels.enlarge(small, small_inverse, wraps, colour, inverse, seen)
+
+
 def typical(inverse: Array) -> Array:
     """Return two distances in metres: a quarter and three quarters of ``inverse`` are nearer."""
     distances: Array = 1 / np.maximum(np.nanpercentile(inverse, [75, 25]), 1e-4)
@@ -235,10 +295,26 @@ def _turn(matrix: Array) -> Array:
     return np.asarray(matrix[:3, :3].T, np.float32)
 
 
+def to_rim(lens: Lens) -> Array:
+    """Return how far each pixel (h, w) is from the edge of what a lens sees: 0 to 1, in `RIM`."""
+    seen = np.pad(np.isfinite(lens.pixel_rays()[..., 0]), 1, constant_values=_wraps(lens))
+    pixels: Array = (
+        distance_transform_cdt(seen)[1:-1, 1:-1]
+        if not seen.all()
+        else np.full((lens.height, lens.width), RIM)
+    )
+    return (pixels / RIM).clip(max=1)
+
+
+def pixel_angle(lens: Lens) -> float:
+    """Return the angle in radians between the rays of two pixels in the middle of a picture."""
+    here, there = lens.rays(lens.center[0] + np.array([0.0, 1.0]), np.array(lens.center[1]))
+    return float(2 * np.arcsin(np.linalg.norm(there - here) / 2))
+
+
 def steepest(lens: Lens) -> np.float32:
     """Return the part by which a surface's distances may differ from one pixel to the next."""
-    here, there = lens.rays(lens.center[0] + np.array([0.0, 1.0]), np.array(lens.center[1]))
-    return np.float32(STEEPEST * np.linalg.norm(there - here))
+    return np.float32(STEEPEST * pixel_angle(lens))
 
 
 def penalty(seen: Array, source: Array) -> Array:
@@ -255,11 +331,21 @@ def penalty(seen: Array, source: Array) -> Array:
     return unlike
 
 
+def _wraps(lens: Lens) -> bool:
+    """Whether the left edge of a lens's picture continues its right one."""
+    return isinstance(lens, Equirectangular) and lens.is_full
+
+
 def _is_amid(right: Array, down: Array) -> Array:
-    """Return which vertices (h, w) are of one surface with all four neighbours that they have."""
+    """Return which vertices (h, w) have all triangles around them that the picture has room for.
+
+    A triangle is there where its corner at the right angle is of one surface with the other two.
+    """
+    upper = right[:-1, :-1] & down[:-1, :-1]
+    lower = right[1:, :-1] & down[:-1, 1:]
     whole = np.ones(right.shape, bool)
-    whole[:, :-1] &= right[:, :-1]
-    whole[:, 1:] &= right[:, :-1]
-    whole[:-1] &= down[:-1]
-    whole[1:] &= down[:-1]
+    whole[:-1, :-1] &= upper
+    whole[:-1, 1:] &= upper & lower
+    whole[1:, :-1] &= upper & lower
+    whole[1:, 1:] &= lower
     return whole

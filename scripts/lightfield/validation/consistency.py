@@ -1,21 +1,24 @@
-"""Do the views of a light field see the same world? Depth of one view, looked up in another.
+"""Compares the depth of two views, to see whether they see the same world.
 
 A view's depth is lifted into the world as small surface patches: 3 × 3 pixels and the plane that
-fits them best. Depth may have been sampled somewhere under the pixel filter (SILVR's is), so one
-value is only good to the slope of the surface times that jitter; the plane averages it, and how far
-the nine points lie from it (`Patches.spread`) says how far it can be trusted. Patches that no plane
-fits (edges, thin structures) are not used to ask, and give a range instead of an answer.
+fits them best. Depth may have been sampled anywhere under the pixel filter (SILVR's is). Then one
+value is only as exact as the surface's slope times that jitter. The plane averages the jitter, and
+`Patches.spread`, the distance of the nine points from the plane, tells how exact it is. No plane
+fits edges and thin structures: they are not looked up, and answer with a range of depth.
 
-A patch's centre is then projected into another view, and the plane of the 3 × 3 pixels recorded
-there is the answer. The distance from centre to plane has a sign: a point behind the recorded
-surface is occluded, which is allowed, and a point in front of it is a contradiction, because that
-view looked through the place where the first one saw a surface. A relation of two views is always
-tried both ways, so whatever is wrong makes contradictions in one of them.
+A patch's centre is then projected into another view. The plane of the 3 × 3 pixels recorded there
+is the answer. The distance from centre to plane has a sign. A point behind the recorded surface is
+occluded, which is allowed. A point in front of it is a contradiction: that view looked through the
+place where the first view saw a surface. Two views are always compared in both directions, so any
+error makes contradictions in one of them.
 
-Errors too small for single points (a fraction of a pixel) show in the mean: `displacement` gives
-the rigid motion between two views that their residuals ask for, and how large that is expected to
-be where nothing is wrong; `scales` the error of field of view and of depth that all pairs together
-ask for; both are first-order least squares on point-to-plane distances (Chen and Medioni 1992).
+Errors too small for single points (a fraction of a pixel) show in the mean:
+
+- `displacement` finds the rigid motion between two views that explains their residuals best. It
+  also gives the size to expect if nothing is wrong.
+- `scales` finds the error of the field of view and of depth that explains all pairs best.
+
+Both are first-order least squares on point-to-plane distances (Chen and Medioni 1992).
 """
 
 from collections.abc import Sequence
@@ -35,25 +38,26 @@ Array = NDArray[np.float64]
 # The nine pixels of a patch, row by row.
 _ROWS, _COLUMNS = (offset.ravel() for offset in np.mgrid[-1:2, -1:2])
 
-# A patch is a surface when its points lie within so many pixel footprints of their plane (standard
-# deviation; the jitter of Cycles' default filter gives up to 0.25) and it is not seen edge-on.
+# A patch is smooth if the standard deviation of its points from their plane is below this many
+# pixel footprints. The jitter of Cycles' default filter gives up to 0.25.
 SMOOTH_SPREAD = 0.35
+# A patch is not used if the cosine between its normal and the line of sight is smaller.
 GRAZING_COSINE = 0.2
 
-# A point lies on a recorded surface within this many standard deviations of both planes, and never
-# closer than this part of a footprint (curvature that a plane cannot follow).
+# A point lies on a recorded surface within this many standard deviations of both planes. This part
+# of a footprint is added for curvature that a plane cannot follow.
 TOLERANCE_DEVIATIONS = 4.0
 TOLERANCE_FOOTPRINTS = 0.05
 
 # Fewer points than this say nothing about a pair of views, nor about six unknowns of motion.
 FEWEST_POINTS = 30
 NEIGHBOURS = 6
-# Among so many of the nearest views are the farther neighbours.
+# The farther neighbours are chosen from this many of the nearest views.
 NEIGHBOURHOOD = 48
-# Distances that are the same in so many decimals of a metre are the same.
+# Distances in metres are equal if they agree to this many decimals.
 DECIMALS = 6
 
-# Residuals beyond this many footprints are another surface, not a slightly wrong view.
+# Residuals beyond this many footprints belong to another surface, not to a slightly wrong view.
 SAME_SURFACE = 1.0
 
 UNKNOWN = 0
@@ -64,11 +68,12 @@ CONTRADICT = 3
 
 @dataclass(frozen=True)
 class Camera:
-    """Where a view is and what it sees: its lens, camera-to-world (4, 4), and what its depth means.
+    """A view's camera.
 
-    ``depth`` is ``"z"`` (along the optical axis) or ``"distance"`` (along the ray), in metres.
-    ``grain`` is the angle in radians, if any, within which a depth may come from beside its
-    pixel's centre: a pixel of the view from which this one was reprojected.
+    - ``world_matrix`` (4, 4): camera to world.
+    - ``depth``: ``"z"`` (along the optical axis) or ``"distance"`` (along the ray), in metres.
+    - ``grain``: the angle in radians of a source view's pixel, if this view was reprojected. A
+      depth may come from that far beside its pixel's centre.
     """
 
     lens: Lens
@@ -81,7 +86,7 @@ class Camera:
         return self.world_matrix[:3, 3]
 
     def lift(self, depth: Array, columns: NDArray[np.int64], rows: NDArray[np.int64]) -> Array:
-        """Return the world points (..., 3) that ``depth`` puts on the rays of the pixel centres."""
+        """Return the world points (..., 3) at ``depth`` along the rays of the pixel centres."""
         rays = self.lens.rays(columns + 0.5, rows + 0.5)
         distance = stored_distance(depth, rays, self.depth)
         with np.errstate(invalid="ignore"):
@@ -90,20 +95,23 @@ class Camera:
         return points
 
     def pixels(self, points: Array) -> Array:
-        """Return the pixel coordinates (..., 2) of world points, NaN where they are not seen."""
+        """Return the pixel coordinates (..., 2) of world points. NaN where they are not seen."""
         return self.lens.pixels((points - self.position) @ self.world_matrix[:3, :3])
 
 
 @dataclass(frozen=True)
 class Patches:
-    """Surface patches of one view, in world coordinates and metres; n of them.
+    """The n surface patches of one view, in world coordinates and metres.
 
-    points (n, 3): the centres; normals (n, 3): unit, towards the camera; spread (n,): standard
-    deviation of the nine points from their plane; footprint (n,): the width of a pixel, or of the
-    grain if that is coarser, at that distance, across the ray; error (n,): how far the plane may
-    lie off the surface by the grain and by what the file's number format resolves; curvature
-    (n, 3): second derivatives of the surface's height above the plane, per pixel squared: along
-    columns, along rows, and mixed.
+    - ``points`` (n, 3): the centres.
+    - ``normals`` (n, 3): unit vectors towards the camera.
+    - ``spread`` (n,): the standard deviation of the nine points from their plane.
+    - ``footprint`` (n,): the width of a pixel at that distance, across the ray. The width of the
+      grain, if that is larger.
+    - ``error`` (n,): how far the plane may lie off the surface. The causes are the grain and the
+      file's number format.
+    - ``curvature`` (n, 3): the second derivatives of the surface's height above the plane, per
+      pixel squared: along columns, along rows, and mixed.
     """
 
     points: Array
@@ -134,7 +142,7 @@ class Patches:
 def _patches(
     camera: Camera, depth: NDArray[Any], columns: NDArray[np.int64], rows: NDArray[np.int64]
 ) -> tuple[Patches, NDArray[np.bool_]]:
-    """Fit planes to 3 × 3 pixels about inner pixels; also say which of them are smooth surfaces."""
+    """Fit planes to 3 × 3 pixels about inner pixels. Also return which are smooth surfaces (n,)."""
     columns = columns[:, np.newaxis] + _COLUMNS
     rows = rows[:, np.newaxis] + _ROWS
     values = depth[rows, columns]
@@ -168,15 +176,17 @@ def _patches(
             & (np.abs(cosine) > GRAZING_COSINE)
         )
         curvature = _curvature(np.einsum("nij,nj->ni", around, normals))
-    # Where pixels have no points there is no plane, and what they say has no extent of its own.
-    footprint[~finite] = error[~finite] = 0.0
+    # Pixels without points have no plane, and so neither a footprint nor an error.
+    footprint[~finite] = 0.0
+    error[~finite] = 0.0
     return Patches(centres, normals, spread, footprint, error, curvature), smooth
 
 
 def _curvature(heights: Array) -> Array:
     """Return `Patches.curvature` (n, 3) of nine points' heights (n, 9) above their plane.
 
-    They are the least squares fit of a quadratic surface, from which the plane takes nothing.
+    They are the least squares fit of a quadratic surface. Its second derivatives do not depend on
+    the plane.
     """
     square = heights.reshape(-1, 3, 3)
     along_columns = (square[:, :, 0] - 2 * square[:, :, 1] + square[:, :, 2]).mean(axis=1)
@@ -188,8 +198,8 @@ def _curvature(heights: Array) -> Array:
 def sample(camera: Camera, depth: NDArray[Any], rays: int) -> Patches:
     """Return up to ``rays`` smooth patches of a view, spread evenly over it.
 
-    The image is divided into square cells; of four fixed places in each the smoothest is taken.
-    ``depth``: (height, width) of a float type, misses +inf; below 3 × 3 there is no patch.
+    The image is divided into square cells. Each cell gives the smoothest of four fixed places.
+    ``depth`` is (height, width) of a float type, with misses +inf. Below 3 × 3 there is no patch.
     """
     height, width = depth.shape
     if min(height, width) < 3:
@@ -197,7 +207,7 @@ def sample(camera: Camera, depth: NDArray[Any], rays: int) -> Patches:
         return _patches(camera, depth, none, none)[0]
     cell = max((height * width / rays) ** 0.5, 2.0)
     down, across = int(height / cell), int(width / cell)
-    # The four places of a cell: the corners of a square turned so that none share a row or column.
+    # The four places in a cell are the corners of a turned square: none share a row or column.
     places = np.array([(0.3, 0.1), (0.9, 0.3), (0.1, 0.7), (0.7, 0.9)])
     y, x = np.mgrid[0:down, 0:across].reshape(2, -1, 1) + places.T[:, np.newaxis]
     rows = np.clip(y * (height / down), 1, height - 2).astype(np.int64)
@@ -212,91 +222,95 @@ def sample(camera: Camera, depth: NDArray[Any], rays: int) -> Patches:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What one view says of another's n patches.
+    """How n patches of one view compare with what another view recorded.
 
     - ``verdict`` (n,): AGREE, OCCLUDED or CONTRADICT, or UNKNOWN beside pixels without a source.
-    - ``fine`` (n,): where the answering view has a smooth patch, too.
-    - ``asked`` and ``answered``: the patches of both views.
-    - ``residual`` (n,): how far the centre of the one lies in front of the plane of the other, in
-      units of ``footprint`` (n,), which is in metres.
+    - ``smooth`` (n,): where the other view has a smooth patch, too.
+    - ``queried``: the patches of the first view.
+    - ``recorded``: the patches of the other view at the same pixels.
+    - ``residual`` (n,): how far a queried centre lies in front of the recorded plane, in units of
+      ``footprint``.
+    - ``footprint`` (n,): in metres.
     - ``expected`` (n,): the standard deviation of the residual in the same units. It follows from
-      how well the planes fit, and from what the files resolve.
+      the fit of the planes, and from what the files resolve.
     - ``curved_residual`` (n,): the residual between curved surfaces. It is noisier. But a plane
       through nine pixels lies inside a ball, and deeper where the ball is seen at an angle.
     """
 
     verdict: NDArray[np.int64]
-    fine: NDArray[np.bool_]
-    asked: Patches
-    answered: Patches
+    smooth: NDArray[np.bool_]
+    queried: Patches
+    recorded: Patches
     residual: Array
     footprint: Array
     expected: Array
     curved_residual: Array
 
     def measuring(self) -> "Comparison | None":
-        """Return the part that says how far the surfaces are apart; None if it is too small."""
-        used = self.fine & (np.abs(self.residual) < SAME_SURFACE)
+        """Return the patches that measure the surfaces' distance. None if they are too few."""
+        used = self.smooth & (np.abs(self.residual) < SAME_SURFACE)
         if used.sum() < FEWEST_POINTS:
             return None
         return Comparison(*(getattr(self, each.name)[used] for each in fields(self)))
 
 
-def _looks_for(asked: Patches, camera: Camera) -> tuple[NDArray[np.bool_], Array]:
+def _visible_patches(patches: Patches, camera: Camera) -> tuple[NDArray[np.bool_], Array]:
     """Return which patches turn towards a view and lie in it, and at which pixels (n, 2)."""
-    sight = camera.position - asked.points
+    sight = camera.position - patches.points
     distance = np.linalg.norm(sight, axis=1)
-    facing = np.einsum("ij,ij->i", asked.normals, sight) > GRAZING_COSINE * distance
-    where = camera.pixels(asked.points)
+    facing = np.einsum("ij,ij->i", patches.normals, sight) > GRAZING_COSINE * distance
+    pixels = camera.pixels(patches.points)
     last = np.array([camera.lens.width, camera.lens.height]) - 1.0
     with np.errstate(invalid="ignore"):
-        inside = ((where >= 1.0) & (where < last)).all(axis=1)
-    return facing & inside, where
+        inside = ((pixels >= 1.0) & (pixels < last)).all(axis=1)
+    return facing & inside, pixels
 
 
-def compare(asked: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison:
-    """Look for the patches of another view in the view that ``camera`` took with ``depth``.
+def compare(queried: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison:
+    """Look up the patches of another view in the view of ``camera``, which recorded ``depth``.
 
-    Patches that the view cannot see, or sees from behind, are not in the answer.
+    Leaves out the patches that this view cannot see, or sees from behind.
     """
-    looked_for, where = _looks_for(asked, camera)
-    asked = asked[looked_for]
-    where = where[looked_for]
-    columns, rows = np.floor(where).astype(np.int64).T
-    answered, smooth = _patches(camera, depth, columns, rows)
-    residual = np.einsum("ij,ij->i", answered.normals, asked.points - answered.points)
-    aside = where - np.floor(where) - 0.5
-    curved_residual = residual + asked.height() - answered.height(aside[:, 0], aside[:, 1])
-    # The centre of nine jittered points, and the plane of nine a pixel's half diagonal off centre.
-    deviation = np.sqrt(asked.spread**2 / 9 + answered.spread**2 * (1 / 9 + 0.5 / 6))
-    footprint = np.maximum(asked.footprint, answered.footprint)
+    visible, pixels = _visible_patches(queried, camera)
+    queried = queried[visible]
+    pixels = pixels[visible]
+    columns, rows = np.floor(pixels).astype(np.int64).T
+    recorded, smooth = _patches(camera, depth, columns, rows)
+    residual = np.einsum("ij,ij->i", recorded.normals, queried.points - recorded.points)
+    off_centre = pixels - np.floor(pixels) - 0.5
+    recorded_height = recorded.height(off_centre[:, 0], off_centre[:, 1])
+    curved_residual = residual + queried.height() - recorded_height
+    # The queried centre is a mean of nine jittered points. The recorded plane is evaluated up to
+    # half a pixel's diagonal off its centre.
+    deviation = np.sqrt(queried.spread**2 / 9 + recorded.spread**2 * (1 / 9 + 0.5 / 6))
+    footprint = np.maximum(queried.footprint, recorded.footprint)
     tolerance = (
         TOLERANCE_DEVIATIONS * deviation
         + TOLERANCE_FOOTPRINTS * footprint
-        + asked.error
-        + answered.error
+        + queried.error
+        + recorded.error
     )
-    verdict = np.full(len(asked), AGREE)
+    verdict = np.full(len(queried), AGREE)
     verdict[residual < -tolerance] = OCCLUDED
     verdict[residual > tolerance] = CONTRADICT
     rough = np.flatnonzero(~smooth)
     nearest, farthest = _recorded_range(camera, depth, columns[rough], rows[rough])
-    expected = np.linalg.norm(asked.points[rough] - camera.position, axis=1)
+    distance = np.linalg.norm(queried.points[rough] - camera.position, axis=1)
     slack = tolerance[rough] + footprint[rough]
     verdict[rough] = AGREE
-    verdict[rough[farthest < expected - slack]] = OCCLUDED
-    verdict[rough[nearest > expected + slack]] = CONTRADICT
+    verdict[rough[farthest < distance - slack]] = OCCLUDED
+    verdict[rough[nearest > distance + slack]] = CONTRADICT
     verdict[rough[np.isnan(nearest)]] = UNKNOWN
-    # Of an error that may be anything up to its bound, as a number's last digit.
-    resolved = (asked.error**2 + answered.error**2) / 12
+    # The variance of a rounding error is a twelfth of its squared bound.
+    rounding = (queried.error**2 + recorded.error**2) / 12
     finest = TOLERANCE_FOOTPRINTS * footprint / TOLERANCE_DEVIATIONS
-    expected = np.sqrt(deviation**2 + finest**2 + resolved)
+    expected = np.sqrt(deviation**2 + finest**2 + rounding)
     unit = np.maximum(footprint, np.finfo(np.float64).tiny)
     return Comparison(
         verdict,
         smooth,
-        asked,
-        answered,
+        queried,
+        recorded,
         residual / unit,
         footprint,
         expected / unit,
@@ -307,7 +321,7 @@ def compare(asked: Patches, camera: Camera, depth: NDArray[Any]) -> Comparison:
 def _recorded_range(
     camera: Camera, depth: NDArray[Any], columns: NDArray[np.int64], rows: NDArray[np.int64]
 ) -> tuple[Array, Array]:
-    """Return the least and largest distance in 3 × 3 pixels; NaN where one has no source."""
+    """Return the least and largest distance in 3 × 3 pixels. NaN where a pixel has no source."""
     columns = columns[:, np.newaxis] + _COLUMNS
     rows = rows[:, np.newaxis] + _ROWS
     nine = depth[rows, columns].astype(np.float64)
@@ -320,22 +334,22 @@ def _recorded_range(
 
 
 def displacement(measured: Comparison, camera: Camera) -> tuple[float, float]:
-    """Return by how many pixels the asked patches must move to lie on the answered ones.
+    """Return how many pixels the queried patches must move to lie on the recorded ones.
 
-    The rigid motion about ``camera``, which answers, that makes the residuals least, in the
-    directions that they determine; its root mean square over the points, in pixel footprints. The
-    second value is the root mean square that residuals as large as expected lead to.
+    The motion is a rigid motion about ``camera``, the recording view. It minimises the residuals in
+    the directions that they determine. The result is its root mean square over the points, in pixel
+    footprints. The second value is the root mean square to expect if nothing is wrong.
     """
     residual = measured.residual
     footprint = measured.footprint
-    arms = (measured.asked.points - camera.position) / footprint[:, np.newaxis]
-    # Unknowns of like size: both in pixels, the rotation as seen at the median distance.
+    arms = (measured.queried.points - camera.position) / footprint[:, np.newaxis]
+    # Give the unknowns a similar size: both are in pixels, the rotation at the median distance.
     arms /= np.median(np.linalg.norm(arms, axis=1))
     # How each point moves with the six unknowns: (n, 3, 6).
     across = np.eye(3) * (np.median(footprint) / footprint)[:, np.newaxis, np.newaxis]
     around = np.cross(np.eye(3), arms[:, np.newaxis]).swapaxes(1, 2)
     moves = np.concatenate([across, around], axis=2)
-    rows = np.einsum("ni,nij->nj", measured.answered.normals, moves)
+    rows = np.einsum("ni,nij->nj", measured.recorded.normals, moves)
     motion = np.zeros(6)
     for _ in range(5):
         root = np.sqrt(_huber(residual + rows @ motion))
@@ -348,7 +362,7 @@ def displacement(measured: Comparison, camera: Camera) -> tuple[float, float]:
 
 
 def _huber(residual: Array) -> Array:
-    """Return Huber's weights; the scale is 1.5 times the median residual."""
+    """Return Huber's weights. The scale is 1.5 times the median residual."""
     scale = 1.5 * np.median(np.abs(residual)) + 1e-12
     weights: Array = scale / np.maximum(np.abs(residual), scale)
     return weights
@@ -357,19 +371,19 @@ def _huber(residual: Array) -> Array:
 def scale_moments(measured: Comparison, asking: Camera, answering: Camera) -> Array:
     """Return what one comparison adds to the least squares of `scales`: moments (3, 3).
 
-    They are the weighted sums of products of how the residual grows with the scale of all angles,
-    how with that of all depths, and minus the residual itself.
+    They are the weighted sums of products of three columns. The first two are the residual's
+    derivatives by the scale of all angles and of all depths. The third is the negated residual.
     """
-    asked = measured.asked
-    answered = measured.answered
-    # Where the two surfaces go when every angle from the axis, or every depth, grows.
-    by_angle = _outwards(asking, asked.points) - _outwards(answering, answered.points)
+    queried = measured.queried
+    recorded = measured.recorded
+    # How the two surfaces move apart when every angle from the axis, or every depth, grows.
+    by_angle = _outwards(asking, queried.points) - _outwards(answering, recorded.points)
     by_depth = answering.position - asking.position
-    grows = np.stack(
-        [np.einsum("ij,ij->i", answered.normals, by_angle), answered.normals @ by_depth], axis=1
+    derivatives = np.stack(
+        [np.einsum("ij,ij->i", recorded.normals, by_angle), recorded.normals @ by_depth], axis=1
     )
     residual = measured.curved_residual
-    columns = np.column_stack([grows / measured.footprint[:, np.newaxis], -residual])
+    columns = np.column_stack([derivatives / measured.footprint[:, np.newaxis], -residual])
     moments: Array = (columns * _huber(residual)[:, np.newaxis]).T @ columns
     return moments
 
@@ -389,8 +403,9 @@ def _outwards(camera: Camera, points: Array) -> Array:
 def view_pairs(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tuple[int, int]]:
     """Return the pairs (i, j), i < j, of views to compare, in order.
 
-    To each view the three nearest that can look for enough of its patches, and three farther away,
-    whose wider baselines show what the near ones cannot. Views at one place count as neighbours.
+    Each view gets the three nearest views that see enough of its patches, and three farther away.
+    The wider baselines of those show errors that the near ones cannot. Views at the same place
+    count as neighbours.
     """
     positions = np.array([camera.position for camera in cameras])
     nearest = Cameras(positions)
@@ -410,7 +425,8 @@ def view_pairs(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tu
             for other in near[start:].tolist():
                 if other in chosen or other in blind:
                     continue
-                if _looks_for(patches_of_view, cameras[other])[0].sum() >= FEWEST_POINTS:
+                visible, _ = _visible_patches(patches_of_view, cameras[other])
+                if visible.sum() >= FEWEST_POINTS:
                     chosen.add(other)
                     break
                 blind.add(other)
@@ -420,11 +436,12 @@ def view_pairs(cameras: Sequence[Camera], patches: Sequence[Patches]) -> list[tu
 
 @dataclass(frozen=True)
 class Answer:
-    """What one view says of another's patches, or two of each other's, in a few numbers.
+    """A comparison of one view with another's patches, or of two with each other's, in few numbers.
 
-    Counts of points by verdict; ``displacement`` and what of it is ``expected`` where nothing is
-    wrong, as that function gives them, in pixels, or None; ``moments`` (3, 3) of the ``measured``
-    points that `scales` uses.
+    - ``agree``, ``occluded``, ``contradict``: numbers of points by verdict.
+    - ``displacement``, ``expected``: the two values in pixels of `displacement`, or None.
+    - ``moments`` (3, 3): the sums that `scales` uses.
+    - ``measured``: the number of points in those sums.
     """
 
     agree: int = 0
@@ -437,7 +454,7 @@ class Answer:
 
     @property
     def contradiction(self) -> float | None:
-        """The part of the points not occluded that contradict; None where there are too few."""
+        """The part of the points not occluded that contradict. None if there are too few points."""
         decided = self.agree + self.contradict
         return self.contradict / decided if decided >= FEWEST_POINTS else None
 
@@ -463,7 +480,7 @@ NOTHING = Answer()
 
 
 def ask(patches: Patches, asking: Camera, answering: Camera, depth: NDArray[Any]) -> Answer:
-    """Look for the ``patches`` of one view in another, whose ``depth`` is (height, width)."""
+    """Look up the ``patches`` of one view in another, whose ``depth`` is (height, width)."""
     comparison = compare(patches, answering, depth)
     counts = np.bincount(comparison.verdict, minlength=4)
     answer = Answer(int(counts[AGREE]), int(counts[OCCLUDED]), int(counts[CONTRADICT]))
@@ -481,9 +498,10 @@ def ask(patches: Patches, asking: Camera, answering: Camera, depth: NDArray[Any]
 
 
 def scales(answers: Answer) -> tuple[Array, Array]:
-    """Return by which part all angles from the axis and all depths must grow, and their deviation.
+    """Return the relative errors of all angles from the axis and of all depths.
 
-    Two arrays (2,): angle and depth. A deviation is inf where the residuals do not determine it.
+    Returns two arrays (2,) of angle and depth: by which part they must grow, and its standard
+    deviation. A deviation is inf if the residuals do not determine it.
     """
     squares = answers.moments[:2, :2]
     products = answers.moments[:2, 2]
@@ -491,5 +509,5 @@ def scales(answers: Answer) -> tuple[Array, Array]:
         return np.zeros(2), np.full(2, np.inf)
     inverse = np.linalg.inv(squares)
     errors = inverse @ products
-    left = max(float(answers.moments[2, 2] - errors @ products), 0.0)
-    return errors, np.sqrt(np.diagonal(inverse) * left / answers.measured)
+    unexplained = max(float(answers.moments[2, 2] - errors @ products), 0.0)
+    return errors, np.sqrt(np.diagonal(inverse) * unexplained / answers.measured)

@@ -1,4 +1,7 @@
-"""What exports claim of a view's depth, answered while the view is read for everything else."""
+"""Questions about a view's depth, which check an export's claims.
+
+They are answered while the view is read for all other checks.
+"""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,11 +18,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of one view.
+    """A question about one view.
 
-    ``points`` (n, 3) are claimed to be lifted from it. ``meaning`` says for which depth, "z" or
-    "distance", the nearest and the farthest are asked for; None asks for neither. ``step`` asks for
-    the world points at every so-manyth pixel; 0 asks for none.
+    - ``points`` (n, 3): points that an export claims to have lifted from it.
+    - ``meaning``: asks for the nearest and the farthest depth, as "z" or "distance". None asks for
+      neither.
+    - ``step``: asks for the world points of every ``step``-th pixel along both axes. 0 asks for
+      none.
     """
 
     points: NDArray[Any]
@@ -29,18 +34,19 @@ class Question:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a view says.
+    """The answer of a view.
 
-    ``apart`` (n,) is how many metres each point is from what its pixel sees, NaN if that is
-    nothing. ``nearest`` and ``farthest`` are in metres, inf for a miss; ``has_unknown`` says
-    whether a depth is NaN. ``seen`` (m, 3) are the world points that were asked for.
+    - ``gaps`` (n,): how many metres each point is from what its pixel sees. NaN for a miss.
+    - ``nearest`` and ``farthest``: depths in metres, inf for a miss.
+    - ``has_unknown``: whether a depth is NaN.
+    - ``world_points`` (m, 3): the world points of every ``step``-th pixel that hits something.
     """
 
-    apart: Floats
+    gaps: Floats
     nearest: float
     farthest: float
     has_unknown: bool
-    seen: Floats
+    world_points: Floats
 
 
 def answer(question: Question, camera: Camera, depth: NDArray[Any]) -> Answer:
@@ -55,18 +61,18 @@ def answer(question: Question, camera: Camera, depth: NDArray[Any]) -> Answer:
         if is_known.any():
             nearest = float(np.nanmin(values))
             farthest = float(np.nanmax(values))
-    seen = np.empty((0, 3))
+    world_points = np.empty((0, 3))
     if question.step:
         down, across = (np.arange(question.step // 2, side, question.step) for side in depth.shape)
         columns, rows = (axis.ravel() for axis in np.meshgrid(across, down))
-        seen = camera.lift(depth[rows, columns].astype(np.float64), columns, rows)
-        seen = seen[np.isfinite(seen).all(axis=1)]
-    apart = _apart(question.points, camera, depth)
-    return Answer(apart, nearest, farthest, has_unknown, seen)
+        world_points = camera.lift(depth[rows, columns].astype(np.float64), columns, rows)
+        world_points = world_points[np.isfinite(world_points).all(axis=1)]
+    gaps = _gaps(question.points, camera, depth)
+    return Answer(gaps, nearest, farthest, has_unknown, world_points)
 
 
 def converted(depth: NDArray[Any], camera: Camera, meaning: str) -> NDArray[Any]:
-    """Return a view's depth (height, width) as "z" or "distance"; NaN where that cannot be."""
+    """Return a view's depth (height, width) as "z" or "distance". NaN where it has no value."""
     if meaning == camera.depth:
         return depth
     values: NDArray[Any] = depth * _factors(camera.lens, meaning)
@@ -75,15 +81,15 @@ def converted(depth: NDArray[Any], camera: Camera, meaning: str) -> NDArray[Any]
 
 @lru_cache(maxsize=1)
 def _factors(lens: Lens, meaning: str) -> Floats:
-    """Return by what (height, width) the other kind of depth is multiplied to have this one."""
+    """Return the factors (height, width) that convert the other kind of depth to this one."""
     cosine = -lens.pixel_rays()[..., 2]
     cosine = np.where(cosine > 0, cosine, np.nan)
     factors: Floats = cosine if meaning == "z" else 1 / cosine
     return factors
 
 
-def _apart(points: NDArray[Any], camera: Camera, depth: NDArray[Any]) -> Floats:
-    """Return how far world points (n, 3) are from what their pixels see; NaN if that is nothing."""
+def _gaps(points: NDArray[Any], camera: Camera, depth: NDArray[Any]) -> Floats:
+    """Return how far world points (n, 3) are from what their pixels see. NaN for a miss."""
     # A damaged point may be anywhere.
     with np.errstate(over="ignore", invalid="ignore"):
         pixels = camera.pixels(points.astype(np.float64))
@@ -91,5 +97,5 @@ def _apart(points: NDArray[Any], camera: Camera, depth: NDArray[Any]) -> Floats:
         inside = ((pixels >= 0) & (pixels < size)).all(axis=1)
         columns, rows = np.where(inside[:, np.newaxis], pixels, 0).astype(np.int64).T
         lifted = camera.lift(depth[rows, columns].astype(np.float64), columns, rows)
-        apart = np.linalg.norm(lifted - points, axis=1)
-    return np.where(inside & np.isfinite(apart), apart, np.nan)
+        gaps = np.linalg.norm(lifted - points, axis=1)
+    return np.where(inside & np.isfinite(gaps), gaps, np.nan)

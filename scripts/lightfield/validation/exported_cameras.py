@@ -1,8 +1,8 @@
 """Checks that exports have the cameras of lightfield.json. Reads each export as its consumer does.
 
-It compares the poses of views, the lenses by where they project the rays of pixels, the lists of
-views and their parts, and the numbers that a file has twice. Numbers may differ by a few steps of
-float32, with which consumers compute.
+It compares poses, lenses, lists of views, the parts of the split, and numbers that a file repeats.
+Two lenses are the same if they project the rays of pixels to the same place. Numbers may differ by
+a few steps of float32, with which consumers compute.
 """
 
 from collections import Counter
@@ -27,20 +27,22 @@ from lightfield.validation.readers.cameras import Camera, PolynomialFisheye
 from lightfield.validation.readers.contents import FLOAT32, Exported, ExportedView, Floats
 from lightfield.validation.result import Check
 
-# How many pixels along each side of an image have their rays compared.
+# A lens is compared at this many pixels along each side of its image.
 GRID = 33
-# To a lens that is no polynomial one is fitted for instant-ngp. It may miss the lens by so many
-# pixels, and by so many times what one fitted here does.
-FITTED_PIXELS, FITTED_TIMES = 0.25, 3.0
-# Where the scene has no split, every such view by name tests, as in most trainers' own examples.
+# The export for instant-ngp fits a polynomial to a lens that is none. The fit may miss the lens by
+# this many pixels, and by this many times the error of the fit that is made here.
+FITTED_PIXELS = 0.25
+FITTED_TIMES = 3.0
+# Without a split, every eighth view in the order of names is a test view. Most trainers' own
+# examples do the same.
 EVERY = 8
 
 
 @dataclass(frozen=True)
 class SetExport:
-    """What one export says of the views of the set ``number``.
+    """One export of the set with this ``number``.
 
-    ``fits_depth`` is whether instant-ngp's unit cube is fitted to the depth of these views.
+    ``fits_depth`` says whether instant-ngp's unit cube is fitted to the depth of these views.
     """
 
     number: int
@@ -49,7 +51,7 @@ class SetExport:
 
 
 class Expected:
-    """What an export must say: the views of a set, and those of the scene's other rigs."""
+    """What an export must contain: the views of a set, and those of the scene's other rigs."""
 
     def __init__(self, dataset: Path, image_set: ImageSet) -> None:
         self.dataset = dataset
@@ -58,7 +60,7 @@ class Expected:
         self.numbers = image_set.numbers
 
     @cached_property
-    def others(self) -> dict[str, View]:
+    def views_of_other_rigs(self) -> dict[str, View]:
         """The views of the scene's other rigs that are here, by the names <rig>_<view>."""
         return {
             f"{rig}_{view.name}": view
@@ -71,13 +73,13 @@ class Expected:
         """The datasets of the scene's other rigs by their names. Empty without a splits.json."""
         # A frame of a sequence lies one folder deeper.
         for home in self.dataset.parents[:2]:
-            if (home / SPLITS).is_file():
-                rig, *below = self.dataset.relative_to(home).parts
-                folders = {path.parent.name: path.parent for path in home.glob(f"*/{NAME}")}
-                if below:
-                    frames = home.glob(f"*/{below[0]}/{NAME}")
-                    folders = {path.parent.parent.name: path.parent for path in frames}
-                return {name: folder for name, folder in folders.items() if name != rig}
+            if not (home / SPLITS).is_file():
+                continue
+            rig, *frame = self.dataset.relative_to(home).parts
+            pattern = "/".join(["*", *frame, NAME])
+            datasets = [path.parent for path in home.glob(pattern)]
+            folders = {folder.relative_to(home).parts[0]: folder for folder in datasets}
+            return {name: folder for name, folder in folders.items() if name != rig}
         return {}
 
     @property
@@ -87,14 +89,14 @@ class Expected:
 
     @cached_property
     def parts(self) -> Mapping[str, set[str]]:
-        """The names of the views of each part: as the rig splits them, or every eighth to test."""
+        """The names of the views of each part. Without a split, every eighth view tests."""
         views = dict(zip(self.numbers, self.image_set.lightfield.views, strict=True))
         if self.has_split:
-            views |= self.others
-            parts = {
-                str(part): {name for name, view in views.items() if view.split == part}
-                for part in PARTS
-            }
+            views |= self.views_of_other_rigs
+            parts: dict[str, set[str]] = {str(part): set() for part in PARTS}
+            for name, view in views.items():
+                if view.split in parts:
+                    parts[view.split].add(name)
         else:
             tests = set(sorted(views)[::EVERY])
             parts = {"train": views.keys() - tests, "validation": set(), "test": tests}
@@ -111,7 +113,7 @@ class Expected:
         """Return the view with a name from an export. None if it is not here."""
         if name in self.numbers:
             return self.image_set.lightfield.views[self.numbers[name]]
-        return self.others.get(name)
+        return self.views_of_other_rigs.get(name)
 
 
 def _views(path: Path) -> Sequence[View]:
@@ -126,11 +128,11 @@ def check(
     dataset: Path,
     sets: Sequence[ImageSet],
     manifests: Sequence[Manifest],
-    wanted: Collection[Path] | None = None,
+    export_lists: Collection[Path] | None = None,
 ) -> tuple[list[Check], list[SetExport]]:
     """Return a check for each set that has exports, and the exports that could be read.
 
-    ``wanted`` is that of `files.of_exports`.
+    ``export_lists`` is that of `files.of_exports`.
     """
     checks = []
     set_exports: list[SetExport] = []
@@ -142,7 +144,7 @@ def check(
         paths = [
             path
             for manifest in manifests
-            for path in lists_of(dataset, image_set, manifest, wanted)
+            for path in lists_of(dataset, image_set, manifest, export_lists)
         ]
         for path in paths:
             try:
@@ -170,14 +172,16 @@ def check(
 
 
 def _faults(exported: Exported, expected: Expected) -> Iterator[str]:
-    """Yield what an export says that differs from lightfield.json."""
+    """Yield how an export differs from lightfield.json."""
     lens = expected.image_set.lightfield.lens
-    errors: dict[Camera, str | None] = {}
-    for given in exported.cameras:
-        if given.camera not in errors:
-            errors[given.camera] = _lens_fault(given.camera, lens)
-        if fault := errors[given.camera]:
-            yield f"{given.place}: {fault} {expected.path}"
+    lens_faults: dict[Camera, str | None] = {}
+    for exported_camera in exported.cameras:
+        camera = exported_camera.camera
+        if camera not in lens_faults:
+            lens_faults[camera] = _lens_fault(camera, lens)
+        fault = lens_faults[camera]
+        if fault:
+            yield f"{exported_camera.place}: {fault} {expected.path}"
     if exported.views:
         yield from _pose_faults(exported.views, expected)
         yield from _name_faults(exported, expected)
@@ -186,76 +190,82 @@ def _faults(exported: Exported, expected: Expected) -> Iterator[str]:
 
 
 def _lens_fault(camera: Camera, lens: Lens) -> str | None:
-    """Say how a camera differs from the lens, for "… that of" a file to follow."""
+    """Return how a camera differs from the lens, or None. The name of a file follows the text."""
     if (camera.width, camera.height) != (lens.width, lens.height):
         size = f"{camera.width} × {camera.height} pixels"
         return f"its image has {size}, not the {lens.width} × {lens.height} of"
     across, down = (np.linspace(0.5, side - 0.5, GRID) for side in (lens.width, lens.height))
     pixels = np.stack([axis.ravel() for axis in np.meshgrid(across, down)], axis=-1)
     rays = lens.rays(pixels[:, 0], pixels[:, 1])
-    seen = np.isfinite(rays).all(axis=-1)
+    visible = np.isfinite(rays).all(axis=-1)
     limit = FLOAT32 * max(lens.width, lens.height)
     if isinstance(camera, PolynomialFisheye):
         fitted = _fitted(lens)
         # Its loader sees less than 90 degrees from the axis, and nothing at the very centre. Where
         # the angle at the centre is not 0, rays around it may be those of the other side.
         hole = 2 * abs(fitted.terms[0] / fitted.terms[1])
-        seen &= (rays[:, 2] < -1e-6) & (np.hypot(*(pixels - lens.center).T) > hole)
+        visible &= (rays[:, 2] < -1e-6) & (np.hypot(*(pixels - lens.center).T) > hole)
         if not camera.is_equidistant:
-            best = np.abs(fitted.pixels(rays[seen]) - pixels[seen]).max()
+            best = np.abs(fitted.pixels(rays[visible]) - pixels[visible]).max()
             limit = max(limit, min(FITTED_PIXELS, FITTED_TIMES * best))
-    pixels, rays = pixels[seen], rays[seen]
-    apart = np.abs(camera.pixels(rays) - pixels).max(axis=-1)
-    if (apart <= limit).all():
+    pixels = pixels[visible]
+    rays = rays[visible]
+    offsets = np.abs(camera.pixels(rays) - pixels).max(axis=-1)
+    if (offsets <= limit).all():
         return None
-    if np.isnan(apart).any():
+    if np.isnan(offsets).any():
         return "its camera does not see all rays that are seen by the lens of"
-    return f"its camera has rays up to {apart.max():.3g} pixels from where they are by the lens of"
+    return (
+        f"its camera has rays up to {offsets.max():.3g} pixels from where they are by the lens of"
+    )
 
 
 def _fitted(lens: Lens) -> PolynomialFisheye:
     """Return a polynomial fitted to a lens to the right of its centre, up to 90 degrees."""
+    # A fisheye is symmetric about its centre, so one half axis is enough.
     x, y = lens.center
     radius = np.linspace(0, max(lens.width, lens.height), 1000)[1:]
     rays = lens.rays(x + radius, np.full_like(radius, y))
-    seen = rays[:, 2] < 0
-    angles = np.arctan2(rays[seen, 0], -rays[seen, 2])
-    p0, p1, p2, p3, p4 = Polynomial.fit(radius[seen], angles, 4).convert().coef.tolist()
+    in_front = rays[:, 2] < 0
+    angles = np.arctan2(rays[in_front, 0], -rays[in_front, 2])
+    p0, p1, p2, p3, p4 = Polynomial.fit(radius[in_front], angles, 4).convert().coef.tolist()
     return PolynomialFisheye(lens.width, lens.height, x, y, (p0, p1, p2, p3, p4))
 
 
 def _pose_faults(views: Sequence[ExportedView], expected: Expected) -> Iterator[str]:
     """Yield the views whose matrix is neither form of the pose in lightfield.json."""
     matrices = np.array([view.matrix for view in views])
-    named = [expected.view(view.name) if view.name else None for view in views]
+    candidates = [expected.view(view.name) if view.name else None for view in views]
     if all(view.name is None for view in views):
-        named = list(_nearest(matrices[:, :3, 3], expected))
-    compared = [index for index, view in enumerate(named) if view]
+        candidates = list(_nearest(matrices[:, :3, 3], expected))
+    compared = [index for index, view in enumerate(candidates) if view]
     if not compared:
         return
-    right = [view for view in named if view]
-    forms = np.array([[view.matrix for view in right], [view.matrix for view in right]])
-    forms[1, :, :3, :3] = rotations.euler_to_matrix(np.array([view.rotation for view in right]))
-    forms[1, :, :3, 3] = [view.position for view in right]
+    references = [view for view in candidates if view]
+    # lightfield.json has each pose as a matrix, and as a position with Euler angles.
+    forms = np.array([[view.matrix for view in references]] * 2)
+    euler_angles = np.array([view.rotation for view in references])
+    forms[1, :, :3, :3] = rotations.euler_to_matrix(euler_angles)
+    forms[1, :, :3, 3] = [view.position for view in references]
     difference = np.abs(matrices[compared] - forms)
-    turned = difference[..., :3, :3].max(axis=(-1, -2)).min(axis=0)
-    moved = difference[..., :3, 3].max(axis=-1).min(axis=0)
-    last = difference[..., 3, :].max(axis=-1).min(axis=0)
+    rotation_error = difference[..., :3, :3].max(axis=(-1, -2)).min(axis=0)
+    position_error = difference[..., :3, 3].max(axis=-1).min(axis=0)
+    last_row_error = difference[..., 3, :].max(axis=-1).min(axis=0)
     reach = 1 + np.abs(forms[..., :3, 3]).max(axis=(0, -1))
-    for row, (index, view) in enumerate(zip(compared, right, strict=True)):
+    for row, (index, view) in enumerate(zip(compared, references, strict=True)):
         where = f"{views[index].file}: {views[index].place} ({views[index].name or view.name})"
-        if not moved[row] <= FLOAT32 * reach[row]:
-            yield f"{where}: its position is {moved[row]:.2g} m from that in {expected.path}"
-        if not turned[row] <= FLOAT32:
-            yield (
-                f"{where}: its rotation differs by {turned[row]:.2g} from that in {expected.path}"
-            )
-        if last[row] != 0:
+        if not position_error[row] <= FLOAT32 * reach[row]:
+            distance = f"{position_error[row]:.2g} m"
+            yield f"{where}: its position is {distance} from that in {expected.path}"
+        if not rotation_error[row] <= FLOAT32:
+            amount = f"{rotation_error[row]:.2g}"
+            yield f"{where}: its rotation differs by {amount} from that in {expected.path}"
+        if last_row_error[row] != 0:
             yield f"{where}: the last row of its matrix is not 0, 0, 0, 1"
 
 
 def _nearest(positions: Floats, expected: Expected) -> Iterable[View]:
-    """Return the view of the set that is nearest to each of the positions (n, 3)."""
+    """Return the nearest view of the set for each of the positions (n, 3)."""
     from scipy.spatial import KDTree
 
     lightfield = expected.image_set.lightfield
@@ -277,22 +287,22 @@ def _name_faults(exported: Exported, expected: Expected) -> Iterator[str]:
             yield f"{part.place}: has {name}, which is none of its views"
     # The lists of NeRF's synthetic scenes are compared as parts of the split.
     if all(view.file == first.file for view in exported.views):
-        wanted = set(expected.numbers)
+        expected_names = set(expected.numbers)
         if exported.views_of and expected.has_split:
-            wanted = wanted & expected.parts[exported.views_of]
-        yield from _different_names(str(first.file), names, wanted, expected)
+            expected_names &= expected.parts[exported.views_of]
+        yield from _different_names(str(first.file), names, expected_names, expected)
 
 
 def _different_names(
-    place: str, names: Sequence[str], wanted: Collection[str], expected: Expected
+    place: str, names: Sequence[str], expected_names: Collection[str], expected: Expected
 ) -> Iterator[str]:
     """Yield the names that are doubled, missing, or not expected."""
     for name, count in Counter(names).items():
         if count > 1:
             yield f"{place}: has {name} {count} times"
-    for name in sorted(set(wanted).difference(names)):
+    for name in sorted(set(expected_names).difference(names)):
         yield f"{place}: lacks {name} of {expected.path}"
-    for name in sorted(set(names).difference(wanted)):
+    for name in sorted(set(names).difference(expected_names)):
         if name in expected.numbers:
             yield f"{place}: has {name}, which is for something else by {expected.path}"
         elif expected.view(name) is None and not expected.lacks_rigs:

@@ -1,8 +1,9 @@
 """Checks that points and depth in exports agree with the depth of the views.
 
 A point was lifted from the centre of a pixel of a rendered view. So it must lie where that pixel's
-depth puts it, as exactly as float32 resolves. While a view is read, it is asked for the points that
-were likely lifted from it (`lifted_points`). A point that does not fit is looked for in all others.
+depth puts it, as exactly as float32 resolves. While a view is read, it is compared with the points
+that were likely lifted from it (`lifted_points`). A point that does not fit is then compared with
+all views.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -26,24 +27,24 @@ from lightfield.validation.result import Check
 
 Ints = NDArray[np.int64]
 
-# How many points that do not fit their view are looked for in all views.
+# At most this many points that do not fit their view are compared with all views.
 MOST_SOUGHT = 20_000
-# How many wrong points of a cloud are named one by one.
+# At most this many wrong points of a cloud are named one by one.
 MOST_NAMED = 100
-# A plane that is seen head on has one depth; the range that an export gives it is no wider.
+# A plane that is seen head on has one depth. Exports widen its range by at most this factor.
 WIDENED = 1.002
 
 Key = tuple[int, int]
 """The number of a set, and of one of its views."""
 Ask = Callable[[Sequence[tuple[File, Question]]], Iterable[Answer | None]]
-"""Answers questions about views in their order; None for a view that cannot be read."""
+"""Answers questions about views, in their order. None for a view that cannot be read."""
 
 
 @dataclass(frozen=True)
 class _Piece:
-    """The indices of a cloud's points for which one rendered view is asked.
+    """The part of a cloud's points that one rendered view is asked about.
 
-    They follow ``start`` others in the question to that view.
+    ``points`` are indices in the cloud. ``start`` is their place among the points of the question.
     """
 
     cloud: int
@@ -68,7 +69,7 @@ class ExportedDepth:
         self.clouds = [
             (export.number, cloud) for export in exports for cloud in export.exported.clouds
         ]
-        # Of how many points of each cloud it is known whether they are right.
+        # For each cloud, the number of points that were compared with a view.
         self.compared = [0] * len(self.clouds)
         self.pieces = list(self._pieces())
         self.questions = self._questions()
@@ -83,7 +84,7 @@ class ExportedDepth:
         """Return a check for each set with exports that hold depth."""
         faults: dict[int, list[str]] = {}
         for export in self.exports:
-            if _speaks_of_depth(export):
+            if _holds_depth(export):
                 faults.setdefault(export.number, []).extend(self._range_faults(export, answers))
         for index, (number, cloud) in enumerate(self.clouds):
             faults[number] += self._cloud_faults(index, cloud, answers, ask)
@@ -114,7 +115,7 @@ class ExportedDepth:
     # ---- questions ----------------------------------------------------------------------
 
     def _pieces(self) -> Iterator[_Piece]:
-        """Yield the points for which each rendered view is asked."""
+        """Yield the points that each rendered view is asked about."""
         source = rendered(self.sets)
         if source is None:
             return
@@ -140,9 +141,9 @@ class ExportedDepth:
         steps: dict[Key, int] = {}
         for export in self.exports:
             image_set = self.sets[export.number]
-            for given in export.exported.ranges:
-                for view in self._views_of(given, image_set):
-                    meanings[export.number, view] = given.meaning
+            for depth_range in export.exported.ranges:
+                for view in self._views_of(depth_range, image_set):
+                    meanings[export.number, view] = depth_range.meaning
             for view in _bounds_views(export, image_set):
                 lens = image_set.lightfield.lens
                 step = max(1, max(lens.width, lens.height) // BOUNDS_PIXELS)
@@ -156,88 +157,90 @@ class ExportedDepth:
             for key in {**points, **meanings, **steps}
         }
 
-    def _views_of(self, given: DepthRange, image_set: ImageSet) -> list[int]:
-        if given.view is None:
+    def _views_of(self, depth_range: DepthRange, image_set: ImageSet) -> list[int]:
+        if depth_range.view is None:
             return [*range(len(image_set.views))]
-        return [image_set.numbers[given.view]] if given.view in image_set.numbers else []
+        number = image_set.numbers.get(depth_range.view)
+        return [] if number is None else [number]
 
     # ---- answers ------------------------------------------------------------------------
 
     def _range_faults(self, export: SetExport, answers: Mapping[Key, Answer]) -> Iterator[str]:
         """Yield what is wrong with an export's ranges of depth, depth map and unit cube."""
         image_set = self.sets[export.number]
-        for given in export.exported.ranges:
-            keys = [(export.number, view) for view in self._views_of(given, image_set)]
+        for depth_range in export.exported.ranges:
+            keys = [(export.number, view) for view in self._views_of(depth_range, image_set)]
             if keys and all(key in answers for key in keys):
-                yield from _range_fault(given, [answers[key] for key in keys])
+                yield from _range_fault(depth_range, [answers[key] for key in keys])
         cube = export.exported.cube
         keys = [(export.number, view) for view in _bounds_views(export, image_set)]
         if cube and keys and all(key in answers for key in keys):
-            seen = np.concatenate([answers[key].seen for key in keys])
-            if len(seen):
+            world_points = np.concatenate([answers[key].world_points for key in keys])
+            if len(world_points):
                 cameras = image_set.lightfield.matrices[:, :3, 3]
-                yield from unit_cube.seen_faults(cube, cameras, seen)
+                yield from unit_cube.seen_faults(cube, cameras, world_points)
         if export.exported.depth_map:
             yield from self._depth_map_fault(export.exported.depth_map, image_set)
 
-    def _depth_map_fault(self, given: DepthMap, image_set: ImageSet) -> Iterator[str]:
+    def _depth_map_fault(self, depth_map: DepthMap, image_set: ImageSet) -> Iterator[str]:
         """Compare one depth map, in metres by the export's unit, with the depth of its view."""
-        if given.view not in image_set.numbers or image_set.lightfield.depth is None:
+        if depth_map.view not in image_set.numbers or image_set.lightfield.depth is None:
             return
-        path = self.dataset / image_set.folder / f"{given.view}.exr"
+        path = self.dataset / image_set.folder / f"{depth_map.view}.exr"
         try:
-            steps = images.read_image(given.path).channels["Y"].astype(np.float64)
+            steps = images.read_image(depth_map.path).channels["Y"].astype(np.float64)
             depth = images.read_image(path, ["Z"]).channels["Z"]
         except (UserError, LookupError):
             return  # which other checks say
-        camera = image_set.camera(image_set.numbers[given.view])
+        camera = image_set.camera(image_set.numbers[depth_map.view])
         if steps.shape != depth.shape:
             return
-        depth = converted(depth, camera, given.meaning)
-        known = steps > 0
-        apart = np.abs(steps * given.metres - depth)[known]
-        if not (apart <= (0.5 + FLOAT32) * given.metres + FLOAT32 * depth[known]).all():
-            yield f"{given.place}: with it {given.path} is up to {apart.max():.2g} m off its view"
+        depth = converted(depth, camera, depth_map.meaning)
+        has_depth = steps > 0
+        errors = np.abs(steps * depth_map.metres - depth)[has_depth]
+        rounding = (0.5 + FLOAT32) * depth_map.metres + FLOAT32 * depth[has_depth]
+        if not (errors <= rounding).all():
+            error = f"{errors.max():.2g} m"
+            yield f"{depth_map.place}: with it {depth_map.path} is up to {error} off its view"
 
     def _cloud_faults(
         self, index: int, cloud: Cloud, answers: Mapping[Key, Answer], ask: Ask
     ) -> Iterator[str]:
-        """Yield the faults of a cloud: points that no view's depth puts there."""
+        """Yield the points of a cloud that no view's depth puts there."""
         source = rendered(self.sets)
         if source is None or any((0, view) not in answers for view in range(len(source.views))):
             return
-        apart = np.full(len(cloud.positions), np.inf)
+        gaps = np.full(len(cloud.positions), np.inf)
         for piece in self.pieces:
             if piece.cloud == index:
-                distances = answers[0, piece.view].apart[piece.rows]
-                apart[piece.points] = np.fmin(apart[piece.points], distances)
+                piece_gaps = answers[0, piece.view].gaps[piece.rows]
+                gaps[piece.points] = np.fmin(gaps[piece.points], piece_gaps)
         limit = resolved(cloud.positions)
-        off = np.flatnonzero(~(apart <= limit))
+        off = np.flatnonzero(~(gaps <= limit))
         # They may have been lifted from another view than the likely one.
         count = min(len(off), MOST_SOUGHT)
         sought = off[np.linspace(0, len(off) - 1, count).astype(int)]
-        self.compared[index] = len(apart) - len(off) + count
+        self.compared[index] = len(gaps) - len(off) + count
         if count:
-            elsewhere = _sought(cloud.positions[sought], source, ask)
-            apart[sought] = np.fmin(apart[sought], elsewhere)
-        wrong = sought[~(apart[sought] <= limit[sought])]
+            gaps[sought] = np.fmin(gaps[sought], _gaps_in_all(cloud.positions[sought], source, ask))
+        wrong = sought[~(gaps[sought] <= limit[sought])]
         for point in wrong[:MOST_NAMED]:
-            yield f"{cloud.name(point)}: is no point of a view's depth{_seen_at(apart[point])}"
+            yield f"{cloud.name(point)}: is no point of a view's depth{_describe_gap(gaps[point])}"
         if len(wrong) > MOST_NAMED:
             yield f"{cloud.file}: {len(wrong)} of {count} points are none of a view's depth"
 
 
-def _seen_at(apart: float) -> str:
-    return f"; what is seen there is {apart:.2g} m away" if np.isfinite(apart) else ""
+def _describe_gap(gap: float) -> str:
+    return f"; what is seen there is {gap:.2g} m away" if np.isfinite(gap) else ""
 
 
-def _speaks_of_depth(export: SetExport) -> bool:
-    said = export.exported
-    return bool(said.clouds or said.ranges or said.depth_map or export.fits_depth)
+def _holds_depth(export: SetExport) -> bool:
+    exported = export.exported
+    return bool(exported.clouds or exported.ranges or exported.depth_map or export.fits_depth)
 
 
 def _bounds_views(export: SetExport, image_set: ImageSet) -> list[int]:
-    """Return the views whose depth a unit cube is fitted to. They are spread evenly."""
+    """Return the views to whose depth a unit cube is fitted. They are spread evenly."""
     if not export.fits_depth:
         return []
     last = len(image_set.views) - 1
@@ -253,26 +256,30 @@ def _lifting_views(image_set: ImageSet, source: ImageSet) -> Ints:
     return np.array([view for view in source_views if view is not None], np.int64)
 
 
-def _range_fault(given: DepthRange, answers: Sequence[Answer]) -> Iterator[str]:
+def _range_fault(depth_range: DepthRange, answers: Sequence[Answer]) -> Iterator[str]:
     """Compare a range with the nearest and the farthest depth of its views."""
-    near = min(given.farthest, *(answer.nearest for answer in answers))
-    far = max(near, *(min(answer.farthest, given.farthest) for answer in answers))
-    # Without an end of what is far, pixels without a source count as being there too.
-    if np.isinf(given.farthest) and any(answer.has_unknown for answer in answers):
-        far = given.farthest
-    is_near = same(given.near, near)
-    is_far = given.far == far or same(given.far, far) or far <= given.far <= WIDENED * near
+    near = min(depth_range.farthest, *(answer.nearest for answer in answers))
+    far = max(near, *(min(answer.farthest, depth_range.farthest) for answer in answers))
+    # If the range may reach to infinity, pixels without a source count as infinitely far.
+    if np.isinf(depth_range.farthest) and any(answer.has_unknown for answer in answers):
+        far = depth_range.farthest
+    is_near = same(depth_range.near, near)
+    is_far = (
+        depth_range.far == far
+        or same(depth_range.far, far)
+        or far <= depth_range.far <= WIDENED * near
+    )
     if not (is_near and is_far):
         yield (
-            f"{given.place}: is {given.near:.7g} to {given.far:.7g} m, "
+            f"{depth_range.place}: is {depth_range.near:.7g} to {depth_range.far:.7g} m, "
             f"but depth goes from {near:.7g} to {far:.7g} m"
         )
 
 
-def _sought(points: NDArray[Any], source: ImageSet, ask: Ask) -> Floats:
-    """Return how far points (n, 3) are from what the views see of which they are on a pixel's ray.
+def _gaps_in_all(points: NDArray[Any], source: ImageSet, ask: Ask) -> Floats:
+    """Return how far points (n, 3) are from what any view sees at the pixel on whose ray they lie.
 
-    It is inf for those that are on no such ray.
+    The distance is inf for points that lie on no such ray.
     """
     lens = source.lightfield.lens
     indices: list[Ints] = []
@@ -285,8 +292,8 @@ def _sought(points: NDArray[Any], source: ImageSet, ask: Ask) -> Floats:
             indices.append(np.flatnonzero(near))
             file = File(f"{source.folder}/{name}.exr", 0, number)
             questions.append((file, Question(points[near])))
-    apart = np.full(len(points), np.inf)
-    for found, answer in zip(indices, ask(questions), strict=True):
+    gaps = np.full(len(points), np.inf)
+    for point_indices, answer in zip(indices, ask(questions), strict=True):
         if answer:
-            apart[found] = np.fmin(apart[found], answer.apart)
-    return apart
+            gaps[point_indices] = np.fmin(gaps[point_indices], answer.gaps)
+    return gaps

@@ -1,12 +1,12 @@
-"""Checks which files a dataset has: none of its own is missing, and no other is there.
+"""Checks which files a dataset has: none is missing, and none lies there that is not its own.
 
-A dataset is a folder with lightfield.json, exr/<view>.exr, and reprojections, each a folder with
-its own lightfield.json and images.
+A dataset is a folder with lightfield.json, exr/<view>.exr, and reprojections. Each reprojection is
+a folder with its own lightfield.json and images.
 """
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -26,30 +26,31 @@ IMAGES = "exr"
 """The folder of a dataset's own views."""
 
 SUMS = "sha256sums.txt"
-"""The checksums in a dataset: only a valid one has them."""
+"""The file with a dataset's checksums. Only a valid dataset has it."""
 
 OUTPUTS = ("validation.json", SUMS)
-"""The files in a dataset that say what came out of its validation."""
+"""The files in a dataset that its validation writes."""
 
 REPORT = "report"
 """The folder in a dataset that is not published with it."""
 
-README, CARD = "README.md", "card.json"
-"""What a package adds to a dataset."""
+README = "README.md"
+CARD = "card.json"
+"""README and CARD are the files that a package adds to a dataset."""
 
-BESIDE = "{view}_depth.png"
-"""The picture beside a view that scripts/reproject.py makes with --depth-png."""
+DEPTH_PICTURE = "{view}_depth.png"
+"""The picture that scripts/reproject.py puts beside a view with --depth-png."""
 
 
 @dataclass(frozen=True)
 class Manifest:
     """How to find the files of one kind of export, so that they are published and checked.
 
-    - ``lists``: a pattern for the export's lists, which are files beside a lightfield.json.
-    - ``pictures``: reads a list, and returns the paths, relative to it, of images that have the
-      size of the views. It raises `UserError` for a file that is no such list.
-    - ``beside``: names, with ``{view}``, of images of that size that may lie beside the views and
-      beside those pictures.
+    - ``lists``: a glob pattern for the export's lists, which lie beside a lightfield.json.
+    - ``pictures``: reads a list, and returns the paths of its images, relative to the list. They
+      have the size of the views. Raises `UserError` for a file that is no such list.
+    - ``beside``: names with ``{view}`` of images that may lie beside the views and beside those
+      pictures. They have the same size.
     - ``files``: returns the SHA-256 of every file of the export, if its list has them.
     """
 
@@ -63,8 +64,8 @@ class Manifest:
 class ImageSet:
     """The views of one lightfield.json: the dataset's own (``name`` "") or a reprojection's.
 
-    ``grain`` is the angle in radians between the pixels at the centre of the views from which these
-    were reprojected, 0 for rendered views.
+    ``grain`` is the angle in radians between two pixels at the centre of a source view. It is 0 for
+    rendered views.
     """
 
     name: str
@@ -100,14 +101,19 @@ class ImageSet:
 class File:
     """An image file: its ``path`` relative to the dataset, its set, and its view.
 
-    What is no view (a mask, a depth map, a picture for a trainer) has ``view`` −1, and has only to
-    be readable and of its set's size. ``of_pass`` is the pass that it holds of a view.
+    Masks, depth maps and pictures for trainers are no views: their ``view`` is −1. They only need
+    to be readable and of their set's size. ``of_pass`` is the pass of the view that the file holds.
     """
 
     path: str
     set: int
     view: int = -1
     of_pass: Pass | None = None
+
+    @property
+    def is_view(self) -> bool:
+        """Whether it is a view's picture, not a pass or a picture beside it."""
+        return self.view >= 0 and self.of_pass is None
 
 
 def read_sets(dataset: Path, reprojections: Iterable[str]) -> tuple[list[ImageSet], list[Check]]:
@@ -137,17 +143,20 @@ def rendered(sets: Sequence[ImageSet]) -> ImageSet | None:
 
 
 def source_view(source: ImageSet | None, name: str) -> int | None:
-    """Return the number of the view from which the reprojected view ``name`` was made."""
+    """Return the number of the view from which the reprojected view ``name`` was made.
+
+    Return None if there is no such view.
+    """
     numbers = source.numbers if source else {}
-    # A face of a cube map is named for its view, and itself.
+    # The name of a cube map's face is its view's name and its own.
     return numbers.get(name, numbers.get(name.rpartition("_")[0]))
 
 
 def _poses(image_set: ImageSet, source: ImageSet | None) -> Check:
-    """Check that each pose is rigid, the same in both forms, and at its source's place."""
+    """Check that each pose is rigid, the same in both forms, and at its source's position."""
     views = image_set.lightfield.views
     # Blender keeps poses in float32.
-    near = 1e-5 * (1 + max(np.abs(view.position).max() for view in views))
+    tolerance = 1e-5 * (1 + max(np.abs(view.position).max() for view in views))
     faults = {}
     for view in views:
         difference = (
@@ -155,13 +164,13 @@ def _poses(image_set: ImageSet, source: ImageSet | None) -> Check:
             + np.abs(view.position - view.matrix[:3, 3]).max()
             + np.abs(view.matrix[3] - (0, 0, 0, 1)).max()
         )
-        if not difference < near:
+        if not difference < tolerance:
             faults[view.name] = "world_matrix: is not that of its position and rotation"
         elif source:
             number = source_view(source, view.name)
             if number is None:
                 faults[view.name] = f"is made of no view of the dataset's {NAME}"
-            elif np.abs(view.position - source.lightfield.views[number].position).max() > near:
+            elif np.abs(view.position - source.lightfield.views[number].position).max() > tolerance:
                 faults[view.name] = f"is not at the place of {source.views[number]}"
     path = f"{image_set.prefix}{NAME}"
     return Check(
@@ -176,35 +185,42 @@ def _poses(image_set: ImageSet, source: ImageSet | None) -> Check:
 def _central_angle(lens: Lens) -> float:
     """Return the angle in radians between two pixels in the middle of the image."""
     x = np.array([lens.width - 1, lens.width + 1]) / 2
-    one, other = lens.rays(x, np.full(2, lens.height / 2))
-    return float(np.arccos(np.clip(one @ other, -1.0, 1.0)))
+    left_ray, right_ray = lens.rays(x, np.full(2, lens.height / 2))
+    return float(np.arccos(np.clip(left_ray @ right_ray, -1.0, 1.0)))
 
 
 def of_views(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], list[Check]]:
     """Return the files of the views that exist, and for each set a check that none is missing.
 
-    A reprojection is EXR, PNG or both. A format that it has of one view, it must have of all.
+    A reprojection is EXR, PNG or both. If one view has a format, all views must have it.
     """
     files: list[File] = []
     checks = []
     for number, image_set in enumerate(sets):
         present = _files(dataset / image_set.folder)
-        formats = [
-            suffix
-            for suffix in ((".exr", ".png") if image_set.name else (".exr",))
-            if any(view + suffix in present for view in image_set.views)
-        ]
-        paths = [
-            (view, f"{image_set.folder}/{name}{suffix}")
-            for suffix in formats or [".exr"]
-            for view, name in enumerate(image_set.views)
-        ]
-        set_files = [File(path, number, view) for view, path in paths if Path(path).name in present]
-        missing = {path: "is missing" for _, path in paths if Path(path).name not in present}
-        detail = f"{len(set_files)} of {len(paths)} images are there"
+        set_files = []
+        missing = {}
+        for suffix in _formats(image_set, present):
+            for view, name in enumerate(image_set.views):
+                path = f"{image_set.folder}/{name}{suffix}"
+                if name + suffix in present:
+                    set_files.append(File(path, number, view))
+                else:
+                    missing[path] = "is missing"
+        detail = f"{len(set_files)} of {len(set_files) + len(missing)} images are there"
         checks.append(Check.of_files(f"{image_set.prefix}views", missing, detail))
         files += set_files
     return files, checks
+
+
+def _formats(image_set: ImageSet, present: Set[str]) -> list[str]:
+    """Return the suffixes of a set's views: those that any view has. EXR if no view is there."""
+    allowed = (".exr", ".png") if image_set.name else (".exr",)
+    formats = []
+    for suffix in allowed:
+        if any(view + suffix in present for view in image_set.views):
+            formats.append(suffix)
+    return formats or [".exr"]
 
 
 def _files(folder: Path) -> set[str]:
@@ -213,41 +229,44 @@ def _files(folder: Path) -> set[str]:
 
 
 def of_passes(dataset: Path, sets: Sequence[ImageSet]) -> tuple[list[File], dict[str, str]]:
-    """Return the files of passes and flow that exist, and by path what is wrong with the others."""
-    files = _of_passes(sets)
+    """Return the existing files of passes and flow, and the faults of the others by path."""
+    files = _pass_files(sets)
     present = [file for file in files if (dataset / file.path).is_file()]
     missing = {file.path for file in files} - {file.path for file in present}
     return present, dict.fromkeys(sorted(missing), "is missing")
 
 
-def _of_passes(sets: Sequence[ImageSet]) -> list[File]:
-    return [
-        File(view_pass.path(Path(image_set.name), name).as_posix(), number, index, view_pass)
-        for number, image_set in enumerate(sets)
-        for index, view in enumerate(image_set.lightfield.views)
-        for view_pass, name in (
-            *((view_pass, view.name) for view_pass in image_set.lightfield.passes),
-            *([(FLOW, view.flow)] if view.flow else []),
-        )
-    ]
+def _pass_files(sets: Sequence[ImageSet]) -> list[File]:
+    """Return the files of passes and flow that the sets must have."""
+    files = []
+    for number, image_set in enumerate(sets):
+        folder = Path(image_set.name)
+        for index, view in enumerate(image_set.lightfield.views):
+            for view_pass in image_set.lightfield.passes:
+                path = view_pass.path(folder, view.name).as_posix()
+                files.append(File(path, number, index, view_pass))
+            if view.flow:
+                path = FLOW.path(folder, view.flow).as_posix()
+                files.append(File(path, number, index, FLOW))
+    return files
 
 
-def names(sets: Sequence[ImageSet]) -> list[str]:
-    """Return the paths of the files that name what the passes of a dataset number."""
+def name_files(sets: Sequence[ImageSet]) -> list[str]:
+    """Return the paths of the JSON files that give the numbers in id passes their names."""
     rendered_set = rendered(sets)
     passes = rendered_set.lightfield.passes if rendered_set else []
-    return [f"{each.name}/{NAMES}" for each in passes if each.kind == "id"]
+    return [f"{view_pass.name}/{NAMES}" for view_pass in passes if view_pass.kind == "id"]
 
 
 def lists_of(
     dataset: Path,
     image_set: ImageSet,
     manifest: Manifest,
-    wanted: Collection[Path] | None = None,
+    export_lists: Collection[Path] | None = None,
 ) -> list[Path]:
-    """Return a set's lists of one kind of export. ``wanted`` limits them, unless it is None."""
+    """Return a set's lists of one kind of export: those in ``export_lists``, or all for None."""
     lists = sorted((dataset / image_set.name).glob(manifest.lists))
-    return [path for path in lists if wanted is None or path.resolve() in wanted]
+    return [path for path in lists if export_lists is None or path.resolve() in export_lists]
 
 
 def of_exports(
@@ -255,50 +274,40 @@ def of_exports(
     sets: Sequence[ImageSet],
     views: Iterable[File],
     manifests: Sequence[Manifest],
-    wanted: Collection[Path] | None = None,
+    export_lists: Collection[Path] | None = None,
 ) -> tuple[list[File], list[str], Check]:
     """Return the pictures beside the views, the exports' other files, and a check of both.
 
-    Only the ``wanted`` lists count; None takes all that exist.
+    Only the lists in ``export_lists`` count. None takes all that exist.
     """
     pictures: dict[str, File] = {}
     lists: list[str] = []
-    others: list[str] = []
+    other_files: list[str] = []
     problems: list[str] = []
     for number, image_set in enumerate(sets):
         folders = {image_set.folder}
-        patterns = [BESIDE]
+        patterns = [DEPTH_PICTURE]
         for manifest in manifests:
-            taken = lists_of(dataset, image_set, manifest, wanted)
-            patterns += manifest.beside if taken or wanted is None else ()
-            for path in taken:
+            set_lists = lists_of(dataset, image_set, manifest, export_lists)
+            if set_lists or export_lists is None:
+                patterns += manifest.beside
+            for path in set_lists:
                 lists.append(path.relative_to(dataset).as_posix())
                 try:
-                    named = manifest.pictures(path)
-                    sums = manifest.files(path)
+                    listed = _listed_files(dataset, path, manifest)
                 except UserError as error:
                     problems.append(str(error).replace(f"{dataset}/", ""))
                     continue
-                for name in named:
-                    target = (path.parent / name).resolve()
-                    if target.is_file() and target.is_relative_to(dataset):
-                        relative = target.relative_to(dataset)
-                        pictures[relative.as_posix()] = File(relative.as_posix(), number)
-                        folders.add(relative.parent.as_posix())
-                    else:
-                        problems.append(f"{lists[-1]}: {name} is no file of the dataset")
-                for name, digest in sums.items():
-                    target = path.parent / name
-                    if not target.resolve().is_relative_to(dataset) or not target.is_file():
-                        problems.append(f"{lists[-1]}: {name} is no file of the dataset")
-                    elif sha256(target) != digest:
-                        problems.append(f"{target.relative_to(dataset)}: is not as it was exported")
-                    else:
-                        others.append(target.relative_to(dataset).as_posix())
+                for picture in listed.pictures:
+                    pictures[picture.as_posix()] = File(picture.as_posix(), number)
+                    folders.add(picture.parent.as_posix())
+                other_files += listed.other_files
+                problems += listed.problems
         for folder in sorted(folders):
             present = _files(dataset / folder)
             for view in image_set.views:
-                for name in (pattern.format(view=view) for pattern in patterns):
+                for pattern in patterns:
+                    name = pattern.format(view=view)
                     if name in present:
                         pictures[f"{folder}/{name}"] = File(f"{folder}/{name}", number)
     for file in views:
@@ -306,7 +315,39 @@ def of_exports(
     files = [file for _, file in sorted(pictures.items())]
     passed = not problems if lists or files else None
     detail = f"{len(lists)} lists of frames, {len(files)} pictures beside the views"
-    return files, [*lists, *others], Check("exports", passed, detail, problems=problems)
+    return files, [*lists, *other_files], Check("exports", passed, detail, problems=problems)
+
+
+@dataclass(frozen=True)
+class _ListedFiles:
+    """The files that an export's list names, relative to the dataset, and what is wrong there."""
+
+    pictures: list[Path] = field(default_factory=list)
+    other_files: list[str] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+
+
+def _listed_files(dataset: Path, path: Path, manifest: Manifest) -> _ListedFiles:
+    """Read an export's list. Raises `UserError` if it is not a list of this kind."""
+    named_pictures = manifest.pictures(path)
+    sums = manifest.files(path)
+    list_name = path.relative_to(dataset).as_posix()
+    listed = _ListedFiles()
+    for name in named_pictures:
+        target = (path.parent / name).resolve()
+        if target.is_file() and target.is_relative_to(dataset):
+            listed.pictures.append(target.relative_to(dataset))
+        else:
+            listed.problems.append(f"{list_name}: {name} is no file of the dataset")
+    for name, digest in sums.items():
+        target = path.parent / name
+        if not target.resolve().is_relative_to(dataset) or not target.is_file():
+            listed.problems.append(f"{list_name}: {name} is no file of the dataset")
+        elif sha256(target) != digest:
+            listed.problems.append(f"{target.relative_to(dataset)}: is not as it was exported")
+        else:
+            listed.other_files.append(target.relative_to(dataset).as_posix())
+    return listed
 
 
 def listing(
@@ -335,25 +376,25 @@ def remove_strays(
     reprojections: Sequence[str],
     manifests: Sequence[Manifest],
     folder: Path,
-    wanted: Collection[Path] | None = None,
+    export_lists: Collection[Path] | None = None,
 ) -> int:
     """Move files that do not belong to the dataset into ``folder``. Return their number.
 
-    Such files are views of a rig that had more cameras, former reprojections and exports, and what
-    an older program drew for the report. Moves nothing if a lightfield.json or an export cannot be
-    read. ``wanted`` is that of `of_exports`.
+    Such files are views of a rig that had more cameras, former reprojections and exports, and
+    figures that an older program drew. Moves nothing if a lightfield.json or an export cannot be
+    read. ``export_lists`` is that of `of_exports`.
     """
     sets, _ = read_sets(dataset, reprojections)
     if len(sets) <= len(reprojections):
         return 0
     views, _ = of_views(dataset, sets)
     views += of_passes(dataset, sets)[0]
-    extras, lists, exports = of_exports(dataset.resolve(), sets, views, manifests, wanted)
+    extras, lists, exports = of_exports(dataset.resolve(), sets, views, manifests, export_lists)
     if exports.passed is False:
         return 0
-    owned = {*lists, *names(sets), *(file.path for file in [*views, *extras])}
+    owned = {*lists, *name_files(sets), *(file.path for file in [*views, *extras])}
     _, strays = _sorted_out(dataset, sets, owned)
-    # Hidden files are being drawn at this moment.
+    # Leave hidden files: another process is writing them now.
     drawn = {path.name for path in (dataset / REPORT).glob("[!.]*")}
     strays += [f"{REPORT}/{name}" for name in sorted(drawn - {*REPORT_FILES})]
     for name in strays:
@@ -373,7 +414,7 @@ def checksums(
 ) -> Check:
     """Check that the images have the sizes and SHA-256 that their writers recorded.
 
-    ``recorded`` and the actual sums are by path. The ``altered_files`` of the ledger fail, too.
+    ``recorded`` and the actual ``sums`` are by path. ``altered_files`` fail, too.
     """
     if recorded is None and not altered_files:
         return Check("checksums", None, "no record was given")
@@ -390,7 +431,7 @@ def checksums(
     rendered_set = rendered(sets)
     views = rendered_set.views if rendered_set else []
     rendered_files = [f"{IMAGES}/{view}.exr" for view in views]
-    rendered_files += [file.path for file in _of_passes(sets[:1])] if rendered_set else []
+    rendered_files += [file.path for file in _pass_files(sets[:1])] if rendered_set else []
     for path in sorted(rendered_files):
         if path in sums and path not in recorded:
             faults[path] = "has no record"
@@ -398,16 +439,16 @@ def checksums(
     return Check.of_files("checksums", faults, detail)
 
 
-def altered(published: Mapping[str, str], noted: Mapping[str, str]) -> dict[str, str]:
+def altered(published: Mapping[str, str], ledger_sums: Mapping[str, str]) -> dict[str, str]:
     """Return which published files changed since they were made, and how.
 
-    Both arguments hold SHA-256 by path; ``noted`` is from when the files were made. Without this
-    check, a damaged file would be published with a checksum of its damage.
+    Both arguments hold SHA-256 by path. Those in ``ledger_sums`` are from when the files were made.
+    Without this check, a damaged file would be published with a checksum of its damage.
     """
     return {
-        path: f"has the sha256 {published[path]}, but {noted[path]} when it was made"
-        for path in sorted(published.keys() & noted.keys())
-        if published[path] != noted[path]
+        path: f"has the sha256 {published[path]}, but {ledger_sums[path]} when it was made"
+        for path in sorted(published.keys() & ledger_sums.keys())
+        if published[path] != ledger_sums[path]
     }
 
 
@@ -442,16 +483,16 @@ def clearance(path: Path | None, sets: Sequence[ImageSet]) -> Check:
 
 def read_sums(path: Path) -> dict[str, str]:
     """Return the SHA-256 of each file that a sha256sums.txt names below its own folder."""
-    lines = path.read_text(encoding="utf-8").splitlines()
-    return {
-        name: digest
-        for digest, _, name in (line.partition("  ") for line in lines)
-        if name and ".." not in name.split("/") and not name.startswith("/")
-    }
+    sums = {}
+    for line in path.read_text(encoding="utf-8").splitlines():
+        digest, _, name = line.partition("  ")
+        if name and ".." not in name.split("/") and not name.startswith("/"):
+            sums[name] = digest
+    return sums
 
 
 def write_sums(path: Path, checksums: Mapping[str, str], dataset: Path, result: Path) -> None:
-    """Write ``checksums`` as sha256sum does, with that of ``result`` if the dataset holds it."""
+    """Write ``checksums`` as sha256sum does, and the sum of ``result`` if the dataset holds it."""
     sums = dict(checksums)
     if result.resolve().is_relative_to(dataset.resolve()):
         sums[result.resolve().relative_to(dataset.resolve()).as_posix()] = sha256(result)

@@ -15,11 +15,11 @@ from lightfield.validation.result import Check
 # A view fails if more than half of its pairs exceed one of two limits. The first is the part of
 # contradictions among the points that are not occluded. The second is the displacement in pixels
 # that explains a pair's residuals best. A few pixels on curved surfaces determine the displacement
-# badly, so it must also exceed EXPECTED_DISPLACEMENTS times what is expected of a right pair. Right
-# views of 40² pixels come to 2.5 times.
-# A set fails if all its pairs together ask for a larger change of all angles, or of all depths,
-# than the scale limit. A reprojection takes each depth from a pixel of its source, which may lie
-# half a pixel away, so its limits are wider.
+# badly, so it must also exceed EXPECTED_DISPLACEMENTS times the value to expect of a right pair.
+# Right views of 40² pixels reach 2.5 times.
+# A set fails if all its pairs together indicate an error of all angles, or of all depths, above the
+# scale limit. A reprojection takes each depth from a source pixel up to half a pixel away, so its
+# limits are wider.
 CONTRADICTIONS_LIMIT = 0.05
 DISPLACEMENT_LIMIT = 0.2
 REPROJECTED_DISPLACEMENT_LIMIT = 0.4
@@ -31,7 +31,6 @@ SCALE_DEVIATION_LIMIT = 0.0015
 
 Question = tuple[File, list[tuple[int, Patches]]]
 """An image, and the positions and patches of the views to look up in it."""
-
 
 Pair = tuple[int, int]
 """The positions of two views among the views with depth."""
@@ -62,7 +61,7 @@ def _pair_answers(
     patches_of_files: Mapping[File, Patches],
     ask: Callable[[Sequence[Question]], Iterable[list[Answer]]],
 ) -> dict[Pair, Answer]:
-    """Return for each pair of neighbours what they say of each other, in one answer."""
+    """Return one answer for each pair of neighbours: the sum of both directions."""
     files = list(patches_of_files)
     patches = list(patches_of_files.values())
     pairs = consistency.view_pairs([image_set.camera(file.view) for file in files], patches)
@@ -71,25 +70,25 @@ def _pair_answers(
         neighbours.setdefault(first, []).append(second)
         neighbours.setdefault(second, []).append(first)
     views = sorted(neighbours)
-    questions = [
-        (files[view], [(files[other].view, patches[other]) for other in neighbours[view]])
-        for view in views
-    ]
+    questions: list[Question] = []
+    for view in views:
+        looked_up = [(files[asking].view, patches[asking]) for asking in neighbours[view]]
+        questions.append((files[view], looked_up))
     answers: dict[Pair, Answer] = {}
     progress = Progress(len(questions), f"validate {name}")
     for view, answers_of_view in zip(views, ask(questions), strict=True):
-        for other, answer in zip(neighbours[view], answers_of_view, strict=True):
-            answers[other, view] = answer
+        for asking, answer in zip(neighbours[view], answers_of_view, strict=True):
+            answers[asking, view] = answer
         progress.done()
     return {pair: answers[pair] + answers[pair[::-1]] for pair in pairs}
 
 
 @dataclass(frozen=True)
 class _ViewVerdict:
-    """What the neighbours of a view say of it: medians over its pairs.
+    """How a view agrees with its neighbours: medians over its pairs.
 
-    ``contradiction`` is the part of its points that contradict them. ``displacement`` is in pixels,
-    and so is its ``displacement_limit``.
+    ``contradiction`` is the part of its points that contradict them. ``displacement`` and its
+    ``displacement_limit`` are in pixels.
     """
 
     contradiction: float
@@ -114,7 +113,7 @@ class _ViewVerdict:
 def _judge(
     name: str, image_set: ImageSet, files: Sequence[File], pairs: Mapping[Pair, Answer]
 ) -> Check:
-    """Turn what the views of each pair say of each other into a check that names the bad views."""
+    """Return the check that follows from the pairs' answers. It names the bad views."""
     limit = REPROJECTED_DISPLACEMENT_LIMIT if image_set.grain else DISPLACEMENT_LIMIT
     verdicts = _view_verdicts(pairs, limit)
     if not verdicts:
@@ -186,7 +185,7 @@ def _scales(pairs: Mapping[Pair, Answer], bad_views: Set[int]) -> dict[str, tupl
     }
 
 
-# Of the figures of validation.json; all others have 4.
+# Decimals of figures in validation.json. All other figures have 4.
 DECIMALS = {"worst_displacement_pixels": 3}
 
 
@@ -215,7 +214,7 @@ def _figures(
 
 
 def _displacement(answers: Iterable[Answer], limit: float) -> tuple[float, float]:
-    """Return a view's displacement in pixels and the limit for it: those of its median pair.
+    """Return a view's displacement in pixels and its limit: those of its median pair.
 
     A pair's limit is ``limit``, or more if resolution and precision alone lead to more.
     """
@@ -231,7 +230,7 @@ def _displacement(answers: Iterable[Answer], limit: float) -> tuple[float, float
 def _low_median(values: Iterable[float | None]) -> float | None:
     """Return the lower median of the values that are not None, or None without any.
 
-    The lower one, so that a view with two neighbours does not fail if one of them is bad.
+    The lower median lets a view with two neighbours pass if one of them is bad.
     """
     numbers = sorted(value for value in values if value is not None)
     return numbers[(len(numbers) - 1) // 2] if numbers else None

@@ -1,8 +1,10 @@
 """Checks that all files of a dataset, and those that it was made from, are as they were written.
 
-A file's checksum is in the ledger of the workflow if a job declares the file, in a shard's record
-if it is a view, and in the dataset's sha256sums.txt if it is published. The first of these counts.
-A copy of a dataset has only the last.
+A file's checksum may be in three places. The first of them counts:
+
+- the workflow's ledger, if a job declares the file as an output;
+- a shard's record, if the file is a view;
+- the dataset's sha256sums.txt, if the file is published. A copy of a dataset has only this one.
 """
 
 import os
@@ -29,7 +31,7 @@ from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
 from lightfield.dataset.splits_file import SPLITS
 from lightfield.validation.files import CARD, IMAGES, README, REPORT, SUMS, read_sums
 
-# Made as the work went on, and of it alone: nothing can make them again, and no dataset needs them.
+# Records of past work. Nothing can make them again, and no dataset needs them.
 _HISTORY = (JOURNAL_SUFFIX, ".tsv")
 
 
@@ -45,7 +47,7 @@ class Fault:
 
 
 class Integrity:
-    """Checks the files of a dataset, and with the folder ``work`` those that it was made from."""
+    """Checks the files of a dataset. With the folder ``work``, also those that it was made from."""
 
     def __init__(self, dataset: Path, work: Path | None = None) -> None:
         # The ledger has paths as the configuration gives them, most of them relative.
@@ -73,10 +75,10 @@ class Integrity:
         present = set(self._present()) if was_finished else set()
         for path in sorted(present - expected.keys()):
             yield Fault(path, "is no file of this dataset, or has no checksum")
-        for path in sorted(self._views_like(present) - expected.keys() - present):
+        for path in sorted(self._required_views(present) - expected.keys() - present):
             yield Fault(path, "is missing")
         wrong = {path for path, problem in problems.items() if problem}
-        # If damaged, these do not tell which files must exist.
+        # Damaged lists do not tell which files must exist.
         if wrong.isdisjoint((self.dataset / NAME, self.dataset / "validation.json")):
             yield from (fault for fault in self._contents(expected) if fault.path not in wrong)
 
@@ -86,26 +88,26 @@ class Integrity:
             numbers = ", ".join(map(str, damaged[:8]))
             yield Fault(path, f"lines that are damaged: {numbers}; their files are made again")
         elif not self._ledger:
-            yield Fault(path, "is missing: the next run makes again what nobody has a checksum of")
+            yield Fault(path, "is missing: the next run makes files without a checksum again")
 
     def mend(self, fault: Fault) -> None:
-        """Set a faulty file aside, and all that the next run must make again to replace it."""
+        """Set a faulty file aside, with all files that the next run must make again for it."""
         assert self.work
-        own_ledger = self.work / ledger.NAME
-        if fault.path == own_ledger:
-            if own_ledger.exists():
-                ledger.Ledger(own_ledger).compact()
+        ledger_path = self.work / ledger.NAME
+        if fault.path == ledger_path:
+            if ledger_path.exists():
+                ledger.Ledger(ledger_path).compact()
             return
         for path in (fault.path, *self._followers(fault.path)):
             if os.path.lexists(path):
                 set_aside(path, self.work / "removed")
         if fault.path.name.endswith(_HISTORY):
-            for name in ledger.read(own_ledger):
+            for name in ledger.read(ledger_path):
                 if os.path.relpath(name) == str(fault.path):
-                    ledger.forget(own_ledger, name)
+                    ledger.forget(ledger_path, name)
 
     def _followers(self, path: Path) -> Iterator[Path]:
-        """Yield the file that stands for the job that made ``path``, if it is another one."""
+        """Yield the declared output of the job that made ``path``, if that is another file."""
         if path.name.endswith(LOG_SUFFIX):
             yield path.with_name(path.name.replace(LOG_SUFFIX, ".json"))
         is_listed = path in self._published or not self._published
@@ -118,7 +120,7 @@ class Integrity:
                         return
 
     def _is_sound(self, path: Path) -> bool:
-        """Return whether a file is as the ledger says. All are in a copy, which has no ledger."""
+        """Return whether a file is as the ledger says. True without a ledger, as in a copy."""
         entry = self._ledger.get(str(path))
         if entry is None:
             return not self._ledger
@@ -136,31 +138,32 @@ class Integrity:
     def _recorded(self) -> dict[Path, str]:
         """The SHA-256 of each view by its path, from the records of shards.
 
-        If a record is damaged, from the shard's log, in which the last line about a file counts.
+        A shard's log replaces a damaged record. The last line about a file counts.
         """
         digests: dict[Path, str] = {}
         for path in map(Path, self._ledger):
-            if not (self._is_own(path) and re.fullmatch(r"\d+-\d+\.json", path.name)):
+            if not (self._belongs_here(path) and re.fullmatch(r"\d+-\d+\.json", path.name)):
                 continue
-            log = path.with_name(f"{path.stem}{LOG_SUFFIX}")
-            if self._is_sound(path):
-                sums = {file: digest for file, (_, digest) in shard_files.read_record(path).items()}
-            elif self._is_sound(log):
-                lines = (line for line in read_json_lines(log) if "file" in line)
-                sums = {line["file"]: line["sha256"] for line in lines}
-            else:
-                continue
-            for file, digest in sums.items():
-                # A record of shards with other bounds may have views that there were.
+            for file, digest in self._shard_sums(path).items():
+                # Records of shards with other bounds may name views that no longer exist.
                 if not self._published or self.dataset / file in self._published:
                     digests[self.dataset / file] = digest
         return digests
 
+    def _shard_sums(self, record: Path) -> dict[str, str]:
+        """Return the SHA-256 of a shard's files. Empty if both record and log are damaged."""
+        if self._is_sound(record):
+            return {file: digest for file, (_, digest) in shard_files.read_record(record).items()}
+        log = record.with_name(f"{record.stem}{LOG_SUFFIX}")
+        if not self._is_sound(log):
+            return {}
+        return {line["file"]: line["sha256"] for line in read_json_lines(log) if "file" in line}
+
     @cached_property
     def _published(self) -> dict[Path, str]:
-        """The SHA-256 of each file in sha256sums.txt by its path, or in its twin if it is damaged.
+        """The SHA-256 of each published file by its path, from sha256sums.txt.
 
-        Empty if both are damaged.
+        The copy in the folder ``work`` replaces a damaged file. Empty if both are damaged.
         """
         candidates = [self.dataset / SUMS]
         if self.work:
@@ -174,30 +177,31 @@ class Integrity:
 
     @cached_property
     def _expected(self) -> dict[Path, tuple[str, str]]:
-        """The SHA-256 that each file must have, and which file says so."""
+        """The SHA-256 that each file must have, and the name of the list that says so."""
         sums = {path: (digest, SUMS) for path, digest in self._published.items()}
         sums |= {path: (digest, "its record") for path, digest in self._recorded.items()}
         for name, digest in self._ledger.items():
-            if self._is_own(Path(name)):
+            if self._belongs_here(Path(name)):
                 sums[Path(name)] = (digest, f"{self.work}/{ledger.NAME}")
         return dict(sorted(sums.items()))
 
-    def _is_own(self, path: Path) -> bool:
+    def _belongs_here(self, path: Path) -> bool:
         """Return whether a file of the ledger belongs to the dataset, or to its scene."""
         if path.is_relative_to(self.dataset) or path == self._splits:
             return True
         if not self.work or not path.is_relative_to(self.work):
             return False
         inside = path.relative_to(self.work).as_posix()
-        scene, _, rest = inside.partition("/")
-        of_scene = "/" not in rest and f"{self._scene}_".startswith(f"{scene}_")
-        return of_scene or inside.startswith((f"{self._name}/", f"benchmarks/{self._name}/"))
+        scene, _, name_in_scene = inside.partition("/")
+        is_of_scene = "/" not in name_in_scene and f"{self._scene}_".startswith(f"{scene}_")
+        return is_of_scene or inside.startswith((f"{self._name}/", f"benchmarks/{self._name}/"))
 
     def _problem(self, path: Path, expected: tuple[str, str]) -> str | None:
         digest, source = expected
         if not os.path.lexists(path):
             return "is missing"
-        if problem := broken(path):
+        problem = broken(path)
+        if problem:
             return problem
         try:
             actual = sha256(path)
@@ -206,25 +210,27 @@ class Integrity:
         return None if actual == digest else f"its sha256 is {actual}, but {source} says {digest}"
 
     def _present(self) -> Iterator[Path]:
-        """Yield the dataset's files. Those of its report only with the ledger, which lists them."""
+        """Yield the dataset's files. Those of its report only with a ledger, which lists them."""
         for path in sorted(self.dataset.rglob("*")):
             parts = path.relative_to(self.dataset).parts
-            added = parts in ((SUMS,), (CARD,), (README,))
+            is_addition = parts in ((SUMS,), (CARD,), (README,))
             # A folder may have taken a picture's place.
             is_file = not path.is_dir() or path.suffix in (".exr", ".png")
-            if is_file and not added and (self._ledger or parts[0] != REPORT):
+            if is_file and not is_addition and (self._ledger or parts[0] != REPORT):
                 yield path
 
-    def _views_like(self, present: set[Path]) -> set[Path]:
-        """Return the views that lightfield.json names, in the formats that the dataset has."""
+    def _required_views(self, present: set[Path]) -> set[Path]:
+        """Return the views that lightfield.json names, in each format that any of them has."""
         views = set()
         for path in {self.dataset / NAME, *self.dataset.glob(f"*/{NAME}")}:
             if self._is_noted(path) and self._is_sound(path):
                 folder = self.dataset / IMAGES if path.parent == self.dataset else path.parent
                 names = {view.name for view in LightField.read(path).views}
-                there = {file for file in present if file.parent == folder and file.stem in names}
-                kinds = {file.suffix for file in there}
-                views |= {folder / f"{name}{kind}" for name in names for kind in kinds}
+                suffixes = set()
+                for file in present:
+                    if file.parent == folder and file.stem in names:
+                        suffixes.add(file.suffix)
+                views |= {folder / f"{name}{suffix}" for name in names for suffix in suffixes}
         return views
 
     def _contents(self, expected: Mapping[Path, tuple[str, str]]) -> Iterator[Fault]:
@@ -232,7 +238,7 @@ class Integrity:
         sums = self.dataset / SUMS
         validation = self.dataset / "validation.json"
         if self._ledger and not self._published:
-            return  # an unfinished build, or both files of sums are damaged, which has been said
+            return  # The build is unfinished, or both lists of sums are damaged: already reported.
         if not self._published:
             yield Fault(
                 sums, broken(sums) or ("has no checksum" if sums.exists() else "is missing")
@@ -247,7 +253,7 @@ class Integrity:
             if not read_json(validation).get("valid"):
                 yield Fault(validation, "says that the dataset is not valid")
         except UserError:
-            return  # its checksum does not hold, which has been said
+            return  # Its checksum does not hold: already reported.
         for view in views:
             if self.dataset / IMAGES / f"{view.name}.exr" not in self._published:
                 yield Fault(sums, f"has no checksum of {IMAGES}/{view.name}.exr")

@@ -14,16 +14,17 @@ from lightfield.validation.readers.contents import FLOAT32, Floats
 
 Ints = NDArray[np.int64]
 
-# How many pairs of a point and a view are tried at once, at most.
+# At most this many pairs of a point and a view are tested at once.
 MOST_PAIRS = 300_000
 
 
 def likely_views(points: NDArray[Any], lens: Lens, matrices: Floats) -> tuple[Ints, Ints]:
     """Return pairs as two arrays of indices: points, and views from which they may be lifted.
 
-    ``points`` (n, 3) are taken to be in the order of their views (m, 4, 4). The middle point is
-    tried with all views; those on whose pixels' rays it lies bound the views of the points before
-    and after it, and so on in both halves. A point may be in no pair, or in several.
+    ``points`` (n, 3) must be in the order of their views, whose ``matrices`` are (m, 4, 4). The
+    search bisects. It tests the middle point with all views. The views on whose pixels' rays it
+    lies bound the views of the points before and after it. A point may be in no pair, or in
+    several.
     """
     low = np.array([0])
     high = np.array([len(points)])
@@ -43,9 +44,11 @@ def likely_views(points: NDArray[Any], lens: Lens, matrices: Floats) -> tuple[In
         which = np.repeat(np.arange(len(middle)), counts)
         view = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts - first, counts)
         near = on_pixel_rays(points[middle[which]], lens, matrices[view])
-        which, view = which[near], view[near]
+        which = which[near]
+        view = view[near]
         pairs.append((middle[which], view))
-        least, most = last.copy(), first.copy()
+        least = last.copy()
+        most = first.copy()
         np.minimum.at(least, which, view)
         np.maximum.at(most, which, view)
         unknown = most < least
@@ -55,12 +58,15 @@ def likely_views(points: NDArray[Any], lens: Lens, matrices: Floats) -> tuple[In
         high = np.concatenate([middle, high])
         first = np.concatenate([first, least])
         last = np.concatenate([most, last])
-    found_points, found_views = zip(*pairs, strict=True)
-    return np.concatenate(found_points), np.concatenate(found_views)
+    point_indices, view_indices = zip(*pairs, strict=True)
+    return np.concatenate(point_indices), np.concatenate(view_indices)
 
 
 def on_pixel_rays(points: NDArray[Any], lens: Lens, matrices: Floats) -> NDArray[np.bool_]:
-    """Return whether points (n, 3) lie on rays of pixels' centres of their views (n, 4, 4)."""
+    """Return whether each point (n, 3) lies on the ray of a pixel's centre of its view.
+
+    ``matrices`` are (n, 4, 4).
+    """
     # A damaged point may be anywhere.
     with np.errstate(invalid="ignore", over="ignore"):
         away = points.astype(np.float64) - matrices[:, :3, 3]
@@ -75,7 +81,7 @@ def on_pixel_rays(points: NDArray[Any], lens: Lens, matrices: Floats) -> NDArray
 
 
 def resolved(points: NDArray[Any]) -> Floats:
-    """Return by how many metres (n,) the numbers of points (n, 3) may be off."""
+    """Return how many metres (n,) points (n, 3) may be off because they are stored as float32."""
     with np.errstate(invalid="ignore"):
         limit: Floats = FLOAT32 * (1 + np.abs(points.astype(np.float64)).max(axis=1, initial=0))
     return limit

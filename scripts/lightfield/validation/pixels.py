@@ -1,4 +1,4 @@
-"""Checks each image of a dataset by itself: that it is complete, and holds what it must."""
+"""Checks each image of a dataset by itself: its file, format, colours, depth and passes."""
 
 import json
 from collections import Counter
@@ -25,17 +25,19 @@ from lightfield.validation.result import Check
 
 Bools = NDArray[np.bool_]
 
+# How many surface patches of a view are compared with its neighbours.
 RAYS_A_VIEW = 400
 
-# Pixels this near to the rim of what a lens sees may hold light from both sides of it.
+# Pixels this near to the rim of the image circle may hold light from both sides of it.
 RIM_PIXELS = 2
 # An image counts as having one colour if at most this part of it has another.
 FEW = 0.002
 # A unit vector's length differs from 1 by less than this.
 NOT_UNIT = 1e-4
-# At most this part of what lies outside the image circle may be brighter than that.
-MOST_LIT_OUTSIDE, FAINT = 0.05, 0.001
-# Regions are kept for this many differently turned views, and computed again for others.
+# Outside the image circle, at most this part of the values may exceed FAINT.
+MOST_LIT_OUTSIDE = 0.05
+FAINT = 0.001
+# Regions of this many differently turned views are kept in memory.
 MOST_REGIONS = 16
 
 
@@ -43,12 +45,13 @@ MOST_REGIONS = 16
 class Facts:
     """What one image file shows by itself.
 
-    - ``faults``: by the check to which they belong.
-    - ``clamped``, ``nan``, ``machine``: the renderer's counts, and the machine that it ran on.
-    - ``marked``: whether the pixels without a source could be compared.
+    - ``faults``: texts by the check to which they belong.
+    - ``clamped``, ``nan``: how many rendered values were clamped, or were not a number.
+    - ``machine``: the machine that rendered the view.
+    - ``marked``: whether the pixels without a source could be checked.
     - ``constant``: whether a reprojected view has one colour, as a piece of sky or a wall may.
-    - ``missed``: of a view with depth, the part of the lens's pixels that hit nothing.
-    - ``patches``: of a view with depth, the surface patches that `geometry` compares.
+    - ``missed``: the part of the lens's pixels that hit nothing, if the view has depth.
+    - ``patches``: the surface patches that `geometry` compares, if the view has depth.
     - ``of_depth``: the answer to the question about its depth.
     """
 
@@ -71,7 +74,7 @@ class Facts:
 
 
 class Examiner:
-    """Reads a dataset's images. Computes once what all views of a set share."""
+    """Reads a dataset's images. Computes only once what all views of a set share."""
 
     def __init__(self, dataset: Path, sets: Sequence[ImageSet]) -> None:
         self.dataset = dataset
@@ -114,7 +117,10 @@ class Examiner:
         return facts
 
     def answer(self, file: File, questions: list[tuple[int, Patches]]) -> list[Answer]:
-        """Look up patches of other views in a view. ``questions`` are their numbers and patches."""
+        """Look up patches of other views in a view.
+
+        ``questions`` are the numbers of those views, and their patches.
+        """
         image_set = self.sets[file.set]
         depth = images.read_image(self.dataset / file.path, ["Z"]).channels["Z"]
         camera = image_set.camera(file.view)
@@ -134,31 +140,9 @@ class Examiner:
     def _examine_view(self, file: File, image: images.Image, facts: Facts) -> None:
         image_set = self.sets[file.set]
         is_rendered = not image_set.name
-        seen, outside = self._of_lens(image_set.lightfield.lens)
+        in_circle, outside = self._of_lens(image_set.lightfield.lens)
+        self._examine_colour(image_set, file, image, facts)
         depth = image.channels.get("Z")
-        empty = depth is not None and bool(np.isposinf(depth).all())
-        transparent = image_set.lightfield.transparent
-        if transparent and file.path.endswith(".exr"):
-            alpha = image.channels["A"]
-            wrong = int((~((alpha >= 0) & (alpha <= 1))).sum())
-            facts.fault("colour", f"{wrong} values of alpha are not between 0 and 1", wrong)
-        colour = np.stack([image.channels[name] for name in "RGB"])
-        nan = int(np.isnan(colour).sum())
-        facts.fault("colour", f"{nan} values are not a number", nan)
-        infinite = int(np.isinf(colour).sum())
-        facts.fault("colour", f"{infinite} values are infinite", infinite)
-        shows_nothing = transparent and _shows_nothing(image, seen, is_rendered)
-        facts.fault("colour", "is black", not colour.any() and not shows_nothing)
-        middle = colour[:, colour.shape[1] // 2, colour.shape[2] // 2]
-        others = ((colour != middle[:, np.newaxis, np.newaxis]) & seen).sum(axis=(1, 2)).max()
-        constant = bool(others <= FEW * seen.sum())
-        facts.constant = constant and not is_rendered and not shows_nothing
-        alone = constant and is_rendered and not empty and not shows_nothing
-        facts.fault("colour", "has one colour everywhere", alone)
-        # Cycles leaves a few values of 1e-6 there, and its denoiser a little more.
-        if is_rendered and outside.any():
-            lit = (colour[:, outside] > FAINT).mean() > MOST_LIT_OUTSIDE
-            facts.fault("colour", "has colour where the lens sees nothing", lit)
         if depth is not None:
             meaning = image_set.lightfield.depth
             header = image.attributes.get(images.DEPTH_ATTRIBUTE, meaning)
@@ -167,11 +151,11 @@ class Examiner:
             if is_rendered:
                 unknown = int(np.isnan(depth).sum())
                 facts.fault("depth", f"{unknown} depths are not a number", unknown)
-                filled = not np.isposinf(depth[outside]).all()
-                facts.fault("depth", "has depth where the lens sees nothing", filled)
+                is_filled = not np.isposinf(depth[outside]).all()
+                facts.fault("depth", "has depth where the lens sees nothing", is_filled)
             wrong = int((depth <= 0).sum())
             facts.fault("depth", f"{wrong} depths are not positive", wrong)
-            facts.missed = float(np.isposinf(depth[seen]).mean())
+            facts.missed = float(np.isposinf(depth[in_circle]).mean())
             facts.patches = consistency.sample(image_set.camera(file.view), depth, RAYS_A_VIEW)
         if is_rendered and images.MACHINE_ATTRIBUTE in image.attributes:
             facts.machine = str(image.attributes[images.MACHINE_ATTRIBUTE])
@@ -182,35 +166,63 @@ class Examiner:
             facts.clamped = int(image.attributes.get(images.CLAMPED_ATTRIBUTE, 0))
             facts.fault("counts", f"{facts.nan} rendered values were not a number", facts.nan)
 
-    def _examine_pass(self, file: File, wanted: Pass, image: images.Image, facts: Facts) -> None:
-        problem = _channels_problem(image, dict.fromkeys(wanted.channels, wanted.dtype))
+    def _examine_colour(
+        self, image_set: ImageSet, file: File, image: images.Image, facts: Facts
+    ) -> None:
+        is_rendered = not image_set.name
+        in_circle, outside = self._of_lens(image_set.lightfield.lens)
+        transparent = image_set.lightfield.transparent
+        if transparent and file.path.endswith(".exr"):
+            alpha = image.channels["A"]
+            wrong = int((~((alpha >= 0) & (alpha <= 1))).sum())
+            facts.fault("colour", f"{wrong} values of alpha are not between 0 and 1", wrong)
+        colour = np.stack([image.channels[name] for name in "RGB"])
+        nan = int(np.isnan(colour).sum())
+        facts.fault("colour", f"{nan} values are not a number", nan)
+        infinite = int(np.isinf(colour).sum())
+        facts.fault("colour", f"{infinite} values are infinite", infinite)
+        shows_nothing = transparent and _shows_nothing(image, in_circle, is_rendered)
+        facts.fault("colour", "is black", not colour.any() and not shows_nothing)
+        if not shows_nothing and _has_one_colour(colour, in_circle):
+            depth = image.channels.get("Z")
+            is_empty = depth is not None and bool(np.isposinf(depth).all())
+            facts.constant = not is_rendered
+            facts.fault("colour", "has one colour everywhere", is_rendered and not is_empty)
+        # Cycles leaves a few values of 1e-6 there, and its denoiser a little more.
+        if is_rendered and outside.any():
+            is_lit = (colour[:, outside] > FAINT).mean() > MOST_LIT_OUTSIDE
+            facts.fault("colour", "has colour where the lens sees nothing", is_lit)
+
+    def _examine_pass(self, file: File, view_pass: Pass, image: images.Image, facts: Facts) -> None:
+        problem = _channels_problem(image, dict.fromkeys(view_pass.channels, view_pass.dtype))
         if problem:
             facts.fault("passes", problem)
             return
         facts.nan = int(image.attributes.get(images.NAN_ATTRIBUTE, 0))
-        pixels = np.stack([image.channels[name] for name in wanted.channels])
+        pixels = np.stack([image.channels[name] for name in view_pass.channels])
         wrong = int((~np.isfinite(pixels)).sum())
         facts.fault("passes", f"{wrong} values are not finite", wrong)
-        if wanted.kind == "normal":
+        if view_pass.kind == "normal":
             lengths = np.linalg.norm(pixels, axis=0)
             wrong = int(((np.abs(lengths - 1) > NOT_UNIT) & (lengths != 0)).sum())
             facts.fault("passes", f"{wrong} normals are no unit vectors", wrong)
-        if wanted.kind == "id":
-            unknown = sorted(set(np.unique(pixels).tolist()) - self._numbers(wanted))
-            path = f"{wanted.name}/{NAMES}"
+        if view_pass.kind == "id":
+            unknown = sorted(set(np.unique(pixels).tolist()) - self._numbers(view_pass))
+            path = f"{view_pass.name}/{NAMES}"
             facts.fault("passes", f"has {unknown[:4]}, which {path} does not have", bool(unknown))
-        if wanted.name == "object":
-            missed = self._missed(file)
-            wrong = 0 if missed is None else int(((pixels[0] == 0) != missed).sum())
+        if view_pass.name == "object":
+            misses = self._misses(file)
+            wrong = 0 if misses is None else int(((pixels[0] == 0) != misses).sum())
             facts.fault("passes", f"{wrong} pixels have a depth or an object, and not both", wrong)
-        if wanted.kind == "matte":
-            part = pixels[1::2]
-            wrong = int(((part < 0) | (np.diff(part, axis=0, append=0) > 0)).any(axis=0).sum())
+        if view_pass.kind == "matte":
+            coverage = pixels[1::2]
+            is_unordered = np.diff(coverage, axis=0, append=0) > 0
+            wrong = int(((coverage < 0) | is_unordered).any(axis=0).sum())
             facts.fault("passes", f"{wrong} pixels have parts below 0 or not in order", wrong)
-            hashes = set(np.unique(pixels[::2][part > 0]).tolist())
+            hashes = set(np.unique(pixels[::2][coverage > 0]).tolist())
             strange = len(hashes - _hashes(image))
             facts.fault("passes", f"has {strange} objects that its manifest does not have", strange)
-        if wanted.kind == "flow":
+        if view_pass.kind == "flow":
             visible = pixels[2] == 1
             wrong = int((~visible & (pixels[2] != 0)).sum())
             facts.fault("passes", f"{wrong} values of V are neither 0 nor 1", wrong)
@@ -218,8 +230,8 @@ class Examiner:
             wrong = int((visible & ~in_frame(lens, pixels[:2])).sum())
             facts.fault("passes", f"{wrong} visible points are out of the frame", wrong)
 
-    def _missed(self, file: File) -> Bools | None:
-        """Return where the rendered view of a pass hits nothing, or None without its depth."""
+    def _misses(self, file: File) -> Bools | None:
+        """Return where the rendered view of a pass hits nothing. None without its depth."""
         image_set = self.sets[file.set]
         lens = image_set.lightfield.lens
         if image_set.name or not image_set.lightfield.depth:
@@ -228,23 +240,23 @@ class Examiner:
             path = self.dataset / f"{IMAGES}/{image_set.views[file.view]}.exr"
             depth = images.read_image(path, ["Z"]).channels["Z"]
         except UserError:
-            return None  # which has been said
-        # Half floats end at 65504 m.
-        is_sure = depth.dtype == np.float32 and depth.shape == (lens.height, lens.width)
-        return np.isposinf(depth) if is_sure else None
+            return None  # The check of the images reports it.
+        # In half floats, inf may also be a depth of more than 65504 m.
+        is_certain = depth.dtype == np.float32 and depth.shape == (lens.height, lens.width)
+        return np.isposinf(depth) if is_certain else None
 
-    def _numbers(self, wanted: Pass) -> set[int]:
-        """Return the numbers in the names file of a pass. None of them if it cannot be read."""
-        if wanted not in self.numbers:
+    def _numbers(self, view_pass: Pass) -> set[int]:
+        """Return the numbers in the names file of a pass. Empty if it cannot be read."""
+        if view_pass not in self.numbers:
             try:
-                named = read_json(self.dataset / wanted.name / NAMES)
-                self.numbers[wanted] = {0, *named.values()}
+                numbers_by_name = read_json(self.dataset / view_pass.name / NAMES)
+                self.numbers[view_pass] = {0, *numbers_by_name.values()}
             except (UserError, AttributeError, TypeError):
-                self.numbers[wanted] = set()
-        return self.numbers[wanted]
+                self.numbers[view_pass] = set()
+        return self.numbers[view_pass]
 
     def _compare_marks(self, file: File, image: images.Image, facts: Facts) -> None:
-        """Check that the pixels marked as having no source are those that the source cannot see."""
+        """Check that exactly the pixels that the source cannot see are marked as without source."""
         regions = self._of_source(file)
         target = self.sets[file.set].lightfield
         if regions is None:
@@ -260,23 +272,23 @@ class Examiner:
         missing = int((without & ~marked).sum())
         wrong = int((with_source & marked).sum())
         if target.transparent and "Z" not in image.channels:
-            wrong = 0  # nothing is there
+            wrong = 0  # Alpha 0 may also mean that the source sees nothing there.
         facts.fault("marks", f"{missing} pixels without a source are not marked", missing)
         facts.fault("marks", f"{wrong} pixels with a source are marked as without", wrong)
         coloured = any(image.channels[name][without].any() for name in "RGB")
         facts.fault("marks", "has colour in pixels without a source", coloured)
 
     def _of_lens(self, lens: Lens) -> tuple[Bools, Bools]:
-        """Return where the lens has a ray, and where it has none, less the rim."""
+        """Return where the lens has a ray, and where it has none. Both exclude the rim."""
         if lens not in self.regions:
-            seen = np.isfinite(lens.pixel_rays(np.float32)[..., 0])
-            self.regions[lens] = _inner(seen), _inner(~seen)
+            has_ray = np.isfinite(lens.pixel_rays(np.float32)[..., 0])
+            self.regions[lens] = (_inner(has_ray), _inner(~has_ray))
         return self.regions[lens]
 
     def _of_source(self, file: File) -> tuple[Bools, Bools] | None:
-        """Return where a reprojected view's source sees something, and where not, less the rim.
+        """Return where a reprojected view's source sees something, and where not.
 
-        None: the dataset has no such view.
+        Both exclude the rim. Return None if the dataset has no such source.
         """
         target = self.sets[file.set]
         source = rendered(self.sets)
@@ -293,27 +305,27 @@ class Examiner:
             pixels = from_lens.pixels(lens.pixel_rays(np.float32) @ turn.T)
             frame = np.array([from_lens.width, from_lens.height], np.float32)
             with np.errstate(invalid="ignore"):
-                seen = ((pixels >= 0) & (pixels <= frame)).all(axis=-1)
+                in_source = ((pixels >= 0) & (pixels <= frame)).all(axis=-1)
             if len(self.regions) > MOST_REGIONS:
                 self.regions.clear()
-            self.regions[key] = _inner(seen), _inner(~seen)
+            self.regions[key] = (_inner(in_source), _inner(~in_source))
         return self.regions[key]
 
 
 def checks(
     image_set: ImageSet, facts: Mapping[File, Facts], volumes: Sequence[str] = ()
 ) -> list[Check]:
-    """Return the checks of a set's images, each of which an image passes or fails by itself.
+    """Return the checks of a set's images. An image passes or fails each by itself.
 
-    ``volumes`` are the names of the scene's volumes, which depth does not see.
+    ``volumes`` are the names of the scene's volumes. Depth does not see them.
     """
     readable = {file: fact for file, fact in facts.items() if "images" not in fact.faults}
     checks = [
         _outcome(image_set, "images", facts, "are whole, of the right size and channels"),
         _outcome(image_set, "colour", readable, "have finite colours, and are not black"),
     ]
-    deep = {file: fact for file, fact in readable.items() if fact.patches is not None}
-    checks.append(_outcome(image_set, "depth", deep, "have positive depths, misses +inf"))
+    with_depth = {file: fact for file, fact in readable.items() if fact.patches is not None}
+    checks.append(_outcome(image_set, "depth", with_depth, "have positive depths, misses +inf"))
     constant = sum(fact.constant for fact in readable.values())
     if constant:
         checks[1].warnings.append(f"{constant} images in {image_set.folder} have one colour")
@@ -321,11 +333,11 @@ def checks(
         marked = {file: fact for file, fact in readable.items() if fact.marked}
         text = "mark the pixels that their source cannot see"
         return [*checks, _outcome(image_set, "marks", marked, text)]
-    if volumes and deep:
-        missed = sum(fact.missed for fact in deep.values()) / len(deep)
+    if volumes and with_depth:
+        missed = sum(fact.missed for fact in with_depth.values()) / len(with_depth)
+        names = ", ".join(volumes[:8]) + (" …" if len(volumes) > 8 else "")
         checks[2].warnings.append(
-            f"{missed:.1%} of the depths are inf; volumes are no surfaces: {', '.join(volumes[:8])}"
-            + (" …" if len(volumes) > 8 else "")
+            f"{missed:.1%} of the depths are inf; volumes are no surfaces: {names}"
         )
     counted = {file: fact for file, fact in readable.items() if fact.nan is not None}
     check = _outcome(image_set, "counts", counted, "have their renderer's counts, without NaN")
@@ -338,7 +350,7 @@ def checks(
 
 
 def _outcome(image_set: ImageSet, name: str, facts: Mapping[File, Facts], claim: str) -> Check:
-    """Return a check of what the facts say about ``name``."""
+    """Return the check ``name`` of the images. ``claim`` says in words what they must satisfy."""
     if not facts:
         return Check(f"{image_set.prefix}{name}", None, f"no image to see if they {claim}")
     faults = {
@@ -351,7 +363,7 @@ def _outcome(image_set: ImageSet, name: str, facts: Mapping[File, Facts], claim:
 
 
 def of_passes(facts: Mapping[File, Facts], missing: Mapping[str, str]) -> Check:
-    """Return the check of the views' passes, some of which may be ``missing``."""
+    """Return the check of the views' passes. ``missing`` maps paths of missing files to texts."""
     faults = {**missing}
     faults |= {
         file.path: ", ".join(fact.faults["passes"]) for file, fact in facts.items() if fact.faults
@@ -372,7 +384,7 @@ def of_passes(facts: Mapping[File, Facts], missing: Mapping[str, str]) -> Check:
 
 
 def with_extras(exports: Check, extras: Mapping[File, Facts]) -> Check:
-    """Return the check of the exports, with the pictures for trainers that cannot be read."""
+    """Return the check of the exports, extended by the faults of pictures for trainers."""
     problems = [
         f"{file.path}: {text}"
         for file, fact in extras.items()
@@ -384,13 +396,13 @@ def with_extras(exports: Check, extras: Mapping[File, Facts]) -> Check:
 
 
 def _hashes(image: images.Image) -> set[float]:
-    """Return the hashes in a matte's manifest as floats. No hashes if it cannot be read."""
+    """Return the hashes in a matte's manifest as floats. Empty if it cannot be read."""
     try:
         texts = json.loads(str(image.attributes.get(MANIFEST))).values()
         bits = np.array([int(text, 16) for text in texts], np.uint32)
     except (ValueError, AttributeError, TypeError, OverflowError):
         return set()
-    # The exponent is kept from those of 0 and infinity.
+    # Cryptomatte avoids the exponents of 0 and infinity.
     exponent = ((bits >> 23) & 255).clip(1, 254)
     return set(((bits & 0x807FFFFF) | exponent << 23).view(np.float32).tolist())
 
@@ -401,16 +413,26 @@ def _inner(region: Bools) -> Bools:
     return inner
 
 
-def _shows_nothing(image: images.Image, seen: Bools, is_rendered: bool) -> bool:
+def _has_one_colour(colour: NDArray[Any], in_circle: Bools) -> bool:
+    """Return whether almost all pixels in the image circle have the middle pixel's colour.
+
+    ``colour`` is (3, height, width).
+    """
+    middle = colour[:, colour.shape[1] // 2, colour.shape[2] // 2]
+    differs = (colour != middle[:, np.newaxis, np.newaxis]) & in_circle
+    return bool(differs.sum(axis=(1, 2)).max() <= FEW * in_circle.sum())
+
+
+def _shows_nothing(image: images.Image, in_circle: Bools, is_rendered: bool) -> bool:
     """Return whether a transparent view shows no more than a few pixels.
 
-    At the rim of an image circle, which touches the image's edge, Cycles calls black samples
-    opaque. A reprojection spreads that rim, so there the colour alone counts.
+    The image circle touches the image's edge. At its rim Cycles makes black samples opaque. A
+    reprojection spreads that rim, so only the colour counts there.
     """
     if not is_rendered:
         return not any(image.channels[name].any() for name in "RGB")
-    within = binary_erosion(seen, np.ones((3, 3)), RIM_PIXELS)
-    return bool((image.channels["A"][within] > 0).sum() <= FEW * seen.sum())
+    within = binary_erosion(in_circle, np.ones((3, 3)), RIM_PIXELS)
+    return bool((image.channels["A"][within] > 0).sum() <= FEW * in_circle.sum())
 
 
 def _format_problem(file: File, image_set: ImageSet, image: images.Image) -> str | None:
@@ -418,23 +440,23 @@ def _format_problem(file: File, image_set: ImageSet, image: images.Image) -> str
     types = {name: pixels.dtype for name, pixels in image.channels.items()}
     transparent = image_set.lightfield.transparent
     has_alpha = transparent or ("A" in types and image_set.name)
-    colour = [*"RGB", *(["A"] if has_alpha else [])]
+    colour = "RGBA" if has_alpha else "RGB"
     if file.path.endswith(".png"):
-        wanted = dict.fromkeys(colour, "uint16" if types.get("R") == "uint16" else "uint8")
+        required = dict.fromkeys(colour, "uint16" if types.get("R") == "uint16" else "uint8")
     else:
-        wanted = dict.fromkeys(colour, "float16")
+        required = dict.fromkeys(colour, "float16")
         if image_set.lightfield.depth:
-            wanted["Z"] = "float16" if types.get("Z") == "float16" else "float32"
-    return _channels_problem(image, wanted)
+            required["Z"] = "float16" if types.get("Z") == "float16" else "float32"
+    return _channels_problem(image, required)
 
 
-def _channels_problem(image: images.Image, wanted: Mapping[str, str]) -> str | None:
+def _channels_problem(image: images.Image, required: Mapping[str, str]) -> str | None:
     """Return which channels an image has and must have, if they differ in name or type."""
     types = {name: str(pixels.dtype) for name, pixels in image.channels.items()}
-    if types == wanted:
+    if types == required:
         return None
-    texts = [
-        " ".join(f"{name}:{kind}" for name, kind in sorted(channels.items()))
-        for channels in (types, wanted)
-    ]
-    return f"has the channels {texts[0]}; must have {texts[1]}"
+    return f"has the channels {_describe(types)}; must have {_describe(required)}"
+
+
+def _describe(channels: Mapping[str, str]) -> str:
+    return " ".join(f"{name}:{kind}" for name, kind in sorted(channels.items()))

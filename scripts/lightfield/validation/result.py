@@ -15,8 +15,8 @@ class Check:
 
     - ``views``: the names of the views that failed.
     - ``problems``: lines that each name a file.
-    - ``warnings``: what is allowed, but should be looked at.
-    - ``figures``: what was measured.
+    - ``warnings``: lines about what is allowed, but deserves a look.
+    - ``figures``: the measured numbers by their names.
     """
 
     name: str
@@ -29,7 +29,7 @@ class Check:
 
     @classmethod
     def of_files(cls, name: str, faults: Mapping[str, str], detail: str, **more: Any) -> "Check":
-        """Return a check that fails if there are ``faults``, by the paths of files of views."""
+        """Return a check that fails if there are ``faults``, which map paths of views to texts."""
         views = sorted({Path(path).stem for path in faults})
         problems = [f"{path}: {fault}" for path, fault in faults.items()]
         return cls(name, not faults, detail, views, problems, **more)
@@ -37,7 +37,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Result:
-    """A dataset's checks, and the SHA-256 of every file that it publishes by relative path."""
+    """A dataset's checks, and the SHA-256 of every published file by its relative path."""
 
     dataset: str
     views: int
@@ -58,7 +58,7 @@ class Result:
         }
 
     def summary(self) -> str:
-        """Return one line for a person."""
+        """Return the result in one line, for people."""
         parts = [f"{self.views} views"]
         parts += [
             check.name.removesuffix("geometry").replace("/", " ") + check.detail
@@ -73,7 +73,7 @@ class Result:
         return f"{self.dataset}: {'valid' if self.valid else 'INVALID'}: {'; '.join(parts)}"
 
     def failures(self) -> list[str]:
-        """Return one line for each of the first problems of each check."""
+        """Return the first problems of each check, one line each."""
         lines = []
         for check in self.checks:
             shown = check.problems[:_LINES_A_CHECK]

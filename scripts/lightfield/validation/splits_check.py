@@ -1,6 +1,6 @@
-"""Check splits.json: it matches the rigs, and no test view has the pose of a training view."""
+"""Checks splits.json: it matches the rigs, and no test view has the pose of a training view."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from lightfield.geometry.rigs.split_setting import PARTS
 from lightfield.validation.files import ImageSet
 from lightfield.validation.result import Check
 
-# Decimals of metres and of a rotation's matrix to which two poses are the same.
+# Two poses are the same if they agree to this many decimals, in metres and in the rotation matrix.
 _SAME_POSE = 6
 
 
@@ -27,7 +27,7 @@ def check(path: Path, dataset: Path, sets: Sequence[ImageSet]) -> Check:
     """
     home = path.resolve().parent
     if not dataset.is_relative_to(home):
-        raise UserError(f"{path}: is of the rigs in {home}, and {dataset} is not in it")
+        raise UserError(f"{path}: belongs to the rigs in {home}, but {dataset} is not in it")
     content = read_json(path)
     try:
         parts = {part: [str(name) for name in content[part]] for part in PARTS}
@@ -53,6 +53,14 @@ def check(path: Path, dataset: Path, sets: Sequence[ImageSet]) -> Check:
             names = {view.name, view.name.rpartition("_")[0]}
             if view.split not in [split[name] for name in names & split.keys()]:
                 problems.append(f"{image_set.prefix}{NAME}: frames: {view.name}: split is another")
+    problems += _shared_poses(lightfields)
+    detail = ", ".join(f"{len(parts[part])} {part}" for part in PARTS)
+    return Check("splits", not problems, detail, problems=problems)
+
+
+def _shared_poses(lightfields: Mapping[str, LightField]) -> list[str]:
+    """Return a line for each view to validate or test that has the pose of a training view."""
+    problems = []
     training_views: dict[bytes, str] = {}
     for part in PARTS:
         for folder, lightfield in lightfields.items():
@@ -60,6 +68,7 @@ def check(path: Path, dataset: Path, sets: Sequence[ImageSet]) -> Check:
                 if view.split != part:
                     continue
                 name = f"{folder}/{view.name}"
+                # Adding 0.0 turns -0.0 into 0.0, so that equal poses have equal bytes.
                 pose = (np.round(view.matrix, _SAME_POSE) + 0.0).tobytes()
                 if part == "train":
                     training_views[pose] = name
@@ -68,5 +77,4 @@ def check(path: Path, dataset: Path, sets: Sequence[ImageSet]) -> Check:
                         f"{name}: is for {part}, but has the pose of {training_views[pose]}, "
                         "which trains"
                     )
-    detail = ", ".join(f"{len(parts[part])} {part}" for part in PARTS)
-    return Check("splits", not problems, detail, problems=problems)
+    return problems

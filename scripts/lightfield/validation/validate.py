@@ -1,13 +1,16 @@
 """Checks a finished dataset: that it is complete, and that every claim about it is true.
 
-`validate` reads every image once, in as many processes as it is given, for what a single file can
-tell (`pixels`). It reads the views with depth once more, for what only several views together can
-tell (`geometry`). Before that it reads the exports back (`exported_cameras`). The depth in exports
-is compared while the views are read (`exported_depth`). Memory holds a few hundred points of each
-view, and the exported points.
+`validate` works in three steps:
 
-The result is a list of checks. Each has passed, failed, or does not apply. What could not be
-checked does not apply, and the check says why.
+1. It reads the exports back (`exported_cameras`).
+2. It reads every image once, and checks each by itself (`pixels`). In the same pass it compares the
+   depth in exports (`exported_depth`).
+3. It reads the views with depth again, and compares them with each other (`geometry`).
+
+Memory holds a few hundred points of each view, and the exported points.
+
+The result is a list of checks. Each has passed, failed, or does not apply. A check that does not
+apply says why.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -37,6 +40,7 @@ from lightfield.validation import (
 )
 from lightfield.validation.consistency import Answer
 from lightfield.validation.depth_questions import Question
+from lightfield.validation.exported_cameras import SetExport
 from lightfield.validation.exported_depth import ExportedDepth
 from lightfield.validation.files import File, ImageSet, Manifest
 from lightfield.validation.pixels import Examiner, Facts
@@ -52,49 +56,49 @@ def validate(
     processes: int = 1,
     manifests: Sequence[Manifest] = (),
     splits: Path | None = None,
-    wanted: Collection[Path] | None = None,
-    noted: Mapping[str, str] | None = None,
+    export_lists: Collection[Path] | None = None,
+    ledger_sums: Mapping[str, str] | None = None,
 ) -> Result:
-    """Check a dataset's files, and what its pixels must satisfy.
+    """Check a dataset's files and pixels.
 
     - ``reprojections``: folders in the dataset.
-    - ``records``: JSON files of what was rendered (``files``: path: ``bytes``, ``sha256``).
-    - ``clearance``: a JSON file of what surrounds each camera (``views``: name: ``distance`` in
-      metres, ``inside``).
+    - ``records``: JSON files that list the rendered files (``files``: path: ``bytes``, ``sha256``).
+    - ``clearance``: a JSON file with each camera's distance to the nearest surface (``views``:
+      name: ``distance`` in metres, ``inside``).
     - ``inventory``: a JSON file of what the scene contains.
     - ``manifests``: the kinds of exports that the dataset may hold.
     - ``splits``: the scene's splits.json, if it has one.
-    - ``wanted``: the lists of the exports that the dataset must have; None takes those that exist.
-    - ``noted``: the SHA-256 of files when they were made, by their paths in the dataset.
+    - ``export_lists``: the lists of the exports that the dataset must have. None takes all that
+      exist.
+    - ``ledger_sums``: the SHA-256 that files had when they were made, by their paths in the
+      dataset.
 
-    Raises `UserError` if one of these cannot be read. All faults of the dataset are in the result.
+    Raises `UserError` if one of these cannot be read. The result holds all faults of the dataset.
     """
     dataset = dataset.resolve()
     volumes = read_inventory(inventory, "volumes")["volumes"] if inventory else []
     sets, checks = files.read_sets(dataset, reprojections)
     views, presence_checks = files.of_views(dataset, sets)
     passes, missing_passes = files.of_passes(dataset, sets)
-    extras, export_files, exports_check = files.of_exports(dataset, sets, views, manifests, wanted)
-    # What needs no images comes first: a wrong file stops the run before hours of reading.
+    extras, export_files, exports_check = files.of_exports(
+        dataset, sets, views, manifests, export_lists
+    )
+    # Do first what needs no images: a wrong file then stops the run before hours of reading.
     recorded_sums = _recorded_sums(records)
     cameras_check = files.clearance(clearance, sets)
     splits_checks = [splits_check.check(splits, dataset, sets)] if splits else []
-    export_checks, exported = exported_cameras.check(dataset, sets, manifests, wanted)
+    export_checks, set_exports = exported_cameras.check(dataset, sets, manifests, export_lists)
     checks += export_checks
-    exported_depth = ExportedDepth(dataset, sets, exported)
-    with _workers(Examiner(dataset, sets), processes) as mapped:
-        facts = _read_images(dataset, views + passes + extras, exported_depth, mapped)
-        for number, image_set in enumerate(sets):
-            set_facts = {file: facts[file] for file in views if file.set == number}
-            checks.append(presence_checks[number])
-            checks += _check_set(image_set, set_facts, volumes, mapped)
-        answers = {(f.set, f.view): fact.of_depth for f, fact in facts.items() if fact.of_depth}
-        checks += exported_depth.checks(answers, lambda asked: mapped(_answer_depth, asked))
+    images = views + passes + extras
+    facts, image_checks = _check_images(
+        dataset, sets, images, presence_checks, set_exports, volumes, processes
+    )
+    checks += image_checks
     if passes or missing_passes:
         checks.append(pixels.of_passes({file: facts[file] for file in passes}, missing_passes))
     checks.append(pixels.with_extras(exports_check, {file: facts[file] for file in extras}))
     digests, files_checks = _check_files(
-        dataset, sets, facts, export_files, recorded_sums, noted or {}
+        dataset, sets, facts, export_files, recorded_sums, ledger_sums or {}
     )
     if len(sets) <= len(reprojections):
         files_checks[0] = UNLISTED
@@ -108,43 +112,83 @@ def validate(
     )
 
 
-Mapped = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
+ParallelMap = Callable[[Callable[[Any], Any], Sequence[Any]], Iterable[Any]]
+"""Applies a function to each item of a sequence, in worker processes."""
+
 Sums = dict[str, tuple[int, str]]
 """The size in bytes and the SHA-256 of files, by their paths in the dataset."""
 
 
-# Of a dataset whose sets could not all be read.
+# The check of the files if not every lightfield.json could be read.
 UNLISTED = Check("files", None, "a lightfield.json that cannot be understood lists no files")
 
 
 def _recorded_sums(records: Sequence[Path]) -> Sums | None:
-    """Return what the records say of the images, or None without records."""
+    """Return the sums of the images from the records. Return None without records."""
     if not records:
         return None
-    return dict(sums for record in records for sums in read_record(record).items())
+    sums: Sums = {}
+    for record in records:
+        sums |= read_record(record)
+    return sums
+
+
+def _check_images(
+    dataset: Path,
+    sets: Sequence[ImageSet],
+    images: Sequence[File],
+    presence_checks: Sequence[Check],
+    set_exports: Sequence[SetExport],
+    volumes: Sequence[str],
+    processes: int,
+) -> tuple[dict[File, Facts], list[Check]]:
+    """Read all images. Return their facts, and the checks of each set and of exported depth.
+
+    The check of ``presence_checks`` for a set comes before the others of that set.
+    """
+    checks = []
+    exported_depth = ExportedDepth(dataset, sets, set_exports)
+    with _workers(Examiner(dataset, sets), processes) as parallel_map:
+        facts = _read_images(dataset, images, exported_depth, parallel_map)
+        for number, image_set in enumerate(sets):
+            views = {
+                file: fact for file, fact in facts.items() if file.is_view and file.set == number
+            }
+            checks.append(presence_checks[number])
+            checks += _check_set(image_set, views, volumes, parallel_map)
+        answers = {
+            (file.set, file.view): fact.of_depth for file, fact in facts.items() if fact.of_depth
+        }
+        checks += exported_depth.checks(
+            answers, lambda questions: parallel_map(_answer_depth, questions)
+        )
+    return facts, checks
 
 
 def _read_images(
-    dataset: Path, images: Sequence[File], exported_depth: ExportedDepth, mapped: Mapped
+    dataset: Path, images: Sequence[File], exported_depth: ExportedDepth, parallel_map: ParallelMap
 ) -> dict[File, Facts]:
-    """Read each image once, and return what it tells by itself."""
+    """Read each image once, and return what it shows by itself."""
     facts: dict[File, Facts] = {}
     progress = Progress(len(images), f"validate {dataset.name}", "files")
     with_questions = [(file, exported_depth.question(file)) for file in images]
-    for file, fact in mapped(_examine, with_questions):
+    for file, fact in parallel_map(_examine, with_questions):
         facts[file] = fact
         progress.done()
     return facts
 
 
 def _check_set(
-    image_set: ImageSet, facts: Mapping[File, Facts], volumes: Sequence[Any], mapped: Mapped
+    image_set: ImageSet,
+    facts: Mapping[File, Facts],
+    volumes: Sequence[str],
+    parallel_map: ParallelMap,
 ) -> list[Check]:
-    """Return the checks of one set's pixels, of its geometry, and of the machines that made it."""
+    """Return the checks of one set's pixels, its geometry, and the machines that rendered it."""
     patches = {file: fact.patches for file, fact in facts.items() if fact.patches is not None}
     return [
         *pixels.checks(image_set, facts, volumes),
-        geometry.check(image_set, patches, lambda asked: mapped(_answer, asked)),
+        geometry.check(image_set, patches, lambda questions: parallel_map(_answer, questions)),
         *machines.check(image_set.lightfield, [fact.machine for fact in facts.values()]),
     ]
 
@@ -155,30 +199,33 @@ def _check_files(
     facts: Mapping[File, Facts],
     export_files: Sequence[str],
     recorded_sums: Sums | None,
-    noted: Mapping[str, str],
+    ledger_sums: Mapping[str, str],
 ) -> tuple[dict[str, str], list[Check]]:
     """Return the SHA-256 of each published file, and the checks of the files and of their sums."""
     sums = {file.path: (fact.bytes, fact.checksum) for file, fact in facts.items()}
-    sums |= _sums_of_names(dataset, sets)
+    sums |= _sums_of_name_files(dataset, sets)
     published, files_check = files.listing(dataset, sets, {*export_files, *sums})
     digests = {
         path: sums[path][1] if path in sums else sha256(dataset / path) for path in published
     }
-    altered = files.altered(digests, noted)
+    altered = files.altered(digests, ledger_sums)
     return digests, [files_check, files.checksums(recorded_sums, sums, sets, altered)]
 
 
-def _sums_of_names(dataset: Path, sets: Sequence[ImageSet]) -> Sums:
+def _sums_of_name_files(dataset: Path, sets: Sequence[ImageSet]) -> Sums:
     """Return the sums of the files that name the objects, materials and instances of passes."""
-    paths = {name: dataset / name for name in files.names(sets)}
+    paths = {name: dataset / name for name in files.name_files(sets)}
     return {
         name: (path.stat().st_size, sha256(path)) for name, path in paths.items() if path.is_file()
     }
 
 
 @contextmanager
-def _workers(examiner: Examiner, processes: int) -> Iterator[Mapped]:
-    """Yield a `map` over worker processes that hold the examiner. One process is this one."""
+def _workers(examiner: Examiner, processes: int) -> Iterator[ParallelMap]:
+    """Yield a `map` over worker processes that hold the examiner.
+
+    A single process is this one.
+    """
     if processes == 1:
         _start_worker(examiner)
         yield map
@@ -206,13 +253,13 @@ def _start_worker(examiner: Examiner) -> None:
     oiio.attribute("exr_threads", 1)
 
 
-def _examine(asked: tuple[File, Question | None]) -> tuple[File, Facts]:
-    file, question = asked
+def _examine(file_and_question: tuple[File, Question | None]) -> tuple[File, Facts]:
+    file, question = file_and_question
     return file, _examiner.examine(file, question)
 
 
-def _answer_depth(asked: tuple[File, Question]) -> depth_questions.Answer | None:
-    return _examiner.answer_depth(*asked)
+def _answer_depth(file_and_question: tuple[File, Question]) -> depth_questions.Answer | None:
+    return _examiner.answer_depth(*file_and_question)
 
 
 def _answer(question: geometry.Question) -> list[Answer]:

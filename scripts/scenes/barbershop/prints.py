@@ -25,8 +25,15 @@ PRICES = (
     ("The works", "3.50"),
 )
 TITLES = ("SHAVE", "GENT", "SPORT", "MOTOR", "JAZZ", "RADIO")
-MOUSTACHES = """0.10 0.30 0.16, 0.34 -0.18 0.26, 0.06 0.02 0.06, 0.20 -0.05 0.2, 0.02 0.42 0.12
-    0.28 0.1 0.2"""  # handlebar, walrus, pencil, chevron, …: droop, curl, thickness
+# handlebar, walrus, pencil, chevron, …: droop, curl, thickness
+MOUSTACHES = [
+    (0.10, 0.30, 0.16),
+    (0.34, -0.18, 0.26),
+    (0.06, 0.02, 0.06),
+    (0.20, -0.05, 0.2),
+    (0.02, 0.42, 0.12),
+    (0.28, 0.1, 0.2),
+]
 
 
 def moustache(scene: Scene, kind: int) -> Shape:

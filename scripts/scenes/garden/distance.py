@@ -38,7 +38,7 @@ def fog(scene: Scene) -> None:
     each camera ray would first be asked whether it starts in the fog.
     """
     arc = np.linspace(0, TAU / FOG_ARCS, scene.segments(12))[:, None]
-    radius, height = points("85 17, 165 21, 165 -2, 85 -2").T
+    radius, height = points([(85, 17), (165, 21), (165, -2), (85, -2)]).T
     rows = polar(radius, arc, height)
     ends = (facets(rows[0], (3, 2, 1, 0)), facets(rows[-1], (0, 1, 2, 3)))
     bank = scene.mesh("Fog", join([sheet(rows, closed=True), *ends]), "Fog", smooth=False)

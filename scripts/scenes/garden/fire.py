@@ -11,18 +11,43 @@ from scenes.library.shapes import icosphere, join, transform, tube
 
 FLAME_TONGUES = 6
 FLAME_SHELLS = (1.0, 0.78, 0.5)
-CANDLES = """-0.62 2.82 0, -0.48 2.9 0, -0.40 2.73 0, 0.47 2.88 0, 0.60 2.76 0, 0.70 2.9 0
-    -0.28 3.05 0.14, -0.12 3.05 0.14, 0.05 3.05 0.14, 0.3 3.05 0.14
-    -1.30 2.13 0, -1.17 2.27 0, -1.43 1.97 0, -3.95 0.2 -0.08, -4.3 1.25 -0.08
-    -4.75 -0.35 -0.08, -5.2 0.75 -0.08, -5.9 1.6 -0.08"""  # on gravel, plinth, gravel, and afloat
-CANDLE_LIGHTS = "-0.5 2.8 0.32, 0.58 2.83 0.32, -1.3 2.1 0.3, -4.6 0.5 0.12"
+# on gravel, plinth, gravel, and afloat
+CANDLES = [
+    (-0.62, 2.82, 0),
+    (-0.48, 2.9, 0),
+    (-0.40, 2.73, 0),
+    (0.47, 2.88, 0),
+    (0.60, 2.76, 0),
+    (0.70, 2.9, 0),
+    (-0.28, 3.05, 0.14),
+    (-0.12, 3.05, 0.14),
+    (0.05, 3.05, 0.14),
+    (0.3, 3.05, 0.14),
+    (-1.30, 2.13, 0),
+    (-1.17, 2.27, 0),
+    (-1.43, 1.97, 0),
+    (-3.95, 0.2, -0.08),
+    (-4.3, 1.25, -0.08),
+    (-4.75, -0.35, -0.08),
+    (-5.2, 0.75, -0.08),
+    (-5.9, 1.6, -0.08),
+]
+CANDLE_LIGHTS = [(-0.5, 2.8, 0.32), (0.58, 2.83, 0.32), (-1.3, 2.1, 0.3), (-4.6, 0.5, 0.12)]
 
 
 def fire(scene: Scene) -> None:
     """An iron bowl with burning logs."""
     x, y = FIRE
-    outside = "0.05 0.30, 0.24 0.34, 0.36 0.46, 0.40 0.60, 0.43 0.60, 0.43 0.58, 0.41 0.575"
-    inside = "0 0.36, 0.22 0.38, 0.34 0.48, 0.40 0.60"
+    outside = [
+        (0.05, 0.30),
+        (0.24, 0.34),
+        (0.36, 0.46),
+        (0.40, 0.60),
+        (0.43, 0.60),
+        (0.43, 0.58),
+        (0.41, 0.575),
+    ]
+    inside = [(0, 0.36), (0.22, 0.38), (0.34, 0.48), (0.40, 0.60)]
     faces = points(outside)[::-1], points(inside)
     bowl = [scene.lathe(face, 48, capped=False) for face in faces]
     legs = [polar([0.30, 0.36, 0.44], 0.4 + k * TAU / 3, [0.42, 0.2, -0.05]) for k in range(3)]
@@ -91,16 +116,18 @@ def flames(scene: Scene, x: float, y: float, z: float) -> None:
 def candles(scene: Scene) -> None:
     """Candles, 0.2 m high, at the statue's feet, by the rocks, and afloat on the pond."""
     random = scene.random("candles")
-    wax = scene.lathe("0.036 0, 0.033 0.01, 0.032 0.19, 0.029 0.20, 0.024 0.193, 0 0.185", 28)
+    wax = scene.lathe(
+        [(0.036, 0), (0.033, 0.01), (0.032, 0.19), (0.029, 0.20), (0.024, 0.193), (0, 0.185)], 28
+    )
     drips = 0.06 * noise(wax.vertices * (40, 40, 9), 81, 2)
     wax = wax.reshaped(wax.vertices * (1 + xyz(drips, drips, 0)))
-    wick = tube("0 0 0.18, 0 0.001 0.2, 0.003 0.002 0.212", 0.0017, 5).painted(1)
+    wick = tube([(0, 0, 0.18), (0, 0.001, 0.2), (0.003, 0.002, 0.212)], 0.0017, 5).painted(1)
     candle = scene.mesh("Candle", join([wax, wick]), "Wax", "Wick", smooth=0.7)
     t = np.linspace(0, 1, scene.segments(14, 6))
     width = 0.0105 * np.sin(np.pi * t**0.62) * (1 - 0.3 * t)
     flame = scene.lathe(np.column_stack([width, 0.2 + 0.052 * t]), 14)
     burning = scene.mesh("Candle flame", flame, "Candle flame")
-    rim = "0.03 -0.015, 0.075 0, 0.095 0.035, 0.09 0.035, 0.07 0.012, 0 0.01"
+    rim = [(0.03, -0.015), (0.075, 0), (0.095, 0.035), (0.09, 0.035), (0.07, 0.012), (0, 0.01)]
     cup = scene.mesh("Candle cup", scene.lathe(rim, 28), "Candle cup")
     for i, (x, y, base) in enumerate(points(CANDLES)):
         afloat = base < 0

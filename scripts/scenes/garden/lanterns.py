@@ -13,15 +13,17 @@ FLOOR_LANTERNS = ((-0.72, -3.25), (0.85, -3.3))
 
 def stone_lanterns(scene: Scene) -> None:
     """Kasuga lanterns, 1.75 m high: base, shaft, fire box with paper panes, curved roof, knob."""
-    shaft = "0.12 0.26, 0.115 0.5, 0.14 0.53, 0.14 0.57, 0.115 0.6, 0.12 0.86"
+    shaft = [(0.12, 0.26), (0.115, 0.5), (0.14, 0.53), (0.14, 0.57), (0.115, 0.6), (0.12, 0.86)]
     stack = [
         prism(circle(0.36, 6), 0.12),
-        lathe("0.27 0.12, 0.27 0.17, 0.18 0.24, 0.14 0.27", 6),
+        lathe([(0.27, 0.12), (0.27, 0.17), (0.18, 0.24), (0.14, 0.27)], 6),
         scene.lathe(shaft, 32),
-        lathe("0.13 0.85, 0.19 0.9, 0.31 0.97, 0.31 1.04, 0.27 1.05", 6),
+        lathe([(0.13, 0.85), (0.19, 0.9), (0.31, 0.97), (0.31, 1.04), (0.27, 1.05)], 6),
         *(box((0.05, 0.05, 0.34), 0.008, 1).moved(x, y, 1.21) for x, y in circle(0.215, 6)),
         prism(circle(0.25, 6), 0.04).moved(0, 0, 1.36),
-        scene.lathe("0.09 1.63, 0.12 1.66, 0.05 1.69, 0.085 1.75, 0.075 1.8, 0 1.88", 24),
+        scene.lathe(
+            [(0.09, 1.63), (0.12, 1.66), (0.05, 1.69), (0.085, 1.75), (0.075, 1.8), (0, 1.88)], 24
+        ),
     ]
     u = np.linspace(0, 1, scene.segments(14, 4))[:, None]
     angle = np.arange(6 * 8) * TAU / 48
@@ -53,7 +55,7 @@ def paper_globes(scene: Scene) -> None:
     hoops = 0.20 * np.sin(t) ** 0.8 * (1 - 0.03 * np.abs(np.sin(t * 9)))
     globe = scene.lathe(np.column_stack([hoops, -0.19 * np.cos(t)]), 40, capped=False)
     globes = [scene.mesh("Globe", globe, f"{tint} globe paper") for tint in ("Cream", "Red")]
-    ends = points("-1.35 -4.35 2.55, 2.3 -4.5 2.6")
+    ends = points([(-1.35, -4.35, 2.55), (2.3, -4.5, 2.6)])
     t = np.linspace(0, 1, 25)[:, None]
     rope = ends[0] + t * (ends[1] - ends[0]) - (0, 0, 1.4) * t * (1 - t)
     scene.add("Lantern rope", tube(rope, 0.006, 5), "Rope")

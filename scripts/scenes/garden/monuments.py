@@ -18,7 +18,9 @@ MIRROR = (1.75, 3.25)
 def statue(scene: Scene) -> None:
     """The figure on a lotus seat and a granite plinth, with a halo of polished brass."""
     x, y = STATUE
-    for i, (width, low, high) in enumerate(points("1.55 -0.1 0.14, 1.32 0.14 0.5, 1.45 0.5 0.58")):
+    for i, (width, low, high) in enumerate(
+        points([(1.55, -0.1, 0.14), (1.32, 0.14, 0.5), (1.45, 0.5, 0.58)])
+    ):
         block = box((width, width, high - low), 0.02, 3)
         spot = (x, y, (low + high) / 2)
         scene.add(f"Plinth.{i}", block, "Plinth granite", matrix=transform(spot))
@@ -32,7 +34,7 @@ def statue(scene: Scene) -> None:
         halo.append(shapes.tube(polar(reach, angle), [0.007, 0.010, 0.0023], 6))
     spot = transform((x, y + 0.2, 2.05))
     scene.add("Halo", upright(join(halo)), "Polished brass", matrix=spot)
-    stem = scene.tube("0 0 0, 0 0.02 0.6, 0 0 1.35", 0.018, 10)
+    stem = scene.tube([(0, 0, 0), (0, 0.02, 0.6), (0, 0, 1.35)], 0.018, 10)
     scene.add("Halo stem", stem, "Polished brass", matrix=transform((x, y + 0.22, 0.75)))
 
 
@@ -51,22 +53,32 @@ def limb(path: Points, radii: Sequence[float]) -> Shape:
 
 
 # The parts of the body that are ellipsoids: centre and radii.
-BODY = """0 0.06 0.20 0.38 0.28 0.21, 0 0.06 0.50 0.26 0.20 0.36, 0 0.03 0.80 0.30 0.20 0.23
-    0 -0.01 1.36 0.160 0.180 0.205, 0 -0.10 1.24 0.085 0.075 0.06
-    0 -0.188 1.345 0.024 0.035 0.055, 0 -0.160 1.275 0.055 0.035 0.016
-    0 0.02 1.42 0.172 0.180 0.180, 0 0.03 1.60 0.085 0.085 0.075"""
+BODY = [
+    (0, 0.06, 0.20, 0.38, 0.28, 0.21),
+    (0, 0.06, 0.50, 0.26, 0.20, 0.36),
+    (0, 0.03, 0.80, 0.30, 0.20, 0.23),
+    (0, -0.01, 1.36, 0.160, 0.180, 0.205),
+    (0, -0.10, 1.24, 0.085, 0.075, 0.06),
+    (0, -0.188, 1.345, 0.024, 0.035, 0.055),
+    (0, -0.160, 1.275, 0.055, 0.035, 0.016),
+    (0, 0.02, 1.42, 0.172, 0.180, 0.180),
+    (0, 0.03, 1.60, 0.085, 0.085, 0.075),
+]
 # Hand, ear and brow of the left; the right is their mirror image, as it is of arm and leg.
-LEFT = """0.06 -0.35 0.32 0.13 0.075 0.05, 0.165 0 1.31 0.022 0.042 0.11
-    0.065 -0.158 1.385 0.045 0.028 0.018"""
-ARM = "0.32 0.03 0.93, 0.43 0 0.56, 0.09 -0.34 0.34"
+LEFT = [
+    (0.06, -0.35, 0.32, 0.13, 0.075, 0.05),
+    (0.165, 0, 1.31, 0.022, 0.042, 0.11),
+    (0.065, -0.158, 1.385, 0.045, 0.028, 0.018),
+]
+ARM = [(0.32, 0.03, 0.93), (0.43, 0, 0.56), (0.09, -0.34, 0.34)]
 ARM_RADII = (0.115, 0.092, 0.055)
-LEG = "0.2 0.06 0.17, 0.55 -0.18 0.13, -0.10 -0.40 0.13"
+LEG = [(0.2, 0.06, 0.17), (0.55, -0.18, 0.13), (-0.10, -0.40, 0.13)]
 LEG_RADII = (0.17, 0.135, 0.09)
 
 
 def figure(scene: Scene) -> Shape:
     """The seated figure, 1.7 m high, facing −Y: parts melted into one skin, with a folded robe."""
-    parts = [limb("0 0.04 0.95, 0 0.02 1.2", (0.13, 0.095))]
+    parts = [limb([(0, 0.04, 0.95), (0, 0.02, 1.2)], (0.13, 0.095))]
     parts += [ellipsoid(part[:3], part[3:]) for part in points(BODY)]
     for mirror in ((-1, 1, 1), (1, 1, 1)):
         parts += [ellipsoid(part[:3] * mirror, part[3:]) for part in points(LEFT)]
@@ -110,7 +122,7 @@ def curls(scene: Scene) -> Shape:
 
 def lotus(scene: Scene) -> Shape:
     """The seat: a drum with two crowns of petals."""
-    drum = scene.lathe("0 0, 0.52 0, 0.60 0.05, 0.56 0.12, 0.60 0.2, 0 0.21", 64)
+    drum = scene.lathe([(0, 0), (0.52, 0), (0.60, 0.05), (0.56, 0.12), (0.60, 0.2), (0, 0.21)], 64)
     u = np.linspace(0, 1, scene.segments(10, 4))[:, None]
     v = np.linspace(-1, 1, scene.segments(9, 3))
     width = 0.115 * np.sin(np.pi * (0.15 + 0.85 * u)) ** 0.6
@@ -158,7 +170,7 @@ def torii(scene: Scene) -> None:
 def lintel(scene: Scene, half: float, low: float, high: float, depth: float, rise: float) -> Shape:
     """A beam along x that is wider above than below and curves upwards to its ends."""
     x = np.linspace(1, -1, scene.segments(24, 6))[:, None]
-    y, top = points("-1 0, 1 0, 1 1, -1 1").T  # around its section
+    y, top = points([(-1, 0), (1, 0), (1, 1), (-1, 1)]).T  # around its section
     z = rise * np.abs(x) ** 2.4 + np.where(top == 1, high, low)
     rows = xyz(half * x * (1 + 0.03 * top), depth * y * (1 + 0.15 * top), z)
     return sheet(rows, closed=True, capped=True)

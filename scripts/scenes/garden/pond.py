@@ -23,7 +23,7 @@ def water_lilies(scene: Scene) -> None:
     """Drifts of lily pads, some with a flower of three rings of petals."""
     random = scene.random("pond")
     angle = np.linspace(0.16, TAU - 0.16, scene.segments(40, 8))
-    reach, rise = points("1 0.03, 0.97 0.006, 0.6 0.002, 0.05 0").T[:, :, None]
+    reach, rise = points([(1, 0.03), (0.97, 0.006), (0.6, 0.002), (0.05, 0)]).T[:, :, None]
     pad = scene.mesh("Lily pad", sheet(polar(reach, angle, rise)), "Lily pad")
     u = np.linspace(0, 1, scene.segments(7, 3))[:, None]
     v = np.linspace(-1, 1, 5)
@@ -55,14 +55,27 @@ def carp(scene: Scene) -> None:
     for i, bend in enumerate((0.35, -0.3, 0.1)):
         sway = 0.09 * np.sin(TAU * 0.7 * t + i) * bend * (t + 0.3)
         spine = xyz(sway, 0.25 - 0.46 * t, 0)
-        tail = points("0 0 0, 0.03 -0.14 0.06, 0 -0.09 0, 0.03 -0.14 -0.06") + spine[-1]
-        side = points("0.05 0.12 -0.02, 0.14 0.05 -0.03, 0.12 0.01 -0.03, 0.05 0.07 -0.02")
+        tail = (
+            points([(0, 0, 0), (0.03, -0.14, 0.06), (0, -0.09, 0), (0.03, -0.14, -0.06)])
+            + spine[-1]
+        )
+        side = points(
+            [(0.05, 0.12, -0.02), (0.14, 0.05, -0.03), (0.12, 0.01, -0.03), (0.05, 0.07, -0.02)]
+        )
         ridge = spine[[9 * len(t) // 28, len(t) // 2, 2 * len(t) // 3, 2 * len(t) // 3]]
-        ridge = ridge + points("0 0.02 0.04, 0 0 0.085, 0 0 0.06, 0 0 0.03")
+        ridge = ridge + points([(0, 0.02, 0.04), (0, 0, 0.085), (0, 0, 0.06), (0, 0, 0.03)])
         fins = [facets(fin, (0, 1, 2, 3)) for fin in (tail, side, side * (-1, 1, 1), ridge)]
         kinds.append(scene.mesh(f"Koi.{i}", join([scene.tube(spine, radius, 16), *fins]), "Koi"))
-    swimming = points("""-4.1 0.75 0.4, -4.55 0.35 1.2, -4.35 -0.3 2.6
-        -5.1 1.5 4.0, -5.4 -0.2 5.2, -4.9 0.95 2.0""")
+    swimming = points(
+        [
+            (-4.1, 0.75, 0.4),
+            (-4.55, 0.35, 1.2),
+            (-4.35, -0.3, 2.6),
+            (-5.1, 1.5, 4.0),
+            (-5.4, -0.2, 5.2),
+            (-4.9, 0.95, 2.0),
+        ]
+    )
     places = [transform((x, y, WATER_LEVEL - 0.13), (0, 0, a), 0.9) for x, y, a in swimming]
     scatter("Koi", kinds, places)
 

@@ -59,7 +59,7 @@ def bamboo_culm(scene: Scene, number: int) -> Shape:
     at = np.concatenate(spots)
     up = random.normal((0, 0, 1), 0.5, at.shape)
     size = random.uniform(0.15, 0.27, len(at))
-    half, y = points("0 0, 0.055 0.25, 0.05 0.6, 0 1").T[:, :, None]
+    half, y = points([(0, 0), (0.055, 0.25), (0.05, 0.6), (0, 1)]).T[:, :, None]
     x = half * (-1, 0, 1)
     leaf = sheet(xyz(x, y, 0.03 * (x != 0) - 0.25 * y * y))  # folded along its rib
     leaves = copies(leaf, at, np.concatenate(forward), up, size)
@@ -68,7 +68,7 @@ def bamboo_culm(scene: Scene, number: int) -> Shape:
 
 def maple_leaf() -> Shape:
     """A leaf of five pointed lobes, 1 long along +Y, as a fan of triangles round its middle."""
-    tips = points("-0.55 0.12, -0.5 0.6, 0 1, 0.5 0.6, 0.55 0.12")
+    tips = points([(-0.55, 0.12), (-0.5, 0.6), (0, 1), (0.5, 0.6), (0.55, 0.12)])
     notches = 0.21 * (tips[:-1] + tips[1:]) + (0, 0.12)
     rim = np.zeros((10, 3))  # the stalk, then tips and notches in turn
     rim[1::2, :2], rim[2::2, :2] = tips, notches
@@ -129,7 +129,9 @@ def pines(scene: Scene) -> None:
             pads.append(copies(brush, spots + tip, forward, upwards, sizes))
         tree = join([*parts, join(pads).painted(1)])
         meshes.append(scene.mesh("Pine", tree, "Pine bark", "Pine needles"))
-    spots = points("5.9 0.2, 3.1 6.3, -7.6 -2.6, -3.3 5.6, 6.4 5.4, -5.8 -5.6, 9.5 2.4")
+    spots = points(
+        [(5.9, 0.2), (3.1, 6.3), (-7.6, -2.6), (-3.3, 5.6), (6.4, 5.4), (-5.8, -5.6), (9.5, 2.4)]
+    )
     scatter("Pine", meshes, standing(random, spots, (0.85, 1.3)))
 
 

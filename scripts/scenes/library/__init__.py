@@ -1,8 +1,8 @@
-"""What the scenes are made of: shapes from numpy, shader graphs, plants, masonry, lights.
+"""The parts of scenes: shapes from numpy, shader graphs, plants, masonry, lights.
 
-Units are metres and radians (degrees only where an argument is called `degrees`), Z is up, the
-ground is z = 0. Everything is deterministic: an element draws its random numbers from
-`Scene.random`. Wherever points are wanted, text will do: "0.1 0, 0.2 0.5" (see `points.points`).
+Units are metres and radians. Only arguments called `degrees` or `turned` are in degrees. Z is up,
+the ground is z = 0. Everything is deterministic: an element draws its random numbers from
+`Scene.random`.
 """
 
-import bpy  # noqa: F401  (mathutils and bmesh are there once it is imported)
+import bpy  # noqa: F401  (makes mathutils and bmesh importable)

@@ -1,6 +1,6 @@
-"""Shader node trees, built by expressions, and materials that more than one scene is made of."""
+"""Shader node trees, built by expressions, and materials that several scenes use."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import bpy
@@ -13,7 +13,7 @@ Color = tuple[float, float, float]  # linear red, green and blue
 class Graph:
     """A shader node tree that is built by expressions.
 
-    Wherever a method takes an input it may be a value, a socket, or a node (its first output).
+    An input of a method may be a value, a socket, or a node (its first output).
     """
 
     def __init__(self, tree: bpy.types.NodeTree) -> None:
@@ -23,7 +23,7 @@ class Graph:
     def add(
         self, kind: str, inputs: Mapping[str | int, Any] | None = None, **properties: Any
     ) -> bpy.types.Node:
-        """A node of type `kind`, its properties set, its inputs (by name or number) given."""
+        """A node of type `kind` with these properties, and inputs by name or number."""
         node = self.tree.nodes.new(f"ShaderNode{kind}")
         for name, value in properties.items():
             setattr(node, name, value)
@@ -45,7 +45,7 @@ class Graph:
         return self.add("Mapping", {"Vector": where, "Scale": scale or (1, 1, 1)}).outputs[0]
 
     def geometry(self, name: str) -> bpy.types.NodeSocket:
-        """Of the place that is seen: its Position or Normal in the world, Random Per Island, …"""
+        """A property of the visible point: its world Position or Normal, Random Per Island, …"""
         return self.add("NewGeometry").outputs[name]
 
     def noise(self, vector: Any, *numbers: float, **properties: Any) -> bpy.types.NodeSocket:
@@ -82,7 +82,7 @@ class Graph:
         return self.add("Math", dict(enumerate(values)), operation=operation).outputs[0]
 
     def vector_math(self, operation: str, *values: Any) -> bpy.types.NodeOutputs:
-        """The same of vectors: outputs Vector, and Value for LENGTH."""
+        """Arithmetic of vectors: outputs Vector, and Value for LENGTH."""
         return self.add("VectorMath", dict(enumerate(values)), operation=operation).outputs
 
     def mix(self, factor: Any, a: Any, b: Any, blend: str = "MIX") -> bpy.types.NodeSocket:
@@ -99,39 +99,39 @@ class Graph:
         return self.add("Bump", {"Height": height, "Distance": distance}).outputs[0]
 
     def object_random(self) -> bpy.types.NodeSocket:
-        """A number in 0..1 that each object (instance) has of its own."""
+        """A number in 0..1, another one for each object or instance."""
         return self.add("ObjectInfo").outputs["Random"]
 
     def shifted(self, *scale: float) -> bpy.types.NodeSocket:
-        """Coordinates that lie elsewhere for each connected piece of a mesh."""
+        """Coordinates with another offset for each connected piece of a mesh."""
         shift = self.math("MULTIPLY", self.geometry("Random Per Island"), 50.0)
         return self.vector_math("ADD", self.coordinates(*scale), shift)[0]
 
     def piece_tint(self, dark: Color, light: Color) -> bpy.types.NodeSocket:
-        """A colour between two that each connected piece of each object has of its own."""
+        """A colour between two, another one for each connected piece of each object."""
         total = self.math("ADD", self.geometry("Random Per Island"), self.object_random())
         return self.mix(self.math("FRACT", total), dark, light)
 
     def principled(self, **inputs: Any) -> bpy.types.Node:
-        """A Principled BSDF; inputs by name with underscores: Base_Color, Roughness, IOR, …"""
+        """A Principled BSDF. Inputs by name with underscores: Base_Color, Roughness, IOR, …"""
         named = {name.replace("_", " "): value for name, value in inputs.items()}
         return self.add("BsdfPrincipled", named)
 
     def plain_when_diffuse(self, surface: Any, color: Color) -> bpy.types.Node:
         """A shader that is a flat diffuse `color` to rays that come from a diffuse surface.
 
-        Cycles then skips the textures wherever light has been blurred already: give it the
+        Cycles then skips the textures for light that is already blurred. `color` should be the
         surface's mean colour.
         """
         blurred = self.add("LightPath").outputs["Is Diffuse Ray"]
         return self.mix_shaders(blurred, surface, self.diffuse(color))
 
     def diffuse(self, color: Any, **normal: Any) -> bpy.types.Node:
-        """A diffuse BSDF, its Normal bent where one is given (see `bump`)."""
+        """A diffuse BSDF. Its Normal may be bent (see `bump`)."""
         return self.add("BsdfDiffuse", {"Color": color} | normal)
 
     def thin(self, color: Any, through: float) -> bpy.types.Node:
-        """A shader of leaves or paper: some of the light comes out at the other side."""
+        """A shader of leaves or paper: some of the light comes out on the other side."""
         back = self.add("BsdfTranslucent", {"Color": color})
         return self.mix_shaders(through, self.diffuse(color), back)
 
@@ -141,7 +141,7 @@ class Graph:
 
 
 class SkyGraph(Graph):
-    """The graph of the scene's world; end it with `finish`."""
+    """The graph of the scene's world. End it with `finish`."""
 
     def __init__(self) -> None:
         self.world = bpy.context.scene.world = bpy.data.worlds.new("Sky")
@@ -153,7 +153,7 @@ class SkyGraph(Graph):
 
 
 class MaterialGraph(Graph):
-    """The graph of a new material; end it with `finish`."""
+    """The graph of a new material. End it with `finish`."""
 
     def __init__(self, name: str) -> None:
         self.material = bpy.data.materials.new(name)
@@ -162,19 +162,13 @@ class MaterialGraph(Graph):
     def finish(self, surface: Any = None, volume: Any = None, is_lamp: bool = True) -> None:
         """Connect the shaders to the material's output.
 
-        is_lamp: whether Cycles samples what glows in it as a lamp. Without, it is only seen, which
-        converges sooner where lamps give its light.
+        is_lamp: whether Cycles samples an emission as a lamp. Without it the emission is only
+        visible, which converges sooner if lamps give its light.
         """
         inputs = {"Surface": surface, "Volume": volume}
         self.add("OutputMaterial", {k: v for k, v in inputs.items() if v is not None})
         if not is_lamp:
             self.material.cycles.emission_sampling = "NONE"
-
-
-def rows(table: str, numbers: int) -> list[tuple[Any, ...]]:
-    """The rows of a table of names, each followed by so many numbers; a comma or line end each."""
-    split = (row.rsplit(maxsplit=numbers) for row in table.replace("\n", ",").split(","))
-    return [(row[0].strip(), *map(float, row[1:])) for row in split]
 
 
 def plain(name: str, color: Color, **inputs: Any) -> None:
@@ -183,24 +177,24 @@ def plain(name: str, color: Color, **inputs: Any) -> None:
     graph.finish(graph.principled(Base_Color=color, **inputs))
 
 
-def plains(table: str, **inputs: Any) -> None:
-    """Materials of a table: name, colour and roughness of each."""
-    for name, *color, roughness in rows(table, 4):
+def plains(table: Iterable[tuple[str, Color, float]], **inputs: Any) -> None:
+    """Materials of one Principled BSDF each: name, colour and roughness."""
+    for name, color, roughness in table:
         plain(name, color, Roughness=roughness, **inputs)
 
 
 def emissive(name: str, color: Color, strength: float) -> None:
-    """A glowing surface that lights nothing by itself: lamps do, and converge much sooner."""
+    """A glowing surface that lights nothing: lamps give its light, and converge much sooner."""
     graph = MaterialGraph(name)
     glow = {"Emission_Color": color, "Emission_Strength": strength}
     graph.finish(graph.principled(Base_Color=color, Roughness=0.3, **glow), is_lamp=False)
 
 
-def foliage(table: str) -> None:
-    """Thin leaves, each of its own tint: rows of name, dark and light colour, and `thin`'s part."""
-    for name, *tints, through in rows(table, 7):
+def foliage(table: Iterable[tuple[str, Color, Color, float]]) -> None:
+    """Thin leaves, each of its own tint: name, dark colour, light colour, and transmitted part."""
+    for name, dark, light, through in table:
         graph = MaterialGraph(name)
-        graph.finish(graph.thin(graph.piece_tint(tints[:3], tints[3:]), through))
+        graph.finish(graph.thin(graph.piece_tint(dark, light), through))
 
 
 def wood(name: str, dark: Color, light: Color, roughness: float, along: str = "Z") -> None:

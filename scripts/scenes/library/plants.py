@@ -16,7 +16,7 @@ TAU = 2 * np.pi
 
 def oval_leaf() -> Shape:
     """A folded leaf of four triangles, 1 long along +Y."""
-    rim = "0 0 0, 0.3 0.4 0.06, 0 1 -0.06, -0.3 0.4 0.06, 0 0.42 0"
+    rim = [(0, 0, 0), (0.3, 0.4, 0.06), (0, 1, -0.06), (-0.3, 0.4, 0.06), (0, 0.42, 0)]
     return facets(rim, (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
 
 

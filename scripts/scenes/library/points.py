@@ -1,4 +1,4 @@
-"""Points as numpy arrays, read from text or made of coordinates; outlines, paths, and noise."""
+"""Points as numpy arrays: outlines, paths, and noise."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -10,29 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 Array = NDArray[Any]
-Points = str | ArrayLike  # points (n, 2) or (n, 3): numbers, or text that `points` reads
+Points = ArrayLike  # points (n, 2) or (n, 3)
 
 
 def points(data: Points) -> Array:
-    """Points (n, k) of text such as "0.1 0, 0.2 0.5", a comma or line end after each; or numbers.
-
-    Long profiles stay as compact as a drawing's coordinates, over as many lines as they need. In
-    text, ±0.3 stands for −0.3 and 0.3, and 1..2*5 for five values evenly from 1 to 2; a point
-    that has such values stands for all their combinations.
-    """
-    if not isinstance(data, str):
-        return np.asarray(data, float)
-    rows = (row.split() for row in data.replace("\n", ",").split(","))
-    return np.array([point for row in rows if row for point in product(*map(_values, row))])
-
-
-def _values(text: str) -> list[float]:
-    if text.startswith("±"):
-        return [-float(text[1:]), float(text[1:])]
-    if "*" in text:
-        ends, count = text.split("*")
-        return np.linspace(*map(float, ends.split("..")), int(count)).tolist()
-    return [float(text)]
+    """Points (n, k) as an array of floats."""
+    return np.asarray(data, float)
 
 
 def evenly(start: float, stop: float, count: int) -> list[float]:
@@ -61,7 +44,8 @@ def xyz(x: ArrayLike, y: ArrayLike, z: ArrayLike = 0.0) -> Array:
 
 def polar(radius: ArrayLike, angle: ArrayLike, z: ArrayLike = 0.0) -> Array:
     """Points (…, 3) of distance from the Z axis, angle from +X in radians, and height."""
-    r, a = np.asarray(radius, float), np.asarray(angle, float)
+    r = np.asarray(radius, float)
+    a = np.asarray(angle, float)
     return xyz(r * np.cos(a), r * np.sin(a), z)
 
 
@@ -77,9 +61,9 @@ def directions(random: np.random.Generator, count: int) -> Array:
 
 
 def circle(radius: float, segments: int, start: float = 0.0, stop: float = 2 * np.pi) -> Array:
-    """Points (n, 2) of a circle or, given where it starts and stops, of an arc with both ends."""
-    full = np.isclose(stop - start, 2 * np.pi)
-    return polar(radius, np.linspace(start, stop, segments, endpoint=not full))[:, :2]
+    """Points (n, 2) of a circle, or of an arc from angle `start` to `stop` with both ends."""
+    is_full = np.isclose(stop - start, 2 * np.pi)
+    return polar(radius, np.linspace(start, stop, segments, endpoint=not is_full))[:, :2]
 
 
 def rectangle(width: float, height: float) -> Array:
@@ -88,20 +72,20 @@ def rectangle(width: float, height: float) -> Array:
 
 
 def smooth_path(path: Points, steps: int) -> Array:
-    """Points (steps + 1, k) of a cubic spline through those given, even in chord length."""
+    """Points (steps + 1, k) of a cubic spline through the path, at even steps of chord length."""
     p = points(path)
     chord = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1))])
     return np.asarray(CubicSpline(chord, p)(np.linspace(0, chord[-1], steps + 1)))
 
 
 def smoothstep(low: float, high: float, value: ArrayLike) -> Array:
-    """0 at `low` and 1 at `high` (which may be the smaller one), level at both."""
+    """0 at `low` and 1 at `high`, with level ends. `high` may be smaller than `low`."""
     t = np.clip((np.asarray(value, float) - low) / (high - low), 0.0, 1.0)
     return t * t * (3 - 2 * t)
 
 
 def noise(places: ArrayLike, seed: int, octaves: int = 1) -> Array:
-    """Perlin's improved gradient noise at places (..., 3), about −1..1; octaves halve in size."""
+    """Perlin's improved gradient noise at places (..., 3), about −1..1. Octaves halve in size."""
     at = np.asarray(places, float)
     total = np.zeros(at.shape[:-1])
     for octave in range(octaves):

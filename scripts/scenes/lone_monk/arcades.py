@@ -11,22 +11,65 @@ from scenes.lone_monk.plan import ARCADE, ARCADE_WALL, FRONT, SPRINGING, VAULT_R
 
 ARCH_RADIUS = 0.92
 # A column's base, shaft and neck, and the bell of its capital: radius and height.
-SHAFT = """0.125 0.115, 0.119 0.116, 0.129 0.122, 0.136 0.133, 0.136 0.147, 0.129 0.158, 0.119 0.164
-    0.112 0.17, 0.104 0.185, 0.106 0.2, 0.113 0.203, 0.116 0.214, 0.113 0.225, 0.098 0.235
-    0.098 0.24, 0.096 0.51, 0.092 0.78, 0.086 1.20, 0.084 1.32
-    0.094 1.324, 0.098 1.335, 0.094 1.346, 0.085 1.35"""
-BELL = "0.085 1.34, 0.087 1.40, 0.092 1.456, 0.103 1.514, 0.119 1.572, 0.14 1.63"
+SHAFT = [
+    (0.125, 0.115),
+    (0.119, 0.116),
+    (0.129, 0.122),
+    (0.136, 0.133),
+    (0.136, 0.147),
+    (0.129, 0.158),
+    (0.119, 0.164),
+    (0.112, 0.17),
+    (0.104, 0.185),
+    (0.106, 0.2),
+    (0.113, 0.203),
+    (0.116, 0.214),
+    (0.113, 0.225),
+    (0.098, 0.235),
+    (0.098, 0.24),
+    (0.096, 0.51),
+    (0.092, 0.78),
+    (0.086, 1.20),
+    (0.084, 1.32),
+    (0.094, 1.324),
+    (0.098, 1.335),
+    (0.094, 1.346),
+    (0.085, 1.35),
+]
+BELL = [(0.085, 1.34), (0.087, 1.40), (0.092, 1.456), (0.103, 1.514), (0.119, 1.572), (0.14, 1.63)]
 # Its leaves: how many, where between two the first is, their foot, height, and reach.
-LEAVES = "8 0.5 1.345 0.15 0.035, 4 0 1.40 0.2 0.05, 4 0.5 1.40 0.2 0.08"
+LEAVES = [(8, 0.5, 1.345, 0.15, 0.035), (4, 0, 1.40, 0.2, 0.05), (4, 0.5, 1.40, 0.2, 0.08)]
 # Plinth and abacus: middle x, y, z and width, depth, height.
-COLUMN_BLOCKS = "0 0 0.088 0.27 0.27 0.06, 0 0 1.665 0.285 0.285 0.07"
+COLUMN_BLOCKS = [(0, 0, 0.088, 0.27, 0.27, 0.06), (0, 0, 1.665, 0.285, 0.285, 0.07)]
 # Masonry of rectangular plan: width, depth, height; the pier's head and top from the springing.
-IMPOST = "0.26 0.50 1.70, 0.36 0.58 1.77, 0.37 0.60 1.77, 0.37 0.60 1.84, 0.35 0.58 1.85"
-PIER_FOOT = "0.80 0.80 -0.03, 0.80 0.80 0.41, 0.76 0.76 0.43, 0.66 0.66 0.50, 0.66 0.66 0.51"
-PIER = "0.66 0.66 -1.95, 0.66 0.66 -0.2, 0.56 0.56 -0.2, 0.56 0.56 1.41"
-PIER_HEAD = "0.66 0.66 -0.22, 0.76 0.76 -0.12, 0.78 0.78 -0.11, 0.78 0.78 -0.01, 0.75 0.75 0"
+IMPOST = [
+    (0.26, 0.50, 1.70),
+    (0.36, 0.58, 1.77),
+    (0.37, 0.60, 1.77),
+    (0.37, 0.60, 1.84),
+    (0.35, 0.58, 1.85),
+]
+PIER_FOOT = [
+    (0.80, 0.80, -0.03),
+    (0.80, 0.80, 0.41),
+    (0.76, 0.76, 0.43),
+    (0.66, 0.66, 0.50),
+    (0.66, 0.66, 0.51),
+]
+PIER = [(0.66, 0.66, -1.95), (0.66, 0.66, -0.2), (0.56, 0.56, -0.2), (0.56, 0.56, 1.41)]
+PIER_HEAD = [
+    (0.66, 0.66, -0.22),
+    (0.76, 0.76, -0.12),
+    (0.78, 0.78, -0.11),
+    (0.78, 0.78, -0.01),
+    (0.75, 0.75, 0),
+]
 # Courses of the low wall: stones, how far they leave the gate open, depth, middle z, and height.
-LOW_WALL = "10 0.9 0.54 0.13 0.246, 10 0.9 0.54 0.38 0.246, 6 0.87 0.66 0.552 0.096"
+LOW_WALL = [
+    (10, 0.9, 0.54, 0.13, 0.246),
+    (10, 0.9, 0.54, 0.38, 0.246),
+    (6, 0.87, 0.66, 0.552, 0.096),
+]
 
 
 def arcades(scene: Scene) -> None:
@@ -70,7 +113,8 @@ def arcades(scene: Scene) -> None:
 def pillar(section: Points) -> Shape:
     """Masonry of rectangular plan with chamfered corners: rows of width, depth and height."""
     width, depth, z = points(section).T[:, :, None]
-    x, y = points("1 1, 1 1, -1 1, -1 1, -1 -1, -1 -1, 1 -1, 1 -1").T  # two points for each corner
+    # two points for each corner
+    x, y = points([(1, 1), (1, 1), (-1, 1), (-1, 1), (-1, -1), (-1, -1), (1, -1), (1, -1)]).T
     inset = 0.012 * np.array([0, 1, 1, 0, 0, 1, 1, 0])
     ring = xyz(x * (width / 2 - inset), y * (depth / 2 - 0.012 + inset), z)
     return sheet(ring, closed=True, capped=True)
@@ -83,7 +127,7 @@ def twin_column(scene: Scene) -> Shape:
         out = polar(1, (np.arange(count) + first) * 2 * np.pi / count)
         one.append(copies(leaf(scene, height, reach), out * 0 + (0, 0, foot), out))
     pair = [join(one).moved(0, y, 0) for y in (-0.15, 0.15)]
-    return join([*pair, stones("0 0 0.03 0.32 0.60 0.06"), pillar(IMPOST)])
+    return join([*pair, stones([(0, 0, 0.03, 0.32, 0.60, 0.06)]), pillar(IMPOST)])
 
 
 def leaf(scene: Scene, height: float, reach: float) -> Shape:
@@ -107,8 +151,10 @@ def vaults(scene: Scene) -> None:
     corner.add(arch, "Limestone", (before, 0, 0), (0, 0, -90))
     corner.add(arch, "Limestone", (0, before, 0))
     on_sides("Corner vault", [corner.mesh("Corner vault")], middle, middle, SPRINGING)
-    bell = scene.lathe("0.02 -0.34, 0.05 -0.31, 0.07 -0.2, 0.13 -0.1, 0.14 -0.09", 12)
-    corbel.add(join([bell, stones("0 0 -0.045 0.34 0.34 0.09")]), "Carved stone")
+    bell = scene.lathe(
+        [(0.02, -0.34), (0.05, -0.31), (0.07, -0.2), (0.13, -0.1), (0.14, -0.09)], 12
+    )
+    corbel.add(join([bell, stones([(0, 0, -0.045, 0.34, 0.34, 0.09)])]), "Carved stone")
     on_sides("Corbel", [corbel.mesh("Corbel")], plan.COLUMNS, plan.BACK, SPRINGING)
 
 
@@ -126,6 +172,6 @@ def vault(scene: Scene, length: float) -> Model:
     for sign in (-1, 1):
         model.add(scene.tube(xyz(a * t, sign * b * t, rise), 0.05), "Limestone")
         model.add(scene.tube(xyz(sign * a, b * t, rise), 0.07), "Limestone")
-    boss = scene.lathe("0.03 -0.1, 0.08 -0.09, 0.12 -0.05, 0.13 0", 16)
+    boss = scene.lathe([(0.03, -0.1), (0.08, -0.09), (0.12, -0.05), (0.13, 0)], 16)
     model.add(boss, "Limestone", (0, 0, VAULT_RISE - 0.02))
     return model

@@ -22,12 +22,20 @@ TOWER_TOP = 15.6
 ROOF_HALF = HALF + 0.4
 ROOF_SLOPE = np.radians(33)
 ROOF_HEIGHT = ROOF_HALF * np.tan(ROOF_SLOPE)
-BELL = """0.55 -1.15, 0.53 -1.12, 0.44 -0.95, 0.36 -0.7, 0.31 -0.4
-    0.26 -0.22, 0.12 -0.15, 0.05 -0.1"""
+BELL = [
+    (0.55, -1.15),
+    (0.53, -1.12),
+    (0.44, -0.95),
+    (0.36, -0.7),
+    (0.31, -0.4),
+    (0.26, -0.22),
+    (0.12, -0.15),
+    (0.05, -0.1),
+]
 # Of the clock: middle x, y, z and width, depth, height.
-MARK = "0 -0.035 0.58 0.05 0.02 0.14"
-HOUR_HAND = "0 -0.05 0.13 0.035 0.015 0.36"
-MINUTE_HAND = "0 -0.05 0.22 0.035 0.015 0.54"
+MARK = [(0, -0.035, 0.58, 0.05, 0.02, 0.14)]
+HOUR_HAND = [(0, -0.05, 0.13, 0.035, 0.015, 0.36)]
+MINUTE_HAND = [(0, -0.05, 0.22, 0.035, 0.015, 0.54)]
 
 
 def church(scene: Scene) -> None:
@@ -35,7 +43,7 @@ def church(scene: Scene) -> None:
     area = (WIDTH, LEAN_TO_TOP, TOP, 0.5)
     hole = arch_outline(*LANCET, scene.segments(20))
     lancet = wall(scene, "Brick", area, hole, (0.14, 0.04))
-    lancet.add(stones("0 -0.04 6.12 1.2 0.2 0.1", 0.02), "Limestone")
+    lancet.add(stones([(0, -0.04, 6.12, 1.2, 0.2, 0.1)], 0.02), "Limestone")
     glaze(lancet, hole, 0.3, 2, "Lead")
     radius, height = ROSE
     hole = circle(radius, scene.segments(40, 8)) + np.array((0, height))
@@ -102,7 +110,7 @@ def tower_side(scene: Scene) -> Model:
     size = xyz(*np.where(np.arange(len(z)) % 2, [[0.38], [0.62]], [[0.62], [0.38]]), 0.385)
     corner = size / 2 - HALF - 0.025
     model.add(blocks(xyz(corner[:, 0], corner[:, 1], z), size, 0.015), "Limestone")
-    face = scene.lathe("0.8 0, 0.8 0.05, 0.72 0.06, 0.7 0.03", 40)
+    face = scene.lathe([(0.8, 0), (0.8, 0.05), (0.72, 0.06), (0.7, 0.03)], 40)
     model.add(upright(face), "Limestone", clock)
     for bar, turn in ((HOUR_HAND, 57), (MINUTE_HAND, 195), *((MARK, 30 * h) for h in range(12))):
         model.add(stones(bar, 0.002), "Iron", clock, (0, turn, 0))
@@ -118,12 +126,15 @@ def core(scene: Scene) -> Model:
     yoke = (0, 0, BELFRY + 2.3)
     summit = (0, 0, TOWER_TOP + ROOF_HEIGHT - 0.05)
     model.add(box((2 * HALF, 2 * HALF, BELFRY)), "Brick", (0, 0, BELFRY / 2))
-    clapper = scene.tube("0 0 -0.5, 0 0 -0.9, 0 0 -1.25", [0.02, 0.03, 0.08])
+    clapper = scene.tube([(0, 0, -0.5), (0, 0, -0.9), (0, 0, -1.25)], [0.02, 0.03, 0.08])
     model.add(join([scene.lathe(BELL, 28), clapper]), "Bronze", yoke)
-    model.add(stones("0 0 0.02 4.2 0.22 0.26", 0.03), "Wood", yoke)
+    model.add(stones([(0, 0, 0.02, 4.2, 0.22, 0.26)], 0.03), "Wood", yoke)
     boards = lathe([(ROOF_HALF * 2**0.5, 0), (0, ROOF_HEIGHT)], 4)
     model.add(boards, "Wood", (0, 0, TOWER_TOP), (0, 0, 45))
-    ball = scene.lathe("0.16 0, 0.06 0.2, 0.15 0.32, 0.15 0.42, 0.05 0.55", 16)
-    cross = (scene.tube(line, 0.03) for line in ("0 0 0.4, 0 0 1.7", "-0.35 0 1.3, 0.35 0 1.3"))
+    ball = scene.lathe([(0.16, 0), (0.06, 0.2), (0.15, 0.32), (0.15, 0.42), (0.05, 0.55)], 16)
+    cross = (
+        scene.tube(line, 0.03)
+        for line in ([(0, 0, 0.4), (0, 0, 1.7)], [(-0.35, 0, 1.3), (0.35, 0, 1.3)])
+    )
     model.add(join([ball, *cross]), "Iron", summit)
     return model

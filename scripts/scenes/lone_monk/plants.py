@@ -19,9 +19,16 @@ from scenes.lone_monk import plan
 from scenes.lone_monk.plan import ARCADE, ARCADE_TOP, BAY, EAST, FRONT, LAWN, NORTH, SOUTH, WEST
 
 OLIVE = Growth((1.35, 2.0, 0.95), (6, 9), (0.9, 0.9), (0.1, 0.12, 0.02), 0.27, 0.22, bare=0.75)
-BEYOND = "-8.2 14.5 2.2, -5.6 15.8 2.5, 2.8 16.0 2.3, 6.0 15.0 2.05, 8.9 16.8 2.4"  # x, y, size
-BOX_BALLS = "5.3 5.3, 1.45 5.3, 5.3 1.45, 1.45 2.75, 2.75 1.45"  # x, y
-POT = "0.12 0, 0.175 0.27, 0.195 0.27, 0.2 0.33, 0.175 0.33, 0.165 0.27"
+# x, y, size
+BEYOND = [
+    (-8.2, 14.5, 2.2),
+    (-5.6, 15.8, 2.5),
+    (2.8, 16.0, 2.3),
+    (6.0, 15.0, 2.05),
+    (8.9, 16.8, 2.4),
+]
+BOX_BALLS = [(5.3, 5.3), (1.45, 5.3), (5.3, 1.45), (1.45, 2.75), (2.75, 1.45)]  # x, y
+POT = [(0.12, 0), (0.175, 0.27), (0.195, 0.27), (0.2, 0.33), (0.175, 0.33), (0.165, 0.27)]
 
 
 def olive_tree(scene: Scene) -> None:
@@ -57,7 +64,7 @@ def cypresses(scene: Scene) -> None:
     tree.add(leaves, "Cypress leaf")
     t = np.linspace(0, 1, 9)
     tree.add(scene.lathe(np.column_stack([0.36 * flame(t), 0.45 + 4.9 * t]), 10), "Cypress leaf")
-    tree.add(scene.tube("0 0 -0.1, 0 0 2.5, 0 0 5.2", [0.10, 0.08, 0.01]), "Bark")
+    tree.add(scene.tube([(0, 0, -0.1), (0, 0, 2.5), (0, 0, 5.2)], [0.10, 0.08, 0.01]), "Bark")
     mesh = tree.mesh("Cypress")
     place("Cypress", mesh, plan.side(NORTH, (3.6, 3.7, 0), 57, 0.95))
     x, y, size = points(BEYOND).T
@@ -104,7 +111,7 @@ def geraniums(scene: Scene) -> None:
     for _ in range(3):
         model = Model(scene)
         model.add(scene.lathe(POT, capped=False), "Pot")
-        model.add(scene.lathe("0.17 0.28, 0.02 0.295"), "Soil")
+        model.add(scene.lathe([(0.17, 0.28), (0.02, 0.295)]), "Soil")
         bush = leaf_cloud(random, scene.count(420), (0.25, 0.25, 0.2), 0.06, 0.95)
         model.add(bush, "Box leaf", (0, 0, 0.46))
         for out in directions(random, 9):

@@ -17,10 +17,10 @@ EXPOSED, LENGTH = 0.36, 0.43  # of a tile
 UP = EXPOSED * np.cos(SLOPE)  # from row to row, seen from above
 # A column's covers and pans: outer radius below and above, x, z, how far the lower end lies over
 # the row below, and which side is up.
-TILES = f"0.09 0.072 0 0.11 0.035 1, 0.074 0.088 {PITCH / 2} 0.13 0.03 -1"
+TILES = [(0.09, 0.072, 0, 0.11, 0.035, 1), (0.074, 0.088, PITCH / 2, 0.13, 0.03, -1)]
 # A downpipe from the trough: how far towards the pier, and how far below the eaves or above ground.
-PIPE_HEAD = "0 -0.05, 0 -0.16, 0.29 -0.5"
-PIPE = "0.29 3, 0.29 0.3, 0.23 0.17, 0.13 0.12"
+PIPE_HEAD = [(0, -0.05), (0, -0.16), (0.29, -0.5)]
+PIPE = [(0.29, 3), (0.29, 0.3), (0.23, 0.17), (0.13, 0.12)]
 
 
 def half_pipe(
@@ -118,7 +118,7 @@ def gutter(scene: Scene, y: float) -> Shape:
     hooks = copies(hook, xyz(np.arange(0.6 - y, y, 1.1), y, EAVE), (-1, 0, 0))
     out, z = np.concatenate([points(PIPE_HEAD) + np.array((0, EAVE)), points(PIPE)]).T
     pipe = scene.tube(xyz(-y - out, y + out, z), 0.045, 10)
-    clip = scene.lathe("0.046 0, 0.056 0, 0.056 0.05", 10)
+    clip = scene.lathe([(0.046, 0), (0.056, 0), (0.056, 0.05)], 10)
     clips = copies(clip, xyz(-y - 0.29, y + 0.29, [0.7, 1.9, 3.0]))
     return join([trough, hooks, pipe, clips])
 

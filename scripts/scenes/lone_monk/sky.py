@@ -33,11 +33,19 @@ def sky(scene: Scene) -> None:
 
 def swallows(scene: Scene) -> None:
     """Swallows over the court: what there is to see straight above."""
-    body = scene.lathe("0 -0.09, 0.018 -0.04, 0.02 0.02, 0.012 0.07, 0 0.09", 8)
+    body = scene.lathe([(0, -0.09), (0.018, -0.04), (0.02, 0.02), (0.012, 0.07), (0, 0.09)], 8)
     body = body.transformed(transform(rotation=(0, np.pi / 2, 0)))
-    right = "0.05 0 0, -0.01 0 0, -0.03 -0.1 0.03, -0.11 -0.22 0.01, 0.04 -0.1 0.035"
+    right = [
+        (0.05, 0, 0),
+        (-0.01, 0, 0),
+        (-0.03, -0.1, 0.03),
+        (-0.11, -0.22, 0.01),
+        (0.04, -0.1, 0.035),
+    ]
     wing = facets(right, (0, 1, 2, 4), (4, 2, 3))
-    tail = facets("-0.07 0 0, -0.19 0.05 0, -0.11 0 0, -0.19 -0.05 0", (0, 1, 2), (0, 2, 3))
+    tail = facets(
+        [(-0.07, 0, 0), (-0.19, 0.05, 0), (-0.11, 0, 0), (-0.19, -0.05, 0)], (0, 1, 2), (0, 2, 3)
+    )
     bird = join([body, wing, wing.scaled(1, -1, 1), tail])
     swallow = scene.mesh("Swallow", bird, "Iron", smooth=False)
     random = scene.random("swallows")

@@ -18,7 +18,13 @@ WINDOW = (0.38, 1.15, 1.80, 0.38)
 UPPER_WINDOW = (0.42, 6.0, 6.62, 0.12)
 WALK_WALL = (plan.BAY, 0.0, LEAN_TO_TOP, BACK_WALL)  # of a bay: width, foot, top, thickness
 # A shutter's frame: middle x, y, z and width, depth, height.
-SHUTTER = "±0.19 0 0 0.05 0.035 0.74, 0 0 0.34..-0.34*2 0.34 0.035 0.06, 0 0 0 0.34 0.035 0.06"
+SHUTTER = [
+    (-0.19, 0, 0, 0.05, 0.035, 0.74),
+    (0.19, 0, 0, 0.05, 0.035, 0.74),
+    (0, 0, 0.34, 0.34, 0.035, 0.06),
+    (0, 0, -0.34, 0.34, 0.035, 0.06),
+    (0, 0, 0, 0.34, 0.035, 0.06),
+]
 
 
 def wall(
@@ -71,7 +77,7 @@ def back_walls(scene: Scene) -> None:
     """The walls behind the walks: whitewashed, with doors and windows by turns."""
     hole = arch_outline(*WINDOW, scene.segments(16))
     window = wall(scene, "Whitewash", WALK_WALL, hole, (0.1, 0.03))
-    window.add(stones("0 -0.02 1.11 1.0 0.16 0.08"), "Limestone")
+    window.add(stones([(0, -0.02, 1.11, 1.0, 0.16, 0.08)]), "Limestone")
     glaze(window, hole, 0.3, 3, "Lead")
     bays = window.mesh("Wall with window"), doorway(scene, 0.22).mesh("Wall with door")
     for number in plan.SIDES:
@@ -99,7 +105,7 @@ def upper_storeys(scene: Scene) -> None:
         meshes = []
         for swing in (21, 7, 7, 7):
             bay = wall(scene, "Plaster", (width, LEAN_TO_TOP, top, 0.4), hole, (0.1, 0.03))
-            bay.add(stones("0 -0.03 5.95 1.1 0.18 0.1", 0.015), "Limestone")
+            bay.add(stones([(0, -0.03, 5.95, 1.1, 0.18, 0.1)], 0.015), "Limestone")
             glaze(bay, hole, 0.22, 1, "Wood")
             for sign in (-1, 1):
                 wing = shutter.moved(0.22 * sign, 0, 0)

@@ -12,8 +12,13 @@ from scenes.library.shapes import box, transform
 
 # Inner size of the room in metres; its floor is at z = 0 and it is centred on x = y = 0.
 SIZE = (6.0, 6.0, 3.0)
-PAINTS = """sphere 0.7 0.15 0.1 0.6, torus 0.1 0.5 0.2 0.6, pillar 0.75 0.7 0.6 0.6
-    cone 0.1 0.2 0.7 0.6, box 0.8 0.6 0.1 0.6"""
+PAINTS = [
+    ("sphere", (0.7, 0.15, 0.1), 0.6),
+    ("torus", (0.1, 0.5, 0.2), 0.6),
+    ("pillar", (0.75, 0.7, 0.6), 0.6),
+    ("cone", (0.1, 0.2, 0.7), 0.6),
+    ("box", (0.8, 0.6, 0.1), 0.6),
+]
 
 
 def build(parameters: Mapping[str, Any]) -> None:
@@ -30,8 +35,8 @@ def build(parameters: Mapping[str, Any]) -> None:
     for name, shape, location, rotation in (
         ("sphere", scene.ball(0.5, 32), (2, 1, 0.5), (0, 0, 0)),
         ("torus", scene.ring(0.5, 0.15, 48, 12), (-1.8, 1.8, 1.2), (np.radians(70), 0, 0.3)),
-        ("pillar", scene.lathe("0.2 0, 0.2 3", 32), (-2, -2, 0), (0, 0, 0)),
-        ("cone", scene.lathe("0.5 0, 0 1", 32), (1, -2, 0), (0, 0, 0)),
+        ("pillar", scene.lathe([(0.2, 0), (0.2, 3)], 32), (-2, -2, 0), (0, 0, 0)),
+        ("cone", scene.lathe([(0.5, 0), (0, 1)], 32), (1, -2, 0), (0, 0, 0)),
         ("box", box((0.7, 0.7, 0.7)), (2.2, -1.2, 0.35), (0, 0, 1)),
     ):
         scene.add(name, shape, name, matrix=transform(location, rotation), smooth=False)

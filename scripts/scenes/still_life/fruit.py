@@ -6,24 +6,53 @@ from scenes.library.points import circle, directions, points, smooth_path, unit,
 from scenes.library.scene import Model, Scene, place
 from scenes.library.shapes import Shape, copies, join, sheet, transform
 
-PEAR = """0.003 0.003, 0.014 0, 0.029 0.01, 0.0365 0.03, 0.034 0.049, 0.024 0.069, 0.0165 0.085
-    0.0125 0.095, 0.006 0.0985, 0.001 0.097"""
-LEMON = """0.0005 0, 0.004 0.0015, 0.0075 0.006, 0.02 0.0165, 0.0275 0.034, 0.0245 0.05
-    0.012 0.063, 0.006 0.068, 0.004 0.072, 0.0005 0.0735"""
+PEAR = [
+    (0.003, 0.003),
+    (0.014, 0),
+    (0.029, 0.01),
+    (0.0365, 0.03),
+    (0.034, 0.049),
+    (0.024, 0.069),
+    (0.0165, 0.085),
+    (0.0125, 0.095),
+    (0.006, 0.0985),
+    (0.001, 0.097),
+]
+LEMON = [
+    (0.0005, 0),
+    (0.004, 0.0015),
+    (0.0075, 0.006),
+    (0.02, 0.0165),
+    (0.0275, 0.034),
+    (0.0245, 0.05),
+    (0.012, 0.063),
+    (0.006, 0.068),
+    (0.004, 0.072),
+    (0.0005, 0.0735),
+]
 # Places, and turns in degrees.
-PEARS = "0.022 -0.052 0.028 -38 12 40, 0.052 0.0 0.032 26 14 -60, 0.085 -0.04 0.03 8 38 150"
+PEARS = [
+    (0.022, -0.052, 0.028, -38, 12, 40),
+    (0.052, 0.0, 0.032, 26, 14, -60),
+    (0.085, -0.04, 0.03, 8, 38, 150),
+]
 GRAPE = 0.0098
 # The bunch: a path from the bowl's middle over its rim to the board, and the width there.
-BUNCH = """0.03 -0.03 0.075, 0.0 -0.06 0.085, -0.035 -0.085 0.072, -0.058 -0.1 0.035
-    -0.07 -0.112 0.014"""
+BUNCH = [
+    (0.03, -0.03, 0.075),
+    (0.0, -0.06, 0.085),
+    (-0.035, -0.085, 0.072),
+    (-0.058, -0.1, 0.035),
+    (-0.07, -0.112, 0.014),
+]
 WIDTHS = (0.022, 0.028, 0.026, 0.022, 0.010)
-VINE_LEAVES = "0.045 -0.02 0.104 0.5 -0.35 2.3, 0.035 -0.028 0.1 -0.35 0.3 4.4"
+VINE_LEAVES = [(0.045, -0.02, 0.104, 0.5, -0.35, 2.3), (0.035, -0.028, 0.1, -0.35, 0.3, 4.4)]
 
 
 def pears(scene: Scene) -> None:
     model = Model(scene)
     model.add(scene.lathe(smooth_path(PEAR, scene.segments(48, 12)), 56), "Pear")
-    stalk = scene.bend("0 0 0.094, 0.001 0 0.108, 0.005 0.002 0.12", 0.0015, 10, 7)
+    stalk = scene.bend([(0, 0, 0.094), (0.001, 0, 0.108), (0.005, 0.002, 0.12)], 0.0015, 10, 7)
     model.add(stalk, "Stalk")
     mesh = model.mesh("Pear", True)
     for number, row in enumerate(points(PEARS)):
@@ -49,7 +78,7 @@ def grapes(scene: Scene) -> None:
     scene.add("Grapes", copies(grape, places, towards, up, size), "Grape")
     nearest = path[np.linalg.norm(places[:, None] - path, axis=-1).argmin(axis=1)]
     bows = np.stack([nearest, (nearest + places) / 2 + (0, 0, 0.002), places], axis=1)
-    stem = np.concatenate([points("0.055 -0.012 0.118, 0.045 -0.02 0.1"), path])
+    stem = np.concatenate([points([(0.055, -0.012, 0.118), (0.045, -0.02, 0.1)]), path])
     stalks = [*(scene.tube(bow, 0.0008, 5) for bow in bows), scene.tube(stem, 0.0015, 7)]
     scene.add("Stalks", join(stalks), "Stalk")
     for number, row in enumerate(points(VINE_LEAVES)):

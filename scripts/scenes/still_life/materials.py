@@ -12,20 +12,33 @@ def palette() -> None:
     wood("Walnut", (0.035, 0.014, 0.006), (0.17, 0.075, 0.03), 0.22, along="X")
     wood("Ebony", (0.010, 0.007, 0.005), (0.035, 0.022, 0.014), 0.25)
     hammered("Copper", (0.93, 0.42, 0.25), 0.17)
-    plains("Brass 0.80 0.53 0.19 0.16, Silver 0.90 0.89 0.87 0.09", Metallic=1.0)
+    plains(
+        [("Brass", (0.80, 0.53, 0.19), 0.16), ("Silver", (0.90, 0.89, 0.87), 0.09)], Metallic=1.0
+    )
     clear("Glass", (0.975, 0.985, 0.98), 1.5)
     clear("Wine", (0.40, 0.012, 0.03), 1.34)
     linen("Linen", (0.74, 0.69, 0.60))
     linen("Blue linen", (0.035, 0.075, 0.19))
-    plains("Porcelain 0.84 0.84 0.82 0.1, Cobalt 0.012 0.03 0.22 0.12", Coat_Weight=0.5)
-    plains("Eye 0.004 0.004 0.005 0.03", Coat_Weight=1.0)
-    plains("Wax 0.90 0.80 0.62 0.42", Subsurface_Weight=1.0, Subsurface_Scale=0.02, **FLESH)
+    plains(
+        [("Porcelain", (0.84, 0.84, 0.82), 0.1), ("Cobalt", (0.012, 0.03, 0.22), 0.12)],
+        Coat_Weight=0.5,
+    )
+    plains([("Eye", (0.004, 0.004, 0.005), 0.03)], Coat_Weight=1.0)
+    plains(
+        [("Wax", (0.90, 0.80, 0.62), 0.42)], Subsurface_Weight=1.0, Subsurface_Scale=0.02, **FLESH
+    )
     pearl = {"Subsurface_Weight": 0.4, "Subsurface_Scale": 0.002, **FLESH}
     plain("Pearl", (0.84, 0.76, 0.69), Roughness=0.16, Coat_Weight=1.0, **pearl)
     emissive("Flame", (1.0, 0.56, 0.16), 14.0)
-    plains("""Wick 0.01 0.008 0.007 0.9, Stalk 0.10 0.055 0.02 0.7, Beak 0.80 0.24 0.03 0.35
-        Skin 0.75 0.45 0.08 0.9""")
-    foliage("Leaf 0.03 0.085 0.012 0.09 0.18 0.03 0.4")
+    plains(
+        [
+            ("Wick", (0.01, 0.008, 0.007), 0.9),
+            ("Stalk", (0.10, 0.055, 0.02), 0.7),
+            ("Beak", (0.80, 0.24, 0.03), 0.35),
+            ("Skin", (0.75, 0.45, 0.08), 0.9),
+        ]
+    )
+    foliage([("Leaf", (0.03, 0.085, 0.012), (0.09, 0.18, 0.03), 0.4)])
     for fruit in (pear, grape, lemon, lemon_flesh):
         graph = MaterialGraph(fruit.__name__.capitalize().replace("_", " "))
         flesh = {"Subsurface_Weight": 0.5, "Subsurface_Scale": 0.006, **FLESH}
@@ -65,7 +78,9 @@ def pear(graph: MaterialGraph) -> dict[str, object]:
     """A fruit's inputs besides those of flesh: green to yellow, with a blush and freckles."""
     where = graph.coordinates()
     side = graph.math("ADD", graph.xyz(where)["X"], graph.noise(where, 40.0))
-    ground = graph.ramp(side, "0.44 0.38 0.42 0.05, 0.50 0.62 0.47 0.06, 0.54 0.55 0.12 0.03")
+    ground = graph.ramp(
+        side, [(0.44, 0.38, 0.42, 0.05), (0.50, 0.62, 0.47, 0.06), (0.54, 0.55, 0.12, 0.03)]
+    )
     freckles = graph.span(graph.voronoi(where, 330.0)["Distance"], 1.0, 0.0, 0.08, 0.2)
     color = graph.mix(graph.math("MULTIPLY", freckles, 0.6), ground, (0.20, 0.11, 0.03))
     return {"Base_Color": color, "Roughness": 0.32, "Normal": graph.bump(freckles, -0.0002)}
@@ -95,7 +110,7 @@ def lemon_flesh(graph: MaterialGraph) -> dict[str, object]:
     far = graph.vector_math("LENGTH", flat)["Value"]
     juice = graph.math("MULTIPLY", within, graph.math("MULTIPLY", far, 40.0))
     pulp = graph.noise(where, 300.0)
-    flesh = graph.ramp(pulp, "0.35 0.78 0.52 0.03, 0.65 0.90 0.70 0.16")
+    flesh = graph.ramp(pulp, [(0.35, 0.78, 0.52, 0.03), (0.65, 0.90, 0.70, 0.16)])
     pith: Color = (0.86, 0.82, 0.62)
     color = graph.mix(graph.span(juice, 0.0, 1.0, 0.03, 0.06), pith, flesh)
     color = graph.mix(graph.span(far, 0.0, 1.0, 0.0235, 0.0245), color, pith)
@@ -106,6 +121,6 @@ def down() -> None:
     """Hair as a fibre of glass that is coloured inside."""
     graph = MaterialGraph("Down")
     along = graph.add("HairInfo").outputs["Intercept"]
-    tint = graph.ramp(along, "0 0.72 0.36 0.05, 1 0.95 0.76 0.30")
+    tint = graph.ramp(along, [(0, 0.72, 0.36, 0.05), (1, 0.95, 0.76, 0.30)])
     hair = {"Color": tint, "Roughness": 0.45, "Radial Roughness": 0.6}
     graph.finish(graph.add("BsdfHairPrincipled", hair, parametrization="COLOR"))

@@ -1,10 +1,14 @@
-"""Exports, read back as their consumers read them: one module a format.
+"""Reads exports back as their consumers do: one module for each format.
 
 A reader shares no code with the writer of its format in `lightfield.export`. It has
-``read(path, size, options)``: the file that lists the export (transforms.json or export.json), the
-views' width and height in pixels, and the options with which the export says it was made. It
-returns `contents.Exported`, in the axes and metres of lightfield.json, and raises `UserError` for a
-file that its consumer could not open.
+``read(path, size, options)``:
+
+- ``path``: the file that lists the export (transforms.json or export.json).
+- ``size``: the views' width and height in pixels.
+- ``options``: the options that the export says it was made with.
+
+It returns `contents.Exported`, in the axes and metres of lightfield.json. It raises `UserError` for
+a file that its consumer could not open.
 """
 
 from pathlib import Path
@@ -49,7 +53,8 @@ def read(path: Path, size: tuple[int, int]) -> Exported:
         return instant_ngp.read(path)
     with reading(path, "list of an export"):
         content = read_json(path)
-        name, options = str(content["format"]), dict(content["options"])
+        name = str(content["format"])
+        options = dict(content["options"])
     if name not in READERS:
         raise UserError(f"{path}: format: is {name!r}; must be of {', '.join(READERS)}")
     with reading(path, f"list of an export for {name}"):

@@ -1,4 +1,4 @@
-"""The consumers' camera models: at which pixel each has what lies in a direction.
+"""The consumers' camera models. Each projects directions to pixels.
 
 Directions (…, 3) are in the axes of lightfield.json: x right, y up, the camera looks along −z.
 Pixels (…, 2) count right and down from the image's corner, centres at ½.
@@ -25,7 +25,7 @@ class Camera(Protocol):
     def height(self) -> int: ...
 
     def pixels(self, rays: Floats) -> Floats:
-        """Return the pixels (…, 2) of directions (…, 3); NaN for those that it cannot project."""
+        """Return the pixels (…, 2) of directions (…, 3). NaN for those that it cannot project."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Pinhole:
 class OpenCVFisheye:
     """OPENCV_FISHEYE: r = θ + k1 θ³ + k2 θ⁵ + k3 θ⁷ + k4 θ⁹, in focal lengths.
 
-    Without distortion it is the equidistant lens, which goes on behind the camera.
+    Without distortion it is the equidistant lens, which also sees behind the camera.
     """
 
     width: int
@@ -96,7 +96,7 @@ class PolynomialFisheye:
         x, y, z = np.moveaxis(rays, -1, 0)
         side = np.hypot(x, y)
         theta = np.arctan2(side, -z)
-        # Inverted by a table so fine that straight lines between its entries are near enough.
+        # Invert the polynomial with a table so fine that linear interpolation is exact enough.
         reach = math.hypot(max(self.cx, self.width - self.cx), max(self.cy, self.height - self.cy))
         table = np.linspace(0, reach, 16 * max(self.width, self.height))
         sign = math.copysign(1.0, self.terms[1])
@@ -108,10 +108,9 @@ class PolynomialFisheye:
 
 @dataclass(frozen=True)
 class Panorama:
-    """Longitude linear in x and growing to the right, latitude linear in y, in radians.
+    """Longitude is linear in x and grows to the right. Latitude is linear in y. Both in radians.
 
-    They are ``west`` and ``north`` at the image's upper left corner, ``east`` and ``south`` at the
-    lower right one.
+    The upper left corner has ``west`` and ``north``, the lower right corner ``east`` and ``south``.
     """
 
     width: int
@@ -134,6 +133,6 @@ class Panorama:
 
 
 def _along(radius: Floats, side: Floats) -> Floats:
-    """Return by what to multiply the sideways part of a direction; it is 0 on the axis."""
+    """Return the factors that scale a direction's (x, y) to pixels: 0 on the axis."""
     with np.errstate(invalid="ignore"):
         return np.where(side > 0, radius / np.where(side > 0, side, 1), 0 * radius)

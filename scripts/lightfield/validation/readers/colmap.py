@@ -1,8 +1,8 @@
 """A COLMAP model, binary or text, read by COLMAP's format.rst and models.h.
 
-Poses are world to camera with x right, y down and z forward. What the model says twice must agree:
-an image's points with the points' tracks, and where an image has a point with where its camera
-projects it.
+Poses are world to camera with x right, y down and z forward. The reader compares what the model
+says twice: an image's points with the points' tracks, and a point's pixel in an image with its
+projection.
 """
 
 import struct
@@ -37,7 +37,7 @@ MODELS: dict[int, tuple[str, Callable[..., Camera], int]] = {
 }
 NAMES = {name: number for number, (name, _, _) in MODELS.items()}
 
-# POINTS2D that see no point have this number.
+# POINTS2D without a point have this number.
 NO_POINT = -1
 
 # From COLMAP's camera to that of lightfield.json (y up, looks along −z), and back.
@@ -46,23 +46,26 @@ _FLIP = np.diag([1.0, -1.0, -1.0])
 
 @dataclass(frozen=True)
 class Image:
-    """One image: ``pixels`` (m, 2) are where it sees the points called ``points`` (m,)."""
+    """One image. It sees the points with the numbers ``points`` (m,) at ``pixels`` (m, 2).
+
+    ``rotation`` (3, 3) and ``translation`` (3,) map the world to the camera.
+    """
 
     number: int
     name: str
     camera: int
-    turn: Floats
-    shift: Floats
+    rotation: Floats
+    translation: Floats
     pixels: Floats
     points: Ints
 
 
 @dataclass(frozen=True)
 class Points:
-    """Points (n,) and their tracks, one after the other: ``sizes`` (n,) are the tracks' lengths.
+    """The n points and their tracks, one after the other. ``sizes`` (n,) are the tracks' lengths.
 
-    A row of ``tracks`` is the number of an image, and the place among the points that it sees.
-    ``errors`` (n,) are how many pixels on average the images have a point beside its projection.
+    A row of ``tracks`` holds an image's number, and an index in the points that it sees. ``errors``
+    (n,) are mean distances in pixels between a point's projections and its places in the images.
     """
 
     numbers: Ints
@@ -74,7 +77,7 @@ class Points:
 
 @dataclass(frozen=True)
 class Model:
-    """A model in a ``folder``, whose files end in ``suffix``."""
+    """A model in a ``folder``. Its files end in ``suffix``."""
 
     folder: Path
     suffix: str
@@ -106,37 +109,43 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
 
 def read_model(folder: Path, suffix: str) -> Model:
     """Read the three files of a model, ``.bin`` or ``.txt``."""
-    readers = {".bin": (_binary_cameras, _binary_images, _binary_points)}
-    readers[".txt"] = (_text_cameras, _text_images, _text_points)
-    contents: list[Any] = []
-    for name, parse in zip(("cameras", "images", "points3D"), readers[suffix], strict=True):
-        path = folder / f"{name}{suffix}"
-        with reading(path, f"COLMAP {name} file"):
-            contents.append(parse(path))
-            if not contents[-1] and name != "points3D":
-                raise ValueError("it is empty")
-    return Model(folder, suffix, *contents)
+    is_binary = suffix == ".bin"
+    cameras_path = folder / f"cameras{suffix}"
+    with reading(cameras_path, "COLMAP cameras file"):
+        cameras = _binary_cameras(cameras_path) if is_binary else _text_cameras(cameras_path)
+        if not cameras:
+            raise ValueError("it is empty")
+    images_path = folder / f"images{suffix}"
+    with reading(images_path, "COLMAP images file"):
+        images = _binary_images(images_path) if is_binary else _text_images(images_path)
+        if not images:
+            raise ValueError("it is empty")
+    points_path = folder / f"points3D{suffix}"
+    with reading(points_path, "COLMAP points3D file"):
+        points = _binary_points(points_path) if is_binary else _text_points(points_path)
+    return Model(folder, suffix, cameras, images, points)
 
 
 def exported_model(model: Model, pictures: Path) -> Exported:
     """Return what a model says of the images in the folder ``pictures``."""
     exported = Exported()
-    cameras_file, images_file = model.file("cameras"), model.file("images")
+    cameras_file = model.file("cameras")
+    images_file = model.file("images")
     for number, camera in model.cameras.items():
         exported.cameras.append(ExportedCamera(f"{cameras_file}: camera {number}", camera))
-    seen: set[int] = set()
+    numbers_so_far: set[int] = set()
     for image in model.images:
         place = f"image {image.number}"
-        if image.number in seen:
+        if image.number in numbers_so_far:
             exported.faults.append(f"{images_file}: {place}: is there twice")
-        seen.add(image.number)
+        numbers_so_far.add(image.number)
         if image.camera not in model.cameras:
             exported.faults.append(f"{images_file}: {place}: has no camera {image.camera}")
         if not (pictures / image.name).is_file():
             exported.faults.append(f"{images_file}: {place}: {image.name} is no file")
         matrix = np.eye(4)
-        matrix[:3, :3] = image.turn.T @ _FLIP
-        matrix[:3, 3] = -image.turn.T @ image.shift
+        matrix[:3, :3] = image.rotation.T @ _FLIP
+        matrix[:3, 3] = -image.rotation.T @ image.translation
         view = ExportedView(images_file, place, Path(image.name).stem, matrix)
         exported.views.append(view)
     points_file = model.file("points3D")
@@ -149,10 +158,10 @@ def exported_model(model: Model, pictures: Path) -> Exported:
     return exported
 
 
-def _turn(quaternion: Floats) -> Floats:
+def _rotation(quaternion: Floats) -> Floats:
     """Return the matrix (3, 3) of a quaternion (w, x, y, z), as COLMAP's readers compute it.
 
-    None of them makes a quaternion a unit one first, so the matrix of any other is no rotation.
+    None of them normalises the quaternion. So only a unit quaternion gives a rotation.
     """
     w, x, y, z = quaternion
     return np.array(
@@ -201,10 +210,10 @@ def _binary_images(path: Path) -> list[Image]:
         end = content.index(b"\0", place + 64)
         name = content[place + 64 : end].decode()
         (count,) = struct.unpack_from("<Q", content, end + 1)
-        seen = np.frombuffer(content, row, count, end + 9) if count else np.empty(0, row)
+        rows = np.frombuffer(content, row, count, end + 9) if count else np.empty(0, row)
         place = end + 9 + count * row.itemsize
-        turn = _turn(pose[:4])
-        images.append(Image(number, name, camera, turn, pose[4:], seen["pixel"], seen["point"]))
+        rotation = _rotation(pose[:4])
+        images.append(Image(number, name, camera, rotation, pose[4:], rows["pixel"], rows["point"]))
     _require_end(content, place)
     return images
 
@@ -236,7 +245,7 @@ def _require_end(content: bytes, place: int) -> None:
 
 
 def _lines(path: Path) -> Iterator[tuple[str, str]]:
-    """Yield where each line stands, and the line; comments are left out."""
+    """Yield the place and the text of each line that is no comment."""
     with path.open(encoding="utf-8") as file:
         for number, line in enumerate(file, 1):
             if not line.startswith("#"):
@@ -263,13 +272,12 @@ def _text_images(path: Path) -> list[Image]:
         with reading(place, "image"):
             number, *texts, camera, name = line.split()
             pose = numbers(from_texts(texts), (7,))
-            turn = _turn(pose[:4])
+            rotation = _rotation(pose[:4])
             _, body = next(lines, ("", ""))
-            seen = np.array(body.split(), np.float64).reshape(-1, 3)
-            points_seen = _whole(seen[:, 2])
-            images.append(
-                Image(int(number), name, int(camera), turn, pose[4:], seen[:, :2], points_seen)
-            )
+            rows = np.array(body.split(), np.float64).reshape(-1, 3)
+            pixels = rows[:, :2]
+            points = _integers(rows[:, 2])
+            images.append(Image(int(number), name, int(camera), rotation, pose[4:], pixels, points))
     return images
 
 
@@ -285,14 +293,17 @@ def _text_points(path: Path) -> Points:
 
 
 def _points(heads: Sequence[tuple[Any, ...]], tracks: Ints) -> Points:
-    """Return points of their numbers, positions, errors and lengths of tracks, and the tracks."""
-    table = np.array([head[1:5] for head in heads], np.float64).reshape(-1, 4)
-    first, last = (np.array([head[place] for head in heads], np.int64) for place in (0, 5))
-    return Points(first, table[:, :3], table[:, 3], last, tracks)
+    """Return the points. A head is (number, x, y, z, error, length of the track)."""
+    point_numbers = np.array([head[0] for head in heads], np.int64)
+    positions_and_errors = np.array([head[1:5] for head in heads], np.float64).reshape(-1, 4)
+    sizes = np.array([head[5] for head in heads], np.int64)
+    positions = positions_and_errors[:, :3]
+    errors = positions_and_errors[:, 3]
+    return Points(point_numbers, positions, errors, sizes, tracks)
 
 
-def _whole(values: Floats) -> Ints:
-    """Return whole numbers that were read as floats; raises ValueError for others."""
+def _integers(values: Floats) -> Ints:
+    """Return whole numbers that were read as floats. Raises ValueError for others."""
     with np.errstate(invalid="ignore"):
         integers = values.astype(np.int64)
     if not (integers == values).all():
@@ -307,26 +318,30 @@ def _track_faults(model: Model) -> list[str]:
     """Compare the points' tracks with the lists of points that the images have."""
     path = model.file("points3D")
     points = model.points
-    by_number = {image.number: index for index, image in enumerate(model.images)}
+    index_of_image = {image.number: index for index, image in enumerate(model.images)}
+    # The points of all images, one image after the other.
     starts = np.cumsum([0, *(len(image.points) for image in model.images)])
     listed = np.concatenate([np.empty(0, np.int64), *(image.points for image in model.images)])
     image_numbers, inverse = np.unique(points.tracks[:, 0], return_inverse=True)
-    images = np.array([by_number.get(number, -1) for number in image_numbers.tolist()], np.int64)
-    image = images[inverse] if len(inverse) else np.empty(0, np.int64)
+    image_indices = np.array(
+        [index_of_image.get(number, -1) for number in image_numbers.tolist()], np.int64
+    )
+    # The image, the index in its points, and the point of each row of the tracks.
+    image = image_indices[inverse] if len(inverse) else np.empty(0, np.int64)
     index = points.tracks[:, 1]
-    inside = (image >= 0) & (index >= 0) & (index < (starts[1:] - starts[:-1])[image])
-    place = np.where(inside, starts[image] + index, 0)
     owner = np.repeat(points.numbers, points.sizes)
-    right = inside & (listed[place] == owner) if len(listed) else inside
+    exists = (image >= 0) & (index >= 0) & (index < (starts[1:] - starts[:-1])[image])
+    place = np.where(exists, starts[image] + index, 0)
+    is_right = exists & (listed[place] == owner) if len(listed) else exists
     faults = [
         f"{path}: point {number}: its track has what is no such point of an image"
-        for number in np.unique(owner[~right]).tolist()
+        for number in np.unique(owner[~is_right]).tolist()
     ]
     is_tracked = listed == NO_POINT
-    is_tracked[place[right]] = True
+    is_tracked[place[is_right]] = True
     untracked = np.flatnonzero(~is_tracked)
-    images_of = np.searchsorted(starts, untracked, side="right") - 1
-    for point, number in zip(listed[untracked], images_of, strict=True):
+    images_of_untracked = np.searchsorted(starts, untracked, side="right") - 1
+    for point, number in zip(listed[untracked], images_of_untracked, strict=True):
         faults.append(f"{path}: point {point}: its track lacks {model.images[number].name}")
     return faults
 
@@ -334,10 +349,11 @@ def _track_faults(model: Model) -> list[str]:
 def _projection_faults(model: Model) -> list[str]:
     """Compare where each image has its points with where its camera projects them."""
     faults: list[str] = []
-    # How many images have each point, and of those that have it elsewhere the image, the place
-    # among the image's points, and the row of the point.
+    # The number of images that see each point.
     totals = np.zeros(len(model.points.numbers), np.int64)
+    # For each wrong projection: the image, the index in its points, and the point's row.
     off = [np.empty((0, 3), np.int64)]
+    # The number of points of each image.
     sizes = []
     order = np.argsort(model.points.numbers)
     for number, image in enumerate(model.images):
@@ -346,7 +362,8 @@ def _projection_faults(model: Model) -> list[str]:
         for place in places[unknown].tolist():
             point = image.points[place]
             faults.append(f"{model.file('images')}: {image.name}: there is no point {point}")
-        places, rows = places[~unknown], rows[~unknown]
+        places = places[~unknown]
+        rows = rows[~unknown]
         wrong = _is_projected_elsewhere(image, model, places, rows)
         totals += np.bincount(rows, minlength=len(totals))
         sizes.append(len(rows))
@@ -379,9 +396,10 @@ def _projection_faults(model: Model) -> list[str]:
 
 
 def _places_and_rows(image: Image, model: Model, order: Ints) -> tuple[Ints, Ints]:
-    """Return the places of an image's points, and their rows in the model's, −1 for none there.
+    """Return the indices of an image's points, and their rows among the model's points.
 
-    ``order`` (n,) sorts the numbers of the model's points.
+    The row is −1 for a point that the model lacks. ``order`` (n,) sorts the numbers of the model's
+    points.
     """
     places = np.flatnonzero(image.points != NO_POINT)
     if not len(order):
@@ -392,15 +410,15 @@ def _places_and_rows(image: Image, model: Model, order: Ints) -> tuple[Ints, Int
 
 
 def _is_projected_elsewhere(image: Image, model: Model, places: Ints, rows: Ints) -> NDArray[Any]:
-    """Return which of an image's points its camera does not project to where the image has them."""
+    """Return which of an image's points its camera projects to another pixel."""
     camera = model.cameras.get(image.camera)
     if camera is None:
         return np.ones(len(rows), bool)
     # A damaged number may be anything.
     with np.errstate(over="ignore", invalid="ignore"):
-        local = (model.points.positions[rows] @ image.turn.T + image.shift) @ _FLIP
-        apart = np.abs(camera.pixels(local) - image.pixels[places]).max(axis=-1)
-    return ~(apart <= FLOAT32 * max(camera.width, camera.height))
+        local = (model.points.positions[rows] @ image.rotation.T + image.translation) @ _FLIP
+        offsets = np.abs(camera.pixels(local) - image.pixels[places]).max(axis=-1)
+    return ~(offsets <= FLOAT32 * max(camera.width, camera.height))
 
 
 def _check_depth_map(path: Path, size: tuple[int, int], exported: Exported) -> None:

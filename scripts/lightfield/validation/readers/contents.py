@@ -14,7 +14,7 @@ from lightfield.validation.readers.cameras import Camera
 Floats = NDArray[np.float64]
 
 FLOAT32 = 4 * float(np.finfo(np.float32).eps)
-"""Relative difference up to which two numbers are the same: consumers compute with float32."""
+"""Numbers with a smaller relative difference are equal, because consumers compute with float32."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class ExportedCamera:
 
 @dataclass(frozen=True)
 class Part:
-    """The names of the views that a ``place`` in a file has for a part of the split."""
+    """The ``names`` of the views that a ``place`` in a file lists for a ``part`` of the split."""
 
     place: str
     part: str
@@ -50,10 +50,10 @@ class Part:
 
 @dataclass(frozen=True)
 class DepthRange:
-    """The nearest and the farthest depth in metres, "z" or "distance", of a view.
+    """The nearest and the farthest depth of a view in metres. ``meaning`` is "z" or "distance".
 
-    ``view`` is None where the range is that of all views together. What is farther than
-    ``farthest``, and where nothing is hit, counts as that far.
+    ``view`` is None for the range of all views together. Misses, and depths beyond ``farthest``,
+    count as ``farthest``.
     """
 
     place: str
@@ -66,7 +66,10 @@ class DepthRange:
 
 @dataclass(frozen=True)
 class DepthMap:
-    """A view's depth in integers: so many ``metres`` a step, "z" or "distance", 0 for none."""
+    """A view's depth in integers: ``metres`` per step, 0 for none.
+
+    ``meaning`` is "z" or "distance".
+    """
 
     place: str
     path: Path
@@ -77,7 +80,7 @@ class DepthMap:
 
 @dataclass(frozen=True)
 class Cloud:
-    """World points (n, 3) in metres; ``numbers`` (n,) are what the file calls them by."""
+    """World points (n, 3) in metres. The file calls them by their ``numbers`` (n,)."""
 
     file: Path
     kind: str
@@ -90,25 +93,27 @@ class Cloud:
 
 @dataclass(frozen=True)
 class UnitCube:
-    """How instant-ngp maps turned world points into its unit cube: times ``scale`` + ``offset``.
+    """How instant-ngp maps rotated world points into its unit cube: times ``scale`` + ``offset``.
 
-    ``asked_scale`` is what was asked for, and ``asked_place`` where the mean camera was to lie
-    then. Without a scale the cube is fitted to the rig, or to depth if ``fits_depth``.
+    ``option_scale`` is the user's scale, and ``option_place`` the user's place for the mean camera.
+    Without them the cube is fitted to the rig, or to depth if ``fits_depth``.
     """
 
     place: str
     scale: float
     offset: Floats
-    asked_scale: float | None
-    asked_place: Floats | None
+    option_scale: float | None
+    option_place: Floats | None
     fits_depth: bool
 
 
 @dataclass
 class Exported:
-    """One export. ``views_of`` is the part of the split of which it holds the views, if not all.
+    """One export.
 
-    ``faults`` are what contradicts itself or its consumer, a line each that names the file.
+    ``views_of`` names the part of the split whose views it holds. None for all views. ``faults``
+    are lines about contradictions in its files, and with what its consumer needs. Each line names
+    the file.
     """
 
     views: list[ExportedView] = field(default_factory=list)
@@ -121,15 +126,15 @@ class Exported:
     cube: UnitCube | None = None
     faults: list[str] = field(default_factory=list)
 
-    def expect(self, place: str, found: Any, expected: Any) -> None:
-        """Note a fault where a number or a text is not the ``expected`` one."""
-        if not same(found, expected):
-            self.faults.append(f"{place}: is {found!r}; must be {expected!r}")
+    def expect(self, place: str, actual: Any, expected: Any) -> None:
+        """Note a fault if a number or a text is not the ``expected`` one."""
+        if not same(actual, expected):
+            self.faults.append(f"{place}: is {actual!r}; must be {expected!r}")
 
     def expect_picture(self, place: str, path: Path, view: str, picture: str) -> None:
-        """Note a fault where a ``path`` is no file, or not called as the ``view``'s ``picture``.
+        """Note a fault if ``path`` is no file, or does not have the name of the view's picture.
 
-        ``picture`` is a file's name with the view's in braces: "{}_depth.png".
+        ``picture`` is that name, with braces in place of the view's name: "{}_depth.png".
         """
         if path.name != picture.format(view):
             self.faults.append(f"{place}: is {path.name}; must be {picture.format(view)}")
@@ -137,20 +142,20 @@ class Exported:
             self.faults.append(f"{place}: there is no file {path}")
 
 
-def same(found: Any, expected: Any) -> bool:
-    """Return whether two values are equal, numbers to what float32 resolves of the largest."""
+def same(actual: Any, expected: Any) -> bool:
+    """Return whether two values are equal. Numbers may differ by `FLOAT32` times the largest."""
     if expected is None or isinstance(expected, str | bytes | bool):
-        return type(found) is type(expected) and bool(found == expected)
+        return type(actual) is type(expected) and bool(actual == expected)
     try:
-        right = np.array(expected, np.float64)
-        difference = numbers(found, right.shape) - right
+        expected_numbers = np.array(expected, np.float64)
+        difference = numbers(actual, expected_numbers.shape) - expected_numbers
     except (TypeError, ValueError, OverflowError):
         return False
-    return bool((np.abs(difference) <= FLOAT32 * np.abs(right).max(initial=0)).all())
+    return bool((np.abs(difference) <= FLOAT32 * np.abs(expected_numbers).max(initial=0)).all())
 
 
 def numbers(value: ArrayLike, shape: tuple[int, ...] = ()) -> Floats:
-    """Return finite numbers as an array of a shape; raises ValueError for anything else."""
+    """Return finite numbers as an array of a shape. Raises ValueError for anything else."""
     array = np.array(value)
     if array.shape != shape or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
         size = " × ".join(map(str, shape))
@@ -159,12 +164,12 @@ def numbers(value: ArrayLike, shape: tuple[int, ...] = ()) -> Floats:
 
 
 def number(value: Any) -> float:
-    """Return a finite number; raises ValueError for anything else."""
+    """Return a finite number. Raises ValueError for anything else."""
     if not isinstance(value, int | float) or not math.isfinite(value):
         raise ValueError(f"must be a finite number, not {value!r}")
     return float(value)
 
 
 def from_texts(texts: Sequence[str]) -> Floats:
-    """Return the finite numbers (n,) of a text file; raises ValueError for anything else."""
+    """Return the finite numbers (n,) of a text file. Raises ValueError for anything else."""
     return numbers([float(text) for text in texts], (len(texts),))

@@ -1,8 +1,8 @@
 """The layout of the HCI 4D light field benchmark: parameters.cfg, and maps of depth as PFM.
 
-The views are numbered row by row from the top left, as far apart across as down, and are turned as
-the one in the middle, whose pose is there. Disparity is b f (1 / Z − 1 / F). Source: Honauer et al.
-2016, and the benchmark's parameters.
+The views are numbered row by row from the top left. Their spacing is the same across and down. All
+have the rotation of the middle view, whose pose is in parameters.cfg. Disparity is
+b f (1 / Z − 1 / F). Source: Honauer et al. 2016, and the benchmark's parameters.
 """
 
 import configparser
@@ -26,7 +26,7 @@ from lightfield.validation.readers.contents import (
 )
 
 INFINITY = 1e9
-"""Metres: the focus of cameras that look in parallel."""
+"""The focus distance in metres of cameras with parallel axes."""
 
 
 def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Exported:
@@ -66,7 +66,7 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
             _check_files(folder, f"_Cam{index:03}", (width, height), exported)
         exported.expect(f"{path}: offset", value("offset"), 0.0)
         exported.expect(f"{path}: depth_map_scale", value("depth_map_scale"), 1.0)
-        # Cameras that look in parallel focus at infinity: d = b f / Z, and 0 where nothing is hit.
+        # Cameras with parallel axes focus at infinity: d = b f / Z, and 0 for a miss.
         focus = value("focus_distance_m")
         exported.expect(f"{path}: focus_distance_m", focus, INFINITY)
         far, near = (_depth(baseline * focal, value(f"disp_{end}")) for end in ("min", "max"))
@@ -82,12 +82,15 @@ def _number(path: Path, texts: Mapping[str, str], key: str) -> float:
 
 
 def _depth(unit: float, disparity: float) -> float:
-    """Return the depth of a disparity, of which one metre has ``unit``."""
+    """Return the depth in metres of a disparity. ``unit`` is the disparity at one metre."""
     return unit / disparity if disparity else math.inf
 
 
 def _check_files(folder: Path, end: str, size: tuple[int, int], exported: Exported) -> None:
-    """Check that a view's maps have the views' size; the middle view's are there without number."""
+    """Check that a view's maps have the views' size.
+
+    ``end`` is the end of their names. It is empty for the middle view's maps, which exist twice.
+    """
     if end and not (folder / f"input{end}.png").is_file():
         exported.faults.append(f"{folder}/parameters.cfg: there is no input{end}.png of it")
     width, height = size

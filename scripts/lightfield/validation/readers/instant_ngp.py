@@ -1,7 +1,7 @@
 """instant-ngp's transforms.json, read as its loader does (src/nerf_loader.cu, common_device.cuh).
 
-Its world is SILVR's: (x, y, z) of lightfield.json is (y, −x, z) there. ``fl_x`` and ``fl_y`` with
-``cx`` and ``cy`` are a pinhole, ``ftheta_p0`` to ``ftheta_p4`` a fisheye, ``latlong`` a panorama.
+Its world is SILVR's: (x, y, z) of lightfield.json is (y, −x, z) there. The keys tell the lens:
+``ftheta_p0`` to ``ftheta_p4`` a fisheye, ``latlong`` a panorama, only ``fl_x`` to ``cy`` a pinhole.
 """
 
 import math
@@ -24,7 +24,7 @@ from lightfield.validation.readers.contents import (
     same,
 )
 
-# Columns: where the loader's world has the axes of lightfield.json.
+# Columns: the axes of lightfield.json in the loader's world.
 WORLD = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
 
 
@@ -61,7 +61,7 @@ def read(path: Path) -> Exported:
 
 
 def _camera(path: Path, content: dict[str, Any], exported: Exported) -> Camera:
-    """Return the lens; of a fisheye and a panorama the loader's focal length is for its display."""
+    """Return the lens. For a fisheye and a panorama, the loader only displays the focal length."""
     width, height = int(content["w"]), int(content["h"])
     fx, fy = number(content["fl_x"]), number(content["fl_y"])
     cx, cy = number(content["cx"]), number(content["cy"])
@@ -85,7 +85,7 @@ def _camera(path: Path, content: dict[str, Any], exported: Exported) -> Camera:
 def _compare_options(
     path: Path, content: dict[str, Any], options: dict[str, Any], exported: Exported
 ) -> None:
-    """Compare what the loader is told of the training volume and of depth with the options."""
+    """Compare the keys for the training volume and for depth with the export's options."""
     for key in ("aabb_scale", "render_aabb"):
         if not same(content.get(key), options[key]):
             exported.faults.append(
@@ -98,7 +98,7 @@ def _compare_options(
         len(content["frames"]) if options["depth"] else 0,
     )
     if with_depth:
-        # The loader's rays have the length 1 along the axis of a pinhole, and 1 themselves else.
+        # The loader scales a pinhole's rays to length 1 along the axis. Other rays have length 1.
         meaning = "z" if isinstance(exported.cameras[0].camera, Pinhole) else "distance"
         exported.depth_map = DepthMap(
             f"{path}: integer_depth_scale",

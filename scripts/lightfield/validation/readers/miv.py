@@ -64,7 +64,7 @@ def _matrix(camera: dict[str, Any]) -> Floats:
 def _check_videos(
     where: str, folder: Path, camera: dict[str, Any], frames: int, exported: Exported
 ) -> None:
-    """Check that colour and depth are there, as large as the camera says."""
+    """Check that the videos of colour and depth exist, and have the camera's size."""
     width, height = camera["Resolution"]
     for kind, bits, space in (
         ("texture", "BitDepthColor", "ColorSpace"),

@@ -1,6 +1,6 @@
 """NeRF's synthetic layout, read as the original NeRF's load_blender.py does.
 
-Poses are in the axes of lightfield.json; one horizontal angle is all that a list says of the lens.
+Poses are in the axes of lightfield.json. A list describes the lens by its horizontal angle only.
 """
 
 import math

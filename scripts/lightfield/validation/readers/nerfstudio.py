@@ -1,6 +1,6 @@
 """A nerfstudio dataset, read as its nerfstudio_dataparser.py and cameras.py do.
 
-What ``applied_transform`` has done to the poses and to the point cloud is undone.
+The reader undoes ``applied_transform`` in the poses and in the point cloud.
 """
 
 import math
@@ -46,10 +46,12 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
                     if key in frame:
                         picture = folder / str(frame[key])
                         exported.expect_picture(f"{path}: {place}: {key}", picture, name, "{}.png")
-        for key, all_or_none in (("mask_path", None), ("depth_file_path", options["depth"])):
-            count = sum(key in frame for frame in frames)
-            wanted = bool(count) if all_or_none is None else all_or_none
-            exported.expect(f"{path}: frames with a {key}", count, len(frames) if wanted else 0)
+        # Either all frames have a mask, or none. The options say whether they have depth.
+        masks = sum("mask_path" in frame for frame in frames)
+        exported.expect(f"{path}: frames with a mask_path", masks, len(frames) if masks else 0)
+        depths = sum("depth_file_path" in frame for frame in frames)
+        expected_depths = len(frames) if options["depth"] else 0
+        exported.expect(f"{path}: frames with a depth_file_path", depths, expected_depths)
         for part, name in PARTS.items():
             names = [Path(str(file)).stem for file in content[f"{part}_filenames"]]
             exported.parts.append(Part(f"{path}: {part}_filenames", name, names))

@@ -1,7 +1,7 @@
 """The keys of a camera that OpenDIBR and MIV share.
 
-Depth maps are normalised disparity between the ends of ``Depth_range``: of Z for perspective views,
-of distance for the others.
+Depth maps hold normalised disparity between the ends of ``Depth_range``. It is that of Z for
+perspective views, and that of distance for all others.
 """
 
 import math
@@ -13,7 +13,7 @@ from lightfield.validation.readers.contents import DepthRange, number, numbers
 
 
 def lens_of(camera: dict[str, Any]) -> Camera:
-    """Return a camera's lens; of a panorama's longitudes those to the left are positive."""
+    """Return a camera's lens. A panorama's longitudes are positive to the left."""
     width, height = (int(side) for side in numbers(camera["Resolution"], (2,)))
     projection = camera["Projection"]
     if projection == "Perspective":
@@ -21,9 +21,9 @@ def lens_of(camera: dict[str, Any]) -> Camera:
         cx, cy = numbers(camera["Principle_point"], (2,)).tolist()
         return Pinhole(width, height, fx, fy, cx, cy)
     if projection == "Equirectangular":
-        right, left = map(math.radians, numbers(camera["Hor_range"], (2,)).tolist())
+        right_end, left_end = map(math.radians, numbers(camera["Hor_range"], (2,)).tolist())
         south, north = map(math.radians, numbers(camera["Ver_range"], (2,)).tolist())
-        return Panorama(width, height, -left, -right, north, south)
+        return Panorama(width, height, -left_end, -right_end, north, south)
     if projection == "Fisheye_Equidistant":
         fov = math.radians(number(camera["Fov"]))
         return OpenCVFisheye(width, height, width / fov, height / fov, width / 2, height / 2)

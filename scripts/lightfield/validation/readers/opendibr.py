@@ -1,7 +1,7 @@
 """OpenDIBR's cameras.json, read as its ioHelper.h and vertex.fs do.
 
 Its world is OpenGL's, y up: (x, y, z) of lightfield.json is (x, z, −y) there. The first camera is
-the one that is shown at first, and has no picture.
+the viewport at the start. It has no picture.
 """
 
 from pathlib import Path
@@ -22,7 +22,7 @@ from lightfield.validation.readers.omaf import depth_range_of, lens_of
 
 # Rows: the axes of OpenGL's world in lightfield.json's.
 WORLD = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
-# By the option ``format``: suffix, bits of colour, bits of depth.
+# Suffix, bits of colour and bits of depth for each value of the option ``format``.
 PICTURES = {"png": (".png", 8, 16), "h265": (".mp4", 10, 12)}
 
 
@@ -50,7 +50,7 @@ def _read_camera(
     pictures: tuple[str, int, int],
     exported: Exported,
 ) -> None:
-    """Read a view's camera, with the suffix and the bits of colour and depth of its pictures."""
+    """Read a view's camera. ``pictures`` are a suffix, the bits of colour, and those of depth."""
     suffix, colour_bits, depth_bits = pictures
     name = str(camera["NameColor"]).removesuffix(f"_texture{suffix}")
     for key, kind in (("NameColor", "texture"), ("NameDepth", "depth")):
@@ -74,7 +74,7 @@ def _matrix(camera: dict[str, Any]) -> Floats:
 
 
 def _check_viewport(place: str, viewport: dict[str, Any], exported: Exported) -> None:
-    """Check that the first picture is from the middle of the views, turned as the first of them."""
+    """Check that the viewport is at the mean of the views, with the rotation of the first view."""
     matrix = _matrix(viewport)
     middle = np.mean([view.matrix[:3, 3] for view in exported.views], axis=0)
     width, height = numbers(viewport["Resolution"], (2,)).tolist()

@@ -16,8 +16,8 @@ _FORMAT = "format binary_little_endian 1.0"
 _NOT_UNIT = 1e-5
 
 
-def read_ply(path: Path, undone: Floats | None = None) -> tuple[Cloud, list[str]]:
-    """Return a file's points, mapped by ``undone`` (4, 4), and what is wrong with the file."""
+def read_ply(path: Path, transform: Floats | None = None) -> tuple[Cloud, list[str]]:
+    """Return a file's points, mapped by ``transform`` (4, 4), and what is wrong with the file."""
     with reading(path, "binary PLY of points"):
         content = path.read_bytes()
         head, _, body = content.partition(b"end_header\n")
@@ -39,6 +39,6 @@ def read_ply(path: Path, undone: Floats | None = None) -> tuple[Cloud, list[str]
         lengths = np.linalg.norm(normals, axis=-1)
     wrong = np.flatnonzero(~((np.abs(lengths - 1) < _NOT_UNIT) | (lengths == 0)))
     faults = [f"{path}: vertex {index}: its normal is no unit vector" for index in wrong]
-    if undone is not None and not np.array_equal(undone, np.eye(4)):
-        positions = positions @ undone[:3, :3].T + undone[:3, 3]
+    if transform is not None and not np.array_equal(transform, np.eye(4)):
+        positions = positions @ transform[:3, :3].T + transform[:3, 3]
     return Cloud(path, "vertex", np.arange(len(vertices)), positions), faults

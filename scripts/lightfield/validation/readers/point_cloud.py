@@ -1,4 +1,4 @@
-"""A point cloud by itself: points.ply."""
+"""A point cloud without views: points.ply."""
 
 from pathlib import Path
 from typing import Any

@@ -18,20 +18,20 @@ export function fitted(canvas) {
   return context;
 }
 
-// At most once a frame, however often it is asked for.
+// Return a function that schedules `draw` for the next frame, at most once a frame.
 export function onceAFrame(draw) {
-  let asked = false;
+  let isScheduled = false;
   return () => {
-    if (asked) return;
-    asked = true;
+    if (isScheduled) return;
+    isScheduled = true;
     requestAnimationFrame(() => {
-      asked = false;
+      isScheduled = false;
       draw();
     });
   };
 }
 
-// Two buttons, of which one is pressed: `show` is told whether it is that of depth.
+// Make two buttons a choice. `show` is called with whether depth is chosen.
 export function chooseDepth(light, depth, show) {
   for (const [isDepth, button, other] of [[false, light, depth], [true, depth, light]]) {
     button.addEventListener("click", () => {

@@ -1,4 +1,4 @@
-// The epipolar-plane image, pointed at and tilted.
+// Lets the user point at the epipolar-plane image, and tilt its plane.
 
 import { DATA } from "./data.js";
 import { chooseDepth, element } from "./document.js";

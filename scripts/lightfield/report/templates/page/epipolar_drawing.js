@@ -13,7 +13,7 @@ export function epipolarPixel(x, y) {
 export const angleAt = (x) => (2 * (x + 0.5 + DATA.row.first)) / DATA.row.columns - 1;
 const columnAt = (angle) => ((angle + 1) / 2) * DATA.row.columns - DATA.row.first;
 
-// In which column each camera of the row sees the point that is at (x, y), by its depth.
+// Return the column in which each camera of the row sees the point at (x, y), by its depth.
 function trace(x, y) {
   const depth = depthOf(depthCode(lines.pixels[1], 4 * epipolarPixel(x, y)), DATA.row.range);
   if (!Number.isFinite(depth)) return null;
@@ -28,7 +28,7 @@ function trace(x, y) {
   return centers.map((center) => columnAt(Math.atan2(point[0] - center[0], point[1] - center[1]) / Math.PI));
 }
 
-// Where a track leaves what the cameras see, and where it wraps around a ring, the line begins anew.
+// Add a track to the path. The line breaks where no camera sees it, and where it wraps around a ring.
 function trackPath(context, track, width, height) {
   const [count, columns] = DATA.row.shape;
   context.beginPath();

@@ -1,4 +1,4 @@
-// What can be turned, stepped through and pointed at on a dataset's page.
+// Starts the figures of a dataset's page that the user can turn, step through and point at.
 
 import { startLines } from "./epipolar.js";
 import { startRig } from "./rig.js";

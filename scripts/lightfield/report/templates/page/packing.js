@@ -1,4 +1,4 @@
-// Light and depth out of their codes. How pictures are packed is said in report/packing.py.
+// Decodes light and depth. report/packing.py says how they are packed.
 
 import { DATA, MISS } from "./data.js";
 import { clamp } from "./vectors.js";
@@ -11,7 +11,7 @@ function encodeSrgb(linear) {
   return value <= 0.0031308 ? 12.92 * value : 1.055 * value ** (1 / 2.4) - 0.055;
 }
 
-// Reinhard et al. 2002, equation 4, as the contact sheet is developed.
+// Tone mapping as in the contact sheet: Reinhard et al. 2002, equation 4.
 export function developed(exposure) {
   return Uint8ClampedArray.from(LIGHT, (light) => {
     const value = light * 2 ** exposure;
@@ -28,7 +28,7 @@ export function depthOf(code, [low, high]) {
 
 export const bytesOf = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 
-// One colour (r, g, b) for each depth code, for codes that span `range`.
+// Return one colour (r, g, b) for each depth code. The codes span `range`.
 export function depthColours(range) {
   const bytes = bytesOf(DATA.depth.colours);
   const [near, far] = DATA.depth.shown;
@@ -54,7 +54,7 @@ export async function decoded(uri) {
   return context.getImageData(0, 0, canvas.width, canvas.height).data;
 }
 
-// Fill `target` from packed pixels, from the pixel `first` on; where `depth` is 0, leave it clear.
+// Fill `target` from packed pixels, from the pixel `first` on. Leave pixels of depth 0 transparent.
 export function paint(target, light, depth, first, table, colours) {
   for (let pixel = 0; pixel < target.length; pixel += 4) {
     const source = 4 * first + pixel;

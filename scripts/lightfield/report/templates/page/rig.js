@@ -1,4 +1,4 @@
-// The rig in 3D, turned and pointed at.
+// Lets the user turn the rig in 3D, and point at its cameras.
 
 import { element } from "./document.js";
 import { drawRig, measureRig, scenePoints } from "./rig_drawing.js";
@@ -6,7 +6,7 @@ import { HOME, rig, viewer } from "./state.js";
 import { clamp } from "./vectors.js";
 import { openView } from "./viewer.js";
 
-// The camera under the pointer: the nearest on screen and, of those, the nearest to the eye.
+// Return the camera under the pointer: the nearest on screen, and among those the nearest to the eye.
 function cameraAt(event) {
   const frame = rig.canvas.getBoundingClientRect();
   const [x, y] = [event.clientX - frame.left, event.clientY - frame.top];
@@ -19,7 +19,7 @@ function cameraAt(event) {
   return best.number;
 }
 
-// How far two fingers are from each other.
+// Return the distance between two fingers.
 const distanceOfTwo = (pointers) => {
   const [first, second] = [...pointers.values()];
   return Math.hypot(first.x - second.x, first.y - second.y);
@@ -35,7 +35,7 @@ function pointerDown(event) {
   rig.moved = 0;
 }
 
-// One pointer turns the rig, two zoom; without a button, the camera under it is named.
+// One pointer turns the rig, two zoom. Without a pressed button, name the camera under the pointer.
 function pointerMove(event) {
   const { pointers } = rig;
   const last = pointers.get(event.pointerId);

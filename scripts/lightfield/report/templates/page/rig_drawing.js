@@ -1,4 +1,4 @@
-// The rig in 3D, drawn: its cameras, its outline and the scene's points.
+// Draws the rig in 3D: its cameras, its outline and the scene's points.
 
 import { DATA, row, shown } from "./data.js";
 import { element, fitted, onceAFrame, polyline, themed } from "./document.js";
@@ -8,7 +8,7 @@ import { along, clamp, dot, minus } from "./vectors.js";
 
 // Focal length of the picture of the rig, in lengths of its shorter side.
 const SPREAD = 1.75;
-// Beyond this many cameras, lines instead of frusta keep it fluid.
+// More cameras than this are drawn as lines instead of frusta, to stay fluid.
 const MOST_FRUSTA = 700;
 
 export function measureRig() {
@@ -36,7 +36,7 @@ function projection(width, height) {
   };
 }
 
-// The scene as its views' depth has it: a list of places and colours.
+// Return the points that the views' depth gives: a list of places and colours.
 export function scenePoints() {
   if (!DATA.points) return [];
   const { low, side } = DATA.points;
@@ -49,7 +49,7 @@ export function scenePoints() {
   });
 }
 
-// From far to near, each a square that grows with its distance from the rig, as their spacing does.
+// Draw the points from far to near. A square grows with its distance from the rig, as the spacing does.
 function drawPoints(context, project, scale) {
   const nearest = (0.5 * 4 * rig.extent) / rig.zoom;
   const drawn = rig.points.map((point) => [...project(point.at), point]);
@@ -95,7 +95,7 @@ function drawAxes(context, project, height) {
   });
 }
 
-// What a camera's view is for says more than whether it is in the page or in the row.
+// A view's part of the split matters more than whether it is in the page or in the row.
 function colourOf(number) {
   const { part } = DATA.views[number];
   if (part === "test" || part === "validation") return `--${part}`;
@@ -135,7 +135,7 @@ function drawOutline(context, project) {
   context.stroke();
 }
 
-// Draw the cameras that are of one colour and in front of the rig's centre, or behind it: in one path, for speed.
+// Draw the cameras of one colour in front of the rig's centre, or behind it. One path is fastest.
 function drawCamerasOf(context, project, colour, isBehind) {
   const isSimple = DATA.views.length > MOST_FRUSTA;
   const centreDepth = (4 * rig.extent) / rig.zoom;
@@ -175,7 +175,7 @@ export const drawRig = onceAFrame(() => {
   if (rig.showsPoints) drawPoints(context, project, SPREAD * Math.min(width, height));
   drawOutline(context, project);
   rig.screen = DATA.views.map((view) => project(view.at));
-  // What is behind is drawn first and paler.
+  // Draw cameras behind the centre first and paler.
   for (const isBehind of [true, false]) {
     context.globalAlpha = isBehind ? 0.4 : 1;
     for (const colour of ["--faint", "--shown", "--row", "--validation", "--test"]) {

@@ -1,4 +1,4 @@
-// What is open, pointed at and turned in each figure of the page.
+// The state of each figure of the page: what is open, pointed at and turned.
 
 import { DATA } from "./data.js";
 import { element } from "./document.js";
@@ -13,7 +13,7 @@ export const viewer = {
   pointed: null,
 };
 
-// How the rig is turned at first: radians around the vertical, radians above the level, and its size.
+// The rig's first position: radians around the vertical, radians above the level, and its size.
 export const HOME = { turn: 0.55, rise: 0.4, zoom: 1 };
 
 export const rig = {

@@ -12,7 +12,7 @@ async function pixelsOf(number) {
   if (!viewer.cache.has(number)) {
     const entry = DATA.embedded[number];
     viewer.cache.set(number, Promise.all([decoded(entry.light), entry.depth ? decoded(entry.depth) : null]));
-    // Some tens of views are kept, so that stepping back and forth is quick.
+    // Keep 32 views, so that stepping back and forth is quick.
     if (viewer.cache.size > 32) viewer.cache.delete(viewer.cache.keys().next().value);
   }
   return viewer.cache.get(number);
@@ -71,27 +71,27 @@ function readOut() {
   }
 }
 
-// The nearest camera in a direction of the open view's own axes; at an edge, the nearest that is
-// turned that way.
+// Return the nearest camera in a direction of the open view's axes. If there is none, return the
+// nearest camera that looks in that direction.
 function neighbour(direction) {
   const from = DATA.views[DATA.embedded[viewer.current].view];
   const sign = direction === "left" || direction === "down" ? -1 : 1;
   const axis = direction === "left" || direction === "right" ? from.right : from.up;
-  const wanted = axis.map((value) => sign * value);
+  const way = axis.map((value) => sign * value);
   let best = null;
   let turned = null;
   DATA.embedded.forEach((entry, number) => {
     if (number === viewer.current) return;
     const other = DATA.views[entry.view];
-    const way = minus(other.at, from.at);
-    const length = Math.hypot(...way);
-    const towards = length > 1e-6 ? dot(way, wanted) / length : 0;
-    // Within 60 degrees; straight ahead counts for more than near.
+    const offset = minus(other.at, from.at);
+    const length = Math.hypot(...offset);
+    const towards = length > 1e-6 ? dot(offset, way) / length : 0;
+    // Within 60 degrees. A small angle counts for more than a small distance.
     if (towards > 0.5 && dot(other.ahead, from.ahead) > -0.2) {
       const cost = length / towards ** 2;
       if (!best || cost < best.cost) best = { cost, number };
     }
-    if (dot(other.ahead, wanted) > 0.5 && (!turned || length < turned.length)) turned = { length, number };
+    if (dot(other.ahead, way) > 0.5 && (!turned || length < turned.length)) turned = { length, number };
   });
   const nearest = best || turned;
   return nearest ? nearest.number : null;
@@ -102,13 +102,13 @@ function step(direction) {
   if (next !== null) open(next);
 }
 
-// Open a camera's view or, where it is not in the page, that of the one most like it.
+// Open a camera's view. If it is not in the page, open the most similar one.
 export function openView(view) {
-  const wanted = DATA.views[view];
+  const target = DATA.views[view];
   let best = { cost: Infinity, number: 0 };
   DATA.embedded.forEach((entry, number) => {
     const other = DATA.views[entry.view];
-    const cost = Math.hypot(...minus(other.at, wanted.at)) + rig.extent * (1 - dot(other.ahead, wanted.ahead));
+    const cost = Math.hypot(...minus(other.at, target.at)) + rig.extent * (1 - dot(other.ahead, target.ahead));
     if (entry.view === view || cost < best.cost) best = { cost: entry.view === view ? -1 : cost, number };
   });
   open(best.number);

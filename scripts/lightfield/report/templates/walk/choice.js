@@ -1,14 +1,19 @@
 // Which views an eye is drawn from.
 
-import { along, clamp, dot, minus } from "../page/vectors.js";
+import { clamp, minus } from "../page/vectors.js";
 import { WALK, walk } from "./state.js";
 
+// While the eye moves, views are chosen anew once it has moved by more than this part of the rig's extent, or turned
+// by more than so many radians.
+export const IN_MOTION = 0.03;
+
 // Whether a source sees in a direction of its own axes.
-function isSeen([x, y, z]) {
+function isSeen(x, y, z) {
   const sum = Math.abs(x) + Math.abs(y) + Math.abs(z);
   let [u, v] = [x / sum, y / sum];
   if (z < 0) [u, v] = [(1 - Math.abs(v)) * (u >= 0 ? 1 : -1), (1 - Math.abs(u)) * (v >= 0 ? 1 : -1)];
-  const [column, line] = [u, v].map((value) => clamp(Math.floor(((value + 1) / 2) * WALK.side), 0, WALK.side - 1));
+  const column = clamp(Math.floor(((u + 1) / 2) * WALK.side), 0, WALK.side - 1);
+  const line = clamp(Math.floor(((v + 1) / 2) * WALK.side), 0, WALK.side - 1);
   return walk.sight[line * WALK.side + column] === 1;
 }
 
@@ -29,42 +34,72 @@ function directionsOfEye([right, up, back], [spreadX, spreadY]) {
 }
 
 // How well a view sees the point that is so far from the eye in a direction: 0 where it does not.
-function quality(view, at, direction, distance) {
-  const way = minus(along(at, direction, distance), view.at);
-  const local = [dot(way, view.right), dot(way, view.up), -dot(way, view.ahead)];
-  if (!isSeen(local)) return 0;
-  const length = Math.hypot(...way);
-  const angle = Math.hypot(...minus(direction, way.map((value) => value / length)));
+function quality({ at, right, up, ahead }, eye, direction, distance) {
+  const x = eye[0] + distance * direction[0] - at[0];
+  const y = eye[1] + distance * direction[1] - at[1];
+  const z = eye[2] + distance * direction[2] - at[2];
+  const along = ([a, b, c]) => a * x + b * y + c * z;
+  if (!isSeen(along(right), along(up), -along(ahead))) return 0;
+  const length = Math.sqrt(x * x + y * y + z * z);
+  const [dx, dy, dz] = [direction[0] - x / length, direction[1] - y / length, direction[2] - z / length];
+  const angle = Math.sqrt(dx * dx + dy * dy + dz * dz);
   return 1 / (angle + WALK.distance * Math.max(length / distance - 1, 0) + WALK.sharp);
+}
+
+function qualities(view, at, directions) {
+  const values = new Float64Array(WALK.distances.length * directions.length);
+  WALK.distances.forEach((distance, part) => directions.forEach((direction, place) => {
+    values[part * directions.length + place] = quality(view, at, direction, distance);
+  }));
+  return values;
+}
+
+// The sum over all directions of the logarithm of what the views taken so far, and this one, are worth.
+function gainOf(values, sums) {
+  let gain = 0;
+  for (let place = 0; place < sums.length; place++) gain += Math.log1p(sums[place] + values[place]);
+  return gain;
 }
 
 // The views that together see best what the eye looks at: one after the other, that which adds most.
 export function bestViews(sources, count, at, eyeAxes, spread) {
   const directions = directionsOfEye(eyeAxes, spread);
-  const qualities = sources.map(({ view }) => WALK.distances.flatMap((distance) =>
-    directions.map((direction) => quality(view, at, direction, distance))));
+  const valued = sources.map((source) => ({ source, values: qualities(source.view, at, directions) }));
+  const sums = new Float64Array(WALK.distances.length * directions.length);
   const chosen = [];
-  let sums = qualities[0].map(() => 0);
   while (chosen.length < Math.min(count, sources.length)) {
-    let best = { gain: -1, number: 0 };
-    qualities.forEach((values, number) => {
-      if (chosen.includes(number)) return;
-      const gain = values.reduce((total, value, place) => total + Math.log1p(sums[place] + value), 0);
-      if (gain > best.gain) best = { gain, number };
+    const rest = valued.filter(({ source }) => !chosen.includes(source));
+    const gains = rest.map(({ values }) => gainOf(values, sums));
+    const best = rest[gains.indexOf(Math.max(...gains))];
+    chosen.push(best.source);
+    best.values.forEach((value, place) => {
+      sums[place] += value;
     });
-    chosen.push(best.number);
-    sums = sums.map((value, place) => value + qualities[best.number][place]);
   }
-  return chosen.map((number) => sources[number]);
+  return chosen;
 }
 
 // The first view that is wanted and not on the graphics card yet.
 export const missing = () => walk.wanted.find((source) => !source.isThere);
 
-// Choose what an eye wants to be drawn of, and what it is drawn of while some of that is missing.
-export function choose(count, ...eye) {
-  walk.wanted = bestViews(walk.order, walk.sources, walk.at, ...eye);
+// Whether the last choice does for an eye: nothing has come in since, and the eye has hardly moved.
+function isStillRight(last, now, slack) {
+  if (!last || last.there.length !== now.there.length || last.count !== now.count) return false;
+  const change = (one, other) => Math.hypot(...minus(one, other));
+  return change(last.at, now.at) <= slack * walk.extent &&
+    now.axes.every((axis, number) => change(last.axes[number], axis) <= slack) &&
+    now.spread.every((value, number) => value === last.spread[number]);
+}
+
+// Choose what an eye wants to be drawn of, and what it is drawn of while some of that is missing. An eye that has
+// moved by no more than `slack` keeps the last choice.
+export function choose(count, eyeAxes, spread, slack) {
   const there = walk.order.filter((source) => source.isThere);
+  const now = { at: walk.at, axes: eyeAxes, spread, there, count };
+  if (isStillRight(walk.lastChoice, now, slack)) return;
+  walk.lastChoice = now;
+  walk.choices += 1;
+  walk.wanted = bestViews(walk.order, walk.sources, walk.at, eyeAxes, spread);
   // They were taken one after the other: the first are the best of fewer, too.
-  walk.chosen = missing() ? bestViews(there, count, walk.at, ...eye) : walk.wanted.slice(0, count);
+  walk.chosen = missing() ? bestViews(there, count, walk.at, eyeAxes, spread) : walk.wanted.slice(0, count);
 }

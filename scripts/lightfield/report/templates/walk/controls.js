@@ -2,10 +2,10 @@
 
 import { element } from "../page/document.js";
 import { drawWalkSoon } from "./drawing.js";
-import { WIDE } from "./eye.js";
+import { fieldOfView } from "./eye.js";
 import { listenForHeadset } from "./headset.js";
 import { goHome, placeHash, showMode } from "./home.js";
-import { TURNING, WALKING, moved, turned, walkOn } from "./motion.js";
+import { TURNING, WALKING, ZOOMING, moved, turned, walkOn } from "./motion.js";
 import { MODES, walk } from "./state.js";
 
 // One finger looks around, two walk.
@@ -22,7 +22,8 @@ function listenToPointers(overlay) {
     const way = [event.clientX - last[0], event.clientY - last[1]];
     pointers.set(event.pointerId, [event.clientX, event.clientY]);
     const side = Math.max(overlay.clientWidth, overlay.clientHeight);
-    if (pointers.size === 1) turned(...way.map((value) => (-value * WIDE) / side));
+    const wide = fieldOfView(...walk.size) / walk.zoom;
+    if (pointers.size === 1) turned(...way.map((value) => (-value * wide) / side));
     else moved((0.5 * way[1]) / side, (-0.5 * way[0]) / side, 0);
   });
   for (const name of ["pointerup", "pointercancel"]) {
@@ -40,7 +41,7 @@ const keyOf = (event) => (event.key.length === 1 ? event.key.toLowerCase() : eve
 function listenToKeys(overlay) {
   overlay.addEventListener("keydown", (event) => {
     const key = keyOf(event);
-    if (!(key in WALKING || key in TURNING)) return;
+    if (!(key in WALKING || key in TURNING || key in ZOOMING)) return;
     event.preventDefault();
     if (!walk.keys.size) walkOn(performance.now());
     walk.keys.add(key);
@@ -75,8 +76,7 @@ function listenToFrames() {
 
 function followSize() {
   const ratio = Math.min(window.devicePixelRatio || 1, 1.5);
-  walk.canvas.width = Math.max(2, Math.round(walk.canvas.clientWidth * ratio));
-  walk.canvas.height = Math.max(2, Math.round(walk.canvas.clientHeight * ratio));
+  walk.size = [ratio * walk.canvas.clientWidth, ratio * walk.canvas.clientHeight];
   drawWalkSoon();
 }
 

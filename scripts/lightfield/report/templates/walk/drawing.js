@@ -3,7 +3,7 @@
 import { DATA } from "../page/data.js";
 import { element, fitted, onceAFrame, polyline } from "../page/document.js";
 import { dot, minus } from "../page/vectors.js";
-import { choose, missing } from "./choice.js";
+import { IN_MOTION, choose, missing } from "./choice.js";
 import { NEAR, axes, metresToEdge, scales } from "./eye.js";
 import { drawEye } from "./layers.js";
 import { MOST_SOURCES, walk } from "./state.js";
@@ -11,17 +11,29 @@ import { MOST_SOURCES, walk } from "./state.js";
 // Where a whole picture takes more milliseconds than this, one in motion is made of few sources.
 const SLOW = 100;
 export const FEW = Math.min(2, MOST_SOURCES);
+// Samples across and down a pixel of a picture that stands. One in motion has this part of its pixels across and down,
+// which the browser enlarges.
+const FINE = 2;
+const COARSE = 0.4;
 // So many milliseconds after the last motion it stands.
 const REST = 200;
 
-// Draw once, from where the eye is, of so many sources.
-function drawWalk(count = walk.sources) {
+// Give the canvas this part of its pixels across and down; return their numbers.
+function sizeCanvas(part) {
   const { canvas } = walk;
+  const [width, height] = walk.size.map((side) => Math.max(2, Math.round(part * side)));
+  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+  return [width, height];
+}
+
+// Draw once, from where the eye is: as well as it can be, or quickly.
+function drawWalk(isInMotion = false) {
   const eyeAxes = axes();
-  const spread = scales(canvas.width, canvas.height);
-  choose(count, eyeAxes, spread);
+  const spread = scales(...walk.size);
+  const size = sizeCanvas(isInMotion ? COARSE : 1);
+  choose(isInMotion ? FEW : walk.sources, eyeAxes, spread, isInMotion ? IN_MOTION : 0);
   const eye = { at: walk.at, axes: eyeAxes, lens: [...spread, 0, 0], sources: walk.chosen };
-  drawEye(eye, null, [0, 0], canvas.width, canvas.height);
+  drawEye(eye, null, [0, 0], size, isInMotion ? 1 : FINE, isInMotion);
   drawOverlay(eyeAxes, spread);
   walk.frames += 1;
 }
@@ -81,7 +93,7 @@ function drawOverlay(eyeAxes, spread) {
 
 export const drawWalkSoon = onceAFrame(() => {
   if (!walk.ready) return;
-  drawWalk(walk.slow ? FEW : walk.sources);
+  drawWalk(walk.slow);
   clearTimeout(walk.rest);
   if (walk.slow) walk.rest = setTimeout(drawAllSources, REST);
 });

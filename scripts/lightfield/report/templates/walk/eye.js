@@ -1,12 +1,14 @@
 // The eye of the walk: its axes, its field of view, and the volume that it stays in.
 
-import { along, dot } from "../page/vectors.js";
+import { along, clamp, dot } from "../page/vectors.js";
 import { WALK, walk } from "./state.js";
 
 // The nearest that the eye sees, in metres.
 export const NEAR = 0.01;
-// The field of view across the picture's longer side.
-export const WIDE = (80 * Math.PI) / 180;
+// The field of view across the picture's longer side: between these, as wide as a pixel of a source needs it to be
+// shown at most so many pixels wide.
+const [NARROWEST, WIDEST] = [(80 * Math.PI) / 180, (120 * Math.PI) / 180];
+const LARGEST_PIXEL = 3;
 export const STEEPEST_PITCH = 1.5;
 
 function ahead() {
@@ -22,9 +24,14 @@ export function axes() {
   return [right, up, back];
 }
 
+export function fieldOfView(width, height) {
+  const wide = 2 * Math.atan((Math.max(width, height) / 2) * (WALK.pixel / LARGEST_PIXEL));
+  return clamp(wide, NARROWEST, WIDEST);
+}
+
 // What a tangent is multiplied by across and up, to be 1 at the picture's edges.
 export function scales(width, height) {
-  const scale = 1 / Math.tan(WIDE / 2);
+  const scale = walk.zoom / Math.tan(fieldOfView(width, height) / 2);
   return width >= height ? [scale, (scale * width) / height] : [(scale * height) / width, scale];
 }
 

@@ -2,7 +2,7 @@
 
 import { element } from "../page/document.js";
 import { along } from "../page/vectors.js";
-import { choose } from "./choice.js";
+import { IN_MOTION, choose } from "./choice.js";
 import { drawWalkSoon } from "./drawing.js";
 import { insideVolume } from "./eye.js";
 import { drawEye } from "./layers.js";
@@ -21,9 +21,9 @@ function drawHeadset(session, space, start, frame) {
     const axes = [column(0), column(1), column(2)];
     walk.at = insideVolume(along(start, column(3), 1));
     const p = view.projectionMatrix;
-    choose(walk.sources, axes, [p[0], p[5]]);
+    choose(walk.sources, axes, [p[0], p[5]], IN_MOTION);
     const eye = { at: walk.at, axes, lens: [p[0], p[5], p[8], p[9]], sources: walk.chosen };
-    drawEye(eye, layer.framebuffer, [x, y], width, height);
+    drawEye(eye, layer.framebuffer, [x, y], [width, height], 1, false);
   }
 }
 

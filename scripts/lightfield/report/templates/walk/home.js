@@ -55,6 +55,7 @@ export function goHome() {
   walk.yaw = isSteep ? 0 : Math.atan2(-x, y);
   const pitch = lookInwards || lookAlike ? Math.asin(clamp(z, -1, 1)) : 0;
   walk.pitch = clamp(pitch, -STEEPEST_PITCH, STEEPEST_PITCH);
+  walk.zoom = 1;
   walk.fadeFrom = Math.min(walk.extent / 4, metresToEdge(walk.at));
   drawWalkSoon();
 }

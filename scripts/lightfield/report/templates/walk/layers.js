@@ -8,19 +8,36 @@ import { APART } from "./sources.js";
 import { MOST_SOURCES, WALK, walk } from "./state.js";
 import { bindTextures, texture } from "./webgl.js";
 
-function deleteLayers({ colours, inverses, depth, framebuffers }) {
+// A framebuffer of two textures: colours (half floats), and inverse distances.
+function framebufferOf(attach) {
   const { gl } = walk;
-  gl.deleteTexture(colours);
-  gl.deleteTexture(inverses);
-  gl.deleteRenderbuffer(depth);
-  for (const framebuffer of framebuffers) gl.deleteFramebuffer(framebuffer);
+  const framebuffer = gl.createFramebuffer();
+  gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+  attach();
+  gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
+  return framebuffer;
 }
 
-// A layer for each source, of the size of the picture.
-function layersOfSize(width, height) {
-  const old = walk.layers;
-  if (old && old.width === width && old.height === height) return old;
-  if (old) deleteLayers(old);
+// A picture of light and inverse distances that a shader can draw.
+function createPicture(width, height) {
+  const { gl } = walk;
+  const image = (format, layout, type) =>
+    texture(gl, gl.TEXTURE_2D, format, width, height, 0, layout, type, null);
+  const colours = image(gl.RGBA16F, gl.RGBA, gl.HALF_FLOAT);
+  const inverses = image(gl.R32F, gl.RED, gl.FLOAT);
+  // One that is smaller than what it is shown on is enlarged smoothly.
+  gl.bindTexture(gl.TEXTURE_2D, colours);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+  const framebuffer = framebufferOf(() => {
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, colours, 0);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT1, gl.TEXTURE_2D, inverses, 0);
+  });
+  return { width, height, colours, inverses, framebuffer };
+}
+
+// A layer for each source.
+function createLayers(width, height) {
   const { gl } = walk;
   const array = (format, layout, type) =>
     texture(gl, gl.TEXTURE_2D_ARRAY, format, width, height, MOST_SOURCES, 0, layout, type, null);
@@ -29,27 +46,57 @@ function layersOfSize(width, height) {
   const depth = gl.createRenderbuffer();
   gl.bindRenderbuffer(gl.RENDERBUFFER, depth);
   gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_COMPONENT32F, width, height);
-  const framebuffers = Array.from({ length: MOST_SOURCES }, (_, layer) => {
-    const framebuffer = gl.createFramebuffer();
-    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+  const framebuffers = Array.from({ length: MOST_SOURCES }, (_, layer) => framebufferOf(() => {
     gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, colours, 0, layer);
     gl.framebufferTextureLayer(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT1, inverses, 0, layer);
     gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depth);
-    gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
-    return framebuffer;
-  });
-  walk.layers = { width, height, colours, inverses, depth, framebuffers };
-  return walk.layers;
+  }));
+  return { width, height, colours, inverses, depth, framebuffers };
 }
 
-// Draw one part of a source, its surface or its torn pixels, into the layer that is bound.
-function drawPart({ linked, uniforms }, { vertices, count }, source, eye) {
+function createStage(width, height, samples) {
+  const levels = [];
+  for (let [w, h] = [width, height]; ; [w, h] = [Math.ceil(w / 2), Math.ceil(h / 2)]) {
+    const level = createPicture(w, h);
+    // The coarsest level has nothing to be filled from.
+    if (w * h === 1) {
+      levels.push({ level, filled: level });
+      break;
+    }
+    levels.push({ level, filled: createPicture(w, h) });
+  }
+  return { width, height, samples, layers: createLayers(samples * width, samples * height), levels };
+}
+
+function deleteStage({ layers, levels }) {
+  const { gl } = walk;
+  const pictures = levels.flatMap(({ level, filled }) => (level === filled ? [level] : [level, filled]));
+  for (const { colours, inverses } of [layers, ...pictures]) {
+    gl.deleteTexture(colours);
+    gl.deleteTexture(inverses);
+  }
+  gl.deleteRenderbuffer(layers.depth);
+  for (const framebuffer of layers.framebuffers) gl.deleteFramebuffer(framebuffer);
+  for (const { framebuffer } of pictures) gl.deleteFramebuffer(framebuffer);
+}
+
+// What a picture of this size is drawn in. Two are kept: for pictures in motion, and for those that stand.
+function stageOf(width, height, samples) {
+  const isRight = (stage) => stage.width === width && stage.height === height && stage.samples === samples;
+  const stage = walk.stages.find(isRight) ?? createStage(width, height, samples);
+  walk.stages = [stage, ...walk.stages.filter((other) => other !== stage)];
+  if (walk.stages.length > 2) deleteStage(walk.stages.pop());
+  return stage;
+}
+
+// Draw one part of a source, its surface or its torn pixels, into the layer that is bound, which is so wide.
+function drawPart({ linked, uniforms }, { vertices, count }, source, eye, width, kind = walk.gl.TRIANGLES) {
   const { gl } = walk;
   const { view } = source;
   const [right, up, back] = eye.axes;
   gl.useProgram(linked);
   bindTextures(gl, uniforms, {
-    rays: [gl.TEXTURE_2D, source.rays],
+    rays: [gl.TEXTURE_2D, walk.raysTexture],
     inverses: [gl.TEXTURE_2D, source.inverses],
     light: [gl.TEXTURE_2D, source.light],
   });
@@ -59,16 +106,16 @@ function drawPart({ linked, uniforms }, { vertices, count }, source, eye) {
   gl.uniformMatrix3fv(uniforms.back, false, [0, 1, 2].flatMap((axis) => [right[axis], up[axis], back[axis]]));
   gl.uniform3fv(uniforms.offset, minus(view.at, eye.at));
   gl.uniform4fv(uniforms.lens, eye.lens);
-  gl.uniform2fv(uniforms.stops, DATA.light);
   gl.uniform1f(uniforms.near, NEAR);
   gl.uniform1f(uniforms.spread, WALK.distance);
   gl.uniform1f(uniforms.sharp, WALK.sharp);
-  gl.uniform1f(uniforms.tornWeight, WALK.torn);
+  gl.uniform1f(uniforms.certain, WALK.certain);
   gl.bindVertexArray(vertices);
-  gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
+  gl.uniform1f(uniforms.pointSize, (eye.lens[0] * width * WALK.pixel) / 2);
+  gl.drawElements(kind, count, gl.UNSIGNED_INT, 0);
 }
 
-function drawSources(layers, eye) {
+function drawSources(layers, eye, isCoarse) {
   const { gl } = walk;
   gl.viewport(0, 0, layers.width, layers.height);
   gl.enable(gl.DEPTH_TEST);
@@ -80,41 +127,101 @@ function drawSources(layers, eye) {
     gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
     gl.clearBufferfv(gl.COLOR, 1, [-1, 0, 0, 0]);
     gl.clearBufferfv(gl.DEPTH, 0, [1]);
-    drawPart(walk.surface, source.surface, source, eye);
-    drawPart(walk.pixels, source.pixels, source, eye);
+    if (isCoarse) {
+      drawPart(walk.coarse, source.coarse, source, eye, layers.width);
+      drawPart(walk.surface, source.points, source, eye, layers.width, gl.POINTS);
+    } else {
+      drawPart(walk.surface, source.surface, source, eye, layers.width);
+      drawPart(walk.pixels, source.pixels, source, eye, layers.width);
+    }
   });
   gl.bindVertexArray(null);
   gl.disable(gl.DEPTH_TEST);
   gl.disable(gl.CULL_FACE);
 }
 
-function blendLayers(layers, eye, target, corner) {
+// Run a program over all of a picture.
+function drawWhole({ linked, uniforms }, picture, textures) {
   const { gl } = walk;
-  const { linked, uniforms } = walk.blended;
-  gl.bindFramebuffer(gl.FRAMEBUFFER, target);
-  gl.viewport(...corner, layers.width, layers.height);
+  gl.bindFramebuffer(gl.FRAMEBUFFER, picture.framebuffer);
+  gl.viewport(0, 0, picture.width, picture.height);
   gl.useProgram(linked);
-  bindTextures(gl, uniforms, {
+  bindTextures(gl, uniforms, textures);
+  gl.uniform1f(uniforms.far, WALK.far);
+  return uniforms;
+}
+
+const drawTriangle = () => walk.gl.drawArrays(walk.gl.TRIANGLES, 0, 3);
+
+function blendLayers({ layers, levels, samples }, count) {
+  const { gl } = walk;
+  const uniforms = drawWhole(walk.blended, levels[0].level, {
     colours: [gl.TEXTURE_2D_ARRAY, layers.colours],
     inverses: [gl.TEXTURE_2D_ARRAY, layers.inverses],
+  });
+  gl.uniform1i(uniforms.count, count);
+  gl.uniform1i(uniforms.samples, samples);
+  gl.uniform1f(uniforms.same, WALK.same);
+  gl.uniform1f(uniforms.hidden, WALK.hidden);
+  gl.uniform1f(uniforms.dark, WALK.dark);
+  drawTriangle();
+}
+
+// Fill what no source sees from coarser levels (push-pull: Gortler et al. 1996).
+function fillHoles({ levels }) {
+  const { gl } = walk;
+  for (let number = 1; number < levels.length; number++) {
+    const { colours, inverses } = levels[number - 1].level;
+    const textures = { colours: [gl.TEXTURE_2D, colours], inverses: [gl.TEXTURE_2D, inverses] };
+    const uniforms = drawWhole(walk.shrunk, levels[number].level, textures);
+    gl.uniform1i(uniforms.isFirst, number === 1);
+    drawTriangle();
+  }
+  for (let number = levels.length - 2; number >= 0; number--) {
+    const { level, filled } = levels[number];
+    const coarse = levels[number + 1].filled;
+    const uniforms = drawWhole(walk.enlarged, filled, {
+      colours: [gl.TEXTURE_2D, level.colours],
+      inverses: [gl.TEXTURE_2D, level.inverses],
+      coarseColours: [gl.TEXTURE_2D, coarse.colours],
+      coarseInverses: [gl.TEXTURE_2D, coarse.inverses],
+    });
+    gl.uniform1i(uniforms.isFirst, number === 0);
+    drawTriangle();
+  }
+}
+
+function showPicture({ levels }, eye, target, corner, size) {
+  const { gl } = walk;
+  const { linked, uniforms } = walk.shown;
+  const { level } = levels[0];
+  const { filled } = WALK.fillsHoles ? levels[0] : { filled: level };
+  gl.bindFramebuffer(gl.FRAMEBUFFER, target);
+  gl.viewport(...corner, ...size);
+  gl.useProgram(linked);
+  bindTextures(gl, uniforms, {
+    filled: [gl.TEXTURE_2D, filled.colours],
+    colours: [gl.TEXTURE_2D, level.colours],
+    inverses: [gl.TEXTURE_2D, level.inverses],
     palette: [gl.TEXTURE_2D, walk.palette],
   });
-  gl.uniform1i(uniforms.count, eye.sources.length);
   gl.uniform1i(uniforms.mode, walk.mode);
   gl.uniform2iv(uniforms.corner, corner);
+  gl.uniform2iv(uniforms.size, size);
   gl.uniform1f(uniforms.gain, 2 ** viewer.exposure);
   gl.uniform1f(uniforms.white, DATA.white);
-  gl.uniform1f(uniforms.same, WALK.same);
-  gl.uniform1f(uniforms.far, WALK.far);
   gl.uniform1f(uniforms.edge, clamp(1 - metresToEdge(eye.at) / Math.max(walk.fadeFrom, NEAR), 0, 0.8));
   gl.uniform2fv(uniforms.shown, DATA.depth.shown);
-  gl.drawArrays(gl.TRIANGLES, 0, 3);
+  drawTriangle();
 }
 
 // Draw what an eye sees into `target`, from its `corner` on. Of the eye: where it is (`at`), its `axes`, its
-// `lens` (scales across and up, and shifts), and the `sources` that it is drawn from.
-export function drawEye(eye, target, corner, width, height) {
-  const layers = layersOfSize(width, height);
-  drawSources(layers, eye);
-  blendLayers(layers, eye, target, corner);
+// `lens` (scales across and up, and shifts), and the `sources` that it is drawn from. `samples` are those across
+// and down a pixel; of coarse sources fewer triangles are drawn.
+export function drawEye(eye, target, corner, size, samples, isCoarse) {
+  const stage = stageOf(...size, samples);
+  drawSources(stage.layers, eye, isCoarse);
+  blendLayers(stage, eye.sources.length);
+  if (WALK.fillsHoles) fillHoles(stage);
+  showPicture(stage, eye, target, corner, size);
 }

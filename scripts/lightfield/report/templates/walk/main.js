@@ -11,9 +11,13 @@ import { FEW, drawWalkSoon } from "./drawing.js";
 import { axes, scales } from "./eye.js";
 import { goHome, goWhereItWas } from "./home.js";
 import blendedShader from "./shaders/blended.glsl";
+import coarseShader from "./shaders/coarse.glsl";
 import drawnShader from "./shaders/drawn.glsl";
+import enlargedShader from "./shaders/enlarged.glsl";
 import pixelsShader from "./shaders/pixels.glsl";
 import placeShader from "./shaders/place.glsl";
+import shownShader from "./shaders/shown.glsl";
+import shrunkShader from "./shaders/shrunk.glsl";
 import surfaceShader from "./shaders/surface.glsl";
 import wholePictureShader from "./shaders/whole_picture.glsl";
 import { unfolded, upload } from "./sources.js";
@@ -32,7 +36,7 @@ async function bringSources(begin) {
   }
 }
 
-// The unit ray of each pixel in the camera's axes, x, y, z and a fourth number for upload to mark.
+// The unit ray of each pixel in the camera's axes: x, y, z, 0.
 function unpackedRays() {
   const codes = new Uint16Array(bytesOf(WALK.rays).buffer);
   const rays = new Float32Array(2 * codes.length);
@@ -53,13 +57,20 @@ function paletteTexture(gl) {
 function prepareDrawing(gl) {
   walk.gl = gl;
   walk.surface = program(gl, placeShader + surfaceShader, drawnShader);
+  walk.coarse = program(gl, placeShader + surfaceShader, coarseShader);
   walk.pixels = program(gl, placeShader + pixelsShader, drawnShader);
   walk.blended = program(gl, wholePictureShader, blendedShader);
+  walk.shrunk = program(gl, wholePictureShader, shrunkShader);
+  walk.enlarged = program(gl, wholePictureShader, enlargedShader);
+  walk.shown = program(gl, wholePictureShader, shownShader);
   walk.palette = paletteTexture(gl);
 }
 
 function prepareSources() {
   walk.rays = unpackedRays();
+  const { gl } = walk;
+  walk.raysTexture = texture(gl, gl.TEXTURE_2D, gl.RGBA32F, ...DATA.size, 0, gl.RGBA, gl.FLOAT, walk.rays);
+  walk.toRim = bytesOf(WALK.toRim);
   walk.sight = bytesOf(WALK.sight);
   walk.inverses = Float32Array.from({ length: DATA.depth.steps }, (_, code) => 1 / depthOf(code, DATA.depth.range));
   walk.order = DATA.embedded.map((entry) => ({ entry, view: DATA.views[entry.view] }));

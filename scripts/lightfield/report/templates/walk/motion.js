@@ -34,12 +34,22 @@ export const WALKING = {
 };
 export const TURNING = { ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
 
+// What each key multiplies the zoom by, in a second.
+export const ZOOMING = { "+": 2, "=": 2, "-": 0.5 };
+
+// Enlarge the picture, between the default field of view and an eighth of it.
+export function zoomed(factor) {
+  walk.zoom = clamp(factor * walk.zoom, 1, 8);
+  drawWalkSoon();
+}
+
 // Move in each frame, for as long as a key is held.
 export function walkOn(before) {
   requestAnimationFrame((now) => {
     const seconds = clamp((now - before) / 1000, 0, 0.1);
     for (const key of walk.keys) {
       if (key in WALKING) moved(...WALKING[key].map((value) => 0.6 * seconds * value));
+      else if (key in ZOOMING) zoomed(ZOOMING[key] ** seconds);
       else turned(...TURNING[key].map((value) => 1.2 * seconds * value));
     }
     if (walk.keys.size) walkOn(now);

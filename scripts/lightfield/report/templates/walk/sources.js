@@ -1,13 +1,20 @@
 // A source view on the graphics card: its colours, its inverse distances, and the triangles that hold.
 
 import { DATA } from "../page/data.js";
-import { depthCode } from "../page/packing.js";
+import { LIGHT, depthCode } from "../page/packing.js";
 import { WALK, walk } from "./state.js";
 import { texture, triangles } from "./webgl.js";
 
 // Between the last vertex of a row and the first of the next so many numbers are left out: what draws
 // without a graphics card keeps a vertex by its number modulo 64, where the one below would drop it.
 export const APART = 32;
+
+// The largest block of pixels, along a side, that is drawn as two triangles in motion, and the part of its inverse
+// distance by which it may be bent.
+const LARGEST_BLOCK = 8;
+const FLAT = 0.03;
+
+const ROOTS = LIGHT.map(Math.sqrt);
 
 // Of the unit square's point, the unit vector (Cigolle et al. 2014).
 export function unfolded(u, v) {
@@ -79,16 +86,68 @@ function surfaceTriangles({ right, down }) {
   return corners.subarray(0, count);
 }
 
-// The pixels beside a tear, which are drawn one by one.
+// Whether all quads of a block are of one surface, and the block is flat enough to be drawn as two triangles.
+function isFlat(inverses, isWhole, first, side) {
+  const width = DATA.size[0];
+  for (let line = 0; line < side; line++) {
+    for (let column = 0; column < side; column++) if (!isWhole(first + line * width + column)) return false;
+  }
+  // Two triangles of a quad in place of eight: nobody sees that in motion.
+  if (side === 2) return true;
+  const corner = (i, j) => inverses[first + i * side * width + j * side];
+  for (let i = 0; i <= 2; i++) {
+    for (let j = 0; j <= 2; j++) {
+      const expected =
+        ((2 - i) * ((2 - j) * corner(0, 0) + j * corner(0, 1)) + i * ((2 - j) * corner(1, 0) + j * corner(1, 1))) / 4;
+      const here = inverses[first + ((i * side) / 2) * width + (j * side) / 2];
+      if (Math.abs(here - expected) > Math.max(FLAT * here, WALK.far)) return false;
+    }
+  }
+  return true;
+}
+
+// The corners of fewer triangles, for pictures in motion: flat blocks of 8, 4 or 2 pixels have two.
+function coarseTriangles(inverses, { right, down }) {
+  const [width, height] = DATA.size;
+  const corners = [];
+  const upper = (pixel) => right[pixel] && down[pixel];
+  const lower = (pixel) => right[pixel + width] && down[pixel + 1];
+  const isWhole = (pixel) => upper(pixel) && lower(pixel);
+  const addBlock = (i, j, side) => {
+    if (i + 1 >= height || j + 1 >= width) return;
+    const pixel = i * width + j;
+    const fits = i + side < height && j + side < width;
+    if (side > 1 && !(fits && isFlat(inverses, isWhole, pixel, side))) {
+      const half = side / 2;
+      for (const [line, column] of [[0, 0], [0, half], [half, 0], [half, half]]) addBlock(i + line, j + column, half);
+      return;
+    }
+    const [next, below, diagonal] = [vertexOf(i, j + side), vertexOf(i + side, j), vertexOf(i + side, j + side)];
+    if (side > 1 || upper(pixel)) corners.push(vertexOf(i, j), next, below);
+    if (side > 1 || lower(pixel)) corners.push(next, diagonal, below);
+  };
+  for (let i = 0; i < height; i += LARGEST_BLOCK) {
+    for (let j = 0; j < width; j += LARGEST_BLOCK) addBlock(i, j, LARGEST_BLOCK);
+  }
+  return Uint32Array.from(corners);
+}
+
+// The pixels that lack a triangle for which the picture has room: they are drawn one by one.
 function tornPixels(inverses, { right, down }) {
   const [width, height] = DATA.size;
+  // Whether a pixel and three around it have the triangle left above, and the one right below.
+  const upper = (pixel) => right[pixel] && down[pixel];
+  const lower = (pixel) => right[pixel + width] && down[pixel + 1];
   const torn = [];
   for (let i = 0; i < height; i++) {
     for (let j = 0; j < width; j++) {
       const pixel = i * width + j;
-      const joinsBeside = (j + 1 === width || right[pixel]) && (j === 0 || right[pixel - 1]);
-      const joinsAbove = (i + 1 === height || down[pixel]) && (i === 0 || down[pixel - width]);
-      if (!(joinsBeside && joinsAbove) && !Number.isNaN(inverses[pixel])) torn.push(pixel);
+      const [hasLeft, hasRight, hasAbove, hasBelow] = [j > 0, j + 1 < width, i > 0, i + 1 < height];
+      const isAmid =
+        (!(hasRight && hasBelow) || upper(pixel)) && (!(hasLeft && hasAbove) || lower(pixel - width - 1)) &&
+        (!(hasLeft && hasBelow) || (upper(pixel - 1) && lower(pixel - 1))) &&
+        (!(hasRight && hasAbove) || (upper(pixel - width) && lower(pixel - width)));
+      if (!isAmid && !Number.isNaN(inverses[pixel])) torn.push(pixel);
     }
   }
   return torn;
@@ -103,11 +162,32 @@ function pixelTriangles(pixels) {
   }));
 }
 
-// The rays of the pixels, with 1 in the fourth number of torn ones.
-function markedRays(torn) {
-  const rays = walk.rays.slice();
-  for (const pixel of torn) rays[4 * pixel + 3] = 1;
-  return rays;
+// The roots of a picture's colours, sharpened as synthesis/kernels.py's sharpen does, and a fourth number:
+// how much each pixel counts.
+function sharpRoots(light, { right, down }, torn) {
+  const [width, height] = DATA.size;
+  const roots = Float32Array.from(light, (code) => ROOTS[code]);
+  const sharp = new Float32Array(roots.length);
+  const part = WALK.sharpened / 4;
+  for (let pixel = 0; pixel < width * height; pixel++) {
+    const [j, row] = [pixel % width, 4 * width];
+    const [joinsLeft, joinsAbove] = [j > 0 && right[pixel - 1], pixel >= width && down[pixel - width]];
+    for (let at = 4 * pixel; at < 4 * pixel + 3; at++) {
+      let apart = 0;
+      if (right[pixel]) apart += roots[at + 4] - roots[at];
+      if (joinsLeft) apart += roots[at - 4] - roots[at];
+      if (down[pixel]) apart += roots[at + row] - roots[at];
+      if (joinsAbove) apart += roots[at - row] - roots[at];
+      sharp[at] = Math.max(roots[at] - part * apart, 0);
+    }
+    sharp[4 * pixel + 3] = walk.toRim[pixel] / 255;
+  }
+  // The mixed colours beside a tear stay as they are.
+  for (const pixel of torn) {
+    for (let at = 4 * pixel; at < 4 * pixel + 3; at++) sharp[at] = roots[at];
+    sharp[4 * pixel + 3] *= WALK.torn;
+  }
+  return sharp;
 }
 
 // Bring a source onto the graphics card: colours, inverse distances, and the triangles that hold.
@@ -117,14 +197,18 @@ export function upload(source, light, depth) {
   const joined = joins(inverses);
   const torn = tornPixels(inverses, joined);
   const marked = inverses.map((value) => (Number.isNaN(value) ? -1 : value));
-  const image = (format, layout, type, values) =>
-    texture(gl, gl.TEXTURE_2D, format, ...DATA.size, 0, layout, type, values);
+  const image = (format, layout, values) =>
+    texture(gl, gl.TEXTURE_2D, format, ...DATA.size, 0, layout, gl.FLOAT, values);
+  const roots = image(gl.RGBA16F, gl.RGBA, sharpRoots(light, joined, torn));
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
   Object.assign(source, {
-    light: image(gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(light.buffer)),
-    inverses: image(gl.R32F, gl.RED, gl.FLOAT, marked),
-    rays: image(gl.RGBA32F, gl.RGBA, gl.FLOAT, markedRays(torn)),
+    light: roots,
+    inverses: image(gl.R32F, gl.RED, marked),
     surface: triangles(gl, surfaceTriangles(joined)),
+    coarse: triangles(gl, coarseTriangles(inverses, joined)),
     pixels: triangles(gl, pixelTriangles(torn)),
+    points: triangles(gl, Uint32Array.from(torn, (pixel) => vertexOf(Math.floor(pixel / DATA.size[0]), pixel % DATA.size[0]))),
     isThere: true,
   });
 }

@@ -10,6 +10,8 @@ export const MODES = ["colour", "depth", "holes", "sources"];
 export const walk = {
   canvas: element("walk"),
   overlay: element("walk-overlay"),
+  // Pixels across and down of a picture that stands.
+  size: [2, 2],
   at: null,
   fadeFrom: 0,
   yaw: 0,
@@ -19,7 +21,11 @@ export const walk = {
   showsCameras: true,
   keys: new Set(),
   frames: 0,
+  stages: [],
+  zoom: 1,
   slow: true,
   wanted: [],
   chosen: [],
+  choices: 0,
+  lastChoice: null,
 };

@@ -1,45 +1,73 @@
 #version 300 es
-// The layers of all sources, blended where they show the same surface.
+// The layers of all sources, blended: synthesis/kernels.py's blend. A pixel is the mean of
+// samples × samples texels of the layers.
 precision highp float;
 precision highp int;
-precision highp sampler2D;
 precision highp sampler2DArray;
 uniform sampler2DArray colours, inverses;
-uniform sampler2D palette;
-uniform int count, mode;
-uniform ivec2 corner;
-uniform float gain, white, same, far, edge;
-uniform vec2 shown;
-out vec4 result;
-vec3 encoded(vec3 v) {
-  v = clamp(v, 0.0, 1.0);
-  return mix(12.92 * v, 1.055 * pow(v, vec3(1.0 / 2.4)) - 0.055, step(vec3(0.0031308), v));
-}
-void main() {
-  ivec2 pixel = ivec2(gl_FragCoord.xy) - corner;
-  float nearest = -1.0, used = 0.0, total = 0.0, mean = 0.0;
-  for (int k = 0; k < count; k++) nearest = max(nearest, texelFetch(inverses, ivec3(pixel, k), 0).r);
-  vec3 sum = vec3(0.0);
+uniform int count, samples;
+uniform float same, hidden, far, dark;
+// Linear light, and the part of the sources that show the nearest surface: 0 in a hole.
+layout(location = 0) out vec4 colour;
+layout(location = 1) out float inverse;
+
+float sum, number, used;
+vec3 light;
+
+// Return the inverse distance of the nearest surface of one sample, −1 in a hole; add to the sums.
+float addSample(ivec2 texel) {
+  float nearest = -1.0, front = -1.0, total = 0.0, parts = 0.0, mean = 0.0;
+  vec3 inverted = vec3(0.0);
   for (int k = 0; k < count; k++) {
-    float inverse = texelFetch(inverses, ivec3(pixel, k), 0).r;
-    if (inverse < 0.0 || inverse < nearest - max(same * nearest, far)) continue;
-    vec4 drawn = texelFetch(colours, ivec3(pixel, k), 0);
-    sum += drawn.a * drawn.rgb;
-    mean += drawn.a * inverse;
-    total += drawn.a;
-    used += 1.0;
+    float near = texelFetch(inverses, ivec3(texel, k), 0).r;
+    nearest = max(nearest, near);
+    if (texelFetch(colours, ivec3(texel, k), 0).a > 0.0) front = max(front, near);
   }
-  bool hole = nearest < 0.0;
-  vec3 v = gain * sum / max(total, 1e-30);
-  vec3 colour = hole ? vec3(0.0) : encoded(v * (1.0 + v / (white * white)) / (1.0 + v));
-  if (mode == 1) {
-    float place = (log2(total / max(mean, 1e-9)) - shown.x) / (shown.y - shown.x);
-    colour = hole ? vec3(0.0) : mean <= 0.0 ? vec3(0.69) : texture(palette, vec2(clamp(place, 0.002, 0.998), 0.5)).rgb;
-  } else if (mode == 2) {
-    colour = hole ? vec3(1.0, 0.0, 0.8) : vec3(dot(colour, vec3(0.3, 0.6, 0.1)) * 0.6);
-  } else if (mode == 3) {
-    colour = hole ? vec3(0.0) : texture(palette, vec2(used / float(count), 0.5)).rgb;
+  if (nearest < 0.0) return -1.0;
+  for (int k = 0; k < count; k++) {
+    float near = texelFetch(inverses, ivec3(texel, k), 0).r;
+    if (near < 0.0) continue;
+    vec4 drawn = texelFetch(colours, ivec3(texel, k), 0);
+    float weight = abs(drawn.a);
+    if (near >= nearest - max(same * nearest, far)) {
+      parts += weight;
+      mean += weight * near;
+      used += 1.0;
+    }
+    // What is behind a surface of which a source is certain counts less and less, and then not at all.
+    float behind = (front - near) / max(front, far);
+    weight *= max(near, far) * max(near, far) * (1.0 - clamp((behind - same) / (hidden - same), 0.0, 1.0));
+    inverted += weight / (drawn.rgb + dark);
+    total += weight;
   }
-  // The edge of the volume is felt: colour fades towards it, from where the walk begins at most.
-  result = vec4(mix(colour, vec3(dot(colour, vec3(1.0 / 3.0))) * 0.5, edge), 1.0);
+  vec3 root = total / inverted - dark;
+  light += root * root;
+  number += 1.0;
+  return mean / parts;
+}
+
+void main() {
+  ivec2 first = samples * ivec2(gl_FragCoord.xy);
+  light = vec3(0.0);
+  used = number = 0.0;
+  vec4 nears = vec4(-1.0);
+  for (int k = 0; k < samples * samples; k++) {
+    float near = addSample(first + ivec2(k % samples, k / samples));
+    if (k == 0) nears.x = near;
+    else if (k == 1) nears.y = near;
+    else if (k == 2) nears.z = near;
+    else nears.w = near;
+  }
+  colour = number > 0.0 ? vec4(light / number, used / (number * float(count))) : vec4(0.0);
+  // Distances are not blended across an edge: those count that are of one surface with the second nearest.
+  vec2 larger = max(nears.xz, nears.yw), smaller = min(nears.xz, nears.yw);
+  float second = max(min(larger.x, larger.y), max(smaller.x, smaller.y));
+  float middle = second >= 0.0 ? second : max(larger.x, larger.y);
+  float total = 0.0, parts = 0.0;
+  for (int k = 0; k < 4; k++) {
+    if (nears[k] < 0.0 || abs(nears[k] - middle) > max(same * middle, far)) continue;
+    total += nears[k];
+    parts += 1.0;
+  }
+  inverse = parts > 0.0 ? total / parts : 0.0;
 }

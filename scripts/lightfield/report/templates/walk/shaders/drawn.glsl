@@ -1,11 +1,14 @@
 #version 300 es
-// What is drawn of one source: its light and its inverse distance from the eye.
+// What is drawn of one source: its light, its weight, and its inverse distance from the eye. The weight is
+// negative where the source is not certain enough to hide what is behind.
 precision highp float;
+uniform float certain;
 in vec4 shade;
-in float nearness;
+in float towards, nearness;
 layout(location = 0) out vec4 colour;
 layout(location = 1) out float inverse;
 void main() {
-  colour = shade;
+  float weight = shade.a * towards;
+  colour = vec4(shade.rgb, shade.a >= certain ? weight : -weight);
   inverse = nearness;
 }

@@ -14,5 +14,5 @@ void main() {
   vec3 across = (texelFetch(rays, toRight, 0).rgb - texelFetch(rays, toLeft, 0).rgb) / float(max(toRight.x - toLeft.x, 1));
   vec3 down = (texelFetch(rays, below, 0).rgb - texelFetch(rays, above, 0).rgb) / float(max(below.y - above.y, 1));
   vec2 corner = vec2(gl_VertexID & 1, (gl_VertexID >> 1) & 1) - 0.5;
-  place(pixel, normalize(ray + corner.x * across + corner.y * down), tornWeight);
+  place(pixel, normalize(ray + corner.x * across + corner.y * down));
 }

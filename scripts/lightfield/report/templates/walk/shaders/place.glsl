@@ -5,31 +5,33 @@ precision highp float;
 precision highp int;
 precision highp sampler2D;
 uniform sampler2D rays, inverses;
+// The roots of colours, and how certain a pixel is of its surface.
 uniform sampler2D light;
 uniform int stride;
 uniform mat3 turn, back;
 uniform vec3 offset;
 uniform vec4 lens;
-uniform vec2 stops;
-uniform float near, spread, sharp, tornWeight;
+uniform float near, spread, sharp;
+// How many pixels wide a source's pixel is at the distance 1.
+uniform float pointSize;
 out vec4 shade;
+out vec2 spot;
+out float towards;
 out float nearness;
 
-vec3 decoded(vec3 code) {
-  vec3 linear = exp2(stops.x + (code * 255.0 - 1.0) / 254.0 * (stops.y - stops.x));
-  return mix(vec3(0.0), linear, step(vec3(0.5 / 255.0), code));
-}
-
-void place(ivec2 pixel, vec3 ray, float weight) {
+void place(ivec2 pixel, vec3 ray) {
   float inverse = texelFetch(inverses, pixel, 0).r;
   vec3 direction = turn * ray;
   vec3 seen = direction + inverse * offset;
   vec3 eye = back * seen;
   gl_Position = vec4(lens.x * eye.x + lens.z * eye.z, lens.y * eye.y + lens.w * eye.z, -eye.z - 2.0 * near * inverse, -eye.z);
+  gl_PointSize = clamp(pointSize / max(-eye.z, 1e-3), 1.0, 16.0);
   float here = length(seen);
   float angle = length(seen / here - direction);
   float penalty = angle + spread * max(1.0 / here - 1.0, 0.0) + sharp;
-  shade = vec4(decoded(texelFetch(light, pixel, 0).rgb), weight / (penalty * penalty));
+  shade = texelFetch(light, pixel, 0);
   nearness = inverse / here;
+  spot = (vec2(pixel) + 0.5) / vec2(textureSize(rays, 0));
+  towards = 1.0 / (penalty * penalty);
 }
 

@@ -1,0 +1,16 @@
+#version 300 es
+// What is drawn of one source in motion: light is read for each pixel, for triangles are larger than the source's.
+precision highp float;
+precision highp sampler2D;
+uniform sampler2D light;
+uniform float certain;
+in vec2 spot;
+in float towards, nearness;
+layout(location = 0) out vec4 colour;
+layout(location = 1) out float inverse;
+void main() {
+  vec4 shade = texture(light, spot);
+  float weight = shade.a * towards;
+  colour = vec4(shade.rgb, shade.a >= certain ? weight : -weight);
+  inverse = nearness;
+}

@@ -1,0 +1,34 @@
+#version 300 es
+// The picture as it is shown: its light, or what else is asked for, on the whole viewport.
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+uniform sampler2D filled, colours, inverses, palette;
+uniform int mode;
+uniform ivec2 corner, size;
+uniform float gain, white, edge;
+uniform vec2 shown;
+out vec4 result;
+vec3 encoded(vec3 v) {
+  v = clamp(v, 0.0, 1.0);
+  return mix(12.92 * v, 1.055 * pow(v, vec3(1.0 / 2.4)) - 0.055, step(vec3(0.0031308), v));
+}
+void main() {
+  vec2 place = (gl_FragCoord.xy - vec2(corner)) / vec2(size);
+  ivec2 texel = ivec2(place * vec2(textureSize(colours, 0)));
+  float used = mode == 0 ? 1.0 : texelFetch(colours, texel, 0).a;
+  bool hole = used <= 0.0;
+  vec3 v = gain * texture(filled, place).rgb;
+  vec3 colour = encoded(v * (1.0 + v / (white * white)) / (1.0 + v));
+  if (mode == 1) {
+    float inverse = texelFetch(inverses, texel, 0).r;
+    float depth = (-log2(max(inverse, 1e-9)) - shown.x) / (shown.y - shown.x);
+    colour = hole ? vec3(0.0) : inverse <= 0.0 ? vec3(0.69) : texture(palette, vec2(clamp(depth, 0.002, 0.998), 0.5)).rgb;
+  } else if (mode == 2) {
+    colour = hole ? vec3(1.0, 0.0, 0.8) : vec3(dot(colour, vec3(0.3, 0.6, 0.1)) * 0.6);
+  } else if (mode == 3) {
+    colour = hole ? vec3(0.0) : texture(palette, vec2(used, 0.5)).rgb;
+  }
+  // The edge of the volume is felt: colour fades towards it, from where the walk begins at most.
+  result = vec4(mix(colour, vec3(dot(colour, vec3(1.0 / 3.0))) * 0.5, edge), 1.0);
+}

@@ -1,0 +1,138 @@
+"""Mistakes of the table: each is refused in one line, before anything is made."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from checkouts import checkout, snakemake
+from mistakes import BOMB, EYE, MISTAKES, RIGHT, changed
+
+from lightfield.core.errors import UserError
+from lightfield.core.settings import read_settings
+from lightfield.dataset import config
+from lightfield.dataset.exports import ExportSettings, settings_of
+from lightfield.dataset.loading import load_datasets
+from lightfield.dataset.reprojections import ReprojectionSettings
+from lightfield.geometry.rigs import from_settings
+from lightfield.measurement.costs import CostSettings
+
+SNAKEMAKE = Path(sys.executable).with_name("snakemake")
+SETTINGS = {
+    "reproject.json": ReprojectionSettings,
+    "colmap.json": ExportSettings[settings_of("colmap")],
+    "instant_ngp.json": ExportSettings[settings_of("instant_ngp")],
+    "costs.json": CostSettings,
+}
+
+
+def read(mistake, file):
+    """Write a file with its mistake, and read it as a program does."""
+    value = mistake.value
+    if not mistake.key and isinstance(value, (str, bytes)):
+        file.write_bytes(value.encode() if isinstance(value, str) else value)
+    if file.name == "scene.yaml":
+        if mistake.key:
+            file.write_text(yaml.safe_dump(changed(mistake.key, value)))
+        config.read_scene(file)
+    elif file.name == "config.yaml":
+        if not mistake.key:
+            config.read_config(file)
+        content = {"scenes": ["garden"], "preset": "full", "presets": {"full": {}}}
+        load_datasets(config.load_config(content | value))
+    elif file.name in SETTINGS:
+        file.write_text(json.dumps(value))
+        read_settings(SETTINGS[file.name], file)
+    else:
+        if mistake.key:
+            frame = {"name": "b", **value} if isinstance(value, dict) else value
+            frames = [{"name": "a", "world_matrix": EYE}, frame]
+            file.write_text(json.dumps({"frames": frames}))
+        from_settings({"type": "poses", "file": str(file)}).poses()
+
+
+@pytest.mark.parametrize("mistake", MISTAKES, ids=str)
+def test_a_mistake_is_refused_in_one_line_with_file_and_key(mistake, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / mistake.file
+    with pytest.raises(UserError) as caught:
+        read(mistake, file)
+    message = str(caught.value)
+    assert message.isprintable() and len(message) <= 2001
+    # Nobody is shown a regular expression.
+    assert not re.search(r"\^[\[\\\w]|\]\*?\$", message), message
+    # The command line may have given what is said of config.yaml: its folder is not named.
+    named = file if mistake.file != "config.yaml" or str(file) in message else file.name
+    assert message.startswith(f"{named}: {mistake.said}")
+    assert mistake.allowed in message
+
+
+# Runs a command and prints the most memory that it had. In a process of its own: Linux counts what
+# the starting process had, which is pytest's.
+MEASURED = """
+import resource, subprocess, sys
+status = subprocess.run(sys.argv[1:], stdout=sys.stderr).returncode
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+sys.exit(status)
+"""
+
+
+CHOICE = "scenes: hostile\nrigs: all\npreset: full\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "own", "arguments"),
+    [
+        ("a0: &a0 [x]\n" + BOMB + "rigs: *a11\n", CHOICE, []),
+        (yaml.safe_dump(RIGHT), CHOICE, ["work=a;id"]),
+        (yaml.safe_dump(RIGHT), CHOICE + "views_per_shard: 12:30\n", []),
+        ("", "a0: &a0 [x]\n" + BOMB, []),
+    ],
+)
+@pytest.mark.slow
+def test_a_hostile_plan_ends_with_one_line_and_little_memory(text, own, arguments, tmp_path):
+    """In a user's own folder, where config.yaml is the user's."""
+    (tmp_path / "configs/scenes").mkdir(parents=True)
+    (tmp_path / "configs/scenes/hostile.yaml").write_text(text)
+    (tmp_path / "config.yaml").write_text(own)
+    words = ("-n", "--cores", "1", "--snakefile", config.ROOT / "Snakefile")
+    command = [SNAKEMAKE, *words, *(["--config", *arguments] if arguments else [])]
+    run = subprocess.run(
+        [sys.executable, "-c", MEASURED, *map(str, command)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode != 0
+    *lines, largest = (run.stderr + run.stdout).splitlines()
+    header = ("host: ", "Using workflow specific profile ", "Config file ")
+    assert [line for line in lines if not line.startswith(header)] == [lines[-1]]
+    assert lines[-1].startswith("error: ")
+    # In KiB, but for macOS.
+    assert int(largest) * (1 if sys.platform == "darwin" else 1024) < 500e6
+    assert not (tmp_path / "results").exists() and not (tmp_path / "work").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        (b"scenes: [garden]\n\tpreset: full\n", "line 2, column 1: is indented with a tab"),
+        (None, "cannot be read as YAML"),
+    ],
+)
+def test_what_is_wrong_with_the_checkouts_own_config_is_one_line(text, problem, tmp_path):
+    folder = checkout(tmp_path)
+    if text is None:
+        (folder / "config.yaml").unlink()
+    else:
+        (folder / "config.yaml").write_bytes(text)
+    run = snakemake(folder, "--dry-run")
+    said = (run.stdout + run.stderr).splitlines()
+    assert run.returncode != 0
+    assert said[-1].startswith("error: ") and "config.yaml: " in said[-1] and problem in said[-1]
+    assert len(said) <= 2
