@@ -92,7 +92,6 @@ rule check_gpu:
         device=SETTINGS.device,
         cache=of_first("trials"),
         calibration=optional("calibration"),
-        full=lambda wildcards: json.dumps(full_sizes(wildcards)),
         stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
     message:
         "Comparing what the GPU and the processor make of {wildcards.scene}"
@@ -100,7 +99,7 @@ rule check_gpu:
         f"python {SCRIPTS}/gpu_check.py"
         " --blend {input.blend:q} --inventory {input.inventory}"
         " --lightfield {input.lightfield} {params.calibration} --device {params.device}"
-        " --threads {threads} --full {params.full:q}"
+        " --threads {threads} --settings {input.settings}"
         " --cache {params.cache} --output {params.stem} > {log} 2>&1"
 
 

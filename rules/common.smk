@@ -29,10 +29,21 @@ from lightfield.core.failures import (
 from lightfield.core.gpus import visible
 from lightfield.core.memory import available
 from lightfield.dataset import journal, ledger, memory, presence, shard_counts
+from lightfield.dataset.capture import LightfieldSettings
 from lightfield.dataset.config import accept_blend, load_config, load_scene, scene_path
 from lightfield.dataset.dataset_paths import PICTURES, PLOTS
-from lightfield.dataset.description import SOURCE_KEYS, Cluster
+from lightfield.dataset.description import Cluster
 from lightfield.dataset.exports import MANIFEST, VIEWS, InstantNgp, export_settings_of
+from lightfield.dataset.job_settings import (
+    BuildSettings,
+    FiguresSettings,
+    FreePlacesSettings,
+    Measurement,
+    PackSettings,
+    PageSettings,
+    SynthesisSettings,
+    ValidationSettings,
+)
 from lightfield.dataset.loading import load_datasets, rendered_frames, scene_datasets
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
 from lightfield.dataset.splits_file import SPLITS

@@ -16,16 +16,13 @@ rule probe_cameras:
         log_of("{scene}/probe_cameras"),
     localrule: True
     params:
-        name=of_first("scene_name"),
-        limits=of_first("limits_json"),
         places=optional("places"),
         inventory=optional("inventory"),
     message:
         "Placing the probe cameras of {wildcards.scene}"
     shell:
         f"python {SCRIPTS}/make_lightfield.py"
-        " --scene {params.name} --limits {params.limits:q} {params.places}"
-        " {params.inventory} --output {output} > {log} 2>&1"
+        " --settings {input.settings} {params.places} {params.inventory} --output {output} > {log} 2>&1"
 
 
 # Only scenes with a target error ask for it. Its output is the same each time but for --seconds.

@@ -14,16 +14,10 @@ rule pack:
     log:
         log_of("{scene}/{rig}/package"),
     params:
-        name=packed_scene,
         folder=f"{RESULTS}/{{scene}}/{{rig}}",
-        size=(
-            f"--gigabytes {SETTINGS.package_gigabytes}"
-            if SETTINGS.package_gigabytes
-            else ""
-        ),
     message:
         "Packing {output.archive}"
     shell:
         f"{taking('input')}python {SCRIPTS}/package.py"
-        " --scene {params.name} --folder {params.folder} {params.size} --output {output.archive}"
+        " --settings {input.settings} --folder {params.folder} --output {output.archive}"
         " > {log} 2>&1"

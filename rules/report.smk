@@ -6,18 +6,7 @@ include: "helpers/report.smk"
 
 rule panorama_lightfield:
     input:
-        settings=settings_of(
-            "panorama",
-            lambda dataset: {
-                "width": dataset.panorama_width,
-                "center": dataset.rig.center,
-                "render": dataset.render,
-                "frame": dataset.source.frame,
-                "scene": dataset.source.model_dump(mode="json", include=SOURCE_KEYS),
-                "fingerprint": dataset.builder_fingerprint,
-                "limits": dataset.limits.model_dump(mode="json", exclude_none=True),
-            },
-        ),
+        settings=settings_of("panorama", panorama_settings),
         inventory=of_dataset("blend_inventory"),
         calibration=of_dataset("calibration"),
     output:
@@ -28,18 +17,13 @@ rule panorama_lightfield:
         times_of("{scene}/{rig}/panorama/lightfield")
     localrule: True
     params:
-        name=of_dataset("scene_name"),
-        limits=of_dataset("limits_json"),
-        width=of_dataset("panorama_width"),
         calibration=optional("calibration"),
         inventory=optional("inventory"),
     message:
         "Placing the panorama of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/make_lightfield.py"
-        " --scene {params.name} --rig {wildcards.rig}"
-        " --limits {params.limits:q} --panorama {params.width} {params.calibration}"
-        " {params.inventory} --output {output} > {log} 2>&1"
+        " --settings {input.settings} {params.calibration} {params.inventory} --output {output} > {log} 2>&1"
 
 
 rule render_panorama:
@@ -73,7 +57,8 @@ rule render_panorama:
 rule figures:
     input:
         settings=settings_of(
-            "figures", lambda dataset: {"rig": json.loads(dataset.rig_json)}
+            "figures",
+            lambda dataset: FiguresSettings(rig=dataset.placed_rig).as_json(),
         ),
         records=records,
         lightfield=f"{DATASET}/lightfield.json",
@@ -96,12 +81,11 @@ rule figures:
     localrule: True
     params:
         dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
-        rig=of_dataset("rig_json"),
     message:
         "Drawing the pictures of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"{taking('input.records')}python {SCRIPTS}/report_figures.py"
-        " --dataset {params.dataset} --rig {params.rig:q}"
+        " --dataset {params.dataset} --settings {input.settings}"
         " --panorama {input.panorama} --output {params.dataset}/report > {log} 2>&1"
 
 
@@ -123,20 +107,13 @@ rule page:
     localrule: True
     params:
         dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
-        rig=of_dataset("rig_json"),
-        panorama=of_dataset("panorama"),
-        yaml=lambda wildcards: str(scene_path(dataset_of(wildcards).scene_name)),
-        command=rebuilding,
-        measurements=measurements,
         inventory=optional("inventory"),
     message:
         "Making the page of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"{taking('input')}python {SCRIPTS}/report_html.py"
         " --dataset {params.dataset}"
-        " --name {wildcards.scene}/{wildcards.rig} --rig {params.rig:q}"
-        " --yaml {params.yaml:q} --command {params.command:q}"
-        " --panorama {params.panorama} --measurements {params.measurements}"
+        " --name {wildcards.scene}/{wildcards.rig} --settings {input.settings}"
         " {params.inventory} --output {output} > {log} 2>&1"
 
 

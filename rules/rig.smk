@@ -7,16 +7,7 @@ include: "helpers/rig.smk"
 # Only a random rig's cameras have to know the scene.
 rule free_places:
     input:
-        settings=settings_of(
-            "free_places",
-            lambda dataset: {
-                "rig": free_rig(dataset),
-                "frame": dataset.source.frame,
-                "scene": dataset.source.model_dump(
-                    mode="json", include={"scene_name", "view_layers"}
-                ),
-            },
-        ),
+        settings=settings_of("free_places", free_places_settings),
         check=of_dataset("blend_check"),
         blend=of_dataset("blend"),
         inventory=of_dataset("blend_inventory"),
@@ -30,35 +21,18 @@ rule free_places:
         mem_mb=8000,
         runtime=60,
     params:
-        rig=lambda wildcards: json.dumps(free_rig(dataset_of(wildcards))),
-        name=of_dataset("scene_name"),
-        frame=lambda wildcards: dataset_of(wildcards).source.frame,
         inventory=optional("inventory"),
     message:
         "Looking for free places for the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/free_places.py"
-        " --blend {input.blend:q} --scene {params.name}"
-        " --rig {params.rig:q} --frame {params.frame} {params.inventory}"
+        " --blend {input.blend:q} --settings {input.settings} {params.inventory}"
         " --output {output} > {log} 2>&1"
 
 
 rule lightfield:
     input:
-        settings=settings_of(
-            "lightfield",
-            lambda dataset: {
-                "rig": json.loads(dataset.rig_json),
-                "poses": poses_sum(dataset),
-                "depth": dataset.depth,
-                "render": dataset.render,
-                "frame": dataset.source.frame,
-                "scene": dataset.source.model_dump(mode="json", include=SOURCE_KEYS),
-                "fingerprint": dataset.builder_fingerprint,
-                "flow": bool(dataset.flow),
-                "limits": dataset.limits.model_dump(mode="json", exclude_none=True),
-            },
-        ),
+        settings=settings_of("lightfield", lightfield_settings),
         inventory=of_dataset("blend_inventory"),
         calibration=of_dataset("calibration"),
         places=of_dataset("places"),
@@ -70,8 +44,6 @@ rule lightfield:
         times_of("{scene}/{rig}/cameras/lightfield")
     localrule: True
     params:
-        name=of_dataset("scene_name"),
-        limits=of_dataset("limits_json"),
         calibration=optional("calibration"),
         places=optional("places"),
         inventory=optional("inventory"),
@@ -79,8 +51,7 @@ rule lightfield:
         "Placing the cameras of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/make_lightfield.py"
-        " --scene {params.name} --rig {wildcards.rig}"
-        " --limits {params.limits:q} {params.calibration} {params.places}"
+        " --settings {input.settings} {params.calibration} {params.places}"
         " {params.inventory} --output {output} > {log} 2>&1"
 
 

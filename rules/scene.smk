@@ -6,15 +6,7 @@ include: "helpers/scene.smk"
 
 rule build_scene:
     input:
-        settings=scene_settings_of(
-            "build_scene",
-            lambda dataset: {
-                "builder": dataset.source.builder,
-                "parameters": dataset.source.parameters.model_dump(mode="json"),
-                # With another text of the builder, the scene, and then its views, are made anew.
-                "fingerprint": dataset.fingerprint,
-            },
-        ),
+        settings=scene_settings_of("build_scene", build_settings),
     output:
         f"{WORK}/{{name}}/scene.blend",
     log:
@@ -24,17 +16,11 @@ rule build_scene:
     resources:
         mem_mb=8000,
         runtime=30,
-    params:
-        builder=lambda wildcards: scene_of(wildcards).source.builder,
-        parameters=lambda wildcards: scene_of(
-            wildcards
-        ).source.parameters.model_dump_json(),
     message:
         "Building the scene {wildcards.name}"
     shell:
         f"python {SCRIPTS}/build_scene.py"
-        " --builder {params.builder}"
-        " --parameters {params.parameters:q} --output {output} > {log} 2>&1"
+        " --settings {input.settings} --output {output} > {log} 2>&1"
 
 
 rule check_blend:

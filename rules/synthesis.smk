@@ -6,6 +6,7 @@ include: "helpers/synthesis.smk"
 
 rule measure_synthesis:
     input:
+        settings=settings_of("synthesis", synthesis_settings),
         records=lambda wildcards: dataset_of(wildcards).records("render"),
         truth=truth_records,
         lightfield=f"{DATASET}/lightfield.json",
@@ -19,13 +20,12 @@ rule measure_synthesis:
         mem_mb=4000,
     params:
         dataset=lambda wildcards, input: str(Path(input.lightfield).parent),
-        truth=truth_words,
         stem=lambda wildcards, output: str(Path(output[0]).with_suffix("")),
     message:
         "Measuring how well views of {wildcards.scene}/{wildcards.rig} are synthesised"
     shell:
         f"python {SCRIPTS}/synthesis_quality.py"
-        " {params.dataset} {params.truth} --output {params.stem} > {log} 2>&1"
+        " {params.dataset} --settings {input.settings} --output {params.stem} > {log} 2>&1"
 
 
 rule synthesis:

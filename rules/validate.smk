@@ -1,19 +1,16 @@
 # What the pixels must satisfy, and checksums of all that is published.
 
 
-include: "helpers/validate.smk"
-
-
 # An invalid dataset is an outcome too: it gets its validation.json and its page, and fails below.
 rule validate:
     input:
         settings=settings_of(
             "validate",
-            lambda dataset: {
-                "reprojections": [*dataset.reprojections],
-                "exports": dataset.export_lists,
-                "records": dataset.all_records,
-            },
+            lambda dataset: ValidationSettings(
+                reprojections=[*dataset.reprojections],
+                exports=dataset.export_lists,
+                records=dataset.all_records,
+            ).as_json(),
         ),
         records=of_dataset("all_records"),
         published=of_dataset("published"),
@@ -33,8 +30,6 @@ rule validate:
         runtime=120,
     params:
         dataset=DATASET,
-        reprojections=reprojection_words,
-        exports=of_dataset("export_lists"),
         optional=optional("inventory", "splits", clearance="cameras"),
         removed=REMOVED,
         # The storage has its own copies of what other machines made.
@@ -43,8 +38,7 @@ rule validate:
         "Validating {wildcards.scene}/{wildcards.rig}"
     shell:
         f"{taking('input')}python {SCRIPTS}/validate.py"
-        " {params.dataset} {params.reprojections} --exports {params.exports}"
-        " --records {input.records} {params.optional} --processes {threads}"
+        " {params.dataset} --settings {input.settings} {params.optional} --processes {threads}"
         " --removed {params.removed} {params.ledger}"
         " --output {output.validation} --sums {output.sums} > {log} 2>&1"
 

@@ -1,14 +1,18 @@
-"""Build a scene with one of the builders in scripts/scenes/ and save it as a .blend."""
+"""Build a scene with one of the builders in scripts/scenes/ and save it as a .blend.
+
+A settings file is JSON: {"builder": "garden", "parameters": {"seed": 0, "detail": 0.5}}.
+"""
 
 import argparse
 import importlib
-import json
 from pathlib import Path
 
-from lightfield.core.cli import run
+from lightfield.core.cli import refuse_beside_settings, run
+from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path
-from lightfield.core.settings import checked
+from lightfield.core.settings import checked, read_settings
 from lightfield.dataset import config
+from lightfield.dataset.job_settings import BuildSettings
 from lightfield.rendering import blend_file
 
 # isort: split
@@ -16,23 +20,40 @@ from pydantic import TypeAdapter
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--builder", required=True, choices=config.builders())
-    parser.add_argument(
-        "--parameters",
-        type=json.loads,
-        default={},
-        help="JSON: seed (default: 0) and detail (default: 1, full)",
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
     parser.add_argument("--output", required=True, type=Path, help=".blend to write")
+    add_settings_flags(parser)
     arguments = parser.parse_args()
 
-    parameters = checked(TypeAdapter(config.Parameters), arguments.parameters, "--parameters")
-    builder = importlib.import_module(f"scenes.{arguments.builder}")
+    settings = settings_from(arguments)
+    builder = importlib.import_module(f"scenes.{settings.builder}")
     blend_file.new_scene()
-    builder.build(parameters.model_dump())
+    builder.build(settings.parameters.model_dump())
     with atomic_path(arguments.output) as temporary:
         blend_file.save_scene(temporary)
+
+
+def add_settings_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that stand for a settings file."""
+    flags = parser.add_argument_group("Instead of --settings")
+    flags.add_argument("--builder", choices=config.builders())
+    flags.add_argument("--seed", type=int, default=0, help="of all that is random (default: 0)")
+    flags.add_argument("--detail", type=float, default=1.0, help="up to 1, which is full (default)")
+
+
+def settings_from(arguments: argparse.Namespace) -> BuildSettings:
+    """Return the settings of --settings, or those of the flags."""
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_settings_flags)
+        return read_settings(BuildSettings, arguments.settings)
+    if arguments.builder is None:
+        raise UserError("--builder: is missing; or give --settings")
+    parameters = {"seed": arguments.seed, "detail": arguments.detail}
+    content = {"builder": arguments.builder, "parameters": parameters}
+    return checked(TypeAdapter(BuildSettings), content, "flags")
 
 
 if __name__ == "__main__":

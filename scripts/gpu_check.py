@@ -1,36 +1,34 @@
-"""Check that a GPU renders what the processor renders, and estimate the full datasets' hours."""
+"""Check that a GPU renders what the processor renders, and estimate the full datasets' hours.
+
+A settings file is JSON: {"full": {"LFSphere": {"views": 642, "resolution": [2048, 2048]}}}. `full`
+has the size of each dataset whose hours are estimated. Without the file none are.
+"""
 
 import argparse
-import json
 from pathlib import Path
 
 from lightfield.core import processors
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
-from lightfield.core.settings import checked
+from lightfield.core.settings import read_settings
 from lightfield.measurement import gpu_check, trials
-from lightfield.measurement.costs import FullSize
-
-# isort: split
-from pydantic import TypeAdapter
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     trials.add_arguments(parser, "lightfield.json")
     trials.add_calibration(parser)
-    parser.add_argument(
-        "--full",
-        type=json.loads,
-        default={},
-        help="JSON: views and resolution of each dataset at full size, by name",
-    )
+    parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
     parser.add_argument("--output", required=True, type=Path, help="stem of the .json and .md")
     arguments = parser.parse_args()
 
-    full = checked(TypeAdapter(dict[str, FullSize]), arguments.full, "--full")
-    sizes = {name: size.model_dump() for name, size in full.items()}
+    settings = gpu_check.GpuCheckSettings()
+    if arguments.settings:
+        settings = read_settings(gpu_check.GpuCheckSettings, arguments.settings)
+    sizes = {name: size.model_dump() for name, size in settings.full.items()}
     # Without a GPU, nothing is rendered.
     with processors.only(arguments.threads):
         from lightfield.rendering import cycles

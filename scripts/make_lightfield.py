@@ -1,69 +1,58 @@
-"""Write a dataset's lightfield.json: its lens, the poses of its views, and how it is rendered."""
+"""Write a dataset's lightfield.json: its lens, the poses of its views, and how it is rendered.
+
+The workflow gives the settings file of a dataset, in which the limits of the preset are applied. By
+hand, --scene and --rig name a dataset at full size.
+"""
 
 import argparse
-import json
 from dataclasses import replace
 from pathlib import Path
 
 from lightfield.core import machine
-from lightfield.core.cli import positive, run
+from lightfield.core.cli import refuse_beside_settings, run
 from lightfield.core.errors import UserError
-from lightfield.core.settings import checked
+from lightfield.core.settings import read_settings
 from lightfield.dataset import passes
-from lightfield.dataset.config import Preset
-from lightfield.dataset.dataset import Dataset
+from lightfield.dataset.capture import LightfieldSettings, panorama_rig
 from lightfield.dataset.lightfield import MACHINE, LightField
 from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import rigs
 from lightfield.measurement.sampling import calibrated
 
-# isort: split
-from pydantic import TypeAdapter
-
 
 def main() -> None:
     arguments = parse()
-    dataset = chosen_dataset(arguments)
-    render = dataset.render
-    if arguments.panorama:
-        dataset = replace(dataset, rig=panorama_rig(dataset.rig, arguments.panorama))
+    settings = settings_from(arguments)
+    capture = settings.capture
+    if arguments.inventory:
+        capture = capture.resolved(arguments.inventory)
+    elif capture.source.blend:
+        raise UserError("--inventory: is missing; scripts/inventory.py writes it for a .blend")
+    render = capture.render
+    if settings.panorama_width:
+        capture = replace(capture, rig=panorama_rig(capture.rig, settings.panorama_width))
         render = passes.without(render)
-    elif isinstance(dataset.rig, rigs.Random):
+    elif isinstance(capture.rig, rigs.Random):
         if arguments.places is None:
             raise UserError("--places: is missing; scripts/free_places.py writes it")
-        dataset = replace(dataset, rig=dataset.rig.placed(arguments.places))
+        capture = replace(capture, rig=capture.rig.placed(arguments.places))
     if arguments.calibration:
         render = calibrated(render, arguments.calibration)
-    keys = dataset.origin(render)
+    keys = capture.origin(render)
     # Imported views were rendered on another machine.
-    if not dataset.imported:
+    if not capture.imported:
         keys[MACHINE] = machine.describe(render["denoise"])
-    lightfield = LightField.from_rig(dataset.rig, dataset.rig.camera.make(), **keys)
-    if dataset.flow and not arguments.panorama:
+    lightfield = LightField.from_rig(capture.rig, capture.rig.camera.make(), **keys)
+    if settings.flow:
         lightfield = lightfield.with_flow()
     lightfield.write(arguments.output)
 
 
 def parse() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scene", required=True, help="name of a file in configs/scenes/")
-    parser.add_argument(
-        "--rig",
-        help="name of a rig in the scene YAML; /f00001 after it chooses a frame of a sequence "
-        "(default: the first)",
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument(
-        "--limits",
-        type=json.loads,
-        default={},
-        help="JSON of a preset's limits, as in config.yaml (default: none, the full size)",
-    )
-    parser.add_argument(
-        "--panorama",
-        type=positive,
-        metavar="WIDTH",
-        help="instead of the rig, one equirectangular view from its centre, WIDTH pixels wide",
-    )
+    parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
     parser.add_argument(
         "--calibration",
         type=Path,
@@ -76,37 +65,37 @@ def parse() -> argparse.Namespace:
         "--places", type=Path, help="JSON of scripts/free_places.py, for a random rig"
     )
     parser.add_argument("--output", required=True, type=Path, help="lightfield.json to write")
+    add_settings_flags(parser)
     return parser.parse_args()
 
 
-def chosen_dataset(arguments: argparse.Namespace) -> Dataset:
-    """Return the dataset of --scene and --rig, with the values of a .blend from its inventory.
+def add_settings_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that stand for a settings file."""
+    flags = parser.add_argument_group("Instead of --settings")
+    flags.add_argument("--scene", help="name of a file in configs/scenes/")
+    flags.add_argument(
+        "--rig",
+        help="name of a rig in the scene YAML; for a frame of a sequence with /f00001 behind it "
+        "(default: the first)",
+    )
 
-    Raises `UserError` for a rig that the scene lacks, and for a .blend without an inventory.
+
+def settings_from(arguments: argparse.Namespace) -> LightfieldSettings:
+    """Return the settings of --settings, or those of the dataset that the flags name.
+
+    Raises `UserError` for a rig that the scene lacks.
     """
-    limits = checked(TypeAdapter(Preset), arguments.limits, "--limits")
-    datasets = scene_datasets(arguments.scene, limits=limits)
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_settings_flags)
+        return read_settings(LightfieldSettings, arguments.settings)
+    if arguments.scene is None:
+        raise UserError("--scene: is missing; or give --settings")
+    datasets = scene_datasets(arguments.scene)
     dataset = next((d for d in datasets if arguments.rig in (None, d.rig_folder)), None)
     if dataset is None:
         rig_names = ", ".join(d.rig_folder for d in datasets)
         raise UserError(f"--rig: is {arguments.rig!r}; must be one of {rig_names}")
-    if arguments.inventory:
-        return dataset.resolved(arguments.inventory)
-    if dataset.source.blend:
-        raise UserError("--inventory: is missing; scripts/inventory.py writes it for a .blend")
-    return dataset
-
-
-def panorama_rig(rig: rigs.Rig, width: int) -> rigs.Rig:
-    """Return a rig of one full equirectangular view, level, at the centre of ``rig``."""
-    return rigs.from_settings(
-        {
-            "type": "lattice",
-            "cameras": [1, 1, 1],
-            "center": rig.center,
-            "camera": {"lens": "equirectangular", "resolution": [width, width // 2]},
-        }
-    )
+    return LightfieldSettings.of_capture(dataset, flow=bool(dataset.flow))
 
 
 if __name__ == "__main__":

@@ -1,33 +1,59 @@
-"""Pack a finished dataset as tar archives with a card: the same bytes whoever packs it."""
+"""Pack a finished dataset as tar archives with a card: the same bytes whoever packs it.
+
+A settings file is JSON: {"gigabytes": 4, "scene": {"licence": "CC0-1.0"}}. `gigabytes` is the
+largest size of a part. `scene` has the keys description, licence and credit of the scene YAML.
+"""
 
 import argparse
 from pathlib import Path
 
-from lightfield.core.cli import above_zero, run
+from lightfield.core.cli import above_zero, refuse_beside_settings, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
+from lightfield.core.settings import read_settings
 from lightfield.dataset.config import load_scene
+from lightfield.dataset.job_settings import PackSettings
 from lightfield.report import package
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scene", required=True, help="name of a file in configs/scenes/")
-    parser.add_argument("--folder", type=Path, required=True, help="of the rig's dataset, or more")
-    parser.add_argument(
-        "--gigabytes", type=above_zero, help="size of a part, at most (default: one)"
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
+    parser.add_argument("--folder", type=Path, required=True, help="of the rig's dataset, or more")
     parser.add_argument("--output", type=Path, required=True, help="<scene>_<rig>.tar, and .json")
+    add_settings_flags(parser)
     arguments = parser.parse_args()
     if arguments.output.suffix != ".tar":
         raise UserError(f"--output {arguments.output}: must end in .tar; .json lies beside it")
     if arguments.output.resolve().is_relative_to(arguments.folder.resolve()):
         raise UserError(f"--output {arguments.output}: must not be in what it packs")
-    card = package.card(arguments.folder, arguments.output.stem, load_scene(arguments.scene))
-    most = arguments.gigabytes and arguments.gigabytes * 1e9
+    settings = settings_from(arguments)
+    card = package.card(arguments.folder, arguments.output.stem, settings.scene)
+    most = settings.gigabytes and settings.gigabytes * 1e9
     parts = package.listed(package.pack(arguments.folder, card, arguments.output, most))
     write_json(arguments.output.with_suffix(".json"), {**card, "parts": parts})
     print(f"{arguments.output}: {len(parts)} parts, {sum(p['bytes'] for p in parts) / 1e9:.3g} GB")
+
+
+def add_settings_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that stand for a settings file."""
+    flags = parser.add_argument_group("Instead of --settings")
+    flags.add_argument("--scene", help="name of a file in configs/scenes/, whose credits are taken")
+    flags.add_argument(
+        "--gigabytes", type=above_zero, help="size of a part, at most (default: one)"
+    )
+
+
+def settings_from(arguments: argparse.Namespace) -> PackSettings:
+    """Return the settings of --settings, or those of the flags."""
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_settings_flags)
+        return read_settings(PackSettings, arguments.settings)
+    if arguments.scene is None:
+        raise UserError("--scene: is missing; or give --settings")
+    return PackSettings.of(scene=load_scene(arguments.scene), gigabytes=arguments.gigabytes)
 
 
 if __name__ == "__main__":

@@ -1,21 +1,24 @@
 """Draw a dataset's pictures: an overview, the contact sheet, its rig in 3D, depth and noise.
 
 Writes overview.png, contact_sheet.png, and rig, depth and noise as .svg and .png, into --output.
+A settings file is JSON: {"rig": {"type": "plane", "cameras": [2, 2], …}}, as in the scene YAML.
 """
 
 import argparse
-import json
 from pathlib import Path
 
 from lightfield.core.cli import run
-from lightfield.geometry import rigs
+from lightfield.core.settings import read_settings
+from lightfield.dataset.job_settings import FiguresSettings
 from lightfield.report import figures
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--dataset", required=True, type=Path, help="folder of the dataset")
-    parser.add_argument("--rig", required=True, type=json.loads, help="the scene YAML's rig, JSON")
+    parser.add_argument(
+        "--settings", required=True, type=Path, metavar="JSON", help="settings file"
+    )
     parser.add_argument(
         "--panorama",
         nargs="?",
@@ -24,8 +27,8 @@ def main() -> None:
     )
     parser.add_argument("--output", required=True, type=Path, help="folder to write to")
     arguments = parser.parse_args()
-    rig = rigs.from_settings(arguments.rig)
-    figures.draw(arguments.dataset, rig, arguments.panorama, arguments.output)
+    settings = read_settings(FiguresSettings, arguments.settings)
+    figures.draw(arguments.dataset, settings.rig, arguments.panorama, arguments.output)
 
 
 if __name__ == "__main__":

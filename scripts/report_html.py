@@ -2,47 +2,40 @@
 
 Everything is in the file, pictures too, so that it can be read without a network, kept and sent.
 What is not there (measurements that were not asked for, depth, costs) is left out, and is no error.
+A settings file is JSON with these keys: `rig`, as in the scene YAML; `yaml`, that file's text;
+`command`, what makes the dataset again; `panorama`, whether the overview is one; `measurements`, a
+list of {"file": …}, the .csv, .json, .svg and .png that measurements wrote.
 """
 
 import argparse
-import json
 from pathlib import Path
 
 from lightfield.core.cli import run
-from lightfield.core.files import read_text
+from lightfield.core.settings import read_settings
 from lightfield.dataset.inventory import read_inventory
-from lightfield.geometry import rigs
+from lightfield.dataset.job_settings import PageSettings
 from lightfield.report import dataset_page
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--dataset", required=True, type=Path, help="folder of the dataset")
     parser.add_argument("--name", required=True, help="how it is called: scene/rig")
-    parser.add_argument("--rig", required=True, type=json.loads, help="the scene YAML's rig, JSON")
-    parser.add_argument("--yaml", required=True, type=Path, help="the scene YAML, to be shown")
-    parser.add_argument("--command", required=True, help="what rebuilds the dataset, to be shown")
     parser.add_argument(
-        "--panorama",
-        nargs="?",
-        help="what the overview was made of, where it is not the view in the rig's middle",
-    )
-    parser.add_argument(
-        "--measurements",
-        type=Path,
-        nargs="*",
-        default=[],
-        help="files that the measurements wrote: .csv, .json, and plots .svg or .png",
+        "--settings", required=True, type=Path, metavar="JSON", help="settings file"
     )
     parser.add_argument("--inventory", type=Path, help="JSON of what the scene's .blend says")
     parser.add_argument("--output", required=True, type=Path, help="HTML file to write")
     arguments = parser.parse_args()
+    settings = read_settings(PageSettings, arguments.settings)
     origin = dataset_page.Origin(
-        rig=rigs.from_settings(arguments.rig),
-        yaml=read_text(arguments.yaml),
-        command=arguments.command,
-        has_panorama=bool(arguments.panorama),
-        measurements=arguments.measurements,
+        rig=settings.rig,
+        yaml=settings.yaml,
+        command=settings.command,
+        has_panorama=settings.panorama,
+        measurements=[Path(measurement.file) for measurement in settings.measurements],
         inventory=read_inventory(arguments.inventory, "blend", "missing")
         if arguments.inventory
         else None,

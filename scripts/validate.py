@@ -7,6 +7,9 @@ validation.json is written, and the checksums of all that the dataset publishes;
 scripts/publish_checksums.py makes them its sha256sums.txt if it is valid. What a killed run left
 half-written in the dataset (hidden *.tmp files), and the sha256sums.txt of an earlier validation,
 are removed first.
+
+A settings file is JSON: {"reprojections": ["perspective"], "exports": [], "records": []}, for the
+flags --reprojection, --exports and --records.
 """
 
 import argparse
@@ -15,10 +18,12 @@ from os.path import normpath
 from pathlib import Path
 
 from lightfield.core import leftovers
-from lightfield.core.cli import positive, run
+from lightfield.core.cli import positive, refuse_beside_settings, run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
+from lightfield.core.settings import read_settings
 from lightfield.dataset import ledger
+from lightfield.dataset.job_settings import ValidationSettings
 from lightfield.dataset.lightfield import NAME
 from lightfield.export import MANIFESTS
 from lightfield.validation.files import REPORT, SUMS, remove_strays, write_sums
@@ -26,40 +31,40 @@ from lightfield.validation.validate import validate
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     add = parser.add_argument
     add("dataset", type=Path, help="folder of the dataset")
+    add("--settings", type=Path, metavar="JSON", help="settings file")
     add("--output", type=Path, help="validation.json to write, with --sums")
     add("--sums", type=Path, help="checksums to write, with --output")
-    records = "JSON of the sizes and checksums with which images were written"
-    add("--records", type=Path, nargs="*", default=[], help=records)
     add("--clearance", type=Path, help="JSON of what surrounds each camera")
     add("--inventory", type=Path, help="JSON of what the scene contains")
     add("--splits", type=Path, help="splits.json of the scene")
-    folders = "folders of the dataset that hold a reprojection (default without --output: all)"
-    add("--reprojection", type=normpath, action="extend", nargs="+", default=[], help=folders)
-    lists = "export.json or transforms.json of each export that it shall have (default: any)"
-    add("--exports", type=Path, nargs="*", help=lists)
     add("--ledger", type=Path, help="the workflow's ledger of what its jobs made")
     add("--removed", type=Path, help="folder to which files go that are not the dataset's")
     add("--processes", type=positive, default=1, help="worker processes (default: 1)")
+    add_settings_flags(parser)
     arguments = parser.parse_args()
     if (arguments.output is None) != (arguments.sums is None):
         raise UserError("--output, --sums: go together")
     if not arguments.dataset.is_dir():
         raise UserError(f"{arguments.dataset}: no such folder")
 
+    settings = settings_from(arguments)
+    reprojections = [normpath(name) for name in settings.reprojections]
     if arguments.output:
         (arguments.dataset / SUMS).unlink(missing_ok=True)
         # The report is made meanwhile.
         leftovers.remove_unfinished(arguments.dataset, age=0, excluded=REPORT)
-    elif not arguments.reprojection:
+    elif not reprojections:
         lightfields = sorted(arguments.dataset.glob(f"*/{NAME}"))
-        arguments.reprojection = [path.parent.name for path in lightfields]
-    wanted = arguments.exports and [path.resolve() for path in arguments.exports]
+        reprojections = [path.parent.name for path in lightfields]
+    wanted = settings.exports and [Path(path).resolve() for path in settings.exports]
     if arguments.removed:
         count = remove_strays(
-            arguments.dataset, arguments.reprojection, MANIFESTS, arguments.removed, wanted
+            arguments.dataset, reprojections, MANIFESTS, arguments.removed, wanted
         )
         if count:
             print(
@@ -68,8 +73,8 @@ def main() -> None:
             )
     result = validate(
         arguments.dataset,
-        arguments.reprojection,
-        arguments.records,
+        reprojections,
+        [Path(record) for record in settings.records],
         arguments.clearance,
         arguments.inventory,
         arguments.processes,
@@ -86,6 +91,30 @@ def main() -> None:
         write_sums(arguments.sums, result.checksums, arguments.dataset, arguments.output)
     elif not result.valid:
         raise UserError(f"{arguments.dataset}: is not valid")
+
+
+def add_settings_flags(parser: argparse.ArgumentParser) -> None:
+    """Add the flags that stand for a settings file."""
+    flags = parser.add_argument_group("Instead of --settings")
+    add = flags.add_argument
+    records = "JSON of the sizes and checksums with which images were written"
+    add("--records", nargs="*", default=[], help=records)
+    folders = "folders of the dataset that hold a reprojection (default without --output: all)"
+    add("--reprojection", action="extend", nargs="+", default=[], help=folders)
+    lists = "export.json or transforms.json of each export that it shall have (default: any)"
+    add("--exports", nargs="*", help=lists)
+
+
+def settings_from(arguments: argparse.Namespace) -> ValidationSettings:
+    """Return the settings of --settings, or those of the flags."""
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_settings_flags)
+        return read_settings(ValidationSettings, arguments.settings)
+    return ValidationSettings.of(
+        reprojections=arguments.reprojection,
+        exports=arguments.exports,
+        records=arguments.records,
+    )
 
 
 def noted_sums(path: Path, dataset: Path) -> dict[str, str]:

@@ -45,8 +45,12 @@ def run_in_process(monkeypatch):
     return run
 
 
-RIG = '{"type": "plane", "cameras": [1, 1], "camera": {"lens": "equidistant", "fov": 180, '
-RIG += '"resolution": [8, 8]}, "size": 1}'
+RIG = {
+    "type": "plane",
+    "cameras": [1, 1],
+    "size": 1,
+    "camera": {"lens": "equidistant", "fov": 180, "resolution": [8, 8]},
+}
 COSTS = ["--dataset", ".", "--journals", ".", "--benchmarks", ".", "--scene-benchmarks", "."]
 FULL = {"views": 6, "resolution": [64, 64], "samples": "file"}
 VIEWS = ["--scene", "smoke", "--calibration"]
@@ -110,6 +114,50 @@ def test_what_a_machine_draws_and_the_full_size_are_checked(refused, tmp_path, c
     said = refused("costs.py", *COSTS, *words, "--output", tmp_path / "made")
     assert said.startswith(f"{tmp_path}/{problem}")
     assert not (tmp_path / "made").exists()
+
+
+PAGE = ["--dataset", ".", "--name", "a/b", "--output", "made.html"]
+CAPTURE = {"scene": "a", "source": {"builder": "room"}, "render": {}, "rig": RIG}
+PACK = ["--folder", ".", "--output", "../made.tar"]
+GPU = ["--blend", "a", "--inventory", "b", "--lightfield", "c", "--cache", "d", "--output", "e"]
+
+
+@pytest.mark.parametrize(
+    ("program", "words", "content", "problem"),
+    [
+        ("report_figures.py", PAGE[:2] + PAGE[-2:], {"rig": 1}, "rig: is 1; must be a mapping"),
+        ("make_lightfield.py", PAGE[-2:], CAPTURE | {"rig": {"type": "x"}}, "rig.type: is"),
+        ("make_lightfield.py", PAGE[-2:], CAPTURE | {"source": {"frame": 1}}, "source: must"),
+        ("report_html.py", PAGE, {"rig": RIG, "yaml": ""}, "is missing the key command"),
+        ("package.py", PACK, {"gigabytes": 0}, "gigabytes: is 0; must be a number above 0"),
+        ("package.py", PACK, {"scene": {"licence": 1}}, "scene.licence: is 1; must be a text"),
+        ("validate.py", ["."], {"records": {}}, "records: is {}; must be a list"),
+        ("synthesis_quality.py", PAGE[1:2] + PAGE[-2:], {"views": 0}, "views: is 0; must be"),
+        ("gpu_check.py", GPU, {"full": {"a": {"views": 1}}}, "full.a: is missing the key"),
+    ],
+)
+def test_a_mistake_in_a_settings_file_is_named(refused, tmp_path, program, words, content, problem):
+    path = tmp_path / "settings.json"
+    write_json(path, content)
+    said = refused(program, *words, "--settings", path, folder=tmp_path)
+    assert said.startswith(f"{path}: {problem}")
+    assert [*tmp_path.iterdir()] == [path]
+
+
+@pytest.mark.parametrize(
+    ("program", "words", "flag"),
+    [
+        ("make_lightfield.py", PAGE[-2:], ["--rig", "LFSphere"]),
+        ("package.py", PACK, ["--gigabytes", "1"]),
+        ("validate.py", ["."], ["--reprojection", "a"]),
+        ("synthesis_quality.py", [".", "--output", "a"], ["--truth", "b"]),
+    ],
+)
+def test_a_flag_beside_a_settings_file_is_refused(refused, tmp_path, program, words, flag):
+    path = tmp_path / "settings.json"
+    write_json(path, {})
+    said = refused(program, *words, *flag, "--settings", path, folder=tmp_path)
+    assert said == f"--settings: excludes {flag[0]}; write it into the file"
 
 
 @pytest.fixture
@@ -300,9 +348,6 @@ def test_a_folder_has_its_name_from_within(tmp_path, monkeypatch):
 def test_an_image_is_no_text(refused, tmp_path):
     other = tmp_path / "view.exr"
     other.write_bytes(bytes([0x76, 0x2F, 0x31, 0x01, 0x80]))
-    words = ["--dataset", tmp_path, "--name", "a/b", "--command", "c", "--rig", RIG]
-    said = refused("report_html.py", *words, "--yaml", other, "--output", tmp_path / "page.html")
-    assert said == f"{other}: is not text in UTF-8"
     said = refused("splits.py", other, "--output", tmp_path / "splits.json")
     assert said == f"{other}: is not text in UTF-8"
 
@@ -357,13 +402,14 @@ def test_the_lens_of_no_blend_is_not_made_up(refused, lightfield, tmp_path):
 
 
 def test_a_report_of_another_rig_is_refused(refused, lightfield, tmp_path):
-    rig = RIG.replace("[1, 1]", "[5, 5]")
-    write_text(tmp_path / "scene.yaml", "scene: {}")
-    words = ["--dataset", tmp_path, "--rig", rig, "--output", tmp_path / "made"]
-    page = ["--name", "a/b", "--command", "c", "--yaml", tmp_path / "scene.yaml"]
+    rig = RIG | {"cameras": [5, 5]}
+    figures, page = (tmp_path / name for name in ("figures.json", "page.json"))
+    write_json(figures, {"rig": rig})
+    write_json(page, {"rig": rig, "yaml": "scene: {}", "command": "c"})
+    words = ["--dataset", tmp_path, "--output", tmp_path / "made", "--settings"]
     why = f"{lightfield}: frames: are 1, but its rig has 25"
-    assert refused("report_figures.py", *words) == why
-    assert refused("report_html.py", *words, *page) == why
+    assert refused("report_figures.py", *words, figures) == why
+    assert refused("report_html.py", *words, page, "--name", "a/b") == why
     assert not (tmp_path / "made").exists()
 
 

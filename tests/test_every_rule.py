@@ -255,6 +255,7 @@ ROOM = "scripts/scenes/room/__init__.py"
 OTHER = f"  LFOther: {{type: plane, cameras: [2, 1], size: 1, camera: {CAMERA}"
 # A light field's cameras, the panorama's, and the probes' follow from the same settings.
 CAMERAS = {"lightfield", "panorama_lightfield", "probe_cameras"}
+RENDERED_CAMERAS = {f"{scene} {rule}" for scene in ("built", "brought") for rule in CAMERAS}
 # The probes are those of the first rig.
 OF_PLANE = {"LFPlane lightfield", "LFPlane panorama_lightfield", "probe_cameras"}
 TESTED = {"LFPlane lightfield", "probe_cameras", "LFPlane export", "splits", "check_gpu"}
@@ -282,7 +283,8 @@ ROUNDS = {
     "the lens, and the view layers": {
         "built": ("lens: equidistant", "lens: equisolid, focal_length: 3", OF_PLANE),
         "brought": ("view_layers: [One]", "view_layers: [Two]", {"inventory"}),
-        "config.yaml": ("  full: {}", "  full: {samples: 3}", CAMERAS),
+        # Nothing limits the samples of views that are imported.
+        "config.yaml": ("  full: {}", "  full: {samples: 3}", RENDERED_CAMERAS),
     },
     "the frame, and the scene": {
         "built": ("frame: 1", "frame: 2", {"inventory"} | CAMERAS),
@@ -306,7 +308,7 @@ ROUNDS = {
             "exposure: -2",
             {"perspective reproject", "perspective reprojected_lightfield"},
         ),
-        "brought": ("flow: {pairs: neighbours}\n", "", {"lightfield"}),
+        "brought": ("flow: {pairs: neighbours}\n", "", {"lightfield", "probe_cameras"}),
     },
     "an export less, and other options": {
         "built": (
@@ -421,8 +423,12 @@ ROUNDS = {
 }
 # The first two follow from the programs' versions, the third from where the scene YAML lies. Only a
 # .blend's camera has frames. For instant-ngp a rig that tests is placed as the trained one is;
-# other formats take its views. No scene YAML asks reproject.py for masks.
+# other formats take its views. No scene YAML asks reproject.py for masks, or says how many
+# synthesised views are compared. A scene with another name is another scene.
+# A panorama has no neighbour.
 CONSTANT = {"version", "bpy", "command", "camera_frames", "reproject.json mask"}
+CONSTANT |= {"synthesis.json views", "lightfield.json scene", "panorama.json scene"}
+CONSTANT |= {"probes.json scene", "panorama.json flow"}
 CONSTANT |= {"nerfstudio.json trained_by", "instant_ngp.json tested_by"}
 
 

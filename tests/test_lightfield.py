@@ -12,8 +12,10 @@ import pytest
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.dataset import keys
+from lightfield.dataset.capture import LightfieldSettings
 from lightfield.dataset.config import SceneSource
 from lightfield.dataset.lightfield import LightField, View
+from lightfield.dataset.loading import scene_datasets
 from lightfield.geometry import lenses, rigs, rotations
 
 FISHEYE = lenses.from_camera({"lens": "equidistant", "resolution": [64, 64], "fov": 180})
@@ -152,8 +154,7 @@ def test_a_key_of_ours_that_another_tool_did_not_write_is_named(key: str) -> Non
 
 
 NO_NAME = "name: must be a file name, not "
-THREE = "must be 3 finite numbers"
-FOUR = "world_matrix: must be 4 × 4 finite numbers"
+NUMBER = "must be a finite number from -1e+07 to 1e+07, not "
 NO_POSE = "world_matrix: is missing, or position and rotation are"
 
 BROKEN = {
@@ -173,14 +174,18 @@ BROKEN_FRAMES: dict[str, tuple[dict[str, Any], str]] = {
     "folder as name": ({"name": "../x"}, NO_NAME + "'../x'"),
     "backslash in name": ({"name": "x\\y"}, NO_NAME),
     "a name twice": ({"name": "view_0000f"}, "view_0000f: is the name of two frames"),
-    "three rows": ({"world_matrix": [[1.5] * 4] * 3}, FOUR),
-    "uneven rows": ({"world_matrix": [[1], [1, 2]]}, FOUR),
-    "infinity": ({"position": [1, 2, math.inf]}, f"position: {THREE}"),
-    "texts": ({"position": ["1", "2", "3"]}, f"position: {THREE}"),
-    "flags": ({"position": [True] * 3}, f"position: {THREE}"),
-    "four angles": ({"rotation": [1, 2, 3, 4]}, f"rotation: {THREE}"),
-    "no rotation": ({"world_matrix": GONE, "rotation": GONE}, NO_POSE),
-    "no position": ({"world_matrix": GONE, "position": GONE}, NO_POSE),
+    "three rows": ({"world_matrix": [[1.5] * 4] * 3}, "world_matrix: must be a list of 4"),
+    "uneven rows": (
+        {"world_matrix": [[1] * 4] * 3 + [[1]]},
+        "world_matrix[3]: must be a list of 4",
+    ),
+    "infinity": ({"position": [1, 2, math.inf]}, f"position[2]: {NUMBER}inf"),
+    "texts": ({"position": ["1", "2", "3"]}, f"position[0]: {NUMBER}'1'"),
+    "flags": ({"position": [1, True, 3]}, f"position[1]: {NUMBER}True"),
+    "four angles": ({"rotation": [1, 2, 3, 4]}, "rotation: must be a list of 3"),
+    "no rotation": ({"rotation": GONE}, "rotation: is missing beside position"),
+    "no position": ({"position": GONE}, "position: is missing beside rotation"),
+    "no pose": ({"world_matrix": GONE, "position": GONE, "rotation": GONE}, NO_POSE),
 }
 for case, (changes, message) in BROKEN_FRAMES.items():
     first, second = content()["frames"]
@@ -324,3 +329,29 @@ def test_keys_stay_what_they_were(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     ]
     with pytest.raises(ValueError, match="not JSON compliant"):
         keys.render_key(first.changed(render={"exposure": math.nan}), first.views[0])
+
+
+def test_settings_do_not_change_when_a_job_records_the_checksum_of_a_blend(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    camera = {"lens": "equidistant", "resolution": [8, 8], "fov": 180}
+    scene = {
+        "scene": {"blend": "mine.blend"},
+        "render": {"samples": 1},
+        "rigs": {"LFPlane": PLANE | {"camera": camera}},
+    }
+    write_json(tmp_path / "configs/scenes/mine.yaml", scene)
+
+    def settings() -> LightfieldSettings:
+        (dataset,) = scene_datasets("mine")
+        return LightfieldSettings.of_capture(dataset)
+
+    before = settings()
+    recorded = {"blend": "mine.blend", "sha256": "a" * 64}
+    write_json(tmp_path / "configs/scenes/mine.lock.json", recorded)
+    after = settings()
+    assert after.as_json() == before.as_json()
+    # The job looks it up when it runs.
+    for planned in (before, after):
+        assert planned.capture.source.sha256 == "a" * 64

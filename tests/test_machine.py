@@ -1,14 +1,17 @@
 """What of a machine changes bytes: named in lightfield.json and in each view's header."""
 
 import ctypes
-import json
 import subprocess
 import sys
 
 import pytest
 
 from lightfield.core import machine
+from lightfield.core.files import write_json
+from lightfield.dataset.capture import LightfieldSettings
+from lightfield.dataset.config import Preset
 from lightfield.dataset.lightfield import LightField
+from lightfield.dataset.loading import scene_datasets
 from lightfield.imaging import images
 
 LIBRARY = ctypes.CDLL(None).gnu_get_libc_version
@@ -53,8 +56,10 @@ def test_lightfield_and_views_name_the_machine_with_cycles_own_instructions(
     run_program, room, tmp_path
 ):
     written = tmp_path / "lightfield.json"
-    limits = json.dumps({"resolution": 16, "samples": 1})
-    run_program("make_lightfield.py", "--scene", "smoke", "--limits", limits, "--output", written)
+    (dataset, *_) = scene_datasets("smoke", limits=Preset(resolution=16, samples=1))
+    settings = tmp_path / "settings.json"
+    write_json(settings, LightfieldSettings.of_capture(dataset).as_json())
+    run_program("make_lightfield.py", "--settings", settings, "--output", written)
     words = ("--blend", room, "--lightfield", written, "--views", "0:1", "--device", "cpu")
     run_program("render_shard.py", *words, "--output", tmp_path / "exr")
     (view,) = (tmp_path / "exr").iterdir()

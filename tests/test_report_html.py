@@ -414,12 +414,13 @@ def test_what_cannot_be_read_is_an_error_of_one_line(tmp_path, file, text, expec
 def test_the_programs_make_pictures_and_page(run_program, tmp_path):
     rig = {**LINE, "cameras": [2, 1]}
     write_dataset(tmp_path, rig)
-    yaml = tmp_path / "ball.yaml"
-    yaml.write_text(YAML)
-    words = ("--dataset", tmp_path, "--rig", json.dumps(rig), "--panorama", "--output")
-    run_program("report_figures.py", *words, tmp_path / "report")
-    page = ("--name", "a/b", "--yaml", yaml, "--command", "make <it>")
-    run_program("report_html.py", *words, tmp_path / "x.html", *page)
+    figures, page = (tmp_path / name for name in ("figures.json", "page.json"))
+    figures.write_text(json.dumps({"rig": rig}))
+    page.write_text(json.dumps({"rig": rig, "yaml": YAML, "command": "make <it>"}))
+    words = ("--dataset", tmp_path, "--settings")
+    run_program("report_figures.py", *words, figures, "--output", tmp_path / "report")
+    words = (*words, page, "--name", "a/b")
+    run_program("report_html.py", *words, "--output", tmp_path / "x.html")
     text = (tmp_path / "x.html").read_text()
     for part in (
         "view_0001f, the view in the middle",

@@ -436,7 +436,7 @@ def test_poses_from_csv_and_lightfield_json_agree(tmp_path: Path) -> None:
         ("p.csv", "name,x,y,z,rx,ry,rz\n", "holds no pose"),
         ("p.json", "{", "is not JSON"),
         ("p.json", "{}", "frames: must be a list"),
-        ("p.json", '{"frames": [{"name": "a"}]}', r"frames\[0\]: position: .*None"),
+        ("p.json", '{"frames": [{"name": "a"}]}', r"frames\[0\]: world_matrix: is missing"),
         (
             "p.json",
             '{"frames": [{"name": "a", "position": [0, 0, true], "rotation": [0, 0, 0]}]}',

@@ -93,10 +93,7 @@ def test_every_stage_is_planned_for_every_frame(tmp_path):
 def test_fire_and_water_move_and_the_rest_stands_still(run_program, tmp_path):
     folder = checkout(tmp_path, moving=SCENE)
     blend, inventory = tmp_path / "garden.blend", tmp_path / "inventory.json"
-    parameters = json.dumps({"seed": 0, "detail": 0.02})
-    run_program(
-        "build_scene.py", "--builder", "garden", "--parameters", parameters, "--output", blend
-    )
+    run_program("build_scene.py", "--builder", "garden", "--detail", "0.02", "--output", blend)
     run_program("inventory.py", "--blend", blend, "--output", inventory)
     colours, depths = [], []
     for rig in (FRAMES[0], FRAMES[2]):

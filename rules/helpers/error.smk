@@ -24,12 +24,5 @@ def probe_settings(wildcards):
     dataset = first_dataset(wildcards.scene)
     if dataset.name in DATASETS:
         mark_stale_files(dataset.name)
-    content = {
-        "rig": json.loads(dataset.rig_json),
-        "render": dataset.render,
-        "frame": dataset.source.frame,
-        "scene": dataset.source.model_dump(mode="json", include=SOURCE_KEYS),
-        "fingerprint": dataset.builder_fingerprint,
-        "limits": dataset.limits.model_dump(mode="json", exclude_none=True),
-    }
-    return settings_file(f"{WORK}/{wildcards.scene}/settings/probes.json", content)
+    path = f"{WORK}/{wildcards.scene}/settings/probes.json"
+    return settings_file(path, lightfield_settings(dataset))

@@ -25,21 +25,13 @@ def packed_sums(wildcards):
     return files
 
 
-def packed_scene(wildcards):
-    """Return the name of an archive's scene YAML."""
-    return packed(wildcards)[0].scene_name
-
-
 def pack_settings(wildcards):
     """Return the settings file of an archive: what is in it, its size, and what its card says."""
-    name = packed_scene(wildcards)
-    written = load_scene(name)
-    content = {
-        "datasets": [dataset.name for dataset in packed(wildcards)],
-        "gigabytes": SETTINGS.package_gigabytes,
-        "scene": written.model_dump(
-            mode="json", include={"description", "licence", "credit"}
-        ),
-    }
+    datasets = packed(wildcards)
+    settings = PackSettings.of(
+        datasets=[dataset.name for dataset in datasets],
+        gigabytes=SETTINGS.package_gigabytes,
+        scene=load_scene(datasets[0].scene_name),
+    )
     path = f"{WORK}/{wildcards.scene}/{wildcards.rig}/settings/pack.json"
-    return settings_file(path, content)
+    return settings_file(path, settings.as_json())

@@ -1,8 +1,18 @@
 # What the rules of report.smk ask of the configuration.
 
 
+def panorama_settings(dataset):
+    """Return the settings of the panorama's lightfield.json."""
+    settings = LightfieldSettings.of_capture(
+        dataset,
+        panorama_width=dataset.panorama_width,
+        fingerprint=dataset.builder_fingerprint,
+    )
+    return settings.as_json()
+
+
 def panorama_memory(wildcards, attempt):
-    """Ask for the same for the panorama."""
+    """Ask for the memory in MB that the panorama takes, and for more where that was too little."""
     dataset = dataset_of(wildcards)
     need = dataset.estimate.memory_bytes(dataset.panorama_width**2 // 2)
     return math.ceil(need / 1e6) * attempt
@@ -38,13 +48,14 @@ def rebuilding(wildcards):
 def page_settings(wildcards):
     """Return the settings file of a page: the scene YAML's text, and which measurements it shows."""
     dataset = dataset_of(wildcards)
-    content = {
-        "rig": json.loads(dataset.rig_json),
-        "yaml": scene_path(dataset.scene_name).read_text(),
-        "command": rebuilding(wildcards),
-        "panorama": dataset.panorama,
-        "measurements": [
-            [str(path), path.stat().st_mtime_ns] for path in measurements(wildcards)
+    settings = PageSettings(
+        rig=dataset.placed_rig,
+        yaml=scene_path(dataset.scene_name).read_text(),
+        command=rebuilding(wildcards),
+        panorama=bool(dataset.panorama),
+        measurements=[
+            Measurement(file=str(path), modified_ns=path.stat().st_mtime_ns)
+            for path in measurements(wildcards)
         ],
-    }
-    return dataset_settings(dataset, "page", content)
+    )
+    return dataset_settings(dataset, "page", settings.as_json())

@@ -1,16 +1,36 @@
 # What the rules of rig.smk ask of the configuration.
 
 
-def free_rig(dataset):
-    """Return what a random rig says of its places."""
-    return dataset.rig.model_dump(
-        mode="json", exclude_unset=True, exclude={"camera", "split"}
+def free_places_settings(dataset):
+    """Return the settings of a random rig's places; ends the run for another rig."""
+    if not dataset.places:
+        sys.exit(
+            f"error: {dataset.work}/places.json: is for rigs of type random; "
+            f"{dataset.rig_name} has type {dataset.rig.type}"
+        )
+    settings = FreePlacesSettings.of(
+        rig=dataset.rig,
+        frame=dataset.source.frame,
+        scene_name=dataset.source.scene_name,
+        view_layers=dataset.source.view_layers,
     )
+    return settings.as_json()
 
 
 def poses_sum(dataset):
     """Return the SHA-256 of the file from which a rig has its poses; None of other rigs."""
     return sha256(dataset.rig.file) if isinstance(dataset.rig, Poses) else None
+
+
+def lightfield_settings(dataset):
+    """Return the settings of a dataset's lightfield.json."""
+    settings = LightfieldSettings.of_capture(
+        dataset,
+        flow=bool(dataset.flow),
+        fingerprint=dataset.builder_fingerprint,
+        poses_sha256=poses_sum(dataset),
+    )
+    return settings.as_json()
 
 
 def split_rigs(wildcards):

@@ -1,6 +1,20 @@
 # What the rules of scene.smk ask of the configuration.
 
 
+def build_settings(dataset):
+    """Return the settings of a built scene; ends the run for a scene without a builder."""
+    if dataset.source.builder is None:
+        sys.exit(
+            f"error: {dataset.scene_work}/scene.blend: the scene YAML has no builder that makes it"
+        )
+    settings = BuildSettings(
+        builder=dataset.source.builder,
+        parameters=dataset.source.parameters,
+        fingerprint=dataset.fingerprint,
+    )
+    return settings.as_json()
+
+
 def inventory_settings(dataset):
     """Return what a scene's inventory depends on of its scene YAML."""
     written = load_scene(dataset.scene_name)

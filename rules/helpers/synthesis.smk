@@ -24,12 +24,10 @@ def held_out(dataset):
     ]
 
 
-def truth_words(wildcards):
-    """Return the words that name the datasets with which synthesised views are compared."""
-    truths = held_out(dataset_of(wildcards))
-    return (
-        shlex.join(["--truth", *(truth.folder for truth in truths)]) if truths else ""
-    )
+def synthesis_settings(dataset):
+    """Return the settings of a measurement: with which datasets synthesised views are compared."""
+    truths = held_out(dataset)
+    return SynthesisSettings(truth=[truth.folder for truth in truths]).as_json()
 
 
 def truth_records(wildcards):

@@ -5,7 +5,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, TypeVar
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -39,7 +39,7 @@ class Settings(BaseModel):
         extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True
     )
 
-    # Keys that earlier versions had, and what to do instead.
+    # Keys of earlier versions, with what to do instead.
     removed_keys: ClassVar[Mapping[str, str]] = {}
 
     @model_validator(mode="before")
@@ -58,8 +58,13 @@ class Settings(BaseModel):
                 raise ValueError(f"{key}: is null; must have a value, or be left out")
         return content
 
+    @classmethod
+    def of(cls, **values: Any) -> Self:
+        """Return settings with these values. A value that is None is left out."""
+        return cls(**{key: value for key, value in values.items() if value is not None})
+
     def as_json(self, keys: set[str] | None = None) -> dict[str, Any]:
-        """Return the content of a settings file: all keys that have a value, or some ``keys``."""
+        """Return the content of a settings file: all keys with a value, or those in ``keys``."""
         return self.model_dump(mode="json", include=keys, exclude_none=True)
 
 
@@ -162,7 +167,7 @@ def _first_problem(errors: list[ErrorDetails], content: Any) -> str:
 
 
 def _shown(value: Any) -> str:
-    """Return a value as JSON, shortened where it is long."""
+    """Return a value as JSON. A long one is shortened."""
     text = json.dumps(value, default=str)
     return text if len(text) <= 60 else f"{text[:57]}..."
 

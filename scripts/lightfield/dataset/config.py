@@ -515,12 +515,17 @@ def _bracketed(reprojections: dict[str, Reprojection]) -> dict[str, Reprojection
     return bracketed
 
 
-class Scene(Settings):
-    """One scene: where it is from, how it is rendered, by which rigs, and what the views become."""
+class Credits(Settings):
+    """What a package's card says of the scene."""
 
     description: str | None = Field(None, description="One line about the scene.")
     licence: str | None = Field(None, description="Of the scene, for a package's card.")
     credit: str | None = Field(None, description="How the scene's artist is to be cited.")
+
+
+class Scene(Credits):
+    """One scene: where it is from, how it is rendered, by which rigs, and what the views become."""
+
     scene: SceneSource
     render: Render | None = Field(
         None, description="How Cycles renders. Required, except with scene.dataset."

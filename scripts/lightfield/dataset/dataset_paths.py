@@ -182,8 +182,3 @@ class DatasetPaths(Description):
         """The frames of a rig of the .blend's camera. None is the file's own frame."""
         rig = self.placed_rig
         return rig.path if isinstance(rig, BlendCamera) else []
-
-    @property
-    def rig_json(self) -> str:
-        """The rig, in the form that the programs of the report take."""
-        return self.placed_rig.model_dump_json(exclude_unset=True, exclude_none=True)

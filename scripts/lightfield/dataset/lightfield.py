@@ -1,10 +1,15 @@
-"""lightfield.json: the lens of a dataset once, and the pose of each of its views.
+"""lightfield.json: the lens of a dataset, and the pose of each of its views.
 
-The keys are SILVR's (``camera``, ``lf_type``, ``resolution``, ``sensor_size``, ``frames``) and ours
-beside them: ``depth``, what channel Z of the views means, ``frame`` of the scene, ``scene`` and
-``render``, what was rendered and how, and ``machine``, what of it changes last digits. ``passes``,
-of a reprojection, are those of ``render`` that it has. A frame's ``split`` is what the view is for,
-and its ``flow`` the view to which its flow leads. Files that SILVR's tools wrote are read too.
+SILVR's keys are ``camera``, ``lf_type``, ``resolution``, ``sensor_size`` and ``frames``. Files that
+SILVR's tools wrote have these alone, and are read, too. Ours are:
+
+- ``depth``: what channel Z of the views means.
+- ``frame``: the frame of the scene that was rendered.
+- ``scene`` and ``render``: what was rendered, and how.
+- ``machine``: what of the machine changes last digits.
+- ``passes``: the passes that a reprojection has, of those in ``render``.
+- ``split`` of a frame: what the view is for.
+- ``flow`` of a frame: the view to which its flow leads.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,11 +23,11 @@ from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
-from lightfield.core.settings import FARTHEST
 from lightfield.dataset import passes
 from lightfield.dataset.passes import PASSES, Pass
 from lightfield.geometry import lenses, rotations
 from lightfield.geometry.flow import neighbours
+from lightfield.geometry.frames import Frame, read_frames
 from lightfield.geometry.lenses import Lens
 
 if TYPE_CHECKING:
@@ -31,19 +36,19 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 NAME = "lightfield.json"
-# Where this key is, metres between the eyes of a pair, the views have no centre.
+# Metres between the eyes of a pair. Views of a file with this key have no centre.
 OMNIDIRECTIONAL = "omnidirectional_stereo"
-# What of the machine changes bytes, as where the file was made; each view names its own.
+# What of the machine changes bytes, where the file was made. Each view names its own machine.
 MACHINE = "machine"
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """One of ``frames``: what SILVR calls a frame is a view, for a scene has frames of its own.
+    """A view, which SILVR calls a frame. Here frames are those of an animated scene.
 
-    ``matrix`` (4, 4) is camera-to-world, in metres; the camera looks along −Z, +Y is up.
-    ``position`` (3,) in metres and ``rotation`` (3,), XYZ Euler angles in radians as Blender has
-    them, say the same. ``others`` are the frame's other keys.
+    ``matrix`` (4, 4) is camera-to-world, in metres. The camera looks along −Z, and +Y is up.
+    ``position`` (3,) in metres and ``rotation`` (3,) give the same pose. The rotation is Blender's:
+    XYZ Euler angles in radians. ``others`` are the frame's other keys.
     """
 
     name: str
@@ -54,18 +59,32 @@ class View:
 
     @classmethod
     def placed(cls, name: str, matrix: Floats, others: Mapping[str, Any] | None = None) -> "View":
-        """Return a view of which the matrix (4, 4) is known."""
+        """Return the view with a camera-to-world matrix (4, 4)."""
         rotation = rotations.matrix_to_euler(matrix[:3, :3])
         return cls(name, matrix, matrix[:3, 3], rotation, others or {})
 
+    @classmethod
+    def from_frame(cls, frame: Frame) -> "View":
+        """Return the view of a frame. Where a form of the pose is missing, the other gives it."""
+        matrix = frame.matrix
+        if matrix is None:
+            assert frame.position is not None
+            assert frame.rotation is not None
+            matrix = np.eye(4)
+            matrix[:3, :3] = rotations.euler_to_matrix(frame.rotation)
+            matrix[:3, 3] = frame.position
+        if frame.position is None or frame.rotation is None:
+            return cls.placed(frame.name, matrix, frame.others)
+        return cls(frame.name, matrix, frame.position, frame.rotation, frame.others)
+
     @property
     def split(self) -> str | None:
-        """What the view is for: ``train``, ``validate`` or ``test``; None where none is said."""
+        """What the view is for: ``train``, ``validate`` or ``test``; None if the file is silent."""
         return self.others.get("split")
 
     @property
     def flow(self) -> str | None:
-        """The name of the view's flow, if it has any: <its own>_to_<the other's>."""
+        """The name of the view's flow, <view>_to_<other view>; None without flow."""
         return f"{self.name}_to_{self.others['flow']}" if "flow" in self.others else None
 
     def to_json(self) -> dict[str, Any]:
@@ -80,12 +99,12 @@ class View:
 
 @dataclass(eq=False)
 class LightField:
-    """A lightfield.json: ``content`` holds all its keys but ``frames``, which are the ``views``.
+    """A lightfield.json. ``content`` holds its keys without ``frames``, which are the ``views``.
 
-    ``lens`` is that of every view. ``depth`` is what channel Z of the views means: "z", along the
-    optical axis, "distance", or None for no depth; where the file lacks the key, as SILVR's do, it
-    is "z" if the lens can have that. Raises `UserError`, one line with ``path`` and the key, for a
-    lens that is not known, for a depth that it cannot have, and for passes that there are not.
+    All views share ``lens``. ``depth`` is what channel Z of the views means: "z", along the optical
+    axis, "distance", or None for no depth. SILVR's files lack this key. Then it is "z" if the lens
+    can have that. Raises `UserError`, one line with ``path`` and the key, for an unknown lens, a
+    depth that the lens cannot have, and unknown passes.
     """
 
     content: Mapping[str, Any]
@@ -113,11 +132,11 @@ class LightField:
 
     @classmethod
     def from_rig(cls, rig: "rigs.Rig | Mapping[str, Any]", lens: Lens, **keys: Any) -> "LightField":
-        """Return what a rig sees through a lens; ``keys`` are further ones of the file.
+        """Return the light field that a rig sees through a lens. ``keys`` are added to the file.
 
-        Raises `UserError` where a cube map's lens is not a 90° rectilinear.
+        Raises `UserError` if a cube map's lens is not a 90° rectilinear one.
         """
-        # Here, for most programs read a file and need no rig's settings.
+        # Imported here, because most programs read a file and need no rig's settings.
         from lightfield.geometry import rigs
 
         rig = rigs.from_settings(rig)
@@ -147,10 +166,10 @@ class LightField:
 
     @classmethod
     def read(cls, path: Path | str) -> "LightField":
-        """Read a file; whatever is wrong with it is a `UserError` of one line that names the key.
+        """Read a file. Raises `UserError`, one line that names the file and the wrong key.
 
-        Of ``world_matrix`` on one side and ``position`` and ``rotation`` on the other, one may be
-        missing. Where both are there they are not compared: validation does that.
+        `lightfield.geometry.frames` says which poses are read. If a frame gives its pose in both
+        forms, they are not compared: validation does that.
         """
         path = Path(path)
         content = read_json(path)
@@ -160,21 +179,12 @@ class LightField:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any], path: Path = Path(NAME)) -> "LightField":
-        """Return what a file's ``content`` says; errors are those of `read`."""
+        """Return the light field of a file's ``content``. Raises the errors of `read`."""
         others = dict(content)
         frames = others.pop("frames", None)
         lightfield = cls(others, (), path)
         try:
-            if not isinstance(frames, list):
-                raise UserError("frames: must be a list of views")
-            if not frames:
-                raise UserError("frames: is empty")
-            views = [_view(f"frames[{index}]", frame) for index, frame in enumerate(frames)]
-            seen: set[str] = set()
-            for index, view in enumerate(views):
-                if view.name in seen:
-                    raise UserError(f"frames[{index}]: {view.name}: is the name of two frames")
-                seen.add(view.name)
+            views = [View.from_frame(frame) for frame in read_frames(frames)]
         except UserError as error:
             raise UserError(f"{path}: {error}") from None
         return replace(lightfield, views=views)
@@ -190,7 +200,7 @@ class LightField:
     def changed(
         self, lens: Lens | None = None, views: Sequence[View] | None = None, **keys: Any
     ) -> "LightField":
-        """Return a copy with another lens, other views, or other values of ``keys``."""
+        """Return a copy with another lens, with other views, or with other values of ``keys``."""
         intrinsics = lens.to_lightfield() if lens else {}
         return replace(
             self,
@@ -199,12 +209,12 @@ class LightField:
         )
 
     def with_flow(self) -> "LightField":
-        """Return a copy in which each view has a neighbour to which its flow leads."""
-        others = [self.views[number].name for number in neighbours(self.matrices)]
+        """Return a copy in which the flow of each view leads to a neighbour."""
+        targets = [self.views[number].name for number in neighbours(self.matrices)]
         return self.changed(
             views=[
-                replace(view, others={**view.others, "flow": other})
-                for view, other in zip(self.views, others, strict=True)
+                replace(view, others={**view.others, "flow": target})
+                for view, target in zip(self.views, targets, strict=True)
             ]
         )
 
@@ -227,18 +237,18 @@ class LightField:
     @property
     def scene(self) -> Mapping[str, Any]:
         """What was rendered: ``name``, ``fingerprint`` and how the scene was built."""
-        found: Mapping[str, Any] = self._key("scene")
-        return found
+        scene: Mapping[str, Any] = self._key("scene")
+        return scene
 
     @property
     def render(self) -> Mapping[str, Any]:
         """How it was rendered: the scene YAML's ``render`` block."""
-        found: Mapping[str, Any] = self._key("render")
-        return found
+        render: Mapping[str, Any] = self._key("render")
+        return render
 
     @property
     def passes(self) -> list[Pass]:
-        """What the views have beside colour and depth; of a reprojection, what it has itself."""
+        """What the views have beside colour and depth. A reprojection may have fewer passes."""
         return passes.selected(self.content if "passes" in self.content else self._render)
 
     @property
@@ -247,72 +257,28 @@ class LightField:
         return bool(self._render.get("transparent"))
 
     def require_rig(self, rig: "rigs.Rig") -> None:
-        """Raise `UserError` where these are not as many views as a rig has."""
+        """Raise `UserError` if the file and a rig differ in the number of views."""
         if rig.view_count != len(self.views):
             raise UserError(
                 f"{self.path}: frames: are {len(self.views)}, but its rig has {rig.view_count}"
             )
 
     def require_centre(self) -> None:
-        """Raise `UserError` where the rays of a view do not start from one point."""
+        """Raise `UserError` if the rays of a view do not start from one point."""
         if OMNIDIRECTIONAL in self.content:
             raise UserError(
-                f"{self.path}: {OMNIDIRECTIONAL}: its views have no centre, so that no other lens "
-                "sees what they do, and no other program reads their poses"
+                f"{self.path}: {OMNIDIRECTIONAL}: its views have no centre; no other lens sees "
+                "what they see, and no other program reads their poses"
             )
 
     @property
     def _render(self) -> Mapping[str, Any]:
         return self.render if "render" in self.content else {}
 
-    def _key(self, key: str, kind: type = Mapping, words: str = "a mapping") -> Any:
+    def _key(self, key: str, kind: type = Mapping, kind_name: str = "a mapping") -> Any:
+        """Return the value of a key. Raises `UserError` if it is missing or of another kind."""
         if key not in self.content:
             raise UserError(f"{self.path}: {key}: is missing; scripts/make_lightfield.py writes it")
         if not isinstance(self.content[key], kind):
-            raise UserError(f"{self.path}: {key}: must be {words}")
+            raise UserError(f"{self.path}: {key}: must be {kind_name}")
         return self.content[key]
-
-
-def _view(where: str, frame: Any) -> View:
-    """Return the view of one of ``frames``; its matrix from the angles or they from it."""
-    if not isinstance(frame, dict):
-        raise UserError(f"{where}: must be a mapping, not {frame!r}")
-    others = dict(frame)
-    name = others.pop("name", None)
-    if not isinstance(name, str) or not name or "/" in name or "\\" in name:
-        raise UserError(f"{where}: name: must be a file name, not {name!r}")
-    numbers = {}
-    for key, shape in (("world_matrix", (4, 4)), ("position", (3,)), ("rotation", (3,))):
-        if key in others:
-            numbers[key] = _numbers(f"{where}: {key}", others.pop(key), shape)
-    matrix, position, rotation = map(numbers.get, ("world_matrix", "position", "rotation"))
-    if matrix is None:
-        if position is None or rotation is None:
-            raise UserError(f"{where}: world_matrix: is missing, or position and rotation are")
-        matrix = np.eye(4)
-        matrix[:3, :3] = rotations.euler_to_matrix(rotation)
-        matrix[:3, 3] = position
-    if position is None:
-        position = matrix[:3, 3]
-    if rotation is None:
-        rotation = rotations.matrix_to_euler(matrix[:3, :3])
-    return View(name, matrix, position, rotation, others)
-
-
-def _numbers(where: str, value: Any, shape: tuple[int, ...]) -> Floats:
-    """Return finite numbers of a given shape as an array."""
-    try:
-        array = np.array(value)
-    except ValueError:  # rows of different lengths
-        array = np.empty(0)
-    # NaN fails the comparison, too.
-    if (
-        array.shape != shape
-        or array.dtype.kind not in "iuf"
-        or not (np.abs(array.astype(np.float64)) <= FARTHEST).all()
-    ):
-        size = " × ".join(map(str, shape))
-        raise UserError(
-            f"{where}: must be {size} finite numbers, from -{FARTHEST:g} to {FARTHEST:g}"
-        )
-    return array.astype(np.float64)

@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
+from lightfield.core.settings import Settings
 from lightfield.measurement import metrics
+from lightfield.measurement.costs import FullSize
 from lightfield.measurement.sampling import standard_error
 from lightfield.measurement.trials import Trial, Trials
 
@@ -28,6 +31,12 @@ MOST_ERRORS = 6.0
 SAME_DEPTH = 1e-4
 # At silhouettes rounding decides which surface is hit, so this part of the pixels may differ.
 SILHOUETTES = 1e-3
+
+
+class GpuCheckSettings(Settings):
+    """The settings of scripts/gpu_check.py."""
+
+    full: dict[str, FullSize] = Field({}, description="Datasets at full size, by name.")
 
 
 @dataclass(frozen=True)

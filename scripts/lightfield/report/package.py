@@ -17,7 +17,7 @@ import jinja2
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, read_keys, sha256
 from lightfield.core.progress import Progress
-from lightfield.dataset.config import Scene
+from lightfield.dataset.config import Credits
 from lightfield.dataset.exports import MANIFEST
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import PASSES
@@ -48,7 +48,7 @@ LOADERS = {
 }
 
 
-def card(folder: Path, name: str, scene: Scene) -> dict[str, Any]:
+def card(folder: Path, name: str, scene: Credits) -> dict[str, Any]:
     """Return the content of card.json for a rig's folder.
 
     The folder of a sequence has a folder for each frame. The first one counts.

@@ -36,6 +36,7 @@ __all__ = [
     "Random",
     "Rig",
     "Sphere",
+    "as_written",
     "from_settings",
 ]
 
@@ -63,3 +64,8 @@ def from_settings(settings: Mapping[str, Any] | Rig, file: str = "rig") -> Rig:
     Raises `UserError` for a wrong key. The error names the ``file``.
     """
     return checked(_SETTINGS, settings, file)
+
+
+def as_written(rig: Rig) -> dict[str, Any]:
+    """Return the keys of a rig that are given, as its scene YAML has them."""
+    return rig.model_dump(mode="json", exclude_unset=True, exclude_none=True)

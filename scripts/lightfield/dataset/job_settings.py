@@ -1,0 +1,111 @@
+"""The settings files of the smaller jobs.
+
+The plan writes each model as JSON to work/<scene>/<rig>/settings/<stage>.json. A program reads the
+file with --settings. The settings of light fields are in `lightfield.dataset.capture`; those of
+reprojections and exports have modules of their own.
+"""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, PlainSerializer
+
+from lightfield.core.settings import Settings
+from lightfield.dataset.config import FILE, AtLeastOne, Credits, Parameters, builders
+from lightfield.geometry.rigs import AnyRig, Random, as_written
+from lightfield.geometry.rigs.rig import Frame
+
+
+def _known_builder(name: str) -> str:
+    if name not in builders():
+        raise ValueError(f"must be one of {', '.join(builders())}")
+    return name
+
+
+def _places_as_written(rig: Random) -> dict[str, Any]:
+    """Return the keys of a rig that its scene YAML gives, but for those that move no camera."""
+    return {key: value for key, value in as_written(rig).items() if key not in CAMERA_KEYS}
+
+
+# The keys of a rig that say what a camera sees and what its view is for.
+CAMERA_KEYS = ("camera", "split")
+
+
+class BuildSettings(Settings):
+    """The settings of scripts/build_scene.py."""
+
+    builder: Annotated[str, AfterValidator(_known_builder)]
+    parameters: Parameters = Parameters()
+    fingerprint: str | None = Field(
+        None, description="Changes with the builder's text, so that the scene is built again."
+    )
+
+
+class FreePlacesSettings(Settings):
+    """The settings of scripts/free_places.py."""
+
+    rig: Annotated[Random, PlainSerializer(_places_as_written)]
+    frame: Frame | Literal["file"] = Field(1, description=f"{FILE}: the .blend's own frame.")
+    scene_name: str | None = None
+    view_layers: Literal["all"] | list[str] | None = None
+
+
+class FiguresSettings(Settings):
+    """The settings of scripts/report_figures.py."""
+
+    rig: Annotated[AnyRig, PlainSerializer(as_written)]
+
+
+class Measurement(Settings):
+    """A file of a measurement that a page shows."""
+
+    file: str
+    modified_ns: int | None = Field(
+        None, description="Changes when it is measured again, so that the page is made again."
+    )
+
+
+class PageSettings(Settings):
+    """The settings of scripts/report_html.py."""
+
+    rig: Annotated[AnyRig, PlainSerializer(as_written)]
+    yaml: str = Field(description="The scene YAML's text.")
+    command: str = Field(description="What makes the dataset again.")
+    panorama: bool = Field(
+        False, description="Whether the overview is a panorama, not the view in the rig's middle."
+    )
+    measurements: list[Measurement] = Field([])
+
+
+class ValidationSettings(Settings):
+    """The settings of scripts/validate.py. Paths are those of the working folder."""
+
+    reprojections: list[str] = Field([], description="Folders in the dataset.")
+    exports: list[str] | None = Field(
+        None,
+        description="The export.json or transforms.json of each export that the dataset shall "
+        "have. Without this key it may have any.",
+    )
+    records: list[str] = Field([], description="Sizes and checksums of the images as written.")
+
+
+class PackSettings(Settings):
+    """The settings of scripts/package.py."""
+
+    datasets: list[str] = Field(
+        [], description="The datasets in the folder. With others the folder is packed again."
+    )
+    gigabytes: float | None = Field(
+        None, gt=0, description="The largest size of a part. Without it, there is one part."
+    )
+    scene: Credits = Credits()
+
+
+class SynthesisSettings(Settings):
+    """The settings of scripts/synthesis_quality.py."""
+
+    truth: list[str] = Field(
+        [],
+        description="Folders of the datasets that synthesised views are compared with. Without "
+        "any, they are compared with the dataset's own test views.",
+    )
+    views: AtLeastOne = Field(12, description="Views of each of these that are compared.")
