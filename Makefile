@@ -1,14 +1,15 @@
-# `make` sets up the environment and builds the default dataset; `make test` sets up and runs the tests,
-# and `make test-other` those that are not slow, with the other of the two Pythons and its own lock.
-# `make consumers` reads exports with the consumers' own code, in an environment of theirs; `make learn`
-# learns radiance fields from exported files, in the same environment.
+# make             sets up the environment and builds the default dataset
+# make test        sets up and runs the checks and tests
+# make test-other  runs the tests that are not slow with the other supported Python and its own lock
+# make consumers   reads exports with the consumers' own code, in an environment of its own
+# make learn       learns radiance fields from exported files, in the same environment
 
 CORES ?= $(shell getconf _NPROCESSORS_ONLN)
 
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
 PIP = .venv/bin/pip -qq --disable-pip-version-check
-# Of the environment's Python, as in the locks' names; and the other one that is supported.
+# The version of the environment's Python, as in the locks' names, and the other supported version.
 VERSION = $$(.venv/bin/python -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 OTHER = $$(test $(VERSION) = 3.13 && echo 3.11 || echo 3.13)
 LOCK = uv pip compile --generate-hashes --no-emit-index-url --no-header --quiet
@@ -20,7 +21,7 @@ all: .venv/complete
 
 test: check
 	python envs/check_system.py --tests
-	@# One more than there are cores: they wait, too, for Slurm, for jobs that are killed, for a browser.
+	@# One process more than cores, because some tests wait: for Slurm, killed jobs, or a browser.
 	python -m pytest -n $$(( $(CORES) + 1 ))
 
 test-other: export PATH := $(CURDIR)/.venv-other/bin:$(PATH)
@@ -39,14 +40,14 @@ consumers: .venv/complete .venv-consumers/complete
 	python tests/consumers/export.py work/consumers
 	.venv-consumers/bin/python -W ignore tests/consumers/check.py work/consumers
 
-# Several GB: on Linux the package index has torch with CUDA alone.
+# Several GB: for Linux, the package index only has torch with CUDA.
 .venv-consumers/complete: .venv/complete envs/requirements-consumers.txt envs/requirements-nerfstudio.txt
 	.venv/bin/python -m venv --clear .venv-consumers
 	.venv-consumers/bin/pip -q install --require-hashes -r envs/requirements-consumers.txt
 	.venv-consumers/bin/pip -q install --require-hashes --no-deps -r envs/requirements-nerfstudio.txt
 	@touch $@
 
-# Twice, for a page shows the measurements that are there when it is planned.
+# Two runs, because a page shows the measurements that exist when it is planned.
 LEARNED = --config scenes='[garden_learn, object_learn]' rigs=all preset=full
 
 learn: .venv/complete .venv-consumers/complete
@@ -57,7 +58,7 @@ learn: .venv/complete .venv-consumers/complete
 soak: .venv/complete
 	python benchmarks/soak.py
 
-# PYTHON names an interpreter; without it the best that is there is taken.
+# PYTHON names an interpreter. Without it, envs/find_python.sh chooses one.
 .venv/complete: envs/requirements-3.13.txt envs/requirements-3.11.txt
 	@set -e; python=$$(envs/find_python.sh $(PYTHON)); \
 	echo "setting up .venv with $$python: some minutes, mostly to download 400 MB"; \
@@ -79,19 +80,19 @@ soak: .venv/complete
 		-r envs/requirements-test-$(OTHER).txt
 	@touch $@
 
-# Where machines see no common folder.
+# For machines without a common folder.
 .venv/complete-with-storage: .venv/complete envs/requirements-storage-3.13.txt envs/requirements-storage-3.11.txt
 	@$(PIP) install --require-hashes -r envs/requirements-storage-$(VERSION).txt
 	@touch $@
 
-# The S3 server of benchmarks/cloud.py: it wants other versions of what the environment has.
+# The S3 server of benchmarks/cloud.py needs other versions of the environment's packages.
 .venv-s3-server/complete: .venv/complete envs/requirements-s3-server.txt
 	.venv/bin/python -m venv --clear .venv-s3-server
 	.venv-s3-server/bin/pip -qq --disable-pip-version-check install --require-hashes \
 		-r envs/requirements-s3-server.txt
 	@touch $@
 
-# Resolve anew what the locks do not hold yet; delete a lock to renew all that is in it. Needs uv.
+# Add new packages to the locks. Delete a lock to renew all its packages. Needs uv.
 locks:
 	for version in 3.13 3.11; do \
 		$(LOCK) --python-version $$version envs/requirements-test.in -o envs/requirements-test-$$version.txt && \

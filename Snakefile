@@ -2,7 +2,7 @@
 import sys
 from pathlib import Path
 
-# Of this workflow, which may be a module of another one.
+# The folder of this workflow, which may be a module of another one.
 FOLDER = Path(workflow.current_basedir)
 sys.path.insert(0, str(FOLDER / "scripts"))
 
@@ -10,17 +10,18 @@ from lightfield.core.errors import UserError
 from lightfield.core.disk_space import obstacle
 from lightfield.dataset.config import as_written, read_config
 
-# Where Snakemake can note nothing, it ends with a traceback.
+# Snakemake ends with a traceback if it cannot write its notes.
 if cause := obstacle(Path(".snakemake")):
     sys.exit(f"error: .snakemake: cannot be written: {cause}")
 
-# What the command line says, or the workflow whose module this is; config.yaml fills in the rest.
+# The keys from the command line, or from the workflow whose module this is. config.yaml fills in
+# the others.
 GIVEN = set(config)
 HAS_OWN_CONFIG = Path("config.yaml").exists() and Path.cwd() != FOLDER
 
-# Snakemake loads both files without a limit, and does not say in which line one is wrong.
+# Snakemake loads both files without a limit of size, and does not name the line of a mistake.
 try:
-    # The defaults, and what a user's own folder says instead.
+    # The defaults, and the values of the user's own folder.
     DEFAULTS = read_config(FOLDER / "config.yaml")
     OWN = read_config(Path("config.yaml")) if HAS_OWN_CONFIG else {}
 except UserError as error:
@@ -35,8 +36,8 @@ if HAS_OWN_CONFIG:
     configfile: "config.yaml"
 
 
-# Snakemake reads no file for a module that is given its configuration, and takes 12:30 for 750. So
-# our own reading replaces its own, and adds the defaults that it did not read.
+# Snakemake reads no file for a module with a given configuration, and reads 12:30 as 750. So this
+# replaces Snakemake's values, and adds the missing defaults.
 OWN_READ = {key: value for key, value in OWN.items() if key in config}
 for written in (DEFAULTS, OWN_READ):
     as_written(
@@ -50,8 +51,8 @@ report: "captions/workflow.rst"
 include: "rules/internals.smk"
 
 
-# For --software-deployment-method apptainer: each job runs in the image of envs/plenoforge.def.
-# Snakemake refuses a path with blanks also where it uses no container.
+# With --software-deployment-method apptainer, each job runs in the image of envs/plenoforge.def.
+# Without containers the path must not have blanks either, because Snakemake checks it anyway.
 container: f"{FOLDER}/envs/plenoforge.sif" if USES_CONTAINERS else "plenoforge.sif"
 
 
@@ -106,7 +107,7 @@ onsuccess:
 onerror:
     end_display()
     end_notes()
-    # Snakemake has something to say after this, too: what failed is repeated when it has.
+    # Snakemake prints more after this. So print the failures when the process ends.
     atexit.register(
         print,
         failure_report(failed_jobs(failed_entries())) or UNFINISHED,

@@ -1,7 +1,8 @@
-"""Install what the environment cannot bring along, as root on Debian or Ubuntu, or say what it is.
+"""Install the system packages that the environment needs, as root on Debian or Ubuntu.
 
-That is the libraries that bpy links to, Python's own module for environments, and for the tests a
-browser and rsync. Uses the standard library only, because it runs before anything is installed.
+Elsewhere, and without root, name the missing packages. They are the libraries that bpy links to,
+Python's module for environments, and for the tests a browser and rsync. This uses only the standard
+library, because it runs before anything is installed.
 """
 
 import argparse
@@ -28,7 +29,7 @@ LIBRARIES = {
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tests", action="store_true", help="what the tests need, too")
+    parser.add_argument("--tests", action="store_true", help="also the packages of the tests")
     tests = parser.parse_args().tests
     packages = missing(tests)
     if not packages:
@@ -36,8 +37,8 @@ def main() -> None:
     if shutil.which("apt-get") and os.geteuid() == 0:
         print(f"installing {' '.join(packages)}", flush=True)
         environment = os.environ | {"DEBIAN_FRONTEND": "noninteractive"}
-        for words in (["update"], ["install", "--yes", *packages]):
-            subprocess.run(["apt-get", "--quiet=2", *words], env=environment, check=False)
+        for arguments in (["update"], ["install", "--yes", *packages]):
+            subprocess.run(["apt-get", "--quiet=2", *arguments], env=environment, check=False)
         importlib.invalidate_caches()
         packages = missing(tests)
     if packages:
@@ -48,7 +49,7 @@ def main() -> None:
 
 
 def missing(tests: bool) -> list[str]:
-    """Return the Debian packages of what is not there."""
+    """Return the missing Debian packages."""
     packages = []
     if sys.platform == "linux":
         packages = [package for library, package in LIBRARIES.items() if not loads(library)]

@@ -1,21 +1,22 @@
 #!/usr/bin/env bash
-# Print the path of the interpreter that `make` builds .venv with: the one named as first word, else
-# Python 3.13, else 3.11, else a 3.13 that uv downloads. A first word of 3.13 or 3.11 is a version to
-# find, or else to download. An interpreter counts once it has run: a version manager's shim may be
-# there and not work.
+# Print the path of the interpreter that `make` builds .venv with.
+#   find_python.sh         Python 3.13, or else 3.11, or else a 3.13 that uv downloads
+#   find_python.sh 3.11    that version, which uv downloads if it is missing
+#   find_python.sh PYTHON  that interpreter
+# An interpreter must run to count: a version manager's shim may exist, but not work.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-# runs PYTHON VERSION: it does, and is of that version.
+# runs PYTHON VERSION: succeed if the interpreter runs and has that version.
 runs() {
     [[ $("$1" -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null) == "$2" ]]
 }
 
-# find_version VERSION: print the first interpreter of that version that runs; pyenv has some off the PATH.
+# find_version VERSION: print the first interpreter of that version that runs, on the PATH or in pyenv.
 find_version() {
     local python
     while read -r python; do
-        # Not the environments that are about to be replaced.
+        # Skip the environments, which are about to be replaced.
         if [[ $python != "$PWD"/.venv* ]] && runs "$python" "$1"; then
             echo "$python"
             return
@@ -31,8 +32,7 @@ find_any() {
     find_version 3.13 || find_version 3.11
 }
 
-# download VERSION: let uv, if need be installed for this alone, download a Python into .python;
-# print its path.
+# download VERSION: download a Python into .python with uv, and print its path. Install uv if needed.
 download() {
     local uv=uv
     if ! uv --version >/dev/null 2>&1; then
@@ -64,7 +64,7 @@ if [[ $# -gt 0 ]]; then
 fi
 
 find_any && exit
-# A bare container may have none at all, or one that can make no environment.
+# A bare container may have no Python, or one that cannot make environments.
 if ! python3 -c 'import ensurepip' >/dev/null 2>&1 && [[ $(id -u) == 0 ]] && type -P apt-get >/dev/null; then
     { apt-get -qq update && apt-get -qq install --yes python3 python3-venv; } >&2
     find_any && exit

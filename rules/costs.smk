@@ -1,4 +1,4 @@
-# What a dataset has cost, and how far a build has come.
+# The costs of a dataset, and the progress of a build.
 
 
 include: "helpers/costs.smk"
@@ -27,7 +27,7 @@ rule costs:
     localrule: True
     params:
         dataset=lambda wildcards, output: str(Path(output[0]).parents[1]),
-        # What the jobs above left there is read, as far as it goes back.
+        # These folders hold the journals and benchmarks of all earlier runs.
         journals=f"{MADE}/render",
         benchmarks=f"{WORK}/benchmarks/{{scene}}/{{rig}}",
         # A calibration belongs to the preset, the scene itself to all of them.
@@ -48,7 +48,7 @@ rule costs:
         " {params.blend} --settings {input.settings} {params.inventory} --output {output} > {log} 2>&1"
 
 
-# Without input and output, so that it can be asked at any time, also while a build runs.
+# It has no input and no output, so that it can run at any time, even during a build.
 rule status:
     log:
         log_of("status"),
@@ -56,9 +56,9 @@ rule status:
     params:
         results=RESULTS,
         work=WORK,
-        datasets=status_words(),
+        datasets=status_arguments(),
     message:
-        "Looking how far the chosen datasets are"
+        "Looking at the progress of the chosen datasets"
     shell:
         f"python {SCRIPTS}/status.py"
         " --results {params.results} --work {params.work}"

@@ -1,4 +1,4 @@
-# What the terminal shows: how far a run is, and what a dry run would do.
+# The terminal's display: the progress of a run, and the forecast of a dry run.
 import logging
 
 from lightfield.core.progress import duration
@@ -6,9 +6,9 @@ from lightfield.core.run_display import RunDisplay, Task
 from lightfield.dataset.estimate import START_UP_SECONDS
 from lightfield.measurement.forecast import Work, calibration_seconds, forecast
 
-# Of more datasets than this the page of all is named instead of each one's own.
+# For more datasets than this, only the page of all datasets is named.
 MOST_PAGES = 12
-# What the rules of a file are called, where that is not the file's name, and some by their own.
+# The phase of a rule, or of all rules in a file. Other rules have their file's name as the phase.
 PHASES = {
     "measure_error": "measurement",
     "try_changes": "measurement",
@@ -23,7 +23,7 @@ PHASES = {
 
 
 def rendering(job):
-    """Return how many views of a dataset a job renders, and for how long, in seconds of a core."""
+    """Return how many views of a dataset a job renders, and its estimated seconds of one core."""
     if job.rule.name == RENDER:
         views = int(job.wildcards.end) - int(job.wildcards.first)
         seconds = dataset_of(job.wildcards).estimate.view_seconds
@@ -41,7 +41,7 @@ def rendering(job):
 
 
 def task_of(job):
-    """Return what the display has to know of a job."""
+    """Return the display's task for a job."""
     stem = Path(job.rule.snakefile).stem
     views, seconds = rendering(job)
     return Task(
@@ -54,9 +54,12 @@ def task_of(job):
     )
 
 
-def jobs_of(found):
-    """Return the jobs of what Snakemake's scheduler lists: jobs, and groups of them."""
-    return {one for job in found for one in (job.jobs if job.is_group() else [job])}
+def jobs_of(entries):
+    """Return the jobs of Snakemake's entries, which are jobs or groups of jobs."""
+    jobs = set()
+    for entry in entries:
+        jobs.update(entry.jobs if entry.is_group() else [entry])
+    return jobs
 
 
 TASKS = {}
@@ -69,7 +72,7 @@ def look():
 
 
 def explain(jobs):
-    """Return why these jobs failed, and their groups."""
+    """Return why these jobs and their groups failed."""
     failed = [entry for entry in failed_entries() if jobs & jobs_of([entry])]
     return failure_report(failed_jobs(failed))
 
@@ -78,14 +81,15 @@ DISPLAY = RunDisplay(look, explain)
 
 
 def is_quiet_about(kind):
-    """Whether --quiet names a kind of output: ALL, PROGRESS, …"""
+    """Return whether --quiet names a kind of output: ALL, PROGRESS, …"""
     return kind in QUIET_ABOUT
 
 
 def passes(record):
-    """Let Snakemake's warnings be logged under a display, and more only where it is not quiet.
+    """Return whether to print a record of Snakemake's log. If so, clear the line of progress.
 
-    Its own words for a job that failed are the whole command; why is said without them.
+    With --quiet progress, it prints only warnings. It skips Snakemake's message on a failed job,
+    which is the whole command, because the display says why the job failed.
     """
     if is_quiet_about("PROGRESS"):
         failed_job = record.getMessage().startswith("RuleException")
@@ -96,43 +100,43 @@ def passes(record):
 
 
 def begin_display():
-    """Show how far the run is, from now on."""
+    """Show the progress of the run from now on."""
     note_failures()
     for handler in logging.getLogger("snakemake.logging").handlers:
-        # Snakemake's own log file is for itself.
+        # Snakemake's own log file gets all records.
         if not isinstance(handler, logging.FileHandler):
             handler.addFilter(passes)
-    # What has no output is asked for to be read, and takes seconds.
+    # A job without output takes seconds, and its log is printed at the end.
     jobs = [job for job in needed_jobs() if job.log and job.output]
     if jobs and not is_quiet_about("ALL"):
         announce_calibrations(jobs)
         TASKS.update({job: task_of(job) for job in jobs})
         DISPLAY.begin(TASKS, workflow.cores or 1)
         DISPLAY.start()
-        # However the run ends.
+        # This runs even if the run fails.
         atexit.register(DISPLAY.stop)
 
 
 def announce_calibrations(jobs):
-    """Print what each calibration is expected to cost, and what the datasets that it is for."""
+    """Print the estimated time of each calibration, and of the datasets that depend on it."""
     for job in jobs:
         if job.rule.name == CALIBRATE:
-            datasets = [
-                rendering(other)[1]
-                for other in jobs
-                if other.rule.name == RENDER
-                and other.wildcards.scene == job.wildcards.scene
-            ]
+            scene = job.wildcards.scene
+            renders = [each for each in jobs if each.rule.name == RENDER]
+            render_seconds = sum(
+                rendering(render)[1]
+                for render in renders
+                if render.wildcards.scene == scene
+            )
             print(
-                f"calibrating {job.wildcards.scene} takes some"
-                f" {duration(rendering(job)[1])} of a core, and rendering it then some"
-                f" {duration(sum(datasets))}",
+                f"calibrating {scene} takes some {duration(rendering(job)[1])} of a core,"
+                f" and rendering it then some {duration(render_seconds)}",
                 file=sys.stderr,
             )
 
 
 def end_display():
-    """Show no more how far the run is, but what jobs without output say: they are asked to."""
+    """Stop the display, and print the logs of jobs without output."""
     DISPLAY.stop()
     for job in needed_jobs():
         if job.log and not job.output and Path(job.log[0]).exists():
@@ -140,21 +144,21 @@ def end_display():
 
 
 def print_pages():
-    """Print where the pages are of the datasets that are valid: all that this run was for."""
-    made = all_outputs()
-    valid = [
-        d for d in DATASETS.values() if stored(f"{d.folder}/sha256sums.txt") in made
-    ]
-    where = f"{STORE}/" if STORE else ""
-    pages = [f"{where}{dataset.page}" for dataset in valid]
+    """Print the paths of the pages of this run's datasets, which are all valid."""
+    outputs = all_outputs()
+    prefix = f"{STORE}/" if STORE else ""
+    pages = []
+    for dataset in DATASETS.values():
+        if stored(f"{dataset.folder}/sha256sums.txt") in outputs:
+            pages.append(f"{prefix}{dataset.page}")
     if len(pages) > MOST_PAGES:
-        pages = [f"{len(pages)} datasets: {where}{RESULTS}/index.html"]
+        pages = [f"{len(pages)} datasets: {prefix}{RESULTS}/index.html"]
     for page in pages:
         print(f"valid: {page}", file=sys.stderr)
 
 
 def print_forecast():
-    """Print at the end of a dry run how many jobs there are, and what rendering will take."""
+    """Print the number of jobs and the estimated rendering time at the end of a dry run."""
     if not is_planned_dry_run():
         return
     announce_damage()
@@ -163,8 +167,10 @@ def print_forecast():
     for job in needed_jobs():
         views, seconds = rendering(job)
         if seconds:
-            name, size = f"calibration of {job.wildcards.scene}", 0.0
-            if job.rule.name != CALIBRATE:
+            if job.rule.name == CALIBRATE:
+                name = f"calibration of {job.wildcards.scene}"
+                size = 0.0
+            else:
                 dataset = dataset_of(job.wildcards)
                 name = f"{dataset.scene_folder}/{dataset.rig_name}"
                 size = views * dataset.estimate.all_view_bytes

@@ -1,18 +1,18 @@
-# Why jobs failed, for the end of a run.
+# The causes of failed jobs, for the end of a run.
 import signal
 
-# What the executor said of a job or group that failed.
-SAID = {}
-# Where a run ends early, and no job has failed.
+# The executor's message on each failed job or group.
+EXECUTOR_MESSAGES = {}
+# The message if a run ends early, and no job has failed.
 UNFINISHED = "error: the run was stopped before its last job: snakemake again goes on"
 
 
 def announce_stop():
-    """Have a run say what SIGTERM does: Snakemake is quiet while it waits for its jobs."""
+    """Print a message at SIGTERM, because Snakemake is quiet while it waits for its jobs."""
     stop = signal.getsignal(signal.SIGTERM)
 
     def stop_and_say_so(*arguments):
-        # print() may not be called again while it prints.
+        # The signal may interrupt a print(), in which print() cannot be called.
         os.write(2, b"stopping after SIGTERM: the jobs that run are finished first\n")
         stop(*arguments)
 
@@ -20,47 +20,63 @@ def announce_stop():
 
 
 def note_failures():
-    """Note what the executor says of jobs that fail, such as that they were refused."""
-    hear_executor(SAID.__setitem__)
+    """Note the executor's messages on failed jobs, such as that they were refused."""
+    hear_executor(EXECUTOR_MESSAGES.__setitem__)
 
 
 def full_cause(log):
-    """Return why a job failed by its log, or by the disk that took no more of the log."""
+    """Return why a job failed, by its log, or by the full disk that cut its log short."""
     why = cause(log)
-    return why if why and why.startswith("error: ") else obstacle(log) or why
+    if why and why.startswith("error: "):
+        return why
+    return obstacle(log) or why
 
 
-def failed_jobs(failed):
-    """Return rule, cause and log of each of these jobs; of a group's, of those that said why.
+def failed_jobs(entries):
+    """Return rule, cause and log of each failed job. The entries are jobs, or groups of jobs."""
+    causes = []
+    for entry in entries:
+        jobs = failed_jobs_of(entry)
+        logged_causes = []
+        for job in jobs:
+            why, log = cause_by_log(job)
+            if why:
+                logged_causes.append((job.rule.name, why, log))
+        if jobs and not logged_causes:
+            causes.append(cause_without_log(entry, jobs))
+        causes += logged_causes
+    return sorted(causes)
 
-    Of a job that said nothing, as one that never began, it is the batch system's log, if there is,
-    or else what the executor said.
+
+def failed_jobs_of(entry):
+    """Return the failed jobs of these rules in an entry, which is a job or a group."""
+    if not entry.is_group():
+        return own_jobs([entry])
+    return [
+        job for job in own_jobs(entry.jobs) if not all(map(os.path.exists, job.output))
+    ]
+
+
+def cause_by_log(job):
+    """Return why a job failed, and its log. The cause is None if this run wrote no log."""
+    log = Path(job.log[0])
+    if STORE:
+        name = os.path.relpath(log, stored(WORK))
+        ViewStore(STORE).bring(f"{WORK}/{name}")
+    # The clocks of nodes differ.
+    is_of_this_run = is_newer(log, start_of_run() - 5)
+    return (full_cause(log) if is_of_this_run else None), log
+
+
+def cause_without_log(entry, jobs):
+    """Return rule, cause and log of an entry whose jobs wrote no log, as if they never began.
+
+    The cause is in the batch system's log, or in the executor's message.
     """
-    found = []
-    # Clocks of nodes differ.
-    start = start_of_run() - 5
-    for one in failed:
-        jobs = own_jobs([one])
-        if one.is_group():
-            jobs = [
-                job
-                for job in own_jobs(one.jobs)
-                if not all(map(os.path.exists, job.output))
-            ]
-        logs = [(job.rule.name, Path(job.log[0])) for job in jobs]
-        for _, log in logs if STORE else ():
-            name = os.path.relpath(log, stored(WORK))
-            ViewStore(STORE).bring(f"{WORK}/{name}")
-        spoke = [
-            (name, full_cause(log), log) for name, log in logs if is_newer(log, start)
-        ]
-        spoke = [(name, why, log) for name, why, log in spoke if why]
-        if logs and not spoke:
-            name, log = min(logs)
-            batch = batch_log(one.name, start)
-            why = batch and cause(batch) or first_sentence(SAID.get(one) or "")
-            # Where no log can be written, nothing can be said in one.
-            why = why or obstacle(log) or "it said nothing"
-            spoke = [(name, why, batch or log)]
-        found += spoke
-    return sorted(found)
+    name, log = min((job.rule.name, Path(job.log[0])) for job in jobs)
+    batch = batch_log(entry.name, start_of_run() - 5)
+    message = first_sentence(EXECUTOR_MESSAGES.get(entry) or "")
+    why = (batch and cause(batch)) or message
+    # A full disk takes no log at all.
+    why = why or obstacle(log) or "it said nothing"
+    return name, why, batch or log

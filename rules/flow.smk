@@ -1,9 +1,9 @@
-# Where each view's neighbour sees what it sees.
+# The optical flow from each view to its neighbour.
 
 
 rule flow:
     input:
-        # A neighbour may be of another shard.
+        # A neighbour may belong to another shard.
         records=records,
         lightfield=f"{DATASET}/lightfield.json",
     output:

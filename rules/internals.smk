@@ -1,5 +1,4 @@
-# What no public interface of Snakemake gives. This is the only file that reaches inside Snakemake;
-# each piece says why.
+# The only file that reaches inside Snakemake, for what has no public interface. Each piece says why.
 import functools
 import inspect
 import threading
@@ -10,11 +9,11 @@ from snakemake_interface_executor_plugins.executors.base import SubmittedJobInfo
 
 from lightfield.core import processors
 
-# A Snakefile is read again by each job on a cluster: these say who reads it, and to what end.
+# Each job on a cluster reads the Snakefile again. These say which process reads it.
 IS_MAIN_PROCESS = workflow.is_main_process
 RUNS_ELSEWHERE = workflow.remote_exec
 
-# What the command line and the profile say: a Snakefile is given only the configuration.
+# Settings of the command line and the profile. A Snakefile gets only the configuration.
 STORE = workflow.storage_settings.default_storage_prefix or ""
 SHARES_FILES = SharedFSUsage.INPUT_OUTPUT in workflow.storage_settings.shared_fs_usage
 NODES = workflow.resource_settings.nodes
@@ -27,33 +26,33 @@ USES_CONTAINERS = "APPTAINER" in {
 }
 ASKS_FOR_GPUS = "gpu" in (workflow.resource_settings.default_resources or ())
 
-# Without --cores and --jobs Snakemake refuses to run. `cores: all` in a profile takes the cores of
-# the machine, where a container may have fewer.
+# Snakemake refuses to run without --cores and --jobs. `cores: all` in a profile would take all cores
+# of the machine, although a container may have fewer.
 if (CORES, NODES) == (None, None):
     workflow.resource_settings.cores = processors.available()
     workflow.register_resource("_cores", processors.available())
 
 
 def limit_resource(name, amount):
-    """Have jobs share a resource, as --resources does, unless the command line limits it."""
+    """Limit a resource that jobs share, as --resources does, unless the command line does so."""
     if name not in workflow.global_resources:
         workflow.register_resource(name, amount)
 
 
 def given_slurm_extra():
-    """Return what the user's profile gives Slurm beside our own: a rule's value replaces it."""
-    given = workflow.resource_settings._parsed_default_resources.get("slurm_extra")
-    # Snakemake has an entry without a text where none is given.
-    return given.raw.strip("'\"") if given and given.raw else ""
+    """Return the arguments for Slurm in the user's profile, which a rule's value would replace."""
+    resource = workflow.resource_settings._parsed_default_resources.get("slurm_extra")
+    # Without a value, Snakemake has an entry without text.
+    return resource.raw.strip("'\"") if resource and resource.raw else ""
 
 
 def rule_name(name):
-    """Return what a rule of ours is called, where we are a module of another workflow."""
+    """Return the name of a rule. A workflow that uses this one as a module may change it."""
     return workflow.modifier.modify_rulename(name)
 
 
 def stored(path):
-    """Return where Snakemake has its copy of a file or folder; without a store that is itself."""
+    """Return the path of Snakemake's copy of a file or folder. Without a store, the same path."""
     return str(workflow.modifier.path_modifier.apply_default_storage(path))
 
 
@@ -63,26 +62,27 @@ def unstored(file):
 
 
 def of_each_shard(function):
-    """Return an input or params function whose signature Snakemake need not work out each time.
+    """Return an input or params function with its signature.
 
-    It does so several times for each shard: a plan of 2,000 shards takes a second less.
+    Otherwise Snakemake inspects the function several times for each shard. This saves a second in a
+    plan of 2,000 shards.
     """
     function.__signature__ = inspect.signature(function)
     return function
 
 
 def rerun(outputs):
-    """Have Snakemake run the jobs of these outputs, although it sees no reason.
+    """Make Snakemake run the jobs of these outputs, although it sees no reason.
 
-    --forcerun is the public way, but what it names becomes a target, too.
+    --forcerun is the public way, but it also makes the outputs targets.
     """
     workflow.dag.forcefiles.update(map(stored, outputs))
 
 
 def before_jobs_are_chosen(mark):
-    """Call ``mark`` once all jobs are known, and so all settings written, and none is chosen yet.
+    """Call ``mark`` when all jobs are known, before Snakemake chooses those that must run.
 
-    An input function runs while those of other jobs have still to write their settings.
+    At that time, all input functions have written their settings.
     """
     dag = workflow.dag
     choose = dag.update_needrun
@@ -104,10 +104,10 @@ def before_jobs_are_chosen(mark):
 
 
 class ReadersOfContent:
-    """By job: the jobs that read what it makes, without those for which it need only be there.
+    """Maps each job to the jobs that read the content of its outputs.
 
-    Snakemake looks for no reason in what follows from a job that runs, and so overlooks those jobs:
-    they follow from it, but do not run because of it.
+    It leaves out jobs that declare all these files as ``ancient``: they do not run because of the
+    job. Snakemake looks for no other reason in the jobs that follow, and would overlook these.
     """
 
     def __init__(self, depending):
@@ -122,9 +122,9 @@ class ReadersOfContent:
 
 
 def take_as_missing(is_damaged):
-    """Have Snakemake take damaged files as missing: they are set aside before the first job.
+    """Make Snakemake treat damaged files as missing. They are set aside before the first job.
 
-    It refuses to plan with a link that leads nowhere, or to replace a file without permissions.
+    Otherwise it would fail at a link that leads nowhere, or at a file without permissions.
     """
     exists_local = _IOFile.exists_local
 
@@ -137,7 +137,7 @@ def take_as_missing(is_damaged):
 def before_lock(take_folder):
     """Call ``take_folder`` when a real run is planned, before Snakemake locks its files.
 
-    Snakemake's hooks come later: where a killed run has left locks, it ends before `onstart`.
+    Snakemake's hooks come later. If a killed run has left locks, Snakemake ends before `onstart`.
     """
     build_dag = workflow._build_dag
 
@@ -146,7 +146,7 @@ def before_lock(take_folder):
         if workflow.executor_plugin is None or not workflow.execution_settings.lock:
             return
         if workflow.dryrun:
-            # It would warn of another run, also of one that was killed, and locks nothing.
+            # A dry run locks nothing, but it would warn of another run, even of a killed one.
             workflow.persistence.lock = workflow.persistence.noop
         else:
             take_folder()
@@ -165,7 +165,7 @@ def files_are_locked():
 
 
 def keep_locks_of_others():
-    """Have Snakemake remove its own locks in the end: it removes those of all runs that live."""
+    """Make Snakemake remove only its own locks at its end, and not those of other live runs."""
     persistence = workflow.persistence
 
     def unlock():
@@ -177,11 +177,10 @@ def keep_locks_of_others():
 
 
 def look_for_jobs_once_a_second():
-    """Let Snakemake's scheduler have one timer at a time for its next look at the ready jobs.
+    """Let Snakemake's scheduler have only one timer for its next look at the ready jobs.
 
-    It looks when a job has finished, and a second after each look. Each of these looks starts a
-    timer of its own. After some dozen jobs Snakemake would look without a pause, and take a core
-    from the jobs until the run ends.
+    It looks when a job has finished, and a second after each look. Each look starts a timer. So
+    after some dozen jobs Snakemake would look without a pause, and take a core from the jobs.
     """
     is_waiting = threading.Lock()
 
@@ -204,17 +203,17 @@ def is_ancient(file):
     return file.is_ancient
 
 
-# Rules see one job at a time. The display, the ledger and the checks before the first job need all.
+# Rules see one job at a time. The display, the ledger and the first checks need all jobs.
 
 
 def own_jobs(jobs):
-    """Return those jobs that are of these rules: another workflow may have some of its own."""
+    """Return the jobs of these rules. A workflow that uses them as a module may have others."""
     jobs = [job for job in jobs if not job.is_group()]
     return [job for job in jobs if Path(job.rule.snakefile).is_relative_to(FOLDER)]
 
 
 def needed_jobs():
-    """Return the jobs of these rules that this run needs, those that are finished too."""
+    """Return the jobs of these rules that this run needs, also those that are finished."""
     return own_jobs(workflow.dag.needrun_jobs(exclude_finished=False))
 
 
@@ -254,18 +253,19 @@ def job_table():
 
 
 def start_of_run():
-    """Return when this run began, in seconds since 1970."""
+    """Return the time at which this run began, in seconds since 1970."""
     return workflow.start_time.timestamp()
 
 
 def hear_executor(note):
-    """Call ``note`` with each failed job and what the executor says of it.
+    """Call ``note`` with each failed job and the executor's message.
 
-    Snakemake keeps that from a group's log. For a group that it cannot even submit, as with an
-    account that does not exist, Slurm's executor reports nothing, and Snakemake waits for ever.
+    Snakemake does not write the message to a group's log. If Slurm's executor cannot submit a
+    group, for example with a wrong account, it reports nothing, and Snakemake waits for ever.
     """
     executor = workflow.scheduler._executor
-    report_job_error, run_job = executor.report_job_error, executor.run_job
+    report_job_error = executor.report_job_error
+    run_job = executor.run_job
 
     def report_and_note(job_info, msg=None, **details):
         note(job_info.job, msg)

@@ -1,4 +1,4 @@
-# Radiance fields learned from exported files; asked for by name, no part of a dataset.
+# Radiance fields that learn from exported files. They are no part of a dataset: name the target.
 
 
 include: "helpers/learn.smk"

@@ -1,4 +1,4 @@
-# Which files are damaged or were made from something else, by the ledger of finished jobs.
+# Detects damaged and outdated files, by the ledger of finished jobs.
 import logging
 
 from snakemake_interface_logger_plugins.common import LogEvent
@@ -12,26 +12,26 @@ from lightfield.core.files import (
 )
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX, LOG_SUFFIX
 
-# What shards of other bounds have made is nobody's any more.
+# The records of the present shards. Records of shards with other bounds are obsolete.
 SHARD_RECORDS = {file for d in DATASETS.values() for file in d.all_records}
 
 
 def is_current(output):
-    """Return whether an output is of a job that these settings may still ask for."""
+    """Return whether an output belongs to a job that these settings may still need."""
     is_record = re.fullmatch(r"\d+-\d+\.json", Path(output).name)
     return output in SHARD_RECORDS or not is_record
 
 
 @cache
 def finished_work():
-    """Return the ledger of what finished jobs made."""
+    """Return the ledger of finished jobs."""
     if STORE:
         ViewStore(STORE).bring(LEDGER)
     return ledger.Ledger(Path(LEDGER), is_current)
 
 
 def settings_file(path, content):
-    """Write settings as JSON where the file has another text; return it as an input."""
+    """Write settings as JSON if the file has another text. Return the file as an input."""
     try:
         if STORE:
             store_settings(path, content)
@@ -45,9 +45,9 @@ def settings_file(path, content):
 
 
 def store_settings(path, content):
-    """Write settings, and send them where the storage has others, or none.
+    """Write settings, and send them to the storage if it has others, or none.
 
-    A run that was killed may have written them here, and not sent them.
+    A killed run may have written them here without sending them.
     """
     store = ViewStore(STORE)
     in_storage = store.bring(path)
@@ -57,15 +57,16 @@ def store_settings(path, content):
 
 
 def clear_folder(path):
-    """Move a folder aside that lies where a file is to be written."""
+    """Move a folder aside that is in the place of a file to write."""
     if os.path.isdir(path):
         set_aside(Path(path), Path(REMOVED))
 
 
 def restore_time(path):
-    """Give settings with which jobs have run before the time that they had then.
+    """Give settings that jobs have read before the time that the file had then.
 
-    They are no newer than what these jobs made. What was made from others since, the ledger knows.
+    So the outputs of these jobs are not older than their settings. The ledger detects outputs that
+    were made from other settings since.
     """
     time = finished_work().last_read(path, sha256(path))
     if time:
@@ -73,13 +74,16 @@ def restore_time(path):
 
 
 def dataset_settings(dataset, stage, content):
-    """Write a dataset's settings of a stage; return their file as an input."""
+    """Write a dataset's settings of a stage. Return their file as an input."""
     mark_stale_files(dataset.name)
     return settings_file(f"{dataset.work}/settings/{stage}.json", content)
 
 
 def settings_of(stage, content):
-    """Return the input function for a dataset's settings of a stage: ``content`` of the dataset."""
+    """Return the input function for a dataset's settings of a stage.
+
+    ``content`` is a function that returns the settings of a dataset.
+    """
 
     def input_function(wildcards):
         dataset = dataset_of(wildcards)
@@ -89,7 +93,10 @@ def settings_of(stage, content):
 
 
 def scene_settings_of(stage, content):
-    """Return the input function for a scene's settings: ``content`` of any of its datasets."""
+    """Return the input function for a scene's settings.
+
+    ``content`` is a function that returns them from any dataset of the scene.
+    """
 
     def input_function(wildcards):
         dataset = scene_of(wildcards)
@@ -100,14 +107,14 @@ def scene_settings_of(stage, content):
     return input_function
 
 
-# By the path of each damaged file: what is wrong with it, and the outputs of the jobs that mend it.
+# For each damaged path: what is wrong with it, and the outputs of the jobs that make it again.
 DAMAGED = {}
 take_as_missing(DAMAGED.__contains__)
 
 
 @cache
 def mark_noted_files():
-    """Mark the files of the ledger that are damaged, or were made from something else."""
+    """Mark the damaged and outdated files of the ledger."""
     DAMAGED.update(finished_work().damage)
     for _, outputs in DAMAGED.values():
         rerun(outputs)
@@ -115,13 +122,14 @@ def mark_noted_files():
 
 
 def mark_outdated_files():
-    """Mark the files that were made from other files, or from other bytes of them, than now."""
-    known = finished_work()
-    rerun(known.outdated_outputs())
+    """Mark the files that were made from other inputs, or from other content of their inputs."""
+    finished = finished_work()
+    rerun(finished.outdated_outputs())
     for job in all_jobs():
+        inputs = set(read_files(job))
         for output in map(unstored, job.output):
-            # From a storage a job's inputs need not lie here when they are noted.
-            if known.has_other_inputs(output, {*read_files(job)}, may_lack=bool(STORE)):
+            # With a storage, inputs may not be here when they are noted.
+            if finished.has_other_inputs(output, inputs, may_lack=bool(STORE)):
                 rerun([output])
 
 
@@ -129,7 +137,7 @@ def mark_outdated_files():
 def mark_stale_files(name):
     """Mark damaged and outdated files, so that Snakemake rebuilds them.
 
-    Of the dataset those are among them of which nobody knows from what they were made.
+    A dataset's files that the ledger does not have are among them.
     """
     if not IS_MAIN_PROCESS:
         return
@@ -146,19 +154,20 @@ def mark_stale_files(name):
 
 
 def damage_to_mend():
-    """Return what is wrong with the damaged files that this run makes again, by path.
+    """Return what is wrong with each damaged file that this run makes again, by path.
 
-    Among them are the ledger, and each job's log and benchmark, where they cannot be written.
+    An unreadable ledger is among them, and unreadable logs and benchmarks of this run's jobs.
     """
     jobs = needed_jobs()
-    made = {unstored(file) for job in jobs for file in job.output}
-    damage = {
-        path: problem
-        for path, (problem, outputs) in DAMAGED.items()
-        if not made.isdisjoint(outputs)
-    }
-    written = [file for job in jobs for file in (*job.log, job.benchmark) if file]
-    for path in (LEDGER, *written):
+    outputs_of_run = {unstored(file) for job in jobs for file in job.output}
+    damage = {}
+    for path, (problem, outputs) in DAMAGED.items():
+        if not outputs_of_run.isdisjoint(outputs):
+            damage[path] = problem
+    notes = [LEDGER]
+    for job in jobs:
+        notes += [file for file in (*job.log, job.benchmark) if file]
+    for path in notes:
         if problem := unreadable(path):
             damage[str(path)] = problem
     return dict(sorted(damage.items()))
@@ -171,7 +180,7 @@ def announce_damage():
 
 
 def set_damage_aside():
-    """Move the damaged files that this run makes again to where nobody loses them."""
+    """Move the damaged files that this run makes again to the folder of removed files."""
     for path in damage_to_mend():
         if os.path.lexists(path):
             set_aside(Path(path), Path(REMOVED))
@@ -179,9 +188,9 @@ def set_damage_aside():
 
 
 def listed_files(job):
-    """Return the files that a job wrote beside its outputs, with their SHA-256 where it is noted.
+    """Return the files that a job wrote beside its outputs, with their SHA-256 if it is noted.
 
-    A shard's record and the list of an export name them.
+    A shard's record, or the list of an export, names them.
     """
     files = {}
     for output in map(Path, job.output):
@@ -214,26 +223,28 @@ def beside_transforms(output, content):
 
 
 def history_of(job):
-    """Return the files of a job that only grow: a shard's logs, and what the job took."""
+    """Return the files of a job that only grow: a shard's journal and log, and its benchmark."""
     files = [str(job.benchmark)] if job.benchmark else []
     for output in map(Path, job.output):
-        # By name: a folder of thousands of shards takes long to list.
-        files += [str(output.with_suffix(s)) for s in (JOURNAL_SUFFIX, LOG_SUFFIX)]
+        # These may not exist. Listing a folder of thousands of shards would take long.
+        for suffix in (JOURNAL_SUFFIX, LOG_SUFFIX):
+            files.append(str(output.with_suffix(suffix)))
     return files
 
 
 class JobNotes(logging.Handler):
-    """Notes each job in the ledger: what it read when it starts, what it made when it is finished.
+    """Notes each job in the ledger: its inputs when it starts, and its outputs when it has finished.
 
-    Snakemake says when it starts jobs, whatever it prints. What has finished since is noted then.
+    Snakemake logs the start of jobs, even with --quiet. At each start, this notes the jobs that
+    have finished since.
     """
 
     def __init__(self, jobs):
         super().__init__()
         self.unfinished = {job.jobid: job for job in jobs if job.output}
-        # The jobs of a group are not announced one by one.
-        self.grouped = {n for n, job in self.unfinished.items() if job.group}
-        # Of those that were announced.
+        # Snakemake does not log the start of the jobs in a group.
+        self.grouped = {number for number, job in self.unfinished.items() if job.group}
+        # The stamps of the inputs of started jobs.
         self.inputs = {}
         self.next_sending = 0.0
 
@@ -243,27 +254,27 @@ class JobNotes(logging.Handler):
         try:
             self.note_finished({*self.inputs, *self.grouped})
         except UserError as error:
-            # What is not noted is made again.
+            # The next run makes files again that are not noted.
             print(f"warning: {error}", file=sys.stderr)
         for number in record.jobs:
             if number in self.unfinished:
                 self.inputs[number] = read_stamps(self.unfinished[number])
 
     def note_finished(self, numbers):
-        """Note those of these unfinished jobs that have finished since."""
-        finished = [n for n in numbers if is_finished(self.unfinished[n])]
-        for number in finished:
+        """Note the unfinished jobs with these numbers that have finished since."""
+        finished_numbers = [n for n in numbers if is_finished(self.unfinished[n])]
+        for number in finished_numbers:
             job = self.unfinished.pop(number)
             self.grouped.discard(number)
             stamps = self.inputs.pop(number, None) or read_stamps(job)
             finished_work().note(line_of(job, stamps))
-        if finished and STORE and time.monotonic() > self.next_sending:
+        if finished_numbers and STORE and time.monotonic() > self.next_sending:
             self.send()
 
     def send(self):
         """Send the ledger to the storage, and not again before 20 times as long has passed.
 
-        It grows with the number of jobs.
+        The ledger grows with the number of jobs.
         """
         began = time.monotonic()
         ViewStore(STORE).send(LEDGER)
@@ -281,7 +292,7 @@ def read_stamps(job):
 
 
 def stamps(digests):
-    """Return the stamps of those files that are there, whose SHA-256 may be known."""
+    """Return the stamps of files that exist. ``digests`` has their SHA-256, or None."""
     return {
         name: ledger.Stamp.of(name, digest)
         for name, digest in digests.items()
@@ -293,7 +304,7 @@ def line_of(job, inputs):
     """Return the line of the ledger for a finished job."""
     outputs = [unstored(file) for file in job.output]
     if STORE:
-        # What the job made lies in the storage.
+        # The storage has the job's files.
         return ledger.Job(outputs, {}, {}, inputs)
     files = stamps(dict.fromkeys(outputs) | listed_files(job))
     return ledger.Job(outputs, files, stamps(dict.fromkeys(history_of(job))), inputs)

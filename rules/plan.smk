@@ -1,10 +1,10 @@
-# Before anything is rendered: what the camera setups are, and what rendering them will take.
+# Tables before rendering: the camera setups, and the estimated time and size of their views.
 
 
 include: "helpers/plan.smk"
 
 
-# Without output: it is asked for to be read.
+# It has no output: its log is printed.
 rule rig_tables:
     input:
         [os.path.relpath(scene_path(name)) for name in CHOSEN_SCENES],
@@ -39,7 +39,7 @@ rule probe:
     params:
         device=SETTINGS.device,
     message:
-        "Measuring what the views of {wildcards.scene}/{wildcards.rig} cost"
+        "Measuring the time and size of the views of {wildcards.scene}/{wildcards.rig}"
     shell:
         f"python {SCRIPTS}/probe.py"
         " --blend {input.blend:q} --inventory {input.inventory}"
@@ -47,7 +47,7 @@ rule probe:
         " > {log} 2>&1"
 
 
-# Without output: it is asked for to be read.
+# It has no output: its log is printed.
 rule plan:
     input:
         [probe for _, _, probe in probes()],
@@ -58,10 +58,10 @@ rule plan:
         datasets=" ".join(
             f"--dataset {name} {frames} {probe}" for name, frames, probe in probes()
         ),
-        advice=advice_words(),
+        advice=advice_arguments(),
         table=f"{RESULTS}/tables/plan.md",
     message:
-        "Adding up what the chosen datasets will take"
+        "Adding up the time and size of the chosen datasets"
     shell:
         f"python {SCRIPTS}/plan.py"
         " {params.datasets} {params.advice} --output {params.table} > {log} 2>&1"

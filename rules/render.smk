@@ -1,10 +1,10 @@
-# The views: one job renders one shard, and keeps every view that is already there and right.
+# The views. One job renders one shard, and keeps every finished view.
 
 
 include: "helpers/render.smk"
 
 
-# A light field that somebody else has rendered is taken over as it is.
+# Views that somebody else has rendered are imported unchanged.
 ruleorder: import_views > render
 
 
@@ -17,7 +17,7 @@ rule import_views:
         log_of("{scene}/{rig}/render/{first}-{end}"),
     wildcard_constraints:
         scene=IMPORTED,
-    # With a store the views lie where Snakemake runs.
+    # With a store, the views to import are on the machine that runs Snakemake.
     localrule: bool(STORE)
     params:
         dataset=of_dataset("imported"),

@@ -78,7 +78,7 @@ rule reproject:
         times_of("{scene}/{rig}/{reprojection}/{first}-{end}")
     resources:
         mem_mb=2000,
-        # In a group with the renders, whose jobs must agree.
+        # Reprojections and renders form groups, whose jobs must agree on this.
         slurm_extra=avoided_nodes,
     params:
         views=f"{DATASET}/exr",

@@ -1,34 +1,31 @@
-# What is checked, noted and cleared before the first job.
+# Checks, notes and removals before the first job.
 import functools
 import resource
 
 from lightfield.core import live_runs
 from lightfield.dataset.config import expected_blend
 
-# Bytes of a process in which bpy can be imported; with less it crashes, or no thread starts.
+# With less address space, in bytes, the import of bpy crashes, or no thread starts.
 LEAST_ADDRESS_SPACE = 1.5e9
 
 
 def check_device():
-    """Refuse a device that is not there before the first job, where renders are for this machine.
-
-    Raises `UserError`.
-    """
+    """Raise `UserError` for a missing device, if this machine renders."""
     jobs = needed_jobs()
     device = SETTINGS.device
     if device == "auto" and any(job.rule.name == CHECK_GPU for job in jobs):
         device = "gpu"
     renders = device == "gpu" or any(job.resources.get("gpu") for job in jobs)
     if renders and RUNS_HERE:
-        words = [sys.executable, FOLDER / "scripts/check_device.py", device]
-        checked = subprocess.run(words, capture_output=True, text=True)
+        command = [sys.executable, FOLDER / "scripts/check_device.py", device]
+        checked = subprocess.run(command, capture_output=True, text=True)
         if checked.returncode:
-            *_, problem = checked.stderr.strip().splitlines() or ["it said nothing"]
-            raise UserError(problem.removeprefix("error: "))
+            lines = checked.stderr.strip().splitlines() or ["it said nothing"]
+            raise UserError(lines[-1].removeprefix("error: "))
 
 
 def check_memory():
-    """Refuse a limit with which Blender cannot even start; raises `UserError`."""
+    """Raise `UserError` for a limit of memory with which Blender cannot start."""
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if RUNS_HERE and 0 <= limit < LEAST_ADDRESS_SPACE:
         raise UserError(
@@ -39,7 +36,7 @@ def check_memory():
 
 
 def check_disk_space():
-    """Warn of disks that this run nearly fills. Raises `UserError` for one that is too small."""
+    """Warn of disks that this run nearly fills. Raise `UserError` for a disk that is too small."""
     jobs = [job for job in needed_jobs() if job.output]
     renders = [job for job in jobs if job.rule.name == RENDER]
     datasets = {d.folder: d for d in (dataset_of(job.wildcards) for job in renders)}
@@ -48,21 +45,19 @@ def check_disk_space():
         views = presence.missing_views(dataset)
         size = views * dataset.estimate.all_view_bytes
         needs.append(disk_space.Need(Path(RESULTS), size, views))
-    # A built scene, at most.
-    needs += [
-        disk_space.Need(Path(WORK), 1e8)
-        for _ in {d.scene_name for d in datasets.values()}
-    ]
+    # A built scene takes at most 100 MB.
+    for _ in {dataset.scene_name for dataset in datasets.values()}:
+        needs.append(disk_space.Need(Path(WORK), 1e8))
     for folder in (RESULTS, WORK):
         outputs = [unstored(file) for job in jobs for file in job.output]
         files = sum(Path(output).is_relative_to(folder) for output in outputs)
         if files:
             needs.append(disk_space.Need(Path(folder), 0, files))
     if jobs:
-        # A log each.
+        # Each job has a log.
         needs.append(disk_space.Need(Path(WORK), 0, len(jobs)))
     if renders and RUNS_HERE:
-        # Each render job writes the passes of one view to memory, or to TMPDIR if that is too small.
+        # Each render job writes a view's passes to memory, or to TMPDIR if memory is too small.
         pixels = max(math.prod(d.rig.camera.resolution) for d in datasets.values())
         at_once = min(len(renders), max(1, workflow.cores // renders[0].threads))
         size = at_once * pixels * memory.PASSES_PIXEL_BYTES
@@ -73,10 +68,10 @@ def check_disk_space():
 
 
 def take_folder():
-    """Go on where a killed run has left its locks; refuse files that another run makes."""
-    others = live_runs.enter(Path(".snakemake/locks"), not RUNS_HERE, remove_locks)
+    """Remove the locks of killed runs. End this run if another one makes the same files."""
+    other_runs = live_runs.enter(Path(".snakemake/locks"), not RUNS_HERE, remove_locks)
     if files_are_locked():
-        sys.exit(f"error: {live_runs.refusal(others)}")
+        sys.exit(f"error: {live_runs.refusal(other_runs)}")
     keep_locks_of_others()
 
 
@@ -85,13 +80,13 @@ if IS_MAIN_PROCESS:
 
 
 def explain_full_disk():
-    """Say that Snakemake can note nothing: it may have ended with words of its own for that."""
+    """Explain that Snakemake cannot write its notes, if it ended because of that."""
     if problem := obstacle(Path(".snakemake")):
         print(f"error: .snakemake: cannot be written: {problem}", file=sys.stderr)
 
 
 def check_start():
-    """Refuse what cannot work before the first job; raises `UserError`."""
+    """Raise `UserError` for a run that cannot work, before the first job."""
     atexit.register(explain_full_disk)
     check_device()
     check_memory()
@@ -100,7 +95,7 @@ def check_start():
 
 
 def check_input(job):
-    """Refuse the user's own files that a job would refuse; raises `UserError`."""
+    """Raise `UserError` for a user's file that a job would refuse."""
     if job.rule.name == CHECK_BLEND and not SETTINGS.accept_blend:
         blend = Path(scene_of(job.wildcards).source.blend)
         if blend.is_file():
@@ -112,7 +107,7 @@ def check_input(job):
 
 
 def announce_refusals():
-    """Say in a dry run what the run would refuse."""
+    """Print in a dry run what the real run would refuse."""
     checks = [check_device, check_memory, check_disk_space, check_consumers]
     checks += [functools.partial(check_input, job) for job in needed_jobs()]
     problems = {}
@@ -126,7 +121,7 @@ def announce_refusals():
 
 
 def keep_shards():
-    """Note the shards of the planned datasets: they keep these."""
+    """Note the number of shards of each planned dataset, which keeps them."""
     jobs = [job for job in all_jobs() if job.rule.name == RENDER]
     datasets = {d.name: d for d in (dataset_of(job.wildcards) for job in jobs)}
     counts = {name: (d.view_count, len(d.shards)) for name, d in datasets.items()}
@@ -138,7 +133,7 @@ def keep_shards():
 
 
 def remove_leftovers():
-    """Remove what killed runs have left, and say so."""
+    """Remove what killed runs have left behind, and print how much."""
     removed = leftovers.remove(map(Path, (RESULTS, WORK)))
     if removed:
         print(

@@ -1,5 +1,5 @@
-# Where jobs see no common folder: Snakemake's own storage has what is declared, and the view store,
-# at the same place, views, of which there are too many to declare.
+# Storage for jobs without a common folder. Snakemake's own storage holds declared files. The view
+# store, at the same place, holds the views, which are too many to declare.
 
 # A shard's views are not among the outputs that Snakemake would bring to and from a job.
 if not (STORE or SHARES_FILES):
@@ -11,27 +11,30 @@ if not (STORE or SHARES_FILES):
 
 
 def taking(lists):
-    """Return the command that takes from the store what a job's ``lists`` name."""
-    words = f"--mend --results {RESULTS} --work {WORK} {{{lists}}}"
-    return f"python {SCRIPTS}/take_views.py {words} > {{log}} 2>&1; " if STORE else ""
+    """Return the command that copies the files that a job's ``lists`` name from the store."""
+    if not STORE:
+        return ""
+    arguments = f"--mend --results {RESULTS} --work {WORK} {{{lists}}}"
+    return f"python {SCRIPTS}/take_views.py {arguments} > {{log}} 2>&1; "
 
 
 def stored_records(wildcards):
-    """Return a dataset's records where the job takes its views from the store.
+    """Return a dataset's records if the job takes its views from the store.
 
-    Else its validation stands for them, and a plan of thousands of shards is shorter.
+    Without a store, the dataset's validation is enough, and makes plans of many shards shorter.
     """
     return dataset_of(wildcards).all_records if STORE else []
 
 
 def stored_lists(wildcards):
-    """Return what lists the files in the view store, of all chosen datasets; nothing without one."""
-    datasets = CHOSEN if STORE else []
-    return [file for d in datasets for file in (*d.all_records, *d.published)]
+    """Return the lists of all chosen datasets' files in the view store. Empty without a store."""
+    if not STORE:
+        return []
+    return [file for d in CHOSEN for file in (*d.all_records, *d.published)]
 
 
 def check_storage():
-    """Refuse what jobs could not find in a storage; raises `UserError`."""
+    """Raise `UserError` for a path that jobs could not find in a storage."""
     if "://" not in STORE and not Path(STORE).is_absolute():
         raise UserError(
             f"default-storage-prefix: {STORE}: must be a URL, or a path from /"
@@ -48,7 +51,7 @@ def check_storage():
 
 
 def use_copies(folder):
-    """Let ``folder`` be that of Snakemake's copies; raises `UserError` where it is another."""
+    """Make ``folder`` a link to Snakemake's copies. Raise `UserError` if it is something else."""
     copies = Path(stored(folder)).absolute()
     copies.mkdir(parents=True, exist_ok=True)
     link = Path(folder)
@@ -63,10 +66,16 @@ def use_copies(folder):
 
 
 def bring_settings():
-    """Bring here what says from what the stored files were made: each run may begin with none."""
+    """Copy the files here that say what the stored files were made from. A run may have none."""
     for dataset in CHOSEN:
-        perhaps = (dataset.blend_check, dataset.inventory, dataset.calibration)
-        for path in (*perhaps, dataset.places, *dataset.published):
+        files = [
+            dataset.blend_check,
+            dataset.inventory,
+            dataset.calibration,
+            dataset.places,
+        ]
+        for path in (*files, *dataset.published):
+            # A file that a dataset lacks is an empty list.
             if isinstance(path, str):
                 ViewStore(STORE).bring(path)
 

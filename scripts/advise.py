@@ -17,10 +17,10 @@ def main() -> None:
     parser.add_argument(
         "measured", nargs="*", type=Path, help="JSON of a scene, with the scene's name"
     )
-    measured = parser.parse_args().measured
-    if not measured:
-        raise UserError("the views of all chosen scenes are there already: nothing is rendered")
-    for path in measured:
+    paths = parser.parse_args().measured
+    if not paths:
+        raise UserError("the views of all chosen scenes exist already: nothing is rendered")
+    for path in paths:
         text = advice.table(path.stem, read_keys(path, "try_changes.py", *advice.SHOWN))
         write_text(path.with_suffix(".md"), text)
         print(text)

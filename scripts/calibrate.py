@@ -1,8 +1,8 @@
 """Choose the cheapest method that reaches a scene's target error.
 
 Each method (plain, adaptive, denoised, both) renders windows of some views with ever more effort,
-until it reaches the target. Its effort is then interpolated to meet the target, not to surpass it.
-The cheapest method is chosen. Held-out views, the nearest others with another seed, confirm it.
+until it reaches the target. Its effort is then interpolated to meet the target exactly. The
+cheapest method is chosen. Held-out views, the nearest others with another seed, confirm it.
 """
 
 import argparse
@@ -25,10 +25,10 @@ def main() -> None:
         "--probes",
         type=positive,
         default=sampling.PROBES,
-        help="windows of views; as many are held out (default: %(default)s)",
+        help="windows of views; as many others are held out (default: %(default)s)",
     )
     parser.add_argument("--output", required=True, type=Path, help="JSON of choice and evidence")
-    parser.add_argument("--seconds", type=Path, help="JSON of the seconds that each method took")
+    parser.add_argument("--seconds", type=Path, help="JSON of each method's seconds to write")
     arguments = parser.parse_args()
 
     lightfield = LightField.read(arguments.lightfield)
@@ -42,9 +42,9 @@ def main() -> None:
     if arguments.seconds:
         write_json(arguments.seconds, seconds)
     print(summary(absolute_path(arguments.lightfield).parent.name, record))
-    wrong = problem(record, lightfield.render.get("most_samples"))
-    if wrong:
-        print(f"warning: render.target_error: {wrong}", file=sys.stderr)
+    warning = problem(record, lightfield.render.get("most_samples"))
+    if warning:
+        print(f"warning: render.target_error: {warning}", file=sys.stderr)
 
 
 def summary(name: str, record: Mapping[str, Any]) -> str:
@@ -62,7 +62,7 @@ def summary(name: str, record: Mapping[str, Any]) -> str:
 
 
 def problem(record: Mapping[str, Any], most_samples: int | None) -> str | None:
-    """Return what is wrong with the choice; None if it reaches the target and is confirmed."""
+    """Return what is wrong with the choice. None if it reaches the target and is confirmed."""
     target = record["target_error"]
     error = record["probe_error"]
     held_out_error = record["held_out_error"]

@@ -1,7 +1,7 @@
-"""Check that a .blend is the one that a scene YAML means, by its SHA-256.
+"""Check that a .blend has the SHA-256 that a scene YAML expects.
 
-Where the scene YAML gives no SHA-256, the first file used is recorded beside it in a lock file,
-configs/scenes/<scene>.lock.json, and every later one must be the same.
+If the scene YAML has no SHA-256, the first use records it beside the YAML in a lock file,
+configs/scenes/<scene>.lock.json. Later files must have the same SHA-256.
 """
 
 import argparse
@@ -20,11 +20,11 @@ def main() -> None:
     )
     parser.add_argument("--scene", required=True, help="name of a file in configs/scenes/")
     parser.add_argument("--blend", required=True, type=Path, help="file to check")
-    parser.add_argument("--output", required=True, type=Path, help="JSON, written if it is right")
+    parser.add_argument("--output", required=True, type=Path, help="JSON to write on success")
     arguments = parser.parse_args()
     source = config.load_scene(arguments.scene).scene
     if source.blend is None:
-        raise UserError(f"--scene {arguments.scene}: is made of no .blend")
+        raise UserError(f"--scene {arguments.scene}: does not use a .blend")
     status = arguments.blend.stat()
     digest = sha256(arguments.blend)
     if lock := config.expected_blend(arguments.scene, arguments.blend, digest):

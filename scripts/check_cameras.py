@@ -1,4 +1,7 @@
-"""Find cameras of a dataset that stand inside geometry, or would show it wrong, before a render."""
+"""Find cameras of a dataset that are inside geometry, or that would show it wrongly.
+
+The workflow runs this before it renders.
+"""
 
 import argparse
 import sys
@@ -22,7 +25,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--blend", required=True, type=Path, help="the scene")
     parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
-    parser.add_argument("--inventory", type=Path, help="JSON of what the scene's .blend reads")
+    parser.add_argument("--inventory", type=Path, help="JSON of the scene's contents")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 
@@ -44,12 +47,13 @@ def main() -> None:
         }
         for name, distance, enclosing in zip(names, distances, inside, strict=True)
     }
-    bad = [name for name in names if views[name]["inside"]]
-    if bad:
-        where = sorted({enclosing for enclosing in inside if enclosing}) or ["a surface"]
+    enclosed_views = [name for name in names if views[name]["inside"]]
+    if enclosed_views:
+        objects = sorted({enclosing for enclosing in inside if enclosing}) or ["a surface"]
+        more = " …" if len(enclosed_views) > 8 else ""
         raise UserError(
-            f"{arguments.lightfield}: {len(bad)} of {len(names)} cameras are inside "
-            f"{', '.join(where)}: {', '.join(bad[:8])}{' …' if len(bad) > 8 else ''}; "
+            f"{arguments.lightfield}: {len(enclosed_views)} of {len(names)} cameras are inside "
+            f"{', '.join(objects)}: {', '.join(enclosed_views[:8])}{more}; "
             "move the rig or make it smaller (center and size in the scene YAML)"
         )
     write_json(arguments.output, {"views": views})

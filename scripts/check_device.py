@@ -1,4 +1,4 @@
-"""Check that Cycles can render on a device here, before anything is rendered."""
+"""Check that Cycles can render on a device of this machine."""
 
 import argparse
 

@@ -18,13 +18,15 @@ def main() -> None:
     )
     parser.add_argument("--dataset", required=True, type=Path, help="folder of the dataset")
     parser.add_argument("--journals", required=True, type=Path, help="folder of its journals")
-    parser.add_argument("--benchmarks", required=True, type=Path, help="folder of its jobs' TSVs")
+    parser.add_argument(
+        "--benchmarks", required=True, type=Path, help="folder of its jobs' benchmark files"
+    )
     parser.add_argument(
         "--scene-benchmarks",
         required=True,
         nargs="+",
         type=Path,
-        help="folders of the scene's jobs' TSVs",
+        help="folders of the benchmark files of the scene's jobs",
     )
     parser.add_argument("--blend", type=Path, help="the scene, if there is one")
     parser.add_argument(
@@ -35,7 +37,7 @@ def main() -> None:
         help="energy (watts, price_per_kwh, currency and cores), full (views and resolution of the "
         "full dataset, and samples and denoise if they differ), and names of reprojections",
     )
-    parser.add_argument("--inventory", type=Path, help="JSON of what the scene's .blend says")
+    parser.add_argument("--inventory", type=Path, help="JSON of the scene's contents")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
     settings = read_settings(costs.CostSettings, arguments.settings)

@@ -16,13 +16,13 @@ def main() -> None:
         "--probes",
         type=positive,
         default=1,
-        help="windows of each stratum; a neighbouring view has the first one, too (default: 1)",
+        help="windows of each stratum; a neighbouring view also gets the first (default: 1)",
     )
     parser.add_argument(
         "--octaves",
         type=positive,
         default=8,
-        help="how often to double the samples, from 1 on (default: 8)",
+        help="how often to double the samples, starting from 1 (default: 8)",
     )
     parser.add_argument(
         "--reference", type=positive, default=2048, help="samples of a reference (default: 2048)"
@@ -31,7 +31,7 @@ def main() -> None:
         "--seeds",
         type=int,
         default=2,
-        help="renders of each method, 2 or more; more tell bias from variance better (default: 2)",
+        help="renders of each method, 2 or more; more separate bias from variance (default: 2)",
     )
     parser.add_argument(
         "--output", required=True, type=Path, help="stem of the .csv, .json, .svg and .png to write"

@@ -1,8 +1,8 @@
-"""Compare renders of a dataset's test views with the truth: errors as CSV, and a page of both.
+"""Compare renders of a dataset's test views with the truth. Write errors as CSV, and a page.
 
-RENDERS holds <view>.png or <view>.exr for each view that the dataset's split has to test with
-(without a split every eighth), and may hold normal/<view>.exr. The rig's name may precede each, as
-in exports: <rig>_<view>.png. See docs/evaluation.md.
+RENDERS has <view>.png or <view>.exr for each test view of the dataset's split. Without a split,
+every eighth view tests. RENDERS may also have normal/<view>.exr. The rig's name may precede each
+view's, as in exports: <rig>_<view>.png. See docs/evaluation.md.
 """
 
 import argparse
@@ -29,17 +29,29 @@ def main() -> None:
     add("renders", type=Path, metavar="RENDERS", help="folder of the renders")
     add("--dataset", type=Path, required=True, help="the dataset's folder")
     add("--source", default=VIEWS, help=f"a reprojection's name (default: {VIEWS}, as rendered)")
-    add("--suffix", choices=[".png", ".exr"], default=".exr", help="of the dataset's views")
-    add("--exposure", type=stops, default=0.0, help="of EXR views, in stops, as in the export")
-    add("--reinhard", type=white, default=1.0, help="of EXR views: what becomes white; 1 is none")
+    add(
+        "--suffix",
+        choices=[".png", ".exr"],
+        default=".exr",
+        help="suffix of the dataset's views (default: .exr)",
+    )
+    add(
+        "--exposure", type=stops, default=0.0, help="exposure of EXR views, as in the export, stops"
+    )
+    add(
+        "--reinhard",
+        type=white,
+        default=1.0,
+        help="value of EXR views that becomes white (default: 1, no tone mapping)",
+    )
     add(
         "--background",
         type=colour,
         default=colour("black"),
         metavar="COLOUR",
-        help="what is behind transparent pixels: black, white or rrggbb (default: black)",
+        help="colour behind transparent pixels: black, white or rrggbb (default: black)",
     )
-    add("--masks", type=Path, help="folder of <view>.png: where they are 0, nothing is compared")
+    add("--masks", type=Path, help="folder of <view>.png, whose pixels of 0 are not compared")
     add("--output", type=Path, required=True, help="folder to write")
     arguments = parser.parse_args()
 
@@ -49,15 +61,16 @@ def main() -> None:
     views = source.lightfield.views
     tests = [view for view in views if view.split == "test"] or splits(source.lightfield).test
     arguments.output.parent.mkdir(parents=True, exist_ok=True)
-    # An evaluation that fails leaves nothing, or the one before it.
-    with temporary_folder(arguments.output.parent) as made:
+    # If the evaluation fails, the output stays as it was.
+    with temporary_folder(arguments.output.parent) as temporary:
         overall = evaluation_page.write(
-            made, source, tests, arguments.renders, arguments.masks, arguments.background
+            temporary, source, tests, arguments.renders, arguments.masks, arguments.background
         )
-        for path in filter(Path.is_file, [*made.rglob("*")]):
-            target = arguments.output / path.relative_to(made)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            path.replace(target)
+        for path in list(temporary.rglob("*")):
+            if path.is_file():
+                target = arguments.output / path.relative_to(temporary)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                path.replace(target)
     print(
         f"{len(tests)} views: PSNR {overall['psnr']:.2f} dB, SSIM {overall['ssim']:.4f}, FLIP "
         f"{overall['flip']:.4f}; LPIPS is left out: no installed package has its weights"
@@ -69,7 +82,7 @@ def colour(text: str) -> NDArray[np.float64]:
     code = NAMED_COLOURS.get(text, text.removeprefix("#"))
     if not re.fullmatch("[0-9a-fA-F]{6}", code):
         raise argparse.ArgumentTypeError(
-            f"is {text}; must be black, white or rrggbb, two hexadecimal digits a channel"
+            f"is {text}; must be black, white or rrggbb, two hexadecimal digits for each channel"
         )
     return np.array([*bytes.fromhex(code)]) / 255
 

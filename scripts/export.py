@@ -1,9 +1,9 @@
 """Export a dataset's views for a consumer: COLMAP, nerfstudio, NeRF-synthetic, and others.
 
 A settings file is JSON: {"options": {"sources": ["perspective"], "points": 50000}, "suffix":
-".png"}. `options` are the keys of the scene YAML's `exports`, with one source, and `suffix` is that
-of its views, .exr by default. `tested_by` maps the names of rigs, whose views test what is trained
-on these, to the folders of their datasets. An earlier export in the same folder is replaced.
+".png"}. `options` has the keys of the scene YAML's `exports`, with one source. `suffix` is the
+suffix of the source's views, by default .exr. `tested_by` maps rigs to the folders of datasets
+whose views test what is trained on these. An earlier export in the same folder is replaced.
 """
 
 import argparse
@@ -36,23 +36,28 @@ def main() -> None:
     development = {
         key: getattr(options, key) for key in ("exposure", "reinhard") if hasattr(options, key)
     }
-    beside = {rig: Path(folder) for rig, folder in settings.tested_by.items()}
+    test_folders = {rig: Path(folder) for rig, folder in settings.tested_by.items()}
     source = SourceDataset(
-        arguments.dataset, settings.source, settings.suffix, beside, **development
+        arguments.dataset, settings.source, settings.suffix, test_folders, **development
     )
     files = export.run(arguments.format, source, options, arguments.output)
     print(f"{arguments.output}: {len(source.lightfield.views)} views in {len(files)} files")
 
 
 def add_settings_flags(parser: argparse.ArgumentParser) -> None:
-    """Add the flags that stand for a settings file without other options."""
+    """Add the flags that can replace a settings file with default options."""
     flags = parser.add_argument_group("Instead of --settings, with default options")
     flags.add_argument("--source", default=VIEWS, help=f"a reprojection (default: {VIEWS})")
-    flags.add_argument("--suffix", choices=[".png", ".exr"], default=".exr", help="of the views")
+    flags.add_argument(
+        "--suffix",
+        choices=[".png", ".exr"],
+        default=".exr",
+        help="suffix of the views (default: .exr)",
+    )
 
 
 def settings_from(arguments: argparse.Namespace) -> ExportSettings[Export]:
-    """Return the settings of --settings, or those of the flags."""
+    """Return the settings from --settings or from the flags."""
     model = export_settings_of(arguments.format)
     if arguments.settings:
         refuse_beside_settings(arguments, add_settings_flags)

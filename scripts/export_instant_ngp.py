@@ -1,4 +1,4 @@
-"""Write the transforms.json with which instant-ngp opens a dataset."""
+"""Write a transforms.json, with which instant-ngp opens a dataset."""
 
 import argparse
 

@@ -1,7 +1,7 @@
-"""Download the .blend of a scene YAML, going on where an earlier download was cut off.
+"""Download the .blend of a scene YAML. Continue where an earlier download was interrupted.
 
-Until it is whole and its SHA-256 is the one that the scene YAML or its lock file says, the file
-has the suffix .part.
+The file has the suffix .part until it is complete, and has the SHA-256 of the scene YAML or its
+lock file.
 """
 
 import argparse

@@ -1,8 +1,8 @@
-"""Compute the optical flow from views of a dataset to their neighbours, keeping what is right.
+"""Compute the optical flow from views of a dataset to their neighbours. Keep finished files.
 
-Each frame of lightfield.json names its neighbour, as scripts/make_lightfield.py chose it. Of a view
-FOLDER/<view>_to_<other>.exr has channels X and Y, in pixels to the right and down, and V, 1 where
-the other view sees the same point. All are 0 where it has no ray for it.
+scripts/make_lightfield.py has chosen the neighbour of each frame in lightfield.json. The output
+FOLDER/<view>_to_<other>.exr has channels X and Y, in pixels to the right and down. Channel V is 1
+where the other view sees the same point. All are 0 where the other view has no ray to the point.
 """
 
 import argparse
@@ -39,22 +39,27 @@ def main() -> None:
 
     lightfield = LightField.read(arguments.lightfield)
     source = SourceDataset(lightfield.folder, "", ".exr")
-    chosen = lightfield.views[view_slice(arguments.views, len(lightfield.views))]
-    named = {view.name: view for view in lightfield.views}
+    views = lightfield.views[view_slice(arguments.views, len(lightfield.views))]
+    view_of_name = {view.name: view for view in lightfield.views}
     record = ShardRecord(arguments.record, arguments.output)
-    progress = Progress(len(chosen), f"flow {lightfield.folder} {arguments.views}".rstrip(": "))
+    progress = Progress(len(views), f"flow {lightfield.folder} {arguments.views}".rstrip(": "))
     paths = []
-    for view in chosen:
-        other = named.get(view.others.get("flow", ""))
-        if other is None:
+    for view in views:
+        neighbour = view_of_name.get(view.others.get("flow", ""))
+        if neighbour is None:
             raise UserError(f"{arguments.lightfield}: frames: {view.name}: flow: must name a view")
         path = arguments.output / f"{view.flow}.exr"
-        sums = [sha256(source.path(each)) for each in (view, other)]
-        key = keys.flow_key(lightfield, view, other, sums)
+        sums = [sha256(source.path(view)), sha256(source.path(neighbour))]
+        key = keys.flow_key(lightfield, view, neighbour, sums)
         if not record.is_finished(path, key):
-            depths = [source.depth(each, "distance") for each in (view, other)]
-            found, visible = flow(source.lens, view.matrix, other.matrix, *depths)
-            planes = [*np.moveaxis(np.nan_to_num(found), -1, 0), visible]
+            motion, visible = flow(
+                source.lens,
+                view.matrix,
+                neighbour.matrix,
+                source.depth(view, "distance"),
+                source.depth(neighbour, "distance"),
+            )
+            planes = [*np.moveaxis(np.nan_to_num(motion), -1, 0), visible]
             channels = {
                 name: plane.astype(FLOW.dtype)
                 for name, plane in zip(FLOW.channels, planes, strict=True)

@@ -1,4 +1,4 @@
-"""Take over views that somebody else has rendered: link or copy them, and record them."""
+"""Import views that somebody else has rendered: link or copy them, and record them."""
 
 import argparse
 from pathlib import Path
@@ -28,13 +28,13 @@ def main() -> None:
         path = arguments.dataset / "exr" / name
         if not path.is_file():
             raise UserError(f"{path}: no such file, but its lightfield.json has the view")
-        taken = arguments.output / name
-        link_or_copy(path, taken)
-        # An owner who makes a view anew makes another file: what changes in this one is damage.
+        imported = arguments.output / name
+        link_or_copy(path, imported)
+        # A view that its owner renders again is another file. So a change of this file is damage.
         key = f"inode-{path.stat().st_ino}"
-        if taken.samefile(path):
-            record.refuse_changed(taken, key)
-        record.add(taken, key)
+        if imported.samefile(path):
+            record.refuse_changed(imported, key)
+        record.add(imported, key)
         progress.done()
     record.write(arguments.output / name for name in names)
 

@@ -45,8 +45,8 @@ def main() -> None:
     layers = blend_file.open_scene(arguments.blend, chosen)
     datasets = scene_datasets(arguments.scene) if arguments.scene else []
     saved_frame = bpy.context.scene.frame_current
-    wanted = rendered_frames(datasets) or [FILE]
-    frames = sorted({saved_frame if frame == FILE else frame for frame in wanted})
+    chosen_frames = rendered_frames(datasets) or [FILE]
+    frames = sorted({saved_frame if frame == FILE else frame for frame in chosen_frames})
     contents: dict[str, Any] = {}
     if chosen.get("blend"):
         camera_frames = [frame for dataset in datasets for frame in dataset.camera_frames]

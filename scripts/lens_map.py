@@ -1,7 +1,7 @@
-"""Compute a lens map once, for reproject.py --lens-map to apply to every view of a rig.
+"""Compute a lens map, which reproject.py --lens-map applies to every view of a rig.
 
-Takes the same settings, or the same flags for the geometry, as reproject.py. Of a cube map it
-writes a map for each face, FILE's name with _f, _b, _l, _r, _u or _d before the suffix.
+Takes the same settings, or the same flags for the geometry, as reproject.py. For a cube map it
+writes a map for each face, with _f, _b, _l, _r, _u or _d before FILE's suffix.
 """
 
 import argparse

@@ -34,7 +34,7 @@ def main() -> None:
         render = passes.without(render)
     elif isinstance(capture.rig, rigs.Random):
         if arguments.places is None:
-            raise UserError("--places: is missing; scripts/free_places.py finds them")
+            raise UserError("--places: is missing; scripts/free_places.py writes it")
         capture = replace(capture, rig=capture.rig.placed(arguments.places))
     if arguments.calibration:
         render = calibrated(render, arguments.calibration)
@@ -56,13 +56,13 @@ def parse() -> argparse.Namespace:
     parser.add_argument(
         "--calibration",
         type=Path,
-        help="what scripts/calibrate.py chose for the scene's target_error",
+        help="JSON of scripts/calibrate.py, for a scene with target_error",
     )
     parser.add_argument(
-        "--inventory", type=Path, help="JSON of what the scene contains: for a .blend"
+        "--inventory", type=Path, help="JSON of scripts/inventory.py, for a user's .blend"
     )
     parser.add_argument(
-        "--places", type=Path, help="what scripts/free_places.py found for a random rig"
+        "--places", type=Path, help="JSON of scripts/free_places.py, for a random rig"
     )
     parser.add_argument("--output", required=True, type=Path, help="lightfield.json to write")
     add_settings_flags(parser)

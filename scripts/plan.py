@@ -1,7 +1,7 @@
-"""Tabulate what the chosen datasets will take on this machine: views, hours and gigabytes.
+"""Tabulate the views, hours and gigabytes of the chosen datasets on this machine.
 
-Reads what scripts/probe.py measured. Hours are those of one processor core, or of the graphics card
-if it renders. Gigabytes are those of the rendered views.
+Reads what scripts/probe.py measured. Hours are of one processor core, or of the GPU if it renders.
+Gigabytes are the size of the rendered views.
 """
 
 import argparse
@@ -34,17 +34,16 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="Markdown to write")
     arguments = parser.parse_args()
     if not arguments.dataset:
-        raise UserError("the views of all chosen datasets are there already: nothing is rendered")
-    text = plan.table(
-        [
-            (name, counted("--dataset", frames), plan.read_probe(probe))
-            for name, frames, probe in arguments.dataset
-        ],
-        {
-            name: read_keys(path, "try_changes.py", "own", "unchanged")
-            for name, path in arguments.advice
-        },
-    )
+        raise UserError("the views of all chosen datasets exist already: nothing is rendered")
+    probes = [
+        (name, counted("--dataset", frames), plan.read_probe(probe))
+        for name, frames, probe in arguments.dataset
+    ]
+    advice = {
+        name: read_keys(path, "try_changes.py", "own", "unchanged")
+        for name, path in arguments.advice
+    }
+    text = plan.table(probes, advice)
     write_text(arguments.output, text)
     print(text, end="")
 

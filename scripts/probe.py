@@ -1,4 +1,4 @@
-"""Measure the time and size of a dataset's views on a few small ones with all their samples."""
+"""Estimate the time and size of a dataset's views from a few small ones with all samples."""
 
 import argparse
 from pathlib import Path
@@ -12,13 +12,15 @@ from lightfield.rendering import probe
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--blend", required=True, type=Path, help="the scene")
-    parser.add_argument("--inventory", required=True, type=Path, help="what the scene contains")
+    parser.add_argument(
+        "--inventory", required=True, type=Path, help="JSON of the scene's contents"
+    )
     parser.add_argument("--lightfield", required=True, type=Path, help="lightfield.json")
     parser.add_argument("--views", type=positive, default=3, help="views to render (default: 3)")
     parser.add_argument(
         "--size", type=positive, default=48, help="pixels of their longer side (default: 48)"
     )
-    parser.add_argument("--device", default="auto", help="what Cycles renders on (default: auto)")
+    parser.add_argument("--device", default="auto", help="device of Cycles (default: auto)")
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
     measured = probe.measure(

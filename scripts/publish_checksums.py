@@ -1,7 +1,6 @@
-"""Publish a dataset's checksums if its validation found it valid; else fail with the first causes.
+"""Publish the checksums of a valid dataset. Fail with the first causes if it is not valid.
 
-Of a dataset that is not valid the checksums are removed: they are of what has to be mended, and
-the next run, which misses them, validates again.
+The checksums of an invalid dataset are removed, so that the next run validates it again.
 """
 
 import argparse
@@ -13,14 +12,16 @@ from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, write_bytes
 
-# So many failed checks are named, each by the first thing that is wrong.
+# So many failed checks are named, each with its first problem.
 CAUSES = 3
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--validation", required=True, type=Path, help="validation.json")
-    parser.add_argument("--page", required=True, type=Path, help="the dataset's page, to be named")
+    parser.add_argument(
+        "--page", required=True, type=Path, help="the dataset's page, for the message"
+    )
     parser.add_argument("--sums", required=True, type=Path, help="checksums that validation wrote")
     parser.add_argument("--output", required=True, type=Path, help="sha256sums.txt to write")
     arguments = parser.parse_args()
@@ -35,11 +36,13 @@ def main() -> None:
 
 
 def causes(validation: Mapping[str, Any]) -> str:
-    """Return the first problem of the first failed checks, and how many more there are."""
-    failed = [check for check in validation["checks"] if check["passed"] is False]
-    named = [f"{check['name']}: {check['problems'][0]}" for check in failed[:CAUSES]]
-    more = sum(len(check["problems"]) for check in failed) - len(named)
-    return "; ".join([*named, f"and {more} more"] if more else named)
+    """Return the first problem of the first failed checks, and the number of other problems."""
+    failed_checks = [check for check in validation["checks"] if check["passed"] is False]
+    parts = [f"{check['name']}: {check['problems'][0]}" for check in failed_checks[:CAUSES]]
+    other_problems = sum(len(check["problems"]) for check in failed_checks) - len(parts)
+    if other_problems:
+        parts.append(f"and {other_problems} more")
+    return "; ".join(parts)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Render a run of a dataset's views in one process, keeping every view that is already right."""
+"""Render some views of a dataset in one process. Keep every view that is finished."""
 
 import argparse
 from pathlib import Path
@@ -15,7 +15,7 @@ def main() -> None:
     parser.add_argument(
         "--inventory",
         type=Path,
-        help="JSON of what the scene contains: leaves out what its pixels do not depend on",
+        help="JSON of the scene's contents, to leave out what no pixel depends on",
     )
     parser.add_argument(
         "--views",
@@ -25,16 +25,20 @@ def main() -> None:
     )
     parser.add_argument("--output", required=True, type=Path, help="folder of the views")
     parser.add_argument("--record", type=Path, help="JSON of the views' sizes and checksums")
-    parser.add_argument("--journal", type=Path, help="JSON lines of what was rendered and how fast")
+    parser.add_argument("--journal", type=Path, help="JSON lines with the time of each view")
     parser.add_argument(
         "--device",
         default="auto",
         choices=["auto", "cpu", "optix", "cuda", "hip", "oneapi", "metal"],
-        help="what Cycles renders on (default: auto)",
+        help="device of Cycles (default: auto)",
     )
     parser.add_argument("--threads", type=positive, help="CPU threads (default: all cores)")
     parser.add_argument(
-        "--stall", type=int, default=0, metavar="S", help="seconds for a view, or it is killed"
+        "--stall",
+        type=int,
+        default=0,
+        metavar="S",
+        help="seconds after which a view counts as hung, and the process ends (default: 0, never)",
     )
     arguments = parser.parse_args()
     shard.render(

@@ -1,7 +1,7 @@
-"""Make the page that leads to the pages of all datasets in a results folder.
+"""Make the page with links to the pages of all datasets in a results folder.
 
-Like them it is one file, thumbnails and all. It holds every dataset whose page is there,
-and warns of those whose files cannot be read.
+It is one file with thumbnails. It has every dataset that has a page. It warns about datasets whose
+files cannot be read.
 """
 
 import argparse
@@ -33,13 +33,13 @@ def main() -> None:
         try:
             datasets.append(entry(arguments.results, path))
         except UserError as error:
-            # Of one dataset; the others' pages are as they were.
+            # One broken dataset must not hide the others.
             print(f"warning: left out: {error}", file=sys.stderr)
     page.write(arguments.output, "index.html.j2", datasets=datasets)
 
 
 def entry(results: Path, path: Path) -> dict[str, Any]:
-    """Return what the index says of the dataset that has its page at ``path``."""
+    """Return the index's entry for the dataset whose page is at ``path``."""
     folder = path.parents[1]
     lightfield = LightField.read(folder / NAME)
     scene, *rig = folder.relative_to(results).parts

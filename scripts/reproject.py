@@ -1,12 +1,12 @@
 """Reproject views from one lens to another, by a settings file or by SILVR's flags.
 
-A settings file is JSON with the keys of a scene YAML's reprojection, but `formats`, a list, in
-place of `format`. With flags, lengths are in mm and the angles of lenses in radians, or in degrees
-as in 120deg; --rotation is in degrees. Without a target lens it is that of the source (the flag
---no-reproject). Pixels without a source are black, with alpha 0 in a PNG and depth NaN in an EXR.
-Of a cube map, only the faces of which the source sees anything are written.
+A settings file is JSON with the keys of a scene YAML's reprojection. Instead of `format` it has
+`formats`, a list. In flags, lengths are in mm. Angles of lenses are in radians, or in degrees as in
+120deg. --rotation is in degrees. Settings without a camera, and the flag --no-reproject, keep the
+source's lens. Pixels without a source are black, with alpha 0 in a PNG and depth NaN in an EXR. Of
+a cube map, only faces that the source sees are written.
 
-Examples, of the views in garden/exr with garden/lightfield.json beside:
+Examples, with views in garden/exr and garden/lightfield.json:
 
   # a perspective of 90 degrees, in 8 bits
   reproject.py -i garden/exr --input-cfg garden/lightfield.json -o flat --rectilinear 18,36 \\
@@ -14,8 +14,8 @@ Examples, of the views in garden/exr with garden/lightfield.json beside:
   # the middle 120 degrees of the fisheye, turned 30 degrees to the left, with depth
   reproject.py -i garden/exr --input-cfg garden/lightfield.json -o left --equidistant 120deg \\
     --rotation 30,0,0 --exr --output-cfg left/lightfield.json
-  # what the file says, as {"camera": {"lens": "rectilinear", "fov": 90, "resolution": [512, 512]},
-  # "formats": ["png"], "reinhard": 5}
+  # the same by a settings file, {"camera": {"lens": "rectilinear", "fov": 90, "resolution":
+  # [512, 512]}, "formats": ["png"], "reinhard": 5}
   reproject.py -i garden/exr --input-cfg garden/lightfield.json -o flat --settings flat.json
   # one photograph of a fisheye of 180 degrees, as the faces of a cube
   reproject.py --single photo.jpg --no-configs 2000,2000 --i-equidistant 180deg -o faces \\

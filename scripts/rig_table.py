@@ -1,8 +1,8 @@
-"""Table of the camera setups of scenes, as Table 2 of the SILVR paper has them, beside its figures.
+"""Tabulate the camera setups of scenes like Table 2 of the SILVR paper, beside its figures.
 
-For every rig: views, cameras along each axis, size, mean distance to the nearest camera at another
-place, mean distance between the neighbours of the camera grid, and the immersive interpolation
-volume by its definition in the paper (lightfield/geometry/interpolation_volume.py says how).
+Columns: views, cameras along each axis, size, mean distance to the nearest camera at another place,
+mean distance between neighbours of the camera grid. The last column is the immersive interpolation
+volume (see lightfield/geometry/interpolation_volume.py).
 """
 
 import argparse

@@ -1,6 +1,6 @@
-"""Write the JSON schemas in configs/schema/, by which editors complete and check YAML files.
+"""Write the JSON schemas in configs/schema/, with which editors complete and check YAML files.
 
-They say what the models in lightfield/dataset/config.py say of each key; a change there needs this.
+They follow from the models in lightfield/dataset/config.py. Run this after a change there.
 """
 
 import argparse
@@ -21,7 +21,7 @@ MODELS: dict[str, type[BaseModel]] = {"config": Configuration, "scene": Scene}
 
 
 class Generator(GenerateJsonSchema):
-    """JSON schema of what a YAML file may hold: a key that is left out, not one that is null."""
+    """Makes a JSON schema of YAML files. A key may be left out, but not be null."""
 
     def field_title_should_be_set(self, schema: Any) -> bool:
         return False

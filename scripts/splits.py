@@ -1,4 +1,4 @@
-"""List what the views of a scene's rigs are for: to train on, for validation, or to test with."""
+"""List which views of a scene's rigs train, validate and test."""
 
 import argparse
 from pathlib import Path

@@ -1,7 +1,7 @@
-"""Say how far the chosen datasets are, also while they are being built: from their files alone.
+"""Print the progress of the chosen datasets, from their files only, even during a build.
 
-The time left is that at the rate of the last ten minutes, as the journals of the shards have it: it
-assumes that the views that are left take as long as those, and that as many processes go on.
+The time left assumes that rendering goes on as in the last ten minutes: with as many processes, and
+as many seconds for each view. The journals of the shards have these.
 """
 
 import argparse
@@ -22,24 +22,25 @@ def main() -> None:
         nargs=3,
         required=True,
         metavar=("NAME", "VIEWS", "REPROJECTIONS"),
-        help="scene/rig, how many views it has, and its reprojections, with commas between them",
+        help="scene/rig, its number of views, and its reprojections, separated by commas",
     )
     arguments = parser.parse_args()
     now = time.time()
     renderings = []
     total = 0
-    for name, text, reprojections in arguments.dataset:
+    for name, count, reprojection_list in arguments.dataset:
         folder = arguments.results / name
-        views = counted("--dataset", text)
-        renderings.append(status.look(folder, arguments.work / name, views, now))
-        others = list(filter(None, reprojections.split(",")))
-        print("\n".join(status.lines(name, folder, views, others, renderings[-1])))
+        views = counted("--dataset", count)
+        rendering = status.look(folder, arguments.work / name, views, now)
+        reprojections = reprojection_list.split(",") if reprojection_list else []
+        print("\n".join(status.lines(name, folder, views, reprojections, rendering)))
+        renderings.append(rendering)
         total += views
     done = sum(len(rendering.finished) for rendering in renderings)
     recent = sum(rendering.recent for rendering in renderings)
     seconds = max(rendering.seconds for rendering in renderings)
-    left = status.outlook(total - done, recent, seconds)
-    print(f"all: {done} of {total} views rendered{left}")
+    outlook = status.outlook(total - done, recent, seconds)
+    print(f"all: {done} of {total} views rendered{outlook}")
 
 
 if __name__ == "__main__":

@@ -1,15 +1,15 @@
-"""Synthesise views from anywhere in a dataset, from the nearest of its views and their depth.
+"""Synthesise views from anywhere in a dataset, from its nearest views and their depth.
 
-OUTPUT gets lightfield.json, exr/<view>.exr (R, G, B, A, and Z as a dataset has it) and
-png/<view>.png. What no view of the dataset sees is a hole: its colour is that of what
-is around and behind it, its alpha 0 in the EXR, and its Z NaN. PNGs show it as it is filled.
+OUTPUT gets lightfield.json, exr/<view>.exr (R, G, B, A, and Z as in a dataset) and png/<view>.png.
+A surface that no view of the dataset sees is a hole. Its colour is that of its surroundings and of
+what is behind it. In the EXR its alpha is 0, and its Z is NaN.
 
 Examples:
 
-  # what the evaluation sphere saw, as far as the views of the dataset show it
+  # the views of the evaluation sphere, from the dataset's views
   synthesize.py results/garden/LFSphere_e100cm_d170cm --output work/walk \\
     --poses results/garden/LFSphere_e100cm_d50cm/lightfield.json
-  # a walk: rig.yaml has type: path, count, keys, and a camera, in the words of a scene YAML
+  # a walk: rig.yaml has type: path, count, keys, and a camera, as in a scene YAML
   synthesize.py results/garden/LFSphere_e100cm_d170cm --poses rig.yaml --video --output work/walk
 """
 

@@ -1,7 +1,7 @@
-"""Take finished datasets from the storage in which their jobs have put them.
+"""Copy finished datasets from the storage of their jobs.
 
-Each file is compared with the dataset's sha256sums.txt. What is there already, with the same bytes,
-is left as it is. The dataset's page is taken, too.
+Each file is compared with the dataset's sha256sums.txt. Files that exist already with the same
+bytes stay. The dataset's page is copied, too.
 """
 
 import argparse
@@ -26,7 +26,7 @@ def main() -> None:
 
 
 def take(store: ViewStore, dataset: Path) -> None:
-    """Take all files of a dataset; raises `UserError` where one is not in the storage."""
+    """Copy all files of a dataset. Raises `UserError` if one is not in the storage."""
     for name in store.names(f"{dataset}/{REPORT}"):
         store.bring(f"{dataset}/{REPORT}/{name}")
     sums = dataset / SUMS
@@ -34,18 +34,19 @@ def take(store: ViewStore, dataset: Path) -> None:
         raise UserError(f"{sums}: is not in {store.url}: no run has finished this dataset there")
     published = read_sums(sums)
     progress = Progress(len(published), "take", "files")
-    lost = []
+    lost_files = []
     for name, digest in published.items():
-        # Views lie under their checksums, all else under its path.
+        # The storage has views under their checksums, and other files under their paths.
         path = dataset / name
-        is_there = store.take(digest, path) or (store.bring(str(path)) and sha256(path) == digest)
-        if not is_there:
-            lost.append(path)
+        has_file = store.take(digest, path) or (store.bring(str(path)) and sha256(path) == digest)
+        if not has_file:
+            lost_files.append(path)
         progress.done()
-    if lost:
+    if lost_files:
         raise UserError(
-            f"{len(lost)} files are not in {store.url} as {sums} has them, as {lost[0]}; "
-            "`snakemake verify` with the storage names them, and --mend has them made again"
+            f"{len(lost_files)} files are not in {store.url} as {sums} has them, as "
+            f"{lost_files[0]}; `snakemake verify` with the storage names them, and --mend makes "
+            "them again"
         )
 
 

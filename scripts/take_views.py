@@ -1,7 +1,8 @@
-"""Take from the view store the views of shards, by their records, and what exports wrote.
+"""Copy files that lists name from the view store: the views of shards, and the files of exports.
 
-Each file goes where its list says, into the dataset that the list belongs to. What is there
-already, with the same bytes, is left as it is. Files that are no lists are left out.
+The lists are the records of shards, and the lists of exports. Each file goes into the dataset of
+its list. Files that exist already with the same bytes stay. Arguments that are no lists are
+ignored.
 """
 
 import argparse
@@ -26,34 +27,38 @@ def main() -> None:
     parser.add_argument(
         "--mend",
         action="store_true",
-        help="remove from the storage what lists a file that is lost, for the next run to make it",
+        help="remove lists of lost files from the storage, so that the next run makes them again",
     )
     arguments = parser.parse_args()
     store = ViewStore(arguments.store) if arguments.store else ViewStore.configured()
     if store is None:
         raise UserError(f"--store: is not given, and ${VARIABLE} is not set")
-    wanted = {
-        target: (digest, path)
-        for path in arguments.lists
-        for target, digest in _listed(store, path, arguments.results, arguments.work)
-    }
-    progress = Progress(len(wanted), "take", "files")
-    lost: dict[Path, Path] = {}
-    for target, (digest, path) in wanted.items():
+    # The SHA-256 and the list of each file.
+    listed_files: dict[Path, tuple[str, Path]] = {}
+    for path in arguments.lists:
+        for target, digest in _listed(store, path, arguments.results, arguments.work):
+            listed_files[target] = (digest, path)
+    progress = Progress(len(listed_files), "take", "files")
+    # The list of each file that the store lacks.
+    lost_files: dict[Path, Path] = {}
+    for target, (digest, path) in listed_files.items():
         if not store.take(digest, target):
-            lost[target] = path
+            lost_files[target] = path
         progress.done()
-    if lost:
-        for path in set(lost.values()) if arguments.mend else ():
-            store.remove(_stored(path, arguments.results, arguments.work))
+    if lost_files:
+        remedy = "--mend lets a run make them"
+        if arguments.mend:
+            remedy = "the next run makes them again"
+            for path in set(lost_files.values()):
+                store.remove(_stored(path, arguments.results, arguments.work))
         raise UserError(
-            f"{len(lost)} files are not in the view store {store.url}, as {min(lost)}; "
-            + ("the next run makes them again" if arguments.mend else "--mend lets a run make them")
+            f"{len(lost_files)} files are not in the view store {store.url}, as "
+            f"{min(lost_files)}; {remedy}"
         )
 
 
 def _stored(path: Path, results: Path, work: Path) -> str:
-    """Return under which path Snakemake has stored a list, of which ``path`` is its copy here."""
+    """Return the path of a list in Snakemake's storage. ``path`` is the list's copy here."""
     for folder in (results, work):
         if path.resolve().is_relative_to(folder.resolve()):
             return str(folder / path.resolve().relative_to(folder.resolve()))
@@ -61,7 +66,7 @@ def _stored(path: Path, results: Path, work: Path) -> str:
 
 
 def _listed(store: ViewStore, path: Path, results: Path, work: Path) -> Iterable[tuple[Path, str]]:
-    """Yield each file that a list names, and its SHA-256."""
+    """Return each file that a list names, and its SHA-256."""
     if re.fullmatch(r"\d+-\d+\.json", path.name):
         if not path.resolve().is_relative_to(work.resolve()):
             raise UserError(f"{path}: must be in {work}")

@@ -25,14 +25,14 @@ def main() -> None:
         "--cores",
         type=positive,
         default=1,
-        help="cores on which to try numbers of threads a process (default: 1)",
+        help="cores on which to try numbers of threads for each process (default: 1)",
     )
     parser.add_argument("--output", required=True, type=Path, help="JSON to write")
     arguments = parser.parse_args()
 
     lightfield, maker = trials.read_arguments(arguments)
     name = arguments.output.stem
-    # Threads come first, because a process that has started Blender cannot start others that do.
+    # Measure threads first: a process that has started Blender cannot start others that do.
     by_threads = threads.measure(
         lightfield, arguments.blend, arguments.inventory, arguments.device, arguments.cores, name
     )

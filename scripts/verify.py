@@ -1,7 +1,7 @@
-"""Check every byte of datasets against the checksums with which they were written.
+"""Check every byte of datasets against the checksums of their files.
 
-A line for each file that is not as it was, with what is wrong; then the exit status is 1. Of a copy
-elsewhere DATASET alone says enough; with --work all that it was made of is checked too.
+Prints a line for each damaged file, with what is wrong. The exit status is then 1. For a copy of a
+dataset, DATASET is enough. --work also checks the files that the dataset was made from.
 """
 
 import argparse
@@ -19,18 +19,18 @@ def main() -> None:
     parser.add_argument(
         "--mend",
         action="store_true",
-        help="move what is faulty to WORK/removed, for the next run to make it again",
+        help="move damaged files to WORK/removed, so that the next run makes them again",
     )
     arguments = parser.parse_args()
     if arguments.mend and not arguments.work:
-        raise UserError("--mend: needs --work: only where a dataset is built can it be mended")
+        raise UserError("--mend: needs --work: a dataset can only be mended where it is built")
 
     problems: dict[Path, str] = {}
     for folder in arguments.dataset:
         if not folder.is_dir():
             raise UserError(f"{folder}: no such folder")
         integrity = Integrity(folder, arguments.work)
-        # A scene's files are those of all its datasets, and are named once.
+        # All datasets of a scene share its files. Name them once.
         faults = [fault for fault in integrity.faults() if fault.path not in problems]
         problems |= {fault.path: fault.problem for fault in faults}
         for fault in faults:

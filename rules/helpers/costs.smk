@@ -1,4 +1,4 @@
-# What the rules of costs.smk ask of the configuration.
+# Functions for the rules of costs.smk.
 
 
 @cache
@@ -8,23 +8,22 @@ def full_datasets(name):
 
 
 def full_size(dataset):
-    """Return what the scene YAML says of a dataset's size, whatever the preset.
+    """Return the size of a dataset in the scene YAML, without the preset.
 
-    Without samples and denoise where the YAML has a target error instead, or there is no render.
+    It lacks samples and denoise if the YAML has a target error instead, or no render.
     """
     full = full_datasets(dataset.scene_name)[dataset.rig_folder]
-    settings = {key: full.render.get(key) for key in ("samples", "denoise")}
-    return {
-        "views": full.view_count,
-        "resolution": full.rig.camera.resolution,
-        **{key: value for key, value in settings.items() if value is not None},
-    }
+    size = {"views": full.view_count, "resolution": full.rig.camera.resolution}
+    for key in ("samples", "denoise"):
+        if full.render.get(key) is not None:
+            size[key] = full.render[key]
+    return size
 
 
-def status_words():
-    """Return the words that name each chosen dataset to scripts/status.py."""
-    words = []
+def status_arguments():
+    """Return the arguments that name each chosen dataset to scripts/status.py."""
+    arguments = []
     for dataset in CHOSEN:
         reprojections = ",".join(dataset.reprojections)
-        words += ["--dataset", dataset.name, str(dataset.view_count), reprojections]
-    return shlex.join(words)
+        arguments += ["--dataset", dataset.name, str(dataset.view_count), reprojections]
+    return shlex.join(arguments)

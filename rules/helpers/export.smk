@@ -1,11 +1,11 @@
-# What the rules of export.smk ask of the configuration.
+# Functions for the rules of export.smk.
 
 
 def export_of(wildcards):
-    """Return what an export's job is asked for."""
-    dataset, name = dataset_of(wildcards), wildcards.format
+    """Return the options of an export."""
+    dataset = dataset_of(wildcards)
     folder = f"{dataset.folder}/exports"
-    return one_of(dataset.exports.selected, name, folder, "export of it")
+    return one_of(dataset.exports.selected, wildcards.format, folder, "export of it")
 
 
 def tested_by(wildcards):
@@ -16,22 +16,22 @@ def tested_by(wildcards):
 
 
 def exported_views(wildcards):
-    """Return what an export reads: the views of its dataset and of those that test it.
+    """Return the inputs of an export: the views of its dataset, and of those that test it.
 
-    Points are lifted from the depth of the rendered views, whatever the source.
+    Points follow from the depth of the rendered views, for any source.
     """
     dataset = dataset_of(wildcards)
     files = [*dataset.records("render"), *records(wildcards)]
-    for other in tested_by(wildcards):
-        files += [*other.records("render"), *other.records(stage_of(wildcards))]
-        files += [
-            f"{other.folder}/{name}lightfield.json" for name in ("", wildcards.source)
-        ]
+    for test_dataset in tested_by(wildcards):
+        files += test_dataset.records("render")
+        files += test_dataset.records(stage_of(wildcards))
+        for source in ("", wildcards.source):
+            files.append(f"{test_dataset.folder}/{source}lightfield.json")
     return list(dict.fromkeys(files))
 
 
 def trained_by(wildcards):
-    """Return the transforms.json, if any, of what is trained on and tested by this dataset."""
+    """Return the transforms.json of the training views that this dataset tests, if any."""
     dataset = dataset_of(wildcards)
     if dataset.trained_by is None:
         return []
@@ -56,7 +56,7 @@ def export_settings(wildcards):
         roles = {"tested_by": {d.rig_name: d.folder for d in tested_by(wildcards)}}
     else:
         name = "instant_ngp"
-        # A transforms.json can be asked for where the scene YAML has no such export.
+        # A user may name a transforms.json that the scene YAML does not export.
         options = dataset.exports.instant_ngp or InstantNgp(sources=[source])
         trained = trained_by(wildcards)
         roles = {"trained_by": trained} if trained else {}

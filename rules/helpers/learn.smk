@@ -1,11 +1,11 @@
-# What the rules of learn.smk ask of the configuration, and the environment that has torch.
+# Functions for the rules of learn.smk, and the environment that has torch.
 
 CONSUMERS = FOLDER / ".venv-consumers"
 CONSUMERS_PYTHON = shlex.quote(os.path.relpath(CONSUMERS / "bin/python"))
 
 
 def check_consumers():
-    """Refuse to learn without the consumers' environment; raises `UserError`."""
+    """Raise `UserError` for a job that learns without the consumers' environment."""
     learns = any(job.rule.name == MEASURE_LEARNING for job in needed_jobs())
     if learns and not (CONSUMERS / "complete").exists():
         raise UserError(
@@ -16,6 +16,8 @@ def check_consumers():
 
 def learned_from(dataset):
     """Return the manifests of a dataset's exports with depth that benchmarks/learn.py reads."""
-    wanted = dataset.exports.nerfstudio
-    files = dataset.exported if wanted and wanted.depth else []
-    return [path for path in files if path.endswith(f"exports/nerfstudio/{MANIFEST}")]
+    options = dataset.exports.nerfstudio
+    if options is None or not options.depth:
+        return []
+    manifest = f"exports/nerfstudio/{MANIFEST}"
+    return [path for path in dataset.exported if path.endswith(manifest)]

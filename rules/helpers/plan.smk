@@ -1,25 +1,30 @@
-# What the rules of plan.smk ask of the configuration.
+# Functions for the rules of plan.smk.
 
 
-def advice_words():
-    """Return the words that name to scripts/plan.py what `snakemake advise` has found."""
-    files = {
-        f"{d.scene_folder}/{d.rig_name}": f"{RESULTS}/benchmarks/advise/{d.scene_name}.json"
-        for d in CHOSEN
-    }
-    there = [(name, file) for name, file in files.items() if Path(file).exists()]
-    return shlex.join(word for pair in there for word in ("--advice", *pair))
+def advice_arguments():
+    """Return the arguments that name the files of `snakemake advise` to scripts/plan.py."""
+    file_of_rig = {}
+    for dataset in CHOSEN:
+        name = f"{dataset.scene_folder}/{dataset.rig_name}"
+        file_of_rig[name] = f"{RESULTS}/benchmarks/advise/{dataset.scene_name}.json"
+    arguments = []
+    for name, file in file_of_rig.items():
+        if Path(file).exists():
+            arguments += ["--advice", name, file]
+    return shlex.join(arguments)
 
 
 def probes():
-    """Return name, number of frames, and probe of each chosen rig: a sequence's first frame's."""
-    frames = {}
+    """Return name, number of frames, and probe of each chosen rig.
+
+    The probe of a sequence is that of its first frame.
+    """
+    frames_of_rig = {}
     for dataset in CHOSEN:
         if not dataset.imported:
-            frames.setdefault((dataset.scene_folder, dataset.rig_name), []).append(
-                dataset
-            )
+            name = f"{dataset.scene_folder}/{dataset.rig_name}"
+            frames_of_rig.setdefault(name, []).append(dataset)
     return [
-        (f"{scene}/{rig}", len(datasets), f"{datasets[0].work}/probe.json")
-        for (scene, rig), datasets in frames.items()
+        (name, len(datasets), f"{datasets[0].work}/probe.json")
+        for name, datasets in frames_of_rig.items()
     ]

@@ -1,18 +1,22 @@
-# What the rules of reproject.smk ask of the configuration.
+# Functions for the rules of reproject.smk.
 
 
 def lens_maps_of(wildcards):
-    """Return the lens maps of a reprojection; none of what is not one."""
-    dataset, name = dataset_of(wildcards), wildcards.reprojection
+    """Return the lens maps of a reprojection. Empty if there is no such reprojection."""
+    dataset = dataset_of(wildcards)
+    name = wildcards.reprojection
     return dataset.lens_maps(name) if name in dataset.reprojections else []
 
 
 def reprojection_settings_of(stage, content):
-    """Return the input function for a reprojection's settings file: ``content`` of its settings."""
+    """Return the input function for a reprojection's settings file.
+
+    ``content`` is a function that returns the file's content from the reprojection's settings.
+    """
 
     def input_function(wildcards):
-        dataset, name = dataset_of(wildcards), wildcards.reprojection
         settings = content(reprojection_of(wildcards).settings)
-        return dataset_settings(dataset, f"{name}/{stage}", settings)
+        name = f"{wildcards.reprojection}/{stage}"
+        return dataset_settings(dataset_of(wildcards), name, settings)
 
     return input_function

@@ -63,7 +63,7 @@ def refuse_beside_settings(
     for name, default in vars(parser.parse_args([])).items():
         if getattr(arguments, name) != default:
             flag = name.replace("_", "-")
-            raise UserError(f"--settings: excludes --{flag}; write it into the settings file")
+            raise UserError(f"--settings: excludes --{flag}; write it into the file")
 
 
 # The following functions are for the ``type`` of an argument.

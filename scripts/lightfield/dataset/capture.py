@@ -1,4 +1,4 @@
-"""What a lightfield.json follows from: a scene, its rendering, and the cameras that see it."""
+"""The description of a lightfield.json: a scene, its rendering, and the cameras that see it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,9 +17,9 @@ from lightfield.dataset.lightfield import OMNIDIRECTIONAL
 from lightfield.geometry import rigs
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
 
-# The keys of a scene YAML's `scene` that lightfield.json has: not where a file lies or comes from.
+# The keys of a scene YAML's `scene` block that lightfield.json records. Paths and URLs are none.
 SOURCE_KEYS = {"builder", "parameters", "scene_name", "view_layers", "frame"}
-# Those on which a lightfield.json depends. Of a .blend it needs the SHA-256 that the YAML asks for.
+# The keys on which a lightfield.json depends. It depends on the SHA-256 in the YAML, if any.
 CAPTURED_KEYS = SOURCE_KEYS | {"blend", "dataset", "sha256"}
 
 
@@ -27,8 +27,9 @@ CAPTURED_KEYS = SOURCE_KEYS | {"blend", "dataset", "sha256"}
 class Capture:
     """A scene as the cameras of a rig see it.
 
-    ``scene_name`` is the scene YAML's name. ``render`` is what lightfield.json holds of it.
-    ``external_files`` are path and SHA-256 of each file that a .blend reads, once they are known.
+    ``scene_name`` is the scene YAML's name. ``render`` is the block of lightfield.json.
+    ``external_files`` are path and SHA-256 of each file that a .blend reads. `resolved` fills them
+    in.
     """
 
     scene_name: str
@@ -38,7 +39,7 @@ class Capture:
     external_files: Sequence[tuple[str, str | None]] = ()
 
     def resolved(self, inventory: Path) -> Self:
-        """Return the dataset with the values of a user's .blend, which its ``inventory`` lists.
+        """Return the capture with the values of a user's .blend, which its ``inventory`` lists.
 
         Raises `UserError` if the .blend lacks something that the scene YAML needs.
         """
@@ -47,6 +48,7 @@ class Capture:
         content = read_inventory(inventory, "blend", "external_files")
         with reading(inventory, "inventory"):
             facts = content["blend"]
+            external_files = [(file["path"], file["sha256"]) for file in content["external_files"]]
             frame = int(facts["frame"] if self.source.frame == FILE else self.source.frame)
             render = dict(self.render)
             rig = self.rig
@@ -66,16 +68,15 @@ class Capture:
                 source=self.source.model_copy(update={"frame": frame}),
                 render=render,
                 rig=rig,
-                external_files=[
-                    (file["path"], file["sha256"]) for file in content["external_files"]
-                ],
+                external_files=external_files,
             )
 
     @property
     def depth(self) -> str | None:
-        """What channel Z of the rendered views means: ``z``, ``distance``, or None for no depth.
+        """The meaning of the rendered views' channel Z: ``z``, ``distance``, or None for no depth.
 
-        Z-depth is unusable for lenses that see beyond 180 degrees, and depth without a centre.
+        Lenses that see beyond 180 degrees have no usable Z-depth. Views without a centre have no
+        depth at all.
         """
         if self.rig.is_omnidirectional:
             return None
@@ -89,35 +90,34 @@ class Capture:
 
     @property
     def fingerprint(self) -> str:
-        """What the scene is identified by: see `scene_fingerprint`."""
+        """The identity of the scene: see `scene_fingerprint`."""
         return scene_fingerprint(self.source, self.external_files)
 
     def origin(self, render: dict[str, Any]) -> dict[str, Any]:
-        """Return what lightfield.json says of what is rendered, and how: by this ``render``."""
-        return {
-            "depth": self.depth,
-            **(
-                {OMNIDIRECTIONAL: self.rig.stereo.distance}
-                if self.rig.stereo and self.rig.is_omnidirectional
-                else {}
-            ),
-            "frame": self.source.frame,
-            "scene": {
-                "name": self.scene_name,
-                **self.source.model_dump(include=SOURCE_KEYS, exclude_none=True),
-                "fingerprint": self.fingerprint,
-            },
-            "render": render,
+        """Return the keys of lightfield.json that say what is rendered, and how.
+
+        ``render`` is its block `render`.
+        """
+        origin: dict[str, Any] = {"depth": self.depth}
+        if self.rig.stereo and self.rig.is_omnidirectional:
+            origin[OMNIDIRECTIONAL] = self.rig.stereo.distance
+        origin["frame"] = self.source.frame
+        origin["scene"] = {
+            "name": self.scene_name,
+            **self.source.model_dump(include=SOURCE_KEYS, exclude_none=True),
+            "fingerprint": self.fingerprint,
         }
+        origin["render"] = render
+        return origin
 
     @property
     def builder_fingerprint(self) -> str | None:
-        """What changes when a builder does; a user's .blend is a file, which is checked."""
+        """A value that changes when the builder does. A user's .blend needs none."""
         return None if self.source.blend else self.fingerprint
 
     @property
     def imported(self) -> str | None:
-        """The folder of a light field that somebody else has rendered."""
+        """The folder of a light field that somebody else has rendered. None for other datasets."""
         if isinstance(self.rig, Poses) and self.source.dataset:
             return str(Path(self.rig.file).parent)
         return None
@@ -133,7 +133,7 @@ def _source_as_written(source: SceneSource) -> dict[str, Any]:
 
 
 def _without_locked_sha256(capture: Capture) -> SceneSource:
-    """Return the source without a SHA-256 that the lock file has: a job may write that file."""
+    """Return the source without a SHA-256 from the lock file, because a job may write that file."""
     source = capture.source
     if source.blend is None:
         return source
@@ -151,7 +151,7 @@ class LightfieldSettings(Settings):
     rig: Annotated[rigs.AnyRig, PlainSerializer(rigs.as_written)]
     flow: bool = Field(False, description="Whether each view has a neighbour for its flow.")
     panorama_width: AtLeastOne | None = Field(
-        None, description="In place of the rig, a panorama from its centre, so many pixels wide."
+        None, description="Instead of the rig, a panorama from its centre, so many pixels wide."
     )
     fingerprint: str | None = Field(
         None, description="Changes with the builder's text, so that the scene is captured again."
@@ -163,9 +163,9 @@ class LightfieldSettings(Settings):
 
     @classmethod
     def of_capture(cls, capture: Capture, panorama_width: int | None = None, **keys: Any) -> Self:
-        """Return the settings for a capture, or for a panorama of it. ``keys`` are the others."""
+        """Return the settings for a capture, or for its panorama. ``keys`` are the other keys."""
         rig = capture.rig
-        # Only the camera of a .blend has a centre that is known later.
+        # The centre of a .blend's camera is unknown until the .blend has been read.
         if panorama_width and not isinstance(rig, BlendCamera):
             rig = panorama_rig(rig, panorama_width)
         return cls.of(
@@ -179,7 +179,7 @@ class LightfieldSettings(Settings):
 
     @property
     def capture(self) -> Capture:
-        """What these settings describe, with the SHA-256 of a .blend, which must be known."""
+        """The capture that these settings describe, with the recorded SHA-256 of a .blend."""
         source = self.source
         if source.blend:
             sha256, _ = config.blend_sha256(self.scene, source)

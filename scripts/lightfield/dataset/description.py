@@ -1,4 +1,4 @@
-"""One scene seen by one rig: what is rendered, and what the views become."""
+"""The description of a dataset: what is rendered, and what the views become."""
 
 import math
 from dataclasses import dataclass

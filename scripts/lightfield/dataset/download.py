@@ -1,9 +1,9 @@
 """Downloads large files over HTTP. An interrupted download continues where it stopped.
 
-pooch cannot replace this. It gives its downloader an empty temporary file for each attempt, and
-deletes the file when an attempt fails. A downloader for pooch would still need the partial file,
-Range and If-Range, and the answers 206 and 416. pooch would save only the check of the SHA-256 and
-the renaming, about seven lines of `fetch`.
+The package pooch cannot replace this. It gives its downloader an empty temporary file for each
+attempt, and deletes the file when an attempt fails. A downloader for pooch would still need the
+partial file, Range and If-Range, and the answers 206 and 416. It would save about seven lines of
+`fetch`: the check of the SHA-256, and the renaming.
 """
 
 import http.client

@@ -23,8 +23,8 @@ def needed(scene: int, pixels: int, denoise: bool) -> int:
 def threads(cores: int, shards: int, need: int, available: int) -> int:
     """Return how many cores each of so many ``shards`` takes. Each needs ``need`` bytes.
 
-    A shard takes more than one core if there are fewer shards than cores, or if one shard for each
-    core would not fit into the ``available`` memory. A tenth of it is left to other programs.
+    A shard takes more than one core in two cases. There are fewer shards than cores, or a shard for
+    each core would not fit into the ``available`` memory. A tenth is left to other programs.
     """
     shards_that_fit = max(1, int(0.9 * available) // need)
     return max(1, cores // max(1, shards), math.ceil(cores / shards_that_fit))

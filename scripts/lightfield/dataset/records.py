@@ -3,9 +3,9 @@
 The record is a JSON that is written when all files of the shard are finished. Its key "files" has
 the "bytes" and "sha256" of each file, by its path in the dataset.
 
-The log beside it, <record's name>.sums.jsonl, gets a line of JSON when a file is finished: "file",
-"key" (of the settings that made it), "bytes" and "sha256". A file is finished if it still has the
-logged bytes. The log outlives the record, which is removed when its files change.
+The log beside it, <record's name>.sums.jsonl, gets a line of JSON when a file is finished. It has
+"file", "key" (of the settings that made it), "bytes" and "sha256". A file is finished if it still
+has the logged bytes. The log outlives the record, which is removed when its files change.
 
 On machines without a common folder, the view store takes the log's place.
 """
