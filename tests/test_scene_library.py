@@ -1,4 +1,4 @@
-"""What the scene builders share: points from text, closed shapes, random streams, fingerprints."""
+"""What the scene builders share: points, closed shapes, random streams, fingerprints."""
 
 import shutil
 
@@ -23,16 +23,8 @@ def volume(shape):
     return np.einsum("ij,ij->", a, np.cross(b, c)) / 6
 
 
-def test_points_are_read_from_text_over_several_lines():
-    text = """0 0.5, 1.25 -2
-        3e-2 4,"""
-    assert points(text).tolist() == [[0.0, 0.5], [1.25, -2.0], [0.03, 4.0]]
+def test_points_are_an_array_of_floats():
     assert points([(1, 2, 3)]).tolist() == [[1.0, 2.0, 3.0]]
-
-
-def test_a_number_in_text_may_stand_for_several():
-    assert points("±0.5 1, 2 3").tolist() == [[-0.5, 1.0], [0.5, 1.0], [2.0, 3.0]]
-    assert points("-1..2*3 ±4").tolist() == [[x, y] for x in (-1.0, 0.5, 2.0) for y in (-4.0, 4.0)]
 
 
 OAK = {"material": "Oak"}
@@ -91,9 +83,9 @@ def test_places_are_made_of_all_combinations_of_coordinates():
     ("shape", "expected"),
     [
         (box((1, 2, 3)), 6.0),
-        (lathe("0.5 0, 0.5 2", 256), np.pi / 2),
-        (tube("0 0 0, 1 0 0, 2 0 0", 0.5, 256), np.pi / 2),
-        (prism("0 0, 2 0, 2 1, 1 0.5, 0 1", 2), 3.0),
+        (lathe([(0.5, 0), (0.5, 2)], 256), np.pi / 2),
+        (tube(LINE, 0.5, 256), np.pi / 2),
+        (prism(SLANTED, 2), 3.0),
         (icosphere(6, 2.0), 32 * np.pi / 3),
         (SCENE.ball(1.0, 256), 4 * np.pi / 3),
         (SCENE.ring(1.0, 0.25, 256, 256), 2 * np.pi**2 / 16),
@@ -107,7 +99,8 @@ def test_solids_are_closed_and_look_outwards(shape, expected):
 
 
 def test_copies_point_forward_and_keep_their_slots():
-    leaf = facets("0 0 0, 0.1 0.5 0, 0 1 0, 0 1 1", (0, 1, 2), (0, 1, 2, 3)).painted(2)
+    corners = [(0, 0, 0), (0.1, 0.5, 0), (0, 1, 0), (0, 1, 1)]
+    leaf = facets(corners, (0, 1, 2), (0, 1, 2, 3)).painted(2)
     made = copies(leaf, [(1, 0, 0), (0, 5, 0)], forward=[(0, 0, 2), (-3, 0, 0)], size=[2, 3])
     assert made.vertices[2] == pytest.approx([1, 0, 2])
     assert made.vertices[6] == pytest.approx([-3, 5, 0])
