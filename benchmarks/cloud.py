@@ -1,9 +1,9 @@
-"""Build where machines see no common folder, against an S3 server here, and kill; compare bytes.
+"""Build with jobs that share no folder, against a local S3 server, kill them, and compare bytes.
 
-Each job works in an empty folder of its own that has the program alone; whatever it needs, it gets
-from the storage, and whatever is to stay of it goes there. A build that nothing disturbs, on one
-disk, says what bytes are right. Prints how often jobs and the whole run were killed, and what was
-lost or made twice. Needs, beside the environment:
+Each job works in a folder of its own that holds the program alone. It fetches its inputs from the
+storage and puts its outputs there. An undisturbed build on one disk gives the expected bytes.
+Prints how often a job or the whole run was killed, and what was lost or rendered twice. Needs,
+beside the environment:
 
     make .venv/complete-with-storage .venv-s3-server/complete
 """
@@ -11,7 +11,6 @@ lost or made twice. Needs, beside the environment:
 import argparse
 import contextlib
 import importlib.util
-import json
 import os
 import random
 import signal
@@ -33,21 +32,23 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.core.progress import Progress
 from lightfield.dataset.view_store import ViewStore
-from soak import DATASET, ROOT, SCENE, Build, write_text
+from soak import DATASET, ROOT, SCENE, Build, count_renders, write_text
 
-# An environment of its own, in the repository, and the packages that the environment here needs.
+# The server's own environment, in the repository.
 SERVER = ".venv-s3-server"
-# Until the server answers.
+# How long to wait until the server answers.
 SERVER_SECONDS = 60
+# The packages that this program's environment needs.
 STORAGE_PACKAGES = ("snakemake_storage_plugin_s3", "upath", "s3fs")
-BUCKET, STORE = "plenoforge", "s3://plenoforge"
-# Exports write files that are not declared one by one either.
+BUCKET = "plenoforge"
+STORE = "s3://plenoforge"
+# Like views, an export's files are not declared one by one.
 EXPORTS = """
 exports:
   instant_ngp: {sources: [views, perspective]}
   poses_csv: {sources: [views]}
 """
-# Of the repository, what an image for a cloud has.
+# The part of the repository that a cloud image contains.
 PROGRAM = (
     "Snakefile",
     "config.yaml",
@@ -90,9 +91,10 @@ class Disk(Build):
 
 
 class Cloud(Disk):
-    """A build whose jobs see nothing of each other but what lies in ``store``, a URL or folder.
+    """A build whose jobs share nothing but ``store``, a URL or folder.
 
-    Each has the scene YAMLs, and ``settings``, paths of what else these name, without blanks.
+    Each job has the scene YAMLs. ``settings`` are paths of further files that these name; they
+    contain no blanks.
     """
 
     def __init__(self, root: Path, views: int, store: str, settings: tuple[str, ...] = ()) -> None:
@@ -106,11 +108,11 @@ class Cloud(Disk):
             subprocess.run(["cp", "-R", ROOT / name, program], check=True)
         for name, text in (("submit", SUBMIT), ("status", STATUS)):
             script = root / f"{name}.sh"
-            named = " ".join(settings)
-            write_text(script, text.format(jobs=self.jobs, root=root, settings=named))
+            paths = " ".join(settings)
+            write_text(script, text.format(jobs=self.jobs, root=root, settings=paths))
             script.chmod(0o755)
 
-    def start(self, *words: str, limit: int | None = None) -> subprocess.Popen[str]:
+    def start(self, *arguments: str, limit: int | None = None) -> subprocess.Popen[str]:
         """Start the run."""
         command = [
             *(Path(sys.executable).with_name("snakemake"), "--snakefile", "program/Snakefile"),
@@ -120,7 +122,7 @@ class Cloud(Disk):
             *("--default-storage-provider", "s3" if "://" in self.store else "fs"),
             *("--default-storage-prefix", self.store),
             *("--jobs", "2", "--cores", "1", "--seconds-between-status-checks", "1"),
-            *("--latency-wait", "10", *words),
+            *("--latency-wait", "10", *arguments),
         ]
         return subprocess.Popen(
             command,
@@ -137,7 +139,7 @@ class Cloud(Disk):
         return [group for group in groups if psutil.pid_exists(group)]
 
     def published(self) -> dict[str, str]:
-        """Return the SHA-256 of each published file, of the bytes that lie in the storage."""
+        """Return the SHA-256 of each published file, computed from the bytes in the storage."""
         store = ViewStore(self.store)
         with contextlib.chdir(self.root):
             store.bring(str(DATASET / "sha256sums.txt"))
@@ -146,18 +148,13 @@ class Cloud(Disk):
                     store.bring(str(DATASET / name))
         return {name: sha256(self.root / DATASET / name) for name in super().published()}
 
-    def made(self) -> Counter[str]:
-        """Return how often each view was rendered, by the journals that all jobs have left."""
-        lines = [
-            line
-            for journal in self.jobs.rglob("render/*.journal.jsonl")
-            for line in journal.read_text(errors="replace").splitlines()
-        ]
-        return Counter(json.loads(line)["view"] for line in lines if line.startswith('{"view"'))
+    def render_counts(self) -> Counter[str]:
+        """Return how often each view was rendered, from the journals that all jobs left."""
+        return count_renders(self.jobs.rglob("render/*.journal.jsonl"))
 
 
 def check_environment() -> None:
-    """Raise `UserError` with what to set up, where the S3 server or the storage's packages lack."""
+    """Raise `UserError` that says what to set up, if the S3 server or a package is missing."""
     targets = []
     if any(importlib.util.find_spec(package) is None for package in STORAGE_PACKAGES):
         targets.append(".venv/complete-with-storage")
@@ -168,13 +165,13 @@ def check_environment() -> None:
 
 
 def serve(folder: Path) -> tuple[subprocess.Popen[bytes], dict[str, str]]:
-    """Start an S3 server with a bucket; return it and the environment by which it is found.
+    """Start an S3 server with a bucket; return it and the environment variables of its clients.
 
-    Raises `UserError` where it does not answer.
+    Raises `UserError` if the server does not answer.
     """
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        port = one.getsockname()[1]
+    with socket.socket() as free_socket:
+        free_socket.bind(("127.0.0.1", 0))
+        port = free_socket.getsockname()[1]
     url = f"http://127.0.0.1:{port}"
     log = folder / "server.log"
     with log.open("wb") as output:
@@ -203,10 +200,10 @@ def kill_group(group: int) -> None:
 
 
 def kill(build: Cloud, count: int, seconds: float, rng: random.Random) -> Counter[str]:
-    """Kill a job, or all of them and the run, at random moments; the last run finishes.
+    """Kill one job, or the run with all its jobs, at random moments; then let the build finish.
 
-    A run fails where one of its jobs was killed more often than it is submitted, and goes on.
-    One that fails although nothing was killed ends the program.
+    A run fails if one of its jobs is killed at every attempt; the next run goes on from there. A
+    run that fails although nothing was killed ends the program.
     """
     killed: Counter[str] = Counter()
     progress = Progress(count, "cloud", "kills")
@@ -218,37 +215,40 @@ def kill(build: Cloud, count: int, seconds: float, rng: random.Random) -> Counte
         if process.poll() == 0:
             break
         if process.poll() is not None:
-            said, _ = process.communicate()
+            output, _ = process.communicate()
             if not disturbed:
-                sys.exit(f"error: a build failed that nothing disturbed:\n{said}")
+                sys.exit(f"error: an undisturbed build failed:\n{output}")
             process = build.start()
             disturbed = False
-        elif rng.random() < 0.5 and (running := build.running()):
+            continue
+        kills_job = rng.random() < 0.5
+        running = build.running()
+        if kills_job and running:
             kill_group(rng.choice(running))
             killed["a job"] += 1
             disturbed = True
         else:
-            for group in (process.pid, *build.running()):
+            for group in (process.pid, *running):
                 kill_group(group)
             process.communicate()
             killed["the run and its jobs"] += 1
             build.run("--unlock")
             process = build.start()
             disturbed = False
-    said, _ = process.communicate()
+    output, _ = process.communicate()
     if process.returncode:
-        print(said, file=sys.stderr)
+        print(output, file=sys.stderr)
         build.finish()
     return killed
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--views", type=int, default=6, help="of the dataset (default: 6)")
-    parser.add_argument("--kills", type=int, default=20, help="default: 20")
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--views", type=int, default=6, help="views of the dataset (default: 6)")
+    parser.add_argument("--kills", type=int, default=20, help="number of kills (default: 20)")
+    parser.add_argument("--seed", type=int, default=1, help="of the random moments (default: 1)")
     parser.add_argument(
-        "--folder", type=Path, help="for all of it, kept (default: a temporary one)"
+        "--folder", type=Path, help="folder to build in, kept (default: a temporary one)"
     )
     arguments = parser.parse_args()
     check_environment()
@@ -268,15 +268,18 @@ def main() -> None:
         finally:
             server.terminate()
             server.wait()
-        made = build.made()
+        renders = build.render_counts()
         jobs = len(list(build.jobs.iterdir()))
-    for what, times in sorted(killed.items()):
-        print(f"killed {what}: {times} times")
-    again = made.total() - len(made)
-    print(f"{len(made)} views, {again} of them made twice, in {jobs} jobs")
-    if again or not same or len(made) != arguments.views:
-        sys.exit("error: not all bytes are those of a build on one disk, or something was lost")
-    print("all published bytes are those of a build on one disk")
+    for target, times in sorted(killed.items()):
+        print(f"killed {target}: {times} times")
+    repeated = renders.total() - len(renders)
+    print(f"{len(renders)} views, {repeated} of them rendered twice, in {jobs} jobs")
+    if repeated or not same or len(renders) != arguments.views:
+        sys.exit(
+            "error: the bytes differ from those of a build on one disk, or a view was lost or "
+            "rendered twice"
+        )
+    print("all published bytes equal those of a build on one disk")
 
 
 if __name__ == "__main__":

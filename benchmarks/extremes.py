@@ -1,10 +1,10 @@
-"""Render what is hard for a renderer in 32-bit floats, and compare it with what is known exactly.
+"""Render what is hard for a renderer in 32-bit floats, and compare it with exact answers.
 
-One row a case: what its truth follows from, the largest relative errors of colour and depth, what
-Plenoforge says about it, and a verdict: right within the case's bound, warned of, refused, as the
-scene's own settings ask for, or WRONG without a word, which fails the run. Scenes are of planes and
-boxes, seen through the same code as the views of datasets. Writes extremes.csv and extremes.md into
---output.
+Each case has a row: the basis of its exact answer, the largest relative errors of colour and depth,
+Plenoforge's messages, and a verdict. A case is "right" within its bound, "warned" or "refused" by
+Plenoforge, or "as asked" by the scene's own settings. Otherwise it is "WRONG", and the run fails.
+Scenes consist of planes and boxes, and the code that renders datasets renders them. Writes
+extremes.csv and extremes.md into --output.
 """
 
 import argparse
@@ -44,13 +44,14 @@ NARROW = {"lens": "rectilinear", "fov": 1, "resolution": [16, 16]}
 RENDER = {"adaptive_threshold": 0, "denoise": False, "seed": 0, "clamp_indirect": 0}
 # Half floats have 11 binary digits.
 HALF = 2.0**-11
-# Relative error of a depth at right incidence, and of one that is worth a warning.
+# Relative error of a depth at perpendicular incidence.
 SHARP = 2e-6
+# Relative error of a depth that is worth a warning.
 COARSE = 10.0**-limits.DIGITS
 
 
 @dataclass(frozen=True)
-class Seen:
+class Render:
     """What a case's view shows: colour (h, w, 3), depth (h, w); rays (h, w, 3) in world space."""
 
     colour: Array
@@ -59,16 +60,18 @@ class Seen:
     origin: Array
 
 
-# Of what is seen, the errors that a case's truth finds: relative, the largest of the pixels'.
-Truth = Callable[[Seen], Mapping[str, float]]
+# Compares a render with the exact answer; returns the largest relative error of each part.
+Truth = Callable[[Render], Mapping[str, float]]
 
 
 @dataclass(frozen=True)
 class Case:
     """One scene and one camera, which looks along +Y.
 
-    ``bound`` is what the errors may be where nothing is said; ``basis`` what the truth is from.
-    ``asked`` is true of settings that give up truth for less noise, of which Blender says so.
+    - ``bound``: the largest errors that may go without a warning.
+    - ``basis``: what the exact answer follows from.
+    - ``trades_truth``: whether the scene's settings give up truth for less noise. Blender's own
+      documentation says so of them.
     """
 
     name: str
@@ -81,17 +84,17 @@ class Case:
     samples: int = 4
     frame: int = 1
     render: Mapping[str, Any] = field(default_factory=dict)
-    asked: bool = False
+    trades_truth: bool = False
 
 
 # Scenes.
 
 
 def nodes(name: str) -> tuple[Any, Callable[..., Any], Any]:
-    """Return a material, what adds a node to it, linked to its output, and its node tree."""
-    made = bpy.data.materials.new(name)
-    made.use_nodes = True
-    tree = made.node_tree
+    """Return a material, a function that adds a linked node to it, and its node tree."""
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    tree = material.node_tree
     tree.nodes.remove(tree.nodes["Principled BSDF"])
     output = tree.nodes["Material Output"]
 
@@ -103,7 +106,7 @@ def nodes(name: str) -> tuple[Any, Callable[..., Any], Any]:
             tree.links.new(node.outputs[0], to if hasattr(to, "links") else output.inputs[to])
         return node
 
-    return made, add, tree
+    return material, add, tree
 
 
 def grey(value: float) -> tuple[float, float, float, float]:
@@ -111,35 +114,35 @@ def grey(value: float) -> tuple[float, float, float, float]:
 
 
 def emission(strength: float) -> Any:
-    made, add, _ = nodes("emission")
+    material, add, _ = nodes("emission")
     add("ShaderNodeEmission", "Surface", Strength=strength)
-    made.cycles.emission_sampling = "NONE"
-    return made
+    material.cycles.emission_sampling = "NONE"
+    return material
 
 
 def furnace(kind: str, albedo: float, **inputs: Any) -> Any:
-    """A surface that emits what it absorbs: in a closed room of it light is 1.
+    """A surface that emits what it absorbs: in a closed room of it, the light is 1.
 
-    Of n bounces it is 1 − albedoⁿ⁺²: Cycles counts what the path of the last one meets.
+    With n bounces the light is 1 − albedoⁿ⁺²: Cycles also counts what the last bounce's path meets.
     """
-    made, add, _ = nodes("furnace")
+    material, add, _ = nodes("furnace")
     both = add("ShaderNodeAddShader", "Surface")
     add(kind, both.inputs[0], Color=grey(albedo), **inputs)
     add("ShaderNodeEmission", both.inputs[1], Strength=1 - albedo)
-    made.cycles.emission_sampling = "NONE"
-    return made
+    material.cycles.emission_sampling = "NONE"
+    return material
 
 
 def surface(kind: str, **inputs: Any) -> Any:
-    made, add, _ = nodes(kind)
+    material, add, _ = nodes(kind)
     add(kind, "Surface", **inputs)
-    return made
+    return material
 
 
 def fog(kind: str, density: float, colour: float) -> Any:
-    made, add, _ = nodes("fog")
+    material, add, _ = nodes("fog")
     add(kind, "Volume", Density=density, Color=grey(colour))
-    return made
+    return material
 
 
 def box(half: float, material: Any, center: Vector = (0, 0, 0)) -> Any:
@@ -164,9 +167,9 @@ def room(half: float, center: Vector = (0, 0, 0)) -> None:
 
 
 def painted(material: Any) -> Any:
-    thing = bpy.context.object
-    thing.data.materials.append(material)
-    return thing
+    obj = bpy.context.object
+    obj.data.materials.append(material)
+    return obj
 
 
 def sun(strength: float, degrees: float) -> None:
@@ -174,23 +177,24 @@ def sun(strength: float, degrees: float) -> None:
     light = bpy.data.lights.new("sun", "SUN")
     light.energy = strength
     light.angle = math.radians(degrees)
-    thing = bpy.data.objects.new("sun", light)
-    thing.rotation_euler = (math.radians(90), 0, 0)
-    bpy.context.scene.collection.objects.link(thing)
+    obj = bpy.data.objects.new("sun", light)
+    obj.rotation_euler = (math.radians(90), 0, 0)
+    bpy.context.scene.collection.objects.link(obj)
 
 
 def bounces(**most: int) -> None:
-    """Let paths bounce so often; Blender's own limits are 12, and 4 diffuse and glossy ones."""
+    """Limit the bounces of paths by kind; Blender's own limits are 12, and 4 diffuse or glossy."""
     for kind, number in most.items():
         setattr(bpy.context.scene.cycles, f"{kind}_bounces", number)
 
 
 def world(strength: float) -> None:
-    made = bpy.data.worlds.new("world")
-    made.use_nodes = True
-    made.node_tree.nodes["Background"].inputs["Color"].default_value = grey(1)
-    made.node_tree.nodes["Background"].inputs["Strength"].default_value = strength
-    bpy.context.scene.world = made
+    white = bpy.data.worlds.new("world")
+    white.use_nodes = True
+    background = white.node_tree.nodes["Background"]
+    background.inputs["Color"].default_value = grey(1)
+    background.inputs["Strength"].default_value = strength
+    bpy.context.scene.world = white
 
 
 def sliding(first: int, frame: int) -> None:
@@ -201,12 +205,12 @@ def sliding(first: int, frame: int) -> None:
     bpy.context.scene.render.use_motion_blur = True
 
 
-def moving(thing: Any, axis: int, places: Mapping[int, float]) -> None:
-    """Let an object be at ``places`` by frame, and between them go evenly."""
+def moving(obj: Any, axis: int, places: Mapping[int, float]) -> None:
+    """Move an object along an axis: through ``places``, by frame, and evenly between them."""
     for frame, place in places.items():
-        thing.location[axis] = place
-        thing.keyframe_insert("location", index=axis, frame=frame)
-    (bag,) = thing.animation_data.action.layers[0].strips[0].channelbags
+        obj.location[axis] = place
+        obj.keyframe_insert("location", index=axis, frame=frame)
+    (bag,) = obj.animation_data.action.layers[0].strips[0].channelbags
     for key in bag.fcurves[0].keyframe_points:
         key.interpolation = "LINEAR"
 
@@ -214,20 +218,21 @@ def moving(thing: Any, axis: int, places: Mapping[int, float]) -> None:
 # Truths.
 
 
-def largest(found: Array, truth: Array | float) -> float:
-    """Return the largest relative error; nothing where nothing is right, inf where only one is."""
-    found, truth = np.broadcast_arrays(np.asarray(found, np.float64), np.asarray(truth))
+def largest(values: Array, truth: Array | float) -> float:
+    """Return the largest relative error; that of equal values is 0, that of a NaN is inf."""
+    values, truth = np.broadcast_arrays(np.asarray(values, np.float64), np.asarray(truth))
     with np.errstate(invalid="ignore", divide="ignore"):
-        error = np.abs(found / truth - 1)
-    return float(np.where(found == truth, 0, np.where(np.isfinite(error), error, np.inf)).max())
+        error = np.abs(values / truth - 1)
+    error = np.where(np.isfinite(error), error, np.inf)
+    return float(np.where(values == truth, 0, error).max())
 
 
-def in_box(seen: Seen, half: float, center: Vector = (0, 0, 0)) -> tuple[Array, Array]:
+def in_box(shown: Render, half: float, center: Vector = (0, 0, 0)) -> tuple[Array, Array]:
     """Return the distances to the walls of a box, (h, w), and the cosines of incidence."""
     with np.errstate(divide="ignore"):
-        each = (np.sign(seen.rays) * half - (seen.origin - center)) / seen.rays
+        each = (np.sign(shown.rays) * half - (shown.origin - center)) / shown.rays
     nearest = each.argmin(axis=-1)[..., None]
-    cosine = np.abs(np.take_along_axis(seen.rays, nearest, -1))[..., 0]
+    cosine = np.abs(np.take_along_axis(shown.rays, nearest, -1))[..., 0]
     return np.take_along_axis(each, nearest, -1)[..., 0], cosine
 
 
@@ -236,14 +241,14 @@ def of_box(
 ) -> Truth:
     """A box of even light, around the camera, in a fog that absorbs.
 
-    Where chance ends paths light is not ``even``, but on average.
+    Where chance ends paths, the light is not ``even``; its mean is right.
     """
 
-    def truth(seen: Seen) -> Mapping[str, float]:
-        distance, cosine = in_box(seen, half, center)
+    def truth(shown: Render) -> Mapping[str, float]:
+        distance, cosine = in_box(shown, half, center)
         expected = light * np.exp(-density * distance)[..., None]
-        error = np.abs(seen.depth / distance - 1) * cosine
-        colour = seen.colour if even else seen.colour.mean()
+        error = np.abs(shown.depth / distance - 1) * cosine
+        colour = shown.colour if even else shown.colour.mean()
         return {"colour": largest(colour, expected), "depth": float(error.max())}
 
     return truth
@@ -252,47 +257,47 @@ def of_box(
 def of_wall(y: float, light: float, density: float = 0, fog_depth: float = 0) -> Truth:
     """A wall ahead, of even light, behind a fog that absorbs, ``fog_depth`` thick."""
 
-    def truth(seen: Seen) -> Mapping[str, float]:
-        ahead = seen.rays[..., 1]
+    def truth(shown: Render) -> Mapping[str, float]:
+        ahead = shown.rays[..., 1]
         expected = light * np.exp(-density * fog_depth / ahead)[..., None]
-        z = y - seen.origin[1]
-        return {"colour": largest(seen.colour, expected), "depth": largest(seen.depth, z)}
+        z = y - shown.origin[1]
+        return {"colour": largest(shown.colour, expected), "depth": largest(shown.depth, z)}
 
     return truth
 
 
 def mean_light(light: float) -> Truth:
-    return lambda seen: {"colour": abs(float(seen.colour.mean()) / light - 1)}
+    return lambda shown: {"colour": abs(float(shown.colour.mean()) / light - 1)}
 
 
-def grazing(seen: Seen) -> Mapping[str, float]:
+def grazing(shown: Render) -> Mapping[str, float]:
     """A floor 1 m below, up to the horizon: Z-depth, and its error times the cosine."""
-    down = -seen.rays[..., 2]
+    down = -shown.rays[..., 2]
     below = down > 0
     distance = 1 / down[below]
-    z = distance * seen.rays[..., 1][below]
-    error = np.abs(seen.depth[below] / z - 1)
-    missed = np.isfinite(seen.depth[~below]).any()
+    z = distance * shown.rays[..., 1][below]
+    error = np.abs(shown.depth[below] / z - 1)
+    missed = np.isfinite(shown.depth[~below]).any()
     return {"depth": math.inf if missed else float((error * down[below]).max())}
 
 
-def one_of_two(seen: Seen) -> Mapping[str, float]:
-    """Of two surfaces in one place each pixel shows the one or the other, whose lights are 1, 3."""
-    other = np.minimum(np.abs(seen.colour - 1), np.abs(seen.colour - 3)).max()
-    return {"colour": float(other), "depth": largest(seen.depth, 2)}
+def one_of_two(shown: Render) -> Mapping[str, float]:
+    """Two surfaces in one place, of light 1 and 3: each pixel shows one of them."""
+    error = np.minimum(np.abs(shown.colour - 1), np.abs(shown.colour - 3)).max()
+    return {"colour": float(error), "depth": largest(shown.depth, 2)}
 
 
-def one_pixel(seen: Seen) -> Mapping[str, float]:
-    """A square as large as a pixel, of light 1 before black: all light together is one pixel's."""
-    hit = np.isfinite(seen.depth)
-    depth = largest(seen.depth[hit], 10) if hit.sum() == 1 else math.inf
-    return {"colour": abs(float(seen.colour[..., 0].sum()) - 1), "depth": depth}
+def one_pixel(shown: Render) -> Mapping[str, float]:
+    """A square of one pixel's size, of light 1 before black: all pixels' light adds up to 1."""
+    hit = np.isfinite(shown.depth)
+    depth = largest(shown.depth[hit], 10) if hit.sum() == 1 else math.inf
+    return {"colour": abs(float(shown.colour[..., 0].sum()) - 1), "depth": depth}
 
 
-def slid(seen: Seen) -> Mapping[str, float]:
-    """The part of the half frame that the shutter is open in which the square is in the way."""
-    x = seen.rays[..., 0] / seen.rays[..., 1] * 10
-    tall = np.abs(seen.rays[..., 2] / seen.rays[..., 1] * 10) < 1
+def slid(shown: Render) -> Mapping[str, float]:
+    """A square slides past: its part of a pixel is its part of the shutter's half frame."""
+    x = shown.rays[..., 0] / shown.rays[..., 1] * 10
+    tall = np.abs(shown.rays[..., 2] / shown.rays[..., 1] * 10) < 1
     begin = np.clip((x - 1) / 4, -0.25, 0.25)
     end = np.clip((x + 1) / 4, -0.25, 0.25)
     covered = np.where(tall, (end - begin) / 0.5, 0)
@@ -300,8 +305,8 @@ def slid(seen: Seen) -> Mapping[str, float]:
     # Pixels whose centre is on the square's edge are either.
     sure = np.abs(np.abs(x) - 1) > 1e-3
     z = np.where(tall & (np.abs(x) < 1), 10, 20)
-    error = np.abs(seen.colour - truth).max()
-    return {"colour": float(error), "depth": largest(seen.depth[sure], z[sure])}
+    error = np.abs(shown.colour - truth).max()
+    return {"colour": float(error), "depth": largest(shown.depth[sure], z[sure])}
 
 
 # Cases.
@@ -340,13 +345,13 @@ def lights() -> Iterator[Case]:
         shade = screen(5, 5e-3, size=2)
         shade.visible_shadow = False
 
-    def in_sun(seen: Seen) -> Mapping[str, float]:
-        away = np.abs(seen.rays / seen.rays[..., 1:2])[..., [0, 2]].max(axis=-1) * 5
+    def in_sun(shown: Render) -> Mapping[str, float]:
+        away = np.abs(shown.rays / shown.rays[..., 1:2])[..., [0, 2]].max(axis=-1) * 5
         inside = away < 0.6
         outside = away > 1.4
         return {
-            "colour": max(largest(seen.colour[inside], 5e-3), largest(seen.colour[outside], 5e4)),
-            "depth": max(largest(seen.depth[inside], 5), largest(seen.depth[outside], 10)),
+            "colour": max(largest(shown.colour[inside], 5e-3), largest(shown.colour[outside], 5e4)),
+            "depth": max(largest(shown.depth[inside], 5), largest(shown.depth[outside], 10)),
         }
 
     bound = {"colour": 2 * HALF, "depth": SHARP}
@@ -411,8 +416,8 @@ def layers() -> Iterator[Case]:
                 [tuple(range(4 * number, 4 * number + 4)) for number in range(count)],
             )
             mesh.materials.append(clear)
-            thing = bpy.data.objects.new("layers", mesh)
-            bpy.context.scene.collection.objects.link(thing)
+            obj = bpy.data.objects.new("layers", mesh)
+            bpy.context.scene.collection.objects.link(obj)
             screen(20)
 
         name = f"{count:,} transparent layers, of {limit:,} that may be"
@@ -433,7 +438,7 @@ def fogs() -> Iterator[Case]:
 
         name = f"fog of optical depth {density:g}"
         truth = of_wall(10, 1, density, 1)
-        # In halves light of 6e-6 has steps of 1 %.
+        # As a half float, light of 6e-6 has steps of 1 %.
         bound = {"colour": 2 * HALF if density < 10 else 0.01, "depth": SHARP}
         yield Case(name, build, truth, bound, "Beer–Lambert", camera=ahead, **sharp)
 
@@ -494,7 +499,8 @@ def paths() -> Iterator[Case]:
     name = "glass in water in glass"
     bound = {"colour": 0.01}
     yield Case(name, dielectrics, mean_light(1), bound, "furnace", camera=ahead, samples=64)
-    # Blender's Filter Glossy, 1 in a new file, takes smooth glass for rough after a diffuse bounce.
+    # Blender's Filter Glossy treats smooth glass as rough after a diffuse bounce. It is 1 in a new
+    # file.
     for degrees, blur, clamp in ((0, 0, 0), (10, 0, 0), (10, 1, 0), (10, 0, 1)):
 
         def caustic(degrees: int = degrees, blur: int = blur) -> None:
@@ -505,7 +511,7 @@ def paths() -> Iterator[Case]:
             bpy.ops.mesh.primitive_cube_add(size=1, location=(0, 8, 0), scale=(60, 0.1, 60))
             painted(surface("ShaderNodeBsdfGlass", IOR=1.5, Roughness=0.0)).visible_camera = False
 
-        # The wall is dark, for the pane sends back a tenth of what it sees of it.
+        # The pane sends back a tenth of the wall's light, so the wall is dark.
         through = 2 * 1.5 / (1.5**2 + 1)
         yield Case(
             f"a sun of {degrees:g}° through glass, filter glossy {blur:g}, clamped at {clamp:g}",
@@ -516,7 +522,7 @@ def paths() -> Iterator[Case]:
             camera=ahead,
             samples=1024,
             render={"clamp_indirect": clamp},
-            asked=bool(blur or clamp),
+            trades_truth=bool(blur or clamp),
         )
 
 
@@ -548,8 +554,8 @@ def cases() -> Iterator[Case]:
         yield from kind()
 
 
-def render(case: Case, folder: Path) -> tuple[Seen, list[str], list[str]]:
-    """Render a case as a dataset's view; return it, what it is warned of and why it is refused."""
+def render(case: Case, folder: Path) -> tuple[Render, list[str], list[str]]:
+    """Render a case as a dataset's view; return the render, the warnings and the refusals."""
     blend_file.new_scene()
     case.build()
     path = folder / "scene.blend"
@@ -577,14 +583,14 @@ def render(case: Case, folder: Path) -> tuple[Seen, list[str], list[str]]:
     rays = lens.pixel_rays()
     sees = np.isfinite(rays[..., 0])
     colour = np.stack([channels[name] for name in "RGB"], axis=-1)
-    # What the lens sees, as one row.
-    seen = Seen(
+    # The pixels that the lens covers, as one row.
+    shown = Render(
         colour[sees][None].astype(np.float64),
         depth[sees][None].astype(np.float64),
         (rays @ view.matrix[:3, :3].T)[sees][None],
         view.position,
     )
-    return seen, warned, refused
+    return shown, warned, refused
 
 
 def measure(chosen: list[Case]) -> Iterator[dict[str, Any]]:
@@ -592,16 +598,19 @@ def measure(chosen: list[Case]) -> Iterator[dict[str, Any]]:
     progress = Progress(len(chosen), "extremes", "cases")
     with tempfile.TemporaryDirectory() as name:
         for case in chosen:
-            seen, warned, refused = render(case, Path(name))
-            errors = case.truth(seen)
-            right = all(errors[what] <= case.bound[what] for what in errors)
-            verdict = "right" if right else "WRONG"
+            shown, warned, refused = render(case, Path(name))
+            errors = case.truth(shown)
+            right = all(error <= case.bound[part] for part, error in errors.items())
             if refused:
                 verdict = "refused"
-            elif not right and warned:
+            elif right:
+                verdict = "right"
+            elif warned:
                 verdict = "warned"
-            elif not right and case.asked:
+            elif case.trades_truth:
                 verdict = "as asked"
+            else:
+                verdict = "WRONG"
             yield {
                 "case": case.name,
                 "truth": case.basis,

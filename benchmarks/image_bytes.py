@@ -1,6 +1,6 @@
 """Measure what a rendered view takes on disk with each codec and precision of depth.
 
-Prints a Markdown table: megabytes, and the CPU seconds of writing and of reading one view whole.
+Prints a Markdown table: megabytes, and the CPU seconds of writing and of reading one view.
 """
 
 import argparse
@@ -46,12 +46,12 @@ def main() -> None:
 
 def cpu_seconds(work: Callable[[], Any]) -> float:
     """Return the least CPU time, of all threads, that some work took."""
-    taken = []
+    times = []
     for _ in range(REPEATS):
         began = time.process_time()
         work()
-        taken.append(time.process_time() - began)
-    return float(np.min(taken))
+        times.append(time.process_time() - began)
+    return float(np.min(times))
 
 
 if __name__ == "__main__":

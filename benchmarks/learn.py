@@ -1,12 +1,16 @@
 """Learn radiance fields from exported files: held-out views of each lens, beside wrong readings.
 
 Runs in the consumers' environment (.venv-consumers), which has torch. Reads nerfstudio exports with
-depth. Each is learned as it is, and with one thing wrong: poses that belong to other views, images
-mirrored, depth of the other kind (Z taken for distance, and distance for Z). Steps, seeds and all
-else are the same.
+depth. A field is learned from each export as it is, and from each with one thing wrong:
 
-STEM.csv has a row for each field and each time it was evaluated, STEM.svg and STEM.png the curves
-and a held-out view of each.
+- poses that belong to other views;
+- mirrored images;
+- depth of the other kind: Z taken for distance, and distance for Z.
+
+Everything else is the same, steps and seeds too.
+
+STEM.csv has a row for each field and each of its evaluations. STEM.svg and STEM.png show the curves
+and a held-out view of each field.
 """
 
 import argparse
@@ -28,15 +32,18 @@ from lightfield.imaging import plots
 from nerfstudio_views import TRUE, Array, Views, read, readings
 from radiance_field import Field
 
-RAYS, STEPS = 2048, 400
-RATE, LAST_RATE = 1e-2, 1e-3
-# A field is evaluated so many times on the way, at so many held-out rays.
-EVALUATIONS, EVALUATED_RAYS = 4, 4000
+RAYS = 2048
+STEPS = 400
+RATE = 1e-2
+LAST_RATE = 1e-3
+# How often a field is evaluated while it learns, and at how many held-out rays.
+EVALUATIONS = 4
+EVALUATED_RAYS = 4000
 Row = dict[str, Any]
 
 
 def learn(views: Views, progress: Progress, steps: int = STEPS) -> tuple[Field, list[Row]]:
-    """Return the field that the training views teach, and how good it was on the way.
+    """Return the field that the training views teach, and its quality along the way.
 
     Each row has ``step``, and ``psnr`` in decibel at rays of the test views.
     """
@@ -82,7 +89,7 @@ def picture(field: Field, views: Views) -> Array:
 
 
 def draw(rows: Sequence[Row], pictures: Mapping[str, Mapping[str, Array]], stem: Path) -> None:
-    """Draw the curves of each lens, and of each reading what it shows above what it was shown."""
+    """Draw the curves of each lens, and for each reading its render above the view itself."""
     columns = 1 + max(map(len, pictures.values()))
     with plots.plot(stem, len(pictures), columns, (2.5 * columns, 3 * len(pictures))) as axes:
         lines = np.reshape(axes, (-1, columns))
@@ -104,11 +111,13 @@ def draw(rows: Sequence[Row], pictures: Mapping[str, Mapping[str, Array]], stem:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     add = parser.add_argument
     add("exports", type=Path, nargs="+", help="folders of nerfstudio exports, each of a lens")
-    add("--steps", type=int, default=STEPS, help=f"of learning (default: {STEPS})")
-    add("--output", type=Path, required=True, metavar="STEM")
+    add("--steps", type=int, default=STEPS, help=f"steps of learning (default: {STEPS})")
+    add("--output", type=Path, required=True, metavar="STEM", help="path without a suffix")
     arguments = parser.parse_args()
 
     exported = [read(folder) for folder in arguments.exports]
@@ -124,9 +133,9 @@ def main() -> None:
             rows += [field_name | {"held_out": views.lens} | row for row in curve]
             if reading == TRUE:
                 last = field_name | {"step": arguments.steps}
-                for other in crops:
-                    if other is not views:
-                        rows.append(last | {"held_out": other.lens, "psnr": psnr(field, other)})
+                for crop in crops:
+                    if crop is not views:
+                        rows.append(last | {"held_out": crop.lens, "psnr": psnr(field, crop)})
             print(f"{views.lens} {reading}: {curve[-1]['psnr']:.2f} dB", flush=True)
     write_csv(arguments.output.with_name(f"{arguments.output.name}.csv"), rows)
     draw(rows, pictures, arguments.output)

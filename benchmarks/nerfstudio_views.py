@@ -17,17 +17,22 @@ from lightfield.core.files import read_json
 Array = np.ndarray[Any, Any]
 
 LENSES = {"PINHOLE": "perspective", "OPENCV_FISHEYE": "fisheye", "EQUIRECTANGULAR": "panorama"}
-TRUE, SHUFFLED = "as exported", "shuffled poses"
+TRUE = "as exported"
+SHUFFLED = "shuffled poses"
 MILLIMETRES = 1000
 
 
 @dataclass(frozen=True)
 class Views:
-    """Views through one lens; ``rays`` (h, w, 3) of unit length in the camera's own axes.
+    """Views through one lens.
 
-    ``depth`` (n, h, w) is metres as the files have it, inf for none, of the ``kind`` "Z" or
-    "distance"; ``poses`` (n, 4, 4) are camera-to-world; ``colour`` (n, h, w, 3) is sRGB from 0 to
-    1; ``valid`` (n, h, w) is what the lens sees; ``test`` (n,) are the views to test with.
+    - ``rays`` (h, w, 3): of unit length, in the camera's own axes.
+    - ``kind``: that of the depth, "Z" or "distance".
+    - ``poses`` (n, 4, 4): camera-to-world.
+    - ``colour`` (n, h, w, 3): sRGB from 0 to 1.
+    - ``depth`` (n, h, w): metres as the files have it, inf for none.
+    - ``valid`` (n, h, w): the pixels that the lens covers.
+    - ``test`` (n,): the views to test with.
     """
 
     lens: str
@@ -85,7 +90,7 @@ def read(folder: Path) -> Views:
 
 
 def _rays(content: dict[str, Any]) -> tuple[Array, str]:
-    """Return the rays (h, w, 3) of a camera that looks along −z, and what its depth is."""
+    """Return the rays (h, w, 3) of a camera that looks along −z, and the kind of its depth."""
     column, row = np.meshgrid(np.arange(content["w"]) + 0.5, np.arange(content["h"]) + 0.5)
     x = (column - content["cx"]) / content["fl_x"]
     y = -(row - content["cy"]) / content["fl_y"]
@@ -96,7 +101,8 @@ def _rays(content: dict[str, Any]) -> tuple[Array, str]:
         angle = np.hypot(x, y)
         across = np.sinc(angle / np.pi)
         return np.stack([x * across, y * across, -np.cos(angle)], axis=-1), "distance"
-    longitude, latitude = np.pi * x, np.pi * y
+    longitude = np.pi * x
+    latitude = np.pi * y
     level = np.cos(latitude)
     return np.stack(
         [np.sin(longitude) * level, np.sin(latitude), -np.cos(longitude) * level], axis=-1
@@ -110,5 +116,5 @@ def readings(views: Views) -> Iterator[tuple[str, Views]]:
     yield SHUFFLED, replace(views, poses=views.poses[order])
     mirrored = {name: getattr(views, name)[:, :, ::-1] for name in ("colour", "depth", "valid")}
     yield "mirrored images", replace(views, **mirrored)
-    other = {"Z": "distance", "distance": "Z"}[views.kind]
-    yield f"{views.kind} taken for {other}", replace(views, kind=other)
+    wrong_kind = {"Z": "distance", "distance": "Z"}[views.kind]
+    yield f"{views.kind} taken for {wrong_kind}", replace(views, kind=wrong_kind)

@@ -1,16 +1,25 @@
-"""What the passes of a scene's view hold, against what else is known of it, and what they cost.
+"""Compare the passes of a scene's view with independent answers, and measure what they cost.
 
-For each lens, of the first view: by how much of the colour its parts of light add up to another,
-at most; how many pixels have the object that Blender's ray casts find, and how many have it first
-in their Cryptomatte; by how much of it depth differs from the ray casts' there, in the median and
-the 99th percentile; the angles in degrees, their median and third quartile, between normals and
-those of the faces that these find, and those of planes through neighbouring depths; motion in
-pixels, of what stands still; values that were not a number, and how many of them not at the rim of
-an image circle or of the picture; which part of its paint the albedo is, in the median, the 5th and
-the 95th percentile, where Blender's nodes say that a surface is nothing but painted; and from it to
-a second view, 5 cm beside it, how many pixels are visible there, and by how much their albedo
-differs, in the mean, from its own where flow leads, and where it does not. Then the seconds of a
-core, those of the geometry among them, and the bytes of a view with more and more passes.
+Prints for each lens, of the first view:
+
+- sum: by how much the parts of light differ from the colour, relative to it, at most. "inside"
+  leaves out the rim.
+- objects: the part of the pixels whose object is the one that Blender's ray casts hit.
+- mattes: the part of the pixels whose first Cryptomatte entry is that object.
+- depth: its relative difference from the ray casts' distance, median and 99th percentile.
+- normals: the angle to the normals of the faces that the ray casts hit, in degrees, median and
+  third quartile.
+- depth gradients: the same, to the normals of planes through neighbouring depths.
+- motion: its largest value in pixels; the scene stands still.
+- nan: how many values of each pass were not a number.
+- lost inside: pixels that have no normal although they are not at a rim.
+- albedo of paint: albedo over paint, median, 5th and 95th percentile. It covers the surfaces
+  that are nothing but painted, by Blender's nodes; painted is their part of the pixels.
+- visible: the part of the pixels that a second view, 5 cm beside the first, also sees.
+- warped: the mean difference of albedo to that view, where flow leads; not warped: without flow.
+
+Then it prints the core seconds of a view, how many of them the geometry takes, and its bytes, with
+more and more passes.
 """
 
 import argparse
@@ -46,9 +55,9 @@ LENSES = {
     "fisheye": {"lens": "equidistant", "fov": 180},
     "panorama": {"lens": "equirectangular"},
 }
-# What is no paint shines with.
+# The brightness of a surface that is not mere paint.
 UNPAINTED = 1e4
-# Metres.
+# Metres from the first view to the second.
 BESIDE = 0.05
 GEOMETRY = ["normal", "object", "material"]
 STEPS = {
@@ -62,22 +71,24 @@ STEPS = {
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--blend", required=True, type=Path, help="the scene")
     parser.add_argument("--lightfield", required=True, type=Path, help="its views' poses")
-    parser.add_argument("--size", type=int, default=64, help="pixels of a side")
-    parser.add_argument("--samples", type=int, default=4)
+    parser.add_argument("--size", type=int, default=64, help="height of a view (default: 64)")
+    parser.add_argument("--samples", type=int, default=4, help="a pixel (default: 4)")
     arguments = parser.parse_args()
-    given = LightField.read(arguments.lightfield)
+    poses = LightField.read(arguments.lightfield)
     with tempfile.TemporaryDirectory() as name:
         for lens in LENSES:
-            content = _content(given, lens, arguments.size, arguments.samples, list(PASSES))
+            content = _content(poses, lens, arguments.size, arguments.samples, list(PASSES))
             folder = Path(name, lens)
             content.write(folder / NAME)
             _render(content, arguments.blend, folder)
             print(lens, json.dumps(_figures(content, folder)), flush=True)
         for step, passes in STEPS.items():
-            content = _content(given, "fisheye", arguments.size, arguments.samples, passes)
+            content = _content(poses, "fisheye", arguments.size, arguments.samples, passes)
             folder = Path(name, step)
             seconds, geometry = _render(content, arguments.blend, folder)
             sizes = {path.parent.name: path.stat().st_size for path in folder.rglob("view_*.exr")}
@@ -86,22 +97,23 @@ def main() -> None:
 
 
 def _content(
-    given: LightField, lens: str, size: int, samples: int, passes: list[str]
+    poses: LightField, lens: str, size: int, samples: int, passes: list[str]
 ) -> LightField:
-    wide = 2 if lens == "panorama" else 1
-    made = lenses.from_camera({**LENSES[lens], "resolution": [wide * size, size]})
-    render = {**given.render, "samples": samples, "denoise": False, "passes": passes}
+    aspect = 2 if lens == "panorama" else 1
+    camera_lens = lenses.from_camera({**LENSES[lens], "resolution": [aspect * size, size]})
+    render = {**poses.render, "samples": samples, "denoise": False, "passes": passes}
     render |= {"transparent": False}
-    # The first view's time has some of the start-up in it.
-    first, _, last = given.views[:3]
+    # The first view's time includes some of the start-up.
+    first, _, last = poses.views[:3]
     matrix = first.matrix.copy()
     matrix[:3, 3] += BESIDE * matrix[:3, 0]
     views = [first, View.placed("beside", matrix), last]
-    return given.changed(made, views, depth=made.usual_depth or "distance", render=render)
+    depth = camera_lens.usual_depth or "distance"
+    return poses.changed(camera_lens, views, depth=depth, render=render)
 
 
 def _render(content: LightField, blend: Path, folder: Path) -> tuple[float, float]:
-    """Render the views; return a view's seconds of a core, and those of its geometry."""
+    """Render the views; return the mean core seconds of a view, and those of its geometry."""
     journal = folder / "journal.jsonl"
     shard.render(
         content,
@@ -113,9 +125,10 @@ def _render(content: LightField, blend: Path, folder: Path) -> tuple[float, floa
         threads=1,
         journal=journal,
     )
-    (made,) = read(journal)
-    columns = ("cpu_seconds", "geometry_seconds")
-    seconds, geometry = (np.mean([view[name] for view in made.views[1:]]) for name in columns)
+    (session,) = read(journal)
+    views = session.views[1:]
+    seconds = np.mean([view["cpu_seconds"] for view in views])
+    geometry = np.mean([view["geometry_seconds"] for view in views])
     return float(seconds), float(geometry)
 
 
@@ -129,99 +142,111 @@ def _read(folder: Path, name: str, view: str) -> tuple[Array, int]:
 def _figures(content: LightField, folder: Path) -> dict[str, Any]:
     view, beside = content.views[:2]
     read = {name: _read(folder, name, view.name) for name in PASSES}
-    found = {name: pixels for name, (pixels, _) in read.items()}
+    passes = {name: pixels for name, (pixels, _) in read.items()}
     source = SourceDataset(folder, "", ".exr")
     distance = source.depth(view, "distance")
-    there = source.depth(beside, "distance")
+    beside_distance = source.depth(beside, "distance")
     colour = images.read_image(source.path(view)).colour.astype(np.float64)
-    total = np.sum([found[name].astype(np.float64) for name in PARTS_OF_LIGHT], axis=0)
+    total = np.sum([passes[name].astype(np.float64) for name in PARTS_OF_LIGHT], axis=0)
     rays = content.lens.pixel_rays()
-    seen = np.isfinite(rays[..., 0])
-    inside = binary_erosion(seen, np.ones((3, 3)), iterations=2, border_value=0)
-    different = np.abs(total - colour) / np.maximum(colour, 1e-3)
-    objects = found["object"][..., 0]
+    covered = np.isfinite(rays[..., 0])
+    inside = binary_erosion(covered, np.ones((3, 3)), iterations=2, border_value=0)
+    sum_error = np.abs(total - colour) / np.maximum(colour, 1e-3)
+    objects = passes["object"][..., 0]
     numbers = json.loads((folder / "object" / "names.json").read_text())
-    names, normals, away = _cast(content)
+    names, normals, cast_distance = _cast(content)
     cast = np.vectorize(lambda name: numbers.get(name, 0))(names)
-    same = seen & (cast > 0) & (cast == objects)
+    same = covered & (cast > 0) & (cast == objects)
     manifest = json.loads(
         images.read_header(PASSES["cryptomatte"].path(folder, view.name)).attributes[MANIFEST]
     )
-    first = found["cryptomatte"][..., 0].astype(np.float32).view(np.uint32)
-    hashed = {number: int(manifest.get(name, "0"), 16) for name, number in numbers.items()}
-    expected = np.vectorize(lambda number: hashed.get(number, 0))(objects)
+    matte = passes["cryptomatte"][..., 0].astype(np.float32).view(np.uint32)
+    hashes = {number: int(manifest.get(name, "0"), 16) for name, number in numbers.items()}
+    expected_matte = np.vectorize(lambda number: hashes.get(number, 0))(objects)
     _, planes = Surface(content.lens, view, rays, distance).points(1)
     hit = np.isfinite(distance) & (distance > 0)
-    led, visible = flow(content.lens, view.matrix, beside.matrix, distance, there)
-    albedo = found["albedo"]
-    other = _read(folder, "albedo", beside.name)[0]
+    motion, visible = flow(content.lens, view.matrix, beside.matrix, distance, beside_distance)
+    albedo = passes["albedo"]
+    beside_albedo = _read(folder, "albedo", beside.name)[0]
     paint = _paint(content)
     painted = ((paint > 0.01) & (paint < UNPAINTED / 2 / content.render["samples"])).all(axis=-1)
+    paint_ratio: list[float] = []
+    if painted.any():
+        quantiles = np.quantile(albedo[painted] / paint[painted], (0.5, 0.05, 0.95))
+        paint_ratio = quantiles.tolist()
     row, column = np.nonzero(visible & hit)
-    across, down = led[row, column].T
+    across, down = motion[row, column].T
     x = np.floor(column + 0.5 + across).astype(int) % content.lens.width
     y = np.floor(row + 0.5 + down).astype(int)
     return {
-        "sum": float(different.max()),
-        "sum inside": float(different[inside].max()),
-        "objects": float((objects == cast)[seen].mean()),
-        "mattes": float((first == expected)[hit].mean()),
-        "depth": np.quantile(np.abs(distance / away - 1)[same], (0.5, 0.99)).tolist(),
-        "normals": _angles(normals[same], found["normal"][same]),
-        "depth gradients": _angles(planes, found["normal"][hit]),
-        "motion": float(np.abs(found["motion"]).max()),
-        "nan": {name: lost for name, (_, lost) in read.items() if lost},
-        "lost inside": int((hit & inside & ~found["normal"].any(axis=-1)).sum()),
-        "albedo of paint": np.quantile(albedo[painted] / paint[painted], (0.5, 0.05, 0.95)).tolist()
-        if painted.any()
-        else [],
-        "painted": float(painted.sum() / seen.sum()),
+        "sum": float(sum_error.max()),
+        "sum inside": float(sum_error[inside].max()),
+        "objects": float((objects == cast)[covered].mean()),
+        "mattes": float((matte == expected_matte)[hit].mean()),
+        "depth": np.quantile(np.abs(distance / cast_distance - 1)[same], (0.5, 0.99)).tolist(),
+        "normals": _angles(normals[same], passes["normal"][same]),
+        "depth gradients": _angles(planes, passes["normal"][hit]),
+        "motion": float(np.abs(passes["motion"]).max()),
+        "nan": {name: count for name, (_, count) in read.items() if count},
+        "lost inside": int((hit & inside & ~passes["normal"].any(axis=-1)).sum()),
+        "albedo of paint": paint_ratio,
+        "painted": float(painted.sum() / covered.sum()),
         "visible": float((visible & hit).sum() / hit.sum()),
-        "warped": float(np.abs(albedo[row, column] - other[y, x]).mean()),
-        "not warped": float(np.abs(albedo[row, column] - other[row, column]).mean()),
+        "warped": float(np.abs(albedo[row, column] - beside_albedo[y, x]).mean()),
+        "not warped": float(np.abs(albedo[row, column] - beside_albedo[row, column]).mean()),
     }
 
 
 def _paint(content: LightField) -> Array:
-    """Return the paint (h, w, 3) of the first view's surfaces, much more where one has another.
+    """Return the paint (h, w, 3) of the first view's surfaces; UNPAINTED for any other material.
 
-    Each shines with its paint as Blender's nodes give it, through the same samples as the colour.
+    Each surface shines with its paint from Blender's nodes, through the same samples as the colour.
     """
     for shaded in (*bpy.data.materials, bpy.context.scene.world):
-        if tree := shaded and shaded.node_tree:
-            output = tree.get_output_node("CYCLES")
-            light = tree.nodes.new("ShaderNodeEmission")
-            light.inputs["Color"].default_value = (UNPAINTED, UNPAINTED, UNPAINTED, 1)
-            if output and (paint := _paint_socket(output.inputs["Surface"])):
-                light.inputs["Color"].default_value = paint.default_value
-                if paint.is_linked:
-                    tree.links.new(light.inputs["Color"], paint.links[0].from_socket)
-            if output:
-                tree.links.new(output.inputs["Surface"], light.outputs[0])
+        if shaded and shaded.node_tree:
+            _shine_with_paint(shaded.node_tree)
     view = content.views[0]
     return render_colour(view.matrix, keys.view_seed(content.render["seed"], view.name)).pixels
 
 
+def _shine_with_paint(tree: Any) -> None:
+    """Replace a material's or world's surface by an emission of its paint."""
+    output = tree.get_output_node("CYCLES")
+    light = tree.nodes.new("ShaderNodeEmission")
+    light.inputs["Color"].default_value = (UNPAINTED, UNPAINTED, UNPAINTED, 1)
+    if not output:
+        return
+    paint = _paint_socket(output.inputs["Surface"])
+    if paint:
+        light.inputs["Color"].default_value = paint.default_value
+        if paint.is_linked:
+            tree.links.new(light.inputs["Color"], paint.links[0].from_socket)
+    tree.links.new(output.inputs["Surface"], light.outputs[0])
+
+
 def _paint_socket(surface: Any) -> Any:
-    """Return the colour of a surface that is paint alone, opaque, or None."""
+    """Return the colour socket of a surface that is opaque paint alone, or None."""
     shader = surface.links[0].from_node if surface.links else None
     if shader and shader.type == "BSDF_DIFFUSE":
         return shader.inputs["Color"]
     if not shader or shader.type != "BSDF_PRINCIPLED":
         return None
-    none = ("Metallic", "Transmission Weight", "Subsurface Weight", "Sheen Weight", "Coat Weight")
-    values = [(shader.inputs[name], 0) for name in none] + [(shader.inputs["Alpha"], 1)]
+    zero = ("Metallic", "Transmission Weight", "Subsurface Weight", "Sheen Weight", "Coat Weight")
+    values = [(shader.inputs[name], 0) for name in zero]
+    values.append((shader.inputs["Alpha"], 1))
     pure = all(not socket.is_linked and socket.default_value == value for socket, value in values)
     return shader.inputs["Base Color"] if pure else None
 
 
-def _angles(one: Array, other: Array) -> list[float]:
+def _angles(expected: Array, normals: Array) -> list[float]:
     """Return the median and the third quartile of the degrees between normals (n, 3)."""
-    cosine = np.sum(one * other, axis=-1)
-    known = np.isfinite(cosine) & other.any(axis=-1)
-    turned = np.degrees(np.arccos(cosine[known].clip(-1, 1)))
-    found: list[float] = np.quantile(turned, (0.5, 0.75)).round(2).tolist() if known.any() else []
-    return found
+    cosine = np.sum(expected * normals, axis=-1)
+    valid = np.isfinite(cosine) & normals.any(axis=-1)
+    if not valid.any():
+        return []
+    degrees = np.degrees(np.arccos(cosine[valid].clip(-1, 1)))
+    quantiles: list[float] = np.quantile(degrees, (0.5, 0.75)).round(2).tolist()
+    return quantiles
 
 
 def _cast(content: LightField) -> tuple[Array, Array, Array]:
@@ -232,16 +257,16 @@ def _cast(content: LightField) -> tuple[Array, Array, Array]:
     depsgraph = bpy.context.evaluated_depsgraph_get()
     names = np.full(rays.shape[:2], "", dtype=object)
     normals = np.zeros(rays.shape)
-    away = np.full(rays.shape[:2], np.inf)
+    distance = np.full(rays.shape[:2], np.inf)
     for pixel in zip(*np.nonzero(np.isfinite(rays[..., 0])), strict=True):
-        hit, place, normal, _, thing, _ = scene.ray_cast(
+        hit, place, normal, _, obj, _ = scene.ray_cast(
             depsgraph, Vector(view.position), Vector(rays[pixel])
         )
         if hit:
-            names[pixel] = thing.name_full
+            names[pixel] = obj.name_full
             normals[pixel] = -np.sign(np.dot(normal, rays[pixel])) * np.array(normal)
-            away[pixel] = np.linalg.norm(np.array(place) - view.position)
-    return names, normals, away
+            distance[pixel] = np.linalg.norm(np.array(place) - view.position)
+    return names, normals, distance
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
-"""Measure what each thing that pruning leaves out of a scene saves, at equal pixels.
+"""Measure what each pruning of a scene saves, at equal pixels.
 
-Each scene is measured as its builder makes it, and as artists leave theirs: with a hidden dense
-object, motion blur, and passes that nobody reads. In each, every pruning that applies is taken
-alone and together; so are those that were tried and are not kept. A measurement is a process of
-its own with one thread. Times are CPU seconds; the processes that are compared render each view one
-right after the other, and what is saved is the median of these pairs' differences, so that other
-work on the machine falls on both.
+Each scene is measured as its builder makes it, and as artists leave theirs. The latter has a hidden
+dense object, motion blur, and passes that nobody reads. Every pruning that applies is measured
+alone and with the others, and so are prunings that the workflow rejected. Each measurement is a
+process of its own with one thread. Times are CPU seconds. The compared processes take turns and
+render the same view one right after the other, so that other work on the machine slows both. A
+saving is the median of these pairs' differences.
 
 Writes pruning.csv and pruning.md to the output folder.
 """
@@ -33,14 +33,14 @@ from lightfield.dataset import config
 from lightfield.dataset.lightfield import LightField
 from lightfield.geometry import lenses
 
-# Tried, and not part of the workflow: a pruning must save something and keep every pixel.
+# Prunings that the workflow rejected: a pruning must save something and keep every pixel.
 NOT_KEPT = {
     "volume_bounces": ("volumes", "no bounces in volumes, where there are none"),
     "transmission_bounces": ("transmission", "no bounces through glass, where there is none"),
     "transparent_bounces": ("transparency", "no bounces through transparency, where there is none"),
     "light_tree": ("", "no tree of lights"),
 }
-# Done for every scene, whatever it contains.
+# Prunings of every scene, whatever it contains.
 ALWAYS = {
     "passes": "passes that the artist had on are not made",
     "depth": "no depth, where the scene YAML says none",
@@ -54,7 +54,7 @@ FRAME = 5
 
 @dataclass(frozen=True)
 class Task:
-    """One process: a scene, what is left out of it, and what is on that need not be."""
+    """One process: a scene, what is left out of it, and what is on although nobody needs it."""
 
     blend: Path
     left_out: tuple[str, ...] = ()
@@ -68,8 +68,8 @@ class Task:
 class Figures:
     """What the processes of a task took: CPU seconds, MiB, and bytes of a view's EXR.
 
-    ``start_ups`` has one entry a process, all that comes before its second view; ``views`` one for
-    each view from there on.
+    ``start_ups`` has one entry a process: the time before its second view. ``views`` has one entry
+    for each later view.
     """
 
     start_ups: list[float] = field(default_factory=list)
@@ -91,8 +91,9 @@ def main() -> None:
         for scene in arguments.scenes:
             for variant in ("as built", "as artists leave it"):
                 blend = Path(folder, f"{scene} {variant}.blend")
-                made = in_process(make_scene, (scene, variant, arguments.detail, blend))
-                for row in measured(blend, *made, arguments.repeats):
+                task = (scene, variant, arguments.detail, blend)
+                scene_inventory, reasons = in_process(make_scene, task)
+                for row in measured(blend, scene_inventory, reasons, arguments.repeats):
                     rows.append({"scene": scene, "variant": variant, **row})
                     print(rows[-1], flush=True)
     write(arguments.output_dir, rows)
@@ -101,14 +102,14 @@ def main() -> None:
 def in_process(function: Any, argument: Any) -> Any:
     """Run a function in a fresh process, so that bpy starts anew and memory is its own.
 
-    Where this one had imported bpy, that would not find its modules.
+    This process must not import bpy: bpy would then not find its modules in the new process.
     """
     with get_context("spawn").Pool(1) as pool:
         return pool.apply(function, (argument,))
 
 
 def make_scene(task: tuple[str, str, float, Path]) -> tuple[dict[str, Any], dict[str, str]]:
-    """Build a scene, save it, and return its inventory, and why what is left out of it is."""
+    """Build and save a scene; return its inventory, and the reason for each of its prunings."""
     scene, variant, detail, path = task
     import importlib
 
@@ -126,31 +127,33 @@ def make_scene(task: tuple[str, str, float, Path]) -> tuple[dict[str, Any], dict
         bpy.context.object.hide_render = True
     blend_file.save_scene(path)
     blend_file.open_scene(path)
-    found = inventory.inventory([FRAME])
-    return found, {name: pruning.REASONS[name] for name in pruning.left_out(found)}
+    contents = inventory.inventory([FRAME])
+    return contents, {name: pruning.REASONS[name] for name in pruning.left_out(contents)}
 
 
 def measured(
-    blend: Path, found: dict[str, Any], reasons: dict[str, str], repeats: int
+    blend: Path, contents: dict[str, Any], reasons: dict[str, str], repeats: int
 ) -> Iterator[dict[str, Any]]:
-    """Yield a row for each thing that can be left out of a scene, alone, and for all together."""
+    """Yield a row for each pruning of a scene, alone, and for all together.
+
+    ``contents`` is the scene's inventory, ``reasons`` has the prunings that apply.
+    """
     artists = blend.stem.endswith("as artists leave it")
-    whole = Task(blend, hidden=tuple(found["hidden"]), passes=artists)
-    kept = replace(whole, left_out=tuple(reasons), passes=False)
-    # What is left out, why, from what and with what effect.
-    compared = [("nothing", "the scene as it is", whole, whole)]
+    original = Task(blend, hidden=tuple(contents["hidden"]), passes=artists)
+    pruned = replace(original, left_out=tuple(reasons), passes=False)
+    # The pruning, its reason, the task without it and the task with it.
+    compared = [("nothing", "the scene as it is", original, original)]
     for name, reason in reasons.items():
-        compared.append((name, reason, whole, replace(whole, left_out=(name,))))
+        compared.append((name, reason, original, replace(original, left_out=(name,))))
     if artists:
-        compared.append(("passes", ALWAYS["passes"], whole, replace(whole, passes=False)))
-    compared.append(("all of these", "what the workflow does", whole, kept))
-    compared.append(("depth", ALWAYS["depth"], kept, replace(kept, depth=False)))
+        compared.append(("passes", ALWAYS["passes"], original, replace(original, passes=False)))
+    compared.append(("all of these", "what the workflow does", original, pruned))
+    compared.append(("depth", ALWAYS["depth"], pruned, replace(pruned, depth=False)))
     if not artists:
-        compared += [
-            (f"({name})", f"not kept: {reason}", kept, replace(kept, tweak=name))
-            for name, (feature, reason) in NOT_KEPT.items()
-            if not found.get(feature)
-        ]
+        for name, (feature, reason) in NOT_KEPT.items():
+            if not contents.get(feature):
+                without = replace(pruned, tweak=name)
+                compared.append((f"({name})", f"not kept: {reason}", pruned, without))
     figures = all_figures([without for *_, without in compared], repeats)
     for name, reason, base, without in compared:
         yield row(name, reason, figures[base], figures[without])
@@ -174,7 +177,7 @@ def row(name: str, reason: str, base: Figures, without: Figures) -> dict[str, An
 
 def saved(base: Sequence[float], without: Sequence[float]) -> float:
     """Return the median difference of times that were taken one right after the other."""
-    return statistics.median(one - other for one, other in zip(base, without, strict=True))
+    return statistics.median(a - b for a, b in zip(base, without, strict=True))
 
 
 def all_figures(tasks: Sequence[Task], repeats: int) -> dict[Task, Figures]:
@@ -189,14 +192,14 @@ def all_figures(tasks: Sequence[Task], repeats: int) -> dict[Task, Figures]:
                 for task, pool in pools.items():
                     figures[task].views.append(pool.apply(render, (number,)))
             for task, pool in pools.items():
-                done = figures[task]
-                peak, done.bytes, done.pixels = pool.apply(finish)
-                done.peak = min(done.peak, peak)
+                task_figures = figures[task]
+                peak, task_figures.bytes, task_figures.pixels = pool.apply(finish)
+                task_figures.peak = min(task_figures.peak, peak)
     return figures
 
 
 class Renderer:
-    """A scene set up in this process as its task says, and what its views amount to."""
+    """A scene set up in this process as its task says, with the sizes and digest of its views."""
 
     def __init__(self, task: Task) -> None:
         import bpy
@@ -278,9 +281,10 @@ def write(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
         "# What pruning saves",
         "",
         "CPU seconds of one thread, MiB of peak memory, and KiB of a view's EXR, at 96² and 4 "
-        "samples a pixel; in brackets what is saved against the scene as it is (for depth and for "
-        "what is not kept: against all prunings), times as the median of pairs that were measured "
-        "one right after the other. Start-up is everything before the second view.",
+        "samples a pixel. In brackets: what is saved against the scene as it is. For depth and for "
+        "what is not kept, it is what is saved against all prunings. A saved time is the median of "
+        "pairs that were measured one right after the other. Start-up is everything before the "
+        "second view.",
         "",
         "| scene | left out | start-up | a view | peak memory | a view's file | same pixels |",
         "| --- | --- | ---: | ---: | ---: | ---: | --- |",

@@ -2,8 +2,8 @@
 
 Rays are integrated as in NeRF (Mildenhall et al. 2020, equation 3). The hash grid is that of
 Müller et al. 2022. The contraction of space is that of mip-NeRF 360 (Barron et al. 2022,
-equation 10). Depth is taught: a training ray has dense samples around its surface, and the loss
-adds the negative logarithm of the light that comes from there.
+equation 10). The field also learns depth: a training ray has dense samples around its surface. The
+loss adds the negative logarithm of the part of the light that comes from there.
 """
 
 import torch
@@ -12,15 +12,22 @@ from torch.nn import functional
 
 # Cells along a side of each level of the grid, entries of a level's table, values of an entry.
 RESOLUTIONS = torch.tensor([16, 26, 43, 70, 115, 189, 311, 512])
-ENTRIES, FEATURES = 1 << 16, 2
+ENTRIES = 1 << 16
+FEATURES = 2
 PRIMES = torch.tensor([1, 2654435761, 805459861])
 HIDDEN = 32
 # Metres. Rays that hit nothing have their surface at FAR.
-NEAR, FAR = 0.1, 100.0
-# Samples of a training ray before its surface, and around it within BAND of its distance.
-BEFORE, AROUND, BAND = 6, 4, 0.03
-# Samples of a rendered ray, from NEAR to FAR; and rays that are rendered at once.
-RENDERED, CHUNK = 256, 256
+NEAR = 0.1
+FAR = 100.0
+# Samples of a training ray before its surface.
+BEFORE = 6
+# Samples of a training ray around its surface, within BAND of its distance.
+AROUND = 4
+BAND = 0.03
+# Samples of a rendered ray, from NEAR to FAR.
+RENDERED = 256
+# Rays that are rendered at once.
+CHUNK = 256
 DEPTH_WEIGHT = 0.1
 
 
@@ -70,7 +77,7 @@ class Field(nn.Module):
         around = surface * torch.linspace(1 - BAND, 1 + BAND, AROUND + 1)
         ends = torch.cat([before, around, torch.full_like(surface, torch.inf)], dim=1)
         shown, weights = self(origins, rays, ends, torch.rand(len(rays), ends.shape[1] - 1))
-        # What is as far as FAR may also be beyond it.
+        # A surface at FAR may also lie beyond it.
         from_surface = weights[:, BEFORE:-1].sum(dim=1) + weights[:, -1] * (distance >= FAR)
         depth_loss = -(from_surface + 1e-5).log().mean()
         return functional.mse_loss(shown, colour) + DEPTH_WEIGHT * depth_loss
@@ -85,7 +92,7 @@ class Field(nn.Module):
         return torch.cat([self(start, ray, ends, middle)[0] for start, ray in chunks])
 
     def _encode(self, points: Tensor) -> Tensor:
-        """Return what the grid holds (…, levels, 2 * FEATURES) at points (…, 3) in metres."""
+        """Return the grid's values (…, levels, 2 * FEATURES) at points (…, 3) in metres."""
         local = (points - self.center) / self.radius
         away = local.norm(dim=-1, keepdim=True).clamp(min=1)
         unit = 0.5 + local * (2 - 1 / away) / away / 4

@@ -1,8 +1,9 @@
 """Measure what the workflow adds to Cycles' own render time, and whether memory stays flat.
 
-Renders the test room through scripts/render_shard.py: 200 views of 256 x 256 pixels at few samples
-(the time of a view is then mostly overhead), and a few views at about 2 s each. Figures are wall
-time on this machine, as idle as it is; Cycles' own time is the one in the header of its EXR files.
+Renders the test room through scripts/render_shard.py: 200 views of 256 x 256 pixels at one sample,
+and a few views of about 2 s each. At one sample, most of a view's time is overhead. Times are wall
+time, so nothing else should run on the machine. Cycles' own time comes from the header of its EXR
+files.
 """
 
 import argparse
@@ -41,11 +42,11 @@ def main() -> None:
     print("| --- | --- | --- | --- | --- | --- | --- |")
     for views, count in ((small, 1), (slow, samples)):
         wall = statistics.median(view["wall_seconds"] for view in views)
-        own = statistics.median(view["render_seconds"] for view in views)
-        over = statistics.median(v["wall_seconds"] - v["render_seconds"] for v in views)
+        render = statistics.median(view["render_seconds"] for view in views)
+        overhead = statistics.median(v["wall_seconds"] - v["render_seconds"] for v in views)
         print(
-            f"| {len(views)} | {RESOLUTION}² | {count} | {wall:.3f} | {own:.3f} "
-            f"| {over * 1000:.0f} ms | {over / wall:.1%} |"
+            f"| {len(views)} | {RESOLUTION}² | {count} | {wall:.3f} | {render:.3f} "
+            f"| {overhead * 1000:.0f} ms | {overhead / wall:.1%} |"
         )
     memory = [view["memory_bytes"] / 2**20 for view in small]
     quarter = max(1, len(memory) // 4)
@@ -56,7 +57,7 @@ def main() -> None:
 
 
 def measure(folder: Path, blend: Path, count: int, samples: int) -> list[dict[str, Any]]:
-    """Render ``count`` views in one process; return the journal's lines, the first view's aside."""
+    """Render ``count`` views in one process, after one more view; return their journal lines."""
     lens = lenses.from_camera(
         {"lens": "equidistant", "fov": 180, "resolution": [RESOLUTION, RESOLUTION]}
     )

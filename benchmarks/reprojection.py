@@ -1,18 +1,19 @@
 """Measure reprojection: its error against its run time, and what whole batches of views cost.
 
-Error: a band-limited function on the sphere is the scene. Source and truth are its means over each
-pixel of an equidistant fisheye and of a perspective view, so a method's error is known without any
-method's help. Every method resamples the same source to the same views: minified by 8, at unity,
-magnified by 3. CPU time a view is reading, resampling and writing, EXR to EXR.
+Error: the scene is a band-limited function on the sphere. The source is an equidistant fisheye and
+the truth a perspective view; each pixel is the mean of the function over it. So no method takes
+part in the truth. Every method resamples the same source to the same views: minified by 8, at
+unity, magnified by 3. CPU time a view is reading, resampling and writing, EXR to EXR.
 
-Batches (--batch N): N views of 2048 x 2048 pixels, half R G B and Z, to EXR with depth at the same
-size and to PNG at an eighth, by scripts/reproject.py with its default filter and with st_warp, by a
-bare read and write of the same files, and by --peer. All CPU time counts, of the start and of the
-lens map too, divided by the views. Ours is compressed at zlib's level 4; SILVR's tool has 9 in its
-source, with which most of its time goes into 3 % fewer bytes.
+Batches (--batch N): N views of 2048 x 2048 pixels with half R G B and Z are the input. The jobs are
+EXR with depth at the same size, and PNG at an eighth. The programs are scripts/reproject.py with
+its default filter and with st_warp, a bare read and write of the same files, and --peer. All CPU
+time counts, that of the start and of the lens map too, divided by the views. We compress at zlib's
+level 4. SILVR's tool has level 9 in its source: most of its time goes into 3 % fewer bytes.
 
 --peer PATH adds a program that takes the flags of SILVR's reprojection tool. Writes
-reprojection.csv, reprojection_batches.csv and reprojection.svg and .png into the output folder.
+reprojection.csv, reprojection_batches.csv, reprojection.svg and reprojection.png into the output
+folder.
 """
 
 import argparse
@@ -54,7 +55,7 @@ except ImportError:
 
 SCRIPTS = Path(sys.path[0])
 SENSOR = 36.0
-# Times that differ by less are equal: repeats differ by as much.
+# Times whose relative difference is smaller are equal: repeats differ by as much.
 SAME_TIME = 0.03
 CAMERA = ["--rectilinear", "18,36"]
 STYLES = {
@@ -95,11 +96,12 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("output", type=Path, help="folder to write to")
-    parser.add_argument("--size", type=int, default=1024, help="of the source (default: 1024)")
-    parser.add_argument("--repeats", type=int, default=5, help="timings each (default: 5)")
-    parser.add_argument("--peer", type=Path, metavar="PATH", help="external reproject program")
-    parser.add_argument("--batch", type=int, default=0, metavar="N", help="views a batch")
-    parser.add_argument("--batch-size", type=int, default=2048, help="of its views")
+    add = parser.add_argument
+    add("--size", type=int, default=1024, help="pixels of the source's side (default: 1024)")
+    add("--repeats", type=int, default=5, help="timings of each method (default: 5)")
+    add("--peer", type=Path, metavar="PATH", help="another program that reprojects")
+    add("--batch", type=int, default=0, metavar="N", help="views of a batch (default: no batch)")
+    add("--batch-size", type=int, default=2048, help="pixels of its views' side (default: 2048)")
     arguments = parser.parse_args()
     if arguments.size < 64:
         sys.exit(f"error: --size {arguments.size}: must be at least 64")
@@ -140,7 +142,7 @@ class Waves:
         total = np.ones((lens.height, lens.width))
         for v, down in zip(places / 2, weights / 2, strict=True):
             for u, across in zip(places / 2, weights / 2, strict=True):
-                # A row at a time, for there are many waves.
+                # A row at a time: all waves of all pixels would not fit into memory.
                 for row, rays in zip(total, lens.rays(x + u, y + v), strict=True):
                     waves = np.cos(rays @ self.vectors.T + self.phases)
                     row += across * down * (waves @ self.amplitudes)
@@ -151,7 +153,7 @@ class Waves:
 
 
 def scenarios(size: int) -> dict[str, Rectilinear]:
-    """Return the views by name: source pixels a target pixel at the centre are 8, 1 and 1/3."""
+    """Return the views by name: at the centre, a pixel spans 8, 1 or 1/3 pixels of the source."""
     unity = size / math.pi  # the source's pixels a radian
     return {
         name: Rectilinear(
@@ -178,8 +180,8 @@ def measure_errors(arguments: argparse.Namespace, folder: Path) -> list[Result]:
     gray = np.where(np.isnan(gray), np.float32(0), gray)
     pixels = np.repeat(gray[:, :, None], 4, axis=2)
     view = folder / "views" / "view.exr"
-    # The file holds floats, so that no method's error is that of halves; its reading is timed on
-    # halves, as views have.
+    # The file holds floats, so that rounding to halves adds no error. Reading is timed on halves,
+    # for views hold halves.
     images.write_exr(view, dict.fromkeys("RGB", gray))
     half = folder / "half.exr"
     images.write_exr(half, dict.fromkeys("RGB", gray.astype(np.float16)))
@@ -189,11 +191,11 @@ def measure_errors(arguments: argparse.Namespace, folder: Path) -> list[Result]:
         print(f"{name}: {lens.width} × {lens.height}", flush=True)
         spans = source.width / math.pi / lens.focal_length * SENSOR / lens.width
         truth = scene.means(lens, max(3, math.ceil(1.2 * spans) + 4))
-        io = best_cpu(partial(read_and_write, half, folder / "out.exr", lens), arguments)
+        io_cpu = best_cpu(partial(read_and_write, half, folder / "out.exr", lens), arguments)
         for method, samples, resample in methods(source, lens, pixels):
             error = resample() - truth
             cpu = best_cpu(resample, arguments)
-            results.append(row(name, lens, method, samples, error, cpu, cpu + io))
+            results.append(row(name, lens, method, samples, error, cpu, cpu + io_cpu))
         if arguments.peer:
             results += peer_rows(arguments, folder, name, lens, truth)
     return results
@@ -205,8 +207,8 @@ def row(
     method: str,
     samples: int,
     error: Array,
-    resample: float | None,
-    all_: float,
+    resample_cpu: float | None,
+    view_cpu: float,
 ) -> Result:
     """Return a result, and print it."""
     result = Result(
@@ -217,10 +219,10 @@ def row(
         lens.height,
         float(np.sqrt(np.mean(error**2))),
         float(np.abs(error).max()),
-        resample,
-        all_,
+        resample_cpu,
+        view_cpu,
     )
-    print(f"  {result.label:16s} rms error {result.rms_error:.2e}, {all_:.4f} CPU-s a view")
+    print(f"  {result.label:16s} rms error {result.rms_error:.2e}, {view_cpu:.4f} CPU-s a view")
     return result
 
 
@@ -230,28 +232,32 @@ def methods(
     """Return (name, samples, function) of every method that resamples in this process."""
     chosen = [(name, 1) for name in STYLES if name not in ("OpenCV", "peer")]
     chosen += [(name, n) for name in ("bilinear", "bicubic") for n in (2, 4, 8)]
-    found: list[tuple[str, int, Callable[[], Array]]] = []
+    functions: list[tuple[str, int, Callable[[], Array]]] = []
     for name, samples in chosen:
-        made = lens_map.compute(source, target, np.eye(3), name, samples)
-        row, end_row, column, end_column = made.window
+        mapping = lens_map.compute(source, target, np.eye(3), name, samples)
+        row, end_row, column, end_column = mapping.window
         window = np.ascontiguousarray(pixels[row:end_row, column:end_column])
-        found.append((name, samples, partial(ours, window, made)))
+        functions.append((name, samples, partial(ours, window, mapping)))
     if cv2 is not None:
         cv2.setNumThreads(1)
-        made = lens_map.compute(source, target, np.eye(3), "bicubic")
-        x = made.centers[..., 0] + np.float32(made.window[2] - 0.5)
-        y = made.centers[..., 1] + np.float32(made.window[0] - 0.5)
+        mapping = lens_map.compute(source, target, np.eye(3), "bicubic")
+        x = mapping.centers[..., 0] + np.float32(mapping.window[2] - 0.5)
+        y = mapping.centers[..., 1] + np.float32(mapping.window[0] - 0.5)
         for flag in (cv2.INTER_LINEAR, cv2.INTER_CUBIC, cv2.INTER_LANCZOS4):
-            found.append(("OpenCV", 1, lambda flag=flag: cv2.remap(pixels, x, y, flag)[:, :, 0]))
-    return found
+            functions.append(("OpenCV", 1, partial(opencv, pixels, x, y, flag)))
+    return functions
 
 
-def ours(window: Array, made: lens_map.LensMap) -> Array:
-    return np.asarray(resample_colour(window, made)[:, :, 0])
+def ours(window: Array, mapping: lens_map.LensMap) -> Array:
+    return np.asarray(resample_colour(window, mapping)[:, :, 0])
+
+
+def opencv(pixels: Array, x: Array, y: Array, flag: int) -> Array:
+    return np.asarray(cv2.remap(pixels, x, y, flag)[:, :, 0])
 
 
 def read_and_write(source: Path, target: Path, lens: Lens) -> None:
-    """Do what every method does but for resampling: read a view, write one of the target's size."""
+    """Do what every method shares: read a view, and write one of the target's size."""
     read = images.read_image(source, ["R", "G", "B"]).channels
     wide = widen(*(read[name] for name in "RGB"))
     rows = np.arange(lens.height) % len(wide)
@@ -261,7 +267,7 @@ def read_and_write(source: Path, target: Path, lens: Lens) -> None:
 
 
 def best_cpu(function: Callable[[], Any], arguments: argparse.Namespace) -> float:
-    """Return the least CPU time of ``function`` among the repeats, after one that warms up."""
+    """Return the least CPU time of ``function`` among the repeats, after a warm-up call."""
     function()
     times = []
     for _ in range(arguments.repeats):
@@ -274,7 +280,7 @@ def best_cpu(function: Callable[[], Any], arguments: argparse.Namespace) -> floa
 def peer_rows(
     arguments: argparse.Namespace, folder: Path, name: str, lens: Rectilinear, truth: Array
 ) -> list[Result]:
-    """Return the external program's rows; the least CPU time of its process."""
+    """Return the other program's rows, with the least CPU time of its process."""
     rows = []
     for flag, samples in (("nn", 1), ("bl", 1), ("bc", 1), ("bc", 2), ("bc", 4), ("bc", 8)):
         command = [
@@ -293,15 +299,15 @@ def peer_rows(
 def cpu_of(command: Sequence[str]) -> float:
     """Return the CPU time, user and system, of a command that succeeds."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    if done.returncode:
-        raise UserError(f"{command[0]}: failed: {done.stderr or done.stdout}")
+    if result.returncode:
+        raise UserError(f"{command[0]}: failed: {result.stderr or result.stdout}")
     return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
 
 def pareto_front(results: Sequence[Result]) -> list[Result]:
-    """Return the rows that no other of their scenario beats in error without costing more time."""
+    """Return the rows that no row of their scenario beats in error at the same or less time."""
     front = []
     for name in dict.fromkeys(result.scenario for result in results):
         rows = [result for result in results if result.scenario == name]
@@ -322,7 +328,7 @@ def draw(stem: Path, results: Sequence[Result], front: Sequence[Result]) -> None
 
 
 def draw_scenario(panel: Any, rows: Sequence[Result], front: Sequence[Result]) -> None:
-    """Draw the results of one scenario, and the front that they have."""
+    """Draw the results of one scenario, and their Pareto front."""
     best = [r for r in front if r in rows]
     times = [r.view_cpu_s for r in best]
     errors = [r.rms_error for r in best]
@@ -356,7 +362,7 @@ def draw_scenario(panel: Any, rows: Sequence[Result], front: Sequence[Result]) -
         xlabel="CPU time a view, EXR to EXR (s)",
         title=f"{rows[0].scenario} ({rows[0].width} × {rows[0].height} pixels)",
     )
-    # Times that hardly differ shall not look as if they did.
+    # A wide axis: times that hardly differ must look so.
     low, high = panel.get_xlim()
     middle = math.sqrt(low * high)
     panel.set_xlim(min(low, middle / 2.5), max(high, middle * 2.5))
@@ -396,7 +402,7 @@ def measure_batches(arguments: argparse.Namespace, folder: Path) -> list[dict[st
 def write_batch(folder: Path, size: int, count: int) -> None:
     """Write ``count`` views, half R G B and Z, with a scene's detail and a render's noise.
 
-    As the renderer does, it gives each the key of its settings, so that no checksum is needed.
+    Each has a key of its settings, as rendered views have, so that it needs no checksum.
     """
     lens = Equidistant(width=size, height=size, fov=math.pi)
     rng = np.random.default_rng(0)
@@ -418,7 +424,7 @@ def write_batch(folder: Path, size: int, count: int) -> None:
 
 
 def run_batch(program: list[str], folder: Path, flags: list[str]) -> float:
-    """Return the CPU time of a program on the whole batch, into an empty folder."""
+    """Return the CPU time of a program that writes the batch into an empty folder."""
     with tempfile.TemporaryDirectory(dir=folder) as out:
         return cpu_of(
             [

@@ -1,10 +1,10 @@
 """Measure how planning, a run with nothing to do, and the status grow with the number of views.
 
-Writes into a folder of its own a scene of one plane of cameras, plans it with Snakemake, then
-simulates all that a finished build of it has, of views of one pixel, and runs Snakemake, dry and
-not, and the status again. Then it renders one shard of the test room and compares the memory of
-the first and the last quarter of its views. With --built it also builds a dataset of tiny views,
-from the scene to the page.
+Writes a scene with one plane of cameras into a folder of its own, and plans it with Snakemake. Then
+it writes the files of a finished build, with views of one pixel. It plans and runs that again, and
+shows its status. After that it renders one shard of the test room, and compares the memory in the
+first and the last quarter of its views. With --built it also builds a dataset of tiny views, from
+the scene to the page.
 """
 
 import argparse
@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +45,7 @@ rigs:
     camera: {{lens: CAMERA}}
 """
 PLANNED_SCENE = SCENE.replace("CAMERA", "rectilinear, fov: 60, resolution: [16, 16]")
-# Of a whole build: fisheye views, which are reprojected and exported as those of the other scenes.
+# A real build renders fisheye views, reprojects and exports them, as the other scenes do.
 BUILT_SCENE = (
     SCENE.replace("CAMERA", "equidistant, fov: 180, resolution: [8, 8]")
     + """
@@ -57,20 +58,21 @@ exports:
     sources: [perspective]
 """
 )
-# Of a dataset that is built: its shards.
+# The shards of a real build.
 BUILT_SHARDS = 20
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--views", type=int, default=100_000, help="default: 100000")
-    parser.add_argument("--shards", type=int, default=2000, help="default: 2000")
-    parser.add_argument("--rendered", type=int, default=500, help="views of a real shard")
-    parser.add_argument("--built", type=int, default=0, help="views of 8² of a whole build")
+    add = parser.add_argument
+    add("--views", type=int, default=100_000, help="views of the simulated build (default: 100000)")
+    add("--shards", type=int, default=2000, help="shards of the simulated build (default: 2000)")
+    add("--rendered", type=int, default=500, help="views of the rendered shard (default: 500)")
+    add("--built", type=int, default=0, help="views of the real build, of 8² (default: no build)")
     arguments = parser.parse_args()
     print("| what | s | CPU-s | MB |\n| --- | ---: | ---: | ---: |", flush=True)
     for measure, views in (
-        (lambda views: plans(views, arguments.shards), arguments.views),
+        (partial(plans, shards=arguments.shards), arguments.views),
         (a_shard, arguments.rendered),
         (a_build, arguments.built),
     ):
@@ -80,10 +82,10 @@ def main() -> None:
 
 
 def plans(views: int, shards: int) -> None:
-    """Measure plans, of nothing and of a simulated build, a run, and the status."""
+    """Measure plans before and after a simulated build, a run without work, and the status."""
     count = write_settings(views, max(1, views // shards))
     row(f"plan of {count} views in {shards} shards", "--dry-run")
-    # In a process of its own, whose memory no other one takes over.
+    # A process of its own, so that no later process inherits its memory.
     simulation = multiprocessing.Process(target=simulate)
     simulation.start()
     simulation.join()
@@ -95,15 +97,15 @@ def plans(views: int, shards: int) -> None:
 
 
 def a_shard(views: int) -> None:
-    """Measure one process that renders so many views."""
+    """Measure one process that renders ``views`` views."""
     write_settings(views, views)
     (dataset,) = chosen()
     ((first, end),) = dataset.shards
     record = Path(dataset.record("render", first, end))
     row(f"a shard of {end} views", str(record))
     lines = record.with_name(f"{record.stem}{JOURNAL_SUFFIX}").read_text().splitlines()
-    memory = [json.loads(line).get("memory_bytes") for line in lines]
-    memory = [entry / 1e6 for entry in memory if entry]
+    entries = [json.loads(line) for line in lines]
+    memory = [entry["memory_bytes"] / 1e6 for entry in entries if entry.get("memory_bytes")]
     quarter = len(memory) // 4
     print(
         f"its memory: {statistics.median(memory[:quarter]):.0f} MB in the first quarter "
@@ -131,9 +133,9 @@ def a_build(views: int) -> None:
 
 
 def write_settings(views: int, views_per_shard: int, scene: str = PLANNED_SCENE) -> int:
-    """Write the scene and the settings of a build into the present folder; return its views.
+    """Write the scene and the settings of a build into the current folder; return its view count.
 
-    These are the ``views`` that fill a plane.
+    The count is the largest one up to ``views`` that fills the plane.
     """
     columns = round(views**0.5)
     rows = views // columns
@@ -146,20 +148,22 @@ def write_settings(views: int, views_per_shard: int, scene: str = PLANNED_SCENE)
 def chosen() -> list[Dataset]:
     """Return the datasets that the settings choose."""
     repository = config.read_config(config.ROOT / "config.yaml")
-    own = config.read_config(Path("config.yaml"))
-    return load_datasets(config.load_config(repository | own))
+    build = config.read_config(Path("config.yaml"))
+    return load_datasets(config.load_config(repository | build))
 
 
-def row(what: str, *words: str) -> float:
-    """Run Snakemake in the present folder, print what it took, and return its seconds.
+def row(label: str, *arguments: str) -> float:
+    """Run Snakemake in the current folder, print a row of what it took, and return its seconds.
 
     Memory is Snakemake's own peak, without that of its jobs.
     """
     snakefile = str(config.ROOT / "Snakefile")
     command = ["snakemake", "--cores", "1", "--quiet", "all", "--snakefile", snakefile]
     with Path("output.txt").open("wb") as output:
-        process = subprocess.Popen([*command, *words], stdout=output, stderr=output)
-        began, peak, ended = os.times().elapsed, 0, 0
+        process = subprocess.Popen([*command, *arguments], stdout=output, stderr=output)
+        began = os.times().elapsed
+        peak = 0
+        ended = 0
         while not ended:
             peak = peak_kib(process.pid) or peak
             time.sleep(0.1)
@@ -168,7 +172,7 @@ def row(what: str, *words: str) -> float:
         sys.exit(Path("output.txt").read_text())
     seconds = os.times().elapsed - began
     print(
-        f"| {what} | {seconds:.1f} | {usage.ru_utime + usage.ru_stime:.1f} "
+        f"| {label} | {seconds:.1f} | {usage.ru_utime + usage.ru_stime:.1f} "
         f"| {peak * 1024 / 1e6:.0f} |",
         flush=True,
     )
@@ -176,7 +180,7 @@ def row(what: str, *words: str) -> float:
 
 
 def peak_kib(process: int) -> int:
-    """Return the most memory that a process had so far; 0 once it has ended."""
+    """Return the peak memory of a process so far, in KiB; 0 once it has ended."""
     for line in Path(f"/proc/{process}/status").read_text().splitlines():
         if line.startswith("VmHWM:"):
             return int(line.split()[1])
@@ -184,7 +188,7 @@ def peak_kib(process: int) -> int:
 
 
 def simulate() -> None:
-    """Write all files of a finished build: views of one pixel, and records that are right."""
+    """Write all files of a finished build: views of one pixel, and correct records."""
     (dataset,) = chosen()
     lightfield = LightField.from_rig(
         dataset.rig, dataset.rig.camera.make(), **dataset.origin(dataset.render)
@@ -192,16 +196,18 @@ def simulate() -> None:
     lightfield.write(f"{dataset.folder}/lightfield.json")
     folder = Path(dataset.folder, "exr")
     folder.mkdir()
-    # One view, of which the others differ by the key in the header alone.
+    # Views differ by the key in the header alone.
     pattern = "0" * 64
     images.write_exr(
         "view.exr", {"R": np.zeros((1, 1), np.float16)}, {images.KEY_ATTRIBUTE: pattern}
     )
     content = Path("view.exr").read_bytes()
     for first, end in dataset.shards:
-        lines, files = [], {}
+        lines = []
+        files = {}
         for view in lightfield.views[first:end]:
-            path, key = folder / f"{view.name}.exr", keys.render_key(lightfield, view)
+            path = folder / f"{view.name}.exr"
+            key = keys.render_key(lightfield, view)
             path.write_bytes(content.replace(pattern.encode(), key.encode()))
             sums = {"bytes": len(content), "sha256": sha256(path)}
             files[f"exr/{path.name}"] = sums
@@ -214,31 +220,31 @@ def simulate() -> None:
     for name in [*published, "results/index.html"]:
         if not Path(name).exists():
             write_text(name, '{"valid": true}')
-    when = 1_700_000_000
+    timestamp = 1_700_000_000
     for root in ("results", "work"):
         for path in Path(root).rglob("*"):
-            os.utime(path, (when, when))
+            os.utime(path, (timestamp, timestamp))
     note_jobs(dataset)
 
 
 def note_jobs(dataset: Dataset) -> None:
-    """Write the ledger of the finished build: one job for each shard, and for each other file."""
-    noted = ledger.Ledger(Path("work", ledger.NAME))
+    """Write the ledger of the finished build: one job for each shard and for each other file."""
+    job_ledger = ledger.Ledger(Path("work", ledger.NAME))
     records = dataset.all_records
-    others = sorted({*dataset.files, *dataset.intermediates} - {*records})
-    from_scene = {name: ledger.Stamp.of(name) for name in others if name.startswith("work/")}
+    other_files = sorted({*dataset.files, *dataset.intermediates} - {*records})
+    from_scene = {name: ledger.Stamp.of(name) for name in other_files if name.startswith("work/")}
     for name in records:
         log = f"{name.removesuffix('.json')}{LOG_SUFFIX}"
         files = {name: ledger.Stamp.of(name)}
         for view, entry in json.loads(Path(name).read_bytes())["files"].items():
             path = f"{dataset.folder}/{view}"
             files[path] = ledger.Stamp.of(path, entry["sha256"])
-        noted.note(ledger.Job([name], files, {log: ledger.Stamp.of(log)}, from_scene))
-    # Of what reads all views, such as the validation.
+        job_ledger.note(ledger.Job([name], files, {log: ledger.Stamp.of(log)}, from_scene))
+    # The validation reads all views.
     from_views = {name: ledger.Stamp.of(name) for name in records}
-    for name in [*others, "results/index.html"]:
+    for name in [*other_files, "results/index.html"]:
         read = from_views if name.endswith("/validation.json") else {}
-        noted.note(ledger.Job([name], {name: ledger.Stamp.of(name)}, {}, read))
+        job_ledger.note(ledger.Job([name], {name: ledger.Stamp.of(name)}, {}, read))
 
 
 if __name__ == "__main__":

@@ -1,10 +1,11 @@
 """Kill builds, damage their files, and leave them no room; count what is found, mended and lost.
 
-Builds a small dataset of the test room in a folder of its own: once undisturbed; once with every
-file limited in size and killed at random moments, until it is finished; then it spoils files of
-every kind, lets `snakemake verify` find them and --mend set them aside, and builds on. In the end
-all published bytes must be those of the undisturbed build. Prints a table, and fails if anything
-was not found, not mended, lost, or made twice.
+Builds a small dataset of the test room twice, each time in a folder of its own. Nothing disturbs
+the first build. The second one may first write no large files, is then killed at random moments,
+and finishes at last. Then the program spoils its files in every way, lets `snakemake verify --mend`
+find them and set them aside, and builds again. In the end all published bytes must be those of the
+undisturbed build. Prints a table. Fails if a fault was not found or not mended, or if anything was
+lost or made twice.
 """
 
 import argparse
@@ -20,7 +21,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import astuple, dataclass
 from pathlib import Path
 
@@ -48,8 +49,9 @@ reprojections:
   perspective:
     camera: {{lens: rectilinear, fov: 60, resolution: [24, 24]}}
 """
-DATASET, WORK = Path("results/soak/LFSoak"), Path("work/soak/LFSoak")
-# Bytes that no file may exceed: from what Snakemake itself needs to less than the scene.
+DATASET = Path("results/soak/LFSoak")
+WORK = Path("work/soak/LFSoak")
+# No file may exceed so many bytes: from what Snakemake itself needs to less than the scene.
 LIMITS = (32_000, 64_000, 128_000)
 
 
@@ -72,7 +74,7 @@ def delete(path: Path, rng: random.Random) -> None:
 
 
 def replace(path: Path, rng: random.Random) -> None:
-    """Put another file there that can be read as well, where it is an image."""
+    """Write another file in its place; an image stays readable."""
     pixels = np.full((4, 4), rng.randrange(100, 200), np.uint8)
     if path.suffix == ".exr":
         images.write_exr(path, {"R": pixels.astype(np.float16)}, {images.KEY_ATTRIBUTE: "render"})
@@ -83,12 +85,13 @@ def replace(path: Path, rng: random.Random) -> None:
 
 
 def swap(path: Path, rng: random.Random) -> None:
-    """Put the bytes of another file of its folder there, which is as good but not this one."""
+    """Write the bytes of another file of its folder, of the same kind, in its place."""
     content = path.read_bytes()
-    beside = sorted(other for other in path.parent.glob(f"*{path.suffix}") if other.is_file())
-    others = [other for other in map(Path.read_bytes, beside) if other != content]
-    if others:
-        path.write_bytes(rng.choice(others))
+    siblings = sorted(file for file in path.parent.glob(f"*{path.suffix}") if file.is_file())
+    contents = [file.read_bytes() for file in siblings]
+    different = [sibling for sibling in contents if sibling != content]
+    if different:
+        path.write_bytes(rng.choice(different))
     else:
         replace(path, rng)
 
@@ -99,7 +102,7 @@ def folder(path: Path, rng: random.Random) -> None:
 
 
 def unreadable(path: Path, rng: random.Random) -> None:
-    """For root, too: a link to itself."""
+    """Make the file a link to itself, which root cannot read either."""
     path.unlink()
     path.symlink_to(path.name)
 
@@ -110,7 +113,7 @@ KINDS: list[Callable[[Path, random.Random], None]] = [
 
 
 def spoil(path: Path, kind: Callable[[Path, random.Random], None], rng: random.Random) -> None:
-    """Spoil a file and keep its time where it stays a file."""
+    """Spoil a file; keep its time if it stays a file."""
     status = path.stat()
     kind(path, rng)
     if path.is_file():
@@ -126,87 +129,97 @@ class Build:
         settings = {"scenes": ["soak"], "rigs": "all", "preset": "full", "device": "cpu"}
         write_json(root / "config.yaml", settings | {"views_per_shard": 2})
 
-    def start(self, *words: str, limit: int | None = None) -> subprocess.Popen[str]:
-        """Start Snakemake, in a process group that can be killed, with no file beyond a limit."""
+    def start(self, *arguments: str, limit: int | None = None) -> subprocess.Popen[str]:
+        """Start Snakemake in a process group of its own; ``limit`` is the largest file's bytes."""
 
-        def limited() -> None:
+        def limit_file_size() -> None:
             if limit:
                 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
         snakemake = str(Path(sys.executable).with_name("snakemake"))
         command = [snakemake, "--snakefile", str(ROOT / "Snakefile")]
         return subprocess.Popen(
-            [*command, "--cores", str(os.cpu_count() or 1), *words],
+            [*command, "--cores", str(os.cpu_count() or 1), *arguments],
             cwd=self.root,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
             start_new_session=True,
-            preexec_fn=limited,
+            preexec_fn=limit_file_size,
         )
 
-    def run(self, *words: str, limit: int | None = None) -> tuple[bool, str]:
-        """Run Snakemake to its end; return whether it succeeded, and what it said."""
-        process = self.start(*words, limit=limit)
-        said, _ = process.communicate()
-        return process.returncode == 0, said
+    def run(self, *arguments: str, limit: int | None = None) -> tuple[bool, str]:
+        """Run Snakemake to its end; return whether it succeeded, and its output."""
+        process = self.start(*arguments, limit=limit)
+        output, _ = process.communicate()
+        return process.returncode == 0, output
 
     def finish(self) -> None:
-        succeeded, said = self.run()
+        succeeded, output = self.run()
         if not succeeded:
-            sys.exit(f"error: a build failed that nothing disturbed:\n{said}")
+            sys.exit(f"error: an undisturbed build failed:\n{output}")
 
     def clear(self) -> None:
-        """Remove all that was made."""
+        """Remove all that the build wrote."""
         for name in ("results", "work", ".snakemake"):
             shutil.rmtree(self.root / name)
 
-    def call(self, *words: str) -> str:
+    def call(self, *command: str) -> str:
         """Run a program in the build's folder; return what it printed."""
-        result = subprocess.run(words, cwd=self.root, capture_output=True, text=True, check=False)
+        result = subprocess.run(command, cwd=self.root, capture_output=True, text=True, check=False)
         return result.stdout
 
     def files(self) -> list[Path]:
-        """Return the files of the dataset and of its scene that jobs made.
+        """Return the files of the dataset and of its scene that jobs wrote.
 
-        Settings are none: each plan writes what is not as it should be.
+        Settings are left out: each plan rewrites those that are wrong.
         """
+        paths = []
+        for part in (DATASET, WORK.parent):
+            paths += sorted((self.root / part).rglob("*"))
         return [
             path
-            for part in (DATASET, WORK.parent)
-            for path in sorted((self.root / part).rglob("*"))
+            for path in paths
             if path.is_file() and path.stat().st_size > 1 and "settings" not in path.parts
         ]
 
     def published(self) -> dict[str, str]:
         """Return the SHA-256 of each published file."""
-        lines = (self.root / DATASET / "sha256sums.txt").read_text().splitlines()
-        return {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
+        digests = {}
+        for line in (self.root / DATASET / "sha256sums.txt").read_text().splitlines():
+            digest, _, name = line.partition("  ")
+            digests[name] = digest
+        return digests
 
     def finished(self) -> dict[Path, tuple[str, int]]:
-        """Return SHA-256 and bytes of each view that is logged as finished."""
-        found = {}
+        """Return the SHA-256 and the size in bytes of each view that is logged as finished."""
+        views = {}
         for log in (self.root / WORK).glob("*/*.sums.jsonl"):
             for line in log.read_text(errors="replace").splitlines():
                 try:
                     entry = json.loads(line)
                 except ValueError:
                     continue  # a kill has cut it short
-                found[self.root / DATASET / entry["file"]] = (entry["sha256"], entry["bytes"])
-        return found
+                views[self.root / DATASET / entry["file"]] = (entry["sha256"], entry["bytes"])
+        return views
 
-    def made(self) -> Counter[str]:
+    def render_counts(self) -> Counter[str]:
         """Return how often each view was rendered."""
-        lines = [
-            line
-            for journal in (self.root / WORK).glob("render/*.journal.jsonl")
-            for line in journal.read_text(errors="replace").splitlines()
-        ]
-        return Counter(json.loads(line)["view"] for line in lines if line.startswith('{"view"'))
+        return count_renders((self.root / WORK).glob("render/*.journal.jsonl"))
 
 
-def lost(before: dict[Path, tuple[str, int]]) -> int:
-    """Return how many bytes of finished files are no longer there as they were."""
+def count_renders(journals: Iterable[Path]) -> Counter[str]:
+    """Return how often each view was rendered, from the journals of the render jobs."""
+    counts: Counter[str] = Counter()
+    for journal in journals:
+        for line in journal.read_text(errors="replace").splitlines():
+            if line.startswith('{"view"'):
+                counts[json.loads(line)["view"]] += 1
+    return counts
+
+
+def lost_bytes(before: dict[Path, tuple[str, int]]) -> int:
+    """Return how many bytes of finished files are missing or changed."""
     return sum(
         size
         for path, (digest, size) in before.items()
@@ -216,7 +229,7 @@ def lost(before: dict[Path, tuple[str, int]]) -> int:
 
 @dataclass
 class Row:
-    """Of the table: a fault, and what became of it."""
+    """A row of the table: a kind of fault, and what became of it."""
 
     fault: str
     injected: int = 0
@@ -225,25 +238,26 @@ class Row:
     bytes_lost: int = 0
     made_twice: int = 0
 
-    def is_whole(self) -> bool:
-        return self.injected == self.found == self.mended and not (
-            self.bytes_lost + self.made_twice
-        )
+    def passes(self) -> bool:
+        """Return whether each fault was found and mended, and nothing was lost or made twice."""
+        mended = self.injected == self.found == self.mended
+        return mended and self.bytes_lost == 0 and self.made_twice == 0
 
 
 def limit_files(build: Build, count: int) -> Iterator[Row]:
-    """Build with ever larger limits of a file's size: each is named, and leaves nothing half."""
+    """Build with ever larger limits of file size: each build says so and leaves no half file."""
     progress = Progress(count, "soak", "limits of files")
     for limit in LIMITS[:count]:
         before = build.finished()
-        succeeded, said = build.run(limit=limit)
-        named = any(word in said for word in ("cannot be written", "File too large", "SIGXFSZ"))
+        succeeded, output = build.run(limit=limit)
+        causes = ("cannot be written", "File too large", "SIGXFSZ")
+        names_cause = any(cause in output for cause in causes)
         half = [path for path in build.root.rglob(".*.tmp*") if ".snakemake" not in path.parts]
-        whole = not half and "Traceback" not in said
-        found = not succeeded and named
-        yield Row(f"no file beyond {limit} B", 1, int(found), int(whole), lost(before))
-        if not (found and whole):
-            print(said, file=sys.stderr)
+        clean = not half and "Traceback" not in output
+        reported = not succeeded and names_cause
+        yield Row(f"no file beyond {limit} B", 1, int(reported), int(clean), lost_bytes(before))
+        if not (reported and clean):
+            print(output, file=sys.stderr)
         progress.done()
 
 
@@ -252,8 +266,8 @@ def kill(
 ) -> Row:
     """Kill a build at random moments; the next one goes on, and the last one finishes.
 
-    ``seconds`` is what a build takes, ``expected`` what it publishes. After one that finishes
-    before it is killed another begins from nothing.
+    ``seconds`` is a build's duration, ``expected`` the checksums of the files that it publishes.
+    If a build finishes before it is killed, another one begins from nothing.
     """
     row = Row("killed at a random moment")
     killed = 0
@@ -261,14 +275,13 @@ def kill(
     while True:
         before = build.finished()
         process = build.start()
+        timeout = rng.uniform(0.05, 0.7) * seconds if row.injected < count else None
         try:
-            process.communicate(
-                timeout=rng.uniform(0.05, 0.7) * seconds if row.injected < count else None
-            )
+            process.communicate(timeout=timeout)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
-        row.bytes_lost += lost(before)
+        row.bytes_lost += lost_bytes(before)
         if process.returncode == -signal.SIGKILL:
             killed += 1
             row.injected += 1
@@ -276,18 +289,20 @@ def kill(
             progress.done()
             build.run("--unlock")
         elif process.returncode == 0:
-            row.mended += killed if build.published() == expected else 0
-            row.made_twice += build.made().total() - len(build.made())
+            if build.published() == expected:
+                row.mended += killed
+            renders = build.render_counts()
+            row.made_twice += renders.total() - len(renders)
             killed = 0
             if row.injected == count:
                 return row
             build.clear()
         else:
-            sys.exit("error: a build failed that was not killed")
+            sys.exit("error: a build failed although nothing killed it")
 
 
 def damage(build: Build, faults: int, rng: random.Random) -> Iterator[Row]:
-    """Spoil files of every kind, find, mend, and build on; yield a row for each kind of fault."""
+    """Spoil files, let them be found and mended, and build again; yield a row for each fault."""
     rows = {kind: Row(f"{kind.__name__}: a file") for kind in KINDS}
     progress = Progress(faults, "soak", "faults")
     verify = [sys.executable, str(ROOT / "scripts/verify.py"), str(DATASET), "--work", "work"]
@@ -297,41 +312,50 @@ def damage(build: Build, faults: int, rng: random.Random) -> Iterator[Row]:
         kinds = {path: KINDS[(faults - number) % len(KINDS)] for number, path in enumerate(chosen)}
         faults -= len(chosen)
         sound = {path: sums for path, sums in build.finished().items() if path not in kinds}
-        rendered = build.made()
-        # Views whose own file, or log of checksums, is spoiled are to be made again.
-        spoiled = {path.name.partition(".")[0] for path in kinds}
-        for log in (path for path in kinds if path.name.endswith(".sums.jsonl")):
-            lines = map(json.loads, log.read_text().splitlines())
-            spoiled |= {Path(line["file"]).stem for line in lines}
+        rendered = build.render_counts()
+        spoiled = views_to_render_again(kinds)
         for path, kind in kinds.items():
             spoil(path, kind, rng)
-        said = build.call(*verify, "--mend")
+        report = build.call(*verify, "--mend")
         build.finish()
-        still = build.call(*verify)
+        later_report = build.call(*verify)
         for path, kind in kinds.items():
             name = f"{path.relative_to(build.root)}: "
             rows[kind].injected += 1
-            rows[kind].found += name in said
-            rows[kind].mended += name not in still
-        again = [view for view in build.made() - rendered if view not in spoiled]
-        rows[KINDS[0]].made_twice += len(again)
-        rows[KINDS[0]].bytes_lost += lost(sound)
+            rows[kind].found += name in report
+            rows[kind].mended += name not in later_report
+        repeated = [view for view in build.render_counts() - rendered if view not in spoiled]
+        rows[KINDS[0]].made_twice += len(repeated)
+        rows[KINDS[0]].bytes_lost += lost_bytes(sound)
         progress.done(len(chosen))
     yield from rows.values()
 
 
+def views_to_render_again(paths: Iterable[Path]) -> set[str]:
+    """Return the views whose own file, or log of checksums, is among ``paths``."""
+    views = set()
+    for path in paths:
+        views.add(path.name.partition(".")[0])
+        if path.name.endswith(".sums.jsonl"):
+            for line in path.read_text().splitlines():
+                views.add(Path(json.loads(line)["file"]).stem)
+    return views
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--views", type=int, default=12, help="of the dataset (default: 12)")
-    parser.add_argument("--limits", type=int, default=len(LIMITS), help="of files' sizes to try")
-    parser.add_argument("--kills", type=int, default=20, help="default: 20")
-    parser.add_argument("--faults", type=int, default=300, help="default: 300")
-    parser.add_argument("--seed", type=int, default=1)
+    add = parser.add_argument
+    add("--views", type=int, default=12, help="views of the dataset (default: 12)")
+    add("--limits", type=int, default=len(LIMITS), help="how many limits of file size to try")
+    add("--kills", type=int, default=20, help="number of kills (default: 20)")
+    add("--faults", type=int, default=300, help="number of spoiled files (default: 300)")
+    add("--seed", type=int, default=1, help="of the random choices (default: 1)")
     arguments = parser.parse_args()
     rng = random.Random(arguments.seed)
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as name:
-        undisturbed, build = (Build(Path(name, part), arguments.views) for part in ("a", "b"))
+        undisturbed = Build(Path(name, "a"), arguments.views)
+        build = Build(Path(name, "b"), arguments.views)
         undisturbed.finish()
         expected = undisturbed.published()
         seconds = time.monotonic() - began
@@ -347,9 +371,9 @@ def main() -> None:
     minutes = (time.monotonic() - began) / 60
     print(
         f"\n{arguments.views} views, seed {arguments.seed}, {minutes:.0f} minutes; all published "
-        f"bytes are {'' if same else 'NOT '}those of a build that nothing disturbed."
+        f"bytes are {'' if same else 'NOT '}those of the undisturbed build."
     )
-    if not (same and all(row.is_whole() for row in rows)):
+    if not (same and all(row.passes() for row in rows)):
         sys.exit("error: something was not found, not mended, lost, or made twice")
 
 

@@ -1,18 +1,21 @@
-"""Measure how steady the geometry is: every lens pair over extremes, against mpmath.
+"""Measure how stable the geometry is: every lens pair over extremes, against mpmath.
 
-One row a case: its condition number, its error against a reference of 50 digits, its round-trip
-error, the bound that the condition number implies, and a verdict. Writes stability.csv (all rows),
-stability.md (a summary) and stability.svg and .png (error over condition number) into --output,
-and fails where a case is outside its bound.
+Each case has a row: its condition number, its error against a reference of 50 digits, its
+round-trip error, the bound that follows from the condition number, and a verdict. Writes
+stability.csv (all rows) and stability.md (a summary) into --output. The error over the condition
+number goes into stability.svg and stability.png. Fails if a case is outside its bound.
 
-The bound. A chain of correctly rounded steps is off by about as much as its exact answer moves
-when each of its data moves by one rounding. The data of pixel → ray → pixel are the pixel (which
-moves by eps · (|x| + |principal point|)), the three components of the ray (each by eps times
-itself) and the answer. The sum of the exact answer's moves, in units of eps and relative to the
-size of the image, is the condition number; a case passes within ROUNDINGS of these moves, and as
-"ill-conditioned" where they let an answer be off by more than half a pixel. Where the
-answer is not unique (a pole, a seam, the rim of a 360° lens, a border between cube faces) the two
-answers are compared as rays.
+The bound. Rounding moves each datum of a chain of steps by up to one eps. The chain's answer may
+then be off by about as much as the exact answer moves. The data of pixel → ray → pixel are:
+
+- the pixel, which moves by eps · (|x| + |principal point|);
+- the three components of the ray, each of which moves by eps times itself;
+- the answer.
+
+The condition number is the sum of the exact answer's moves, in units of eps and relative to the
+image's size. A case passes within ROUNDINGS of these moves. It passes as "ill-conditioned" if they
+allow an error of more than half a pixel. Some answers are not unique: at a pole, a seam, the rim of
+a 360° lens, or a border between cube faces. These are compared as rays.
 """
 
 import argparse
@@ -38,21 +41,24 @@ from lightfield.geometry.lenses import LENSES, Array, Lens
 from lightfield.geometry.lenses.base import CircleFisheye
 from lightfield.imaging.plots import BLUE, VERMILION, plot
 
-ROUNDINGS = 16  # roundings, each of one eps, in the longest chain of operations of one step
-RIM = 32  # a point this many eps from the rim may count as inside or outside
-VAGUE = 0.5  # pixels of bound beyond which a case passes as ill-conditioned only
+# Roundings, each of one eps, in the longest chain of operations of one step.
+ROUNDINGS = 16
+# A point within so many eps of the rim may count as inside or outside.
+RIM = 32
+# If its bound is larger, in pixels, a case passes as ill-conditioned only.
+VAGUE = 0.5
 ILL_CONDITIONED = "ok, ill-conditioned"
 DIGITS = 50
-# Of differences: far below eps, so that a jump (a seam, a border) shows as an infinite derivative.
+# The step of differences: far below eps, so that a jump (a seam, a border) has a huge derivative.
 STEP = mpf(10) ** -20
-# What mpmath's roots are exact to, and more.
+# More than the error of mpmath's roots.
 TINY = mpf(10) ** -25
 INF = mpf("inf")
 
 Vector = Sequence[mpf]
 
 
-# The reference: every lens by its definition, in mpmath. An answer is None where there is none.
+# The reference: every lens by its definition, in mpmath. A missing answer is None.
 
 
 def half_fov(lens: Any) -> mpf:
@@ -61,13 +67,17 @@ def half_fov(lens: Any) -> mpf:
 
 def angles(lens: Any) -> tuple[int, list[mpf]]:
     """Return the sign of a polynomial lens's θ, and the coefficients of |θ| over r."""
-    sign = -1 if next(k for k in lens.coefficients[1:] if k) > 0 else 1
+    first_nonzero = next(k for k in lens.coefficients[1:] if k)
+    sign = -1 if first_nonzero > 0 else 1
     return sign, [-sign * mpf(k) for k in lens.coefficients]
 
 
 def radii(lens: Any) -> list[mpf]:
-    """Return the coefficients of a Kannala–Brandt lens's r / f over θ."""
-    return [mpf(c) for k in (1, *lens.coefficients) for c in (0, k)]
+    """Return the coefficients of a Kannala–Brandt lens's r / f over θ; even powers have none."""
+    coefficients = []
+    for k in (1, *lens.coefficients):
+        coefficients += [mpf(0), mpf(k)]
+    return coefficients
 
 
 def value(coefficients: Sequence[mpf], t: mpf) -> mpf:
@@ -111,7 +121,17 @@ def polynomial_radius(lens: Any, theta: mpf) -> mpf | None:
     return None if r is None else sign * r
 
 
-# θ at r, and r at θ, each None where there is none; r as in the lenses' own definitions.
+def equisolid_angle(lens: Any, r: mpf) -> mpf | None:
+    sine = r / (2 * mpf(lens.focal_length))
+    return 2 * asin(sine) if sine <= 1 else None
+
+
+def orthographic_angle(lens: Any, r: mpf) -> mpf | None:
+    sine = r * sin(half_fov(lens))
+    return asin(sine) if sine <= 1 else None
+
+
+# θ at r, and r at θ, each None if missing; r as in the lenses' own definitions.
 RADIAL: dict[str, tuple[Callable[[Any, mpf], mpf | None], Callable[[Any, mpf], mpf | None]]] = {
     "rectilinear": (
         lambda lens, r: atan(r / lens.focal_length),
@@ -122,7 +142,7 @@ RADIAL: dict[str, tuple[Callable[[Any, mpf], mpf | None], Callable[[Any, mpf], m
         lambda lens, t: t / half_fov(lens),
     ),
     "equisolid": (
-        lambda lens, r: 2 * asin(s) if (s := r / (2 * mpf(lens.focal_length))) <= 1 else None,
+        equisolid_angle,
         lambda lens, t: 2 * lens.focal_length * sin(t / 2),
     ),
     "stereographic": (
@@ -130,7 +150,7 @@ RADIAL: dict[str, tuple[Callable[[Any, mpf], mpf | None], Callable[[Any, mpf], m
         lambda lens, t: tan(t / 2) / tan(half_fov(lens) / 2),
     ),
     "orthographic": (
-        lambda lens, r: asin(s) if (s := r * sin(half_fov(lens))) <= 1 else None,
+        orthographic_angle,
         lambda lens, t: sin(t) / sin(half_fov(lens)) if t <= pi / 2 else None,
     ),
     "polynomial": (
@@ -146,7 +166,7 @@ RADIAL: dict[str, tuple[Callable[[Any, mpf], mpf | None], Callable[[Any, mpf], m
 
 @functools.cache
 def pixel_size(lens: Lens) -> tuple[mpf, mpf]:
-    """Return what one pixel is, across and down, in the unit of the lens's r."""
+    """Return a pixel's width and height in the unit of the lens's r."""
     sides = (2, 2) if isinstance(lens, CircleFisheye) else lens.sensor
     return mpf(sides[0]) / lens.width, mpf(sides[1]) / lens.height
 
@@ -176,7 +196,7 @@ CUBE = (
 
 @functools.cache
 def ray_and_excess(lens: Any, x: mpf, y: mpf) -> tuple[Vector | None, mpf]:
-    """Return the exact ray of a pixel, and how far outside the lens it is (negative: inside)."""
+    """Return the exact ray of a pixel, and how far outside the lens it lies (negative: inside)."""
     if lens.name == "cube_map":
         face = min(int(x // lens.height), 5)
         u = 2 * (x - face * lens.height) / lens.height - 1
@@ -202,7 +222,7 @@ def ray_and_excess(lens: Any, x: mpf, y: mpf) -> tuple[Vector | None, mpf]:
 
 
 def pixel_and_excess(lens: Any, ray: Vector) -> tuple[Vector | None, mpf]:
-    """Return the exact pixel of a ray, and how far outside the lens it is (negative: inside)."""
+    """Return the exact pixel of a ray, and how far outside the lens it lies (negative: inside)."""
     if lens.name == "cube_map":
         faces = [[mpmath.fdot(axis, ray) for axis in axes] for axes in CUBE]
         face = max(range(6), key=lambda i: faces[i][2])
@@ -236,13 +256,13 @@ def exact_pixel(lens: Lens, ray: Vector) -> Vector | None:
 
 
 def exact_pair(source: Lens, target: Lens, pixel: Vector) -> Vector | None:
-    """Return the target's pixel of the source's."""
+    """Return the target's exact pixel for a pixel of the source."""
     ray = exact_ray(source, pixel)
     return None if ray is None else exact_pixel(target, ray)
 
 
 def ray_within(lens: Lens, pixel: Vector, eps: mpf) -> Vector | None:
-    """Return the exact ray of a pixel, which rounding may have carried beyond the lens's rim."""
+    """Return the exact ray of a pixel; one that rounding carried beyond the rim is moved back."""
     ray = exact_ray(lens, pixel)
     if ray is not None:
         return ray
@@ -256,29 +276,29 @@ def distance(a: Vector, b: Vector) -> mpf:
     return 2 * asin(min(mpmath.norm([p - q for p, q in zip(a, b, strict=True)]) / 2, 1))
 
 
-# How far the exact answers move with their data.
+# How far the exact answers move as their data move.
 
 
 def moves(answer: Callable[[Vector], Vector | None], data: Vector, sizes: Vector) -> mpf:
     """Return the sum of the answer's largest moves with each datum, per eps of the datum's size.
 
-    Infinite where there is no answer.
+    It is infinite where an answer is missing.
     """
     total = mpf(0)
     for i, size in enumerate(sizes):
         step = [STEP * size * (i == j) for j in range(len(data))]
         if not size:
             continue
-        ends = [answer(tuple(d + sign * s for d, s in zip(data, step, strict=True)))
-                for sign in (1, -1)]  # fmt: skip
-        if None in ends:
+        above = answer(tuple(d + s for d, s in zip(data, step, strict=True)))
+        below = answer(tuple(d - s for d, s in zip(data, step, strict=True)))
+        if above is None or below is None:
             return INF
-        total += max(abs(a - b) for a, b in zip(*ends, strict=True)) / (2 * STEP)
+        total += max(abs(a - b) for a, b in zip(above, below, strict=True)) / (2 * STEP)
     return total
 
 
 def extent(lens: Lens, pixel: Vector) -> mpf:
-    """Return the size of the numbers that a pixel coordinate is computed from and with."""
+    """Return the size of the numbers that a pixel coordinate is computed from."""
     return max(abs(c) + abs(m) for c, m in zip(pixel, lens.center, strict=True))
 
 
@@ -297,53 +317,60 @@ def pair_moves(source: Lens, target: Lens, pixel: Vector) -> mpf:
     return moves(functools.partial(exact_pair, source, target), pixel, [extent(source, pixel)] * 2)
 
 
-# Cases: mappings of what a row of the table says, errors and bounds in pixels.
+# A case is a row of the table, by column; errors and bounds are in pixels.
 
 Case = dict[str, Any]
 
 
 class Worst:
-    """The largest error relative to its bound among the points of a case, and how they are held."""
+    """The largest error relative to its bound among the points of a case, and its counts.
+
+    - ``vague``: whether any bound was larger than VAGUE.
+    - ``as_rays``: how many answers were compared as rays.
+    - ``wrong``: how many of these were wrong.
+    """
 
     def __init__(self) -> None:
-        self.error, self.bound = mpf(0), mpf(0)
+        self.error = mpf(0)
+        self.bound = mpf(0)
         self.vague = False
-        self.as_rays = self.wrong = 0
+        self.as_rays = 0
+        self.wrong = 0
 
     def add(self, error: mpf, bound: mpf) -> None:
         self.vague |= bool(bound > VAGUE)
         if self.bound == 0 or error * self.bound > self.error * bound:
             self.error, self.bound = error, bound
 
-    def hold(
+    def compare(
         self,
         lens: Lens,
-        found: Vector,
+        computed: Vector,
         answer: Vector,
         bound: mpf,
         ray: Vector,
         moves: mpf,
         eps: mpf,
     ) -> bool:
-        """Hold a pixel that was ``found`` against its bound; return whether it is within.
+        """Compare a ``computed`` pixel with the exact ``answer``; return whether it is in bounds.
 
-        The bound of an answer that eps moves by more than the image says nothing: such an answer,
-        and a twin of the right one, must have the ``ray`` to within its ``moves`` and the pixel's.
+        A bound larger than the image says nothing. Then, and if the answer is not unique, the rays
+        are compared: the pixel's must equal ``ray`` to within ``moves``, in eps.
         """
-        error = max(abs(a - b) for a, b in zip(found, answer, strict=True))
+        error = max(abs(a - b) for a, b in zip(computed, answer, strict=True))
         if error <= bound < max(lens.width, lens.height):
             self.add(error, bound)
             return True
         self.as_rays += 1
-        seen = ray_within(lens, found, eps)
-        if seen is None or distance(seen, ray) > ROUNDINGS * eps * moves:
+        computed_ray = ray_within(lens, computed, eps)
+        if computed_ray is None or distance(computed_ray, ray) > ROUNDINGS * eps * moves:
             self.wrong += 1
             self.add(error, bound)
         return False
 
 
 class Point:
-    """Exact answers for one point of a lens pair; both dtypes are held against them."""
+    """Exact answers for one point of a lens pair; those of both dtypes are compared with them."""
 
     def __init__(self, source: Lens, target: Lens, pixel: Vector) -> None:
         self.source = source
@@ -371,30 +398,30 @@ class Point:
         return bool(min(abs(self.excess), abs(self.answer_excess)) <= RIM * eps)
 
     def check(
-        self, found: Vector, returned: Sequence[float], eps: mpf, forward: Worst, back: Worst
+        self, computed: Vector, returned: Sequence[float], eps: mpf, forward: Worst, back: Worst
     ) -> mpf:
-        """Hold the target's pixel that was ``found`` and the way back from it.
+        """Compare the target's ``computed`` pixel, and the source's pixel ``returned`` from it.
 
-        Returns the condition number, relative to the image; 0 where only rays were compared.
+        Returns the condition number, relative to the image; 0 if only rays were compared.
         """
         source = self.source
         target = self.target
         bound = ROUNDINGS * eps * self.moves
-        moved = ray_moves(target, found)
-        within = forward.hold(
-            target, found, self.answer, bound, self.ray, self.ray_moves + moved, eps
+        moved = ray_moves(target, computed)
+        within = forward.compare(
+            target, computed, self.answer, bound, self.ray, self.ray_moves + moved, eps
         )
-        ray = exact_ray(target, found)
+        ray = exact_ray(target, computed)
         if ray is not None:
-            per_eps = pair_moves(target, source, found)
+            per_eps = pair_moves(target, source, computed)
             size = extent(source, self.pixel)
-            before = bound
+            forward_bound = bound
             bound = ROUNDINGS * eps * (per_eps + pixel_moves(source, ray) + size)
-            bound += per_eps / extent(target, found) * before
+            bound += per_eps / extent(target, computed) * forward_bound
             if not math.isnan(returned[0]):
-                again = [mpf(float(c)) for c in returned]
+                returned_pixel = [mpf(float(c)) for c in returned]
                 moved += 2 * self.ray_moves
-                back.hold(source, again, self.pixel, bound, self.ray, moved, eps)
+                back.compare(source, returned_pixel, self.pixel, bound, self.ray, moved, eps)
             # The way back may end outside only where the rim is within the bound.
             elif abs(self.excess) * size <= bound or abs(self.answer_excess) <= RIM * eps:
                 back.as_rays += 1
@@ -404,7 +431,7 @@ class Point:
 
 
 def measure(lenses: dict[str, Lens]) -> Iterator[Case]:
-    """Every lens as source and as target: pixel → ray → pixel, and back again."""
+    """Yield the cases of every lens as source and target: pixel → ray → pixel, and back again."""
     mpmath.mp.dps = DIGITS
     progress = Progress(len(lenses) ** 2, "stability", "lens pairs")
     for source_name, source in lenses.items():
@@ -422,21 +449,29 @@ def case(name: str, pixels: Array, exact: Sequence[Point], dtype: type) -> Case:
     target = exact[0].target
     answers = target.pixels(source.rays(*pixels.T.astype(dtype)))
     back = source.pixels(target.rays(*answers.T))
-    forward, round_trip = Worst(), Worst()
+    forward = Worst()
+    round_trip = Worst()
     conditions = [mpf(0)]
-    misses = wrong = 0
-    for point, got, returned in zip(exact, answers, back, strict=True):
-        missed = np.isnan(got).all()
+    misses = 0
+    wrong = 0
+    for point, answer, returned in zip(exact, answers, back, strict=True):
+        missed = np.isnan(answer).all()
         if point.is_seen and not missed:
-            found = [mpf(float(c)) for c in got]
-            conditions.append(point.check(found, returned, eps, forward, round_trip))
+            computed = [mpf(float(c)) for c in answer]
+            conditions.append(point.check(computed, returned, eps, forward, round_trip))
         else:
-            # A miss has to be marked in both coordinates, and to be one.
+            # Both must agree that it is a miss, but for points at the rim.
             misses += 1
-            wrong += not (missed and not point.is_seen) and not point.is_at_the_rim(eps)
+            agree = missed and not point.is_seen
+            wrong += not agree and not point.is_at_the_rim(eps)
     passes = all(worst.error <= worst.bound for worst in (forward, round_trip))
     passes = passes and not wrong and not forward.wrong
-    vague = forward.vague or round_trip.vague
+    if not passes:
+        verdict = "FAIL"
+    elif forward.vague or round_trip.vague:
+        verdict = ILL_CONDITIONED
+    else:
+        verdict = "ok"
     return {
         "group": "lens pair",
         "case": name,
@@ -452,27 +487,28 @@ def case(name: str, pixels: Array, exact: Sequence[Point], dtype: type) -> Case:
         "round_trip_error": float(round_trip.error),
         "round_trip_bound": float(round_trip.bound),
         "unit": "px",
-        "verdict": "FAIL" if not passes else ILL_CONDITIONED if vague else "ok",
+        "verdict": verdict,
     }
 
 
 def extreme_lenses() -> dict[str, Lens]:
     """Return the lenses of the cases, by name."""
-    odd, wide = {"width": 65, "height": 33}, {"width": 2048, "height": 1536}
-    one = {"width": 1, "height": 1}
+    odd = {"width": 65, "height": 33}
+    wide = {"width": 2048, "height": 1536}
+    pixel = {"width": 1, "height": 1}
     shifted = {**wide, "principal_point": (-300.25, 2000.5)}
-    # The arguments of the lens that each name begins with; a field of view is in degrees.
+    # Each name begins with the lens; a field of view is in degrees.
     arguments: dict[str, dict[str, Any]] = {
         "rectilinear 0.01°": wide | focal(0.01),
         "rectilinear 90° odd": odd | focal(90),
         "rectilinear 179.9°": wide | focal(179.9),
         "rectilinear 1e-6 mm": wide | {"focal_length": 1e-6},
         "rectilinear 1e6 mm": wide | {"focal_length": 1e6},
-        "rectilinear 1×1 px": one | {"focal_length": 18},
+        "rectilinear 1×1 px": pixel | {"focal_length": 18},
         "rectilinear shifted": shifted | {"focal_length": 18, "sensor_size": (36, 20)},
         "equidistant 0.01°": wide | {"fov": 0.01},
         "equidistant 180° odd": odd | {"fov": 180},
-        "equidistant 180° 1×1 px": one | {"fov": 180},
+        "equidistant 180° 1×1 px": pixel | {"fov": 180},
         "equidistant 220° shifted": shifted | {"fov": 220},
         "equidistant 360°": wide | {"fov": 360},
         "equisolid 180° 1e-6 mm": wide | {"focal_length": 1e-6, "fov": 180},
@@ -513,11 +549,12 @@ def focal(fov: float) -> dict[str, float]:
 
 
 def places(lens: Lens) -> Array:
-    """Return pixel coordinates (n, 2) in float32 that a lens is tried at.
+    """Return the pixel coordinates (n, 2) in float32 at which a lens is tested.
 
-    The exact centre and beside it, the frame's corner, the middles of its edges (the rim of an
-    image circle, the seam and the poles of a panorama), just inside the rim, and in between; for
-    a lens that turns, at and beside its turning point.
+    - The exact centre and a point beside it, the frame's corner, and points in between.
+    - The middles of the frame's edges: the rim of an image circle, the seam and the poles of a
+      panorama. And a point just inside the rim.
+    - For a lens that turns: its turning point, and points beside it.
     """
     width = lens.width
     height = lens.height
@@ -545,25 +582,29 @@ def places(lens: Lens) -> Array:
 
 def used(case: Case) -> float:
     """Return the part of its bound that a case uses."""
-    pairs = (
-        (case["error"], case["error_bound"]),
-        (case["round_trip_error"], case["round_trip_bound"]),
-    )
-    return max(error / bound if bound else (math.inf if error else 0) for error, bound in pairs)
+    forward = part(case["error"], case["error_bound"])
+    round_trip = part(case["round_trip_error"], case["round_trip_bound"])
+    return max(forward, round_trip)
 
 
-# What is written.
+def part(error: float, bound: float) -> float:
+    if bound:
+        return error / bound
+    return math.inf if error else 0
+
+
+# The files.
 
 
 def summary(cases: Sequence[Case]) -> str:
-    """Return one line a source lens and dtype, and what is outside its bound."""
+    """Return a line for each source lens and dtype, and the cases outside their bounds."""
     groups = collections.defaultdict(list)
     for each in cases:
         groups[each["source"], each["dtype"]].append(each)
     failed = [each for each in cases if each["verdict"] == "FAIL"]
     lines = [
-        f"{len(cases)} cases, {len(failed)} outside their bounds. Errors of lenses are in pixels; "
-        "the last number is the largest part of its bound that any case uses.",
+        f"{len(cases)} cases, {len(failed)} outside their bounds. Errors of lenses are in pixels. "
+        "The last number is the largest part of its bound that any case uses.",
         "",
         "| cases | dtype | number | largest condition | largest round-trip error | of the bound "
         "| verdict |",
@@ -579,15 +620,18 @@ def summary(cases: Sequence[Case]) -> str:
             f"| {max(used(each) for each in members):.2f} | {verdicts} |"
         )
     for dtype in ("float32", "float64"):
-        own = (e for e in cases if e["dtype"] == dtype and len(set(e["case"].split(" → "))) == 1)
-        largest = max((each["round_trip_error"] for each in own), default=0)
+        largest = 0.0
+        for each in cases:
+            source, target = each["case"].split(" → ")
+            if each["dtype"] == dtype and source == target:
+                largest = max(largest, each["round_trip_error"])
         lines.append(f"\nFrom a lens to itself and back, {dtype}: off by at most {largest:.1e} px.")
     lines += [f"\nOutside its bound: {each['case']} ({each['dtype']})." for each in failed]
     return "\n".join(lines) + "\n"
 
 
 def draw(stem: Path, cases: Sequence[Case]) -> None:
-    """Plot every lens pair's round-trip error over the condition of its round trip."""
+    """Plot every lens pair's round-trip error over its round trip's condition number."""
     with plot(stem, size=(8, 5.5)) as axes:
         for dtype, colour, marker in (("float32", VERMILION, "o"), ("float64", BLUE, "s")):
             eps = float(np.finfo(dtype).eps)
@@ -596,7 +640,7 @@ def draw(stem: Path, cases: Sequence[Case]) -> None:
             ]
             condition = np.array([each["round_trip_bound"] / (ROUNDINGS * eps) for each in chosen])
             errors = np.array([each["round_trip_error"] for each in chosen])
-            # A round trip without any error is shown at the bottom.
+            # A round trip without an error is shown at the bottom.
             axes.scatter(
                 condition, np.maximum(errors, eps / 100), s=10, c=colour, marker=marker, alpha=0.5,
                 linewidths=0, label=f"{dtype} ({len(chosen)} lens pairs)",
@@ -615,24 +659,28 @@ def draw(stem: Path, cases: Sequence[Case]) -> None:
         axes.legend()
 
 
+def printable(case: Case) -> Case:
+    """Return a row with its numbers as text of 4 digits."""
+    return {
+        column: f"{value:.3e}" if isinstance(value, float) else value
+        for column, value in case.items()
+    }
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--output", required=True, type=Path, help="folder for the results")
     folder = parser.parse_args().output
     cases = list(measure(extreme_lenses()))
-    write_csv(
-        folder / "stability.csv",
-        [{k: f"{v:.3e}" if isinstance(v, float) else v for k, v in row.items()} for row in cases],
-    )
+    write_csv(folder / "stability.csv", map(printable, cases))
     write_text(folder / "stability.md", summary(cases))
     draw(folder / "stability", cases)
     failed = [each for each in cases if each["verdict"] == "FAIL"]
     print(f"{len(cases)} cases, {len(failed)} outside their bounds", file=sys.stderr)
     if failed:
         raise UserError(
-            f"{len(failed)} of {len(cases)} cases are outside the bound that their condition "
-            f"number implies, the first: {failed[0]['case']} ({failed[0]['dtype']}); "
-            f"all are in {folder / 'stability.csv'}"
+            f"{len(failed)} of {len(cases)} cases are outside their bound; the first is "
+            f"{failed[0]['case']} ({failed[0]['dtype']}); all are in {folder / 'stability.csv'}"
         )
 
 

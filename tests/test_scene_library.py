@@ -95,9 +95,8 @@ def test_solids_are_closed_and_look_outwards(shape, expected):
 
 
 def test_copies_point_forward_and_keep_their_slots():
-    leaf = facets(
-        [(0, 0, 0), (0.1, 0.5, 0), (0, 1, 0), (0, 1, 1)], (0, 1, 2), (0, 1, 2, 3)
-    ).painted(2)
+    corners = [(0, 0, 0), (0.1, 0.5, 0), (0, 1, 0), (0, 1, 1)]
+    leaf = facets(corners, (0, 1, 2), (0, 1, 2, 3)).painted(2)
     made = copies(leaf, [(1, 0, 0), (0, 5, 0)], forward=[(0, 0, 2), (-3, 0, 0)], size=[2, 3])
     assert made.vertices[2] == pytest.approx([1, 0, 2])
     assert made.vertices[6] == pytest.approx([-3, 5, 0])

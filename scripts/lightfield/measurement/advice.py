@@ -1,12 +1,13 @@
-"""Changes of a scene's settings that reach the same error in less time, tried on probe windows.
+"""Finds changes of a scene's settings that reach the same error in less time, on probe windows.
 
-An `Experiment` renders windows of the scene's strata with each change, and without a change with
-half, the same and twice the samples. A change saves as many times as the unchanged scene takes
-longer to reach the change's error. Changes of the denoiser are compared with denoised renders.
+An `Experiment` renders windows of the scene's strata with each change. It also renders them
+unchanged, with half, the same and twice the samples. The saving is a factor: the unchanged scene's
+time to the change's error, over the change's time. Changes of the denoiser are compared with
+denoised renders.
 
 A change that makes a different picture is not a saving. The bias of a change is the mean of the
 differences that it makes to renders of equal seeds. If the square of the bias, over all pixels, is
-above the variance of the reference, the picture differs, and the change is not advised. The light
+above the variance of the reference, the picture differs. Then the change is not advised. The light
 tree and path guiding choose other paths to the same mean, so they are exempt. Changes of a clamp
 are reported with their bias, and never advised.
 """
@@ -25,18 +26,18 @@ from lightfield.measurement.experiment import WHOLE_VIEWS, Experiment, Method, R
 from lightfield.measurement.sampling import DENOISED, TRACED, standard_error
 from lightfield.measurement.trials import Trials
 
-# The samples of a pixel with which changes are tried; the unchanged scene also has half and twice.
+# The samples of a pixel with which changes are tried. The unchanged scene also has half and twice.
 SAMPLES = 8
 SEEDS = range(1, 5)
-# Adaptive sampling decides nothing before some thirty samples.
+# Adaptive sampling has no effect below about thirty samples.
 ADAPTIVE = {"samples": 64, "adaptive_threshold": 0.2}
-# A change is advised if it saves at least this factor, by so many standard errors.
+# A change is advised if it saves at least the factor WORTH, by SURE standard errors.
 WORTH = 1.03
 SURE = 2.0
-# A render that takes more than this times the median of its seeds was slowed by another load.
+# A render slower than this times the median of its seeds was slowed by another load.
 DISTURBED = 1.5
 
-# The unchanged scene, path traced and denoised, at rising samples: what changes are compared with.
+# The methods that changes are compared with: path traced and denoised, at rising samples.
 UNCHANGED = {
     name: [
         Method(name, {"samples": samples, "denoise": name == DENOISED})
@@ -45,7 +46,7 @@ UNCHANGED = {
     for name in (TRACED, DENOISED)
 }
 
-# What an inventory lists that may cost time.
+# The keys of an inventory that may cost time.
 COSTLY = (
     "volumes",
     "transmission",
@@ -57,7 +58,7 @@ COSTLY = (
     "procedural",
     "displacement",
 )
-# The table names so many of a kind.
+# The table names at most this many of a kind.
 MOST_NAMES = 8
 
 
@@ -83,11 +84,13 @@ class Change:
 
 @dataclass(frozen=True)
 class Saving:
-    """What a change saves: the unchanged scene takes ``times`` as long to reach the same error.
+    """The saving of a change: the unchanged scene takes ``times`` as long to reach the same error.
 
-    ``uncertainty`` is the standard error of ``times`` over seeds. ``times_of_all_pixels`` includes
-    the worst thousandth of pixels. ``bias`` (squared) and the reference's own ``noise`` are
-    relative mean squared errors of all pixels. ``light`` is the relative change of all light.
+    - ``uncertainty``: the standard error of ``times`` over seeds.
+    - ``times_of_all_pixels``: the same with the worst thousandth of pixels.
+    - ``bias`` (squared) and the reference's own ``noise``: relative mean squared errors of all
+      pixels.
+    - ``light``: the relative change of all light.
     """
 
     times: float
@@ -106,9 +109,9 @@ class Saving:
 
 @dataclass(frozen=True)
 class Figures:
-    """One seed's renders: errors without the worst thousandth of pixels and of all, and time.
+    """The figures of one seed's renders.
 
-    ``seconds`` are those of a megapixel.
+    ``error`` leaves out the worst thousandth of pixels. ``seconds`` are those of a megapixel.
     """
 
     error: float
@@ -126,7 +129,7 @@ class Difference:
 
 
 def changes_to_try(sampling: Mapping[str, Any], on_cpu: bool) -> list[Change]:
-    """Return the changes to try of a scene that samples as ``sampling`` says, by `render` keys."""
+    """Return the changes to try. ``sampling`` is the scene's current one, by `render` keys."""
     # Cycles guides paths only on processors.
     switches = ("light_tree", "guiding") if on_cpu else ("light_tree",)
     most_bounces = sampling["max_bounces"]
@@ -165,7 +168,7 @@ def probe_experiment(
 def measure(
     experiment: Experiment, render: Mapping[str, Any], inventory: Mapping[str, Any], name: str
 ) -> dict[str, Any]:
-    """Try what could be cheaper than a scene's ``render`` settings.
+    """Try changes that could be cheaper than a scene's ``render`` settings.
 
     ``inventory`` says what the scene contains, and how its .blend samples. ``name`` starts the
     progress lines.
@@ -209,23 +212,28 @@ def measure(
 
 
 def advised_changes(measured: Sequence[tuple[Change, Mapping[str, Saving]]]) -> list[Change]:
-    """Return the advised changes; of several values of one key, the one that saves most."""
+    """Return the advised changes. Of several values of a key, only the one that saves most."""
     good = [
         (saved[WHOLE_VIEWS].times, change)
         for change, saved in measured
         if is_advised(change, saved.get(WHOLE_VIEWS))
     ]
     good.sort(key=lambda pair: pair[0])
-    return list({tuple(change.change): change for _, change in good}.values())
+    # Later changes, which save more, replace earlier ones of the same keys.
+    by_keys = {tuple(change.change): change for _, change in good}
+    return list(by_keys.values())
 
 
 def combination(changes: Sequence[Change]) -> Change | None:
-    """Return several changes as one, which is only reported; None for fewer than two."""
+    """Return several changes as one, which is only reported. None for fewer than two."""
     if len(changes) < 2:
         return None
-    change = {key: value for part in changes for key, value in part.change.items()}
-    settings = {key: value for part in changes for key, value in part.settings.items()}
-    return Change(TRACED, change, settings, may_be_advised=False)
+    combined: dict[str, Any] = {}
+    settings: dict[str, Any] = {}
+    for part in changes:
+        combined |= part.change
+        settings |= part.settings
+    return Change(TRACED, combined, settings, may_be_advised=False)
 
 
 def is_advised(change: Change, saving: Saving | None) -> bool:
@@ -244,9 +252,9 @@ def is_advised(change: Change, saving: Saving | None) -> bool:
 
 
 def savings(experiment: Experiment, change: Change) -> dict[str, Saving]:
-    """Return what a change saves, by stratum and of whole views.
+    """Return the saving of a change, by stratum and of whole views.
 
-    A stratum is left out if its renders are no worse than the reference.
+    Leaves out a stratum whose renders are no worse than the reference.
     """
     changed = figures(experiment, change.method)
     unchanged = [figures(experiment, method) for method in UNCHANGED[change.compared_with]]
@@ -255,8 +263,8 @@ def savings(experiment: Experiment, change: Change) -> dict[str, Saving]:
     for stratum, of_seeds in changed.items():
         rising = [by_stratum[stratum] for by_stratum in unchanged]
         difference = differences[stratum]
-        every = [*of_seeds, *(seed for of_method in rising for seed in of_method)]
-        if min(seed.error for seed in every) <= difference.noise:
+        least_error = min(seed.error for seeds in (of_seeds, *rising) for seed in seeds)
+        if least_error <= difference.noise:
             continue
         times = []
         times_of_all_pixels = []
@@ -280,40 +288,39 @@ def figures(experiment: Experiment, method: Method) -> dict[str, list[Figures]]:
         stratum: stratum_figures(experiment, method, references)
         for stratum, references in experiment.strata.items()
     }
-    by_stratum[WHOLE_VIEWS] = [
-        Figures(
-            error=experiment.over_views({s: f.error for s, f in of_seed.items()}),
-            error_of_all_pixels=experiment.over_views(
-                {s: f.error_of_all_pixels for s, f in of_seed.items()}
-            ),
-            seconds=experiment.over_views({s: f.seconds for s, f in of_seed.items()}),
+    whole_views = []
+    for figures_of_seed in zip(*by_stratum.values(), strict=True):
+        of_seed = dict(zip(by_stratum, figures_of_seed, strict=True))
+        whole_views.append(
+            Figures(
+                error=experiment.over_views({s: f.error for s, f in of_seed.items()}),
+                error_of_all_pixels=experiment.over_views(
+                    {s: f.error_of_all_pixels for s, f in of_seed.items()}
+                ),
+                seconds=experiment.over_views({s: f.seconds for s, f in of_seed.items()}),
+            )
         )
-        for of_seed in (
-            dict(zip(by_stratum, seeds, strict=True))
-            for seeds in zip(*by_stratum.values(), strict=True)
-        )
-    ]
+    by_stratum[WHOLE_VIEWS] = whole_views
     return by_stratum
 
 
 def stratum_figures(
     experiment: Experiment, method: Method, references: References
 ) -> list[Figures]:
-    """Return the figures of each seed, means over the windows of a stratum."""
+    """Return the figures of each seed: means over the windows of a stratum."""
     errors = experiment.errors(method, references)
     errors_of_all_pixels = experiment.errors(method, references, left_out=0)
-    seconds = [
-        [min(value, DISTURBED * median(of_window)) for value in of_window]
-        for of_window in experiment.seconds(method, references)
-    ]
+    seconds = []
+    for of_window in experiment.seconds(method, references):
+        limit = DISTURBED * median(of_window)
+        seconds.append([min(value, limit) for value in of_window])
     return [
-        Figures(fmean(by_window[0]), fmean(by_window[1]), fmean(by_window[2]))
-        for by_window in zip(
-            zip(*errors, strict=True),
-            zip(*errors_of_all_pixels, strict=True),
-            zip(*seconds, strict=True),
-            strict=True,
+        Figures(
+            fmean(of_window[seed] for of_window in errors),
+            fmean(of_window[seed] for of_window in errors_of_all_pixels),
+            fmean(of_window[seed] for of_window in seconds),
         )
+        for seed in range(len(errors[0]))
     ]
 
 
@@ -347,10 +354,8 @@ def picture_differences(experiment: Experiment, change: Change) -> dict[str, Dif
             biases.append(metrics.bias_and_variance(moved, exact)[0])
             counted = reference.counted
             noises.append(float((reference.variance[counted] * reference.weights).mean()))
-            light, light_before = (
-                fmean(float(trial.colour[counted].mean()) for trial in trials)
-                for trials in zip(*pairs, strict=True)
-            )
+            light = fmean(float(now.colour[counted].mean()) for now, _ in pairs)
+            light_before = fmean(float(before.colour[counted].mean()) for _, before in pairs)
             lights.append(light / light_before - 1 if light_before else 0.0)
         by_stratum[stratum] = Difference(fmean(biases), fmean(noises), fmean(lights))
     by_stratum[WHOLE_VIEWS] = Difference(
@@ -379,12 +384,12 @@ def geometric_mean(factors: Sequence[float]) -> tuple[float, float]:
     return mean, mean * standard_error(logarithms)
 
 
-# The keys that `table` reads.
+# The keys of the content that `table` reads.
 SHOWN = ("device", "seeds", "strata", "tried", "unchanged", "threads", "costly", "yaml")
 
 
 def table(name: str, content: Mapping[str, Any]) -> str:
-    """Return what `measure` and the trial of threads returned, in Markdown."""
+    """Return the results of `measure` and of the trial of threads, in Markdown."""
     return "\n".join(
         [
             *_savings_table(name, content),
@@ -402,13 +407,13 @@ def _savings_table(name: str, content: Mapping[str, Any]) -> list[str]:
     lines = [
         f"# {name}: what could be cheaper at equal error",
         "",
-        "How many times as long the unchanged scene takes to the error of the changed one, ± the",
-        f"standard error over {content['seeds']} seeds: of whole views, of all their pixels with "
-        "the",
-        "worst thousandth, and by what pixels show. The bias is that of all pixels, over the noise",
-        "of the reference, and light is by what part the whole picture is brighter. Where the bias",
-        "is above 1 it is another picture, and nothing is advised, but of the light tree and of",
-        "guiding, whose mean is the same; — is as good as the reference.",
+        "Each figure is a factor: the unchanged scene takes that many times as long to the same",
+        f"error. ± is the standard error over {content['seeds']} seeds. The columns are whole "
+        "views,",
+        "all their pixels with the worst thousandth, and what pixels show. The bias is that of all",
+        "pixels over the noise of the reference. Light is the relative change of all light. A bias",
+        "above 1 means another picture, and the change is not advised. The light tree and guiding",
+        "are exempt, because their mean is the same. — is as good as the reference.",
         "",
         f"| change | of | advised | {columns[0]} | all pixels | bias | light "
         f"| {' | '.join(columns[1:])} |",
@@ -441,7 +446,7 @@ def _unchanged_table(content: Mapping[str, Any]) -> list[str]:
     unit = "a core" if content["device"] == "CPU" else "the GPU"
     return [
         "",
-        "Unchanged, of whole views:",
+        "Unchanged, in whole views:",
         "",
         f"| of | samples | s of {unit} a megapixel | error |",
         "| --- | ---: | ---: | ---: |",
@@ -458,7 +463,7 @@ def _threads_table(content: Mapping[str, Any]) -> list[str]:
         return []
     return [
         "",
-        "As processes that fill the same cores, in seconds of a core, idle ones counted:",
+        "Processes that fill the same cores, in seconds of a core. Idle cores count:",
         "",
         "| threads a process | processes | s a small view | s to the first view | GB of all |",
         "| ---: | ---: | ---: | ---: | ---: |",
@@ -482,11 +487,11 @@ def _advised_yaml(content: Mapping[str, Any]) -> list[str]:
     if not content["yaml"]:
         return [
             "",
-            "Nothing is advised: no change saves anything for sure and leaves the picture.",
+            "Nothing is advised: no change surely saves time and keeps the picture.",
         ]
     return [
         "",
-        "To take what is advised:",
+        "To use the advised changes:",
         "",
         "```yaml",
         "render:",

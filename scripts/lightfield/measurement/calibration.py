@@ -1,7 +1,7 @@
-"""The cheapest method that reaches a scene's target error.
+"""Finds the cheapest method that reaches a scene's target error.
 
-Cost is counted in samples of a pixel, not in seconds, so that a scene makes the same choice each
-time: the bytes of its views follow from the choice. `lightfield.measurement.metrics` defines the
+Cost is counted in samples of a pixel, not in seconds. So a scene makes the same choice each time,
+and the bytes of its views follow from the choice. `lightfield.measurement.metrics` defines the
 error.
 """
 
@@ -30,30 +30,31 @@ from lightfield.measurement.trials import Trials, Window, nearest_view
 PROBE_SEED = 1
 HELD_OUT_SEED = 2
 
-# Cycles takes no more samples of a pixel.
+# Cycles' largest number of samples of a pixel.
 MOST_SAMPLES = 2**24
-# Adaptive sampling may take so many samples; the calibration chooses its threshold.
+# The most samples of adaptive sampling. The calibration chooses its threshold.
 MOST_ADAPTIVE_SAMPLES = 4096
 FIRST_THRESHOLD = 0.4
 LEAST_THRESHOLD = 1e-4
 
-# The target leaves out the worst thousandth of pixels. A method that reaches it may have so many
-# times the error of all pixels that plain path tracing has at the target; more hides fireflies.
+# The target leaves out the worst thousandth of pixels. A method that reaches it may have at most
+# this many times the error of all pixels of plain path tracing at the target. More hides fireflies.
 MOST_OF_PLAIN = 2
 
 # An error within this part of the target counts as on the target.
 CLOSE = 0.05
-# Within this part of the target, held-out views confirm the choice.
+# Held-out views confirm the choice if their error is within this part of the target.
 CONFIRMED = 0.2
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A method at one effort, measured on some windows: means over the windows.
+    """A method at one effort: means over some windows.
 
-    ``samples`` are those that a pixel took, ``cost`` adds the denoiser's. ``error`` is the relative
-    mean squared error without the worst thousandth of pixels, ``whole_error`` with it. ``seconds``
-    are those of one core, or of the GPU, for a megapixel.
+    - ``samples``: those that a pixel took. ``cost`` adds the denoiser's.
+    - ``error``: the relative mean squared error without the worst thousandth of pixels.
+      ``whole_error`` includes it.
+    - ``seconds``: those of one core, or of the GPU, for a megapixel.
     """
 
     way: str
@@ -75,10 +76,10 @@ class Candidate:
 
 
 class Bench:
-    """An experiment with one seed, whose references are good enough for a target error.
+    """An experiment with one seed. Its references are good enough for a target error.
 
     The references take more seeds until their own error is a small part of the ``target``.
-    ``exposure`` is that of the references; without it, they are exposed by their own light.
+    ``exposure`` is that of the references. Without it, their own light decides.
     """
 
     def __init__(
@@ -127,13 +128,13 @@ class Bench:
         return candidate
 
     def errors(self, method: Method, left_out: float = metrics.OUTLIERS) -> list[float]:
-        """Return the error of each window, rendered with a method that was measured."""
+        """Return the error of each window, rendered with a measured method."""
         by_window = self.experiment.errors(method, self.experiment.all_windows, left_out)
         return [error for (error,) in by_window]
 
 
 class Search:
-    """Measures every method at rising effort; ``measured`` holds the candidates to choose from.
+    """Measures every method at rising effort. ``measured`` holds the candidates to choose from.
 
     ``measure`` renders a method and returns its figures, as `Bench.measure` does. ``most`` limits a
     pixel's samples. ``denoise`` True or False leaves out the methods without or with the denoiser.
@@ -171,12 +172,12 @@ class Search:
         return effort_for(error, sorted((entry.samples, entry.error) for entry in plain))
 
     def reaches(self, entry: Candidate) -> bool:
-        """Return whether the error is on the target, or below it, without hiding fireflies."""
+        """Return whether the error is at most the target, without hiding fireflies."""
         keeps_fireflies = entry.way == "plain" or entry.whole_error <= self.most_whole_error
         return keeps_fireflies and entry.error <= self.target * (1 + CLOSE)
 
     def choose(self) -> Candidate:
-        """Return the cheapest candidate that reaches the target; else that of the least error."""
+        """Return the cheapest candidate that reaches the target, or the one with least error."""
         eligible = self._eligible()
         good = [entry for entry in eligible if self.reaches(entry)]
         if good:
@@ -193,10 +194,10 @@ class Search:
         ]
 
     def _affordable(self) -> float:
-        """Return the least cost that is known to reach the target.
+        """Return the least known cost that reaches the target.
 
-        Without any, it is infinite under a limit, so that the limit itself is tried, and else what
-        Cycles can take.
+        If there is none, return Cycles' largest number of samples. Under a limit return infinity
+        instead, so that the limit itself is tried.
         """
         costs = [entry.cost for entry in self._eligible() if self.reaches(entry)]
         if not self.denoise and self._plain_samples_needed <= self.limit:
@@ -204,7 +205,7 @@ class Search:
         return min(costs, default=MOST_SAMPLES if self.limit == math.inf else math.inf)
 
     def _climb_thresholds(self, name: str, fixed: Mapping[str, Any]) -> None:
-        """Climb with ever lower thresholds of adaptive sampling; the effort is the inverse."""
+        """Climb with ever lower thresholds of adaptive sampling. The effort is the inverse."""
 
         def with_threshold(effort: float) -> dict[str, Any]:
             threshold = float(f"{1 / effort:.3g}")
@@ -221,9 +222,9 @@ class Search:
         first: float,
         last: float,
     ) -> None:
-        """Double a method's effort until it reaches the target, then interpolate to meet it.
+        """Double a method's effort until it reaches the target. Then interpolate to meet it.
 
-        ``settings_at`` returns the settings of an effort, to which ``fixed`` are added. Gives up at
+        ``settings_at`` returns the settings of an effort. ``fixed`` settings are added. Gives up at
         effort ``last``, or when the target will cost more than with another method.
         """
         points = self._double(name, settings_at, fixed, first, last)
@@ -248,7 +249,7 @@ class Search:
         first: float,
         last: float,
     ) -> list[tuple[float, Candidate]]:
-        """Return (effort, candidate) of doubled efforts, to the target or to where it gives up."""
+        """Return (effort, candidate) of doubled efforts, until the target or until it gives up."""
         affordable = self._affordable()
         points: list[tuple[float, Candidate]] = []
         effort = first
@@ -258,7 +259,7 @@ class Search:
             at_end = effort >= last or candidate.cost >= affordable
             if self.reaches(candidate) or at_end:
                 return points
-            # Every pixel takes the most samples that it may.
+            # Every pixel already takes the most samples that it may.
             if len(points) > 1 and candidate.samples == points[-2][1].samples:
                 return points
             if len(points) > 2 and self._is_hopeless(points[-2][1], candidate, affordable):
@@ -266,7 +267,7 @@ class Search:
             effort = min(2 * effort, last)
 
     def _is_hopeless(self, before: Candidate, now: Candidate, affordable: float) -> bool:
-        """Return whether the last doubling, drawn out to the target, costs more than affordable."""
+        """Return whether the target will cost too much, extrapolated from the last doubling."""
         doublings = 0.0
         if before.error <= now.error:
             doublings = math.inf
@@ -280,8 +281,8 @@ def calibrate(
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Choose how to render for ``render.target_error``, from ``count`` windows of ``size``².
 
-    Returns the choice with its evidence, which is the same each time, and the seconds that each
-    method took, which are not. Seconds are those of one core, or of the GPU, for a megapixel.
+    Returns the choice with its evidence, which is the same each time. Also returns the seconds that
+    each method took, which vary. Seconds are those of one core, or of the GPU, for a megapixel.
     """
     target = render["target_error"]
     windows = maker.windows(size, count)
@@ -294,7 +295,7 @@ def calibrate(
     held_out = Bench(maker, others, HELD_OUT_SEED, target, bench.experiment.references[0].exposure)
     for each in (bench, held_out):
         each.measure(choice.method)
-    # By chance, an error far below the references' own is measured as nothing, or less.
+    # An error far below the references' own may be measured as 0 or less by chance.
     plain_samples = search.plain_samples(max(choice.error, bench.own_error))
     record = {
         **choice_evidence(search, choice, bench),
@@ -319,14 +320,17 @@ def calibrate(
 
 
 def held_out_windows(maker: Trials, windows: Sequence[Window]) -> list[Window]:
-    """Return each window's place in the nearest view that has no window itself, if there is one."""
+    """Return each window's place in the nearest view without a window, or else in its own view."""
     views_of_windows = [window.view for window in windows]
     views = [view for view in maker.lightfield.views if view not in views_of_windows]
-    return [replace(w, view=nearest_view(views, w.view) or w.view) for w in windows]
+    held_out = []
+    for window in windows:
+        held_out.append(replace(window, view=nearest_view(views, window.view) or window.view))
+    return held_out
 
 
 def choice_evidence(search: Search, choice: Candidate, bench: Bench) -> dict[str, Any]:
-    """Return the choice, and the errors that it has on the bench that it was chosen by."""
+    """Return the choice, and its errors on the bench that chose it."""
     return {
         "target_error": search.target,
         "metric": "relative mean squared error of all but the worst thousandth of pixels",
@@ -353,7 +357,7 @@ def confirmation(errors: Sequence[float], target: float) -> dict[str, Any]:
 
 
 def seconds_taken(search: Search, choice: Candidate, plain_samples: float) -> dict[str, Any]:
-    """Return the seconds of the choice, of all candidates, and of ``plain_samples`` plain ones."""
+    """Return the seconds of the choice, of all candidates, and of ``plain_samples`` samples."""
     plain = max((e for e in search.measured if e.way == "plain"), key=lambda e: e.samples)
     plain_seconds = plain.seconds * plain_samples / plain.samples
     return {
@@ -373,7 +377,7 @@ def errors_by_stratum(
     """Return the error of a measured method in each stratum of all windows, and the stratum's area.
 
     ``classes`` are those of the benches' windows, one bench after the other. The area is the part
-    of the windows' pixels, by which the windows' errors are weighted, too.
+    of the windows' pixels. The windows' errors are weighted by it, too.
     """
     references = [reference for bench in benches for reference in bench.experiment.references]
     trials = [trial for bench in benches for (trial,) in bench.experiment.renders(method)]
@@ -392,7 +396,7 @@ def errors_by_stratum(
 def effort_for(target: float, points: Sequence[tuple[float, float]]) -> float:
     """Return the effort at which the error is ``target``, from (effort, error) in rising order.
 
-    Between points the error is a power of the effort; after the last it is inversely proportional.
+    Between points the error is a power of the effort. After the last it is inversely proportional.
     """
     below = next((i for i, (_, error) in enumerate(points) if error <= target), None)
     if below is None:
@@ -401,7 +405,7 @@ def effort_for(target: float, points: Sequence[tuple[float, float]]) -> float:
     if below == 0:
         return points[0][0]
     (x0, e0), (x1, e1) = points[below - 1 : below + 1]
-    # By chance an error far below the reference's own is measured as nothing, or less.
+    # An error far below the reference's own may be measured as 0 or less by chance.
     part = math.log(e0 / target) / math.log(e0 / max(e1, 1e-6 * target))
     return float(x0 * (x1 / x0) ** part)
 

@@ -1,10 +1,10 @@
-"""Add up what a dataset has cost, and what the full one would: report/costs.json.
+"""Adds up the cost of a dataset, and extrapolates that of the full one: report/costs.json.
 
 Times are seconds, memory and sizes bytes, energy kWh. Wall and processor time of the views come
-from the journals of their shards. Journals survive kills, so they hold all the time that was spent,
+from the journals of their shards. Journals survive kills. So they hold all the time that was spent,
 also on views that were lost or rendered again. Any other job counts with the time and memory of its
 last run, as Snakemake measured them. Snakemake looks every half second, and after a while every
-30 s, so processor time may be short by as much. A job that ends before the first look counts as
+30 s. So processor time may be too short by as much. A job that ends before the first look counts as
 busy throughout.
 
     {
@@ -26,17 +26,17 @@ busy throughout.
 
 Energy is the machine's wattage, times the wall time, times the busy part of its cores. The busy
 part is processor time over wall time and number of cores. While a graphics card renders, the whole
-machine counts. Waiting and idle time count for nobody.
+machine counts. Waiting and idle time do not count.
 
 The extrapolation multiplies each view's path-tracing time by the ratio of pixels and the ratio of
 samples, and takes the mean. It assumes that the time is proportional to both. Denoising counts as
 samples (see `lightfield.measurement.sampling`). The uncertainty is the standard error of that mean
-over the views, with the correction for a finite number of views, sqrt(1 - n / N); it is null for a
-single view. The rest of each view's time (writing, reprojection, validation) is taken in proportion
-to views and pixels, and everything else as it was. The first view of each process prepares the
-scene for Cycles, so it counts for neither. Gigabytes are those of the rendered views, in proportion
-to their pixels: an upper estimate, because larger views compress better. "device" and
-"extrapolation" are null if no journal has a rendered view, for example if the working folder was
+over the views. It has the correction for a finite number of views, sqrt(1 - n / N). It is null for
+a single view. The rest of each view's time (writing, reprojection, validation) is proportional to
+views and pixels. Everything else stays as it was. The first view of each process prepares the scene
+for Cycles, so it counts for neither. Gigabytes are those of the rendered views, in proportion to
+their pixels. They are an upper estimate, because larger views compress better. "device" and
+"extrapolation" are null if no journal has a rendered view. That happens if the working folder was
 deleted and the views were kept."""
 
 import csv
@@ -62,8 +62,8 @@ from lightfield.measurement.sampling import DENOISING_SAMPLES, cost_in_samples, 
 # The stages that every dataset has, in the order of the work. Other stages come between.
 FIRST_STAGES = ("scene", "cameras", "render")
 LAST_STAGES = ("export", "validate", "report")
-# The files and folders of a stage whose folder does not have its name.
-MADE = {
+# The files and folders of a stage. Without an entry, the folder has the stage's name.
+STAGE_PATHS = {
     "cameras": ("lightfield.json",),
     "render": ("exr", *PASSES),
     "export": ("transforms.json",),
@@ -75,7 +75,7 @@ NOT_COUNTED = ("costs.json", "index.html")
 
 @dataclass
 class Stage:
-    """What the jobs of one stage took together; the peak memory is that of the largest job."""
+    """The sums over the jobs of one stage. The peak memory is that of the largest job."""
 
     jobs: int = 0
     wall_seconds: float = 0.0
@@ -84,7 +84,7 @@ class Stage:
 
 
 class FullSize(Settings):
-    """A dataset at full size; without ``samples`` or ``denoise``, those of the one at hand."""
+    """A dataset at full size. ``samples`` and ``denoise`` default to those of the small one."""
 
     views: AtLeastOne
     resolution: list[AtLeastOne] = Field(min_length=2, max_length=2)
@@ -111,7 +111,7 @@ class Tariff:
 
     @classmethod
     def read(cls, settings: Mapping[str, Any]) -> "Tariff":
-        """Take config.yaml's `energy`."""
+        """Read the key `energy` of config.yaml."""
         cores = os.cpu_count() or 1 if settings["cores"] == "auto" else settings["cores"]
         return cls(**{**settings, "cores": cores})
 
@@ -120,7 +120,7 @@ class Tariff:
         return self.watts * machine_seconds / 3.6e6
 
     def price(self, kwh: float) -> float:
-        """Return what ``kwh`` of energy cost."""
+        """Return the price of ``kwh`` of energy."""
         return kwh * self.price_per_kwh
 
 
@@ -151,15 +151,15 @@ def shard_costs(name: str, runs: Sequence[journal.Run]) -> dict[str, Any]:
 
 
 def _rounded(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Return figures whose seconds are rounded to milliseconds."""
+    """Return the figures, with seconds rounded to milliseconds."""
     return {k: round(v, 3) if isinstance(v, float) else v for k, v in figures.items()}
 
 
 def job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, Stage]:
     """Add up the jobs' TSVs by stage: the name of a TSV's folder, or else its own name.
 
-    The TSVs of shards are left out, because they tell only of a shard's last run. A TSV that cannot
-    be read is left out with a warning.
+    Leaves out the TSVs of shards, because they hold only a shard's last run. Warns about a TSV that
+    cannot be read, and leaves it out.
     """
     stages: dict[str, Stage] = {}
     tables = [("scene", path) for folder in scene for path in folder.glob("*.tsv")]
@@ -194,14 +194,17 @@ def job_times(path: Path) -> tuple[float, float, int]:
 
 
 def stage_bytes(stage: str, dataset: Path, blend: Path | None) -> int:
-    """Return the size of a stage's files in the dataset; 0 if it has none there."""
+    """Return the size of a stage's files in the dataset. 0 if it has none there."""
     if stage == "scene":
         return blend.stat().st_size if blend else 0
-    paths = [dataset / name for name in MADE.get(stage, (stage,))]
-    files = [file for path in paths for file in ([path] if path.is_file() else path.rglob("*"))]
-    return sum(
-        file.stat().st_size for file in files if file.is_file() and file.name not in NOT_COUNTED
-    )
+    size = 0
+    for name in STAGE_PATHS.get(stage, (stage,)):
+        path = dataset / name
+        files = [path] if path.is_file() else path.rglob("*")
+        for file in files:
+            if file.is_file() and file.name not in NOT_COUNTED:
+                size += file.stat().st_size
+    return size
 
 
 @dataclass(frozen=True)
@@ -222,7 +225,7 @@ class Rendering:
 def renderings(run: journal.Run) -> Iterator[Rendering]:
     """Split the time of each view that a process rendered.
 
-    While Cycles traces paths, all threads are busy; the rest takes one thread. The view's processor
+    While Cycles traces paths, all threads are busy. The rest takes one thread. The view's processor
     time is divided in these proportions, because wall time includes the work of other programs.
     """
     for index, view in enumerate(run.views):
@@ -250,11 +253,11 @@ def costs(
     full: Mapping[str, Any],
     reprojections: Iterable[str],
 ) -> dict[str, Any]:
-    """Return what costs.json says of the dataset in the folder ``dataset``.
+    """Return the content of costs.json for the dataset in the folder ``dataset``.
 
     ``journals`` is the folder of its journals. ``benchmarks`` and ``scene_benchmarks`` are the
     folders of its jobs' and its scene's TSVs. ``full`` has the ``views``, ``resolution``,
-    ``samples`` and ``denoise`` of the full dataset, null for those of this one.
+    ``samples`` and ``denoise`` of the full dataset. Null stands for this dataset's value.
     """
     by_shard = {
         path.name.removesuffix(JOURNAL_SUFFIX): journal.read(path)
@@ -300,7 +303,7 @@ def costs(
 
 
 def render_stage(shards: Sequence[Mapping[str, Any]]) -> Stage:
-    """Return what the jobs of all shards took together."""
+    """Return the sums over the jobs of all shards."""
     return Stage(
         jobs=len(shards),
         wall_seconds=sum(shard["wall_seconds"] for shard in shards),
@@ -333,9 +336,9 @@ def machine_seconds(stages: Mapping[str, Stage], runs: Sequence[journal.Run], co
 
 @dataclass(frozen=True)
 class Scale:
-    """How much larger the full dataset is: ``pixels`` and ``effort`` a view are factors.
+    """The scale of the full dataset. ``pixels`` and ``effort`` are factors for a view.
 
-    The effort is that of a pixel, in samples, denoising counted in samples.
+    The effort is that of a pixel in samples. Denoising counts as samples.
     """
 
     views: int
@@ -345,11 +348,11 @@ class Scale:
 
     @classmethod
     def of(cls, full: Mapping[str, Any], lightfield: LightField) -> "Scale":
-        """Return the scale of a full dataset over the one at hand."""
+        """Return the scale of a full dataset over this one."""
         render = lightfield.render
         lens = lightfield.lens
         samples = full["samples"] or render["samples"]
-        # Where a target error decides, both are unknown until then.
+        # If a target error decides, both are unknown until then.
         denoise = render["denoise"] if full["denoise"] is None else full["denoise"]
         effort = cost_in_samples(samples, denoise)
         return cls(
@@ -369,11 +372,11 @@ def extrapolation(
     full: Mapping[str, Any],
     reprojections: Iterable[str],
 ) -> dict[str, Any] | None:
-    """Return what the full dataset would cost, from the views of this one; None without views."""
-    every = [rendering for run in runs for rendering in renderings(run)]
-    if not every:
+    """Return the cost of the full dataset, from the views of this one. None without views."""
+    all_renderings = [rendering for run in runs for rendering in renderings(run)]
+    if not all_renderings:
         return None
-    latest = latest_renderings(every)
+    latest = latest_renderings(all_renderings)
     scale = Scale.of(full, lightfield)
     times = [view.path_tracing * scale.pixels * scale.effort for view in latest]
     error = None
@@ -387,12 +390,14 @@ def extrapolation(
     each_view = mean(view.rest for view in latest) + part / len(lightfield.views) * sum(
         stage.cpu_seconds for name, stage in stages.items() if name in growing_stages
     )
-    once = sum(rendering.rest for rendering in every if rendering.first) + part * (
-        sum(run.start.get("start_up_cpu_seconds", 0.0) for run in runs)
-        + sum(
-            s.cpu_seconds for name, s in stages.items() if name not in {"render", *growing_stages}
-        )
+    start_ups = sum(run.start.get("start_up_cpu_seconds", 0.0) for run in runs)
+    fixed_stages = sum(
+        stage.cpu_seconds
+        for name, stage in stages.items()
+        if name not in {"render", *growing_stages}
     )
+    first_views = sum(rendering.rest for rendering in all_renderings if rendering.first)
+    once = first_views + part * (start_ups + fixed_stages)
     seconds = scale.views * (mean(times) + each_view * scale.pixels) + once
     machine = seconds / tariff.cores if by_processor else seconds
     uncertainty = None if error is None else tariff.kwh(error * machine / seconds)
@@ -411,18 +416,19 @@ def extrapolation(
     }
 
 
-def latest_renderings(every: Sequence[Rendering]) -> list[Rendering]:
+def latest_renderings(all_renderings: Sequence[Rendering]) -> list[Rendering]:
     """Return the latest rendering of each view, without the first views of processes.
 
-    First views tell little of the others. They count only if there are no others.
+    First views do not represent the others. They count only if there are no others.
     """
-    by_view = {r.view: r for r in sorted(every, key=lambda rendering: rendering.finished)}
+    by_finish = sorted(all_renderings, key=lambda rendering: rendering.finished)
+    by_view = {rendering.view: rendering for rendering in by_finish}
     latest = list(by_view.values())
     return [rendering for rendering in latest if not rendering.first] or latest
 
 
 def basis(count: int, lightfield: LightField, scale: Scale, by_processor: bool) -> str:
-    """Say what an extrapolation from ``count`` views follows from, and how far it reaches."""
+    """Describe the basis of an extrapolation from ``count`` views, and how far it reaches."""
     lens = lightfield.lens
     render = lightfield.render
     denoising = f", and denoising, which counts as {DENOISING_SAMPLES}" if render["denoise"] else ""

@@ -1,12 +1,12 @@
-"""The error of renders against their time: plain, adaptive, guided and denoised sampling.
+"""Measures the error of renders against their time: plain, adaptive, guided and denoised sampling.
 
 An `Experiment` renders windows of the dataset's views with every method. A seed's time is Cycles'
-own for rendering, denoising included; a window counts with the median of its seeds. The times are
-right only if nothing else runs on the same core.
+own for rendering, with denoising. A window counts with the median of its seeds. The times are right
+only if nothing else runs on the same core.
 
 The slope of a method is the slope of its error over its time, both in logarithms. Plain path
-tracing has −1 over samples, with and without clamped indirect light, because Cycles clamps samples,
-not pixels. Two things bend the line. In smooth light, Cycles' Sobol points converge faster than
+tracing has −1 over samples, also with clamped indirect light, because Cycles clamps samples, not
+pixels. Two effects bend the line. In smooth light, Cycles' Sobol points converge faster than
 independent points. In rare bright light, leaving out the worst thousandth of pixels hides more
 light at few samples than at many. There the slope of all pixels, which is reported too, stays at
 −1, with a larger standard error. Adaptive sampling and denoising are biased: their slopes are
@@ -46,7 +46,7 @@ BOTH = "adaptive + denoised"
 GUIDED = "path guiding"
 OWN = "this scene's settings"
 
-# Above 0.2, the fewest samples that adaptive sampling takes decide.
+# Thresholds above 0.2 have no effect: adaptive sampling takes its fewest samples.
 THRESHOLDS = (0.2, 0.1, 0.05, 0.02, 0.01)
 
 # The figures of a point that are means over the errors of its renders.
@@ -66,20 +66,22 @@ FIGURES = (
     *("mse_seconds", "relative_mse_unexposed", "mrse", "psnr", "ssim", "flip"),
 )
 
-# The keys of a point that tell its method; the rest are figures.
+# The keys of a point that tell its method. All others are figures.
 METHOD_KEYS = ("method", "settings")
 
 
 @dataclass(frozen=True)
 class Point:
-    """What one method gives: means over windows and seeds.
+    """The figures of one method: means over windows and seeds.
 
-    ``samples`` is the mean number of samples that a pixel took. ``seconds`` are those of one core,
-    or of the GPU, for a megapixel. ``standard_error`` is that of ``relative_mse`` over seeds.
-    ``resolved`` says whether the error is above the references' own error; points below it are
-    neither drawn nor fitted. ``bias`` (squared) and ``variance`` add up to ``relative_mse_whole``.
-    ``mse_seconds`` is ``relative_mse_whole`` times ``seconds``: without bias, it is the same for
-    any number of samples.
+    - ``samples``: the mean number of samples that a pixel took.
+    - ``seconds``: those of one core, or of the GPU, for a megapixel.
+    - ``standard_error``: that of ``relative_mse`` over seeds.
+    - ``resolved``: whether the error is above the references' own error. Points below it are
+      neither drawn nor fitted.
+    - ``bias`` (squared) and ``variance``: they add up to ``relative_mse_whole``.
+    - ``mse_seconds``: ``relative_mse_whole`` times ``seconds``. Without bias, it does not
+      depend on the number of samples.
     """
 
     method: str
@@ -118,9 +120,10 @@ def measure(
 ) -> dict[str, Any]:
     """Measure every method on ``windows`` windows of ``size``² pixels of each stratum.
 
-    One more window is that of the first one's neighbouring view. ``render`` is the scene's own
-    block. Sample counts are 1 to 2^``octaves``, each rendered with ``seeds`` seeds. Errors of whole
-    views are the mean of the strata's, weighted by their areas. ``name`` starts the progress lines.
+    One more window shows the same place in the first one's neighbouring view. ``render`` is the
+    scene's own block. Sample counts are 1 to 2^``octaves``, each rendered with ``seeds`` seeds.
+    Errors of whole views are the mean of the strata's, weighted by their areas. ``name`` starts the
+    progress lines.
     """
     chosen, areas = strata.choose(maker, size, windows)
     neighbour = nearest_view(maker.lightfield.views, chosen[0].view)
@@ -159,7 +162,7 @@ def measure(
 
 
 def all_methods(render: Mapping[str, Any], octaves: int, guiding: bool) -> list[Method]:
-    """Return all methods that are measured. The scene's own settings come last."""
+    """Return all methods to measure. The scene's own settings come last."""
     counts = [2**octave for octave in range(octaves + 1)]
     methods: list[Method] = []
     for denoise, by_count, by_threshold in ((False, PLAIN, ADAPTIVE), (True, DENOISED, BOTH)):
@@ -167,7 +170,7 @@ def all_methods(render: Mapping[str, Any], octaves: int, guiding: bool) -> list[
         for threshold in THRESHOLDS:
             settings = {"samples": counts[-1], "adaptive_threshold": threshold, "denoise": denoise}
             methods.append(Method(by_threshold, settings))
-    # Elsewhere guiding stays as the .blend has it, off unless an artist turned it on.
+    # In all other methods guiding stays as the .blend has it, which is usually off.
     if guiding:
         methods += [Method(GUIDED, {"samples": n, "guiding": True}) for n in counts]
     own_settings = {key: render[key] for key in ("samples", "adaptive_threshold", "denoise")}
@@ -192,6 +195,9 @@ def measured_point(
     seconds = fmean(median(trial.seconds for trial in trials) for trials in renders)
     seconds *= 1e6 / pixels
     depths = [error.depth for error in all_errors if error.depth is not None]
+    errors_of_seeds = [
+        fmean(error.relative_mse for error in of_seed) for of_seed in zip(*errors, strict=True)
+    ]
     return Point(
         method=method.name,
         settings=method.settings,
@@ -201,12 +207,7 @@ def measured_point(
         bias=fmean(bias for bias, _ in parts),
         variance=fmean(variance for _, variance in parts),
         mse_seconds=means["relative_mse_whole"] * seconds,
-        standard_error=standard_error(
-            [
-                fmean(error.relative_mse for error in of_seed)
-                for of_seed in zip(*errors, strict=True)
-            ]
-        ),
+        standard_error=standard_error(errors_of_seeds),
         resolved=means["relative_mse"] > mean_own_error(references),
         depth_error=fmean(depths) if depths else None,
     )
@@ -254,10 +255,10 @@ def whole_views_point(
 
 
 def evaluated(points: Sequence[Point], reference_error: float) -> dict[str, Any]:
-    """Return what follows from the points: slopes, the Pareto front, and what each method saves.
+    """Return the slopes, the Pareto front, and the savings of each method, from the points.
 
-    ``reference_error`` is the references' own error. Points below it are left out of all but
-    ``points`` and ``settings``.
+    ``reference_error`` is the references' own error. Only ``points`` and ``settings`` include
+    points below it.
     """
     resolved = [point for point in points if point.resolved]
     lines = {
@@ -284,7 +285,7 @@ def evaluated(points: Sequence[Point], reference_error: float) -> dict[str, Any]
 def savings(points: Sequence[Point], plain: Mapping[str, metrics.Line]) -> list[dict[str, Any]]:
     """Return how many times less time and samples each point takes than plain path tracing.
 
-    ``plain`` has the lines of `fitted` of plain path tracing; without lines nothing is returned.
+    ``plain`` has the lines of `fitted` of plain path tracing. Without lines the result is empty.
     """
     if not plain:
         return []
@@ -305,9 +306,10 @@ def savings(points: Sequence[Point], plain: Mapping[str, metrics.Line]) -> list[
 def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
     """Return each method's error at equal time, and its time at equal error.
 
-    Both are equal to those of one of plain path tracing's points: with ``part`` 0.5 the middle one,
-    with 1 that of most samples. Figures are interpolated between a method's own points, and None
-    beyond them. If even a method's cheapest point has less error, the time is that of this point.
+    One of plain path tracing's points sets the equal time and the equal error. With ``part`` 0.5 it
+    is the middle one, with 1 that of most samples. Figures are interpolated between a method's own
+    points, and None beyond them. If even a method's cheapest point has less error, the time is that
+    of this point.
     """
     plain = sorted((p for p in points if p.method == PLAIN), key=lambda p: p.seconds)
     if not plain:
@@ -338,10 +340,10 @@ def by_method(points: Sequence[Point], part: float) -> list[dict[str, Any]]:
 
 
 def fitted(points: Sequence[Point]) -> dict[str, metrics.Line]:
-    """Fit the errors of a method's points over time and over samples; empty for too few points."""
+    """Fit the errors of a method's points over time and over samples. Empty for too few points."""
     lines: dict[str, metrics.Line] = {}
     for prefix, error in (("", "relative_mse"), ("of_all_pixels_", "relative_mse_whole")):
-        # An error that a few pixels make almost alone may be below 0 by chance.
+        # If a few pixels dominate an error, it may be below 0 by chance.
         positive = [point for point in points if getattr(point, error) > 0]
         errors = [getattr(point, error) for point in positive]
         by_time = metrics.fit([point.seconds for point in positive], errors)
@@ -359,9 +361,9 @@ def neighbour_disagreements(
 ) -> list[dict[str, Any]]:
     """Return how the first two windows, of neighbouring views, disagree under each method.
 
-    Each entry has the keys of `metrics.Disagreement`, means over the seeds, and
-    ``bias_correlation``: how far the views' biases agree, from the renders of all seeds. Without
-    depth there is no entry; an entry without a surface that both views see has no figures.
+    Each entry has the keys of `metrics.Disagreement`, as means over the seeds. It also has
+    ``bias_correlation``, how far the views' biases agree, from the renders of all seeds. Without
+    depth there is no entry. Without a surface that both views see, an entry has no figures.
     """
     references = (experiment.references[0], experiment.references[1])
     if references[0].depth is None:
@@ -371,13 +373,13 @@ def neighbour_disagreements(
         experiment.maker.camera(windows[0].view),
         experiment.maker.camera(windows[1].view),
     )
-    seen = both_see(cameras, windows, references)
+    common_pixels = both_see(cameras, windows, references)
     entries = []
     for method in methods:
         entry: dict[str, Any] = {"method": method.name, "settings": method.settings}
-        if len(seen[0]):
+        if len(common_pixels[0]):
             renders = experiment.renders(method)
-            entry |= disagreement((renders[0], renders[1]), references, seen)
+            entry |= disagreement((renders[0], renders[1]), references, common_pixels)
         entries.append(entry)
     return entries
 
@@ -385,18 +387,19 @@ def neighbour_disagreements(
 def disagreement(
     renders: tuple[Sequence[Trial], Sequence[Trial]],
     references: tuple[metrics.Reference, metrics.Reference],
-    seen: tuple[NDArray[np.int64], NDArray[np.int64]],
+    common_pixels: tuple[NDArray[np.int64], NDArray[np.int64]],
 ) -> dict[str, float | None]:
-    """Return how two windows' renders of the same seeds disagree at the pixels ``seen``."""
+    """Return how two windows' renders of the same seeds disagree at their common pixels."""
     by_seed = [
-        asdict(metrics.disagreement((first.colour, second.colour), references, seen))
+        asdict(metrics.disagreement((first.colour, second.colour), references, common_pixels))
         for first, second in zip(*renders, strict=True)
     ]
     means: dict[str, float | None] = {
         name: fmean(figures[name] for figures in by_seed) for name in by_seed[0]
     }
     colours = [trial.colour for trial in renders[0]], [trial.colour for trial in renders[1]]
-    return means | {"bias_correlation": metrics.bias_correlation(colours, references, seen)}
+    means["bias_correlation"] = metrics.bias_correlation(colours, references, common_pixels)
+    return means
 
 
 def write(stem: Path, content: Mapping[str, Any]) -> None:
@@ -442,8 +445,8 @@ def _equal_table(name: str, content: Mapping[str, Any]) -> list[str]:
     return [
         f"# {name}: methods at equal time and at equal error",
         "",
-        "The error is the relative mean squared error of all but the worst thousandth of pixels;",
-        "seconds are those of a megapixel; — is outside what was measured.",
+        "The error is the relative mean squared error of all but the worst thousandth of pixels.",
+        "Seconds are those of a megapixel. — is outside what was measured.",
         "",
         f"| method | error at {seconds:.3g} s | seconds at error {error:.2g} | times faster |",
         "| --- | ---: | ---: | ---: |",
@@ -461,11 +464,11 @@ def _figures_table(content: Mapping[str, Any]) -> list[str]:
     }
     lines = [
         "",
-        f"Of each method what was measured nearest to {content['methods'][0]['seconds']:.3g} s. "
-        "Bias (squared) and variance",
-        "add up to the error of all pixels, and × s is that times the seconds; a bias below 0 is",
+        f"Each method's point nearest to {content['methods'][0]['seconds']:.3g} s. Bias (squared) "
+        "and variance add",
+        "up to the error of all pixels. × s is that error times the seconds. A bias below 0 is",
         "within the noise of 0. In common is the correlation of the bias with the neighbouring",
-        "view's; texture has 1.",
+        "view's. Texture has 1.",
         "",
         "| method | samples | s | error | of all pixels | bias | variance | × s | unexposed "
         "| MRSE | PSNR | SSIM | FLIP | in common |",
@@ -483,10 +486,10 @@ def _strata_table(content: Mapping[str, Any]) -> list[str]:
     columns, rows = strata_table(content)
     return [
         "",
-        "By stratum, what pixels show, which is a part of the views: the slope of a method's error",
-        "over time, its error in the time of plain path tracing in the middle of its points, its",
-        "seconds to the error of that, and how many times faster it is there, and at the error of",
-        "plain path tracing with most samples.",
+        "The strata are what pixels show. The columns are a stratum's part of the views, and the",
+        "slope of a method's error over time. The equal time and the equal error are those of the",
+        "middle point of plain path tracing. Then come the seconds to that error, how many times",
+        "faster a method is there, and at the error of plain path tracing with most samples.",
         "",
         f"| {' | '.join(columns)} |",
         "| --- | ---: | --- " + "| ---: " * (len(columns) - 3) + "|",
@@ -522,7 +525,7 @@ def draw(stem: Path, content: Mapping[str, Any]) -> None:
             xlabel=by_method_axes.get_xlabel(),
         )
         by_stratum_axes.xaxis.set_minor_formatter("")
-        # Beside the axes: a legend of seven strata would hide the curves.
+        # Put the legend beside the axes: its seven strata would hide the curves.
         by_stratum_axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1, 0.5))
 
 
@@ -592,7 +595,7 @@ def _column(name: str, points: Sequence[Mapping[str, Any]]) -> list[float]:
 
 
 def _slopes(lines: Mapping[str, Mapping[str, float]]) -> str:
-    """Return the slopes over time, each ± its standard error, as text; nothing without them."""
+    """Return the slopes over time with their standard errors, as text. Empty without slopes."""
     text = ""
     for name, form in (
         ("over_time", ", slope {}"),

@@ -1,10 +1,10 @@
-"""Compare somebody's renders of a dataset's views with the dataset's own, view by view, by region.
+"""Compares renders of a dataset's views with the dataset's own, view by view, by region.
 
-A render is ``<view>.png``, sRGB, or ``<view>.exr``, linear, with depth as the dataset's in its
-channel Z. Normals are ``normal/<view>.exr``, as the dataset's pass. The rig's name may stand before
+A render is ``<view>.png``, sRGB, or ``<view>.exr``, linear, with the dataset's kind of depth in
+channel Z. Normals are ``normal/<view>.exr``, like the dataset's pass. The rig's name may precede
 the view's, as in exports of several rigs: ``spiral_view_0000f.png``. The developed pictures are
-compared; pictures with alpha are composited over a background. LPIPS is not among the metrics,
-because no package of this environment holds the weights of its network.
+compared. Pictures with alpha are composited over a background. LPIPS is missing, because no package
+of this environment holds the weights of its network.
 """
 
 import math
@@ -28,10 +28,11 @@ from lightfield.measurement import metrics
 
 # Neighbouring depths of different surfaces differ by more than this part.
 EDGE = 0.1
-EDGE_PIXELS = 5  # the width of what counts as an edge
+# The width of an edge in pixels.
+EDGE_PIXELS = 5
 NORMALS = "normal"
-# A render's alpha differs from the truth's if it is off by more than this step, in more than this
-# part of the pixels. At silhouettes they always differ somewhat.
+# A render's alpha differs from the truth's if more than ALPHA_PART of the pixels are off by more
+# than ALPHA_STEP. At silhouettes they always differ somewhat.
 ALPHA_STEP = 0.1
 ALPHA_PART = 0.01
 
@@ -40,7 +41,7 @@ ALPHA_PART = 0.01
 class Pictures:
     """The pictures of one view: sRGB-encoded colour (h, w, 3), depth (h, w), normals (h, w, 3).
 
-    The colour is composited over the background, of which ``alpha`` (h, w) covers a part.
+    The colour is composited over the background. ``alpha`` (h, w) is the part that it covers.
     """
 
     colour: Floats
@@ -54,7 +55,7 @@ def find(
 ) -> Path:
     """Return the picture of a view in a folder. Raises `UserError` if there is none.
 
-    Names with the rig's name go first, because a bare view's name may be another rig's.
+    Names with the rig's name come first, because a view's name alone may belong to another rig.
     """
     names = [*(f"{rig}_{view.name}" for rig in _rig_names(source)), view.name]
     for name in names:
@@ -70,9 +71,9 @@ def find(
 
 
 def _rig_names(source: SourceDataset) -> list[str]:
-    """Return the names that a dataset's rig may have, the name of its folder first.
+    """Return the names that a dataset's rig may have, beginning with the name of its folder.
 
-    The folder of a frame lies in the rig's. A package unfolds to <scene>_<rig>, or to
+    The folder of a frame lies in the rig's. A package unpacks to <scene>_<rig>, or to
     <scene>_<preset>_<rig>.
     """
     folder = absolute_path(source.dataset)
@@ -87,7 +88,7 @@ def _rig_names(source: SourceDataset) -> list[str]:
 
 
 def mask(path: Path, source: SourceDataset) -> Bools:
-    """Return where a grey picture is not 0. Raises `UserError` for another size or kind."""
+    """Return where a grey picture is not 0. Raises `UserError` for a wrong size or kind."""
     pixels = images.read_image(path, ["Y"]).channels["Y"]
     check_size(path, source.lightfield, pixels)
     return np.asarray(pixels > 0)
@@ -96,7 +97,7 @@ def mask(path: Path, source: SourceDataset) -> Bools:
 def truth(source: SourceDataset, view: View, like: Path, background: Floats) -> Pictures:
     """Return a dataset's own view over a background (3,) in sRGB, 0 to 1.
 
-    It is rounded as a PNG if ``like``, the picture that it is compared with, is one.
+    ``like`` is the picture to compare it with. If that is a PNG, the view is rounded as a PNG.
     """
     transparent = source.lightfield.transparent
     if like.suffix == ".png":
@@ -118,7 +119,7 @@ def truth(source: SourceDataset, view: View, like: Path, background: Floats) -> 
 
 
 def rendered(path: Path, source: SourceDataset, background: Floats) -> Pictures:
-    """Return somebody's view over a background (3,) in sRGB, 0 to 1.
+    """Return a render over a background (3,) in sRGB, 0 to 1.
 
     Raises `UserError` if it has no colour, or another size than the dataset's.
     """
@@ -134,7 +135,7 @@ def rendered(path: Path, source: SourceDataset, background: Floats) -> Pictures:
 
 
 def _alpha(image: images.Image) -> Floats | None:
-    """Return a picture's alpha (h, w), 0 to 1; None if it has none."""
+    """Return a picture's alpha (h, w), 0 to 1. None if it has none."""
     alpha = image.channels.get("A")
     if alpha is None:
         return None
@@ -147,8 +148,8 @@ def _developed(
 ) -> Floats:
     """Return a picture's sRGB colour (h, w, 3) over a background.
 
-    An EXR's colour is multiplied by alpha, and the background is added as light. A PNG's colour is
-    not, and its sRGB values are blended, as trainers blend those of RGBA pictures.
+    An EXR's colour is premultiplied by alpha, so the background is added as light. A PNG's colour
+    is not. Its sRGB values are blended, as trainers do with RGBA pictures.
     """
     if image.channels["R"].dtype.kind == "u":
         pixels = np.stack([image.channels[name] for name in "RGB"], axis=-1)
@@ -174,12 +175,15 @@ def _on_background(
 def background_problem(
     shown: Pictures, true: Pictures, counted: Bools, background: Floats
 ) -> str | None:
-    """Return how a render's alpha or background differs from the truth's; None if they agree.
+    """Return how a render's alpha or background differs from the truth's. None if they agree.
 
     A render without alpha must show the ``background`` where the truth is transparent.
     """
     if shown.alpha is None:
-        if true.alpha is None or not (empty := counted & (true.alpha == 0)).any():
+        if true.alpha is None:
+            return None
+        empty = counted & (true.alpha == 0)
+        if not empty.any():
             return None
         colour = np.median(shown.colour[empty], axis=0)
         if np.abs(colour - background).max() <= ALPHA_STEP:
@@ -206,23 +210,23 @@ def regions(
     """Return the regions (h, w) of a view in which errors are counted, by their names.
 
     ``counted`` are the pixels that a mask leaves. ``centre`` and ``rim`` divide the lens at half
-    its largest angle. With ``depth``, as the dataset has it, ``edges`` are where the distance
-    jumps, and ``background`` is where nothing was hit.
+    its largest angle. If there is ``depth``, of the dataset's kind, ``edges`` are where the
+    distance jumps. ``background`` is where nothing was hit.
     """
     valid = source.valid(view)
     rays = source.lens.pixel_rays()
-    every = counted & valid
+    compared = counted & valid
     angle = np.arccos(np.clip(-rays[..., 2], -1, 1))
     inner = angle < np.nanmax(angle) / 2
-    by_name = {"all": every, "centre": every & inner, "rim": every & ~inner}
+    by_name = {"all": compared, "centre": compared & inner, "rim": compared & ~inner}
     if depth is not None:
-        # Towards the rim of a wide lens Z falls on any surface.
+        # Compare distances: towards the rim of a wide lens, Z decreases on any surface.
         distance = stored_distance(depth, rays, source.lightfield.depth)
         finite_distance = np.where(np.isfinite(distance), distance, 1e9)
         near = minimum_filter(np.where(valid, finite_distance, np.inf), EDGE_PIXELS)
         far = maximum_filter(np.where(valid, finite_distance, 0), EDGE_PIXELS)
-        by_name["edges"] = every & (far > (1 + EDGE) * near)
-        by_name["background"] = every & np.isposinf(depth)
+        by_name["edges"] = compared & (far > (1 + EDGE) * near)
+        by_name["background"] = compared & np.isposinf(depth)
     return {name: region for name, region in by_name.items() if region.any()}
 
 
@@ -231,13 +235,13 @@ def errors(
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the errors of each region: means over its pixels, None without depth or normals.
 
-    psnr in decibel (inf if equal), ssim (1 if equal), flip (0 if equal), depth as
-    `metrics.depth_error`, normal as the mean angle in degrees. Outside the region "all" both
+    They are psnr in decibel (inf if equal), ssim (1 if equal), flip (0 if equal), depth as in
+    `metrics.depth_error`, and normal as the mean angle in degrees. Outside the region "all" both
     pictures count as black.
     """
-    every = parts["all"][..., np.newaxis]
-    true_colour = np.where(every, true.colour, 0)
-    shown_colour = np.where(every, shown.colour, 0)
+    compared = parts["all"][..., np.newaxis]
+    true_colour = np.where(compared, true.colour, 0)
+    shown_colour = np.where(compared, shown.colour, 0)
     squares = ((true_colour - shown_colour) ** 2).mean(axis=-1)
     similarity = metrics.ssim_map(true_colour, shown_colour)
     flip = metrics.flip_map(true_colour, shown_colour)
@@ -261,7 +265,7 @@ def errors(
 
 
 def means(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return a row of means over the views for each region; one PSNR of inf makes the mean inf."""
+    """Return a row of means over the views for each region. A PSNR of inf makes the mean inf."""
     mean_rows = []
     for region in dict.fromkeys(row["region"] for row in rows):
         of_region = [row for row in rows if row["region"] == region]
@@ -280,7 +284,7 @@ def _normals(path: Path) -> Floats | None:
 
 
 def _angle(normals: Floats, truth: Floats) -> float | None:
-    """Return the mean angle in degrees between normals (n, 3) where the truth has a normal."""
+    """Return the mean angle in degrees between normals (n, 3), where the truth has a normal."""
     has_normal = np.linalg.norm(truth, axis=-1) > 0.5
     if not has_normal.any():
         return None

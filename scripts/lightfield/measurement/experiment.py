@@ -17,10 +17,10 @@ from lightfield.measurement import metrics, strata
 from lightfield.measurement.metrics import Reference
 from lightfield.measurement.trials import Trial, Trials, Window
 
-# What a report calls all strata together.
+# The name of all strata together in reports.
 WHOLE_VIEWS = "whole views"
 
-# A stratified reference splits its samples among so many seeds; their differences tell its error.
+# A stratified reference splits its samples among this many seeds. Their differences tell its error.
 REFERENCE_SEEDS = 8
 
 # The renders of one method, by window and seed.
@@ -38,15 +38,15 @@ class Method:
 
     @property
     def key(self) -> str:
-        """What tells this method's renders from those of others: its settings."""
+        """The key of this method's renders: its settings."""
         return json.dumps(self.settings)
 
 
 class Experiment:
     """Renders ``windows`` with methods, and compares the renders with ``references``.
 
-    ``by_stratum`` holds each stratum's references, in which only the stratum's pixels count;
-    ``areas`` holds each stratum's part of the whole views. Without strata, all pixels are one.
+    ``by_stratum`` holds each stratum's references, in which only the stratum's pixels count.
+    ``areas`` holds each stratum's part of the whole views. Without strata, all pixels form one.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class Experiment:
     ) -> "Experiment":
         """Render references of ``samples`` samples a pixel, and split them by stratum.
 
-        ``areas`` is each stratum's part of the whole views; ``name`` starts the progress lines.
+        ``areas`` is each stratum's part of the whole views. ``name`` starts the progress lines.
         """
         # The pilot renders first, because it sets up Cycles for the parts of light.
         classes = strata.classes_of(maker, windows)
@@ -93,12 +93,12 @@ class Experiment:
 
     @cached_property
     def device(self) -> str:
-        """What Cycles renders on, CPU or GPU."""
+        """The device that Cycles renders on, CPU or GPU."""
         return self.maker.render(self.windows[0], 1, {"samples": 1}).device
 
     @property
     def megapixels(self) -> float:
-        """The size of a window; all have the same."""
+        """The size of a window. All have the same size."""
         return self.windows[0].width * self.windows[0].height / 1e6
 
     def run(self, methods: Iterable[Method], seeds: Sequence[int], title: str = "") -> None:
@@ -120,7 +120,7 @@ class Experiment:
                         progress.done()
 
     def renders(self, method: Method) -> Renders:
-        """Return what `run` rendered with a method, by window and seed."""
+        """Return the renders of a method from `run`, by window and seed."""
         return self._renders[method.key]
 
     def errors(
@@ -128,15 +128,15 @@ class Experiment:
     ) -> list[list[float]]:
         """Return the relative mean squared errors of a method, by window and seed.
 
-        ``left_out`` is the part of the pixels that do not count, those with the largest errors.
+        ``left_out`` is the part of the pixels, those with the largest errors, that do not count.
         """
-        return [
-            [
-                metrics.relative_mse(trial.colour, reference, left_out)
-                for trial in self.renders(method)[number]
-            ]
-            for number, reference in references.items()
-        ]
+        errors = []
+        for number, reference in references.items():
+            trials = self.renders(method)[number]
+            errors.append(
+                [metrics.relative_mse(trial.colour, reference, left_out) for trial in trials]
+            )
+        return errors
 
     def seconds(self, method: Method, numbers: Iterable[int] | None = None) -> list[list[float]]:
         """Return a method's seconds a megapixel, by window and seed, of all windows or some."""
@@ -156,7 +156,7 @@ class Experiment:
         )
 
     def described(self) -> dict[str, Any]:
-        """Return where this experiment measured, for its report."""
+        """Return the windows of this experiment, for its report."""
         return {
             "probes": [window.name for window in self.windows],
             "size": self.windows[0].width,
@@ -169,8 +169,8 @@ def split_by_stratum(
 ) -> dict[str, dict[int, Reference]]:
     """Return each stratum's references, in which only its pixels count.
 
-    ``classes`` are those of the references' windows. A window is left out of a stratum of which it
-    has fewer than `strata.FEWEST_PIXELS`, and a stratum without any window is left out.
+    ``classes`` are those of the references' windows. A stratum leaves out windows with fewer than
+    `strata.FEWEST_PIXELS` of its pixels. A stratum without any window is left out.
     """
     by_stratum: dict[str, dict[int, Reference]] = {}
     for stratum_number, stratum in enumerate(strata.STRATA):

@@ -1,4 +1,4 @@
-"""What a run will take, as a dry run prints it at its end, before anything is measured.
+"""Forecasts the cost of a run, which a dry run prints at its end, before anything is measured.
 
 Every job reads this file with the rules, so it must import nothing that takes long.
 """
@@ -17,10 +17,12 @@ from lightfield.measurement.sampling import (
     WINDOW_SIZE,
 )
 
-# Measured in the courtyard: a calibration's search makes so many renders of each window, with so
-# many times the samples that the target needs, and a render takes so long beside its samples.
+# The following were measured in the courtyard. A calibration's search makes this many renders of
+# each window.
 SEARCH_RENDERS = 9
+# Together they take this many times the samples that the target needs.
 SEARCH_PART = 2.5
+# A render takes this many seconds beside its samples.
 WINDOW_SECONDS = 0.07
 
 # The formulas of the columns, which stand under the table.
@@ -59,7 +61,7 @@ def forecast(works: Sequence[Work]) -> str:
 
 
 def calibration_seconds(target: float, size: int, most: int | None = None) -> float:
-    """Estimate how many seconds one core calibrates for a ``target`` error with views of ``size``².
+    """Estimate the seconds of a calibration on one core, for a ``target`` error and views of size².
 
     The estimate takes the error of N samples a pixel as 1 / N. It is 0.4 / N in the courtyard,
     1.4 / N in the barbershop, and 2.6 / N in the garden. A preset allows at most ``most`` samples.
@@ -68,7 +70,7 @@ def calibration_seconds(target: float, size: int, most: int | None = None) -> fl
     seeds = FEWEST_SEEDS
     while seeds < MOST_SEEDS and seeds * REFERENCE_SAMPLES * REFERENCE_PART < needed:
         seeds *= 2
-    # Windows and held-out windows have references; plain path tracing and the search come on top.
+    # Windows and held-out windows have references. Plain path tracing and the search add samples.
     search_samples = sum(PLAIN_SAMPLES) + SEARCH_PART * min(needed, most or needed)
     samples = 2 * seeds * REFERENCE_SAMPLES + search_samples
     renders = 2 * seeds + SEARCH_RENDERS
@@ -95,5 +97,5 @@ def size_text(size: float) -> str:
 
 
 def _figure(value: float) -> str:
-    """Return a number with two digits, or from 10 on as a whole number with commas."""
+    """Return a number with two digits. From 10 on return a whole number with commas."""
     return f"{value:.2g}" if value < 9.95 else f"{value:,.0f}"

@@ -1,4 +1,4 @@
-"""Compare a GPU's renders with the processor's, and estimate the full datasets' GPU hours."""
+"""Compares a GPU's renders with the processor's, and estimates the full datasets' GPU hours."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -21,15 +21,15 @@ SIZE = 128
 # Renders on each device, and the samples of each render.
 SEEDS = 4
 SAMPLES = 16
-# Blocks of so many pixels along a side are compared, because means are less noisy than pixels.
+# Blocks of this many pixels along a side are compared, because means are less noisy than pixels.
 BLOCK = 8
-# The largest squared difference of the same picture, in units of what noise alone makes.
+# The largest squared difference of the same picture, in units of that by noise alone.
 MOST_OF_NOISE = 2.0
 # The largest difference of all light, in standard errors.
 MOST_ERRORS = 6.0
 # Depths of the same picture differ by less than this part.
 SAME_DEPTH = 1e-4
-# At silhouettes rounding decides which surface is hit, so this part of the pixels may differ.
+# At silhouettes rounding decides which surface a ray hits, so this part of the pixels may differ.
 SILHOUETTES = 1e-3
 
 
@@ -41,12 +41,13 @@ class GpuCheckSettings(Settings):
 
 @dataclass(frozen=True)
 class Comparison:
-    """How renders of the same view on two devices differ.
+    """The difference between renders of the same view on two devices.
 
-    ``colour`` is the mean squared difference of block means, relative as `metrics.relative_mse`, in
-    units of what the noise of both makes: 1 if nothing but noise differs. ``light`` is the
-    difference of all light, in standard errors. ``depth`` is the part of the pixels whose depths
-    differ by more than `SAME_DEPTH`, or where only one device hits anything.
+    - ``colour``: the mean squared difference of block means, relative as in `metrics.relative_mse`.
+      The unit is the difference by noise alone: 1 if nothing but noise differs.
+    - ``light``: the difference of all light, in standard errors.
+    - ``depth``: the part of the pixels whose depths differ by more than `SAME_DEPTH`, or where only
+      one device hits anything.
     """
 
     colour: float
@@ -64,36 +65,42 @@ class Comparison:
 
 
 def compare(
-    one: Sequence[Trial], other: Sequence[Trial], mask: metrics.Mask, block: int = BLOCK
+    first: Sequence[Trial], second: Sequence[Trial], mask: metrics.Mask, block: int = BLOCK
 ) -> Comparison:
     """Compare at least two renders, of different seeds, with as many of another device.
 
     ``mask`` (h, w) says which pixels the lens has a ray for.
     """
-    full = _blocks(mask[..., None].astype(float), block)[..., 0] == 1
-    mean, other_mean = (
-        metrics.make_reference([_blocks(trial.colour, block) for trial in trials], None, full)
-        for trials in (one, other)
-    )
-    noise = ((mean.variance + other_mean.variance)[full] * mean.weights).mean()
-    difference = ((mean.colour - other_mean.colour)[full] ** 2 * mean.weights).mean()
-    totals = [
-        [trial.colour[mask].mean(dtype=np.float64) for trial in made] for made in (one, other)
-    ]
-    error = math.hypot(*(standard_error(total) for total in totals))
-    light = _over(fmean(totals[1]) - fmean(totals[0]), error)
-    depths = one[0].depth, other[0].depth
+    is_complete = _blocks(mask[..., None].astype(float), block)[..., 0] == 1
+    first_mean = _block_means(first, block, is_complete)
+    second_mean = _block_means(second, block, is_complete)
+    weights = first_mean.weights
+    noise = ((first_mean.variance + second_mean.variance)[is_complete] * weights).mean()
+    difference = ((first_mean.colour - second_mean.colour)[is_complete] ** 2 * weights).mean()
+    first_light = [trial.colour[mask].mean(dtype=np.float64) for trial in first]
+    second_light = [trial.colour[mask].mean(dtype=np.float64) for trial in second]
+    error = math.hypot(standard_error(first_light), standard_error(second_light))
+    light = _over(fmean(second_light) - fmean(first_light), error)
+    first_depth = first[0].depth
+    second_depth = second[0].depth
     differ = np.zeros(mask.shape, dtype=bool)
-    if depths[0] is not None and depths[1] is not None:
+    if first_depth is not None and second_depth is not None:
         with np.errstate(invalid="ignore"):
-            near = np.abs(depths[1] / depths[0] - 1) <= SAME_DEPTH
-        differ = ~near & ~(np.isinf(depths[0]) & np.isinf(depths[1]))
+            near = np.abs(second_depth / first_depth - 1) <= SAME_DEPTH
+        differ = ~near & ~(np.isinf(first_depth) & np.isinf(second_depth))
     return Comparison(_over(difference, noise), light, float(differ[mask].mean()))
 
 
+def _block_means(trials: Sequence[Trial], block: int, mask: metrics.Mask) -> metrics.Reference:
+    """Return the mean of renders in blocks. ``mask`` says which blocks count."""
+    return metrics.make_reference([_blocks(trial.colour, block) for trial in trials], None, mask)
+
+
 def _over(difference: float, noise: float) -> float:
-    """Return a difference over noise; 0 for equal pictures, which may have no noise at all."""
-    return 0.0 if difference == 0 else float(difference / noise) if noise else math.inf
+    """Return a difference over noise. Return 0 for equal pictures, which may have no noise."""
+    if difference == 0:
+        return 0.0
+    return float(difference / noise) if noise else math.inf
 
 
 def _blocks(pixels: NDArray[Any], block: int) -> Any:
@@ -109,8 +116,8 @@ def check(
     """Compare small renders of the first view on both devices, and time a large one on the GPU.
 
     ``render`` has the scene's settings. ``full`` has the ``views`` and ``resolution`` of each of
-    its datasets at full size. Returns the comparison, the seconds that a sample of a megapixel
-    takes on a core and on the GPU, and the GPU hours of each dataset.
+    its datasets at full size. Returns the comparison, and the seconds of a sample of a megapixel on
+    a core and on the GPU. Also returns the GPU hours of each dataset.
     """
     lens = maker.lens
     scale = min(1.0, SIZE / max(lens.width, lens.height))
@@ -123,7 +130,7 @@ def check(
         renders.append([on_device.render(on_device.first_view, s, settings) for s in seeds])
     comparison = compare(renders[0], renders[1], on_device.mask(on_device.first_view))
     core = median(trial.seconds for trial in renders[0]) / (small.width * small.height * SAMPLES)
-    # A small view would not keep a GPU busy.
+    # Time a large view: a small one would not keep a GPU busy.
     on_gpu = maker.on(device, lens)
     timed = on_gpu.render(on_gpu.first_view, 1, settings)
     gpu = timed.seconds / (lens.width * lens.height * SAMPLES)
@@ -147,7 +154,7 @@ def check(
 
 
 def table(name: str, content: Mapping[str, Any]) -> str:
-    """Return what `check` returned, in Markdown."""
+    """Return the result of `check` in Markdown."""
     faster = content["core_seconds"] / content["gpu_seconds"]
     rows = [f"| {dataset} | {hours:.3g} |" for dataset, hours in content["hours"].items()]
     return "\n".join(
@@ -155,10 +162,10 @@ def table(name: str, content: Mapping[str, Any]) -> str:
             f"# {name}: the GPU beside the processor",
             "",
             f"{'The same' if content['same'] else 'Not the same'}: colours differ by "
-            f"{content['colour']:.2f} of what noise makes (at most {MOST_OF_NOISE:g}), all light "
-            f"by {abs(content['light']):.1f} standard errors (at most {MOST_ERRORS:g}), and of the "
-            f"depths {content['depth']:.2%} by more than {SAME_DEPTH:g} of themselves (at most "
-            f"{SILHOUETTES:.1%}).",
+            f"{content['colour']:.2f} of what noise makes (at most {MOST_OF_NOISE:g}). All light "
+            f"differs by {abs(content['light']):.1f} standard errors (at most {MOST_ERRORS:g}). "
+            f"{content['depth']:.2%} of the depths differ by more than {SAME_DEPTH:g} of "
+            f"themselves (at most {SILHOUETTES:.1%}).",
             f"A sample of a megapixel takes {content['gpu_seconds']:.3g} s on the GPU, "
             f"{faster:.3g} times as fast as on one core.",
             "",

@@ -3,26 +3,29 @@
 The reference is the mean of n renders that differ only in their seeds. Every metric counts only
 pixels that the lens has a ray for.
 
-The main metric is the relative mean squared error, (x − r)² / (r² + ε): the mean over channels and
-over all pixels but the worst thousandth (Rousselle, Knaus and Zwicker 2011, section 5). Images are
-exposed so that the references' geometric mean luminance is middle grey, 0.18; ε is 0.01. Leaving
-out the worst thousandth makes the metric robust. Otherwise a few fireflies would decide it, and it
-would take thousands of views to tell two methods apart. The expected error of all pixels is
-exactly proportional to 1/N for N independent samples. Without the worst pixels it falls slower:
-where light comes in rare bright paths, few samples make few bright pixels, and the thousandth is
-most of them.
+The main metric is the relative mean squared error, (x − r)² / (r² + ε). It is the mean over
+channels and over all pixels but the worst thousandth (Rousselle, Knaus and Zwicker 2011, section
+5). Images are exposed so that the references' geometric mean luminance is middle grey, 0.18. ε is
+0.01. Leaving out the worst thousandth makes the metric robust. Otherwise a few fireflies would
+decide it, and it would take thousands of views to tell two methods apart.
 
-Beside it stands the same error of all pixels. Two more are published by others, of all pixels and
-of light without exposure: (x − r)² / (r² + ε), and pbrt's MRSE, (x − r)² / (r + ε)². They say
-little about a linear image whose middle grey is far from 0.18, where ε is too large or too small.
+The expected error of all pixels is exactly proportional to 1/N for N independent samples. Without
+the worst pixels it falls more slowly, if light comes in rare bright paths. Then few samples make
+few bright pixels, and the thousandth is most of them.
 
-The error is the sum of bias and variance. The bias is what the mean of many renders differs by; the
-variance is how single renders differ from that mean. Many short renders measure both (Celarek,
+Reports also give the same error of all pixels. Two more metrics are common in publications. They
+count all pixels, and light without exposure: (x − r)² / (r² + ε), and pbrt's MRSE,
+(x − r)² / (r + ε)². They say little about a linear image whose middle grey is far from 0.18,
+because ε is then too large or too small.
+
+The error is the sum of bias and variance. The bias is the difference of the mean of many renders.
+The variance is how single renders differ from that mean. Many short renders measure both (Celarek,
 Jakob, Wimmer and Lehtinen 2019). Plain path tracing has only variance, which falls with more
 samples. A denoiser's error ends at its bias, which falls more slowly or not at all.
 
-An independent reference adds its own variance, and nothing else, to every expected square. So
-subtracting an estimate of that variance, from how its n renders differ, leaves the image's error.
+An independent reference adds its own variance, and nothing else, to every expected square. The
+differences of its n renders give an estimate of that variance. Subtracting it leaves the image's
+error.
 """
 
 import math
@@ -45,7 +48,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 EPSILON = 0.01
-# The part of the pixels that does not count, those with the largest errors.
+# The part of the pixels, those with the largest errors, that does not count.
 OUTLIERS = 0.001
 # From sRGB to luma and two differences of colour. Source: ITU-R BT.709.
 TO_YCBCR = np.array(
@@ -59,12 +62,14 @@ MOST_OFFSET = 0.01
 
 @dataclass(frozen=True)
 class Reference:
-    """What an image is compared with.
+    """The reference of an image.
 
-    colour (h, w, 3): scene-linear, the mean of the renders; variance (h, w, 3): the estimated
-    variance of that mean; depth (h, w): the median of the renders' depths, inf for a miss, or None;
-    mask (h, w): pixels that the lens has a ray for; exposure: stops at which the image is shown;
-    part (h, w): the pixels of the mask that count, or None for all.
+    - ``colour`` (h, w, 3): scene-linear, the mean of the renders.
+    - ``variance`` (h, w, 3): the estimated variance of that mean.
+    - ``depth`` (h, w): the median of the renders' depths, inf for a miss, or None.
+    - ``mask`` (h, w): the pixels that the lens has a ray for.
+    - ``exposure``: the stops at which the image is shown.
+    - ``part`` (h, w): the pixels of the mask that count, or None for all.
     """
 
     colour: Array
@@ -108,7 +113,7 @@ def make_reference(
     depths: Sequence[NDArray[np.float32]] | None,
     mask: Mask,
 ) -> Reference:
-    """Make a reference of at least two renders, (h, w, 3) each, with depths (h, w) if any."""
+    """Make a reference of at least two renders (h, w, 3), with their depths (h, w) if any."""
     stack = np.stack(colours).astype(np.float64)
     with np.errstate(invalid="ignore"):
         depth = np.median(np.stack(depths), axis=0).astype(np.float64) if depths else None
@@ -130,11 +135,14 @@ def exposed_alike(
 class Errors:
     """The errors of one image against its reference.
 
-    relative_mse: without the reference's own error; an error far below that is below 0 by chance.
-    relative_mse_whole: the same of all pixels, with the worst thousandth.
-    relative_mse_unexposed, mrse (pbrt's): of all pixels, of light without exposure.
-    psnr (decibel; inf if equal), ssim (1 if equal), flip (0 if equal): of the tone-mapped image.
-    depth: as `depth_error`, or None without depth. Depth is one sample; more do not improve it.
+    - ``relative_mse``: without the reference's own error. Much smaller errors may be below 0 by
+      chance.
+    - ``relative_mse_whole``: the same of all pixels, with the worst thousandth.
+    - ``relative_mse_unexposed``, ``mrse`` (pbrt's): of all pixels, of light without exposure.
+    - ``psnr`` (decibel, inf if equal), ``ssim`` (1 if equal), ``flip`` (0 if equal): of the
+      tone-mapped image.
+    - ``depth``: as in `depth_error`, or None without depth. Depth is one sample, and more samples
+      do not improve it.
     """
 
     relative_mse: float
@@ -172,7 +180,7 @@ def compare(
 
 
 def ssim_map(truth: Array, shown: Array) -> Array:
-    """Return the structural similarity (h, w, 3) of sRGB pictures in [0, 1]; 1 is equal.
+    """Return the structural similarity (h, w, 3) of sRGB pictures in [0, 1]. 1 is equal.
 
     Source: Wang et al. 2004, with its Gaussian window of 1.5 pixels.
     """
@@ -190,7 +198,7 @@ def ssim_map(truth: Array, shown: Array) -> Array:
 
 
 def flip_map(truth: Array, shown: Array) -> Array:
-    """Return the FLIP (h, w) of sRGB pictures in [0, 1]; 0 is equal. Source: Andersson 2020."""
+    """Return the FLIP (h, w) of sRGB pictures in [0, 1]. 0 is equal. Source: Andersson 2020."""
     flip: Array = flip_evaluator.evaluate(
         truth.astype(np.float32), shown.astype(np.float32), "LDR", applyMagma=False
     )[0]
@@ -255,14 +263,14 @@ def _iv_psnr(picture: Array, other: Array, counted: NDArray[np.bool_]) -> float:
 def relative_mse(
     colour: NDArray[np.float32], reference: Reference, left_out: float = OUTLIERS
 ) -> float:
-    """Return the relative mean squared error, without what the reference itself adds to it.
+    """Return the relative mean squared error, without the reference's own part of it.
 
-    ``left_out`` is the part of the pixels that does not count, those with the largest errors.
+    ``left_out`` is the part of the pixels, those with the largest errors, that does not count.
     """
     errors = (_squares(colour, reference) * reference.weights).mean(axis=-1)
     reference_error = (reference.variance[reference.counted] * reference.weights).mean(axis=-1)
-    kept = _inliers(errors, left_out)
-    return float((errors - reference_error)[kept].mean())
+    inliers = _inliers(errors, left_out)
+    return float((errors - reference_error)[inliers].mean())
 
 
 def bias_and_variance(
@@ -270,14 +278,15 @@ def bias_and_variance(
 ) -> tuple[float, float]:
     """Return the squared bias and the variance of renders that differ only in their seeds.
 
-    Both are relative, and add up to `relative_mse` of all pixels. The squared mean of n ≥ 2 renders
-    holds the squared bias, an n-th of the variance, and the reference's own. So the bias is known
-    to about an n-th of the variance; a smaller one may be below 0 by chance.
+    Both are relative, and add up to `relative_mse` of all pixels. The squared difference of the
+    mean of n ≥ 2 renders is a sum: the squared bias, an n-th of the variance, and the reference's
+    own variance. So the bias is exact to about an n-th of the variance. A smaller bias may be below
+    0 by chance.
     """
     stack = np.stack([colour[reference.counted] for colour in colours]).astype(np.float64)
     variance = stack.var(axis=0, ddof=1)
-    apart = (stack.mean(axis=0) - reference.colour[reference.counted]) ** 2
-    bias = apart - variance / len(stack) - reference.variance[reference.counted]
+    squared_difference = (stack.mean(axis=0) - reference.colour[reference.counted]) ** 2
+    bias = squared_difference - variance / len(stack) - reference.variance[reference.counted]
     weights = reference.weights
     return float((bias * weights).mean()), float((variance * weights).mean())
 
@@ -285,20 +294,22 @@ def bias_and_variance(
 def bias_correlation(
     renders: tuple[Sequence[NDArray[np.float32]], Sequence[NDArray[np.float32]]],
     references: tuple[Reference, Reference],
-    seen: tuple[NDArray[np.int64], NDArray[np.int64]],
+    common_pixels: tuple[NDArray[np.int64], NDArray[np.int64]],
 ) -> float | None:
-    """Return the correlation of two views' biases at the pixels ``seen`` (see `disagreement`).
+    """Return the correlation of two views' biases at ``common_pixels`` (see `disagreement`).
 
-    1 if both views are wrong alike, as texture is; 0 if their biases have nothing in common. None
-    if the square of a bias is not above 0 by two standard errors over the pixels.
+    1 if both views have the same bias, as a blurred texture has. 0 if their biases have nothing in
+    common. None if the square of a bias is not above 0 by two standard errors over the pixels.
     """
-    means, squares = [], []
-    for colours, reference, where in zip(renders, references, seen, strict=True):
+    means = []
+    squares = []
+    for colours, reference, where in zip(renders, references, common_pixels, strict=True):
         stack = np.stack([c.reshape(-1, 3)[where] for c in colours]).astype(np.float64)
         means.append(stack.mean(axis=0) - reference.colour.reshape(-1, 3)[where])
         noise = stack.var(axis=0, ddof=1) / len(stack)
         squares.append(means[-1] ** 2 - noise - reference.variance.reshape(-1, 3)[where])
-    weights = _weights(references[0].colour.reshape(-1, 3)[seen[0]], references[0].exposure)
+    truth = references[0].colour.reshape(-1, 3)[common_pixels[0]]
+    weights = _weights(truth, references[0].exposure)
     biases = [(square * weights).mean(axis=-1) for square in squares]
     if any(bias.mean() <= 2 * bias.std() / math.sqrt(bias.size) for bias in biases):
         return None
@@ -307,7 +318,7 @@ def bias_correlation(
 
 
 def _squares(colour: NDArray[np.float32], reference: Reference) -> Array:
-    """Return the squared differences of the pixels that count, (n, 3)."""
+    """Return the squared differences (n, 3) of the pixels that count."""
     squares: Array = (colour.astype(np.float64) - reference.colour)[reference.counted] ** 2
     return squares
 
@@ -324,9 +335,9 @@ def developed(colour: NDArray[Any], reference: Reference) -> Array:
 
 
 def depth_error(depth: NDArray[Any], truth: NDArray[Any]) -> float:
-    """Return the mean of |depth / truth − 1|, at most 1 a pixel; inf is a miss, NaN unknown.
+    """Return the mean of |depth / truth − 1|, at most 1 per pixel. inf is a miss, NaN unknown.
 
-    A pixel in which only one of the two hit anything counts as 1.
+    A pixel counts as 1 if only one of the two hit anything.
     """
     missed = np.isinf(depth)
     truth_missed = np.isinf(truth)
@@ -348,7 +359,7 @@ class Line:
         return float(self.factor * x**self.slope)
 
     def inverse(self, y: float) -> float:
-        """Return x at y; at most 1e300, as for a line that hardly falls or rises."""
+        """Return x at y. At most 1e300, as for a line that hardly falls or rises."""
         with np.errstate(divide="ignore", invalid="ignore"):
             exponent = np.log10(y / self.factor) / np.float64(self.slope)
         return float(10 ** np.fmin(exponent, 300.0))
@@ -357,7 +368,7 @@ class Line:
 def fit(x: Sequence[float], y: Sequence[float]) -> Line | None:
     """Fit a power law by least squares of the logarithms.
 
-    None for fewer than three different x, and if a number is not above 0.
+    Return None for fewer than three different x, or if a number is not above 0.
     """
     if len(set(x)) < 3 or min(*x, *y) <= 0:
         return None
@@ -366,7 +377,7 @@ def fit(x: Sequence[float], y: Sequence[float]) -> Line | None:
 
 
 def interpolated(x: float, points: Sequence[tuple[float, float]]) -> float | None:
-    """Return y at x by power laws between points (x, y), in any order; None outside of them."""
+    """Return y at x by power laws between points (x, y), in any order. None outside of them."""
     points = sorted(points)
     for (x0, y0), (x1, y1) in pairwise(points):
         if x0 <= x <= x1 and x1 > x0 and min(y0, y1) > 0:
@@ -384,11 +395,16 @@ def pareto(cost: Sequence[float], error: Sequence[float], same_cost: float = 0.0
     costs = np.array(cost)
     errors = np.array(error)
     order = np.arange(len(cost))
-    own_cost, own_error = costs[:, np.newaxis], errors[:, np.newaxis]
-    better = errors < own_error * (1 - 1e-6), costs < own_cost * (1 - same_cost)
-    as_good = errors <= own_error * (1 + 1e-6), costs <= own_cost * (1 + same_cost)
-    repeats = (errors == own_error) & (costs == own_cost) & (order < order[:, np.newaxis])
-    beaten = (better[0] & as_good[1]) | (as_good[0] & better[1]) | repeats
+    # Rows are the points, columns the points that may beat them.
+    point_cost = costs[:, np.newaxis]
+    point_error = errors[:, np.newaxis]
+    has_less_error = errors < point_error * (1 - 1e-6)
+    has_no_more_error = errors <= point_error * (1 + 1e-6)
+    costs_less = costs < point_cost * (1 - same_cost)
+    costs_no_more = costs <= point_cost * (1 + same_cost)
+    is_same = (errors == point_error) & (costs == point_cost)
+    is_repeated = is_same & (order < order[:, np.newaxis])
+    beaten = (has_less_error & costs_no_more) | (has_no_more_error & costs_less) | is_repeated
     front = order[~beaten.any(axis=1)]
     return [int(index) for index in front[np.argsort(costs[front], kind="stable")]]
 
@@ -397,11 +413,12 @@ def pareto(cost: Sequence[float], error: Sequence[float], same_cost: float = 0.0
 class Disagreement:
     """How two views differ where both see the same surface.
 
-    total: root of the mean relative squared difference of the images.
-    floor: the same of their references; reflections, texture and the nearest pixels make it.
-    added: the same of the images' errors; rendering makes it.
-    share: added² as a part of both images' squared errors: 1 for independent errors, as noise is;
-    less if both views are wrong alike; 0 without errors.
+    - ``total``: the root of the mean relative squared difference of the images.
+    - ``floor``: the same of their references. Its causes are reflections, texture and the choice of
+      the nearest pixel.
+    - ``added``: the same of the images' errors. Its cause is rendering.
+    - ``share``: added² as a part of both images' squared errors. It is 1 for independent errors,
+      such as noise, less if both views have similar errors, and 0 without errors.
     """
 
     total: float
@@ -413,33 +430,36 @@ class Disagreement:
 def disagreement(
     images: tuple[NDArray[np.float32], NDArray[np.float32]],
     references: tuple[Reference, Reference],
-    seen: tuple[NDArray[np.int64], NDArray[np.int64]],
+    common_pixels: tuple[NDArray[np.int64], NDArray[np.int64]],
 ) -> Disagreement:
-    """Compare two views at the pixels ``seen``: flat indices (n,) into each, of common surfaces.
+    """Compare two views at ``common_pixels`` of common surfaces: flat indices (n,) into each.
 
     Compares the nearest pixels, because interpolation would remove noise. The weights are those of
-    the first view's reference. What the references' own errors add is subtracted.
+    the first view's reference. The part of the references' own errors is subtracted.
     """
-    truths = [r.colour.reshape(-1, 3)[where] for r, where in zip(references, seen, strict=True)]
+    truths = [
+        r.colour.reshape(-1, 3)[where] for r, where in zip(references, common_pixels, strict=True)
+    ]
     errors = [
         image.astype(np.float64).reshape(-1, 3)[where] - truth
-        for image, truth, where in zip(images, truths, seen, strict=True)
+        for image, truth, where in zip(images, truths, common_pixels, strict=True)
     ]
     weights = _weights(truths[0], references[0].exposure)
     reference_errors = sum(
         r.variance.reshape(-1, 3)[where] * weights
-        for r, where in zip(references, seen, strict=True)
+        for r, where in zip(references, common_pixels, strict=True)
     )
     both = (errors[0] ** 2 + errors[1] ** 2) * weights
     # The same pixels are left out of every mean.
-    kept = _inliers(both.mean(axis=-1))
-    apart, between = errors[0] - errors[1], truths[0] - truths[1]
+    inliers = _inliers(both.mean(axis=-1))
+    error_difference = errors[0] - errors[1]
+    truth_difference = truths[0] - truths[1]
     total, floor, added, sum_ = (
-        float(value[kept].mean())
+        float(value[inliers].mean())
         for value in (
-            (apart + between) ** 2 * weights,
-            between**2 * weights - reference_errors,
-            apart**2 * weights - reference_errors,
+            (error_difference + truth_difference) ** 2 * weights,
+            truth_difference**2 * weights - reference_errors,
+            error_difference**2 * weights - reference_errors,
             both - reference_errors,
         )
     )

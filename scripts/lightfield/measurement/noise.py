@@ -1,4 +1,4 @@
-"""The noise of a rendered picture, estimated from the picture alone."""
+"""Estimates the noise of a rendered picture, from the picture alone."""
 
 from typing import Any
 
@@ -12,12 +12,12 @@ Array = NDArray[Any]
 MEDIAN_OF_NORMAL = 0.6745
 # The root of the sum of the squares of Immerkær's mask.
 MASK_NORM = 6.0
-# From so many pixels along a side on, a block's estimate is steady to a few percent.
+# A block with at least this many pixels along a side has an estimate exact to a few percent.
 SMALLEST_BLOCK = 8
 
 
 def relative_noise(luminance: Array, block: int = SMALLEST_BLOCK) -> Array:
-    """Return noise over luminance of each ``block`` × ``block`` pixels of (height, width).
+    """Return noise over luminance of each block of ``block``² pixels of a picture (height, width).
 
     Noise is the standard deviation of the filtered picture. The filter, [[1, −2, 1], [−2, 4, −2],
     [1, −2, 1]], removes linear gradients (Immerkær, *Fast Noise Variance Estimation*, 1996). The
@@ -34,7 +34,7 @@ def relative_noise(luminance: Array, block: int = SMALLEST_BLOCK) -> Array:
 
 
 def _blocks(values: Array, block: int) -> Array:
-    """Return (rows, columns, block²) of the complete blocks of (height, width)."""
+    """Return the complete blocks of values (height, width) as (rows, columns, block²)."""
     rows, columns = (side // block * block for side in values.shape)
     complete = np.ascontiguousarray(values[:rows, :columns])
     blocks = view_as_blocks(complete, (block, block))

@@ -1,4 +1,4 @@
-"""What the chosen datasets will take on this machine: views, time and disk space."""
+"""Estimates the cost of the chosen datasets on this machine: views, time and disk space."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -50,7 +50,7 @@ probe
 
 @dataclass(frozen=True)
 class Expected:
-    """What one dataset will take. Seconds are those of one core or of the GPU.
+    """The estimate of one dataset. Seconds are those of one core or of the GPU.
 
     ``parts`` are those of `cheaper_parts`.
     """
@@ -77,7 +77,7 @@ class Expected:
 
     @property
     def cheaper_seconds(self) -> list[float | None]:
-        """The seconds of all views denoised and calibrated; None if they are not known."""
+        """The seconds of all views denoised and calibrated. None if unknown."""
         return [None if part is None else part * self.seconds for part in self.parts]
 
     @property
@@ -97,7 +97,7 @@ class Expected:
 
 
 def read_probe(path: Path | str) -> dict[str, Any]:
-    """Return what scripts/probe.py has measured. Raises `UserError` if the file is damaged."""
+    """Return the result of scripts/probe.py. Raises `UserError` if the file is damaged."""
     probe = read_keys(path, "probe.py", *PROBED)
     with reading(path, "probe"):
         width, height = probe["resolution"]
@@ -115,7 +115,7 @@ def read_probe(path: Path | str) -> dict[str, Any]:
 def table(datasets: list[tuple[str, int, dict[str, Any]]], advice: Mapping[str, Any]) -> str:
     """Return the table of (name, frames, probe), with the sums and the formulas below.
 
-    ``advice`` has what `lightfield.measurement.advice` measured of datasets, by their names.
+    ``advice`` has the results of `lightfield.measurement.advice`, by the datasets' names.
     """
     expected = [
         Expected(
@@ -137,10 +137,10 @@ def table(datasets: list[tuple[str, int, dict[str, Any]]], advice: Mapping[str, 
         device_of(expected),
         "",
         FORMULAS,
-        "Probes are a few of the views, small, with all their samples. The seconds to an error",
-        "follow from the measurements of `snakemake advise`: the error is a power of the samples,",
-        "and the seconds are a line over them. — means that it has not run, or that no number of",
-        "samples is enough.",
+        "Probes are a few small views with all their samples. The seconds to an error follow from",
+        "the measurements of `snakemake advise`. The error is a power of the samples, and the",
+        "seconds are a line over them. — means that it has not run, or that no number of samples",
+        "is enough.",
         "",
     ]
     return "\n".join(lines)
@@ -161,7 +161,7 @@ def sums_row(expected: Sequence[Expected]) -> str:
 
 
 def device_of(expected: Sequence[Expected]) -> str:
-    """Say what device the times are of, and how long this machine's cores take."""
+    """Return the device of the times, and how long this machine's cores take."""
     if any(dataset.probe["device"] != "CPU" for dataset in expected):
         return "Times of the graphics card."
     cores = processors.available()
@@ -172,12 +172,12 @@ def device_of(expected: Sequence[Expected]) -> str:
 def cheaper_parts(
     samples: int, advice: Mapping[str, Any] | None
 ) -> tuple[float | None, float | None]:
-    """Return the parts of the time of plain path tracing that denoised and calibrated views take.
+    """Return the times of denoised and of calibrated views, over that of plain path tracing.
 
-    Plain path tracing takes ``samples`` a pixel. By ``advice``, the error is a power of the samples
-    and the seconds are a line over them, from one sample on. A part is None if the advice does not
-    fit, as for a scene without noise, or if no number of samples is enough, as for a denoiser whose
-    error is all bias.
+    Plain path tracing takes ``samples`` a pixel. According to ``advice``, the error is a power of
+    the samples, and the seconds are a line over them, from one sample on. A part is None if the
+    advice does not fit, as for a scene without noise. It is also None if no number of samples is
+    enough, as for a denoiser whose error is all bias.
     """
     if not advice or advice["own"] != {"samples": samples, "denoise": False}:
         return None, None
@@ -191,11 +191,11 @@ def cheaper_parts(
         laws[method] = errors, max(0.0, float(seconds.intercept)), float(seconds.slope)
 
     def seconds_to(error: float, method: str) -> float:
-        errors, overhead, each = laws[method]
-        return overhead + each * max(1.0, math.ceil(errors.inverse(error)))
+        errors, overhead, sample_seconds = laws[method]
+        return overhead + sample_seconds * max(1.0, math.ceil(errors.inverse(error)))
 
-    errors, overhead, each = laws[TRACED]
-    plain = overhead + each * samples
+    errors, overhead, sample_seconds = laws[TRACED]
+    plain = overhead + sample_seconds * samples
     denoised = seconds_to(errors.at(samples), DENOISED) / plain
     calibrated = min(seconds_to(TARGET_ERROR, method) for method in laws) / plain
     return (

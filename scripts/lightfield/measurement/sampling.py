@@ -1,4 +1,4 @@
-"""How a ``render`` block samples pixels, and what the samples cost."""
+"""Constants and functions for the sampling of a ``render`` block, and the cost of samples."""
 
 import math
 import statistics
@@ -8,43 +8,43 @@ from typing import Any
 
 from lightfield.core.files import read_keys, reading
 
-# The keys of a `render` block with a target error that are for its calibration alone: the target,
-# and a preset's limits.
+# Keys of a `render` block that only its calibration reads: the target error, and a preset's limits.
 UNCALIBRATED = ("target_error", "most_samples", "denoise")
 
-# A calibration renders so many windows of views, of so many pixels along a side, and holds out as
-# many more.
+# A calibration renders this many windows of views, and as many held-out ones.
 PROBES = 16
+# The pixels along a window's side.
 WINDOW_SIZE = 64
 
-# A calibration's reference takes more seeds, of so many samples each, until its own error is this
-# part of the target.
+# A calibration's reference takes more seeds, of REFERENCE_SAMPLES samples each, until its own error
+# is below REFERENCE_PART of the target.
 REFERENCE_SAMPLES = 16
 REFERENCE_PART = 0.2
 FEWEST_SEEDS = 4
 MOST_SEEDS = 256
 
-# Plain path tracing is measured at these samples; beyond, its error is inversely proportional.
+# Plain path tracing is measured at these samples. Beyond, its error is inversely proportional.
 PLAIN_SAMPLES = (1, 4, 16, 64)
 
-# What reports call renders without and with the denoiser.
+# The names of renders without and with the denoiser in reports.
 TRACED = "path tracing"
 DENOISED = "denoised"
 
 PLAIN = {"adaptive_threshold": 0, "denoise": False}
 
-# Denoising a pixel costs as much as so many samples of it: 18 µs against 6, on one core of an EPYC,
-# in views of the garden of 256² and more. In small windows it costs up to twice as much.
+# Denoising a pixel costs as much as this many samples of it: 18 µs against 6. It was measured on
+# one core of an EPYC, in views of the garden of 256² and more. In small windows it costs up to
+# twice as much.
 DENOISING_SAMPLES = 3
 
 
 def cost_in_samples(samples: float, denoise: bool) -> float:
-    """Return the samples of a pixel that take as long as ``samples`` and, if so, denoising."""
+    """Return the cost of a pixel in samples: ``samples``, and denoising if ``denoise``."""
     return samples + DENOISING_SAMPLES * denoise
 
 
 def calibrated(render: Mapping[str, Any], path: Path) -> dict[str, Any]:
-    """Return a ``render`` block with the settings that calibrate.py chose for its target error.
+    """Return a ``render`` block with calibrate.py's choice for its target error.
 
     Raises `UserError` if the file at ``path`` is not a calibration.
     """
@@ -55,10 +55,10 @@ def calibrated(render: Mapping[str, Any], path: Path) -> dict[str, Any]:
 
 
 def without_target(render: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a ``render`` block without the keys that are for calibration alone."""
+    """Return a ``render`` block without the keys that only its calibration reads."""
     return {key: value for key, value in render.items() if key not in UNCALIBRATED}
 
 
 def standard_error(values: Sequence[float]) -> float:
-    """Return the standard error of the mean of ``values``; 0 for a single one."""
+    """Return the standard error of the mean of ``values``. 0 for a single value."""
     return statistics.stdev(values) / math.sqrt(len(values)) if len(values) > 1 else 0.0

@@ -1,8 +1,8 @@
-"""Strata: classes of pixels by what they show, because path tracing finds some things hard.
+"""Divides pixels into strata by what they show, because some content is hard for path tracing.
 
 A fire, a mirror or a pane of glass is small, so windows spread evenly over the views miss it. A
-pilot finds where each stratum is, and how noisy. It renders a few small whole views with few
-samples, with the parts of light that add up to the colour, and with the materials.
+pilot finds where each stratum is, and how noisy. It renders a few small full views with few
+samples. It also renders the parts of light that add up to the colour, and the materials.
 """
 
 from collections.abc import Sequence
@@ -19,23 +19,23 @@ from lightfield.measurement.trials import FULL_ENOUGH, SURFACES, Trials, Window
 
 Classes = NDArray[np.int64]
 
-# The light that a pixel shows most of; glossy is the light of metal and mirrors.
+# Strata by the light that dominates a pixel. Glossy is the light of metal and mirrors.
 BY_LIGHT = ("diffuse", "glossy", "emission", "environment")
-# In the order of the classes' numbers. Leaves and paper are translucent, glass is transparent.
+# All strata, in the order of their numbers. Leaves and paper are translucent, glass is transparent.
 STRATA = [*BY_LIGHT, "translucent", "transparent", "volume"]
 # A pixel shows fog, smoke or fire if they give at least this part of its light.
 OF_VOLUME = 0.25
 # The class of pixels outside the image circle.
 NONE = -1
 
-# The pilot: views, pixels of their longer side, samples of a pixel, renders of each.
+# The pilot's views, the pixels of their longer side, the samples of a pixel, the renders of each.
 VIEWS = 8
 SIZE = 96
 SAMPLES = 4
 SEEDS = 2
 # A stratum has at least this part of the pilot's pixels.
 SMALLEST_AREA = 0.0005
-# A window counts in a stratum if it has so many of its pixels.
+# A window counts in a stratum if it has at least this many of its pixels.
 FEWEST_PIXELS = 64
 
 
@@ -60,7 +60,7 @@ def classes(pilot: Trials, window: Window) -> tuple[Classes, NDArray[Any]]:
 
 
 def classes_of(maker: Trials, windows: Sequence[Window]) -> list[Classes]:
-    """Return the stratum of each pixel of some windows, (h, w) each, by a pilot of ``maker``."""
+    """Return the stratum of each pixel (h, w) of some windows, from a pilot of ``maker``."""
     pilot = maker.pilot()
     return [classes(pilot, window)[0] for window in windows]
 
@@ -69,8 +69,8 @@ def choose(maker: Trials, size: int, count: int) -> tuple[list[Window], dict[str
     """Choose ``count`` windows of ``size``² pixels for each stratum.
 
     Returns all windows, and each stratum's part of the whole views. A stratum's windows lie around
-    pixels that stand for its noise: sorted by noise, at even steps. They keep away from the
-    stratum's borders if it is large enough.
+    pixels that represent its noise: at even steps of the pixels sorted by noise. If the stratum is
+    large enough, the windows avoid its borders.
     """
     small = maker.lens.fitted(SIZE)
     pilot = maker.pilot(small)
@@ -106,7 +106,7 @@ def _around(
 ) -> list[Window]:
     """Return a window around each member pixel of the pilot's views, the least noisy first.
 
-    Windows that reach too far out of the image circle are left out, unless all of them do.
+    Leaves out windows that reach too far out of the image circle, unless all of them do.
     """
     lens = maker.lens
     side = min(size, lens.width, lens.height)
@@ -114,12 +114,10 @@ def _around(
     for view, member, noisy in zip(views, members, noise, strict=True):
         height, width = member.shape
         for row, column in np.argwhere(member):
-            x = round(
-                min(max((column + 0.5) / width * lens.width - side / 2, 0), lens.width - side)
-            )
-            y = round(
-                min(max((row + 0.5) / height * lens.height - side / 2, 0), lens.height - side)
-            )
+            left_edge = (column + 0.5) / width * lens.width - side / 2
+            top_edge = (row + 0.5) / height * lens.height - side / 2
+            x = round(min(max(left_edge, 0), lens.width - side))
+            y = round(min(max(top_edge, 0), lens.height - side))
             by_noise.append((float(noisy[row, column]), Window(view, x, y, side, side)))
     by_noise.sort(key=lambda entry: entry[0])
     windows = [window for _, window in by_noise]

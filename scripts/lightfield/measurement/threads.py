@@ -1,7 +1,7 @@
-"""The threads of a process: many processes of one thread each at once, or fewer of more threads.
+"""Compares many processes of one thread each with fewer processes of more threads.
 
-Pictures do not change with the threads, so nothing is compared with a reference here. Views are
-rendered as a shard renders them, in processes of their own, and only their times are compared.
+Pictures do not change with the threads, so there is no reference here. Views are rendered as in a
+shard, in processes of their own. Only their times are compared.
 """
 
 from concurrent.futures import ProcessPoolExecutor
@@ -21,11 +21,11 @@ from lightfield.dataset.inventory import read_inventory
 from lightfield.dataset.lightfield import LightField
 from lightfield.rendering import probe
 
-# The longer side of the views, and the samples of a pixel: a view takes some seconds, of which
-# little is overhead.
+# The longer side of the views, and the samples of a pixel. A view takes a few seconds, with little
+# overhead.
 SIZE = 256
 SAMPLES = 16
-# Each process renders so many views. The first one does not count as a later view.
+# Each process renders this many views. The first one does not count as a later view.
 VIEWS = 3
 
 
@@ -34,11 +34,15 @@ def measure(
 ) -> list[dict[str, Any]]:
     """Render views on all ``cores``: each process with one thread, with two, and so on to all.
 
-    Returns an entry for each number of ``threads``: how many ``processes`` ran at once, the
-    ``memory_bytes`` of all, the seconds of a core that a view took (``view_core_seconds``), and
-    those until a process had its first view (``start_up_core_seconds``). Idle threads count.
-    Numbers of processes that do not fit into memory are left out. Returns nothing on a GPU, which
-    has one process, and on one core. Raises `UserError` if a process is killed.
+    Returns an entry for each number of ``threads``:
+
+    - ``processes``: how many ran at once.
+    - ``memory_bytes``: their memory together.
+    - ``view_core_seconds``: the seconds of a core that a view took.
+    - ``start_up_core_seconds``: those until a process had its first view.
+
+    Idle threads count. Leaves out numbers of processes that do not fit into memory. Returns nothing
+    on one core, and on a GPU, which has one process. Raises `UserError` if a process is killed.
     """
     probes = small_views(lightfield)
     scene = read_inventory(inventory, "memory_bytes")["memory_bytes"]
@@ -50,7 +54,7 @@ def measure(
         return []
     progress = Progress(len(counts), f"{name}: threads a process", "numbers")
     entries = []
-    # One process first: if it finds itself on a GPU, no more are started there.
+    # Begin with one process: if it renders on a GPU, start no more.
     for threads in reversed(counts):
         runs = rendered_at_once(probes, blend, inventory, device, threads, cores // threads, name)
         if runs[0].start["device"] != "CPU":
@@ -61,7 +65,7 @@ def measure(
 
 
 def small_views(lightfield: LightField) -> LightField:
-    """Return some views of a dataset, made small, with few samples."""
+    """Return some small views of a dataset, with few samples."""
     render = {**lightfield.render, "samples": SAMPLES, "adaptive_threshold": 0}
     views = lightfield.views[:: max(1, len(lightfield.views) // VIEWS)][:VIEWS]
     return lightfield.changed(lens=lightfield.lens.fitted(SIZE), views=views, render=render)
@@ -76,7 +80,7 @@ def rendered_at_once(
     processes: int,
     name: str,
 ) -> list[journal.Run]:
-    """Render the views in several processes at once, and return what the journal of each says."""
+    """Render the views in several processes at once. Return the run of each from its journal."""
     with (
         temporary_folder() as temporary,
         ProcessPoolExecutor(processes, get_context("spawn")) as pool,
@@ -97,7 +101,7 @@ def rendered_at_once(
 
 
 def core_seconds(runs: list[journal.Run], threads: int) -> dict[str, Any]:
-    """Return the entry of some processes that ran at once with ``threads`` threads each."""
+    """Return the entry of processes that ran at once with ``threads`` threads each."""
     views = [view["wall_seconds"] for run in runs for view in run.later_views]
     starts = [run.start["start_up_seconds"] + run.views[0]["wall_seconds"] for run in runs]
     return {

@@ -1,11 +1,11 @@
-"""Renders of windows of a dataset's views under changed settings, with the times that they took.
+"""Renders windows of a dataset's views under changed settings, and measures the time.
 
-A window is a part of a view at the view's own resolution. A whole view made small would show more
+A window is a part of a view at the view's own resolution. A smaller full view would show more
 detail in a pixel than the dataset does, and a denoiser cannot tell detail from noise.
 
 A cache folder keeps every render with its time, under a key of all its inputs. An interrupted
-measurement goes on where it was, and a repeated one renders nothing. The key names the device that
-rendered, not `auto`, because the seconds of one device are not those of another.
+measurement continues where it stopped, and a repeated one renders nothing. The key names the actual
+device, not `auto`, because devices differ in speed.
 """
 
 import argparse
@@ -32,17 +32,18 @@ from lightfield.measurement.metrics import Mask, Reference, make_reference
 from lightfield.measurement.sampling import PLAIN, WINDOW_SIZE, calibrated, without_target
 from lightfield.validation.consistency import Camera
 
-# Seeds of references begin here and those of trials at 1, so no trial is part of its reference.
+# Seeds of references begin here, those of trials at 1. So no trial is part of its reference.
 REFERENCE_SEED = 1000
 
 # The steps of Roberts' R2 sequence, which fills a square evenly.
 R2 = (0.7548776662466927, 0.5698402909980532)
-# A window has at least this part of its pixels in the image circle, if one of so many places does.
+# A window has at least this part of its pixels in the image circle, if possible.
 FULL_ENOUGH = 0.75
+# At most this many places of a window are tried.
 MOST_PLACES = 64
 
-# What a pilot tells of the surface in a pixel: whether the inventory lists its material under one
-# of these features.
+# The kinds of surfaces that a pilot finds, and the features by which the inventory lists their
+# materials.
 SURFACES = {
     "emitting": ("emission",),
     "translucent": ("translucency",),
@@ -72,14 +73,17 @@ class Window:
 
 @dataclass(frozen=True)
 class Trial:
-    """One render: colour (h, w, 3) scene-linear; depth (h, w) in metres as Cycles has it, or None.
+    """One render.
 
-    ``samples`` is the mean number of samples that the pixels of the image circle took. ``seconds``
-    is the time from Cycles' first sample to the end, with denoising and without synchronization. On
-    processors it is their working time: cores add up, and other load does not count. On a GPU it is
-    Cycles' own render time. ``device`` is what Cycles rendered on, CPU or GPU. Only a pilot has
-    ``parts``: the parts of its light (h, w) by their passes' names, and 1 or 0 for each of
-    `SURFACES`.
+    - ``colour`` (h, w, 3): scene-linear.
+    - ``depth`` (h, w): in metres, of Cycles' kind, or None.
+    - ``samples``: the mean number of samples that the pixels of the image circle took.
+    - ``seconds``: from Cycles' first sample to the end, with denoising, without synchronization. On
+      a CPU it is processor time: cores add up, and other load does not count. On a GPU it is
+      Cycles' own render time.
+    - ``device``: CPU or GPU.
+    - ``parts``: only of a pilot. The parts of its light (h, w) by their passes' names, and 1 or 0
+      for each of `SURFACES`.
     """
 
     colour: NDArray[np.float32]
@@ -93,9 +97,9 @@ class Trial:
 class Trials:
     """Renders windows of the views of a lightfield.json, or takes them from the folder ``cache``.
 
-    Blender starts only to render, or to find out what the device ``auto`` is here. In a process,
-    `Trials` render one after the other: once another one has rendered, this one must not. With
-    ``parts`` it is a pilot, which renders the parts of the light and the materials, too.
+    Blender starts only to render, or to resolve the device ``auto``. In a process, `Trials` must
+    render one after the other: once another one has rendered, this one must not. With ``parts`` it
+    is a pilot, which also renders the parts of the light and the materials.
     """
 
     def __init__(
@@ -123,7 +127,7 @@ class Trials:
 
     @classmethod
     def of(cls, arguments: argparse.Namespace, lightfield: LightField) -> "Trials":
-        """Return the trials that the arguments of `add_arguments` ask for."""
+        """Return the trials for the arguments of `add_arguments`."""
         return cls(
             arguments.blend,
             arguments.inventory,
@@ -152,12 +156,12 @@ class Trials:
 
     @cached_property
     def inventory(self) -> Any:
-        """What the scene contains, and how its .blend samples."""
+        """The content of the scene, and the sampling of its .blend."""
         return read_inventory(self._inventory, "left_out", "sampling", "volumes")
 
     @property
     def has_volumes(self) -> bool:
-        """Whether there is fog, smoke or fire in the scene."""
+        """Whether the scene has fog, smoke or fire."""
         return bool(self.inventory["volumes"])
 
     @property
@@ -166,7 +170,7 @@ class Trials:
         return Window(self.lightfield.views[0], 0, 0, self.lens.width, self.lens.height)
 
     def render(self, window: Window, seed: int, sampling: Mapping[str, Any]) -> Trial:
-        """Render a window under the render settings that ``sampling`` changes."""
+        """Render a window with the render settings changed by ``sampling``."""
         settings = {**self.lightfield.render, **PLAIN, **sampling, "seed": seed}
         place = [window.x, window.y, window.width, window.height]
         keyed = self.lightfield.changed(render=settings, device=self._renders_on, window=place)
@@ -175,16 +179,14 @@ class Trials:
         if not images.is_finished(path, key):
             self._render(window, settings, path, key)
         image = images.read_image(path)
+        part_names = (*passes.PARTS_OF_LIGHT, *SURFACES) if "passes" in settings else ()
         return Trial(
             colour=image.colour,
             depth=image.channels.get("Z"),
             samples=float(image.attributes[SAMPLES_ATTRIBUTE]),
             seconds=float(image.attributes[SECONDS_ATTRIBUTE]),
             device=str(image.attributes[DEVICE_ATTRIBUTE]),
-            parts={
-                name: image.channels[f"{name}.Y"]
-                for name in ((*passes.PARTS_OF_LIGHT, *SURFACES) if "passes" in settings else ())
-            },
+            parts={name: image.channels[f"{name}.Y"] for name in part_names},
         )
 
     def reference(self, window: Window, seeds: int, samples: int) -> Reference:
@@ -198,7 +200,7 @@ class Trials:
         return make_reference(colours, depths or None, self.mask(window))
 
     def mask(self, window: Window) -> Mask:
-        """Return which pixels of a window the lens has a ray for, (h, w)."""
+        """Return which pixels (h, w) of a window the lens has a ray for."""
         rows, columns = np.mgrid[: window.height, : window.width]
         rays = self.lens.rays(columns + window.x + 0.5, rows + window.y + 0.5)
         inside: Mask = np.isfinite(rays).all(axis=-1)
@@ -211,7 +213,7 @@ class Trials:
     def windows(self, size: int, count: int) -> list[Window]:
         """Choose ``count`` windows of ``size``² pixels, spread evenly over the views and the image.
 
-        A view that is not larger is a window as a whole.
+        A smaller view is one window.
         """
         views = self.lightfield.views
         size = min(size, self.lens.width, self.lens.height)
@@ -248,7 +250,7 @@ class Trials:
 
         if not self._started:
             self._start(settings)
-        # Settings that an earlier trial changed go back to the .blend's own.
+        # Restore the .blend's settings that an earlier trial changed.
         cycles.set_sampling({**self.inventory["sampling"], **settings})
         cycles.set_window(window.x, window.y, window.width, window.height)
         seed = keys.view_seed(settings["seed"], window.view.name)
@@ -295,7 +297,7 @@ class Trials:
             self._threads,
         )
         colour_pass.watch_samples()
-        # The first render also loads what all others use, so it does not count.
+        # The first render also loads shared data, so it does not count.
         cycles.set_sampling({**settings, "samples": 1, "denoise": True})
         cycles.set_window(0, 0, min(64, self.lens.width), min(64, self.lens.height))
         colour_pass.render_colour(self.lightfield.views[0].matrix, 0)
@@ -303,7 +305,7 @@ class Trials:
 
 
 def add_arguments(parser: argparse.ArgumentParser, lightfield: str) -> None:
-    """Add the arguments of a program that renders windows; ``lightfield`` is a help text."""
+    """Add the arguments of a program that renders windows. ``lightfield`` is a help text."""
     parser.add_argument("--blend", required=True, type=Path, help="the scene")
     parser.add_argument("--inventory", required=True, type=Path, help="what the scene contains")
     parser.add_argument("--lightfield", required=True, type=Path, help=lightfield)
@@ -321,14 +323,14 @@ def add_arguments(parser: argparse.ArgumentParser, lightfield: str) -> None:
 def add_calibration(parser: argparse.ArgumentParser) -> None:
     """Add the argument that `read_arguments` reads beside those of `add_arguments`."""
     parser.add_argument(
-        "--calibration", type=Path, help="what scripts/calibrate.py chose for a target error"
+        "--calibration", type=Path, help="the file of scripts/calibrate.py for a target error"
     )
 
 
 def read_arguments(arguments: argparse.Namespace) -> tuple[LightField, Trials]:
-    """Return the dataset, with the ``render`` settings that its views get, and its trials.
+    """Return the dataset with its final ``render`` settings, and its trials.
 
-    Settings that calibrate.py chose replace a target error. Raises `UserError` if the dataset has a
+    The choice of calibrate.py replaces a target error. Raises `UserError` if the dataset has a
     target error, and ``arguments`` name no calibration.
     """
     lightfield = LightField.read(arguments.lightfield)
@@ -346,15 +348,16 @@ def read_arguments(arguments: argparse.Namespace) -> tuple[LightField, Trials]:
 def nearest_view(views: Sequence[View], view: View) -> View | None:
     """Return the nearest other view whose direction differs by less than 70 degrees, if any."""
     least_cosine = math.cos(math.radians(70))
-    others = [
-        (round(float(np.linalg.norm(other.matrix[:3, 3] - view.matrix[:3, 3])), 6), index)
-        for index, other in enumerate(views)
-        if other.name != view.name and other.matrix[:3, 2] @ view.matrix[:3, 2] > least_cosine
-    ]
-    return views[min(others)[1]] if others else None
+    distances = []
+    for index, other in enumerate(views):
+        looks_alike = other.matrix[:3, 2] @ view.matrix[:3, 2] > least_cosine
+        if other.name != view.name and looks_alike:
+            distance = float(np.linalg.norm(other.matrix[:3, 3] - view.matrix[:3, 3]))
+            distances.append((round(distance, 6), index))
+    return views[min(distances)[1]] if distances else None
 
 
-# Two depths of one surface differ by less than this part, because pixels are coarse.
+# Two depths of the same surface differ by less than this part, because pixels are coarse.
 SAME_DEPTH = 0.03
 
 
@@ -365,8 +368,8 @@ def both_see(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the pixels of surfaces that two windows see, as flat indices (n,) into each window.
 
-    Lifts the first window's pixels by their depth, and looks them up in the second. Pixels that the
-    second one's depth hides are left out. Both references need depth.
+    Lifts the first window's pixels by their depth, and looks them up in the second window. Leaves
+    out pixels that the second window's depth hides. Both references need depth.
     """
     first, second = cameras
     window, other_window = windows
@@ -379,9 +382,9 @@ def both_see(
         inside = (x >= 0) & (x < other_window.width) & (y >= 0) & (y < other_window.height)
     across, down = (np.where(inside, value, 0).astype(np.int64) for value in (x, y))
     inside &= references[1].mask[down, across]
-    seen = second.lift(depths[1][down, across], across + other_window.x, down + other_window.y)
+    surface = second.lift(depths[1][down, across], across + other_window.x, down + other_window.y)
     with np.errstate(invalid="ignore"):
         distance = np.linalg.norm(points - second.position, axis=1)
-        seen_distance = np.linalg.norm(seen - second.position, axis=1)
-        same = inside & (np.abs(seen_distance / distance - 1) < SAME_DEPTH)
+        surface_distance = np.linalg.norm(surface - second.position, axis=1)
+        same = inside & (np.abs(surface_distance / distance - 1) < SAME_DEPTH)
     return (rows * window.width + columns)[same], (down * other_window.width + across)[same]
