@@ -281,7 +281,12 @@ ROUNDS = {
         "config.yaml": ("device:", "package_gigabytes: 1\ndevice:", {"pack"}),
     },
     "the lens, and the view layers": {
-        "built": ("lens: equidistant", "lens: equisolid, focal_length: 3", OF_PLANE),
+        # A panorama has a lens of its own.
+        "built": (
+            "lens: equidistant",
+            "lens: equisolid, focal_length: 3",
+            {"LFPlane lightfield", "probe_cameras"},
+        ),
         "brought": ("view_layers: [One]", "view_layers: [Two]", {"inventory"}),
     },
     # Nothing limits the samples of views that are imported.

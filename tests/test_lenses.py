@@ -695,6 +695,12 @@ def test_angles_in_a_scene_yaml_are_as_round_as_they_are_meant() -> None:
         assert from_lightfield(image).settings()["fov"] == degrees
 
 
+def test_each_lens_of_the_registry_is_an_example_and_a_camera_if_cycles_has_it() -> None:
+    assert {lens.name for lens in EXAMPLES.values()} == LENSES.keys()
+    of_cycles = {name for name, lens in LENSES.items() if lens.in_cycles}
+    assert {lens.name for lens in CAMERAS.values()} == of_cycles
+
+
 def test_cycles_has_lenses_of_blenders_cameras() -> None:
     known = {name for name, lens in LENSES.items() if lens.in_cycles}
     assert known == {"rectilinear", "equidistant", "equisolid", "polynomial", "equirectangular"}

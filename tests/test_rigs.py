@@ -5,7 +5,7 @@ import math
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -59,6 +59,22 @@ OTHERS: dict[str, tuple[int, dict[str, Any]]] = {
 }
 
 RIGS = {label: (count, from_settings(rig)) for label, (count, rig) in (SILVR | OTHERS).items()}
+
+# One rig of each type of the registry; those of files have tests of their own.
+KEYS = [{"position": [0, 0, 0]}, {"position": [3, 0, 0]}, {"position": [3, 4, 1]}]
+EACH: dict[str, dict[str, Any]] = {
+    "plane": {"cameras": [3, 2]},
+    "cuboid": {"cameras": [3, 2, 4]},
+    "cylinder": {"cameras": [5, 2]},
+    "sphere": {"subdivisions": 2},
+    "lattice": {"cameras": [2, 3, 1]},
+    "hemisphere": {"count": 7},
+    "ring": {"count": 5},
+    "spiral": {"count": 9, "turns": 2},
+    "path": {"count": 6, "keys": KEYS},
+    "random": {"count": 8},
+}
+OF_FILES = {"poses", "blend_camera"}
 
 # The addon's method, by Blender's own means; nothing of the project is imported here.
 BLENDER = r"""
@@ -153,6 +169,23 @@ def blender(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         stdout=subprocess.DEVNULL,
     )
     return dict(np.load(path))
+
+
+def registered() -> set[str]:
+    """Return the names of all types of rigs."""
+    kinds = get_args(get_args(rigs.AnyRig)[0])
+    return {get_args(kind.model_fields["type"].annotation)[0] for kind in kinds}
+
+
+@pytest.mark.parametrize("name", sorted(registered() - OF_FILES))
+def test_each_type_of_rig_has_as_many_views_as_it_says_each_with_a_name(name: str) -> None:
+    rig = from_settings({"type": name, **EACH[name]})
+    poses = rig.poses()
+    assert len(poses) == rig.view_count == len({pose.name for pose in poses})
+    for pose in poses:
+        turn = pose.matrix()[:3, :3]
+        np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-9)
+        assert np.linalg.det(turn) > 0
 
 
 @pytest.mark.parametrize("label", [*SILVR, *OTHERS])
