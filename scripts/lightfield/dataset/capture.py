@@ -38,35 +38,37 @@ class Capture:
     external_files: Sequence[tuple[str, str | None]] = ()
 
     def resolved(self, inventory: Path) -> Self:
-        """Return the dataset with what a user's .blend says, by its ``inventory``, filled in.
+        """Return a copy that has what a user's .blend says, which its ``inventory`` lists.
 
-        Raises `UserError` where the .blend has not what the scene YAML asks of it.
+        Raises `UserError` if the .blend lacks what the scene YAML asks of it.
         """
         if not self.source.blend:
             return self
-        found = read_inventory(inventory, "blend", "external_files")
+        listed = read_inventory(inventory, "blend", "external_files")
         with reading(inventory, "inventory"):
-            said = found["blend"]
-            frame = int(said["frame"] if self.source.frame == FILE else self.source.frame)
+            facts = listed["blend"]
+            frame = int(facts["frame"] if self.source.frame == FILE else self.source.frame)
             render = dict(self.render)
             rig = self.rig
             if render.get("samples") == FILE:
-                most = render.pop("most_samples", said["samples"])
-                render["samples"] = min(said["samples"], most)
+                most = render.pop("most_samples", facts["samples"])
+                render["samples"] = min(facts["samples"], most)
             if render.get("depth_of_field"):
-                blend.camera_of(said)
+                blend.camera_of(facts)
             if isinstance(rig, BlendCamera):
-                blend.camera_of(said)
+                blend.camera_of(facts)
                 rig = rig.placed(inventory, frame)
             if rig.camera.lens == FILE:
-                camera = blend.lens_of(said, rig.camera.resolution)
+                camera = blend.lens_of(facts, rig.camera.resolution)
                 rig = rig.model_copy(update={"camera": camera})
             return replace(
                 self,
                 source=self.source.model_copy(update={"frame": frame}),
                 render=render,
                 rig=rig,
-                external_files=[(file["path"], file["sha256"]) for file in found["external_files"]],
+                external_files=[
+                    (file["path"], file["sha256"]) for file in listed["external_files"]
+                ],
             )
 
     @property
@@ -110,7 +112,7 @@ class Capture:
 
     @property
     def builder_fingerprint(self) -> str | None:
-        """What changes when a builder does; a user's .blend is a file, which is checked."""
+        """The fingerprint of a built scene. A user's .blend is a file, which is checked itself."""
         return None if self.source.blend else self.fingerprint
 
     @property
@@ -131,7 +133,7 @@ def _source_as_written(source: SceneSource) -> dict[str, Any]:
 
 
 def _without_locked_sha256(capture: Capture) -> SceneSource:
-    """Return the source without a SHA-256 that the lock file has: a job may write that file."""
+    """Return the source without a SHA-256 from the lock file, which a job may only write later."""
     source = capture.source
     if source.blend is None:
         return source
@@ -161,7 +163,7 @@ class LightfieldSettings(Settings):
 
     @classmethod
     def of_capture(cls, capture: Capture, panorama_width: int | None = None, **keys: Any) -> Self:
-        """Return the settings for a capture, or for a panorama of it. ``keys`` are the others."""
+        """Return the settings for a capture, or for a panorama of it. ``keys`` are added."""
         rig = capture.rig
         # Only the camera of a .blend has a centre that is known later.
         if panorama_width and not isinstance(rig, BlendCamera):
@@ -177,7 +179,7 @@ class LightfieldSettings(Settings):
 
     @property
     def capture(self) -> Capture:
-        """What these settings describe, with the SHA-256 of a .blend, which must be known."""
+        """What these settings describe. The SHA-256 of a .blend is looked up if they lack it."""
         source = self.source
         if source.blend:
             sha256, _ = config.blend_sha256(self.scene, source)
