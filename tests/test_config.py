@@ -266,7 +266,7 @@ def test_scenes_without_rigs_mean_all_of_theirs(arguments, rigs, tmp_path):
         text=True,
         check=True,
     )
-    assert set(re.findall(r"--rig (\w+) ", plan.stdout + plan.stderr)) == rigs
+    assert set(re.findall(r"Placing the cameras of \w+/(\w+)", plan.stdout + plan.stderr)) == rigs
 
 
 @pytest.mark.parametrize(

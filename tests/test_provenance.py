@@ -50,8 +50,9 @@ def in_yaml(old, new):
 def in_builder(folder):
     path = folder / "scripts/scenes/room/__init__.py"
     text = path.read_text()
-    assert "0.7 0.15 0.1 0.6" in text
-    path.write_text(text.replace("0.7 0.15 0.1 0.6", "0.1 0.15 0.7 0.6"))
+    red = '("sphere", (0.7, 0.15, 0.1)'
+    assert red in text
+    path.write_text(text.replace(red, '("sphere", (0.1, 0.15, 0.7)'))
 
 
 VIEWS = {"lightfield", "check_cameras", "render", "reproject", "validate", "checksums", "page"}

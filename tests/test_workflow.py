@@ -176,10 +176,10 @@ def test_snakemakes_own_report_holds_the_figures_and_their_captions(smoke, tmp_p
         html = file.read("report/report.html").decode()
         pictures = Counter(Path(name).name for name in file.namelist())
     for name, caption in (
-        ("overview", "The scene all round, from the centre of the rig"),
+        ("overview", "A panorama of the scene from the centre of the rig"),
         ("contact_sheet", "The views in their order"),
         ("rig", "The cameras of the rig"),
-        ("depth", "The overview's depth"),
+        ("depth", "The overview's depth on a logarithmic scale"),
     ):
         assert pictures[f"{name}.png"] == 3
         assert html.count(caption) == 3
