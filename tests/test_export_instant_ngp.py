@@ -1,6 +1,5 @@
 """The export for instant-ngp, read back as its loader reads it (nerf_loader.cu), in float32."""
 
-import argparse
 import json
 import math
 import re
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
+import export_instant_ngp
 from lightfield.core.errors import UserError
 from lightfield.dataset.exports import ExportSettings, InstantNgp
 from lightfield.dataset.lightfield import LightField
@@ -54,11 +54,9 @@ class Dataset:
 
     def export(self, *words: Any) -> dict[str, Any]:
         """Return the transforms.json that the program writes on these words."""
-        parser = argparse.ArgumentParser()
-        instant_ngp.add_arguments(parser)
         paths = ["--input-cfg", self.folder / "lightfield.json"]
         paths += ["--output", self.folder / "transforms.json"]
-        instant_ngp.export(parser.parse_args([*map(str, [*paths, *words])]))
+        export_instant_ngp.main([*map(str, [*paths, *words])])
         return self.read("transforms.json")
 
     def read(self, name: str) -> dict[str, Any]:
@@ -606,10 +604,8 @@ def test_what_cannot_be_exported_is_an_error(
 def test_what_the_command_line_cannot_say(
     words: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    parser = argparse.ArgumentParser()
-    instant_ngp.add_arguments(parser)
     with pytest.raises(SystemExit):
-        parser.parse_args(words)
+        export_instant_ngp.main(words)
     assert message in capsys.readouterr().err
 
 

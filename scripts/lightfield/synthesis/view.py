@@ -22,9 +22,8 @@ from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.imaging import images
 from lightfield.synthesis import kernels
+from lightfield.synthesis.defaults import BEST
 
-# So many views a picture is made of, where nothing else is said.
-BEST = 6
 # A view is chosen by how well it sees points in so many directions across and down the picture, at
 # two distances that are typical of the scene.
 DIRECTIONS = 12
