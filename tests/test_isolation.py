@@ -184,15 +184,17 @@ def test_a_reprojected_view_has_the_same_bytes_where_numba_is_told_not_to_compil
     assert reproject("hostile", NUMBA_DISABLE_JIT="1") == reproject("clean")
 
 
-def test_numbas_file_in_the_folder_where_a_program_runs_is_not_read(run_program, tmp_path):
+@pytest.mark.parametrize("first_import", ["lightfield.dataset.config", "lightfield.imaging.halves"])
+def test_numbas_file_in_the_folder_where_a_program_runs_is_not_read(
+    run_program, tmp_path, first_import
+):
     written(tmp_path / ".numba_config.yaml", "disable_jit: 1")
-    (tmp_path / "kernel.py").write_text(KERNEL)
+    (tmp_path / "kernel.py").write_text(f"import {first_import}\n{KERNEL}")
     assert run_program(tmp_path / "kernel.py", cwd=tmp_path).stdout == "True\n"
 
 
-# Settings are read before a kernel is needed, as some programs do. What is compiled has signatures.
+# What is compiled has signatures.
 KERNEL = """
-import lightfield.dataset.config
 from lightfield.core.compiled import kernel
 
 @kernel
