@@ -17,11 +17,17 @@ from lightfield.dataset.dataset_paths import DatasetPaths
 SECONDS_PER_SAMPLE = 6e-6
 # Start-up of bpy, the scene, and Cycles' acceleration structures.
 START_UP_SECONDS = 3.0
+# Start-up of a job without Blender.
+JOB_SECONDS = 1.0
 # Reading a pixel of an imported view: EXR with depth, by benchmarks/reprojection.py with batches of
 # 16 views of 2048².
 READ_SECONDS = 4e-8
 # Computing a pixel of a reprojected view, measured in the same way.
 REPROJECTION_SECONDS = 1.5e-7
+# A pixel's part of an export, of the validation, and of the page with its figures.
+EXPORT_SECONDS = 1e-7
+VALIDATION_SECONDS = 1e-7
+PAGE_SECONDS = 1e-7
 # A pixel's samples if a target error is given instead.
 GUESSED_SAMPLES = 256
 # Start-up takes at most this part of a shard's time.
@@ -98,6 +104,22 @@ class Estimate:
         pixels = self.dataset.panorama_width**2 / 2
         return START_UP_SECONDS + self.view_seconds * pixels / self.dataset.pixels
 
+    def reprojection_seconds(self, name: str) -> float:
+        """Return the seconds that one core takes to read and reproject a view."""
+        read_pixels = self.dataset.pixels
+        return read_pixels * READ_SECONDS + self._reprojected_pixels(name) * REPROJECTION_SECONDS
+
+    @property
+    def import_seconds(self) -> float:
+        """Seconds that one core takes to import a view."""
+        return self.dataset.pixels * READ_SECONDS
+
+    @property
+    def all_pixels(self) -> int:
+        """The pixels of all views and of their reprojections."""
+        reprojected_pixels = sum(map(self._reprojected_pixels, self.dataset.reprojections))
+        return self.dataset.view_count * (self.dataset.pixels + reprojected_pixels)
+
     @property
     def shard_count(self) -> int:
         """How many shards a dataset gets before the first is rendered.
@@ -142,9 +164,7 @@ class Estimate:
         """Seconds that one core takes to render a view, or to import and reproject one."""
         dataset = self.dataset
         if dataset.imported:
-            computed_pixels = sum(self._reprojected_pixels(name) for name in dataset.reprojections)
-            read_pixels = dataset.pixels * (1 + len(dataset.reprojections))
-            return read_pixels * READ_SECONDS + computed_pixels * REPROJECTION_SECONDS
+            return self.import_seconds + sum(map(self.reprojection_seconds, dataset.reprojections))
         return dataset.pixels * self._planned_samples * SECONDS_PER_SAMPLE
 
     @cached_property
