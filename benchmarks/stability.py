@@ -672,7 +672,7 @@ def main() -> None:
     parser.add_argument("--output", required=True, type=Path, help="folder for the results")
     folder = parser.parse_args().output
     cases = list(measure(extreme_lenses()))
-    write_csv(folder / "stability.csv", map(printable, cases))
+    write_csv(folder / "stability.csv", [printable(case) for case in cases])
     write_text(folder / "stability.md", summary(cases))
     draw(folder / "stability", cases)
     failed = [each for each in cases if each["verdict"] == "FAIL"]

@@ -228,7 +228,7 @@ def test_the_first_file_used_is_recorded_and_every_later_one_checked(scene, monk
 
 def test_a_built_scene_has_no_file_to_check(monkeypatch, tmp_path):
     (tmp_path / "any.blend").write_bytes(CONTENT)
-    with pytest.raises(UserError, match="--scene smoke: is made of no"):
+    with pytest.raises(UserError, match=r"--scene smoke: does not use a \.blend"):
         check(monkeypatch, tmp_path / "any.blend", "smoke")
 
 

@@ -157,7 +157,7 @@ def test_a_flag_beside_a_settings_file_is_refused(refused, tmp_path, program, wo
     path = tmp_path / "settings.json"
     write_json(path, {})
     said = refused(program, *words, *flag, "--settings", path, folder=tmp_path)
-    assert said == f"--settings: excludes {flag[0]}; write it into the settings file"
+    assert said == f"--settings: excludes {flag[0]}; write it into the file"
 
 
 @pytest.fixture

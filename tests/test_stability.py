@@ -113,9 +113,9 @@ def test_program_fails_where_a_case_is_outside_its_bound(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     good = list(stability.measure({"a": ALL["rectilinear 90° odd"]}))
-    bad = good[0] | {"case": "made up", "error": 1.0, "error_bound": 1e-16, "verdict": "FAIL"}
+    bad = good[0] | {"case": "made → up", "error": 1.0, "error_bound": 1e-16, "verdict": "FAIL"}
     monkeypatch.setattr(stability, "measure", lambda lenses: [*good, bad])
     monkeypatch.setattr(sys, "argv", ["stability.py", "--output", str(tmp_path)])
-    with pytest.raises(UserError, match=r"1 of 3 cases.*made up"):
+    with pytest.raises(UserError, match=r"1 of 3 cases.*made → up"):
         stability.main()
-    assert "Outside its bound: made up" in (tmp_path / "stability.md").read_text()
+    assert "Outside its bound: made → up" in (tmp_path / "stability.md").read_text()

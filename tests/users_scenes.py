@@ -162,11 +162,16 @@ def split_box():
 
 
 def leaves():
-    """Split a ball into its faces, and turn every other one round."""
+    """Split a ball into its faces, and turn every other one round, as on a chessboard."""
     bpy.ops.mesh.primitive_uv_sphere_add(radius=3)
     edit(lambda face: face.calc_center_median().z > 2)
-    for face in list(bpy.context.object.data.polygons)[::2]:
-        face.flip()
+    # The faces' order differs from run to run, so it cannot say which to turn.
+    for face in bpy.context.object.data.polygons:
+        x, y, z = face.center.normalized()
+        column = math.floor(32 * math.atan2(y, x) / math.tau)
+        row = math.floor(16 * math.acos(z) / math.pi)
+        if (row + column) % 2:
+            face.flip()
 
 
 def floor():
