@@ -5,11 +5,8 @@ import resource
 from lightfield.core.progress import duration
 from lightfield.core.run_display import RunDisplay, Task
 from lightfield.dataset.estimate import (
-    EXPORT_SECONDS,
     JOB_SECONDS,
-    PAGE_SECONDS,
     START_UP_SECONDS,
-    VALIDATION_SECONDS,
 )
 from lightfield.measurement.forecast import Work, calibration_seconds, forecast
 
@@ -57,14 +54,6 @@ BLENDER_RULES = (
     "inventory",
     "probe_cameras",
 )
-# The seconds of a pixel of a dataset's views and reprojections.
-SECONDS_OF_PIXEL = {
-    "export_to_instant_ngp": EXPORT_SECONDS,
-    "export": EXPORT_SECONDS,
-    "validate": VALIDATION_SECONDS,
-    "figures": PAGE_SECONDS,
-    "page": PAGE_SECONDS,
-}
 
 
 def views_of(job):
@@ -112,7 +101,11 @@ def estimated_seconds(job):
     if name == "reproject":
         seconds = estimate.reprojection_seconds(wildcards.reprojection)
         return JOB_SECONDS + views_of(job) * seconds
-    return JOB_SECONDS + estimate.all_pixels * SECONDS_OF_PIXEL.get(name, 0)
+    if name in ("export", "export_to_instant_ngp", "validate"):
+        return JOB_SECONDS + estimate.check_seconds
+    if name in ("figures", "page"):
+        return JOB_SECONDS + estimate.report_seconds
+    return JOB_SECONDS
 
 
 def task_of(job):

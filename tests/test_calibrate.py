@@ -121,10 +121,10 @@ def test_what_calibration_will_cost_is_said_beforehand(tmp_path):
     told = snakemake(
         checkout(tmp_path, aimed=SCENE.format(render="target_error: 0.02")), "-n", *ASKED
     )
-    table = told.stdout.split("to render")[1]
+    table = told.stdout.split("phase")[1]
     # 16 windows of 24²: two references of 256 samples, which suffice for 50, 85 plain ones and 125
-    # others, 6 µs each; 41 renders of 70 ms; and a start.
-    assert re.search(r"^calibration of aimed +89 s +$", table, re.M), table
+    # others, 6 µs each; 41 renders of 70 ms; and two starts, one to choose the views.
+    assert re.search(r"^calibration +2 +92 s$", table, re.M), table
 
 
 def simulated(whole_error, bias=0.0):

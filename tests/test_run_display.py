@@ -62,8 +62,8 @@ def run(request, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("run", [Terminal], indirect=True)
 def test_one_line_says_how_far_the_whole_run_is(run):
-    # 250 s of renders and four times 1.5 s, on two cores.
-    assert run.shown() == ["0 of 4 jobs · 0 of 20 views · 2 min 08 s left"]
+    # 250 s of renders on two cores.
+    assert run.shown() == ["0 of 4 jobs · 0 of 20 views · 2 min 05 s left"]
     run.shown(running=["place"])
     assert run.shown(2, finished=["place"], running=["a", "b"])[0] == "cameras: 1 job in 2 s"
     run.log("a", "render scene a: 8 views to do, 2 already done")
@@ -78,6 +78,21 @@ def test_one_line_says_how_far_the_whole_run_is(run):
     # Views took 20 s instead of 10 s: 50 s become 100 s, of which 1.8 are done in a second.
     assert run.display.line(run.now) == "3 of 4 jobs · 20 of 20 views · 56 s left · report"
     assert run.shown(50, finished=["panorama"]) == ["report: 1 job in 50 s"]
+
+
+def test_the_end_tells_the_forecast_beside_what_the_run_took(run):
+    run.tasks["place"].seconds = 5.0
+    run.shown(running=["a"])
+    # An earlier run rendered 2 of 10 views.
+    run.log("a", "render scene a: 8 views to do, 2 already done")
+    run.shown(100, finished=[*run.tasks])
+    forecast = 5 + 80 + 100 + 50
+    assert run.display.summary(300) == (
+        f"4 jobs in 1 min 40 s, 5 min 00 s of CPU time; the forecast was 3 min {forecast - 180} s"
+    )
+    assert run.display.summary(None) == "4 jobs in 1 min 40 s"
+    run.tasks["place"].seconds = None
+    assert run.display.summary(300) == "4 jobs in 1 min 40 s, 5 min 00 s of CPU time"
 
 
 @pytest.mark.parametrize("run", [Terminal], indirect=True)

@@ -14,7 +14,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import simulated
-from checkouts import assert_same_bytes, checkout, rendered, snakemake, start_snakemake, wait_until
+from checkouts import (
+    assert_same_bytes,
+    checkout,
+    planned,
+    rendered,
+    snakemake,
+    start_snakemake,
+    wait_until,
+)
 
 from lightfield.core.files import sha256, write_json
 from lightfield.imaging import images
@@ -87,7 +95,7 @@ def test_deleted_and_damaged_views_are_made_again_alone(smoke, tmp_path):
     (pictures / "view_f0000f.png").write_bytes((pictures / "view_r0000f.png").read_bytes())
 
     found = files(folder)
-    assert re.search(r"^render +1$", succeeding(folder, "-n", "--cores", "2", "smoke"), re.M)
+    assert planned(folder, "smoke")["render"] == 1
     assert files(folder) == found
     succeeding(folder, "--cores", "2", "smoke")
     again = rendered(folder) - before
@@ -225,9 +233,30 @@ def test_killed_while_it_renders_the_next_run_goes_on(smoke, other):
 
 @pytest.mark.parametrize("preset", ["tiny", "full"])
 def test_the_default_scene_plans_its_stages(preset, smoke):
-    plan = succeeding(smoke, "-n", "--cores", "1", "--config", f"preset={preset}")
-    assert "build_scene" in plan
-    assert "check_blend" not in plan
+    rules = planned(smoke, "--config", f"preset={preset}")
+    assert "build_scene" in rules
+    assert "check_blend" not in rules
+
+
+def test_a_dry_run_ends_with_the_phases_and_their_sum(smoke):
+    result = snakemake(smoke, "-n", "--cores", "1", "--config", "preset=tiny")
+    before, _, table = result.stdout.partition("phase ")
+    assert len((result.stderr + before).splitlines()) <= 4
+    lines = table.splitlines()
+    rows = [line.split() for line in lines[1 : lines.index("")]]
+    assert [row[0] for row in rows] == [
+        *("scene", "cameras", "views", "reprojections", "exports", "validation", "report", "all")
+    ]
+    jobs = [int(row[1]) for row in rows]
+    assert jobs[-1] == sum(jobs[:-1])
+    assert [row[2] for row in rows if row[0] in ("views", "all")] == ["12", "12"]
+
+
+def test_a_run_ends_with_its_forecast(other):
+    folders = ("results=forecast/results", "work=forecast/work")
+    target = f"forecast/{CUBOID}/lightfield.json"
+    said = succeeding(other, "--cores", "1", "--config", *folders, "scenes=smoke", "--", target)
+    assert re.search(r"^1 job in \d+ s, \d+ s of CPU time; the forecast was 1 s$", said, re.M)
 
 
 @pytest.mark.parametrize(

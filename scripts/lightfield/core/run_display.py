@@ -256,7 +256,7 @@ class RunDisplay:
         done = 0.0
         remaining = 0.0
         for task in self._tasks.values():
-            seconds = (task.seconds or 0.0) * (slowness if task.views else 1.0)
+            seconds = slowness * (task.seconds or 0.0)
             done += seconds * task.part * (1 - task.already / (task.total or 1))
             remaining += seconds * (1 - task.part)
         elapsed = now - self._began

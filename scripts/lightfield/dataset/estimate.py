@@ -24,10 +24,15 @@ JOB_SECONDS = 1.0
 READ_SECONDS = 4e-8
 # Computing a pixel of a reprojected view, measured in the same way.
 REPROJECTION_SECONDS = 1.5e-7
-# A pixel's part of an export, of the validation, and of the page with its figures.
-EXPORT_SECONDS = 1e-7
-VALIDATION_SECONDS = 1e-7
-PAGE_SECONDS = 1e-7
+# For each pixel of the views and their reprojections: each export, and the validation.
+CHECK_SECONDS = 1e-7
+# The same for the figures, and for the page. They show at most so many views.
+REPORT_SECONDS = 4e-7
+MOST_SHOWN_VIEWS = 120
+# Denoising a pixel costs as much as this many samples of it: 18 µs against 6. It was measured on
+# one core of an EPYC, in views of the garden of 256² and more. In small windows it costs up to
+# twice as much.
+DENOISING_SAMPLES = 3
 # A pixel's samples if a target error is given instead.
 GUESSED_SAMPLES = 256
 # Start-up takes at most this part of a shard's time.
@@ -55,7 +60,7 @@ class Estimate:
         """Seconds that one core takes to render a view, by a probe or as a guess."""
         if self._probe:
             return self._probe[0]
-        return self.dataset.pixels * self._samples * SECONDS_PER_SAMPLE
+        return self.dataset.pixels * self._cost_samples * SECONDS_PER_SAMPLE
 
     @cached_property
     def view_bytes(self) -> float:
@@ -115,10 +120,15 @@ class Estimate:
         return self.dataset.pixels * READ_SECONDS
 
     @property
-    def all_pixels(self) -> int:
-        """The pixels of all views and of their reprojections."""
-        reprojected_pixels = sum(map(self._reprojected_pixels, self.dataset.reprojections))
-        return self.dataset.view_count * (self.dataset.pixels + reprojected_pixels)
+    def check_seconds(self) -> float:
+        """Seconds that one core takes to validate or export all views and reprojections."""
+        return self.dataset.view_count * self._all_pixels * CHECK_SECONDS
+
+    @property
+    def report_seconds(self) -> float:
+        """Seconds that one core takes to draw the figures, or to write the page."""
+        shown_views = min(self.dataset.view_count, MOST_SHOWN_VIEWS)
+        return shown_views * self._all_pixels * REPORT_SECONDS
 
     @property
     def shard_count(self) -> int:
@@ -148,16 +158,17 @@ class Estimate:
         return min(limit, GUESSED_SAMPLES) if samples == FILE else int(samples)
 
     @property
-    def _samples(self) -> float:
-        """A pixel's samples, by the calibration if it has run."""
+    def _cost_samples(self) -> float:
+        """A pixel's cost in samples, with denoising, by the calibration if it has run."""
+        denoising = DENOISING_SAMPLES if self.dataset.render.get("denoise") else 0
         if not isinstance(self.dataset.calibration, str):
-            return self._planned_samples
+            return self._planned_samples + denoising
         try:
             calibration = json.loads(Path(self.dataset.calibration).read_bytes())
             return float(calibration["cost_samples"])
         except (OSError, *DAMAGE):
             # The file is missing, or broken, so that it will be made again.
-            return self._planned_samples
+            return self._planned_samples + denoising
 
     @property
     def _planned_view_seconds(self) -> float:
@@ -191,6 +202,12 @@ class Estimate:
         except (OSError, *DAMAGE):
             pass
         return None
+
+    @property
+    def _all_pixels(self) -> int:
+        """The pixels of a view and its reprojections."""
+        reprojected_pixels = sum(map(self._reprojected_pixels, self.dataset.reprojections))
+        return self.dataset.pixels + reprojected_pixels
 
     def _reprojected_pixels(self, name: str) -> int:
         """Return the pixels of a view's reprojection. A cube map has six images."""

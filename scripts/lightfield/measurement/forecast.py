@@ -7,12 +7,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from lightfield.dataset.estimate import (
+    CHECK_SECONDS,
     COMPRESSED,
+    DENOISING_SAMPLES,
     JOB_SECONDS,
+    REPORT_SECONDS,
     REPROJECTION_SECONDS,
     SECONDS_PER_SAMPLE,
     START_UP_SECONDS,
-    VALIDATION_SECONDS,
 )
 from lightfield.measurement.sampling import (
     FEWEST_SEEDS,
@@ -34,10 +36,11 @@ WINDOW_SECONDS = 0.07
 
 # The formulas of the columns, which stand under the table.
 FORMULAS = f"""\
-CPU time = rendered pixels × samples × {1e6 * SECONDS_PER_SAMPLE:g} µs \
-+ reprojected pixels × {1e6 * REPROJECTION_SECONDS:g} µs
-+ pixels × {1e6 * VALIDATION_SECONDS:g} µs for each export, validation and page \
-+ jobs × {JOB_SECONDS:g} s, or {START_UP_SECONDS:g} s with Blender.
+CPU time = rendered pixels × (samples + {DENOISING_SAMPLES} if denoised) \
+× {1e6 * SECONDS_PER_SAMPLE:g} µs + reprojected pixels × {1e6 * REPROJECTION_SECONDS:g} µs
++ pixels × {1e6 * CHECK_SECONDS:g} µs for the validation and each export \
++ shown pixels × {2e6 * REPORT_SECONDS:g} µs
++ jobs × {JOB_SECONDS:g} s, with Blender {START_UP_SECONDS:g} s.
 Size = views × pixels × bytes of a pixel × {COMPRESSED:g}, with the reprojections.
 After `snakemake plan`, the seconds and bytes of a view are those that its probes measured."""
 
