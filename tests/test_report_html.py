@@ -394,6 +394,41 @@ def test_an_index_leads_to_every_page(sphere, run_program, show):
     assert tab.url == output.as_uri()
 
 
+def write_many(results, count):
+    """Write an index's datasets: fisheyes of one scene, and a panorama of another one."""
+    for number in range(count):
+        folder = results / ("ball" if number else "garden") / f"rig{number}"
+        (folder / "report").mkdir(parents=True)
+        camera = {"lens": "equidistant", "fov": 180, "resolution": [8, 8]}
+        if not number:
+            camera = {"lens": "equirectangular", "resolution": [16, 8]}
+        rig = {**LINE, "cameras": [1, 1], "camera": camera}
+        write_dataset(folder, rig, depth="z" if number else "distance")
+        (folder / "report/index.html").write_text("")
+
+
+@pytest.mark.parametrize(("count", "has_search"), [(11, False), (12, True)])
+def test_an_index_of_many_datasets_can_be_searched(count, has_search, run_program, show, tmp_path):
+    write_many(tmp_path, count)
+    output = tmp_path / "index.html"
+    run_program("report_index.py", "--results", tmp_path, "--output", output)
+    tab = show(output)
+    cards = tab.locator(".cards li:visible")
+    assert cards.count() == count
+    search = tab.get_by_label("Search")
+    assert search.count() == has_search
+    if not has_search:
+        return
+    search.fill("Ball rig1")
+    assert cards.locator("p:first-of-type").all_inner_texts() == ["rig1", "rig10", "rig11"]
+    search.fill("")
+    tab.get_by_label("Lens").select_option("equirectangular panorama")
+    assert cards.locator("h2").all_inner_texts() == ["garden"]
+    assert tab.inner_text("#count") == "1 of 12 shown"
+    tab.get_by_label("State").select_option("not validated")
+    assert cards.count() == 1
+
+
 @pytest.mark.parametrize(
     ("file", "text", "expected"),
     [
