@@ -31,7 +31,7 @@ def test_what_is_imported_is_exported(module):
 
 
 def test_every_module_is_in_the_page():
-    entries = [page.TEMPLATES / "page/main.js", page.TEMPLATES / "walk/main.js"]
+    entries = [page.TEMPLATES / f"{name}/main.js" for name in ("page", "walk", "index")]
     assert {module for entry in entries for module in scripts.modules(entry)} == set(MODULES)
 
 
