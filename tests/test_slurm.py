@@ -10,17 +10,18 @@ from pathlib import Path
 
 import psutil
 import pytest
-from checkouts import assert_same_bytes, checkout, rendered, start_snakemake, wait_until
+from checkouts import checkout, rendered, snakemake, start_snakemake, wait_until
 from slurm_node import Node, install
 
 CUBOID = "smoke/LFCuboid_1x1x1"
 JOURNALS = f"work/{CUBOID}/render/*.journal.jsonl"
+CONFIG = ["--config", "scenes=smoke", "rigs=LFCuboid_1x1x1", "preset=full", "views_per_shard=3"]
 WORDS = [
     *("--profile", "profiles/slurm", "--cores", "2", "--retries", "4"),
     *("--slurm-init-seconds-before-status-checks", "2"),
     # A panorama is given too little memory first.
     *("--set-resources", "render_panorama:mem_mb=100 if attempt == 1 else 4000"),
-    *("--config", "scenes=smoke", "rigs=LFCuboid_1x1x1", "preset=full", "views_per_shard=3"),
+    *CONFIG,
 ]
 IMPATIENT = Path(__file__).with_name("impatient")
 pytestmark = [
@@ -29,9 +30,26 @@ pytestmark = [
 ]
 
 
-def test_no_view_is_lost_or_made_twice_whatever_happens_on_the_cluster(smoke, tmp_path):
+def slower_checkout(folder: Path) -> Path:
+    """Return a checkout whose views take seconds, so that a shard can be stopped amid them."""
+    path = checkout(folder) / "configs/scenes/smoke.yaml"
+    path.write_text(path.read_text().replace("samples: 4\n", "samples: 60\n"))
+    return folder
+
+
+def views_of(folder: Path) -> dict[str, bytes]:
+    """Return the rendered views of the dataset by name."""
+    views = folder.glob(f"results/{CUBOID}/exr/*.exr")
+    return {path.name: path.read_bytes() for path in views}
+
+
+def test_no_view_is_lost_or_made_twice_whatever_happens_on_the_cluster(tmp_path):
     install()
-    folder = checkout(tmp_path / "cluster")
+    undisturbed = slower_checkout(tmp_path / "undisturbed")
+    records = [f"work/{CUBOID}/render/{shard}.json" for shard in ("0-3", "3-6")]
+    result = snakemake(undisturbed, *CONFIG, "--", *records)
+    assert result.returncode == 0, result.stdout + result.stderr
+    folder = slower_checkout(tmp_path / "cluster")
     with Node(tmp_path / "node") as node:
         log = folder / "terminal.log"
         environment = node.environment | {"PYTHONPATH": str(IMPATIENT)}
@@ -65,7 +83,8 @@ def test_no_view_is_lost_or_made_twice_whatever_happens_on_the_cluster(smoke, tm
         assert any(map(no_room_left.search, logs)), logs
     assert "exceeded memory limit" in (tmp_path / "node/slurmd.log").read_text()
     assert set(rendered(folder).values()) == {1}
-    assert_same_bytes(smoke, folder, CUBOID)
+    assert views_of(folder) == views_of(undisturbed)
+    assert len(views_of(folder)) == 6
 
 
 def pids(journal: Path) -> set[int]:
