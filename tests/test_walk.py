@@ -49,7 +49,7 @@ def tab(dataset, show):
 
 def wait(tab):
     for _ in range(300):
-        if tab.evaluate("Boolean(walk.frames && walk.order.every((source) => source.isThere))"):
+        if tab.evaluate("Boolean(walk.frames && walk.order.every((source) => source.isLoaded))"):
             return
         tab.wait_for_timeout(100)
     raise AssertionError("the walk did not begin")
@@ -184,7 +184,7 @@ def test_it_begins_where_the_cameras_look(tmp_path, show, rig):
 
 def test_nobody_leaves_the_volume(tab):
     opened = tab()
-    opened.evaluate("moved(5, 0, 0)")
+    opened.evaluate("moveEye(5, 0, 0)")
     assert -1e-6 < opened.evaluate("metresToEdge(walk.at)") < 0.01
     assert "m to the edge" in opened.locator("#walk-readout").inner_text()
 
@@ -201,7 +201,7 @@ def test_a_sequence_goes_on_from_where_the_eye_was(dataset, show, tmp_path):
     slider = opened.locator("#walk-frame")
     assert [slider.get_attribute(key) for key in ("max", "value")] == ["2", "0"]
     opened.locator("#walk-depth").click()
-    opened.evaluate("Object.assign(walk, { yaw: 1.25, pitch: -0.5 }), moved(0.05, 0.02, 0)")
+    opened.evaluate("Object.assign(walk, { yaw: 1.25, pitch: -0.5 }), moveEye(0.05, 0.02, 0)")
     before = opened.evaluate("[...walk.at, walk.yaw, walk.pitch, walk.mode]")
     slider.focus()
     with opened.expect_navigation():
@@ -221,7 +221,7 @@ def test_a_place_that_is_none_is_the_start(tab):
     opened = tab()
     state = "[...walk.at, walk.yaw, walk.pitch, walk.mode]"
     home = opened.evaluate(state)
-    go = f"(place) => {{ location.hash = place; goWhereItWas(); return {state}; }}"
+    go = f"(place) => {{ location.hash = place; restorePlace(); return {state}; }}"
     for place in ("", "walk=", "walk=1,a,3,0,0,0", "walk=0,0,0,0,0,9", "walk=0,0,0,0,0,0.5"):
         assert opened.evaluate(go, place) == home
     # Nobody leaves the volume so, either.
@@ -239,7 +239,7 @@ def test_one_in_motion_is_of_few_views_where_drawing_takes_long(tab):
             window.counts = [];
             drawWalk = (...words) => { draw(...words); window.counts.push(walk.chosen.length); };
             walk.slow = true;
-            turned(0.1, 0);
+            turnEye(0.1, 0);
         }"""
     )
     for _ in range(100):
@@ -321,7 +321,7 @@ def test_the_default_field_of_view_keeps_source_pixels_small(tab, width, widest)
 def test_keys_zoom_in_and_back(tab):
     opened = tab()
     before = opened.evaluate("scales(160, 90)")
-    opened.evaluate("zoomed(2)")
+    opened.evaluate("zoomBy(2)")
     assert opened.evaluate("scales(160, 90)") == pytest.approx([2 * scale for scale in before])
-    opened.evaluate("zoomed(0.01)")
+    opened.evaluate("zoomBy(0.01)")
     assert opened.evaluate("scales(160, 90)") == pytest.approx(before)
