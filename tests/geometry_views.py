@@ -22,24 +22,24 @@ from lightfield.rendering.geometry_pass import render_geometry
 
 
 def material(name, alpha=1.0):
-    made = bpy.data.materials.new(name)
-    made.use_nodes = True
-    shader = made.node_tree.nodes["Principled BSDF"]
+    created = bpy.data.materials.new(name)
+    created.use_nodes = True
+    shader = created.node_tree.nodes["Principled BSDF"]
     shader.inputs["Emission Strength"].default_value = 0.5
     shader.inputs["Alpha"].default_value = alpha
-    made.pass_index = 20 + len(bpy.data.materials)
-    return made
+    created.pass_index = 20 + len(bpy.data.materials)
+    return created
 
 
 def volume(name, surface=None, shader="ShaderNodeVolumeScatter"):
-    made = bpy.data.materials.new(name)
-    made.use_nodes = True
-    add_volume(made.node_tree, shader)
-    links, nodes = made.node_tree.links, made.node_tree.nodes
+    created = bpy.data.materials.new(name)
+    created.use_nodes = True
+    add_volume(created.node_tree, shader)
+    links, nodes = created.node_tree.links, created.node_tree.nodes
     nodes.remove(nodes["Principled BSDF"])
     if surface:
         links.new(nodes.new(surface).outputs[0], nodes["Material Output"].inputs["Surface"])
-    return made
+    return created
 
 
 def add_volume(tree, shader="ShaderNodeVolumeScatter"):
@@ -57,7 +57,7 @@ def add(kind, index, surface, **settings):
     return obj
 
 
-def known():
+def known_surfaces():
     """Add a floor z = 0, a wall y = 3, and an exact sphere of radius 1 about (−1, 1.5, 1.25)."""
     add("plane", 1, material("floor"), size=20)
     add("plane", 2, material("wall"), size=20, location=(0, 3, 0), rotation=(np.pi / 2, 0, 0))
@@ -70,11 +70,11 @@ def by_nodes(obj, surface, kind, inputs=MappingProxyType({})):
     """Let geometry nodes replace an object by the output of a node of a ``kind``."""
     group = bpy.data.node_groups.new("made", "GeometryNodeTree")
     group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    made, painted = group.nodes.new(kind), group.nodes.new("GeometryNodeSetMaterial")
+    maker, painted = group.nodes.new(kind), group.nodes.new("GeometryNodeSetMaterial")
     for name, value in inputs.items():
-        made.inputs[name].default_value = value
+        maker.inputs[name].default_value = value
     painted.inputs["Material"].default_value = surface
-    group.links.new(made.outputs[0], painted.inputs["Geometry"])
+    group.links.new(maker.outputs[0], painted.inputs["Geometry"])
     group.links.new(painted.outputs[0], group.nodes.new("NodeGroupOutput").inputs[0])
     obj.modifiers.new("made", "NODES").node_group = group
 
@@ -92,17 +92,17 @@ def curtains():
 
 
 def mesh_fog():
-    known()
+    known_surfaces()
     add("cube", 9, volume("fog"), size=8)
 
 
 def clear_surface_fog():
-    known()
+    known_surfaces()
     add("cube", 9, volume("fog", "ShaderNodeBsdfTransparent"), size=8)
 
 
 def volume_object():
-    known()
+    known_surfaces()
     shape = add("cube", 9, material("shape"), size=8)
     shape.hide_render = True
     cloud = bpy.data.objects.new("cloud", bpy.data.volumes.new("cloud"))
@@ -118,7 +118,7 @@ def volume_object():
 
 def nodes_fog():
     """Let geometry nodes make fog of cubes that no viewport shows: from a mesh, and from a grid."""
-    known()
+    known_surfaces()
     for kind in ("GeometryNodeMeshCube", "GeometryNodeVolumeCube"):
         host = add("cube", 9, material("replaced"))
         host.hide_viewport = True
@@ -126,7 +126,7 @@ def nodes_fog():
 
 
 def world_fog():
-    known()
+    known_surfaces()
     world = bpy.data.worlds.new("world")
     world.use_nodes = True
     add_volume(world.node_tree)
@@ -135,7 +135,7 @@ def world_fog():
 
 def moving():
     """The wall comes nearer while the shutter is open. At frame 2 it is at y = 3."""
-    known()
+    known_surfaces()
     wall = bpy.data.objects["Plane.001"]
     for frame in (1, 2, 3):
         wall.location.y = 5 - frame
@@ -145,7 +145,7 @@ def moving():
 
 def unfocused():
     """The artist's camera has a wide aperture, and focuses on something near."""
-    known()
+    known_surfaces()
     camera = bpy.data.cameras.new("wide open")
     camera.dof.use_dof = True
     camera.dof.aperture_fstop = 0.1

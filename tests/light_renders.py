@@ -31,12 +31,12 @@ def lamp(energy=100.0, colour=(1, 1, 1)):
 
 
 def world(colour=(0.2, 0.3, 0.5, 1), strength=1.0):
-    made = bpy.data.worlds.new("sky")
-    bpy.context.scene.world = made
-    background = made.node_tree.nodes["Background"]
+    sky = bpy.data.worlds.new("sky")
+    bpy.context.scene.world = sky
+    background = sky.node_tree.nodes["Background"]
     background.inputs["Color"].default_value = colour
     background.inputs["Strength"].default_value = strength
-    return made
+    return sky
 
 
 def painted(kind, output="Surface", **inputs):

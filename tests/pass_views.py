@@ -48,11 +48,13 @@ def lightfield(camera, pair=None, **render):
 
 
 def material(name, **inputs):
-    made = bpy.data.materials.new(name)
-    made.use_nodes = True
+    created = bpy.data.materials.new(name)
+    created.use_nodes = True
     for key, value in inputs.items():
-        made.node_tree.nodes["Principled BSDF"].inputs[key.replace("_", " ")].default_value = value
-    return made
+        created.node_tree.nodes["Principled BSDF"].inputs[
+            key.replace("_", " ")
+        ].default_value = value
+    return created
 
 
 def add(name, kind, surface, **settings):
@@ -245,11 +247,13 @@ def main(folder: Path) -> None:
     render("plain", bare.changed(render=settings), "0:1")
     # Rendering again must replace a missing file of a view, and a missing list of names.
     files = ["normal/view_0001f.exr", "object/names.json"]
-    made = {file: (folder / "perspective" / file).read_bytes() for file in files}
+    first_bytes = {file: (folder / "perspective" / file).read_bytes() for file in files}
     for file in files:
         (folder / "perspective" / file).unlink()
     render("perspective", lightfield("perspective"))
-    same = {file: (folder / "perspective" / file).read_bytes() == made[file] for file in files}
+    same = {
+        file: (folder / "perspective" / file).read_bytes() == first_bytes[file] for file in files
+    }
     (folder / "again.json").write_text(json.dumps(same))
     blend_file.new_scene()
     build_instances()

@@ -14,7 +14,7 @@ PACKAGES = re.findall(r"^\| (\w+) \|", (ROOT / "docs/architecture.md").read_text
 
 
 def imported(file):
-    """Return all that a file imports, anywhere in it, with dots."""
+    """Return the dotted names of all that a file imports, anywhere in it."""
     found = set()
     for node in ast.walk(ast.parse(file.read_text())):
         if isinstance(node, ast.Import):
@@ -50,7 +50,7 @@ def test_no_files_import_each_other_in_a_circle():
     for path in LIBRARY.rglob("*.py"):
         name = ".".join(("lightfield", *path.relative_to(LIBRARY).with_suffix("").parts))
         found = imported(path)
-        # What is imported may be a file or a name in one.
+        # An imported name may be a file, or a name in a file.
         arrows[name.removesuffix(".__init__")] = found | {n.rpartition(".")[0] for n in found}
     arrows = {name: others & arrows.keys() - {name} for name, others in arrows.items()}
     while free := [name for name, others in arrows.items() if not others & arrows.keys()]:
@@ -59,7 +59,7 @@ def test_no_files_import_each_other_in_a_circle():
     assert not arrows
 
 
-def test_what_each_run_and_job_reads_the_rules_with_imports_nothing_heavy():
+def test_reading_the_rules_imports_nothing_heavy():
     lines = "\n".join(file.read_text() for file in (ROOT / "rules").rglob("*.smk"))
     imports = re.findall(r"^from lightfield\S* import (?:\([^)]*\)|.*)", lines, re.M)
     program = "\n".join([*imports, "import sys", "print(*sys.modules)"])
@@ -70,12 +70,12 @@ def test_what_each_run_and_job_reads_the_rules_with_imports_nothing_heavy():
     assert not {"numba", "skimage", "scipy", "OpenImageIO", "matplotlib", "bpy"} & set(found)
 
 
-# What a Snakefile may ask of Snakemake by its documentation.
+# Snakemake's documentation allows a Snakefile these.
 PUBLIC = r"workflow\.(?:cores|current_basedir)\b|workflow\.rst"
 INSIDE = re.compile(rf"(?!{PUBLIC})\bworkflow\.\w+|__signature__|\b(?:from|import) snakemake\b")
 
 
-def test_one_file_of_rules_alone_reaches_inside_snakemake():
+def test_only_one_file_of_rules_reaches_inside_snakemake():
     files = [ROOT / "Snakefile", *(ROOT / "rules").rglob("*.smk")]
     reaching = {
         file.name: INSIDE.findall(file.read_text()) for file in files if file.stem != "internals"

@@ -1,4 +1,4 @@
-"""Programs as a person runs them by hand: what is not meant is refused in one plain line."""
+"""Programs run by hand: each refuses a mistake with one plain line."""
 
 import runpy
 import sys
@@ -19,14 +19,14 @@ from lightfield.validation.integrity import Integrity
 
 @pytest.fixture
 def refused(monkeypatch, capsys):
-    """Run a program that must refuse its arguments; return the line that says why."""
+    """Return a function that runs a program that must refuse its arguments, and its message."""
 
     def run(name, *arguments, folder=ROOT):
         monkeypatch.chdir(folder)
         monkeypatch.setattr(sys, "argv", [name, *map(str, arguments)])
         with pytest.raises(SystemExit) as caught:
             runpy.run_path(str(SCRIPTS / name), run_name="__main__")
-        # What argparse refuses it writes itself, below the usage.
+        # argparse writes its own messages below the usage.
         said = str(caught.value) if caught.value.code != 2 else capsys.readouterr().err
         assert caught.value.code == 2 or "\n" not in said
         return said.partition("error: ")[2].strip()
@@ -36,7 +36,7 @@ def refused(monkeypatch, capsys):
 
 @pytest.fixture
 def run_in_process(monkeypatch):
-    """Run a program that must end well."""
+    """Return a function that runs a program that must succeed."""
 
     def run(name, *arguments):
         monkeypatch.setattr(sys, "argv", [name, *map(str, arguments)])
@@ -67,7 +67,7 @@ SUMS = ["--page", "page", "--sums", "sums", "--validation"]
         ("device: is missing; scripts/try_changes.py", "advise.py", []),
     ],
 )
-def test_json_of_another_kind_is_named_with_the_key_that_it_lacks(
+def test_json_of_another_kind_is_named_with_the_missing_key(
     refused, tmp_path, content, key, program, arguments
 ):
     path, made = tmp_path / "other.json", tmp_path / "made"
@@ -91,7 +91,7 @@ def test_a_blend_whose_inventory_is_another_file_is_refused(tmp_path, refused):
 
 
 @pytest.mark.parametrize("program", ["plan.py", "status.py"])
-def test_a_count_that_is_none_is_refused(refused, tmp_path, program):
+def test_an_invalid_count_is_refused(refused, tmp_path, program):
     last = tmp_path / "probe.json" if program == "plan.py" else ""
     write_json(tmp_path / "probe.json", {})
     folders = ["--results", tmp_path, "--work", tmp_path] if program == "status.py" else []
@@ -107,7 +107,7 @@ def test_a_count_that_is_none_is_refused(refused, tmp_path, program):
         ({}, "other.json: blend: is missing; scripts/inventory.py writes it"),
     ],
 )
-def test_what_a_machine_draws_and_the_full_size_are_checked(refused, tmp_path, content, problem):
+def test_energy_settings_and_full_size_are_checked(refused, tmp_path, content, problem):
     write_json(tmp_path / "settings.json", {"energy": {}, "full": FULL, **content})
     write_json(tmp_path / "other.json", {})
     words = ["--settings", tmp_path / "settings.json", "--inventory", tmp_path / "other.json"]
@@ -157,12 +157,12 @@ def test_a_flag_beside_a_settings_file_is_refused(refused, tmp_path, program, wo
     path = tmp_path / "settings.json"
     write_json(path, {})
     said = refused(program, *words, *flag, "--settings", path, folder=tmp_path)
-    assert said == f"--settings: excludes {flag[0]}; write it into the settings file"
+    assert said == f"--settings: excludes {flag[0]}; write it into the file"
 
 
 @pytest.fixture
 def lightfield(tmp_path):
-    """A lightfield.json of one perspective view, whose image is not there."""
+    """A lightfield.json of one perspective view without its image."""
     lens = {"lens": "rectilinear", "fov": 90, "resolution": [8, 8]}
     rig = {"type": "plane", "cameras": [1, 1], "size": 1, "camera": lens}
     path = tmp_path / "lightfield.json"
@@ -198,20 +198,22 @@ def test_numbers_are_read_however_they_are_written(run_in_process, lightfield, t
         ("package.py", "--gigabytes", ["0", "-1e-05", "nan", "inf"]),
     ],
 )
-def test_a_number_that_would_spoil_all_is_refused(refused, program, flag, values):
+def test_a_number_that_would_spoil_everything_is_refused(refused, program, flag, values):
     for value in values:
         said = refused(program, flag, value)
         assert said.startswith(f"argument {flag}: is ")
         assert "; must be " in said
 
 
-def test_what_is_read_is_never_written_over(refused, lightfield, tmp_path):
+def test_no_program_overwrites_its_input(refused, lightfield, tmp_path):
     views = tmp_path / "exr"
     write_text(views / "view_0000f.exr", "rendered in an hour")
     write_text(views / "view_0000f.png", "rendered in an hour")
     folder = ["--input-cfg", lightfield]
     (tmp_path / "link").symlink_to(views)
     lens = ["--rectilinear", "18,36"]
+    link = tmp_path / "link"
+    exr_views = ["-i", views, "--filter-suffix", "exr"]
     exr = [
         *folder,
         "--image-dir",
@@ -225,7 +227,7 @@ def test_what_is_read_is_never_written_over(refused, lightfield, tmp_path):
     for said in (
         refused("synthesize.py", tmp_path, "--output", views / ".."),
         refused("synthesize.py", views, "--poses", lightfield, "--output", tmp_path),
-        refused("reproject.py", "-i", views, *folder, *lens, "-o", tmp_path / "link", "--exr"),
+        refused("reproject.py", *exr_views, *folder, *lens, "-o", link, "--exr"),
         refused(
             "reproject.py",
             "--single",
@@ -254,20 +256,20 @@ def test_what_is_read_is_never_written_over(refused, lightfield, tmp_path):
         refused("export_instant_ngp.py", *png, "--depth-dir", tmp_path / "link"),
         refused("export_instant_ngp.py", *folder, "--output", lightfield),
     ):
-        assert "read" in said, said
+        assert "is an input" in said or "replace the input" in said, said
     assert {path.read_text() for path in views.iterdir()} == {"rendered in an hour"}
     assert LightField.read(lightfield).views
     assert not (tmp_path / "made").exists()
 
 
-def test_a_rig_that_is_none_is_named_by_its_file(refused, lightfield, tmp_path):
+def test_an_invalid_rig_is_named_by_its_file(refused, lightfield, tmp_path):
     write_text(tmp_path / "rig.yaml", "scenes: [garden]")
     words = ["--poses", tmp_path / "rig.yaml", "--output", tmp_path / "made"]
     said = refused("synthesize.py", lightfield.parent, *words)
     assert said == f"{tmp_path}/rig.yaml: is missing the key type"
 
 
-def test_splits_are_listed_by_whatever_path_they_are_named(
+def test_splits_are_listed_for_any_path_to_a_dataset(
     run_in_process, refused, lightfield, tmp_path, monkeypatch
 ):
     rig = tmp_path / "Rig"
@@ -308,9 +310,7 @@ def test_the_index_leaves_out_a_dataset_that_cannot_be_read(
 
 
 @pytest.mark.parametrize("within", [True, False])
-def test_views_are_compared_with_their_record_by_whatever_path(
-    refused, lightfield, tmp_path, within
-):
+def test_views_are_compared_with_their_record_for_any_path(refused, lightfield, tmp_path, within):
     view = tmp_path / "dataset/exr/view_0000f.exr"
     images.write_exr(view, dict.fromkeys("RGB", np.ones((8, 8), np.float16)))
     sums = {"bytes": view.stat().st_size, "sha256": "0" * 64}
@@ -330,14 +330,14 @@ def test_a_record_of_another_kind_is_named_once(refused, lightfield, tmp_path, c
     assert not capsys.readouterr().err
 
 
-def test_a_list_elsewhere_is_refused(refused, tmp_path):
+def test_a_list_outside_its_folder_is_refused(refused, tmp_path):
     write_json(tmp_path / "0-6.json", {"files": {}})
     words = ["--store", tmp_path, "--results", tmp_path / "results", "--work", tmp_path / "work"]
     said = refused("take_views.py", tmp_path / "0-6.json", *words)
     assert said == f"{tmp_path}/0-6.json: must be in {tmp_path}/work"
 
 
-def test_a_folder_has_its_name_from_within(tmp_path, monkeypatch):
+def test_the_current_folder_has_its_own_name(tmp_path, monkeypatch):
     (tmp_path / "scene/rig/exr").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "scene/rig/exr")
     for path in (Path(".."), Path("../../rig/"), Path("../exr/.."), tmp_path / "scene/rig"):
@@ -345,7 +345,7 @@ def test_a_folder_has_its_name_from_within(tmp_path, monkeypatch):
         assert Integrity(path, tmp_path)._name == "scene/rig"
 
 
-def test_an_image_is_no_text(refused, tmp_path):
+def test_an_image_is_refused_as_text(refused, tmp_path):
     other = tmp_path / "view.exr"
     other.write_bytes(bytes([0x76, 0x2F, 0x31, 0x01, 0x80]))
     said = refused("splits.py", other, "--output", tmp_path / "splits.json")
@@ -369,7 +369,7 @@ def test_a_table_of_another_kind_is_named(tmp_path, name, read, column):
             read([path])
 
 
-def test_slopes_that_are_no_numbers_are_named(tmp_path):
+def test_slopes_that_are_not_numbers_are_named(tmp_path):
     path = tmp_path / "error_vs_time/scene.json"
     write_json(path, {"slopes": {"plain": {"over_time": {"slope": "steep"}}}})
     with pytest.raises(UserError, match=r"scene.json: slopes: is not what"):
@@ -383,13 +383,13 @@ def test_costs_of_another_kind_are_named(tmp_path, content):
         tables.costs(tmp_path / "costs.json")
 
 
-def test_an_index_of_no_folder_is_refused(refused, tmp_path):
+def test_an_index_of_a_missing_folder_is_refused(refused, tmp_path):
     words = ["--results", tmp_path / "none", "--output", tmp_path / "index.html"]
     assert refused("report_index.py", *words) == f"{tmp_path}/none: no such folder"
     assert not [*tmp_path.iterdir()]
 
 
-def test_the_lens_of_no_blend_is_not_made_up(refused, lightfield, tmp_path):
+def test_a_lens_from_a_missing_blend_is_refused(refused, lightfield, tmp_path):
     camera = '{"lens": "file", "resolution": [8, 8]}'
     write_text(tmp_path / "flat.json", f'{{"camera": {camera}, "formats": ["exr"]}}')
     words = ["-i", tmp_path, "--input-cfg", lightfield, "-o", tmp_path / "made"]
@@ -417,7 +417,7 @@ def test_a_report_of_another_rig_is_refused(refused, lightfield, tmp_path):
     ("output", "why"),
     [("../rig.json", "must end in .tar; .json lies beside it"), ("./rig.tar", "must not be in")],
 )
-def test_a_package_is_no_list_and_not_in_itself(refused, lightfield, tmp_path, output, why):
+def test_a_package_must_be_an_archive_outside_itself(refused, lightfield, tmp_path, output, why):
     rig = tmp_path / "rig"
     rig.mkdir()
     lightfield.rename(rig / "lightfield.json")

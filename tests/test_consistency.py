@@ -1,4 +1,4 @@
-"""What views say of each other's surfaces, against walls, motions and scales that are known."""
+"""What views tell of each other's surfaces, with known walls, motions and scales."""
 
 from dataclasses import replace
 
@@ -15,10 +15,10 @@ from lightfield.validation.consistency import Answer, Camera, Comparison, Patche
 AGREE, OCCLUDED, CONTRADICT, UNKNOWN = (
     getattr(consistency, name) for name in ("AGREE", "OCCLUDED", "CONTRADICT", "UNKNOWN")
 )
-AWAY = 4.0  # metres to the wall
-FOCAL = 256  # pixels
+AWAY = 4.0  # The metres to the wall.
+FOCAL = 256  # The focal length in pixels.
 NARROW = Rectilinear(width=64, height=64, focal_length=FOCAL * 36 / 64)
-STEP = AWAY / FOCAL  # what a pixel sees of the wall
+STEP = AWAY / FOCAL  # The metres of the wall that a pixel sees.
 
 
 def at(x=0.0, y=0.0, z=0.0, turn=None, lens=NARROW, depth="z", grain=0.0):
@@ -52,8 +52,8 @@ def on_wall(columns, rows=32, away=AWAY, **more):
 
 @pytest.mark.parametrize("depth", ["z", "distance"])
 @pytest.mark.parametrize("grain", [0.0, 0.05])
-def test_a_wall_gives_patches_that_lie_on_it_as_wide_as_a_pixel_sees(depth, grain):
-    lens = Rectilinear(width=64, height=48, focal_length=18)  # f = 32 pixels
+def test_patches_lie_on_the_wall_and_are_as_wide_as_a_pixel_sees(depth, grain):
+    lens = Rectilinear(width=64, height=48, focal_length=18)  # The focal length is 32 pixels.
     cos = -lens.pixel_rays()[..., 2]
     turn = Rotation.from_euler("xyz", [40, 20, -70], degrees=True).as_matrix()
     camera = at(1, -2, 3, [40, 20, -70], lens, depth, grain)
@@ -62,13 +62,13 @@ def test_a_wall_gives_patches_that_lie_on_it_as_wide_as_a_pixel_sees(depth, grai
     assert len(found) == 48
     local = (found.points - [1, -2, 3]) @ turn
     np.testing.assert_allclose(local[:, 2], -2, rtol=1e-6)
-    # One in each square of 8 pixels.
+    # There is one patch in each square of 8 pixels.
     pixels = np.floor(lens.pixels(local)).astype(int)
     assert len({(x // 8, y // 8) for x, y in pixels.tolist()}) == 48
     np.testing.assert_allclose(found.normals @ turn, [[0, 0, 1]] * 48, atol=1e-5)
     distance = np.linalg.norm(local, axis=1)
     cosine = 2 / distance
-    # A step of tan θ along x turns the ray by √(1 + y²) cos² θ, and one along y alike.
+    # A step of tan θ along x turns the ray by √(1 + y²) cos² θ, and a step along y likewise.
     both = np.sqrt(1 + (local[:, :2] / 2) ** 2).prod(axis=1)
     angle = np.maximum(np.sqrt(both) * cosine**2 / 32, grain)
     np.testing.assert_allclose(found.footprint, distance * angle, rtol=2e-3)
@@ -88,7 +88,7 @@ def test_patches_reach_the_last_pixel_that_has_neighbours_and_are_no_denser_than
 
 
 @pytest.mark.parametrize("smooth", [np.s_[:, :8], np.s_[:, 8:], np.s_[:8], np.s_[8:]])
-def test_of_each_cell_a_smooth_place_is_taken(smooth):
+def test_each_cell_gives_a_smooth_place(smooth):
     rough = np.random.default_rng(1).normal(AWAY, 0.2 * STEP, (16, 16))
     rough[smooth] = AWAY
     found = consistency.sample(at(), np.tile(rough, (4, 4)), 16)
@@ -98,8 +98,8 @@ def test_of_each_cell_a_smooth_place_is_taken(smooth):
     assert len(consistency.sample(at(), wall()[:2], 16)) == 0
 
 
-def test_smooth_is_what_is_so_for_the_size_of_its_pixels():
-    # Chequered by a fifth of a pixel at 1 m, and by a tenth of one at 8 m.
+def test_smoothness_is_relative_to_the_size_of_pixels():
+    # The checks differ by a fifth of a pixel at 1 m, and by a tenth of one at 8 m.
     away, amount = np.array([[1.0], [8.0]]), np.array([[0.2], [0.1]])
     halves = away + np.where(np.arange(8) % 2, 1, -1) * amount * away / FOCAL
     rows = np.stack([halves.ravel(), 2 * np.repeat(away, 8) - halves.ravel()])
@@ -112,7 +112,7 @@ def test_spread_is_the_deviation_of_depth_from_a_plane():
     chequered = AWAY + 0.1 * STEP * (-1.0) ** np.indices((64, 64)).sum(axis=0)
     found = consistency.sample(at(), chequered, 10**6)
     assert len(found) == 1024
-    # Five of nine pixels are farther than the other four, about a plane of three unknowns.
+    # Five of nine pixels are farther than the other four. Their plane has three unknowns.
     heights = np.array([1, -1, 1, -1, 1, -1, 1, -1, 1]) * 0.1 * STEP
     expected = np.sqrt(((heights - heights.mean()) ** 2).sum() / 6)
     np.testing.assert_allclose(found.spread, expected, rtol=0.01)
@@ -120,7 +120,7 @@ def test_spread_is_the_deviation_of_depth_from_a_plane():
 
 @pytest.mark.parametrize("depth", ["z", "distance"])
 def test_a_curved_surface_lies_before_its_plane(depth):
-    # From 3 m a ball of 1 m, of which a pixel sees some 12 mm.
+    # The ball of 1 m is 3 m away, so a pixel sees some 12 mm of it.
     lens = Rectilinear(width=64, height=64, focal_length=160 * 36 / 64)
     camera = at(lens=lens, depth=depth)
     rays = lens.pixel_rays()
@@ -138,14 +138,14 @@ def test_a_curved_surface_lies_before_its_plane(depth):
 
 
 @pytest.mark.parametrize(("spread", "smooth"), [(0.33, True), (0.37, False)])
-def test_what_no_plane_fits_is_no_surface(spread, smooth):
-    # Nine pixels of a chequered wall: their squares from the mean add up to 80 / 9.
+def test_depth_that_fits_no_plane_is_not_a_surface(spread, smooth):
+    # The deviations of nine chequered pixels from their mean have 80 / 9 as sum of squares.
     chequered = np.where(np.indices((64, 64)).sum(axis=0) % 2, 1, -1)
     depth = AWAY + chequered * spread * STEP * np.sqrt(6 * 9 / 80)
     assert len(consistency.sample(at(), depth, 16)) == (16 if smooth else 0)
 
 
-def test_a_floor_is_a_surface_until_it_is_grazed():
+def test_a_floor_is_a_surface_except_at_grazing_angles():
     lens = Equidistant(width=256, height=256, fov=3)
     rays = lens.pixel_rays()
     with np.errstate(divide="ignore"):
@@ -174,7 +174,7 @@ def chequered(amount):
 @pytest.mark.parametrize(
     ("asked", "depth", "tolerance", "slack"),
     [
-        # In footprints: 0.05, 4 deviations of a centre of nine points, and both errors.
+        # In footprints: 0.05, 4 deviations of the centre of nine points, and both errors.
         ({}, wall(), 0.05, 0.001),
         ({"spread": 0.3 * STEP}, wall(), 0.4 + 0.05, 0.001),
         ({"error": 0.2 * STEP}, wall(), 0.2 + 0.05, 0.001),
@@ -191,13 +191,13 @@ def test_a_point_agrees_within_the_tolerance_of_both_surfaces(asked, depth, tole
         assert verdicts(on_wall(ROW, away=AWAY - beyond, **asked), depth) == {verdict}
 
 
-def test_a_residual_counts_in_footprints_and_comes_with_the_deviation_that_is_expected():
+def test_residuals_are_in_footprints_and_have_an_expected_deviation():
     asked = on_wall(ROW, away=AWAY - 0.2 * STEP, spread=0.3 * STEP, error=1.2 * STEP)
     found = consistency.compare(asked, at(), wall())
     assert found.smooth.all()
     np.testing.assert_allclose(found.footprint, STEP, rtol=0.02)
     np.testing.assert_allclose(found.residual, 0.2, rtol=0.02)
-    # Of an error evenly within its bound the deviation is a √12th.
+    # An error spread evenly within its bound has a √12th of it as deviation.
     expected = np.sqrt(0.1**2 + (0.05 / 4) ** 2 + 1.2**2 / 12)
     np.testing.assert_allclose(found.expected, expected, rtol=0.02)
     coarse = replace(asked, error=0 * asked.error)
@@ -213,24 +213,24 @@ def test_a_residual_counts_in_footprints_and_comes_with_the_deviation_that_is_ex
 @pytest.mark.parametrize(
     ("right", "away", "verdict"),
     [
-        # At a step the answer is a range, wider by a footprint and the tolerance: that of 4
-        # deviations of the plane across it, which are 3/8 of a footprint, is 0.66 of it.
+        # At a step the answer is a range, widened by a footprint and the tolerance. The plane
+        # across the step deviates by 3/8 of a footprint: 4 deviations are 0.66 of a footprint.
         (5.0, 3.0 - 1.65 * STEP, AGREE),
         (5.0, 3.0 - 1.77 * STEP, CONTRADICT),
         (5.0, 4.0, AGREE),
         (5.0, 5.0 + 1.65 * STEP, AGREE),
         (5.0, 5.0 + 1.77 * STEP, OCCLUDED),
-        # Beside the sky nothing is behind; there is no plane, so the tolerance is the least.
+        # Beside the sky there is no plane, so the tolerance is the least.
         (np.inf, 9.0, AGREE),
         (np.inf, 3.0 - 1.04 * STEP, AGREE),
         (np.inf, 3.0 - 1.06 * STEP, CONTRADICT),
-        # What a neighbour without a source would say is not known.
+        # A neighbour without a source tells nothing.
         (np.nan, 3.0, UNKNOWN),
     ],
 )
 def test_at_an_edge_anything_between_the_two_surfaces_agrees(right, away, verdict):
     depth = np.where(np.arange(64) < 32, 3.0, right) * np.ones((64, 1))
-    # Wherever the world begins; beside the sky nothing depends on how coarse its view is.
+    # The world's origin does not matter. Beside the sky, the grain of depth does not either.
     for place, grain in (((0, 0, 0), 0), ((30, -20, 10), 0), ((3, 4, 0), 0.002)):
         if np.isfinite(right) and grain:
             continue
@@ -241,7 +241,7 @@ def test_at_an_edge_anything_between_the_two_surfaces_agrees(right, away, verdic
 
 def test_a_surface_before_the_sky_contradicts():
     assert verdicts(on_wall(ROW), wall(np.inf)) == {CONTRADICT}
-    # And where there is no source nothing is said at all.
+    # Without a source there is no answer.
     unknown = consistency.ask(on_wall(ROW), at(), at(), wall(np.nan))
     assert (unknown.agree, unknown.occluded, unknown.contradict) == (0, 0, 0)
 
@@ -259,12 +259,12 @@ def test_a_surface_before_the_sky_contradicts():
         (32, 63.01, 0),
     ],
 )
-def test_only_what_lies_in_a_view_with_its_neighbours_is_asked(column, row, seen):
+def test_only_points_inside_a_view_with_neighbours_are_compared(column, row, seen):
     found = consistency.compare(on_wall([column], [row]), at(), wall())
     assert len(found.verdict) == seen
 
 
-def test_a_surface_that_is_grazed_or_seen_from_behind_is_not_asked():
+def test_surfaces_seen_from_behind_or_at_grazing_angles_are_not_compared():
     for degrees, seen in ((0, 1), (78, 1), (79, 0), (180, 0)):
         normal = Rotation.from_euler("y", degrees, degrees=True).apply([0, 0, 1])
         found = consistency.compare(on_wall([32.0], normal=normal), at(), wall())
@@ -288,7 +288,7 @@ def test_thirty_points_on_one_surface_measure():
 
 
 def surfaces(count, seed):
-    """Return points all around at 1 to 4 m and normals, of which none is square to its ray."""
+    """Return points all around at 1 to 4 m, their normals at oblique angles, and footprints."""
     random = np.random.default_rng(seed)
     rays = random.normal(size=(count, 3))
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
@@ -298,7 +298,7 @@ def surfaces(count, seed):
 
 
 def compared(asked, found, normals, footprint, residual=None, expected=0.1):
-    """Return the comparison of points (n, 3) with surfaces at others."""
+    """Return the comparison of points (n, 3) with surfaces at other points."""
     one = np.ones(len(asked))
     if residual is None:
         residual = ((asked - found) * normals).sum(axis=1) / footprint
@@ -326,7 +326,7 @@ def test_displacement_is_the_motion_in_pixels_that_brings_surfaces_together():
     assert robust == pytest.approx(found, rel=0.1)
 
 
-def test_displacement_says_how_much_of_it_is_expected_of_noise():
+def test_displacement_has_the_deviation_expected_from_noise():
     points, normals, footprint = surfaces(60, 2)
     random = np.random.default_rng(3)
     of_points = random.uniform(0.05, 0.3, 60)
@@ -337,14 +337,14 @@ def test_displacement_says_how_much_of_it_is_expected_of_noise():
         found.append(consistency.displacement(measured, at()))
     moved, expected = np.sqrt((np.array(found) ** 2).mean(axis=0))
     assert moved == pytest.approx(expected, rel=0.1)
-    # Along a wall nothing tells, so nothing moves.
+    # A motion along the wall does not show, so nothing moves.
     flat = on_wall(ROW, rows=np.tile([20, 28, 36, 44], 10))
     along = compared(flat.points + np.array([0.1, 0, 0]), flat.points, flat.normals, flat.footprint)
     assert consistency.displacement(along, at())[0] < 1e-6
 
 
 @pytest.mark.parametrize(("angle", "depth"), [(1e-3, 0.0), (0.0, 1e-3), (-1e-3, 2e-3)])
-def test_scales_are_what_angles_and_depths_lack(angle, depth):
+def test_scales_are_the_missing_factors_of_angles_and_depths(angle, depth):
     points, normals, footprint = surfaces(400, 4)
     right = lenses.from_camera({"lens": "equidistant", "resolution": [512, 512], "fov": 300})
     wrong = replace(right, fov=right.fov * (1 + angle))
@@ -365,7 +365,7 @@ def test_scales_are_what_angles_and_depths_lack(angle, depth):
     assert (deviation < 1e-6).all()
 
 
-def test_of_large_residuals_less_counts():
+def test_large_residuals_count_less():
     points, normals, footprint = surfaces(33, 7)
     residual = np.where(np.arange(33) < 30, 1.0, 3.0) * np.where(np.arange(33) % 2, 1, -1)
     measured = compared(points, points, normals, footprint, residual)
@@ -390,7 +390,7 @@ def test_the_deviation_of_scales_is_that_of_their_noise():
         found, deviation = consistency.scales(few)
         assert (found == 0).all() and np.isinf(deviation).all()
     assert np.isfinite(consistency.scales(Answer(moments=moments, measured=30))[1]).all()
-    # From one place depth's scale cannot be seen.
+    # Depth's scale does not show from one place.
     alone = consistency.scale_moments(measured, asking, replace(asking))
     assert np.isinf(consistency.scales(Answer(moments=alone, measured=300))[1]).all()
 
@@ -406,7 +406,7 @@ def test_a_view_is_compared_with_three_near_ones_and_three_farther_ones():
     def pairs(cameras, own=seen):
         return consistency.view_pairs(cameras, [own] + [nothing] * (len(cameras) - 1))
 
-    # The farther ones begin at a quarter, a half and three quarters of the 48 nearest.
+    # The farther views begin at a quarter, a half and three quarters of the 48 nearest.
     assert pairs(line) == [(0, other) for other in (1, 2, 3, 13, 25, 37)]
     assert pairs(line, few) == []
     blind = list(line)
@@ -414,7 +414,7 @@ def test_a_view_is_compared_with_three_near_ones_and_three_farther_ones():
         blind[number] = at(0.001 * number, turn=[0, 180, 0])
     assert pairs(blind) == [(0, other) for other in (2, 3, 4, 13, 26, 37)]
     assert pairs(line[:5]) == [(0, other) for other in (1, 2, 3, 4)]
-    # Cameras at one place are neighbours, too; each pair is there once.
+    # Cameras at one place are neighbours too. Each pair appears once.
     assert consistency.view_pairs([at(), at(), at()], [seen] * 3) == [(0, 1), (0, 2), (1, 2)]
 
 
@@ -426,6 +426,6 @@ def test_answers_add_up():
     assert (both.displacement, both.expected) == (0.75, 0.2)
     np.testing.assert_array_equal(both.moments, 3 * np.eye(3))
     assert (consistency.NOTHING + other).displacement is None
-    # Of the 30 points that decide.
+    # Only the 30 points of the deciding pair count.
     assert Answer(27, 9, 3).contradiction == 0.1
     assert Answer(26, 9, 3).contradiction is None

@@ -44,7 +44,7 @@ rigs:
     camera: {lens: rectilinear, fov: 60, resolution: [16, 16]}
 """
 
-# In place of the program that builds a scene: it waits to be let go.
+# Stands in for the program that builds a scene. It waits until the test lets it go on.
 WAITING = """
 import sys, time
 from pathlib import Path
@@ -55,7 +55,7 @@ Path(sys.argv[sys.argv.index("--output") + 1]).write_text("a scene")
 """
 BUILD = ("--config", "scenes=one", "rigs=all", "preset=full", "--", "work/one/scene.blend")
 
-# A run that lives until it is killed, and one of its jobs.
+# Starts a run that lives until it is killed, and one of its jobs.
 RUN = """
 import subprocess, sys, time
 from pathlib import Path
@@ -80,7 +80,7 @@ with temporary_folder(sys.argv[1]) as folder:
     ("sizes", "expected"),
     [([40, 40], None), ([50, 45], "warning"), ([150, 45], "warning"), ([150, 55], "error")],
 )
-def test_what_is_written_to_one_disk_is_added_up(sizes, expected, tmp_path, monkeypatch):
+def test_sizes_of_files_on_one_disk_are_added_up(sizes, expected, tmp_path, monkeypatch):
     monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda _: Usage(100e9))
     folders = [tmp_path / f"not/there/{number}" for number in range(len(sizes))]
     needs = [
@@ -118,7 +118,7 @@ DISK |= dict.fromkeys(("f_blocks", "f_bfree", "f_bavail"), 10**9)
         ({"f_flag": os.ST_RDONLY}, 0, "is read-only: mount its disk for writing, or write else"),
     ],
 )
-def test_a_disk_that_takes_nothing_more_is_refused_with_the_cause(
+def test_a_full_or_read_only_disk_is_refused_with_the_cause(
     state, files, cause, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(disk_space.os, "statvfs", lambda _: SimpleNamespace(**DISK | state))
@@ -148,7 +148,7 @@ def test_a_run_that_cannot_fit_ends_before_its_first_job(tmp_path):
     assert said.startswith("error: results: ") and " GB are free on its disk" in said
     assert "Traceback" not in result.stderr
     assert not (folder / "results").exists()
-    # The plan writes the settings of its jobs, and nothing else.
+    # The plan writes only the settings of its jobs.
     written = [path for path in (folder / "work").rglob("*") if path.is_file()]
     assert all("settings" in path.parts for path in written)
 
@@ -172,7 +172,7 @@ def test_a_disk_that_takes_nothing_ends_a_run_with_one_line(name, options, cause
     disk.mkdir()
     mounted = mount_disk(disk, options)
     if not mounted:
-        # Without the right to mount, nobody may write there.
+        # Without the right to mount, the folder itself is read-only.
         disk.chmod(0o500)
         causes = ["you may not write in"]
     try:
@@ -222,7 +222,7 @@ def test_a_limit_of_memory_in_which_blender_cannot_start_is_one_line(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_dry_run_names_all_that_the_run_would_refuse(tmp_path):
+def test_a_dry_run_names_everything_that_the_run_would_refuse(tmp_path):
     folder = checkout(
         tmp_path,
         huge=HUGE,
@@ -252,7 +252,7 @@ def test_a_dry_run_names_all_that_the_run_would_refuse(tmp_path):
     assert f"theirs/dataset/exr: {missing.name}: no such file" in told
 
 
-def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path, monkeypatch):
+def test_only_leftovers_of_killed_processes_are_removed(tmp_path, monkeypatch):
     monkeypatch.setattr(leftovers.tempfile, "gettempdir", lambda: str(tmp_path))
     words = [sys.executable, "-c", KEEPER, tmp_path]
     keepers = [
@@ -285,7 +285,7 @@ def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path, monkey
     keepers[0].wait()
 
 
-def test_a_link_with_a_temporary_folders_name_leads_to_no_removal(tmp_path, monkeypatch):
+def test_a_link_named_like_a_temporary_folder_removes_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(leftovers.tempfile, "gettempdir", lambda: str(tmp_path))
     monkeypatch.setattr(leftovers, "FOLDER_AGE", -1)
     kept = tmp_path / "kept/view.exr"
@@ -311,7 +311,7 @@ def test_a_temporary_folder_needs_no_locks(tmp_path, monkeypatch):
     assert not folder.exists()
 
 
-def test_two_processes_of_one_number_write_to_one_file_each_its_own(tmp_path, monkeypatch):
+def test_processes_of_equal_number_write_separate_temporary_files(tmp_path, monkeypatch):
     monkeypatch.setattr(files.os, "getpid", lambda: 7)
     target = tmp_path / "names.json"
     with files.atomic_path(target) as one, files.atomic_path(target) as other:
@@ -321,7 +321,7 @@ def test_two_processes_of_one_number_write_to_one_file_each_its_own(tmp_path, mo
     assert list(tmp_path.iterdir()) == [target]
 
 
-def test_a_name_that_is_no_files_is_refused(tmp_path, monkeypatch):
+def test_a_temporary_name_without_a_file_is_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match="cannot be written"):
         files.write_text("", "text")
@@ -330,7 +330,7 @@ def test_a_name_that_is_no_files_is_refused(tmp_path, monkeypatch):
 
 @pytest.fixture
 def start_run(tmp_path):
-    """Start runs that note themselves in a folder; return the process and its job's number."""
+    """Return a function that starts a run noted in a folder. It returns the process and its job."""
     runs = []
 
     def start(place="here"):
@@ -371,7 +371,7 @@ def start_entering(folder):
 
 
 def outcome(process):
-    """Return the runs that may live, whether locks were removed, and what would be said."""
+    """Return the runs that may live, whether locks were removed, and the message."""
     told, problem = process.communicate()
     assert process.returncode == 0, problem
     *removed, pids, refusal = told.splitlines()
@@ -382,7 +382,7 @@ def entered(folder):
     return outcome(start_entering(folder))
 
 
-def test_a_run_that_lives_is_named_and_one_that_was_killed_leaves_nothing(start_run, tmp_path):
+def test_a_live_run_is_named_and_a_killed_one_leaves_nothing(start_run, tmp_path):
     folder = tmp_path / "locks"
     assert entered(folder)[:2] == ([], False)
     assert not list(folder.iterdir())
@@ -420,7 +420,7 @@ def test_locks_of_a_killed_run_stay_while_another_run_lives(start_run, tmp_path)
         ),
     ],
 )
-def test_what_may_live_elsewhere_keeps_its_locks(place, host, advice, start_run, tmp_path):
+def test_a_run_that_may_live_elsewhere_keeps_its_locks(place, host, advice, start_run, tmp_path):
     run, job = start_run(place)
     os.kill(job, signal.SIGKILL)
     run.kill()
@@ -444,7 +444,7 @@ def test_jobs_that_outlive_their_run_are_waited_for(start_run, tmp_path):
     assert outcome(entering)[:2] == ([], True)
 
 
-def test_a_folder_without_locks_of_files_is_left_to_snakemake(tmp_path, monkeypatch, capsys):
+def test_a_folder_without_file_locks_is_left_to_snakemake(tmp_path, monkeypatch, capsys):
     def flock(*_):
         raise OSError(errno.ENOLCK, "No locks available")
 
@@ -459,7 +459,7 @@ def test_a_folder_without_locks_of_files_is_left_to_snakemake(tmp_path, monkeypa
 
 @pytest.fixture(params=["checkout", "own folder"])
 def building(request, tmp_path):
-    """A folder in which a run waits for its job to be let go, and the run's process."""
+    """A folder with a run that waits for its job, and the run's process."""
     folder, words = checkout(tmp_path / "checkout", one=ONE), BUILD
     (folder / "scripts/build_scene.py").write_text(WAITING)
     if request.param == "own folder":
@@ -491,7 +491,7 @@ def last_line(run):
 
 
 @pytest.mark.slow
-def test_a_second_live_build_is_refused_whatever_else_looks_at_the_folder(building):
+def test_a_second_build_is_refused_whatever_other_runs_look_at_the_folder(building):
     folder, process, run = building
     refusal = f"error: another run makes these files, process {process.pid}: wait for it, or end"
     second = run()
@@ -499,7 +499,7 @@ def test_a_second_live_build_is_refused_whatever_else_looks_at_the_folder(buildi
     assert last_line(second).startswith(refusal)
     assert "Traceback" not in second.stdout + second.stderr
     assert "locked" not in (dry := run("--dry-run")).stderr and dry.returncode == 0
-    # What makes no files leaves the build its locks when it ends.
+    # A run that makes no files leaves the build its locks.
     for options in ((), ("--nolock",)):
         status = run(*options, target="status")
         assert status.returncode == 0, status.stderr
@@ -510,7 +510,7 @@ def test_a_second_live_build_is_refused_whatever_else_looks_at_the_folder(buildi
 
 
 @pytest.mark.slow
-def test_after_a_kill_with_its_jobs_the_next_run_goes_on_by_itself(building):
+def test_after_a_kill_with_its_jobs_the_next_run_continues(building):
     folder, process, run = building
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
@@ -538,7 +538,7 @@ def test_after_a_kill_the_next_run_waits_for_the_jobs_that_live_on(building, tmp
 
 @pytest.mark.slow
 @pytest.mark.parametrize("building", ["checkout"], indirect=True)
-def test_a_run_that_is_stopped_says_so_and_the_next_one_goes_on(building):
+def test_a_stopped_run_says_so_and_the_next_one_continues(building):
     folder, process, run = building
     process.terminate()
     said = process.stderr.readline()

@@ -1,4 +1,4 @@
-"""Error against render time, measured small: what is written, and nothing rendered twice."""
+"""Error against render time, measured small: the files, and that nothing is rendered twice."""
 
 import csv
 import json
@@ -58,7 +58,7 @@ def content(measured):
 
 
 def test_plain_path_tracing_converges_as_monte_carlo_does(content):
-    """Cycles' Sobol points make a smooth room converge a little faster than independent ones."""
+    """Cycles' Sobol points make a smooth room converge a little faster than independent points."""
     slope = content["slopes"]["plain"]["over_samples"]["slope"]
     assert -1.3 < slope < -0.9
     whole = content["slopes"]["plain"]["of_all_pixels_over_samples"]["slope"]
@@ -69,7 +69,7 @@ def test_plain_path_tracing_converges_as_monte_carlo_does(content):
     assert 0 < content["reference_error"] < errors[-1]
 
 
-def test_every_way_is_measured_and_the_scenes_own_is_known(content):
+def test_every_method_is_measured_with_the_scenes_own_settings(content):
     counts = {}
     for point in content["points"]:
         counts[point["method"]] = counts.get(point["method"], 0) + 1
@@ -93,7 +93,7 @@ def test_every_way_is_measured_and_the_scenes_own_is_known(content):
 
 
 def test_whole_views_are_made_of_their_strata(content):
-    """The room has lamps and diffuse walls; what is no light of it is no stratum."""
+    """The room has lamps and diffuse walls. It has no other strata."""
     strata = content["strata"]
     assert set(strata) <= set(STRATA) and "diffuse" in strata and "volume" not in strata
     total = sum(found["area"] for found in strata.values())
@@ -107,7 +107,7 @@ def test_whole_views_are_made_of_their_strata(content):
 
 
 class SimulatedPilot:
-    """A pilot that costs no render: a fire in one corner of the views, before a diffuse wall."""
+    """A pilot that renders nothing: a fire in one corner of the views before a diffuse wall."""
 
     has_volumes = True
 
@@ -156,12 +156,12 @@ def test_a_small_fire_gets_windows_of_its_own():
         ({"emission": 5}, "volume"),
     ],
 )
-def test_what_a_surface_is_says_what_its_pixels_show(shows, stratum):
+def test_a_surfaces_stratum_follows_from_its_light(shows, stratum):
     maker = SimulatedPilot(lenses.from_camera(CAMERA))
     maker.changes = {name: np.full((64, 64), value, np.float32) for name, value in shows.items()}
     kinds, _ = strata.classes(maker, Window(maker.lightfield.views[0], 0, 0, 64, 64))
     assert STRATA[kinds[32, 32]] == stratum
-    # Where nothing is fog or fire, what glows is a lamp too small for its pixel.
+    # Without fog or fire, light without a surface is a lamp too small for its pixel.
     maker.has_volumes = False
     kinds, _ = strata.classes(maker, Window(maker.lightfield.views[0], 0, 0, 64, 64))
     assert STRATA[kinds[32, 32]] == ("emission" if stratum == "volume" else stratum)
@@ -192,7 +192,7 @@ def test_methods_are_compared_at_equal_time_and_at_equal_error(measured, content
         parts = point["bias"] + point["variance"]
         assert parts == pytest.approx(point["relative_mse_whole"], rel=1e-6, abs=1e-9)
         assert point["mse_seconds"] == point["relative_mse_whole"] * point["seconds"]
-    # A part of what denoised renders are wrong by is common to all of them.
+    # All denoised renders share a part of their errors.
     plain, denoised = (
         [p for p in content["points"] if p["method"] == method][-1]
         for method in ("plain", "denoised")
@@ -202,7 +202,7 @@ def test_methods_are_compared_at_equal_time_and_at_equal_error(measured, content
     table = (measured.folder / "room.md").read_text().splitlines()
     assert all(sum(row.startswith(f"| {m} |") for row in table) == 2 for m in methods)
     assert sum(row.startswith("| diffuse |") for row in table) == len(methods)
-    # At the error of most samples plain path tracing takes these, and the denoiser fewer.
+    # At the error of its most samples, plain path tracing takes these. The denoiser takes fewer.
     most = {entry["method"]: entry for entry in content["methods_at_most_samples"]}
     assert most["plain"]["times_faster"] == pytest.approx(1)
     assert most["plain"]["equal_error"] < methods["plain"]["equal_error"]
@@ -241,7 +241,7 @@ def test_a_stratum_without_noise_has_no_error_and_no_psnr(tmp_path):
     assert (same.total, same.added, same.share) == (0, 0, 0)
 
 
-def test_files_can_be_read_by_others(measured, content):
+def test_other_programs_can_read_the_files(measured, content):
     rows = list(csv.DictReader((measured.folder / "room.csv").open()))
     strata = content["strata"].values()
     assert len(rows) == len(content["points"]) + sum(len(found["points"]) for found in strata)
@@ -260,7 +260,7 @@ def test_a_second_run_renders_nothing(measured):
     assert (measured.folder / "room.json").read_bytes() == made
 
 
-def test_a_target_error_that_was_not_calibrated_is_told(measured, run_program, room):
+def test_a_target_error_without_calibration_is_refused(measured, run_program, room):
     path = measured.folder / "target.json"
     lightfield({"target_error": 0.01}).write(path)
     result = run_program(
@@ -285,11 +285,11 @@ def test_windows_lie_in_the_image_circle_and_in_different_views():
     for window in windows:
         assert 0 <= window.x <= 48 and 0 <= window.y <= 48
         assert maker.mask(window).mean() >= 0.75
-    # The whole view where that is small: π/4 of it.
+    # If the view is small, the window is the whole view: its circle fills π/4 of it.
     (whole,) = maker.windows(100, 1)
     assert (whole.x, whole.y, whole.width, whole.height) == (0, 0, 64, 64)
     assert maker.mask(whole).mean() == pytest.approx(np.pi / 4, abs=0.01)
-    # A circle that fills less of every window.
+    # Here the circle fills less of every window.
     maker.lens = replace(maker.lens, principal_point=(60.0, 60.0))
     (corner,) = maker.windows(64, 1)
     assert 0 < maker.mask(corner).mean() < 0.75
@@ -313,13 +313,13 @@ def test_the_same_wall_is_found_in_both_views():
     cameras = tuple(maker.camera(view) for view in views)
     here, there = trials.both_see(cameras, windows, (reference, reference))
     middle = 24 * 48 + 24
-    # The pixel right of the optical axis, at 1/32 of 90 degrees, half a pixel on.
+    # The pixel right of the optical axis is at 1/32 of 90 degrees, half a pixel on.
     angle = np.radians(90) / 32 * 0.5
     other = np.arctan((2 * np.tan(angle) - 0.4) / 2) / np.radians(90) * 32 + 24
     (found,) = there[here == middle]
     assert found % 48 == int(other)
     assert abs(found // 48 - 24) <= 1
-    # Nothing is seen where the second depth says that something is in front.
+    # If the second depth has something in front, the wall is hidden.
     near = Reference(zero, zero, depth / 2, mask, 0.0)
     assert not len(trials.both_see(cameras, windows, (reference, near))[0])
 
@@ -351,10 +351,10 @@ print(*counts)
 """
 
 
-def test_what_one_device_rendered_is_not_taken_for_anothers(run_program, room, tmp_path):
+def test_a_render_is_not_reused_on_another_device(run_program, room, tmp_path):
     lightfield().write(tmp_path / "lightfield.json")
     run_program("inventory.py", "--blend", room, "--output", tmp_path / "inventory.json")
     (tmp_path / "program.py").write_text(ON_TWO_DEVICES)
     counts = run_program(tmp_path / "program.py", tmp_path, room).stdout.split()[-3:]
-    # On the processor `auto` is the processor; where it is a GPU, the window is rendered again.
+    # Without a GPU, `auto` is the processor. With one, the window is rendered again.
     assert counts == ["1", "1", "2"]

@@ -1,4 +1,4 @@
-"""Renders beside the truth: errors that are known beforehand, and none of the truth itself."""
+"""Renders compared with the truth: errors that are known beforehand, and none for the truth."""
 
 import csv
 import math
@@ -50,7 +50,7 @@ def rows_of(dataset, name, shown, mask=True, view="view_0001f"):
 
 
 @pytest.mark.parametrize("name", LENSES)
-def test_the_truth_scores_perfectly(dataset, tmp_path, name, run_program):
+def test_the_truth_has_no_error(dataset, tmp_path, name, run_program):
     renders = tmp_path / "renders"
     shutil.copytree(dataset / name, renders)
     source = SourceDataset(dataset, name, ".exr")
@@ -80,7 +80,7 @@ def test_the_truth_scores_perfectly(dataset, tmp_path, name, run_program):
 
 
 def named(dataset, tmp_path, folder):
-    """Return the source of a copy of the perspective views in a folder of that name."""
+    """Return the source of a copy of the perspective views in a folder with that name."""
     shutil.copytree(dataset / "perspective", tmp_path / folder / "perspective")
     path = tmp_path / folder / "perspective" / "lightfield.json"
     LightField.read(path).changed(scene={"name": "ball"}).write(path)
@@ -96,10 +96,10 @@ def named(dataset, tmp_path, folder):
         ("ball_preview_low_spiral", "low_spiral_"),
     ],
 )
-def test_a_render_is_found_by_the_name_that_exports_give_it(dataset, tmp_path, folder, prefix):
+def test_a_render_is_found_by_its_name_in_exports(dataset, tmp_path, folder, prefix):
     source = named(dataset, tmp_path, folder)
     view = source.lightfield.views[1]
-    # The name of each rig's view in a folder of several rigs' views.
+    # A view's name in a folder with several rigs' views starts with its rig.
     for name in (view.name, f"high_{view.name}", f"{prefix}{view.name}"):
         images.write_png(tmp_path / f"{name}.png", np.zeros((48, 64, 3), np.uint8))
         found = evaluation.find(tmp_path, source, view)
@@ -128,7 +128,7 @@ def test_renders_and_masks_under_exported_names_are_compared(dataset, tmp_path, 
     assert {(row["psnr"], float(row["pixels"])) for row in rows} == {("inf", 48)}
 
 
-def test_errors_are_those_that_were_made(dataset, tmp_path):
+def test_errors_are_those_of_the_changed_renders(dataset, tmp_path):
     path = dataset / "perspective" / "view_0001f.exr"
     image = images.read_image(path)
     source = SourceDataset(dataset, "perspective", ".exr")
@@ -148,7 +148,7 @@ def test_errors_are_those_that_were_made(dataset, tmp_path):
     assert both["flip"] > 0
     assert both["pixels"] == 48 * 64
     deeper = image.channels | {"Z": image.channels["Z"] * np.float32(1.25)}
-    # Unknown depth is as wrong as can be.
+    # An unknown depth counts as the largest error.
     deeper["Z"][:, 16:32] = np.nan
     images.write_exr(tmp_path / "view_0001f.exr", deeper)
     turned = {"R": np.full((48, 64), 1, np.float32), "B": np.full((48, 64), 1, np.float32)}
@@ -162,7 +162,7 @@ def test_errors_are_those_that_were_made(dataset, tmp_path):
 
 @pytest.fixture
 def transparent(tmp_path):
-    """The source of views of a grey wall whose alpha falls from 1 at the left to 0."""
+    """The source of views of a grey wall. Its alpha falls from 1 at the left to 0."""
     folder = tmp_path / "spiral"
     write_views(folder / "views", LENSES["perspective"], RIG)
     (folder / "views").rename(folder / "exr")
@@ -176,7 +176,7 @@ def transparent(tmp_path):
 
 
 def compared(source, path, background):
-    """Return the errors of a render over a background, and what is wrong with its own."""
+    """Return a render's errors over a background, and the problem with its own background."""
     view = next(view for view in source.lightfield.views if path.stem.endswith(view.name))
     shown = evaluation.rendered(path, source, background)
     true = evaluation.truth(source, view, path, background)
@@ -186,8 +186,8 @@ def compared(source, path, background):
 
 
 def on(background, alpha):
-    """The wall's sRGB colour, 0 to 255, over a background in sRGB, 0 to 1, as trainers blend."""
-    wall = 0.5371  # 0.25 of light, by IEC 61966-2-1
+    """Return the wall's sRGB colour, 0 to 255, blended with an sRGB background as trainers do."""
+    wall = 0.5371  # Light of 0.25, by IEC 61966-2-1.
     alpha = alpha[..., None].astype(np.float64)
     return np.rint(255 * (alpha * wall + (1 - alpha) * background)).astype(np.uint8)
 
@@ -200,7 +200,7 @@ def test_renders_without_alpha_are_compared_over_their_background(
     path = tmp_path / "spiral_view_0001f.png"
     images.write_png(path, on(background, alpha))
     errors, problem = compared(transparent, path, background)
-    # A step of 8 bits at most.
+    # At most a step of 8 bits.
     assert errors["psnr"] > -20 * math.log10(1 / 255)
     assert problem is None
     errors, problem = compared(transparent, path, np.array([0, 0, 1]))
@@ -209,7 +209,7 @@ def test_renders_without_alpha_are_compared_over_their_background(
     assert f"has no alpha, and is {code} where the truth is transparent" in problem
 
 
-# The light of a grey of sRGB's 0.5, by IEC 61966-2-1.
+# The light of the grey 0.5 in sRGB, by IEC 61966-2-1.
 @pytest.mark.parametrize(("background", "light"), [(0, 0), (0.5, 0.2140411), (1, 1)])
 def test_linear_renders_are_composited_as_light(background, light, transparent, tmp_path):
     alpha = images.read_image(transparent.path(transparent.lightfield.views[1])).channels["A"]
@@ -236,7 +236,7 @@ def test_renders_with_alpha_are_composited_over_the_background_too(
     assert "has another alpha than the truth in 70% of its pixels" in problem
 
 
-def test_a_render_with_holes_of_opaque_views_is_warned_of(dataset, tmp_path):
+def test_holes_in_renders_of_opaque_views_are_warned_of(dataset, tmp_path):
     source = SourceDataset(dataset, "perspective", ".exr")
     view = source.lightfield.views[1]
     alpha = np.full((48, 64), 255, np.uint8)
@@ -269,7 +269,7 @@ def test_white_renders_are_warned_of_until_their_background_is_given(
     assert "must be black, white or rrggbb" in result.stderr
 
 
-def test_regions_are_where_the_lens_sees_and_where_depth_jumps(dataset):
+def test_regions_follow_the_lens_and_the_jumps_of_depth(dataset):
     source = SourceDataset(dataset, "fisheye", ".exr")
     distance = np.ones((48, 48))
     distance[:, 24:], distance[:10] = 2, np.inf
@@ -283,7 +283,7 @@ def test_regions_are_where_the_lens_sees_and_where_depth_jumps(dataset):
     assert np.flatnonzero(parts["background"][:, 24]).tolist() == list(range(10))
 
 
-def test_what_is_missing_or_of_another_size_is_named(dataset, tmp_path, run_program):
+def test_a_missing_picture_or_one_of_another_size_is_named(dataset, tmp_path, run_program):
     words = ["--dataset", dataset, "--source", "perspective", "--output", tmp_path / "page"]
     result = run_program("evaluate.py", tmp_path, *words, check=False)
     assert result.returncode == 1

@@ -1,4 +1,4 @@
-"""Exports, read back as their consumers read them, of a scene whose every point is known."""
+"""Exports of a scene whose points are all known, read back as their consumers read them."""
 
 import configparser
 import csv
@@ -63,7 +63,7 @@ def on_sphere(points, tolerance):
 
 
 class Colmap:
-    """A model as text, by COLMAP's format.rst."""
+    """A model as text, according to COLMAP's format.rst."""
 
     def __init__(self, folder):
         def lines(name):
@@ -100,7 +100,7 @@ class Colmap:
         ]
 
     def lift(self, pixels, z):
-        """Return the points (n, 3) in the camera's frame that OpenCV finds in pixels (n, 2)."""
+        """Return the points (n, 3) in the camera's frame that OpenCV computes for pixels (n, 2)."""
         if self.distortion is None:
             found = cv2.undistortPoints(pixels, self.matrix, None)
         else:
@@ -109,7 +109,7 @@ class Colmap:
 
 
 @pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "opencv", "png"])
-def test_colmap_model_projects_its_points_to_where_the_views_see_them(dataset, tmp_path, source):
+def test_colmap_projects_its_points_to_where_the_views_see_them(dataset, tmp_path, source):
     folder = exported(dataset, "colmap", source, tmp_path, format="text", points=400)
     model = Colmap(folder / "sparse" / "0")
     assert 100 < len(model.positions) <= 400
@@ -129,7 +129,7 @@ def test_colmap_model_projects_its_points_to_where_the_views_see_them(dataset, t
         expected = model.project(places, *model.images[image][1:])
         np.testing.assert_allclose(rows[:, :2], expected, atol=1e-6)
         found += len(rows)
-    # Nothing hides anything inside a sphere: every view in whose image a point lies sees it.
+    # Nothing inside a sphere hides anything. So a view sees every point in its image.
     every = 0
     for name, turn, shift in model.images.values():
         places = np.array([*model.positions.values()])
@@ -141,7 +141,7 @@ def test_colmap_model_projects_its_points_to_where_the_views_see_them(dataset, t
         if mask.exists():
             valid = images.read_image(mask).channels["Y"]
             column, row = np.where(inside, x, 0).astype(int), np.where(inside, y, 0).astype(int)
-            # A pixel at the rim of an image circle is valid, but not all of it is seen.
+            # A pixel at the rim of an image circle is valid, but partly outside the circle.
             angle = np.degrees(np.arctan2(np.hypot(*local.T[:2]), local[:, 2]))
             inside &= (valid[row, column] > 0) & (angle <= LENSES[source]["fov"] / 2)
         every += inside.sum()
@@ -149,10 +149,11 @@ def test_colmap_model_projects_its_points_to_where_the_views_see_them(dataset, t
 
 
 def read_by_3dgrut(model):
-    """Return the angles that 3DGRUT gives to pixels, in radians, and those it takes to pixels.
+    """Return the angles in radians that 3DGRUT computes for pixels, and those that it projects.
 
-    By its dataset_colmap.py, OpenCVFisheyeCameraModel in NCore and cameraProjections.cuh: the
-    angles (h, w) of pixels, and radii in focal lengths of angles up to its largest, two rows.
+    Follows its dataset_colmap.py, OpenCVFisheyeCameraModel in NCore and cameraProjections.cuh.
+    The first are the angles (h, w) of pixels. The others are two rows: angles up to the largest,
+    and their radii in focal lengths.
     """
     width, height = map(int, model.size_and_parameters[:2])
     fx, fy, cx, cy, *distortion = model.parameters
@@ -177,7 +178,7 @@ TURNING = [0.02, -0.01, 0.003, -0.001]
         ({"coefficients": TURNING}, "stops growing at 109.2°, but 3DGRUT reads it up to 121.5°"),
         ({"coefficients": [0, 0, 0, 0]}, None),
         ({"coefficients": [0.02, 0.01, 0, 0]}, None),
-        # Newton's method begins beyond the corner's angle, where the radius falls.
+        # Newton's method starts beyond the corner's angle, where the radius falls.
         ({"coefficients": [0.021, -0.0043, -0.002, -0.0006], "fov": 174}, "stops growing at"),
         ({"coefficients": TURNING, "focal_length": 40}, None),
         ({"coefficients": [-0.1, 0, 0, 0], "focal_length": 24}, "draws nothing beyond 60.8°"),
@@ -207,7 +208,7 @@ def test_a_fisheye_that_3dgrut_misreads_is_warned_of(tmp_path, capsys, changed, 
     assert (off or folds_in or cut) == (problem is not None)
 
 
-def test_colmap_binary_says_what_its_text_says(dataset, tmp_path):
+def test_colmaps_binary_model_equals_its_text_model(dataset, tmp_path):
     text = exported(dataset, "colmap", "fisheye", tmp_path / "text", format="text", points=50)
     binary = exported(dataset, "colmap", "fisheye", tmp_path / "binary", points=50)
     model, folder = Colmap(text / "sparse" / "0"), binary / "sparse" / "0"
@@ -280,7 +281,7 @@ def test_colmap_depth_maps_are_0_where_a_view_sees_the_sky(tmp_path):
 
 
 def nerfstudio_rays(content):
-    """Directions as nerfstudio's Cameras.generate_rays has them, in the camera's frame."""
+    """Return directions in the camera's frame, as nerfstudio's Cameras.generate_rays does."""
     y, x = np.mgrid[: content["h"], : content["w"]] + 0.5
     x, y = (x - content["cx"]) / content["fl_x"], -(y - content["cy"]) / content["fl_y"]
     if content["camera_model"] == "PINHOLE":
@@ -338,7 +339,7 @@ def test_splits_have_no_view_in_two_and_follow_the_rig(dataset, tmp_path):
     assert all(int(Path(name).stem[5:9]) % 2 for name in test)
 
 
-def test_nerf_synthetic_is_read_by_its_own_recipe(dataset, tmp_path):
+def test_nerf_synthetic_is_read_with_its_own_formula(dataset, tmp_path):
     folder = exported(dataset, "nerf_synthetic", "perspective", tmp_path)
     names = set()
     for part, count in (("train", 10), ("val", 2), ("test", 2)):
@@ -368,7 +369,7 @@ def of_disparity(levels, camera, bits):
 
 
 def opengl_points(camera, depth):
-    """Points of every pixel as OpenDIBR's vertex shader finds them, in OpenGL's world."""
+    """Return the points of all pixels in OpenGL's world, as OpenDIBR's vertex shader does."""
     width, height = camera["Resolution"]
     u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     if camera["Projection"] == "Perspective":
@@ -446,7 +447,7 @@ def test_miv_lifts_its_disparity_to_the_scene(dataset, tmp_path, source):
         np.testing.assert_allclose(red / 224 * 1.5748, apart, atol=3e-3)
 
 
-def test_pixels_without_a_source_and_misses_are_none_and_far_to_miv():
+def test_miv_has_no_depth_for_empty_pixels_and_the_farthest_for_misses():
     depth = np.array([[1.0, 2.0], [np.inf, np.nan]])
     assert disparity.depth_range(depth) == (1, disparity.FARTHEST)
     assert disparity.levels(depth, (1, 1000), 16, 1).tolist() == [[65535, 32735], [1, 0]]
@@ -455,12 +456,12 @@ def test_pixels_without_a_source_and_misses_are_none_and_far_to_miv():
 @pytest.mark.slow
 @pytest.mark.parametrize("depths", [[[np.inf, np.inf]], [[2.0, np.inf]], [[5000.0, 3000.0]]])
 def test_no_far_limit_is_read_as_infinity(depths):
-    # MPEG's Reference View Synthesizer takes 1000 m and more for infinity.
+    # MPEG's Reference View Synthesizer reads 1000 m and more as infinity.
     near, far = disparity.depth_range(np.array(depths))
     assert 0 < near < far < 1000
 
 
-def test_opendibr_takes_lossless_h265_where_there_is_ffmpeg(dataset, tmp_path, monkeypatch):
+def test_opendibr_takes_lossless_h265_if_ffmpeg_is_installed(dataset, tmp_path, monkeypatch):
     lens = LightField.read(dataset / "perspective" / "lightfield.json").lens
     settings = settings_of("opendibr").model_validate({"sources": ["views"], "format": "h265"})
     if shutil.which("ffmpeg"):
@@ -507,7 +508,7 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
         disparity = pfm(found / f"gt_disp_lowres_{name}")
         np.testing.assert_allclose(disparity, 0.2 * focal / z, rtol=1e-6)
         disparities.append(disparity)
-        # A camera is the middle one moved by whole baselines, right and down.
+        # Each camera is the middle one, moved right and down by whole baselines.
         right, down = number % columns - columns // 2, number // columns - rows // 2
         y, x = np.mgrid[:48, :64] + 0.5
         local = [(x - 32) / focal * z + 0.2 * right, -(y - 24) / focal * z - 0.2 * down, -z]
@@ -519,7 +520,7 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
         np.stack([images.read_image(found / f"input_Cam{n:03}.png").channels[c] for c in "RGB"], -1)
         for n in range(12)
     ]
-    # What one camera sees is by its disparity farther left in the next, and higher in the lower.
+    # A point moves left in the next camera, and up in the lower one, by its disparity.
     y, x = np.mgrid[10:38, 20:44]
     for number, step, shift in ((4, 1, (1, 0)), (4, 3, (0, 1)), (7, -3, (0, -1))):
         apart = disparities[number][y, x]
@@ -534,7 +535,7 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
 
 def test_hci_is_for_regular_grids(dataset, tmp_path):
     with pytest.raises(UserError, match="frames: are no grid of cameras that look in parallel"):
-        exported(dataset, "hci", "perspective", tmp_path)  # farther apart down than across
+        exported(dataset, "hci", "perspective", tmp_path)  # Rows are farther apart.
 
 
 def test_scannetpp_is_a_text_model_beside_fisheyes_with_masks(dataset, tmp_path):
@@ -565,7 +566,7 @@ def ply(path):
     return vertices, head
 
 
-def test_point_cloud_has_one_coloured_point_a_voxel_with_normals_to_the_cameras(dataset, tmp_path):
+def test_a_point_cloud_has_a_coloured_point_per_voxel_and_normals_to_the_cameras(dataset, tmp_path):
     folder = exported(dataset, "point_cloud", "views", tmp_path, voxel=0.1)
     vertices, _ = ply(folder / "points.ply")
     places = np.stack([vertices[name] for name in "xyz"], axis=-1).astype(float)
@@ -580,7 +581,7 @@ def test_point_cloud_has_one_coloured_point_a_voxel_with_normals_to_the_cameras(
     assert np.degrees(np.arccos((normals[known] * inward).sum(axis=-1).clip(-1, 1))).max() < 5
 
 
-def test_poses_csv_is_a_rig_again(dataset, tmp_path):
+def test_poses_csv_can_be_read_as_a_rig(dataset, tmp_path):
     folder = exported(dataset, "poses_csv", "perspective", tmp_path)
     with (folder / "poses.csv").open() as file:
         assert next(csv.reader(file)) == ["name", "x", "y", "z", "rx", "ry", "rz"]
@@ -594,7 +595,7 @@ def test_poses_csv_is_a_rig_again(dataset, tmp_path):
 
 def test_a_surface_in_front_hides_points_behind_it(dataset, tmp_path):
     shutil.copytree(dataset, tmp_path / "dataset")
-    # The first view looks at a wall right before it: nothing of the sphere is seen from there.
+    # The first view looks at a near wall, so it sees nothing of the sphere.
     path = tmp_path / "dataset" / "exr" / "view_0000f.exr"
     image = images.read_image(path)
     wall = {**image.channels, "Z": np.full_like(image.channels["Z"], 0.01)}
@@ -603,7 +604,7 @@ def test_a_surface_in_front_hides_points_behind_it(dataset, tmp_path):
     model = Colmap(folder / "sparse" / "0")
     number = next(key for key, (name, *_) in model.images.items() if name == "view_0000f.png")
     _, turn, shift = model.images[number]
-    # No other view sees the wall, and its points are kept.
+    # No other view sees the wall, so its points stay.
     assert len(model.seen[number]) > 10
     for index in model.seen[number][:, 2]:
         assert model.tracks[int(index)][:, 0].tolist() == [number]
@@ -611,7 +612,7 @@ def test_a_surface_in_front_hides_points_behind_it(dataset, tmp_path):
     assert all(len(rows) for rows in model.seen.values())
 
 
-def test_every_image_has_a_point_where_its_depth_is_finite(tmp_path, capsys):
+def test_every_image_with_finite_depth_has_a_point(tmp_path, capsys):
     camera = {"lens": "rectilinear", "fov": 40, "resolution": [24, 24]}
     write_views(tmp_path / "dataset", camera, {"type": "sphere", "subdivisions": 2, "size": 0.2})
     sky = "view_0007f"
@@ -619,7 +620,7 @@ def test_every_image_has_a_point_where_its_depth_is_finite(tmp_path, capsys):
     image = images.read_image(path)
     nothing = {**image.channels, "Z": np.full_like(image.channels["Z"], np.inf)}
     images.write_exr(path, nothing, {images.DEPTH_ATTRIBUTE: "z"})
-    # The views look in 42 directions, and four points are too few for all of them.
+    # The views look in 42 directions, so four points are too few.
     folder = exported(tmp_path / "dataset", "colmap", "views", tmp_path, format="text", points=4)
     model = Colmap(folder / "sparse" / "0")
     assert len(model.images) == 42
@@ -712,9 +713,7 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
         ("poses_csv", "elsewhere", VIEWS, {}, "is 'elsewhere'; must be of views, again"),
     ],
 )
-def test_what_a_consumer_cannot_take_is_refused_when_the_yaml_is_read(
-    name, source, camera, options, problem
-):
+def test_yaml_that_a_consumer_cannot_take_is_refused(name, source, camera, options, problem):
     content = {
         "scene": {"blend": "a.blend"},
         "render": {"samples": 1},
@@ -727,7 +726,7 @@ def test_what_a_consumer_cannot_take_is_refused_when_the_yaml_is_read(
     assert f"exports.{name}.sources: " in str(caught.value)
 
 
-def test_a_rig_that_a_consumer_cannot_take_is_refused_when_the_yaml_is_read():
+def test_a_rig_that_a_consumer_cannot_take_is_refused_in_yaml():
     camera = LENSES["perspective"]
     rigs = {
         "Plane": RIG | {"camera": camera},
@@ -755,7 +754,7 @@ def test_a_rig_that_a_consumer_cannot_take_is_refused_when_the_yaml_is_read():
     assert TypeAdapter(Scene).validate_python(content).exports.instant_ngp
 
 
-def test_nothing_but_an_earlier_export_is_replaced(dataset, tmp_path):
+def test_only_an_earlier_export_is_replaced(dataset, tmp_path):
     folder = exported(dataset, "poses_csv", "perspective", tmp_path)
     (folder / "export.json").unlink()
     with pytest.raises(UserError, match=r"perspective: holds poses.csv, which is of no export"):
@@ -763,7 +762,7 @@ def test_nothing_but_an_earlier_export_is_replaced(dataset, tmp_path):
     assert (folder / "poses.csv").is_file()
 
 
-def test_what_lies_among_the_files_of_an_earlier_export_is_kept(dataset, tmp_path):
+def test_other_files_in_an_earlier_exports_folder_are_kept(dataset, tmp_path):
     folder = exported(dataset, "poses_csv", "perspective", tmp_path / "exports")
     (folder / "thesis.txt").write_text("years of work")
     with pytest.raises(UserError, match=r"perspective: holds thesis.txt, which is of no export"):
@@ -787,14 +786,16 @@ def test_what_lies_among_the_files_of_an_earlier_export_is_kept(dataset, tmp_pat
         ("colmap", "views", "sees 180 degrees, where COLMAP's fisheye ends"),
     ],
 )
-def test_what_a_consumer_cannot_take_is_refused_by_hand_too(dataset, tmp_path, name, source, why):
+def test_views_that_a_consumer_cannot_take_are_refused_by_hand_too(
+    dataset, tmp_path, name, source, why
+):
     with pytest.raises(UserError, match=rf"lightfield.json: {why}"):
         exported(dataset, name, source, tmp_path)
     assert not [*tmp_path.iterdir()]
 
 
 def by_hand(run_program, dataset, folder, *words):
-    """Export a table of poses by the program; return the names of its views."""
+    """Export a table of poses with the program. Return the names of its views."""
     words = ["poses_csv", "--dataset", dataset, "--output", folder, *words]
     run_program("export.py", *words)
     rows = (folder / "poses.csv").read_text().splitlines()[1:]
@@ -826,7 +827,7 @@ def test_a_mistake_in_a_settings_file_is_named_and_nothing_made(run_program, dat
     assert not (tmp_path / "made").exists()
 
 
-def test_a_model_as_text_may_be_without_points(tmp_path):
+def test_a_text_model_may_have_no_points(tmp_path):
     def sky(lens, _):
         shape = (lens.height, lens.width)
         return np.ones((*shape, 3)), np.full(shape, np.inf)
@@ -839,7 +840,7 @@ def test_a_model_as_text_may_be_without_points(tmp_path):
     assert (folder / "sparse/0/images.txt").read_text().endswith(".png\n\n")
 
 
-def test_points_are_lifted_from_views_that_see_the_sky_too():
+def test_points_come_from_views_with_sky_too():
     lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [8, 8]})
     rays = lens.pixel_rays()
     distance = np.full(rays.shape[:2], np.inf)
@@ -860,7 +861,7 @@ def test_points_are_as_dense_at_the_origin_as_elsewhere():
         assert gaps.max() < 1.5 * np.median(gaps)
 
 
-def test_points_that_several_views_see_alike_are_kept_once():
+def test_a_point_that_several_views_see_alike_is_kept_once():
     points = np.random.default_rng(1).normal(size=(50, 3))
     assert evenly(np.repeat(points, 4, axis=0), 100).tolist() == list(range(0, 200, 4))
 

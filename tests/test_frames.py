@@ -1,4 +1,4 @@
-"""Scenes that change with time: what holds for one frame is not taken to hold for another."""
+"""Scenes that change with time: the facts of one frame are not used for another."""
 
 import json
 from pathlib import Path
@@ -52,7 +52,7 @@ CASES = [
 
 @pytest.fixture(scope="module")
 def folder(run_program, tmp_path_factory):
-    """A folder with a .blend of each case, saved at frame 1, and what was rendered of it."""
+    """A folder with a .blend of each case, saved at frame 1, and the results of its renders."""
     folder = tmp_path_factory.mktemp("animated")
     run_program(Path(__file__).with_name("animated_renders.py"), folder)
     return folder
@@ -66,16 +66,16 @@ def scenes(folder):
 @pytest.mark.parametrize("name", CASES)
 def test_pruning_changes_no_pixel_at_any_frame(name, scenes):
     assert scenes[name]["same"] == [True, True]
-    # The two frames differ: there is something to lose.
+    # The two frames differ, so pruning could lose something.
     assert scenes[name]["changes"]
 
 
 @pytest.mark.parametrize("name", ["blur_by_velocities", "blur_by_velocities_from_nodes"])
-def test_what_has_velocities_is_blurred_though_it_stands_still(name, scenes):
+def test_meshes_with_velocities_are_blurred_at_rest(name, scenes):
     assert scenes[name]["left_out"] == ["viewport"]
 
 
-def test_what_has_keyframes_is_known_by_all_the_values_that_it_may_have(scenes):
+def test_keyframed_values_are_listed_completely(scenes):
     found = scenes["keyed_material"]["inventory"]
     assert found["transmission"] == found["transparency"] == ["sphere"]
     assert found["emission"] == ["torus"]
@@ -85,12 +85,12 @@ def test_objects_are_counted_at_the_frame_that_shows_most(scenes):
     found = scenes["keyed_visibility"]["inventory"]
     assert found["frames"] == [1, 5]
     assert found["fullest_frame"] == 5
-    # The room's six, and the cube.
+    # The room's six objects, and the cube.
     assert found["objects"] == 7
 
 
 @pytest.mark.parametrize("name", ["keyed_samples", "keyed_view_layer"])
-def test_keyframes_do_not_override_what_the_yaml_says(name, scenes):
+def test_keyframes_do_not_override_the_yaml(name, scenes):
     assert scenes[name]["pixels"] == scenes["keyed_light"]["pixels"]
 
 
@@ -128,7 +128,7 @@ def test_a_cube_that_appears_at_the_yamls_frame_is_in_the_view(folder, run_progr
 
 
 def write_lightfield(path, frame, center=(0.5, 1.5, 1), **render):
-    """Write a light field of two cameras: one where the cube is at frame 5, one beside it."""
+    """Write a light field of two cameras: one at the cube's place at frame 5, one beside it."""
     lens = lenses.from_camera({"lens": "equirectangular", "resolution": [64, 32]})
     rig = {"type": "lattice", "cameras": [2, 1, 1], "size": 1, "center": list(center)}
     LightField.from_rig(
@@ -142,7 +142,7 @@ def write_lightfield(path, frame, center=(0.5, 1.5, 1), **render):
 
 
 @pytest.mark.parametrize("name", CASES[:4])
-def test_cameras_are_checked_against_what_their_frame_shows(name, folder, run_program, tmp_path):
+def test_cameras_are_checked_against_their_frame(name, folder, run_program, tmp_path):
     def checked(frame):
         lightfield = tmp_path / f"{frame}.json"
         write_lightfield(lightfield, frame)
@@ -166,8 +166,8 @@ def test_a_camera_that_touches_the_floor_is_refused(room, run_program, tmp_path)
     assert "1 of 2 cameras are inside a surface" in result.stderr
 
 
-def test_cameras_are_checked_against_what_particles_place(folder, run_program, tmp_path):
-    # The first camera is where the emitter is at frame 5. Each grain is hidden itself.
+def test_cameras_are_checked_against_particles(folder, run_program, tmp_path):
+    # The first camera is at the emitter's place at frame 5. The grains themselves are hidden.
     write_lightfield(tmp_path / "lightfield.json", 5, center=[1.5, 1, 1.05])
     words = ("--blend", folder / "particles_from_a_keyed_emitter.blend")
     words += ("--lightfield", tmp_path / "lightfield.json", "--output", tmp_path / "cameras.json")
@@ -193,7 +193,7 @@ def test_keyframes_do_not_number_objects(folder, run_program, tmp_path):
         ("particles_from_a_keyed_emitter", "plane > grain"),
     ],
 )
-def test_instances_that_only_a_render_shows_are_told(blend, shown, folder, run_program, tmp_path):
+def test_objects_that_only_a_render_shows_are_reported(blend, shown, folder, run_program, tmp_path):
     write_lightfield(tmp_path / "lightfield.json", 5, passes=["instance"])
     words = ("--blend", folder / f"{blend}.blend", "--views", "1:2")
     words += ("--lightfield", tmp_path / "lightfield.json", "--output", tmp_path / "exr")

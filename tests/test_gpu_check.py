@@ -1,4 +1,4 @@
-"""The GPU check: what it calls the same picture, and how many hours it reckons; none is needed."""
+"""The GPU check: when pictures count as the same, and the estimated hours. Needs no GPU."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ print(json.dumps(gpu_check.check(maker, "cpu", lightfield.render, {})))
 
 
 class Simulated:
-    """Trials that cost no render: noise of their seeds on a picture that is known."""
+    """Trials that render nothing: their seeds' noise on a known picture."""
 
     def __init__(self, lens, device="cpu"):
         self.lens, self.device, self.lightfield = lens, device, None
@@ -42,7 +42,7 @@ class Simulated:
         light = np.linspace(0.1, 2, width * height * 3, dtype=np.float32)
         light = light.reshape(height, width, 3)
         random = np.random.default_rng(seed)
-        # As path tracing has it: now and then a bright path.
+        # Like path tracing, now and then a path is bright.
         noise = random.exponential(NOISE, light.shape) - NOISE
         noise += (random.random(light.shape) < 1e-3) * 5 - 0.005
         depth = np.where(light[..., 0] < 1.5, light[..., 0] + 1, np.inf)
@@ -79,12 +79,12 @@ def test_renders_of_other_seeds_are_the_same_picture(trials):
     ],
     ids=["exposure", "mirrored", "tinted", "depth", "shifted", "misses"],
 )
-def test_another_picture_is_not_the_same(trials, change):
+def test_a_changed_picture_is_not_the_same(trials, change):
     one, other, mask = trials
     assert not gpu_check.compare(one, [change(trial) for trial in other], mask).same
 
 
-def test_a_picture_without_noise_is_the_same_or_not(trials):
+def test_pictures_without_noise_are_compared_exactly(trials):
     one, _, mask = trials
     still = [replace(trial, colour=np.full_like(trial.colour, 0.5)) for trial in one]
     assert gpu_check.compare(still, still, mask).same
@@ -92,7 +92,7 @@ def test_a_picture_without_noise_is_the_same_or_not(trials):
     assert not gpu_check.compare(still, brighter, mask).same
 
 
-def test_hours_are_those_of_the_views_pixels_and_samples():
+def test_hours_follow_from_views_pixels_and_samples():
     full = {"big": {"views": 10, "resolution": [2000, 1000]}}
     maker = Simulated(lenses.from_camera(CAMERA))
     found = gpu_check.check(maker, "gpu", {"samples": 256}, full)
@@ -104,7 +104,7 @@ def test_hours_are_those_of_the_views_pixels_and_samples():
 
 
 def test_the_processor_agrees_with_itself(tmp_path, run_program, room):
-    """The real renders, with the processor in place of the GPU."""
+    """Uses real renders, with the processor in place of the GPU."""
     content = LightField.from_rig(
         RIG | {"center": [0, 0, 1.5]},
         lenses.from_camera(CAMERA | {"resolution": [48, 48]}),
@@ -118,7 +118,7 @@ def test_the_processor_agrees_with_itself(tmp_path, run_program, room):
     program.write_text(PROGRAM)
     found = run_program(program, room, tmp_path / "inventory.json", cwd=tmp_path)
     assert '"same": true' in found.stdout
-    # The program itself says so in one line, without a file.
+    # The program itself says so in one line, without writing a file.
     words = ["--blend", room, "--inventory", tmp_path / "inventory.json"]
     words += ["--lightfield", tmp_path / "lightfield.json", "--cache", tmp_path / "cache"]
     words += ["--output", tmp_path / "room"]

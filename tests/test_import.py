@@ -1,4 +1,4 @@
-"""Views that somebody else has rendered, in SILVR's published layout, become a dataset of ours."""
+"""Views that somebody else rendered, in SILVR's published layout, become a dataset."""
 
 import json
 import math
@@ -46,7 +46,7 @@ from snakemake.cli import main
 main(sys.argv[1:])
 """
 
-# Runs Snakemake, then writes how many timers it had at most at one time.
+# Runs Snakemake, then writes the largest number of simultaneous timers.
 TIMING = """
 import atexit, json, sys, threading
 waiting = most = 0
@@ -66,7 +66,7 @@ main(sys.argv[1:])
 
 @pytest.fixture
 def published(tmp_path):
-    """A folder with one rig's views as SILVR publishes its own: half depth, and nothing of ours."""
+    """A folder with one rig's views as SILVR publishes them: half depth, and none of our files."""
     folder = tmp_path / "published" / "LFPlane"
     write_views(folder, VIEWS, RIG)
     content = json.loads((folder / "lightfield.json").read_text())
@@ -95,7 +95,7 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
     assert content["frames"] == theirs["frames"]
     assert content["camera"] == theirs["camera"]
     assert content["depth"] == "z"
-    # Nobody knows where they were rendered.
+    # The machine that rendered them is unknown.
     assert "machine" not in content
     record, views = tmp_path / "0-4.json", dataset / "exr"
     words = ["--dataset", published, "--lightfield", own, "--output", views, "--record", record]
@@ -104,7 +104,7 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
     assert files.keys() == {f"exr/{path.name}" for path in (published / "exr").iterdir()}
     for name, entry in files.items():
         assert sha256(published / name) == sha256(dataset / name) == entry["sha256"]
-    # One file by two names: what damages the one damages the other.
+    # Both names are one file, so damage affects both.
     view = next((published / "exr").iterdir())
     content = view.read_bytes()
     view.write_bytes(content[:-1] + b"?")
@@ -128,7 +128,7 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
 
 
 @pytest.mark.parametrize(("side", "fewest", "most"), [(64, 1, 1), (2048, 4, 20)])
-def test_a_shard_takes_over_as_many_views_as_are_worth_a_start(
+def test_a_shard_takes_over_enough_views_to_be_worth_a_start(
     published, tmp_path, monkeypatch, side, fewest, most
 ):
     monkeypatch.chdir(tmp_path)
@@ -141,12 +141,12 @@ def test_a_shard_takes_over_as_many_views_as_are_worth_a_start(
     yaml = tmp_path / "configs/scenes/theirs.yaml"
     yaml.write_text(YAML.replace("[24, 24]", f"[{side}, {side}]"))
     (dataset,) = scene_datasets("theirs")
-    # Of 400 views: small ones are done before a second process has started.
+    # There are 400 views. Small ones are finished before a second process could start.
     assert fewest <= len(dataset.shards) <= most
 
 
 @pytest.mark.slow
-def test_nothing_is_rendered_of_it(published, tmp_path):
+def test_nothing_is_rendered_for_imported_views(published, tmp_path):
     words = ("--snakefile", ROOT / "Snakefile", "--config", "scenes=theirs", "preset=full")
     jobs = planned(tmp_path, *words)
     assert jobs.keys() >= {"import_views", "reproject", "validate", "page"}
@@ -159,7 +159,7 @@ def test_nothing_is_rendered_of_it(published, tmp_path):
     dataset, (view, *_) = tmp_path / "results/theirs/LFPlane", (published / "exr").iterdir()
     again = []
     for part in (1, 0.5):
-        # A view that its owner makes anew is taken over anew.
+        # A view that its owner changes is taken over again.
         channels = images.read_image(view).channels
         images.write_exr(view, channels | {name: part * channels[name] for name in "RGB"})
         built = snakemake(tmp_path, *words)
@@ -171,8 +171,8 @@ def test_nothing_is_rendered_of_it(published, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_run_lists_no_folder_once_a_shard(published, tmp_path):
-    """Thousands of shards have a folder of many thousand files in common."""
+def test_a_run_does_not_list_a_folder_for_each_shard(published, tmp_path):
+    """Thousands of shards share a folder of many thousand files."""
     command = [sys.executable, "-c", COUNTING, "--cores", "1", "--snakefile", ROOT / "Snakefile"]
     command += ["--config", "scenes=theirs", "preset=full"]
     of_views_and_records = []
@@ -191,8 +191,8 @@ def test_a_run_lists_no_folder_once_a_shard(published, tmp_path):
 
 
 @pytest.mark.slow
-def test_waiting_for_jobs_takes_no_more_the_more_have_finished(published, tmp_path):
-    """A timer for each job of hundreds keeps Snakemake looking for jobs without a pause."""
+def test_waiting_for_jobs_costs_the_same_for_any_number_of_finished_jobs(published, tmp_path):
+    """With a timer for each of hundreds of jobs, Snakemake would check jobs without a pause."""
     command = [sys.executable, "-c", TIMING, "--cores", "1", "--snakefile", ROOT / "Snakefile"]
     command += ["--config", "scenes=theirs", "preset=full", "views_per_shard=1"]
     subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
@@ -209,7 +209,7 @@ def test_linked_folders_are_rigs_by_the_names_of_their_links(published, tmp_path
     assert list(lightfields(".")) == list(lightfields("../LFPlane/exr/..")) == ["LFPlane"]
 
 
-def test_a_folder_that_can_be_no_rig_is_named(published, tmp_path, monkeypatch):
+def test_a_folder_that_cannot_be_a_rig_is_named(published, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     published.rename(published.with_name("view sphere"))
     with pytest.raises(UserError, match=r"theirs.yaml: rigs: 'view sphere' is no name; must"):
@@ -229,7 +229,9 @@ def test_a_folder_that_can_be_no_rig_is_named(published, tmp_path, monkeypatch):
         ),
     ],
 )
-def test_what_goes_not_with_it_is_refused(published, tmp_path, monkeypatch, content, problem):
+def test_settings_that_do_not_go_with_imported_views_are_refused(
+    published, tmp_path, monkeypatch, content, problem
+):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(UserError, match=problem):
         checked(TypeAdapter(Scene), content, "theirs.yaml")
@@ -251,19 +253,19 @@ def test_what_goes_not_with_it_is_refused(published, tmp_path, monkeypatch, cont
         },
     ],
 )
-def test_a_lens_is_a_camera_of_a_yaml_again(camera):
+def test_a_lens_can_be_written_as_a_yamls_camera(camera):
     lens = lenses.from_camera(camera)
     assert lenses.from_camera(lens.settings()) == lens
 
 
-def test_an_angle_that_blender_rounded_is_whole_again():
+def test_an_angle_that_blender_rounded_becomes_round_again():
     camera = {"type": "PANO", "panorama_type": "FISHEYE_EQUIDISTANT"}
     camera["fisheye_fov"] = float(np.float32(2 * math.pi))
     lens = lenses.from_lightfield({"camera": camera, "resolution": [8, 8]})
     assert lens.settings()["fov"] == 360
 
 
-def test_a_view_that_nobody_may_write_is_taken_over(nobody):
+def test_a_read_only_view_is_taken_over(nobody):
     view, taken = nobody / "published.exr", nobody / "exr" / "taken.exr"
     view.write_bytes(b"a view")
     view.chmod(0o444)

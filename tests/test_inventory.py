@@ -1,4 +1,4 @@
-"""What a scene contains, what follows from that, and that no pixel tells the difference."""
+"""What a scene contains, what pruning leaves out, and that this changes no pixel."""
 
 import json
 import subprocess
@@ -33,11 +33,11 @@ NOTHING = {
         ({"animated": ["Door"], "uses_visibility": ["Door"]}, ["animation"]),
     ],
 )
-def test_what_is_left_out_follows_from_what_is_there(contains, expected):
+def test_the_content_decides_what_is_left_out(contains, expected):
     assert pruning.left_out(NOTHING | contains) == expected
 
 
-def test_the_benchmark_of_pruning_leaves_blender_to_processes_that_it_spawns():
+def test_the_benchmark_of_pruning_imports_bpy_only_in_spawned_processes():
     # A process spawned by one that has imported bpy does not find it.
     code = "import sys, pruning; sys.exit('bpy' in sys.modules)"
     folder = Path(__file__).resolve().parents[1] / "benchmarks"
@@ -52,18 +52,18 @@ def scenes(run_program, tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", ["plain", "left_behind", "animated", "blurred", "features"])
-def test_a_pruned_render_is_the_whole_one_byte_for_byte(name, scenes):
+def test_a_pruned_render_equals_the_unpruned_one(name, scenes):
     assert scenes[name]["same"]
 
 
-def test_what_artists_leave_behind_is_found_and_left_out(scenes):
+def test_leftovers_of_artists_are_found_and_left_out(scenes):
     found = scenes["left_behind"]
     assert found["left_out"] == ["viewport", "hidden_objects", "motion_blur"]
-    # What a modifier or an instancer needs stays, though no ray meets it as it stands.
+    # Objects that a modifier or an instancer needs stay, although no ray hits them directly.
     assert found["inventory"]["hidden"] == ["hidden", "in excluded", "in off", "unseen"]
     assert "only hidden" not in found["materials"]
-    # The room's seven, the cutter by its modifier, the instanced, its instancer, our camera, and
-    # one for each kind of ray that meets nothing else.
+    # The room's seven, the modifier's cutter, the instanced object, its instancer, our camera, and
+    # an object for each kind of ray that hits nothing else.
     assert found["objects"] == 11 + 6
 
 
@@ -71,17 +71,17 @@ def test_an_animation_is_frozen_at_the_frame_of_the_dataset(scenes):
     found = scenes["animated"]
     assert found["left_out"] == ["viewport", "animation"]
     assert set(found["inventory"]["animated"]) == {"cone", "sphere", "Key", "pillar", "torus"}
-    # What the viewport does not show is not evaluated there: its value is not known, so it stays.
+    # Objects hidden in the viewport are not evaluated, so their values are unknown. They stay.
     assert found["animated"] == ["torus"]
 
 
-def test_what_moves_under_motion_blur_is_not_frozen(scenes):
+def test_objects_under_motion_blur_are_not_frozen(scenes):
     found = scenes["blurred"]
     assert found["left_out"] == ["viewport"]
     assert found["animated"] == ["cone"]
 
 
-def test_features_are_told_by_the_materials_that_have_them(scenes):
+def test_features_are_listed_with_their_materials(scenes):
     found = scenes["features"]["inventory"]
     assert {name: found[name] for name in ("transmission", "subsurface", "transparency")} == {
         "transmission": ["sphere"],
@@ -169,7 +169,7 @@ bpy.ops.wm.save_as_mainfile(filepath=folder + "/imports.blend", relative_remap=F
 """
 
 
-def test_what_is_missing_or_cannot_be_read_is_an_error(run_program, tmp_path, monkeypatch):
+def test_missing_or_unreadable_files_are_an_error(run_program, tmp_path, monkeypatch):
     (tmp_path / "make.py").write_text(MISSING)
     scripts = Path(pruning.__file__).parents[2]
     run_program(tmp_path / "make.py", tmp_path, scripts)
@@ -198,7 +198,7 @@ def test_what_is_missing_or_cannot_be_read_is_an_error(run_program, tmp_path, mo
     bark, font = tmp_path / "bark.png", tmp_path / "font.woff2"
     texture = f"the texture bark at {bark}"
     letters = f"the font DejaVu Sans Mono Book at {font}"
-    # Of a photograph that was not copied to its end, Cycles would show a part.
+    # Cycles would show a part of a photograph that was copied incompletely.
     photograph = tmp_path / "photograph.jpg"
     oiio.ImageBuf(np.zeros((64, 64, 3), np.uint8)).write(str(photograph))
     bark.write_bytes(photograph.read_bytes()[:-100])
@@ -244,7 +244,7 @@ exports: {instant_ngp: {sources: [views]}}
 
 
 @pytest.mark.slow
-def test_a_minimal_scene_plans_its_own_stages_only(tmp_path):
+def test_a_minimal_scene_plans_only_its_own_stages(tmp_path):
     folder = checkout(tmp_path, minimal=MINIMAL)
     jobs = planned(folder, "--config", "scenes=[minimal]", "rigs=all", "preset=full")
     assert {"build_scene", "render", "validate"} <= jobs.keys()

@@ -1,4 +1,4 @@
-"""What rendering takes of memory: measured, asked for, shared between jobs, and refused in time."""
+"""The memory of rendering: measured, requested, shared between jobs, and refused in time."""
 
 import json
 
@@ -29,7 +29,7 @@ GB = 10**9
         (1, 0, GB, 25 * GB, 1),
     ],
 )
-def test_what_runs_at_once_fits_into_memory(cores, shards, need, available, expected):
+def test_simultaneous_jobs_fit_into_memory(cores, shards, need, available, expected):
     threads = memory.threads(cores, shards, need, available)
     assert threads == expected
     assert cores // threads * need <= available or threads == cores
@@ -46,13 +46,13 @@ def test_this_machines_memory_is_within_every_limit(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("own", "limits"),
     [
-        # The second version of control groups: a batch system limits a job, and not its steps.
+        # The second version of control groups: a batch system limits a job, but not its steps.
         (
             "0::/batch/job_7/step_0",
             {"batch/job_7/memory.max": "1000000", "batch/job_7/step_0/memory.max": "max"},
         ),
         ("0::/batch/job_7", {"memory.max": "max", "batch/job_7/memory.max": "1000000"}),
-        # The first version, whose limit of the whole machine is a huge number.
+        # The first version: the machine's own limit is a huge number.
         (
             "5:cpu:/batch\n9:memory:/batch/job_7",
             {
@@ -64,7 +64,7 @@ def test_this_machines_memory_is_within_every_limit(tmp_path, monkeypatch):
         ),
     ],
 )
-def test_of_nested_limits_of_memory_the_tightest_counts(own, limits, tmp_path, monkeypatch):
+def test_the_tightest_of_nested_memory_limits_counts(own, limits, tmp_path, monkeypatch):
     (tmp_path / "own").write_text(f"{own}\n")
     for name, limit in limits.items():
         path = tmp_path / "groups" / name
@@ -75,7 +75,7 @@ def test_of_nested_limits_of_memory_the_tightest_counts(own, limits, tmp_path, m
     assert machine.available() == 1_000_000
 
 
-def test_a_job_asks_for_what_the_scene_was_measured_to_take(tmp_path):
+def test_a_job_requests_the_measured_memory_of_the_scene(tmp_path):
     content = read_config(ROOT / "config.yaml") | {"work": str(tmp_path)}
     dataset = scene_datasets("garden", settings=load_config(content))[0]
     pixels = 2048 * 2048 * memory.PIXEL_BYTES
@@ -83,7 +83,7 @@ def test_a_job_asks_for_what_the_scene_was_measured_to_take(tmp_path):
     (tmp_path / "garden").mkdir()
     (tmp_path / "garden/inventory.json").write_text(json.dumps({"memory_bytes": 2 * GB}))
     assert dataset.estimate.view_memory_bytes == 2.4 * GB + pixels
-    # Four pixels for each of a view's, up to 4096 by 2048.
+    # Four pixels for each pixel of a view, up to 4096 × 2048.
     assert dataset.estimate.memory_bytes(dataset.panorama_width**2 // 2) == 2.4 * GB + 2 * pixels
 
 

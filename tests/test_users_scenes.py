@@ -1,4 +1,4 @@
-"""Scenes of users that Cycles renders wrong without an error: what is wrong is said, once."""
+"""Scenes of users that Cycles renders incorrectly without an error: each is reported once."""
 
 from pathlib import Path
 
@@ -62,20 +62,20 @@ def test_grease_pencil_is_left_out_of_a_fisheye(folder, run_program):
         np.testing.assert_array_equal(drawn[name], pixels, err_msg=name)
 
 
-def test_grease_pencil_is_in_the_colour_of_perspective_views_alone(folder, run_program):
+def test_only_perspective_views_show_grease_pencil_and_only_in_their_colour(folder, run_program):
     plain, drawn = (rendered(folder, run_program, each, "flat") for each in ("wall", "pencil"))
     for name in "ZY":
         np.testing.assert_array_equal(drawn[name], plain[name], err_msg=name)
     differs = np.abs(drawn["R"] - plain["R"]) > 0.01
     assert differs[12:20, 12:20].mean() > 0.5
-    # What is behind the wall would be seen here.
+    # Behind the wall, this would be visible.
     assert not differs[:4].any() and not differs[:, :4].any()
 
 
 @pytest.mark.parametrize(
     ("lens", "said"), [("fisheye", "is left out"), ("flat", "no depth and no pass")]
 )
-def test_what_views_lack_of_grease_pencil_is_said(lens, said, folder, run_program):
+def test_missing_grease_pencil_is_reported(lens, said, folder, run_program):
     write_lightfield(folder / "lightfield.json", lens, [(0, -4, 0), (0.1, -4, 0)])
     words = ("--lightfield", folder / "lightfield.json", "--output", folder / "cameras.json")
     result = run_program("check_cameras.py", "--blend", folder / "pencil.blend", *words)
@@ -97,7 +97,7 @@ ONE_INSIDE = [(0, 0, 0), (0, 30, 30)]
         ("dome", BOTH_INSIDE, "2 of 2 cameras are inside an open mesh: dome: "),
     ],
 )
-def test_cameras_inside_an_open_mesh_are_said(blend, places, said, folder, run_program):
+def test_cameras_inside_an_open_mesh_are_reported(blend, places, said, folder, run_program):
     status, (warning,) = checked(folder, run_program, blend, places)
     assert status == 0
     assert warning.startswith(f"warning: {said}")
@@ -111,12 +111,12 @@ def test_a_camera_inside_a_closed_mesh_is_refused(blend, folder, run_program):
 
 
 @pytest.mark.parametrize("blend", ["open_room", "leaves", "floor"])
-def test_cameras_that_see_fronts_or_a_plane_are_not_said_to_be_inside(blend, folder, run_program):
+def test_cameras_that_see_fronts_or_a_plane_are_not_inside(blend, folder, run_program):
     assert checked(folder, run_program, blend, BOTH_INSIDE) == (0, [])
 
 
 def listed(folder, run_program, blend, frame):
-    """Return the warnings of the inventory of a .blend that is rendered at a frame."""
+    """Return the warnings of the inventory of a .blend for a frame."""
     scenes = folder / "configs/scenes"
     scenes.mkdir(parents=True, exist_ok=True)
     text = SIMULATED.format(blend=blend, frame=frame)
@@ -147,7 +147,7 @@ def test_unbaked_simulations_are_named_with_a_remedy(folder, run_program):
     assert "bake them in Blender" in warning
 
 
-def test_simulations_are_right_without_a_bake_at_their_first_frame(folder, run_program):
+def test_simulations_need_no_bake_at_their_first_frame(folder, run_program):
     assert listed(folder, run_program, "simulations", 1) == (0, [])
 
 
@@ -164,7 +164,7 @@ def test_a_fluid_that_is_not_baked_is_refused_by_name(folder, run_program):
 @pytest.mark.parametrize("lens", LENSES)
 def test_a_transparent_view_of_nothing_is_valid(lens, folder, run_program):
     output = folder / f"nothing_{lens}"
-    # The box lies behind the first camera and before the second.
+    # The box is behind the first camera, and in front of the second.
     places = [(0, 5, 0), (0, -5, 0)]
     more = {"passes": [], "transparent": True}
     write_lightfield(output / "lightfield.json", lens, places, **more)
@@ -189,7 +189,7 @@ rigs:
 """
 
 
-def test_a_pixel_aspect_is_said_to_be_ignored_and_pixels_are_square(folder, run_program):
+def test_a_pixel_aspect_is_reported_as_ignored_and_pixels_are_square(folder, run_program):
     (folder / "configs/scenes").mkdir(parents=True, exist_ok=True)
     (folder / "configs/scenes/aspect.yaml").write_text(ASPECT)
     blend = ("--scene", "aspect", "--blend", "aspect.blend")
