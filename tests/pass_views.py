@@ -142,12 +142,15 @@ def build_instances():
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     line = tree.nodes.new("GeometryNodeMeshLine")
     line.inputs["Count"].default_value, line.inputs["Offset"].default_value = 3, (0.7, 0, 0)
-    what = tree.nodes.new("GeometryNodeObjectInfo")
-    what.inputs["Object"].default_value, what.inputs["As Instance"].default_value = ball, True
-    there = tree.nodes.new("GeometryNodeInstanceOnPoints")
-    tree.links.new(line.outputs[0], there.inputs["Points"])
-    tree.links.new(what.outputs["Geometry"], there.inputs["Instance"])
-    tree.links.new(there.outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0])
+    object_info = tree.nodes.new("GeometryNodeObjectInfo")
+    object_info.inputs["Object"].default_value, object_info.inputs["As Instance"].default_value = (
+        ball,
+        True,
+    )
+    instances = tree.nodes.new("GeometryNodeInstanceOnPoints")
+    tree.links.new(line.outputs[0], instances.inputs["Points"])
+    tree.links.new(object_info.outputs["Geometry"], instances.inputs["Instance"])
+    tree.links.new(instances.outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0])
     row = bpy.data.objects.new("row", bpy.data.meshes.new("row"))
     row.location = (-0.5, 3.5, 1.8)
     row.modifiers.new("row", "NODES").node_group = tree
@@ -174,7 +177,7 @@ def cast_instances(content):
             name = f"{entry.parent.name} > {name} {places}"
         names[entry.object.name, tuple(np.round(entry.matrix_world.translation, 3).tolist())] = name
     rays = content.lens.pixel_rays() @ view.matrix[:3, :3].T
-    found = np.full(rays.shape[:2], "", dtype="U24")
+    names_of_pixels = np.full(rays.shape[:2], "", dtype="U24")
     for pixel in zip(*np.nonzero(np.isfinite(rays[..., 0])), strict=True):
         origin, direction, obj = Vector(view.position), Vector(rays[pixel]), None
         while obj is None or obj.name == "card":
@@ -182,12 +185,12 @@ def cast_instances(content):
                 depsgraph, origin, direction
             )
             if not hit:
-                found[pixel] = ""
+                names_of_pixels[pixel] = ""
                 break
             origin = origin + 1e-4 * direction
             place = tuple(np.round(matrix.translation, 3).tolist())
-            found[pixel] = names[obj.name, place]
-    return found
+            names_of_pixels[pixel] = names[obj.name, place]
+    return names_of_pixels
 
 
 def read_matte(path, name, target):

@@ -79,19 +79,19 @@ def advice_of(maker, windows, reference_samples):
 
 @pytest.fixture(scope="module")
 def simulated():
-    found = advice_of(Simulated(), 2, 512)
-    return found, {json.dumps(one["change"]): one for one in found["tried"]}
+    advice_content = advice_of(Simulated(), 2, 512)
+    return advice_content, {json.dumps(entry["change"]): entry for entry in advice_content["tried"]}
 
 
 def test_a_change_that_saves_is_advised_with_its_yaml(simulated):
-    found, changes = simulated
-    one = changes['{"light_tree": false}']
-    whole = one["savings"]["whole views"]
-    assert whole["times"] == pytest.approx(2, abs=2 * whole["uncertainty"] + 0.02)
-    assert abs(whole["light"]) < 1e-6 and whole["same_picture"] and one["advised"]
-    assert one["savings"]["diffuse"] == whole
-    assert found["yaml"] == {"light_tree": False}
-    text = advice.table("room", {**found, "threads": []})
+    advice_content, changes = simulated
+    entry = changes['{"light_tree": false}']
+    whole_views = entry["savings"]["whole views"]
+    assert whole_views["times"] == pytest.approx(2, abs=2 * whole_views["uncertainty"] + 0.02)
+    assert abs(whole_views["light"]) < 1e-6 and whole_views["same_picture"] and entry["advised"]
+    assert entry["savings"]["diffuse"] == whole_views
+    assert advice_content["yaml"] == {"light_tree": False}
+    text = advice.table("room", {**advice_content, "threads": []})
     assert "render:\n  light_tree: false\n" in text
     assert "- lights: 1, sun" in text and "- volumes: 1, Fog" in text
     assert "| `light_tree: false` | path tracing | yes | 2.0" in text
@@ -101,17 +101,17 @@ def test_a_change_that_saves_is_advised_with_its_yaml(simulated):
     "change", ['{"max_bounces": 4}', '{"max_bounces": 2}', '{"denoise": true}']
 )
 def test_a_change_of_the_picture_is_not_advised(simulated, change):
-    one = simulated[1][change]
-    assert not one["savings"]["whole views"]["same_picture"] and not one["advised"]
+    entry = simulated[1][change]
+    assert not entry["savings"]["whole views"]["same_picture"] and not entry["advised"]
     if "max_bounces" in change:
-        assert one["savings"]["whole views"]["light"] == pytest.approx(-0.1, abs=1e-3)
+        assert entry["savings"]["whole views"]["light"] == pytest.approx(-0.1, abs=1e-3)
 
 
 def test_a_change_that_hides_fireflies_is_not_advised(simulated):
-    one = simulated[1]['{"guiding": true}']
-    whole = one["savings"]["whole views"]
-    assert whole["times"] > 1.5 > 1 > whole["times_of_all_pixels"]
-    assert not one["advised"]
+    entry = simulated[1]['{"guiding": true}']
+    whole_views = entry["savings"]["whole views"]
+    assert whole_views["times"] > 1.5 > 1 > whole_views["times_of_all_pixels"]
+    assert not entry["advised"]
 
 
 def test_a_clamp_is_reported_and_never_advised():
@@ -137,21 +137,21 @@ def test_the_value_of_a_key_that_saves_most_is_advised(monkeypatch):
         return replace(trial, seconds=trial.seconds / times)
 
     monkeypatch.setattr(maker, "render", faster)
-    found = advice_of(maker, 1, 64)
-    assert found["yaml"]["denoise_prefilter"] == "fast"
+    advice_content = advice_of(maker, 1, 64)
+    assert advice_content["yaml"]["denoise_prefilter"] == "fast"
 
 
 def test_without_light_nothing_is_advised(monkeypatch):
     lit = Simulated.render
     monkeypatch.setattr(
-        Simulated, "render", lambda *words: replace(t := lit(*words), colour=0 * t.colour)
+        Simulated, "render", lambda *arguments: replace(t := lit(*arguments), colour=0 * t.colour)
     )
-    found = advice_of(Simulated(), 1, 64)
-    assert found["yaml"] == {}
-    assert "Nothing is advised" in advice.table("black", found | {"threads": []})
+    advice_content = advice_of(Simulated(), 1, 64)
+    assert advice_content["yaml"] == {}
+    assert "Nothing is advised" in advice.table("black", advice_content | {"threads": []})
 
 
-def killed(*words):
+def killed(*arguments):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
@@ -182,18 +182,18 @@ def test_a_scene_is_advised_by_the_programs(run_program, room, tmp_path):
     lightfield().write(tmp_path / "lightfield.json")
     inventory, output = tmp_path / "inventory.json", tmp_path / "room.json"
     run_program("inventory.py", "--blend", room, "--output", inventory)
-    words = ("--blend", room, "--inventory", inventory, "--device", "cpu", "--size", "24")
-    words += ("--lightfield", tmp_path / "lightfield.json", "--cache", tmp_path / "cache")
-    words += ("--reference", "1024", "--cores", "2", "--output", output)
-    run_program("try_changes.py", *words)
-    found = json.loads(output.read_text())
-    assert "diffuse" in found["strata"]
-    savings = {json.dumps(one["change"]): one["savings"] for one in found["tried"]}
-    own = json.loads(inventory.read_text())["sampling"]
+    arguments = ("--blend", room, "--inventory", inventory, "--device", "cpu", "--size", "24")
+    arguments += ("--lightfield", tmp_path / "lightfield.json", "--cache", tmp_path / "cache")
+    arguments += ("--reference", "1024", "--cores", "2", "--output", output)
+    run_program("try_changes.py", *arguments)
+    content = json.loads(output.read_text())
+    assert "diffuse" in content["strata"]
+    savings = {json.dumps(entry["change"]): entry["savings"] for entry in content["tried"]}
+    sampling = json.loads(inventory.read_text())["sampling"]
     # In a closed room with a lamp, fewer bounces make it darker. No other change does.
-    fewer = savings[json.dumps({"max_bounces": own["max_bounces"] // 4})]["whole views"]
+    fewer = savings[json.dumps({"max_bounces": sampling["max_bounces"] // 4})]["whole views"]
     assert fewer["light"] < -0.01 and not fewer["same_picture"]
-    tree = savings[json.dumps({"light_tree": not own["light_tree"]})]["whole views"]
+    tree = savings[json.dumps({"light_tree": not sampling["light_tree"]})]["whole views"]
     assert 0 < abs(tree["light"]) < 0.02
     # Each change reaches Cycles: no two make the same pixels. Two are exceptions: a clamp clamps
     # nothing here, and on some processors the denoiser has one filter for two qualities.
@@ -203,11 +203,11 @@ def test_a_scene_is_advised_by_the_programs(run_program, room, tmp_path):
         for change, saved in savings.items()
         if not any(name in change for name in same)
     ]
-    assert len({(whole["bias"], whole["light"]) for whole in wholes}) == len(wholes)
+    assert len({(saving["bias"], saving["light"]) for saving in wholes}) == len(wholes)
     qualities = [saved for change, saved in savings.items() if "denoise_quality" in change]
     assert any(saved["whole views"] not in wholes for saved in qualities)
     # Two processes of one thread hold the scene twice. One process of two threads holds it once.
-    single, double = found["threads"]
+    single, double = content["threads"]
     assert (single["threads"], single["processes"]) == (1, 2)
     assert (double["threads"], double["processes"]) == (2, 1)
     assert single["memory_bytes"] > 1.5 * double["memory_bytes"]

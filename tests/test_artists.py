@@ -59,12 +59,12 @@ TAKEN = {
 }
 
 
-def build(folder, *words, accept="accept_blend=false"):
+def build(folder, *arguments, accept="accept_blend=false"):
     return subprocess.run(
         [
             Path(sys.executable).with_name("snakemake"),
             *("--snakefile", ROOT / "Snakefile", "--directory", folder, "--cores", "1"),
-            *words,
+            *arguments,
             *("--config", "preset=full", f"scenes=[{','.join(SCENES)}]", accept),
         ],
         cwd="/",

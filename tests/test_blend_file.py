@@ -314,10 +314,10 @@ def test_scripts_and_drivers_in_a_blend_do_not_run(run_program, tmp_path):
     folder.mkdir()
     scripts = config.BUILDERS.parent
     run_program(tmp_path / "make.py", folder, scripts)
-    told = run_program(tmp_path / "open.py", folder, scripts).stdout.splitlines()
+    lines = run_program(tmp_path / "open.py", folder, scripts).stdout.splitlines()
     # If Blender is told to trust the file, the traps do work.
-    assert "trusted: driver script trap.blend" in told
-    assert "ours: trap.blend" in told
+    assert "trusted: driver script trap.blend" in lines
+    assert "ours: trap.blend" in lines
 
 
 def test_another_bpy_renders_a_brought_blend_again(tmp_path, room, monkeypatch):
@@ -356,8 +356,8 @@ for name in ("library", "main"):
 def test_a_blend_newer_than_bpy_is_an_error_that_names_both_versions(newer, run_program, tmp_path):
     (tmp_path / "make.py").write_text(LINKED)
     run_program(tmp_path / "make.py", tmp_path)
-    words = ("--blend", tmp_path / "main.blend", "--output", tmp_path / "inventory.json")
-    run_program("inventory.py", *words)
+    arguments = ("--blend", tmp_path / "main.blend", "--output", tmp_path / "inventory.json")
+    run_program("inventory.py", *arguments)
 
     major, minor = map(int, version("bpy").split(".")[:2])
     path = tmp_path / f"{newer}.blend"
@@ -365,11 +365,13 @@ def test_a_blend_newer_than_bpy_is_an_error_that_names_both_versions(newer, run_
     mark = f"v{major:02}{minor:02}".encode()
     assert mark in content[:17]
     path.write_bytes(content.replace(mark, f"v{major:02}{minor + 1:02}".encode(), 1))
-    result = run_program("inventory.py", *words, check=False)
+    result = run_program("inventory.py", *arguments, check=False)
     assert result.returncode == 1
-    told = result.stderr.splitlines()[-1]
-    assert told.startswith(f"error: {path}: was saved by Blender {major}.{minor + 1}, and Blender ")
-    assert f"Blender {version('bpy')}" in told
+    message = result.stderr.splitlines()[-1]
+    assert message.startswith(
+        f"error: {path}: was saved by Blender {major}.{minor + 1}, and Blender "
+    )
+    assert f"Blender {version('bpy')}" in message
 
 
 @pytest.mark.slow

@@ -54,14 +54,14 @@ def calibrated(tmp_path_factory, run_program, room_probes):
 
     def run(target, *more, **limits):
         folder = tmp_path_factory.mktemp("calibrated")
-        told = run_program(
+        result = run_program(
             "calibrate.py",
             *room_probes(target_error=target, **limits),
             *("--probes", "4", "--size", "24", "--device", "cpu", "--cache", folder / "cache"),
             *("--output", folder / "record.json", "--seconds", folder / "seconds.json"),
             *more,
         )
-        return folder, told
+        return folder, result
 
     return run
 
@@ -72,13 +72,13 @@ def once(calibrated):
 
 
 def test_other_views_confirm_the_choice(once):
-    folder, told = once
+    folder, result = once
     record = json.loads((folder / "record.json").read_text())
     assert record["reached"] and record["confirmed"]
     assert abs(record["held_out_error"] / TARGET - 1) < 0.2
     assert not set(record["probes"]) & {entry["probe"] for entry in record["held_out"]}
     assert set(record["choice"]) == {"samples", "adaptive_threshold", "denoise"}
-    assert "warning" not in told.stderr
+    assert "warning" not in result.stderr
     # No candidate that reaches the target is cheaper.
     good = [c for c in record["candidates"] if c["error"] <= TARGET * 1.05]
     assert min(c["cost"] for c in good) == record["cost_samples"]
@@ -86,7 +86,7 @@ def test_other_views_confirm_the_choice(once):
     # The room's walls are diffuse, so nearly all pixels have this error.
     reached = record["strata"]["diffuse"]
     assert reached["area"] > 0.5 and reached["error"] == pytest.approx(TARGET, rel=0.5)
-    assert f"most of: diffuse {reached['error']:.2g}" in told.stdout
+    assert f"most of: diffuse {reached['error']:.2g}" in result.stdout
     seconds = json.loads((folder / "seconds.json").read_text())
     assert len(seconds["candidates"]) == len(record["candidates"])
 
@@ -98,12 +98,12 @@ def test_the_choice_is_the_same_to_the_byte_on_other_threads(once, calibrated):
 
 
 def test_a_preset_limits_the_choice(calibrated):
-    folder, told = calibrated(0.01, most_samples=4, denoise=False)
+    folder, result = calibrated(0.01, most_samples=4, denoise=False)
     record = json.loads((folder / "record.json").read_text())
     assert record["choice"]["samples"] <= 4
     assert record["choice"]["denoise"] is False
     assert not record["reached"]
-    assert "warning: render.target_error: 0.01 is not reached within the preset's" in told.stderr
+    assert "warning: render.target_error: 0.01 is not reached within the preset's" in result.stderr
 
 
 def test_a_scene_may_be_calibrated_without_a_denoiser(tmp_path, monkeypatch):
@@ -118,10 +118,10 @@ def test_a_scene_may_be_calibrated_without_a_denoiser(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_a_dry_run_forecasts_the_cost_of_a_calibration(tmp_path):
-    told = snakemake(
+    result = snakemake(
         checkout(tmp_path, aimed=SCENE.format(render="target_error: 0.02")), "-n", *ASKED
     )
-    table = told.stdout.split("to render")[1]
+    table = result.stdout.split("to render")[1]
     # 16 windows of 24² pixels, 6 µs a sample: two references of 256 samples, 85 samples of plain
     # path tracing, and 125 of the search. Add 70 ms for each of 41 renders, and the start.
     assert re.search(r"^calibration of aimed +89 s +$", table, re.M), table
@@ -139,8 +139,8 @@ def simulated(whole_error, bias=0.0):
         samples = min(settings["samples"], 1 / (settings["adaptive_threshold"] or 1e-4))
         is_plain = method.name == "plain"
         error = 1 / samples if is_plain else bias + 0.5 / samples
-        whole = 8 / samples if is_plain else whole_error
-        return Candidate(method.name, settings, samples, samples, error, whole, 1.0)
+        error_of_all_pixels = 8 / samples if is_plain else whole_error
+        return Candidate(method.name, settings, samples, samples, error, error_of_all_pixels, 1.0)
 
     return measure
 
@@ -222,7 +222,7 @@ def test_a_scene_has_samples_or_a_target(tmp_path):
         return config.read_scene(path)
 
     assert read("target_error: 0.01").render.target_error == 0.01
-    for render, told in {
+    for render, message in {
         "seed: 1": "render: is missing the key samples (or target_error)",
         "samples: 4, target_error: 0.1": "render.samples: does not go with target_error",
         "denoise: true, target_error: 0.1": "render.denoise: does not go with target_error",
@@ -231,7 +231,7 @@ def test_a_scene_has_samples_or_a_target(tmp_path):
     }.items():
         with pytest.raises(UserError) as caught:
             read(render)
-        assert told in str(caught.value)
+        assert message in str(caught.value)
 
 
 def test_presets_limit_what_a_calibration_may_choose(monkeypatch, tmp_path):

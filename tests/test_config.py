@@ -158,8 +158,8 @@ def test_a_preset_leaves_the_pixels_of_a_perspective_view_square(tmp_path, monke
     content = changed("rigs.LFSphere.camera", camera)
     (tmp_path / "right.yaml").write_text(yaml.safe_dump(content))
     monkeypatch.setattr(config, "SCENES", tmp_path)
-    whole = (Preset(), (36, 24), (3000, 2000))
-    for limits, size, resolution in (whole, (Preset(resolution=65), 36, (64, 42))):
+    without_preset = (Preset(), (36, 24), (3000, 2000))
+    for limits, size, resolution in (without_preset, (Preset(resolution=65), 36, (64, 42))):
         datasets = scene_datasets("right", limits=limits)
         (rig,) = [dataset.rig for dataset in datasets if dataset.rig_name == "LFSphere"]
         assert rig.camera.sensor_size == size
@@ -289,9 +289,9 @@ def test_snakemake_ends_with_one_line_and_no_job(arguments, expected, tmp_path):
         check=False,
     )
     assert result.returncode != 0
-    told = [line for line in result.stderr.splitlines() if "error" in line.lower()]
-    assert len(told) == 1
-    assert expected in told[0]
+    errors = [line for line in result.stderr.splitlines() if "error" in line.lower()]
+    assert len(errors) == 1
+    assert expected in errors[0]
     assert "Traceback" not in result.stderr
     assert "rule " not in result.stdout + result.stderr
 

@@ -96,10 +96,10 @@ def dataset(tmp_path, run_program):
         # This copy by the user belongs to no shard.
         (journals / "kept.journal.jsonl").write_text("{}\n")
         (journals / "0-3.journal.jsonl").write_text("\n".join(map(json.dumps, lines)) + "\n")
-        words = []
+        arguments = []
         if inventory:
             (work / "inventory.json").write_text(json.dumps(inventory))
-            words = ["--inventory", work / "inventory.json"]
+            arguments = ["--inventory", work / "inventory.json"]
         settings = {"energy": TARIFF, "full": FULL | (full or {}), "reprojections": ["flat"]}
         (tmp_path / "settings.json").write_text(json.dumps(settings))
         run_program(
@@ -108,7 +108,7 @@ def dataset(tmp_path, run_program):
             *("--scene-benchmarks", work / "scene", "--blend", work / "scene.blend"),
             *("--settings", tmp_path / "settings.json"),
             *("--output", tmp_path / "costs.json"),
-            *words,
+            *arguments,
         )
         return json.loads((tmp_path / "costs.json").read_text())
 
@@ -124,8 +124,8 @@ def test_the_papers_energy_and_price_follow_from_its_days_and_watts():
 
 
 def test_all_time_counts_and_repeated_time_is_reported(dataset):
-    found = dataset(*KILLED, *RESUMED)
-    (shard,) = found["shards"]
+    costs_content = dataset(*KILLED, *RESUMED)
+    (shard,) = costs_content["shards"]
     assert shard["shard"] == "0-3"
     assert (shard["views"], shard["views_rendered"]) == (3, 4)
     assert (shard["runs"], shard["killed_runs"]) == (2, 1)
@@ -137,12 +137,12 @@ def test_all_time_counts_and_repeated_time_is_reported(dataset):
     # The first rendering of view b, and the second start.
     assert shard["repeated_seconds"] == 10 + 2
     for key in ("path_tracing_seconds", "overhead_seconds", "repeated_seconds"):
-        assert found[key] == shard[key]
+        assert costs_content[key] == shard[key]
 
 
 def test_each_stage_has_its_jobs_times_and_bytes(dataset):
-    found = dataset(*KILLED, *RESUMED)
-    stages = {stage.pop("stage"): stage for stage in found["stages"]}
+    costs_content = dataset(*KILLED, *RESUMED)
+    stages = {stage.pop("stage"): stage for stage in costs_content["stages"]}
     assert list(stages) == ["scene", "render", "flat"]
     assert stages["scene"] == {
         "jobs": 1,
@@ -161,8 +161,8 @@ def test_each_stage_has_its_jobs_times_and_bytes(dataset):
     assert (stages["render"]["wall_seconds"], stages["render"]["bytes"]) == (43, 300)
     # 100 W times the busy part of four cores.
     seconds = (3.0 + 40.5 + 1.4) / 4
-    assert found["energy_kwh"] == pytest.approx(100 * seconds / 3600 / 1000)
-    assert found["price"] == pytest.approx(0.5 * found["energy_kwh"])
+    assert costs_content["energy_kwh"] == pytest.approx(100 * seconds / 3600 / 1000)
+    assert costs_content["price"] == pytest.approx(0.5 * costs_content["energy_kwh"])
 
 
 def test_a_graphics_card_takes_the_whole_machine(dataset):
@@ -171,9 +171,9 @@ def test_a_graphics_card_takes_the_whole_machine(dataset):
         view("a", 12.0, wall=10.0, traced=9.0, cpu=1.0),
         end(12.0, wall=12.0, cpu=2.0, memory=1),
     ]
-    found = dataset(*lines)
-    assert found["device"] == "GPU"
-    assert found["energy_kwh"] == pytest.approx(100 * (12 + 4.4 / 4) / 3.6e6)
+    costs_content = dataset(*lines)
+    assert costs_content["device"] == "GPU"
+    assert costs_content["energy_kwh"] == pytest.approx(100 * (12 + 4.4 / 4) / 3.6e6)
 
 
 def test_the_full_dataset_is_extrapolated_from_the_path_tracing_of_the_views(dataset):
@@ -183,29 +183,33 @@ def test_the_full_dataset_is_extrapolated_from_the_path_tracing_of_the_views(dat
     for name, seconds in zip("zabcd", [50.0, *traced], strict=True):
         lines.append(view(name, 10.0, wall=seconds + 1, traced=seconds, cpu=seconds + 1))
     full = {"views": 40, "resolution": [16, 8], "samples": 20}
-    found = dataset(*lines, full=full)["extrapolation"]
-    assert (found["views"], found["resolution"], found["samples"]) == (40, [16, 8], 20)
+    extrapolation = dataset(*lines, full=full)["extrapolation"]
+    assert (extrapolation["views"], extrapolation["resolution"], extrapolation["samples"]) == (
+        40,
+        [16, 8],
+        20,
+    )
     # Four times the pixels, ten times the samples. In proportion to pixels: the second that each
     # view took beside path tracing, and the reprojection's jobs for three views.
     path_tracing = 40 * statistics.mean(traced) * 40
     each = 40 * (1.0 + 1.4 / 3) * 4
     once = 1.0 + 1.0 + 3.0
-    assert found["core_hours"] == pytest.approx((path_tracing + each + once) / 3600)
+    assert extrapolation["core_hours"] == pytest.approx((path_tracing + each + once) / 3600)
     # The standard error of a mean of 4 out of 40 views.
     error = statistics.stdev(traced) / 2 * math.sqrt(1 - 4 / 40)
-    assert found["core_hours_uncertainty"] == pytest.approx(error * 40 * 40 / 3600)
-    kwh = found["core_hours"] / 4 * 0.1
-    assert found["energy_kwh"] == pytest.approx(kwh)
-    assert found["price_uncertainty"] / found["price"] == pytest.approx(
-        found["core_hours_uncertainty"] / found["core_hours"]
+    assert extrapolation["core_hours_uncertainty"] == pytest.approx(error * 40 * 40 / 3600)
+    kwh = extrapolation["core_hours"] / 4 * 0.1
+    assert extrapolation["energy_kwh"] == pytest.approx(kwh)
+    assert extrapolation["price_uncertainty"] / extrapolation["price"] == pytest.approx(
+        extrapolation["core_hours_uncertainty"] / extrapolation["core_hours"]
     )
-    assert found["gigabytes"] == pytest.approx(300 / 3 * 40 * 4 / 1e9)
-    assert "4 views: 8 × 4 pixels, 2 samples" in found["basis"]
+    assert extrapolation["gigabytes"] == pytest.approx(300 / 3 * 40 * 4 / 1e9)
+    assert "4 views: 8 × 4 pixels, 2 samples" in extrapolation["basis"]
     # The description follows from this build alone.
-    assert "40 times the path tracing" in found["basis"]
+    assert "40 times the path tracing" in extrapolation["basis"]
     same = dataset(*lines)["extrapolation"]["basis"]
     assert "times the path tracing" not in same
-    assert not re.search(r"\d\.\d", found["basis"] + same)
+    assert not re.search(r"\d\.\d", extrapolation["basis"] + same)
 
 
 def test_the_full_dataset_defaults_to_the_samples_of_the_blend(dataset):
@@ -224,9 +228,9 @@ def test_other_programs_do_not_count_as_path_tracing():
 
 
 def test_views_without_journals_have_no_known_cost(dataset):
-    found = dataset({"started": 5.0, "host": "there", "pid": 1}, end(6.0, 1.0, 0.5, 9))
-    assert found["extrapolation"] is None
-    assert found["shards"][0]["views_rendered"] == 0
+    costs_content = dataset({"started": 5.0, "host": "there", "pid": 1}, end(6.0, 1.0, 0.5, 9))
+    assert costs_content["extrapolation"] is None
+    assert costs_content["shards"][0]["views_rendered"] == 0
 
 
 def test_denoising_counts_as_three_samples(dataset):

@@ -63,12 +63,12 @@ class Damaged:
                     spoilt = spoil(self.root, kind, fault, number)
                     self.files |= dict.fromkeys(spoilt, (kind, fault))
 
-    def run(self, *words):
+    def run(self, *arguments):
         """Run Snakemake as a user who obeys permissions, which root does not."""
         may_not = ["--bounding-set=-dac_override,-dac_read_search"]
         held = [] if os.geteuid() else ["setpriv", *may_not, "--inh-caps=-all"]
         return subprocess.run(
-            [*held, Path(sys.executable).with_name("snakemake"), "--cores", "2", *words],
+            [*held, Path(sys.executable).with_name("snakemake"), "--cores", "2", *arguments],
             cwd=self.root,
             capture_output=True,
             text=True,
@@ -88,8 +88,8 @@ class Damaged:
         return {str(f.path) for path in folders for f in Integrity(path, Path("work")).faults()}
 
 
-def has_same_bytes(one, other, path):
-    return (one / path).read_bytes() == (other / path).read_bytes()
+def has_same_bytes(first, second, path):
+    return (first / path).read_bytes() == (second / path).read_bytes()
 
 
 @pytest.mark.slow
@@ -250,12 +250,12 @@ def test_a_folder_is_set_aside_even_in_place_of_a_broken_link(tmp_path, monkeypa
 @pytest.mark.slow
 def test_a_single_dataset_notices_a_changed_yaml_and_damage(tmp_path):
     folder = checkout(tmp_path)
-    one, two, _ = simulated.build(folder)
-    targets = [f"{one.folder}/sha256sums.txt", two.package]
+    first, second, _ = simulated.build(folder)
+    targets = [f"{first.folder}/sha256sums.txt", second.package]
     assert not simulated.planned(folder, targets[0])
     path = folder / "configs/scenes/smoke.yaml"
     path.write_text(re.sub(r"samples: \d+", "samples: 3", path.read_text(), count=1))
-    (folder / two.costs).write_text("{")
-    os.utime(folder / two.costs, (simulated.WHEN, simulated.WHEN))
-    expected = {f"{d.folder}/lightfield.json" for d in (one, two)} | {two.costs}
+    (folder / second.costs).write_text("{")
+    os.utime(folder / second.costs, (simulated.WHEN, simulated.WHEN))
+    expected = {f"{d.folder}/lightfield.json" for d in (first, second)} | {second.costs}
     assert expected <= simulated.planned(folder, *targets)

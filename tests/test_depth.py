@@ -72,17 +72,17 @@ def test_half_depths_become_as_precise_as_the_rays() -> None:
 
 
 def test_depths_beyond_the_half_limit_become_misses() -> None:
-    found = with_precision(np.array([1e6, 2, -1e6], np.float32), "half")
-    assert found.dtype == np.float16
-    np.testing.assert_array_equal(found, [np.inf, 2, -np.inf])
+    stored_depth = with_precision(np.array([1e6, 2, -1e6], np.float32), "half")
+    assert stored_depth.dtype == np.float16
+    np.testing.assert_array_equal(stored_depth, [np.inf, 2, -np.inf])
 
 
 def test_rounded_depth_is_the_nearest_float_of_17_digits() -> None:
     depth = (10 ** np.random.default_rng(2).uniform(-6, 9, 1000)).astype(np.float32)
-    found = with_precision(depth, "rounded")
+    rounded = with_precision(depth, "rounded")
     mantissa, exponent = np.frexp(depth.astype(np.float64))
-    np.testing.assert_array_equal(found, np.ldexp(np.rint(mantissa * 2**17), exponent - 17))
-    assert found.dtype == np.float32 and with_precision(depth.astype("f8"), "float").dtype == "f4"
+    np.testing.assert_array_equal(rounded, np.ldexp(np.rint(mantissa * 2**17), exponent - 17))
+    assert rounded.dtype == np.float32 and with_precision(depth.astype("f8"), "float").dtype == "f4"
     tie = np.float32(1 + 2.0**-17)  # Midway between two floats of 17 digits, one of them even.
     odd = np.array([tie, np.inf, -np.inf, 0, -2.5], np.float32)
     np.testing.assert_array_equal(with_precision(odd, "rounded"), [1, np.inf, -np.inf, 0, -2.5])

@@ -107,13 +107,13 @@ def test_transparent_views_are_rgba_to_trainers(tmp_path):
     source = SourceDataset(tmp_path, "", ".exr")
     folder = tmp_path / "nerf"
     nerf_synthetic.export(source, NerfSynthetic(sources=["views"]), folder)
-    found = read(next(folder.rglob("view_0000f.png")))
+    pixels = read(next(folder.rglob("view_0000f.png")))
     colour, alpha = disk(source.lens)
-    np.testing.assert_allclose(found[..., 3], alpha, atol=1 / 255)
+    np.testing.assert_allclose(pixels[..., 3], alpha, atol=1 / 255)
     covered = alpha > 0.1
-    np.testing.assert_allclose(found[covered, :3], encode_srgb(colour[covered]), atol=1.5 / 255)
+    np.testing.assert_allclose(pixels[covered, :3], encode_srgb(colour[covered]), atol=1.5 / 255)
     source.write_image(source.lightfield.views[1], folder / "one.png")
-    np.testing.assert_array_equal(read(folder / "one.png"), found)
+    np.testing.assert_array_equal(read(folder / "one.png"), pixels)
 
 
 def spoil(folder, alpha):
@@ -147,7 +147,10 @@ def test_a_png_of_the_views_themselves_can_be_undone(bits, exposure, reinhard, t
     assert images.read_image(folder / "view_0000f.png").channels["R"].dtype == f"uint{bits}"
     # The way back: sRGB, then v (1 + v / m²) / (1 + v) = t, then the stops.
     step = 0.5 / (2**bits - 1) + 1e-7
-    found, known = read(folder / "view_0000f.png")[..., :3], read(tmp_path / "exr/view_0000f.exr")
+    png_colour, exr_colour = (
+        read(folder / "view_0000f.png")[..., :3],
+        read(tmp_path / "exr/view_0000f.exr"),
+    )
 
     def light(encoded):
         t, m = decode_srgb(encoded.clip(0, 1)), made["reinhard"]
@@ -155,8 +158,8 @@ def test_a_png_of_the_views_themselves_can_be_undone(bits, exposure, reinhard, t
         v = t if m == 1 else (-root + np.sqrt(root**2 + 4 * m**2 * t)) / 2
         return v / 2 ** made["exposure"]
 
-    assert (light(found + step) >= known.clip(None, light(np.ones(1))) - 1e-6).all()
-    assert (light(found - step) <= known + 1e-6).all()
+    assert (light(png_colour + step) >= exr_colour.clip(None, light(np.ones(1))) - 1e-6).all()
+    assert (light(png_colour - step) <= exr_colour + 1e-6).all()
     assert validate(tmp_path, ["png"]).valid
 
 
@@ -170,13 +173,13 @@ def scene(**reprojection):
 
 
 def test_a_bracket_is_a_folder_for_each_exposure():
-    found = Scene.model_validate(scene(exposure=[-2.0, 0.5, 2], bits=16)).reprojections
-    assert {name: each.exposure for name, each in found.items()} == {
+    reprojections = Scene.model_validate(scene(exposure=[-2.0, 0.5, 2], bits=16)).reprojections
+    assert {name: each.exposure for name, each in reprojections.items()} == {
         "png_ev-2": -2.0,
         "png_ev0.5": 0.5,
         "png_ev2": 2.0,
     }
-    assert not any("camera" in each.settings.as_json() for each in found.values())
+    assert not any("camera" in each.settings.as_json() for each in reprojections.values())
 
 
 @pytest.mark.parametrize(

@@ -208,9 +208,23 @@ def test_a_full_disk_below_snakemake_itself_is_one_line(tmp_path):
 @pytest.mark.slow
 def test_a_limit_of_memory_in_which_blender_cannot_start_is_one_line(tmp_path):
     folder = checkout(tmp_path, one=ONE)
-    words = [Path(sys.executable).with_name("snakemake"), "--cores", "1", "--config", "scenes=one"]
+    arguments = [
+        Path(sys.executable).with_name("snakemake"),
+        "--cores",
+        "1",
+        "--config",
+        "scenes=one",
+    ]
     result = subprocess.run(
-        ["bash", "-c", 'ulimit -v 600000; exec "$@"', "bash", *words, "rigs=all", "preset=full"],
+        [
+            "bash",
+            "-c",
+            'ulimit -v 600000; exec "$@"',
+            "bash",
+            *arguments,
+            "rigs=all",
+            "preset=full",
+        ],
         cwd=folder,
         capture_output=True,
         text=True,
@@ -240,23 +254,27 @@ def test_a_dry_run_names_everything_that_the_run_would_refuse(tmp_path):
     missing = next((folder / "theirs/dataset/exr").iterdir())
     missing.unlink()
     scenes = "scenes=[huge,other,textured,theirs]"
-    words = ("--dry-run", "--config", scenes, "rigs=all", "preset=full")
-    result = snakemake(folder, *words)
+    arguments = ("--dry-run", "--config", scenes, "rigs=all", "preset=full")
+    result = snakemake(folder, *arguments)
     refused = [line for line in result.stderr.splitlines() if line.startswith("would be refused")]
     assert result.returncode == 0, result.stderr
     assert len(refused) == 4, refused
-    told = "\n".join(refused)
-    assert re.search(r": results: .* GB are free on its disk, and this run writes some", told)
-    assert f": other.blend: its sha256 is {files.sha256(folder / 'other.blend')}, but" in told
-    assert ": textured.blend: files that it shows are missing: textures/gone.png; put them" in told
-    assert f"theirs/dataset/exr: {missing.name}: no such file" in told
+    message = "\n".join(refused)
+    assert re.search(r": results: .* GB are free on its disk, and this run writes some", message)
+    assert f": other.blend: its sha256 is {files.sha256(folder / 'other.blend')}, but" in message
+    assert (
+        ": textured.blend: files that it shows are missing: textures/gone.png; put them" in message
+    )
+    assert f"theirs/dataset/exr: {missing.name}: no such file" in message
 
 
 def test_only_leftovers_of_killed_processes_are_removed(tmp_path, monkeypatch):
     monkeypatch.setattr(leftovers.tempfile, "gettempdir", lambda: str(tmp_path))
-    words = [sys.executable, "-c", KEEPER, tmp_path]
+    arguments = [sys.executable, "-c", KEEPER, tmp_path]
     keepers = [
-        subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env={"PYTHONPATH": str(SCRIPTS)})
+        subprocess.Popen(
+            arguments, stdout=subprocess.PIPE, text=True, env={"PYTHONPATH": str(SCRIPTS)}
+        )
         for _ in range(2)
     ]
     live, dead = (Path(keeper.stdout.readline().strip()) for keeper in keepers)
@@ -271,16 +289,18 @@ def test_only_leftovers_of_killed_processes_are_removed(tmp_path, monkeypatch):
     for path in (empty, full, young):
         path.mkdir()
     (full / "picture.png").write_bytes(b"an artist's")
-    own = tmp_path / "plenoforge-checkout"
-    own.mkdir()
+    checkout_folder = tmp_path / "plenoforge-checkout"
+    checkout_folder.mkdir()
     old = time.time() - 2 * leftovers.BLENDER_AGE
-    for path in (live, dead, *paths, full / "picture.png", empty, full, own):
+    for path in (live, dead, *paths, full / "picture.png", empty, full, checkout_folder):
         os.utime(path, (old, old))
     os.utime(paths[2])
-    found = leftovers.remove([tmp_path / "results"])
-    assert {path for path in found if path.is_relative_to(tmp_path)} == {dead, *paths[:2], empty}
-    assert not any(path.exists() for path in found)
-    assert all(path.exists() for path in (live / "view.exr", *paths[2:], full, young, own))
+    removed = leftovers.remove([tmp_path / "results"])
+    assert {path for path in removed if path.is_relative_to(tmp_path)} == {dead, *paths[:2], empty}
+    assert not any(path.exists() for path in removed)
+    assert all(
+        path.exists() for path in (live / "view.exr", *paths[2:], full, young, checkout_folder)
+    )
     keepers[0].kill()
     keepers[0].wait()
 
@@ -334,9 +354,9 @@ def start_run(tmp_path):
     runs = []
 
     def start(place="here"):
-        words = [sys.executable, "-c", RUN, tmp_path / "locks", place]
+        arguments = [sys.executable, "-c", RUN, tmp_path / "locks", place]
         run = subprocess.Popen(
-            words, stdout=subprocess.PIPE, text=True, env={"PYTHONPATH": str(SCRIPTS)}
+            arguments, stdout=subprocess.PIPE, text=True, env={"PYTHONPATH": str(SCRIPTS)}
         )
         runs.append((run, int(run.stdout.readline())))
         return runs[-1]
@@ -372,9 +392,9 @@ def start_entering(folder):
 
 def outcome(process):
     """Return the runs that may live, whether locks were removed, and the message."""
-    told, problem = process.communicate()
+    output, problem = process.communicate()
     assert process.returncode == 0, problem
-    *removed, pids, refusal = told.splitlines()
+    *removed, pids, refusal = output.splitlines()
     return list(map(int, pids.split())), removed == ["locks are removed"], refusal
 
 
@@ -438,8 +458,8 @@ def test_jobs_that_outlive_their_run_are_waited_for(start_run, tmp_path):
     run.kill()
     run.wait()
     entering = start_entering(tmp_path / "locks")
-    told = entering.stderr.readline()
-    assert told.startswith(f"waiting for jobs that a killed run has left, processes {job} (kill")
+    line = entering.stderr.readline()
+    assert line.startswith(f"waiting for jobs that a killed run has left, processes {job} (kill")
     os.kill(job, signal.SIGKILL)
     assert outcome(entering)[:2] == ([], True)
 
@@ -460,25 +480,25 @@ def test_a_folder_without_file_locks_is_left_to_snakemake(tmp_path, monkeypatch,
 @pytest.fixture(params=["checkout", "own folder"])
 def building(request, tmp_path):
     """A folder with a run that waits for its job, and the run's process."""
-    folder, words = checkout(tmp_path / "checkout", one=ONE), BUILD
+    folder, arguments = checkout(tmp_path / "checkout", one=ONE), BUILD
     (folder / "scripts/build_scene.py").write_text(WAITING)
     if request.param == "own folder":
-        own = tmp_path / "own"
-        (own / "configs").mkdir(parents=True)
-        (folder / "configs/scenes").rename(own / "configs/scenes")
-        shutil.copytree(own / "configs/scenes", folder / "configs/scenes")
-        words = ("--snakefile", folder / "Snakefile", "--directory", own, *BUILD)
-        folder = own
+        own_folder = tmp_path / "own"
+        (own_folder / "configs").mkdir(parents=True)
+        (folder / "configs/scenes").rename(own_folder / "configs/scenes")
+        shutil.copytree(own_folder / "configs/scenes", folder / "configs/scenes")
+        arguments = ("--snakefile", folder / "Snakefile", "--directory", own_folder, *BUILD)
+        folder = own_folder
     else:
-        words = ("--directory", folder, *BUILD)
-    process = start_snakemake(tmp_path / "checkout", *words, stderr=subprocess.PIPE, text=True)
+        arguments = ("--directory", folder, *BUILD)
+    process = start_snakemake(tmp_path / "checkout", *arguments, stderr=subprocess.PIPE, text=True)
     wait_until((folder / "started").exists, process)
 
     def run(*more, target=None):
-        given = (*words[:-1], target) if target else words
+        given = (*arguments[:-1], target) if target else arguments
         return snakemake(tmp_path / "checkout", *more, *given)
 
-    run.start = lambda **options: start_snakemake(tmp_path / "checkout", *words, **options)
+    run.start = lambda **options: start_snakemake(tmp_path / "checkout", *arguments, **options)
     yield folder, process, run
     (folder / "go").touch()
     with suppress(ProcessLookupError):

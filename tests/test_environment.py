@@ -28,9 +28,9 @@ class Machine:
         program.chmod(0o755)
         return str(program)
 
-    def find(self, *words):
+    def find(self, *arguments):
         return subprocess.run(
-            [self.programs / "bash", ROOT / "envs/find_python.sh", *words],
+            [self.programs / "bash", ROOT / "envs/find_python.sh", *arguments],
             env={"PATH": f"{self.home}/shims:{self.programs}", "HOME": str(self.home)},
             capture_output=True,
             text=True,

@@ -61,8 +61,8 @@ def test_plain_path_tracing_converges_as_monte_carlo_does(content):
     """Cycles' Sobol points make a smooth room converge a little faster than independent points."""
     slope = content["slopes"]["plain"]["over_samples"]["slope"]
     assert -1.3 < slope < -0.9
-    whole = content["slopes"]["plain"]["of_all_pixels_over_samples"]["slope"]
-    assert -1.3 < whole < -0.9
+    slope_of_all_pixels = content["slopes"]["plain"]["of_all_pixels_over_samples"]["slope"]
+    assert -1.3 < slope_of_all_pixels < -0.9
     errors = [p["relative_mse"] for p in content["points"] if p["method"] == "plain"]
     assert len(errors) == 5
     assert all(more > less for more, less in pairwise(errors))
@@ -83,23 +83,23 @@ def test_every_method_is_measured_with_the_scenes_own_settings(content):
         "path guiding": 5,
         "this scene's settings": 1,
     }
-    (own,) = content["settings"]
+    (own_point,) = content["settings"]
     (same,) = (
         point
         for point in content["points"]
         if point["method"] == "denoised" and point["settings"]["samples"] == RENDER["samples"]
     )
-    assert own["relative_mse"] == same["relative_mse"]
+    assert own_point["relative_mse"] == same["relative_mse"]
 
 
 def test_whole_views_are_made_of_their_strata(content):
     """The room has lamps and diffuse walls. It has no other strata."""
     strata = content["strata"]
     assert set(strata) <= set(STRATA) and "diffuse" in strata and "volume" not in strata
-    total = sum(found["area"] for found in strata.values())
+    total = sum(stratum["area"] for stratum in strata.values())
     assert total == pytest.approx(1, abs=0.01)
     for number, point in enumerate(content["points"]):
-        parts = [(found["area"], found["points"][number]) for found in strata.values()]
+        parts = [(stratum["area"], stratum["points"][number]) for stratum in strata.values()]
         assert all(part["method"] == point["method"] for _, part in parts)
         mean = sum(area * part["relative_mse"] for area, part in parts) / total
         assert point["relative_mse"] == pytest.approx(mean)
@@ -140,10 +140,10 @@ def test_a_small_fire_gets_windows_of_its_own():
     assert len(windows) == 4
     for window in windows[2:]:
         assert window.x < 41 and window.x + 16 > 47 and window.y < 21 and window.y + 16 > 25
-    whole = Window(windows[0].view, 0, 0, 64, 64)
-    kinds, _ = strata.classes(maker, whole)
+    whole_view = Window(windows[0].view, 0, 0, 64, 64)
+    kinds, _ = strata.classes(maker, whole_view)
     assert (kinds == STRATA.index("volume")).sum() == 48
-    assert ((kinds == strata.NONE) == ~maker.mask(whole)).all()
+    assert ((kinds == strata.NONE) == ~maker.mask(whole_view)).all()
 
 
 @pytest.mark.parametrize(
@@ -213,10 +213,12 @@ def test_a_datasets_page_has_the_strata_in_a_table(measured, content):
     folder.mkdir()
     for suffix in (".json", ".svg"):
         (folder / f"room{suffix}").write_bytes((measured.folder / f"room{suffix}").read_bytes())
-    found = tables.error_vs_time([folder / "room.json"], "room").tables["By what pixels show"]
+    strata_table = tables.error_vs_time([folder / "room.json"], "room").tables[
+        "By what pixels show"
+    ]
     strata = content["strata"]
-    assert list(dict.fromkeys(row[0] for row in found.rows)) == ["whole views", *strata]
-    rows = [dict(zip(found.columns, row, strict=True)) for row in found.rows]
+    assert list(dict.fromkeys(row[0] for row in strata_table.rows)) == ["whole views", *strata]
+    rows = [dict(zip(strata_table.columns, row, strict=True)) for row in strata_table.rows]
     (row,) = (r for r in rows if (r["stratum"], r["method"]) == ("diffuse", "denoised"))
     assert row["part"] == strata["diffuse"]["area"]
     assert row["slope"] == strata["diffuse"]["slopes"]["denoised"]["over_time"]["slope"]
@@ -233,9 +235,9 @@ def test_a_stratum_without_noise_has_no_error_and_no_psnr(tmp_path):
     plain = Method("plain", {"samples": 1})
     points = [measured_point(plain, [[trial, trial]], [reference])]
     points.append(whole_views_point({"environment": points[0]}, {"environment": 1.0}, 0.0))
-    found = evaluated(points, 0.0)
-    assert [(p["relative_mse"], p["psnr"]) for p in found["points"]] == [(0, None)] * 2
-    write_json(tmp_path / "points.json", found)
+    evaluation = evaluated(points, 0.0)
+    assert [(p["relative_mse"], p["psnr"]) for p in evaluation["points"]] == [(0, None)] * 2
+    write_json(tmp_path / "points.json", evaluation)
     seen = np.arange(9), np.arange(9)
     same = disagreement((sky, sky), (reference, reference), seen)
     assert (same.total, same.added, same.share) == (0, 0, 0)
@@ -244,10 +246,10 @@ def test_a_stratum_without_noise_has_no_error_and_no_psnr(tmp_path):
 def test_other_programs_can_read_the_files(measured, content):
     rows = list(csv.DictReader((measured.folder / "room.csv").open()))
     strata = content["strata"].values()
-    assert len(rows) == len(content["points"]) + sum(len(found["points"]) for found in strata)
+    assert len(rows) == len(content["points"]) + sum(len(stratum["points"]) for stratum in strata)
     assert float(rows[0]["relative_mse"]) == content["points"][0]["relative_mse"]
-    whole = [row for row in rows if row["stratum"] == "whole views"]
-    assert sum(row["pareto"] == "True" for row in whole) == len(content["pareto_front"])
+    whole_views = [row for row in rows if row["stratum"] == "whole views"]
+    assert sum(row["pareto"] == "True" for row in whole_views) == len(content["pareto_front"])
     assert ElementTree.parse(measured.folder / "room.svg").getroot().tag.endswith("svg")
     assert images.read_image(measured.folder / "room.png").channels
 
@@ -286,9 +288,9 @@ def test_windows_lie_in_the_image_circle_and_in_different_views():
         assert 0 <= window.x <= 48 and 0 <= window.y <= 48
         assert maker.mask(window).mean() >= 0.75
     # If the view is small, the window is the whole view: its circle fills π/4 of it.
-    (whole,) = maker.windows(100, 1)
-    assert (whole.x, whole.y, whole.width, whole.height) == (0, 0, 64, 64)
-    assert maker.mask(whole).mean() == pytest.approx(np.pi / 4, abs=0.01)
+    (whole_view,) = maker.windows(100, 1)
+    assert (whole_view.x, whole_view.y, whole_view.width, whole_view.height) == (0, 0, 64, 64)
+    assert maker.mask(whole_view).mean() == pytest.approx(np.pi / 4, abs=0.01)
     # Here the circle fills less of every window.
     maker.lens = replace(maker.lens, principal_point=(60.0, 60.0))
     (corner,) = maker.windows(64, 1)
@@ -311,14 +313,14 @@ def test_the_same_wall_is_found_in_both_views():
     zero = np.zeros((48, 48, 3))
     reference = Reference(zero, zero, depth, mask, 0.0)
     cameras = tuple(maker.camera(view) for view in views)
-    here, there = trials.both_see(cameras, windows, (reference, reference))
+    pixels_here, pixels_there = trials.both_see(cameras, windows, (reference, reference))
     middle = 24 * 48 + 24
     # The pixel right of the optical axis is at 1/32 of 90 degrees, half a pixel on.
     angle = np.radians(90) / 32 * 0.5
     other = np.arctan((2 * np.tan(angle) - 0.4) / 2) / np.radians(90) * 32 + 24
-    (found,) = there[here == middle]
-    assert found % 48 == int(other)
-    assert abs(found // 48 - 24) <= 1
+    (pixel,) = pixels_there[pixels_here == middle]
+    assert pixel % 48 == int(other)
+    assert abs(pixel // 48 - 24) <= 1
     # If the second depth has something in front, the wall is hidden.
     near = Reference(zero, zero, depth / 2, mask, 0.0)
     assert not len(trials.both_see(cameras, windows, (reference, near))[0])

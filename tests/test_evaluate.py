@@ -41,11 +41,11 @@ BLACK, WHITE = np.zeros(3), np.ones(3)
 def rows_of(dataset, name, shown, mask=True, view="view_0001f"):
     """Return the errors of a render by region."""
     source = SourceDataset(dataset, name, ".exr")
-    found = next(each for each in source.lightfield.views if each.name == view)
+    chosen_view = next(each for each in source.lightfield.views if each.name == view)
     rendered = evaluation.rendered(shown, source, BLACK)
-    true = evaluation.truth(source, found, shown, BLACK)
+    true = evaluation.truth(source, chosen_view, shown, BLACK)
     counted = np.broadcast_to(mask, rendered.colour.shape[:2])
-    parts = evaluation.regions(source, found, counted, true.depth)
+    parts = evaluation.regions(source, chosen_view, counted, true.depth)
     return dict(evaluation.errors(rendered, true, parts))
 
 
@@ -57,8 +57,8 @@ def test_the_truth_has_no_error(dataset, tmp_path, name, run_program):
     second = next(view for view in source.lightfield.views if view.name == TESTS[1])
     (renders / f"{second.name}.exr").unlink()
     images.write_png(renders / f"{second.name}.png", source.colour(second))
-    words = [renders, "--dataset", dataset, "--source", name, "--output", tmp_path / "page"]
-    result = run_program("evaluate.py", *words)
+    arguments = [renders, "--dataset", dataset, "--source", name, "--output", tmp_path / "page"]
+    result = run_program("evaluate.py", *arguments)
     assert "LPIPS is left out" in result.stdout
     with (tmp_path / "page" / "evaluation.csv").open() as file:
         rows = list(csv.DictReader(file))
@@ -102,8 +102,8 @@ def test_a_render_is_found_by_its_name_in_exports(dataset, tmp_path, folder, pre
     # A view's name in a folder with several rigs' views starts with its rig.
     for name in (view.name, f"high_{view.name}", f"{prefix}{view.name}"):
         images.write_png(tmp_path / f"{name}.png", np.zeros((48, 64, 3), np.uint8))
-        found = evaluation.find(tmp_path, source, view)
-        assert found.name == f"{prefix if name.startswith(prefix) else ''}{view.name}.png"
+        path_of_render = evaluation.find(tmp_path, source, view)
+        assert path_of_render.name == f"{prefix if name.startswith(prefix) else ''}{view.name}.png"
 
 
 def test_renders_and_masks_under_exported_names_are_compared(dataset, tmp_path, run_program):
@@ -113,7 +113,7 @@ def test_renders_and_masks_under_exported_names_are_compared(dataset, tmp_path, 
             name = f"spiral_{view.name}.png"
             images.write_png(tmp_path / "renders" / name, source.colour(view))
             images.write_png(tmp_path / "masks" / name, np.eye(48, 64, dtype=np.uint8))
-    words = [
+    arguments = [
         "--source",
         "perspective",
         "--masks",
@@ -121,7 +121,7 @@ def test_renders_and_masks_under_exported_names_are_compared(dataset, tmp_path, 
         "--output",
         tmp_path / "page",
     ]
-    run_program("evaluate.py", tmp_path / "renders", "--dataset", source.dataset, *words)
+    run_program("evaluate.py", tmp_path / "renders", "--dataset", source.dataset, *arguments)
     with (tmp_path / "page" / "evaluation.csv").open() as file:
         rows = [row for row in csv.DictReader(file) if row["region"] == "all"]
     assert [row["view"] for row in rows] == [*TESTS, "mean"]
@@ -154,10 +154,10 @@ def test_errors_are_those_of_the_changed_renders(dataset, tmp_path):
     turned = {"R": np.full((48, 64), 1, np.float32), "B": np.full((48, 64), 1, np.float32)}
     turned["G"] = np.zeros((48, 64), np.float32)
     images.write_exr(tmp_path / "normal" / "view_0001f.exr", turned)
-    found = rows_of(dataset, "perspective", tmp_path / "view_0001f.exr")["all"]
-    assert found["psnr"] == math.inf
-    assert found["depth"] == pytest.approx(0.75 * 0.25 + 0.25, abs=1e-6)
-    assert found["normal"] == pytest.approx(45)
+    row = rows_of(dataset, "perspective", tmp_path / "view_0001f.exr")["all"]
+    assert row["psnr"] == math.inf
+    assert row["depth"] == pytest.approx(0.75 * 0.25 + 0.25, abs=1e-6)
+    assert row["normal"] == pytest.approx(45)
 
 
 @pytest.fixture
@@ -254,17 +254,23 @@ def test_white_renders_are_warned_of_until_their_background_is_given(
     alpha = images.read_image(transparent.path(transparent.lightfield.views[1])).channels["A"]
     for view in TESTS:
         images.write_png(tmp_path / "renders" / f"spiral_{view}.png", on(WHITE, alpha))
-    words = [tmp_path / "renders", "--dataset", transparent.dataset, "--output", tmp_path / "page"]
-    result = run_program("evaluate.py", *words)
+    arguments = [
+        tmp_path / "renders",
+        "--dataset",
+        transparent.dataset,
+        "--output",
+        tmp_path / "page",
+    ]
+    result = run_program("evaluate.py", *arguments)
     assert f"spiral_{TESTS[0]}.png: has no alpha, and is #ffffff where" in result.stderr
     assert "--background" in result.stderr
     assert "(and 1 more of 2)" in result.stderr
     assert "#ffffff" in (tmp_path / "page" / "index.html").read_text()
-    result = run_program("evaluate.py", *words, "--background", "white")
+    result = run_program("evaluate.py", *arguments, "--background", "white")
     assert "warning" not in result.stderr
     with (tmp_path / "page" / "evaluation.csv").open() as file:
         assert min(float(row["psnr"]) for row in csv.DictReader(file)) > 48
-    result = run_program("evaluate.py", *words, "--background", "sky", check=False)
+    result = run_program("evaluate.py", *arguments, "--background", "sky", check=False)
     assert result.returncode == 2
     assert "must be black, white or rrggbb" in result.stderr
 
@@ -274,8 +280,8 @@ def test_regions_follow_the_lens_and_the_jumps_of_depth(dataset):
     distance = np.ones((48, 48))
     distance[:, 24:], distance[:10] = 2, np.inf
     depth = z_from_distance(distance, source.lens.pixel_rays())
-    whole = np.ones((48, 48), bool)
-    parts = evaluation.regions(source, source.lightfield.views[1], whole, depth)
+    everywhere = np.ones((48, 48), bool)
+    parts = evaluation.regions(source, source.lightfield.views[1], everywhere, depth)
     assert parts["all"].sum() == pytest.approx(math.pi * 24**2, rel=0.02)
     assert parts["centre"].sum() == pytest.approx(math.pi * 12**2, rel=0.02)
     assert (parts["centre"] ^ parts["rim"] == parts["all"]).all()
@@ -284,8 +290,8 @@ def test_regions_follow_the_lens_and_the_jumps_of_depth(dataset):
 
 
 def test_a_missing_picture_or_one_of_another_size_is_named(dataset, tmp_path, run_program):
-    words = ["--dataset", dataset, "--source", "perspective", "--output", tmp_path / "page"]
-    result = run_program("evaluate.py", tmp_path, *words, check=False)
+    arguments = ["--dataset", dataset, "--source", "perspective", "--output", tmp_path / "page"]
+    result = run_program("evaluate.py", tmp_path, *arguments, check=False)
     assert result.returncode == 1
     assert "has no view_0001f.exr or .png, nor dataset_view_0001f.exr or .png" in result.stderr
     renders = tmp_path / "renders"
@@ -293,7 +299,7 @@ def test_a_missing_picture_or_one_of_another_size_is_named(dataset, tmp_path, ru
         light = {name: np.full((48, 64), 0.5, np.float32) for name in "RGB"}
         light["G"][3, 3] = np.nan if number else 0.5
         images.write_exr(renders / f"{view}.exr", light)
-    result = run_program("evaluate.py", renders, *words, check=False)
+    result = run_program("evaluate.py", renders, *arguments, check=False)
     problem = f"{TESTS[1]}.exr: has colour that is no number where it is compared"
     assert (result.returncode, result.stderr.splitlines()[-1].endswith(problem)) == (1, True)
     assert [path.name for path in tmp_path.iterdir()] == ["renders"]

@@ -120,9 +120,19 @@ class Build:
         self.jobs = self.run()
         shutil.rmtree(folder / ".snakemake")
 
-    def start(self, *words):
+    def start(self, *arguments):
         return subprocess.Popen(
-            [sys.executable, "-m", "snakemake", "--cores", "4", *words, *CHOSEN, "--", *TARGETS],
+            [
+                sys.executable,
+                "-m",
+                "snakemake",
+                "--cores",
+                "4",
+                *arguments,
+                *CHOSEN,
+                "--",
+                *TARGETS,
+            ],
             cwd=self.folder,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -130,16 +140,16 @@ class Build:
             env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
         )
 
-    def snakemake(self, *words):
+    def snakemake(self, *arguments):
         """Run everything. Return the terminal's stderr."""
-        process = self.start(*words)
+        process = self.start(*arguments)
         stdout, stderr = process.communicate()
         assert process.returncode == 0, stdout + stderr
         return stderr
 
-    def plan(self, *words):
+    def plan(self, *arguments):
         """Return the jobs that a run would start, by their first output."""
-        stderr = self.snakemake("--dry-run", *words, "--logger", "jobs")
+        stderr = self.snakemake("--dry-run", *arguments, "--logger", "jobs")
         return {job["output"][0]: job for job in jobs_on(stderr) if job["output"]}
 
     def run(self):
@@ -213,17 +223,17 @@ def followers(jobs, first):
         for name in job["input"]:
             readers.setdefault(maker.get(name), set()).add(output)
     reached = set()
-    found = set(first)
-    while found:
-        reached |= found
-        found = {reader for output in found for reader in readers.get(output, ())} - reached
+    newest = set(first)
+    while newest:
+        reached |= newest
+        newest = {reader for output in newest for reader in readers.get(output, ())} - reached
     return reached
 
 
 def identifying_arguments(command):
     """Return a command's arguments except for those that say how to run it."""
-    words = iter(command)
-    return [word for word in words if word not in MACHINE or not next(words)]
+    arguments = iter(command)
+    return [word for word in arguments if word not in MACHINE or not next(arguments)]
 
 
 def assert_made_from_present_inputs(build, jobs):
@@ -238,9 +248,9 @@ def assert_made_from_present_inputs(build, jobs):
         if first_output in shown_later:
             continue
         inputs = {name: build.sha256(name) for name in job["input"]}
-        words = shlex.split(job["command"])
-        (python,) = (word for word in words if Path(word).name == "python")
-        command = words[words.index(python) + 1 : words.index(">")]
+        arguments = shlex.split(job["command"])
+        (python,) = (word for word in arguments if Path(word).name == "python")
+        command = arguments[arguments.index(python) + 1 : arguments.index(">")]
         for output in job["output"]:
             content = json.loads((build.folder / output).read_text())
             assert content["inputs"] == inputs, output

@@ -52,13 +52,13 @@ class Dataset:
         lightfield.write(self.folder / "lightfield.json")
         return lightfield.to_json()
 
-    def export(self, *words: Any) -> dict[str, Any]:
+    def export(self, *arguments: Any) -> dict[str, Any]:
         """Return the transforms.json that the program writes for these arguments."""
         parser = argparse.ArgumentParser()
         instant_ngp.add_arguments(parser)
         paths = ["--input-cfg", self.folder / "lightfield.json"]
         paths += ["--output", self.folder / "transforms.json"]
-        instant_ngp.export(parser.parse_args([*map(str, [*paths, *words])]))
+        instant_ngp.export(parser.parse_args([*map(str, [*paths, *arguments])]))
         return self.read("transforms.json")
 
     def read(self, name: str) -> dict[str, Any]:
@@ -414,8 +414,8 @@ def test_a_point_beyond_the_rigs_reach_is_not_its_target() -> None:
     cameras = np.array([[98.0, 0, 0], [100, 0, 0], [102, 0, 0], [100, 0, 1]])
     for away, expected in ((2.5, None), (1.5, [100, 1.5, 0])):
         axes = np.array([100, away, 0]) - cameras
-        found = instant_ngp.looked_at(cameras, axes / np.linalg.norm(axes, axis=1, keepdims=True))
-        assert found is None if expected is None else np.allclose(found, expected)
+        target = instant_ngp.looked_at(cameras, axes / np.linalg.norm(axes, axis=1, keepdims=True))
+        assert target is None if expected is None else np.allclose(target, expected)
 
 
 def test_a_scene_fitted_to_depth_is_within_the_cube(dataset: Dataset) -> None:
@@ -453,18 +453,18 @@ def test_split_gives_odd_sequence_numbers_to_the_test_file(
     dataset: Dataset, capsys: pytest.CaptureFixture[str]
 ) -> None:
     dataset.write(FISHEYE)
-    everything = dataset.export()
+    all_frames = dataset.export()
     said = [line.split(", scale")[0] for line in capsys.readouterr().out.splitlines()]
     counts = {"transforms": 6, "transforms_train": 3, "transforms_test": 3}
     assert said == [f"{dataset.folder / name}.json: {counts[name]} frames" for name in counts]
     parts = {}
     for part in ("train", "test"):
         parts[part] = dataset.read(f"transforms_{part}.json")
-        assert parts[part] | {"frames": 0} == everything | {"frames": 0}
+        assert parts[part] | {"frames": 0} == all_frames | {"frames": 0}
     names = [Path(frame["file_path"]).stem for frame in parts["test"]["frames"]]
     assert names == ["view_0001f", "view_0003f", "view_0005f"]
     assert len(parts["train"]["frames"]) == 3
-    assert len(everything["frames"]) == 6
+    assert len(all_frames["frames"]) == 6
 
 
 def test_a_rig_that_tests_another_dataset_is_placed_like_it(dataset: Dataset) -> None:
@@ -593,7 +593,7 @@ def test_an_impossible_export_is_an_error(
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("arguments", "message"),
     [
         ([], "required: --input-cfg, --output"),
         (["--image-suffix", ".jpg"], "--image-suffix: invalid choice: '.jpg'"),
@@ -602,12 +602,12 @@ def test_an_impossible_export_is_an_error(
     ],
 )
 def test_impossible_arguments_are_refused(
-    words: list[str], message: str, capsys: pytest.CaptureFixture[str]
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     parser = argparse.ArgumentParser()
     instant_ngp.add_arguments(parser)
     with pytest.raises(SystemExit):
-        parser.parse_args(words)
+        parser.parse_args(arguments)
     assert message in capsys.readouterr().err
 
 
@@ -640,11 +640,11 @@ def test_views_of_another_size_or_of_unknown_depth_are_named(dataset: Dataset) -
 
 
 def test_the_program_names_what_is_wrong_in_a_line(dataset: Dataset, run_program: Any) -> None:
-    words = ("--input-cfg", dataset.folder / "lightfield.json")
-    words += ("--output", dataset.folder / "transforms.json")
-    result = run_program("export_instant_ngp.py", *words, check=False)
+    arguments = ("--input-cfg", dataset.folder / "lightfield.json")
+    arguments += ("--output", dataset.folder / "transforms.json")
+    result = run_program("export_instant_ngp.py", *arguments, check=False)
     assert result.returncode == 1
     assert result.stderr.startswith("error: ") and result.stderr.count("\n") == 1
     dataset.write(FISHEYE)
-    run_program("export_instant_ngp.py", *words)
+    run_program("export_instant_ngp.py", *arguments)
     assert len(dataset.read("transforms.json")["frames"]) == 6

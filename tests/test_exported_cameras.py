@@ -92,8 +92,8 @@ def dataset(tmp_path_factory):
     for name, formats in EXPORTS.items():
         for kind, options in formats.items():
             write_export(folder, name, kind, options)
-    for name, words in INSTANT_NGP.items():
-        write_instant_ngp(folder, name, words)
+    for name, arguments in INSTANT_NGP.items():
+        write_instant_ngp(folder, name, arguments)
     return folder
 
 
@@ -107,14 +107,24 @@ def write_export(folder, name, kind, options, beside=None):
     export.run(kind, source, settings, home(folder, name) / "exports" / kind)
 
 
-def write_instant_ngp(folder, name, words):
+def write_instant_ngp(folder, name, arguments):
     parser = argparse.ArgumentParser()
     instant_ngp.add_arguments(parser)
-    own = home(folder, name)
-    files = ["--input-cfg", own / "lightfield.json", "--output", own / "transforms.json"]
-    files += ["--image-suffix", ".exr", "--image-dir", folder / "exr" if own == folder else own]
-    files += ["--depth-dir", own / "instant_ngp" / "depth"]
-    instant_ngp.export(parser.parse_args([*map(str, files), *words]))
+    folder_of_set = home(folder, name)
+    files = [
+        "--input-cfg",
+        folder_of_set / "lightfield.json",
+        "--output",
+        folder_of_set / "transforms.json",
+    ]
+    files += [
+        "--image-suffix",
+        ".exr",
+        "--image-dir",
+        folder / "exr" if folder_of_set == folder else folder_of_set,
+    ]
+    files += ["--depth-dir", folder_of_set / "instant_ngp" / "depth"]
+    instant_ngp.export(parser.parse_args([*map(str, files), *arguments]))
 
 
 def problems(folder, name, kind):
@@ -124,7 +134,7 @@ def problems(folder, name, kind):
         lists = [home(folder, name) / "exports" / kind / "export.json"]
     wanted = {path.resolve() for path in lists}
     sets, _ = read_sets(folder, [] if name == "views" else [name])
-    found, exports = exported_cameras.check(folder, sets, MANIFESTS, wanted)
+    checks, exports = exported_cameras.check(folder, sets, MANIFESTS, wanted)
     of_depth = ExportedDepth(folder, sets, exports)
     examiner = Examiner(folder, sets)
 
@@ -132,29 +142,32 @@ def problems(folder, name, kind):
         return [examiner.answer_depth(*each) for each in asked]
 
     files = [
-        File(f"{one.folder}/{view}.exr", number, index)
-        for number, one in enumerate(sets)
-        for index, view in enumerate(one.views)
+        File(f"{image_set.folder}/{view}.exr", number, index)
+        for number, image_set in enumerate(sets)
+        for index, view in enumerate(image_set.views)
     ]
     asked = [(file, of_depth.question(file)) for file in files if of_depth.question(file)]
-    answers = {(file.set, file.view): one for (file, _), one in zip(asked, ask(asked), strict=True)}
-    found += of_depth.checks(answers, ask)
-    return [line for check in found for line in check.problems]
+    answers = {
+        (file.set, file.view): image_set
+        for (file, _), image_set in zip(asked, ask(asked), strict=True)
+    }
+    checks += of_depth.checks(answers, ask)
+    return [line for check in checks for line in check.problems]
 
 
 @pytest.mark.parametrize("name", EXPORTS)
 def test_correct_exports_agree_with_their_views(name, dataset):
     result = validate(dataset, [] if name == "views" else [name], manifests=MANIFESTS)
     prefix = "" if name == "views" else f"{name}/"
-    found = {check.name.removeprefix(prefix): check for check in result.checks}
-    for check in (found["exported_cameras"], found["exported_depth"]):
+    checks = {check.name.removeprefix(prefix): check for check in result.checks}
+    for check in (checks["exported_cameras"], checks["exported_depth"]):
         assert check.passed, check.problems
-    own = EXPORTS[name]
-    with_points = {"colmap", "nerfstudio", "scannetpp", "point_cloud"} & own.keys()
-    assert (found["exported_depth"].figures["points"] >= 30 * len(with_points)) or not with_points
+    exports_of_set = EXPORTS[name]
+    with_points = {"colmap", "nerfstudio", "scannetpp", "point_cloud"} & exports_of_set.keys()
+    assert (checks["exported_depth"].figures["points"] >= 30 * len(with_points)) or not with_points
     # Each part of the split also has a list for instant-ngp.
-    lists = len(own) + (name in INSTANT_NGP) * (4 if name == "split" else 1)
-    assert f"{lists} exports" in found["exported_cameras"].detail
+    lists = len(exports_of_set) + (name in INSTANT_NGP) * (4 if name == "split" else 1)
+    assert f"{lists} exports" in checks["exported_cameras"].detail
 
 
 def other_digit(text, place=0):
@@ -298,10 +311,10 @@ IN_JSON = [
 def test_a_changed_digit_in_json_is_found(name, kind, file, keys, said, place, dataset):
     path = home(dataset, name) / (f"exports/{kind}/{file}" if file else "transforms.json")
     with changed(path, in_json(path, keys, place)):
-        found = problems(dataset, name, kind)
-    assert any(said in line for line in found), found
+        problem_lines = problems(dataset, name, kind)
+    assert any(said in line for line in problem_lines), problem_lines
     shown = path.relative_to(dataset).as_posix().removesuffix(".json")
-    assert all(shown in line or f"exports/{kind}/" in line for line in found)
+    assert all(shown in line or f"exports/{kind}/" in line for line in problem_lines)
 
 
 NUMBER = r"(-?\d+\.\d+(?:e-\d+)?)"
@@ -386,9 +399,9 @@ IN_TEXT = [
 def test_a_changed_digit_in_text_is_found(name, kind, file, pattern, said, place, dataset):
     path = home(dataset, name) / "exports" / file
     with changed(path, in_text(path, pattern, place)):
-        found = problems(dataset, name, kind)
-    assert any(said in line for line in found), found
-    assert all(f"{name}/exports/{kind}/" in line for line in found)
+        problem_lines = problems(dataset, name, kind)
+    assert any(said in line for line in problem_lines), problem_lines
+    assert all(f"{name}/exports/{kind}/" in line for line in problem_lines)
 
 
 def binary_places(folder):
@@ -420,9 +433,9 @@ def test_a_changed_number_in_a_binary_model_is_found(name, dataset):
             f"<{kind}", content, start, 1.001 * value + 0.001 if kind == "d" else value + 1
         )
         with changed(folder / file, content):
-            found = problems(dataset, name, "colmap")
-        assert any(said in line for line in found), (file, start, found)
-        assert all(f"{name}/exports/colmap/sparse/0/" in line for line in found)
+            problem_lines = problems(dataset, name, "colmap")
+        assert any(said in line for line in problem_lines), (file, start, problem_lines)
+        assert all(f"{name}/exports/colmap/sparse/0/" in line for line in problem_lines)
 
 
 @pytest.mark.parametrize(
@@ -442,11 +455,11 @@ def test_every_changed_coordinate_of_a_point_cloud_is_found(name, kind, dataset)
         (value,) = struct.unpack_from("<f", content, place)
         struct.pack_into("<f", content, place, value + 1e-4)
     with changed(path, content):
-        found = problems(dataset, name, kind)
+        problem_lines = problems(dataset, name, kind)
     expected = [f"points.ply: vertex {vertex}: is no point of a view's depth" for vertex in moved]
-    shown = [line.split("exports/")[1].split("/", 1)[1].split(";")[0] for line in found]
+    shown = [line.split("exports/")[1].split("/", 1)[1].split(";")[0] for line in problem_lines]
     if len(moved) > 100:
-        assert f"{len(moved)} of" in found[-1]
+        assert f"{len(moved)} of" in problem_lines[-1]
         shown, expected = shown[:-1], expected[:100]
     assert shown == expected
     content = bytearray(right)
@@ -493,10 +506,12 @@ def test_a_file_that_its_consumer_cannot_open_is_named(name, kind, file, dataset
     for content in (b"", right[: len(right) // 2], b"\xff" * 64, b"{}", b"[1]"):
         path.write_bytes(content)
         try:
-            found = problems(dataset, name, kind)
+            problem_lines = problems(dataset, name, kind)
         finally:
             path.write_bytes(right)
-        assert any(line.startswith(f"{name}/exports/{file}: ") for line in found), content[:9]
+        assert any(line.startswith(f"{name}/exports/{file}: ") for line in problem_lines), content[
+            :9
+        ]
     if path.name != "export.json":
         path.rename(tmp_path / "away")
         try:
@@ -526,10 +541,10 @@ def test_a_view_with_missing_numbers_is_named(name, kind, file, keys, said, data
         parent[last] = value
         path.write_text(json.dumps(content))
         try:
-            found = problems(dataset, name, kind)
+            problem_lines = problems(dataset, name, kind)
         finally:
             path.write_bytes(right)
-        assert any(said in line for line in found), found
+        assert any(said in line for line in problem_lines), problem_lines
 
 
 @pytest.mark.parametrize("value", ["nan", "1e999", "a few"])
@@ -539,10 +554,10 @@ def test_parameters_that_are_not_numbers_are_named(key, value, dataset):
     right = path.read_text()
     path.write_text(re.sub(rf"{key} = .*", f"{key} = {value}", right))
     try:
-        found = problems(dataset, "perspective", "hci")
+        problem_lines = problems(dataset, "perspective", "hci")
     finally:
         path.write_text(right)
-    assert f"parameters.cfg: {key}: " in found[0]
+    assert f"parameters.cfg: {key}: " in problem_lines[0]
 
 
 @pytest.mark.parametrize(
@@ -589,8 +604,8 @@ def test_a_changed_name_is_found(name, kind, file, old, new, said, dataset):
     text = path.read_text()
     assert old in text
     with changed(path, text.replace(old, new, 1).encode()):
-        found = problems(dataset, name, kind)
-    assert any(said in line for line in found), found
+        problem_lines = problems(dataset, name, kind)
+    assert any(said in line for line in problem_lines), problem_lines
 
 
 def test_points_are_found_in_any_order(dataset):
@@ -653,8 +668,8 @@ def test_views_of_a_rig_that_tests_are_compared_with_its_own_lightfield(scene):
     path = scene / "around" / "exports" / "nerf_synthetic" / "transforms_test.json"
     keys = ("frames", 2, "transform_matrix", 1, 3)
     with changed(path, in_json(path, keys, 2)):
-        found = problems(scene / "around", "views", "nerf_synthetic")
-    assert "transforms_test.json: frames[2] (along_view_0002f): its position" in found[0]
+        problem_lines = problems(scene / "around", "views", "nerf_synthetic")
+    assert "transforms_test.json: frames[2] (along_view_0002f): its position" in problem_lines[0]
     path = scene / "along" / "transforms.json"
     for keys in (("scale",), ("offset", 1)):
         with changed(path, in_json(path, keys, 2)):

@@ -102,10 +102,10 @@ class Colmap:
     def lift(self, pixels, z):
         """Return the points (n, 3) in the camera's frame that OpenCV computes for pixels (n, 2)."""
         if self.distortion is None:
-            found = cv2.undistortPoints(pixels, self.matrix, None)
+            directions = cv2.undistortPoints(pixels, self.matrix, None)
         else:
-            found = cv2.fisheye.undistortPoints(pixels[:, None], self.matrix, self.distortion)
-        return np.column_stack([found.reshape(-1, 2), np.ones(len(z))]) * z[:, None]
+            directions = cv2.fisheye.undistortPoints(pixels[:, None], self.matrix, self.distortion)
+        return np.column_stack([directions.reshape(-1, 2), np.ones(len(z))]) * z[:, None]
 
 
 @pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "opencv", "png"])
@@ -119,7 +119,7 @@ def test_colmap_projects_its_points_to_where_the_views_see_them(dataset, tmp_pat
         assert len({image for image, _ in model.tracks[number]}) == len(model.tracks[number]) >= 1
         for image, index in model.tracks[number]:
             assert model.seen[image][index, 2] == number
-    found = 0
+    point_count = 0
     for name, turn, shift in model.images.values():
         camera = -turn.T @ shift
         np.testing.assert_allclose(camera, matrices(dataset, source)[name[:-4]][:3, 3], atol=1e-12)
@@ -128,7 +128,7 @@ def test_colmap_projects_its_points_to_where_the_views_see_them(dataset, tmp_pat
         places = np.array([model.positions[int(number)] for number in rows[:, 2]])
         expected = model.project(places, *model.images[image][1:])
         np.testing.assert_allclose(rows[:, :2], expected, atol=1e-6)
-        found += len(rows)
+        point_count += len(rows)
     # Nothing inside a sphere hides anything. So a view sees every point in its image.
     every = 0
     for name, turn, shift in model.images.values():
@@ -145,7 +145,7 @@ def test_colmap_projects_its_points_to_where_the_views_see_them(dataset, tmp_pat
             angle = np.degrees(np.arctan2(np.hypot(*local.T[:2]), local[:, 2]))
             inside &= (valid[row, column] > 0) & (angle <= LENSES[source]["fov"] / 2)
         every += inside.sum()
-    assert found == every
+    assert point_count == every
 
 
 def read_by_3dgrut(model):
@@ -310,18 +310,18 @@ def test_nerfstudio_lifts_its_depth_to_the_scene(dataset, tmp_path, source):
         np.testing.assert_array_equal(matrix, expected[Path(frame["file_path"]).stem])
         depth = images.read_image(folder / frame["depth_file_path"]).channels["Y"]
         assert depth.dtype == np.uint16
-        known = depth > 0
+        has_depth = depth > 0
         if "mask_path" in frame:
             mask = images.read_image(folder / frame["mask_path"]).channels["Y"]
-            np.testing.assert_array_equal(mask > 0, known)
+            np.testing.assert_array_equal(mask > 0, has_depth)
             assert set(np.unique(mask)) == {0, 255}
         else:
-            assert known.all()
+            assert has_depth.all()
         world = rays * (depth / 1000)[..., None] @ matrix[:3, :3].T + matrix[:3, 3]
-        on_sphere(world[known], 2e-3)
+        on_sphere(world[has_depth], 2e-3)
         picture = images.read_image(folder / frame["file_path"]).channels
         rgb = np.stack([picture[name] for name in "RGB"], axis=-1)
-        np.testing.assert_allclose(rgb[known], colour_of(world[known]), atol=1)
+        np.testing.assert_allclose(rgb[has_depth], colour_of(world[has_depth]), atol=1)
     assert ("mask_path" in content["frames"][0]) == (source in ("fisheye", "wide"))
     vertices, _ = ply(folder / content["ply_file_path"])
     on_sphere(np.stack([vertices[name] for name in "xyz"], axis=-1), 1e-5)
@@ -490,9 +490,9 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
     rig = {"type": "plane", "cameras": [3, 4], "size": [0.4, 1, 0.6], "rotation": [10, 20, 30]}
     folder = tmp_path / "dataset"
     write_views(folder, LENSES["perspective"], rig)
-    found = exported(folder, "hci", "views", tmp_path)
+    disparity_folder = exported(folder, "hci", "views", tmp_path)
     config = configparser.ConfigParser()
-    config.read(found / "parameters.cfg")
+    config.read(disparity_folder / "parameters.cfg")
     extrinsics, intrinsics = config["extrinsics"], config["intrinsics"]
     columns, rows = (extrinsics.getint(f"num_cams_{axis}") for axis in "xy")
     assert (columns, rows) == (3, 4)
@@ -504,8 +504,8 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
     disparities = []
     for number in range(12):
         name = f"Cam{number:03}.pfm"
-        z = pfm(found / f"gt_depth_lowres_{name}")
-        disparity = pfm(found / f"gt_disp_lowres_{name}")
+        z = pfm(disparity_folder / f"gt_depth_lowres_{name}")
+        disparity = pfm(disparity_folder / f"gt_disp_lowres_{name}")
         np.testing.assert_allclose(disparity, 0.2 * focal / z, rtol=1e-6)
         disparities.append(disparity)
         # Each camera is the middle one, moved right and down by whole baselines.
@@ -517,7 +517,13 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
     assert low == pytest.approx(np.min(disparities))
     assert high == pytest.approx(np.max(disparities))
     pictures = [
-        np.stack([images.read_image(found / f"input_Cam{n:03}.png").channels[c] for c in "RGB"], -1)
+        np.stack(
+            [
+                images.read_image(disparity_folder / f"input_Cam{n:03}.png").channels[c]
+                for c in "RGB"
+            ],
+            -1,
+        )
         for n in range(12)
     ]
     # A point moves left in the next camera, and up in the lower one, by its disparity.
@@ -527,8 +533,8 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
         at = [np.float32(x - shift[0] * apart), np.float32(y - shift[1] * apart)]
         moved = cv2.remap(pictures[number + step], *at, cv2.INTER_LINEAR)
         assert np.abs(moved.astype(float) - pictures[number][y, x]).max() <= 1.5
-    middle = found / "gt_disp_lowres.pfm"
-    assert middle.read_bytes() == (found / "gt_disp_lowres_Cam007.pfm").read_bytes()
+    middle = disparity_folder / "gt_disp_lowres.pfm"
+    assert middle.read_bytes() == (disparity_folder / "gt_disp_lowres_Cam007.pfm").read_bytes()
     names = {tuple(np.round(m[:3, 3], 9)): name for name, m in matrices(folder, ".").items()}
     assert names[tuple(np.round(center, 9))] == "view_0007f"
 
@@ -575,10 +581,10 @@ def test_a_point_cloud_has_a_coloured_point_per_voxel_and_normals_to_the_cameras
     colours = np.stack([vertices[name] for name in ("red", "green", "blue")], axis=-1)
     np.testing.assert_allclose(colours, colour_of(places), atol=1)
     normals = np.stack([vertices[f"n{name}"] for name in "xyz"], axis=-1)
-    known = np.linalg.norm(normals, axis=-1) > 0.5
-    assert known.mean() > 0.9
-    inward = -places[known] / RADIUS
-    assert np.degrees(np.arccos((normals[known] * inward).sum(axis=-1).clip(-1, 1))).max() < 5
+    has_normal = np.linalg.norm(normals, axis=-1) > 0.5
+    assert has_normal.mean() > 0.9
+    inward = -places[has_normal] / RADIUS
+    assert np.degrees(np.arccos((normals[has_normal] * inward).sum(axis=-1).clip(-1, 1))).max() < 5
 
 
 def test_poses_csv_can_be_read_as_a_rig(dataset, tmp_path):
@@ -588,8 +594,8 @@ def test_poses_csv_can_be_read_as_a_rig(dataset, tmp_path):
     rig = {"type": "poses", "file": str(folder / "poses.csv")}
     again = LightField.from_rig(rig, lenses.from_camera(LENSES["perspective"]))
     for name, matrix in matrices(dataset, "perspective").items():
-        found = next(view for view in again.views if view.name == name)
-        np.testing.assert_allclose(found.matrix, matrix, atol=1e-11)
+        same_view = next(view for view in again.views if view.name == name)
+        np.testing.assert_allclose(same_view.matrix, matrix, atol=1e-11)
     assert rigs.from_settings(rig).view_count == 12
 
 
@@ -637,26 +643,26 @@ def test_every_image_with_finite_depth_has_a_point(tmp_path, capsys):
 
 
 def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(dataset, tmp_path):
-    one = exported(dataset, "colmap", "fisheye", tmp_path / "one", points=50)
+    first_export = exported(dataset, "colmap", "fisheye", tmp_path / "one", points=50)
     two = exported(dataset, "colmap", "fisheye", tmp_path / "two", points=50)
-    files = json.loads((one / "export.json").read_text())["files"]
+    files = json.loads((first_export / "export.json").read_text())["files"]
     assert files == {
         path.relative_to(two).as_posix(): sha256(path)
         for path in two.rglob("*")
         if path.is_file() and path.name != "export.json"
     }
-    assert (one / "export.json").read_bytes() == (two / "export.json").read_bytes()
+    assert (first_export / "export.json").read_bytes() == (two / "export.json").read_bytes()
     shutil.copytree(dataset, tmp_path / "dataset")
     target = tmp_path / "dataset" / "fisheye" / "exports" / "colmap"
-    shutil.copytree(one, target)
+    shutil.copytree(first_export, target)
     sets, _ = validation_files.read_sets(tmp_path / "dataset", ["fisheye"])
 
     def checked():
         return validation_files.of_exports(tmp_path / "dataset", sets, [], export.MANIFESTS)
 
-    found, others, check = checked()
+    exports_check, others, check = checked()
     assert check.passed
-    assert {*others, *(file.path for file in found)} >= {
+    assert {*others, *(file.path for file in exports_check)} >= {
         f"fisheye/exports/colmap/{name}" for name in (*files, "export.json")
     }
     points = target / "sparse" / "0" / "points3D.bin"
@@ -794,17 +800,17 @@ def test_views_that_a_consumer_cannot_take_are_refused_by_hand_too(
     assert not [*tmp_path.iterdir()]
 
 
-def by_hand(run_program, dataset, folder, *words):
+def by_hand(run_program, dataset, folder, *arguments):
     """Export a table of poses with the program. Return the names of its views."""
-    words = ["poses_csv", "--dataset", dataset, "--output", folder, *words]
-    run_program("export.py", *words)
+    arguments = ["poses_csv", "--dataset", dataset, "--output", folder, *arguments]
+    run_program("export.py", *arguments)
     rows = (folder / "poses.csv").read_text().splitlines()[1:]
     return [row.split(",")[0] for row in rows]
 
 
 def test_a_settings_file_gives_source_and_rigs_that_test(run_program, dataset, tmp_path):
-    words = ["--source", "perspective", "--suffix", ".exr"]
-    names = by_hand(run_program, dataset, tmp_path / "flags", *words)
+    arguments = ["--source", "perspective", "--suffix", ".exr"]
+    names = by_hand(run_program, dataset, tmp_path / "flags", *arguments)
     settings = tmp_path / "settings.json"
     content = {"options": {"sources": ["perspective"]}, "suffix": ".exr"}
     settings.write_text(json.dumps(content))
@@ -818,11 +824,11 @@ def test_a_mistake_in_a_settings_file_is_named_and_nothing_made(run_program, dat
     content = {"options": {"sources": ["views"], "point": 5}}
     settings = tmp_path / "settings.json"
     settings.write_text(json.dumps(content))
-    words = ["--dataset", dataset, "--output", tmp_path / "made", "--settings", settings]
-    refused = run_program("export.py", "colmap", *words, check=False)
+    arguments = ["--dataset", dataset, "--output", tmp_path / "made", "--settings", settings]
+    refused = run_program("export.py", "colmap", *arguments, check=False)
     assert refused.stderr.startswith(f"error: {settings}: options.point: unknown key")
     assert (refused.returncode, refused.stderr.count("\n")) == (1, 1)
-    refused = run_program("export.py", "colmap", *words, "--suffix", ".png", check=False)
+    refused = run_program("export.py", "colmap", *arguments, "--suffix", ".png", check=False)
     assert "--settings: excludes --suffix" in refused.stderr
     assert not (tmp_path / "made").exists()
 

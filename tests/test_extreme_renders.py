@@ -71,23 +71,25 @@ def test_no_case_is_wrong_without_a_warning(tmp_path, run_program):
     run_program(ROOT / "benchmarks/extremes.py", "--output", tmp_path)
     with (tmp_path / "extremes.csv").open() as file:
         rows = {row["case"]: row for row in csv.DictReader(file)}
-    found = {kind: [] for kind in ("right", "warned", "refused", "as asked")}
+    rows_of_verdict = {kind: [] for kind in ("right", "warned", "refused", "as asked")}
     for name, row in rows.items():
-        found[row["verdict"]].append(name)
-    assert len(found["right"]) >= 25
-    assert found["warned"] == [
+        rows_of_verdict[row["verdict"]].append(name)
+    assert len(rows_of_verdict["right"]) >= 25
+    assert rows_of_verdict["warned"] == [
         *(f"a room of 4 m, 1e{power} m from the origin" for power in (5, 6, 7)),
         "light of 1e+06",
         "1,000 transparent layers, of 8 that may be",
         "a sun of 0° through glass, filter glossy 0, clamped at 0",
     ]
-    assert found["refused"] == [
+    assert rows_of_verdict["refused"] == [
         "a room of 1 mm",
         "a surface 0.0001 m ahead",
         "a surface 5e-05 m ahead",
     ]
-    assert all(rows[name]["said"] for kind in ("warned", "refused") for name in found[kind])
-    assert len(found["as asked"]) == 2
+    assert all(
+        rows[name]["said"] for kind in ("warned", "refused") for name in rows_of_verdict[kind]
+    )
+    assert len(rows_of_verdict["as asked"]) == 2
     assert (tmp_path / "extremes.md").read_text().count("\n") == len(rows) + 2
 
 

@@ -132,8 +132,8 @@ def test_cameras_a_million_metres_from_the_origin_see_the_same_point(name) -> No
     # Three numbers of a million metres are each off by up to one eps. The pixel follows the angle.
     moves = 3 * mpf(place[0]) / mpmath.norm(point) / smallest_move(lens, exact)
     bound = ROUNDINGS * EPS * (moves + 2 * stability.extent(lens, exact))
-    for found, wanted in ((lens.pixels(seen[:3]), exact), (lens.pixels(back[:3]), (x, y))):
-        assert max(abs(mpf(float(f)) - w) for f, w in zip(found, wanted, strict=True)) <= bound
+    for projected, wanted in ((lens.pixels(seen[:3]), exact), (lens.pixels(back[:3]), (x, y))):
+        assert max(abs(mpf(float(f)) - w) for f, w in zip(projected, wanted, strict=True)) <= bound
 
 
 SOURCE = Equirectangular(width=64, height=32)

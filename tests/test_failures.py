@@ -130,7 +130,9 @@ class Failing:
         groups = []
         for rule in RULES:
             for group in groups:
-                if not any(self.is_read(one, rule) or self.is_read(rule, one) for one in group):
+                if not any(
+                    self.is_read(member, rule) or self.is_read(rule, member) for member in group
+                ):
                     group.append(rule)
                     break
             else:
@@ -181,13 +183,13 @@ def last_words(failing, *rules):
 @pytest.fixture(scope="module")
 def failed(failing):
     """For each rule: the terminal's output after its failure, and its remaining files."""
-    found = {}
+    failures = {}
     for rules in failing.independent_groups():
         terminal = failing.fail(*rules, options=["--keep-going"])
         for rule in rules:
             outputs = (failing.folder / file for file in failing.jobs[rule]["output"])
-            found[rule] = terminal, [path for path in outputs if path.exists()]
-    return found
+            failures[rule] = terminal, [path for path in outputs if path.exists()]
+    return failures
 
 
 @pytest.mark.parametrize("rule", RULES)

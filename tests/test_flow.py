@@ -111,11 +111,11 @@ def test_flow_belongs_to_the_dataset_only_while_the_yaml_asks_for_it(folder):
     assert files[0].name == "view_0000f_to_view_0001f.exr" and len(files) == 3
     assert "flow/view_0000f_to_view_0001f.exr" in (dataset / "sha256sums.txt").read_text()
     assert "flow" in (dataset / "lightfield.json").read_text()
-    there = images.read_image(files[0]).channels
-    assert {name: str(plane.dtype) for name, plane in there.items()} == dict.fromkeys(
+    channels = images.read_image(files[0]).channels
+    assert {name: str(plane.dtype) for name, plane in channels.items()} == dict.fromkeys(
         "XYV", "float32"
     )
-    check_warp(dataset, there)
+    check_warp(dataset, channels)
     # A missing file alone is computed again, to the same bytes.
     made, kept = files[1].read_bytes(), files[0].stat().st_mtime_ns
     files[1].unlink()
@@ -184,8 +184,8 @@ def test_flow_follows_a_change_of_either_view(changed, computed, tmp_path, run_p
     image = images.read_image(path)
     channels = dict(image.channels) | {"Z": image.channels["Z"] * np.float32(0.9)}
     images.write_exr(path, channels, image.attributes)
-    words = ("--lightfield", folder / "lightfield.json", "--output", folder / "flow")
-    run_program("flow.py", *words)
+    arguments = ("--lightfield", folder / "lightfield.json", "--output", folder / "flow")
+    run_program("flow.py", *arguments)
     name = "flow/view_0000f_to_view_0001f.exr"
     assert (folder / name).read_bytes() != (computed / name).read_bytes()
     kept = "flow/view_0002f_to_view_0001f.exr"

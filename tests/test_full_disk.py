@@ -125,11 +125,11 @@ def assert_refused(write, path):
     before = {p.name: p.read_bytes() for p in path.parent.iterdir()}
     with pytest.raises(UserError) as caught:
         write(path, 1)
-    told = str(caught.value)
-    assert told.startswith(f"{path.with_suffix('')}.")
-    assert ": cannot be written: " in told and "\n" not in told
+    message = str(caught.value)
+    assert message.startswith(f"{path.with_suffix('')}.")
+    assert ": cannot be written: " in message and "\n" not in message
     # The message says what to do, and has sizes that a person can read.
-    assert re.search(r"GB are free on its disk: |is full: free some space", told), told
+    assert re.search(r"GB are free on its disk: |is full: free some space", message), message
     after = {p.name: p.read_bytes() for p in path.parent.iterdir()}
     assert after.keys() == before.keys()
     assert after[path.name] == before[path.name]

@@ -160,14 +160,14 @@ def lightfield(rng):
 
 
 def read_lightfield(path, _):
-    found = LightField.read(path)
-    found.matrices  # noqa: B018
-    found.with_flow()
-    found.lens.fitted(8).pixel_rays()
-    found.lens.pixels([[0.1, 0.2, -1.0]])
-    json.dumps(found.to_json())
+    lightfield = LightField.read(path)
+    lightfield.matrices  # noqa: B018
+    lightfield.with_flow()
+    lightfield.lens.fitted(8).pixel_rays()
+    lightfield.lens.pixels([[0.1, 0.2, -1.0]])
+    json.dumps(lightfield.to_json())
     for key in ("passes", "transparent", "frame", "scene", "render"):
-        getattr(found, key)
+        getattr(lightfield, key)
 
 
 def inventory(_):
@@ -191,9 +191,9 @@ def read_scene_inventory(path, dataset):
     check_external_files(dataset)
     for key in ("left_out", "external_files", "memory_bytes", "volumes", "missing"):
         read_inventory(path, key)
-    found = dataset.resolved(path)
-    found.rig.poses()
-    found.rig.camera.make()
+    resolved = dataset.resolved(path)
+    resolved.rig.poses()
+    resolved.rig.camera.make()
 
 
 def record(_):
@@ -247,18 +247,18 @@ def ledger_lines(_):
 
 
 def read_ledger(path, _):
-    found = ledger.Ledger(path)
-    found.damage  # noqa: B018
+    jobs = ledger.Ledger(path)
+    jobs.damage  # noqa: B018
     for name in ("a.json", "b"):
-        if name in found:
-            found.changed_input(name)
-    found.last_read("b.json", "0" * 64)
-    found.input_stamps(["a.json"])
+        if name in jobs:
+            jobs.changed_input(name)
+    jobs.last_read("b.json", "0" * 64)
+    jobs.input_stamps(["a.json"])
     ledger.read(path)
     ledger.damaged_lines(path)
     ledger.forget(path, "c")
-    found.refresh()
-    found.compact()
+    jobs.refresh()
+    jobs.compact()
 
 
 def transforms(_):

@@ -107,8 +107,8 @@ def test_depth_and_normals_are_those_of_the_first_surface(name, views):
     # point on the surface accordingly farther.
     rays = content.lens.pixel_rays() @ content.views[0].matrix[:3, :3].T
     facing = np.abs(np.sum(rays * normals, axis=-1))
-    z, known = views[f"{name}.z"][sure], stored(content, distance)[sure]
-    error = np.abs(z.astype(np.float64) / known - 1)
+    z, expected_z = views[f"{name}.z"][sure], stored(content, distance)[sure]
+    error = np.abs(z.astype(np.float64) / expected_z - 1)
     assert np.median(error) < 1e-6
     assert (error * facing[sure]).max() < 1.5e-6
     turned = np.linalg.norm(views[f"{name}.normal"] - normals, axis=-1)[sure]
@@ -141,13 +141,15 @@ def test_invisible_surfaces_have_no_depth_and_glass_has(views):
     for number, (index, normal) in enumerate(
         [(1, (np.sin(0.3), -np.cos(0.3), 0)), *((10 + n, (0, -1, 0)) for n in (1, 2, 3, 4))]
     ):
-        there = (np.abs(x - (number - 2)) < 0.4) & (np.abs(z) < 0.4)
-        assert there.sum() > 80
-        assert set(np.unique(views["curtains.objects"][there])) == {index}
+        inside_card = (np.abs(x - (number - 2)) < 0.4) & (np.abs(z) < 0.4)
+        assert inside_card.sum() > 80
+        assert set(np.unique(views["curtains.objects"][inside_card])) == {index}
         np.testing.assert_allclose(
-            views["curtains.normal"][there], np.broadcast_to(normal, (there.sum(), 3)), atol=1e-6
+            views["curtains.normal"][inside_card],
+            np.broadcast_to(normal, (inside_card.sum(), 3)),
+            atol=1e-6,
         )
         if index > 1:
             np.testing.assert_allclose(
-                views["curtains.z"][there], 2 / rays[..., 1][there], rtol=1e-6
+                views["curtains.z"][inside_card], 2 / rays[..., 1][inside_card], rtol=1e-6
             )

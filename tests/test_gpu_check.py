@@ -60,11 +60,11 @@ def trials():
 
 
 def test_renders_of_other_seeds_are_the_same_picture(trials):
-    one, other, mask = trials
-    found = gpu_check.compare(one, other, mask)
-    assert found.same
-    assert found.colour == pytest.approx(1, abs=0.5)
-    assert found.depth == 0
+    first, second, mask = trials
+    comparison = gpu_check.compare(first, second, mask)
+    assert comparison.same
+    assert comparison.colour == pytest.approx(1, abs=0.5)
+    assert comparison.depth == 0
 
 
 @pytest.mark.parametrize(
@@ -80,13 +80,13 @@ def test_renders_of_other_seeds_are_the_same_picture(trials):
     ids=["exposure", "mirrored", "tinted", "depth", "shifted", "misses"],
 )
 def test_a_changed_picture_is_not_the_same(trials, change):
-    one, other, mask = trials
-    assert not gpu_check.compare(one, [change(trial) for trial in other], mask).same
+    first, second, mask = trials
+    assert not gpu_check.compare(first, [change(trial) for trial in second], mask).same
 
 
 def test_pictures_without_noise_are_compared_exactly(trials):
-    one, _, mask = trials
-    still = [replace(trial, colour=np.full_like(trial.colour, 0.5)) for trial in one]
+    first, _, mask = trials
+    still = [replace(trial, colour=np.full_like(trial.colour, 0.5)) for trial in first]
     assert gpu_check.compare(still, still, mask).same
     brighter = [replace(trial, colour=trial.colour * 2) for trial in still]
     assert not gpu_check.compare(still, brighter, mask).same
@@ -95,12 +95,12 @@ def test_pictures_without_noise_are_compared_exactly(trials):
 def test_hours_follow_from_views_pixels_and_samples():
     full = {"big": {"views": 10, "resolution": [2000, 1000]}}
     maker = Simulated(lenses.from_camera(CAMERA))
-    found = gpu_check.check(maker, "gpu", {"samples": 256}, full)
-    assert found["devices"] == ["CPU", "GPU"]
-    assert found["core_seconds"] == pytest.approx(1)
-    assert found["gpu_seconds"] == pytest.approx(0.1)
-    assert found["hours"]["big"] == pytest.approx(10 * 2e6 * 256 * 1e-7 / 3600)
-    assert "times as fast as on one core" in gpu_check.table("garden", found)
+    content = gpu_check.check(maker, "gpu", {"samples": 256}, full)
+    assert content["devices"] == ["CPU", "GPU"]
+    assert content["core_seconds"] == pytest.approx(1)
+    assert content["gpu_seconds"] == pytest.approx(0.1)
+    assert content["hours"]["big"] == pytest.approx(10 * 2e6 * 256 * 1e-7 / 3600)
+    assert "times as fast as on one core" in gpu_check.table("garden", content)
 
 
 def test_the_processor_agrees_with_itself(tmp_path, run_program, room):
@@ -116,14 +116,14 @@ def test_the_processor_agrees_with_itself(tmp_path, run_program, room):
     run_program("inventory.py", "--blend", room, "--output", tmp_path / "inventory.json")
     program = tmp_path / "check.py"
     program.write_text(PROGRAM)
-    found = run_program(program, room, tmp_path / "inventory.json", cwd=tmp_path)
-    assert '"same": true' in found.stdout
+    result = run_program(program, room, tmp_path / "inventory.json", cwd=tmp_path)
+    assert '"same": true' in result.stdout
     # The program itself says so in one line, without writing a file.
-    words = ["--blend", room, "--inventory", tmp_path / "inventory.json"]
-    words += ["--lightfield", tmp_path / "lightfield.json", "--cache", tmp_path / "cache"]
-    words += ["--output", tmp_path / "room"]
+    arguments = ["--blend", room, "--inventory", tmp_path / "inventory.json"]
+    arguments += ["--lightfield", tmp_path / "lightfield.json", "--cache", tmp_path / "cache"]
+    arguments += ["--output", tmp_path / "room"]
     for device, said in (("cpu", "device: is cpu"), ("metal", "has no metal device")):
-        refused = run_program("gpu_check.py", *words, "--device", device, check=False)
+        refused = run_program("gpu_check.py", *arguments, "--device", device, check=False)
         assert refused.returncode == 1
         assert refused.stderr.count("error: ") == 1
         assert said in refused.stderr

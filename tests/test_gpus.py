@@ -146,15 +146,15 @@ def test_a_gpu_without_memory_is_reported_with_advice(message, room, run_program
     rig = {"type": "plane", "cameras": [1, 1]}
     lightfield = LightField.from_rig(rig, lens, depth=None, frame=1, render=sampling)
     lightfield.write(tmp_path / "lightfield.json")
-    found = run_program(
+    result = run_program(
         *(Path(__file__).with_name("full_gpu.py"), message, "--blend", room, "--device", "cuda"),
         *("--lightfield", tmp_path / "lightfield.json", "--output", tmp_path / "exr"),
         check=False,
     )
-    assert found.returncode == 1
-    assert found.stderr.splitlines()[-1] == (
+    assert result.returncode == 1
+    assert result.stderr.splitlines()[-1] == (
         f"error: Cycles cannot render the view: {message}: lower resolution, shrink the scene's "
         "textures, end what else uses the GPU, or take device=cpu"
     )
-    assert "Traceback" not in found.stderr
+    assert "Traceback" not in result.stderr
     assert not list(tmp_path.rglob("*.exr"))

@@ -33,9 +33,9 @@ def channels():
     return halves | {"Z": depth}
 
 
-def same(found, expected):
-    return found.dtype == expected.dtype and np.array_equal(
-        found.view(np.uint8), expected.view(np.uint8)
+def same(pixels, expected):
+    return pixels.dtype == expected.dtype and np.array_equal(
+        pixels.view(np.uint8), expected.view(np.uint8)
     )
 
 
@@ -45,9 +45,9 @@ def test_a_picture_that_ends_too_soon_is_not_finished(tmp_path, suffix):
     pixels = np.random.default_rng(0).integers(0, 255, (64, 48, 3), dtype=np.uint8)
     assert oiio.ImageBuf(pixels).write(str(path))
     assert is_readable(path)
-    whole = path.read_bytes()
-    for size in (0, len(whole) // 2, len(whole) * 9 // 10):
-        path.write_bytes(whole[:size])
+    content = path.read_bytes()
+    for size in (0, len(content) // 2, len(content) * 9 // 10):
+        path.write_bytes(content[:size])
         assert not is_readable(path)
 
 
@@ -121,13 +121,13 @@ def test_a_codec_that_openexr_does_not_have_is_refused(monkeypatch):
 
 def test_some_rows_of_some_channels(tmp_path, channels):
     write_exr(tmp_path / "a.exr", channels)
-    found = read_image(tmp_path / "a.exr", ["Z", "G"], (17, 20)).channels
-    assert found.keys() == {"Z", "G"}
-    assert all(same(found[name], channels[name][17:20]) for name in found)
+    read_channels = read_image(tmp_path / "a.exr", ["Z", "G"], (17, 20)).channels
+    assert read_channels.keys() == {"Z", "G"}
+    assert all(same(read_channels[name], channels[name][17:20]) for name in read_channels)
     pixels = np.arange(37 * 53 * 3, dtype=np.uint8).reshape(37, 53, 3)
     write_png(tmp_path / "a.png", pixels)
-    found = read_image(tmp_path / "a.png", ["B"], (17, 20)).channels
-    assert found.keys() == {"B"} and np.array_equal(found["B"], pixels[17:20, :, 2])
+    read_channels = read_image(tmp_path / "a.png", ["B"], (17, 20)).channels
+    assert read_channels.keys() == {"B"} and np.array_equal(read_channels["B"], pixels[17:20, :, 2])
 
 
 @pytest.mark.parametrize("storage", ["parts", "tiles", "offset"])
@@ -147,22 +147,24 @@ def test_exr_files_of_other_kinds(tmp_path, channels, storage):
         case "offset":
             corners = np.array([7, -5], np.int32), np.array([59, 31], np.int32)
             OpenEXR.File(kind | {"dataWindow": corners}, dict(channels)).write(path)
-    found = read_image(path).channels
-    assert found.keys() == channels.keys()
-    assert all(same(np.ascontiguousarray(found[name]), channels[name]) for name in found)
-    some = read_image(path, ["Z"], (3, 9)).channels["Z"]
-    assert np.array_equal(some, channels["Z"][3:9], equal_nan=True)
+    read_channels = read_image(path).channels
+    assert read_channels.keys() == channels.keys()
+    assert all(
+        same(np.ascontiguousarray(read_channels[name]), channels[name]) for name in read_channels
+    )
+    some_rows = read_image(path, ["Z"], (3, 9)).channels["Z"]
+    assert np.array_equal(some_rows, channels["Z"][3:9], equal_nan=True)
 
 
 def test_a_header_with_damaged_text_is_read_or_named(tmp_path, channels):
     path = tmp_path / "a.exr"
     write_exr(path, channels, ATTRIBUTES)
-    whole = path.read_bytes()
+    content = path.read_bytes()
     # For both, OpenEXR itself ends with an error of Python or of the system.
-    path.write_bytes(whole.replace(b"plenoforge:nan", b"\xf0lenoforge:nan"))
+    path.write_bytes(content.replace(b"plenoforge:nan", b"\xf0lenoforge:nan"))
     assert read_header(path).attributes["plenoforge:scale"] == 0.5
     assert same(np.ascontiguousarray(read_image(path).channels["Z"]), channels["Z"])
-    path.write_bytes(whole.replace(b"\0Z\0", b"\0\xda\0"))
+    path.write_bytes(content.replace(b"\0Z\0", b"\0\xda\0"))
     with pytest.raises(UserError, match=r"a\.exr: is no image that can be read: .*utf-8"):
         read_header(path)
 
@@ -171,8 +173,8 @@ def test_a_header_with_damaged_text_is_read_or_named(tmp_path, channels):
 def test_a_file_cut_short_is_named(tmp_path, channels, part):
     path = tmp_path / "cut.exr"
     write_exr(path, channels)
-    whole = path.read_bytes()
-    path.write_bytes(whole[: part if isinstance(part, int) else int(part * len(whole))])
+    content = path.read_bytes()
+    path.write_bytes(content[: part if isinstance(part, int) else int(part * len(content))])
     with pytest.raises(UserError, match=r"cut\.exr"):
         read_image(path)
 
@@ -227,8 +229,8 @@ def test_a_png_damaged_by_the_disk_replaces_no_other(tmp_path, monkeypatch):
     monkeypatch.setattr(oiio, "ImageOutput", Output)
     with pytest.raises(UserError, match=r"a\.png: cannot be written: .*damaged"):
         write_png(path, 255 - pixels)
-    found = read_image(path)
-    assert np.array_equal(np.dstack([found.channels[name] for name in "RGB"]), pixels)
+    image = read_image(path)
+    assert np.array_equal(np.dstack([image.channels[name] for name in "RGB"]), pixels)
     assert [p.name for p in tmp_path.iterdir()] == ["a.png"]
 
 

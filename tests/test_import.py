@@ -85,21 +85,32 @@ def published(tmp_path):
 
 
 def test_published_views_are_reprojected_exported_and_validated(published, tmp_path, run_program):
-    def run(name, *words, **options):
-        return run_program(name, *words, cwd=tmp_path, **options)
+    def run(name, *arguments, **options):
+        return run_program(name, *arguments, cwd=tmp_path, **options)
 
     dataset = tmp_path / "results" / "theirs" / "LFPlane"
-    own = dataset / "lightfield.json"
-    run("make_lightfield.py", "--scene", "theirs", "--rig", "LFPlane", "--output", own)
-    content, theirs = (json.loads(p.read_text()) for p in (own, published / "lightfield.json"))
+    own_lightfield = dataset / "lightfield.json"
+    run("make_lightfield.py", "--scene", "theirs", "--rig", "LFPlane", "--output", own_lightfield)
+    content, theirs = (
+        json.loads(p.read_text()) for p in (own_lightfield, published / "lightfield.json")
+    )
     assert content["frames"] == theirs["frames"]
     assert content["camera"] == theirs["camera"]
     assert content["depth"] == "z"
     # The machine that rendered them is unknown.
     assert "machine" not in content
     record, views = tmp_path / "0-4.json", dataset / "exr"
-    words = ["--dataset", published, "--lightfield", own, "--output", views, "--record", record]
-    run("import_views.py", *words)
+    arguments = [
+        "--dataset",
+        published,
+        "--lightfield",
+        own_lightfield,
+        "--output",
+        views,
+        "--record",
+        record,
+    ]
+    run("import_views.py", *arguments)
     files = json.loads(record.read_text())["files"]
     assert files.keys() == {f"exr/{path.name}" for path in (published / "exr").iterdir()}
     for name, entry in files.items():
@@ -108,21 +119,23 @@ def test_published_views_are_reprojected_exported_and_validated(published, tmp_p
     view = next((published / "exr").iterdir())
     content = view.read_bytes()
     view.write_bytes(content[:-1] + b"?")
-    refused = run("import_views.py", *words, check=False)
+    refused = run("import_views.py", *arguments, check=False)
     assert f"{view.name}: has other bytes than at its import" in refused.stderr
     view.write_bytes(content)
-    run("import_views.py", *words)
+    run("import_views.py", *arguments)
     again = dataset / "perspective"
     camera = {"lens": "rectilinear", "fov": 90, "resolution": [24, 24]}
     settings = tmp_path / "perspective.json"
     settings.write_text(json.dumps({"camera": camera, "formats": ["exr"]}))
-    words = ["--settings", settings, "--input-cfg", own, "--input-dir", views]
-    run("reproject.py", *words, "--output-dir", again, "--output-cfg", again / "lightfield.json")
-    words = ["--input-cfg", again / "lightfield.json", "--image-suffix", ".exr"]
-    run("export_instant_ngp.py", *words, "--output", again / "transforms.json")
-    words = [dataset, "--reprojection", "perspective", "--records", record]
-    words += ["--output", dataset / "validation.json", "--sums", tmp_path / "sums.txt"]
-    run("validate.py", *words)
+    arguments = ["--settings", settings, "--input-cfg", own_lightfield, "--input-dir", views]
+    run(
+        "reproject.py", *arguments, "--output-dir", again, "--output-cfg", again / "lightfield.json"
+    )
+    arguments = ["--input-cfg", again / "lightfield.json", "--image-suffix", ".exr"]
+    run("export_instant_ngp.py", *arguments, "--output", again / "transforms.json")
+    arguments = [dataset, "--reprojection", "perspective", "--records", record]
+    arguments += ["--output", dataset / "validation.json", "--sums", tmp_path / "sums.txt"]
+    run("validate.py", *arguments)
     validation = json.loads((dataset / "validation.json").read_text())
     assert validation["valid"], validation["summary"]
 
@@ -147,14 +160,14 @@ def test_a_shard_takes_over_enough_views_to_be_worth_a_start(
 
 @pytest.mark.slow
 def test_nothing_is_rendered_for_imported_views(published, tmp_path):
-    words = ("--snakefile", ROOT / "Snakefile", "--config", "scenes=theirs", "preset=full")
-    jobs = planned(tmp_path, *words)
+    arguments = ("--snakefile", ROOT / "Snakefile", "--config", "scenes=theirs", "preset=full")
+    jobs = planned(tmp_path, *arguments)
     assert jobs.keys() >= {"import_views", "reproject", "validate", "page"}
     rendering = {"render", "render_panorama", "build_scene", "inventory", "check_cameras"}
     assert not rendering & jobs.keys()
     for target in ("plan", "advise"):
-        assert planned(tmp_path, target, *words) == {target: 1}
-        terminal = snakemake(tmp_path, target, *words).stderr
+        assert planned(tmp_path, target, *arguments) == {target: 1}
+        terminal = snakemake(tmp_path, target, *arguments).stderr
         assert f"{target} failed: error: the views of all chosen" in terminal
     dataset, (view, *_) = tmp_path / "results/theirs/LFPlane", (published / "exr").iterdir()
     again = []
@@ -162,7 +175,7 @@ def test_nothing_is_rendered_for_imported_views(published, tmp_path):
         # A view that its owner changes is taken over again.
         channels = images.read_image(view).channels
         images.write_exr(view, channels | {name: part * channels[name] for name in "RGB"})
-        built = snakemake(tmp_path, *words)
+        built = snakemake(tmp_path, *arguments)
         assert built.returncode == 0, built.stdout + built.stderr
         assert "\nvalid: results/theirs/LFPlane/report/index.html\n" in built.stdout + built.stderr
         assert sha256(dataset / "exr" / view.name) == sha256(view)
@@ -177,14 +190,16 @@ def test_a_run_does_not_list_a_folder_for_each_shard(published, tmp_path):
     command += ["--config", "scenes=theirs", "preset=full"]
     of_views_and_records = []
     for views_per_shard in (4, 1):
-        words = [*command, f"views_per_shard={views_per_shard}"]
-        subprocess.run(words, cwd=tmp_path, capture_output=True, check=True)
+        arguments = [*command, f"views_per_shard={views_per_shard}"]
+        subprocess.run(arguments, cwd=tmp_path, capture_output=True, check=True)
         assert len([*tmp_path.glob("work/theirs/LFPlane/render/*-?.json")]) == 4 / views_per_shard
         listings = json.loads((tmp_path / "listings.json").read_text())
         roots = ("results", "work")
-        own = {folder: count for folder, count in listings.items() if folder.startswith(roots)}
-        assert "results/theirs/LFPlane/exr" in own
-        of_views_and_records.append(own)
+        own_listings = {
+            folder: count for folder, count in listings.items() if folder.startswith(roots)
+        }
+        assert "results/theirs/LFPlane/exr" in own_listings
+        of_views_and_records.append(own_listings)
         for folder in (*roots, ".snakemake"):
             shutil.rmtree(tmp_path / folder)
     assert of_views_and_records[0] == of_views_and_records[1]

@@ -47,10 +47,10 @@ def faults(datasets, work="work"):
 
 def own_files(*folders):
     """Return the files that jobs made. Leaves out the index, which belongs to no single dataset."""
-    found = [path for name in folders for path in sorted(Path(name).rglob("*")) if path.is_file()]
+    paths = [path for name in folders for path in sorted(Path(name).rglob("*")) if path.is_file()]
     return [
         path
-        for path in found
+        for path in paths
         if path not in (Path("work/ledger.txt"), Path("results/index.html"))
         and "settings" not in path.parts
         and not path.name.endswith(".lock")
@@ -95,36 +95,36 @@ def test_a_damaged_ledger_is_named_and_written_anew(copy):
 
 
 def test_repaired_files_are_planned_and_no_others(copy, run_program):
-    one, two, three = copy
-    view = next(Path(one.folder, "exr").iterdir())
-    picture = next(Path(two.folder, "perspective").glob("*.png"))
+    first, second, third = copy
+    view = next(Path(first.folder, "exr").iterdir())
+    picture = next(Path(second.folder, "perspective").glob("*.png"))
     spoilt = {
-        str(view): one.record("render", *one.shards[0]),
-        str(picture): two.record("perspective", *two.shards[0]),
-        f"{two.work}/perspective/lens_map.npy": f"{two.work}/perspective/lens_map.npy",
-        f"{one.folder}/report/rig.svg": f"{one.folder}/report/rig.svg",
-        two.record("render", *two.shards[0]): two.record("render", *two.shards[0]),
+        str(view): first.record("render", *first.shards[0]),
+        str(picture): second.record("perspective", *second.shards[0]),
+        f"{second.work}/perspective/lens_map.npy": f"{second.work}/perspective/lens_map.npy",
+        f"{first.folder}/report/rig.svg": f"{first.folder}/report/rig.svg",
+        second.record("render", *second.shards[0]): second.record("render", *second.shards[0]),
     }
     rng = random.Random(3)
     for name in spoilt:
         spoil(Path(name), replace, rng)
-    Path(one.folder, "notes.txt").write_text("a stray")
-    words = ("verify.py", one.folder, two.folder, three.folder)
-    told = run_program(*words, "--work", "work", check=False)
-    assert told.returncode == 1
-    assert sorted(line.split(": ")[0] for line in told.stdout.splitlines()) == sorted(
-        [*spoilt, f"{one.folder}/notes.txt"]
+    Path(first.folder, "notes.txt").write_text("a stray")
+    arguments = ("verify.py", first.folder, second.folder, third.folder)
+    result = run_program(*arguments, "--work", "work", check=False)
+    assert result.returncode == 1
+    assert sorted(line.split(": ")[0] for line in result.stdout.splitlines()) == sorted(
+        [*spoilt, f"{first.folder}/notes.txt"]
     )
-    told = run_program(*words, "--work", "work", "--mend", check=False)
-    assert told.stderr == (
-        f"error: 6 faults in {', '.join(words[1:])}; the next run makes them again\n"
+    result = run_program(*arguments, "--work", "work", "--mend", check=False)
+    assert result.stderr == (
+        f"error: 6 faults in {', '.join(arguments[1:])}; the next run makes them again\n"
     )
     planned = simulated.planned(Path(), "smoke")
     assert set(spoilt.values()) <= planned
-    assert not any(name.startswith((three.folder, three.work)) for name in planned)
-    assert two.inventory not in planned and two.blend not in planned
-    assert f"{two.folder}/lightfield.json" not in planned
-    assert Path("work/removed", one.folder, "notes.txt").read_text() == "a stray"
+    assert not any(name.startswith((third.folder, third.work)) for name in planned)
+    assert second.inventory not in planned and second.blend not in planned
+    assert f"{second.folder}/lightfield.json" not in planned
+    assert Path("work/removed", first.folder, "notes.txt").read_text() == "a stray"
 
 
 # ---- a dataset of one view, alone and as a frame of a sequence ------------------------------
@@ -193,13 +193,15 @@ def small(request, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     name = request.param
     noted = []
-    for one in (name, f"{name[:-1]}2", "scene_near/other"):
-        published(Path("results", one))
-        noted += write_work_files(one)
+    for dataset_name in (name, f"{name[:-1]}2", "scene_near/other"):
+        published(Path("results", dataset_name))
+        noted += write_work_files(dataset_name)
         listed = ("exr/view_0000f.exr", "exports/colmap/sparse/points.txt", "depth.png")
-        present = [path for path in Path("results", one).rglob("*") if path.is_file()]
+        present = [path for path in Path("results", dataset_name).rglob("*") if path.is_file()]
         noted += [
-            path for path in present if path.relative_to(f"results/{one}").as_posix() not in listed
+            path
+            for path in present
+            if path.relative_to(f"results/{dataset_name}").as_posix() not in listed
         ]
     for path in map(Path, OF_SCENE + OF_OTHERS):
         put(path, {"of": str(path)})
@@ -210,25 +212,25 @@ def small(request, tmp_path, monkeypatch):
 
 def problems_of(name, work="work"):
     integrity = Integrity(Path("results", name), Path(work) if work else None)
-    found = list(integrity.faults())
-    assert len({fault.path for fault in found}) == len(found)
-    return {str(fault.path): fault.problem for fault in found}
+    faults = list(integrity.faults())
+    assert len({fault.path for fault in faults}) == len(faults)
+    return {str(fault.path): fault.problem for fault in faults}
 
 
 def test_a_dataset_has_the_faults_of_its_own_files_only(small):
     assert problems_of(small) == problems_of(small, None) == {}
-    own = {path for path in Path("results", small).rglob("*") if path.is_file()}
-    published_ones = {path for path in own if "report" not in path.parts}
-    own |= {path for path in Path("work", small).rglob("*") if path.is_file()}
-    own |= {Path("work/benchmarks", small, "r.tsv"), *map(Path, OF_SCENE)}
-    everything = [p for top in ("results", "work") for p in Path(top).rglob("*") if p.is_file()]
-    assert len(own) == 17 and own < set(everything)
-    for path in everything:
+    own_paths = {path for path in Path("results", small).rglob("*") if path.is_file()}
+    published_ones = {path for path in own_paths if "report" not in path.parts}
+    own_paths |= {path for path in Path("work", small).rglob("*") if path.is_file()}
+    own_paths |= {Path("work/benchmarks", small, "r.tsv"), *map(Path, OF_SCENE)}
+    all_paths = [p for top in ("results", "work") for p in Path(top).rglob("*") if p.is_file()]
+    assert len(own_paths) == 17 and own_paths < set(all_paths)
+    for path in all_paths:
         if path.name in ("ledger.txt", ".ledger.txt.lock"):
             continue
         content = path.read_bytes()
         path.write_bytes(content + b"\n")
-        assert problems_of(small).keys() == ({str(path)} if path in own else set()), path
+        assert problems_of(small).keys() == ({str(path)} if path in own_paths else set()), path
         if path in published_ones and path.name != "sha256sums.txt":
             assert problems_of(small, None).keys() == {str(path)}
         path.write_bytes(content)
@@ -279,8 +281,8 @@ def test_a_copys_own_lists_must_agree(small):
     simulated.note(written)
     # A run that adds a package notes its files.
     added = {f"{folder}/{name}" for name in ("README.md", "card.json")}
-    found = problems_of(small)
-    assert {path: problem for path, problem in found.items() if path not in added} == invalid
+    problems = problems_of(small)
+    assert {path: problem for path, problem in problems.items() if path not in added} == invalid
     for text, problem in (("no sums\n", "has no checksum"), ("", "is empty"), (None, "is missing")):
         Path(sums).unlink()
         if text is not None:
@@ -328,9 +330,9 @@ def test_without_a_ledger_only_published_files_have_a_checksum(small):
     Path("work/ledger.txt").unlink()
     stray = Path("results", small, "depth.png")
     stray.write_bytes(b"spoilt")
-    found = problems_of(small)
-    assert found.pop("work/ledger.txt").startswith("is missing")
-    assert found.keys() == {str(stray)}
+    problems = problems_of(small)
+    assert problems.pop("work/ledger.txt").startswith("is missing")
+    assert problems.keys() == {str(stray)}
 
 
 @pytest.mark.parametrize(
@@ -372,7 +374,7 @@ def test_history_that_was_set_aside_is_not_missed(small):
 
 @pytest.mark.slow
 def test_files_of_other_settings_are_planned_without_snakemakes_metadata(copy):
-    one, two, three = copy
+    first, second, third = copy
     shutil.rmtree(".snakemake")
     scene = Path("configs/scenes/smoke.yaml")
     text = scene.read_text()
@@ -380,10 +382,10 @@ def test_files_of_other_settings_are_planned_without_snakemakes_metadata(copy):
     scene.unlink()
     scene.write_text(text.replace("size: 0.5", "size: 0.25", 1))
     planned = simulated.planned(Path(), "smoke")
-    assert {f"{two.folder}/lightfield.json", *two.all_records} <= planned
-    others = {name for name in planned if name.startswith((one.folder, three.folder))}
+    assert {f"{second.folder}/lightfield.json", *second.all_records} <= planned
+    others = {name for name in planned if name.startswith((first.folder, third.folder))}
     # A page shows the scene YAML.
-    assert others == {one.page, three.page}
+    assert others == {first.page, third.page}
     scene.write_text(text.replace("samples: 4", "samples: 2"))
     planned = simulated.planned(Path(), "smoke")
     assert all({f"{d.folder}/lightfield.json", *d.all_records} <= planned for d in copy)

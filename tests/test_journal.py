@@ -84,8 +84,8 @@ shard.render(LightField.read(lightfield), ":", lightfield.with_name("exr"), **op
 
 
 def test_a_view_that_hangs_ends_its_process(run_program, room, tmp_path):
-    words = ("--scene", "smoke", "--rig", "LFCuboid_1x1x1")
-    run_program("make_lightfield.py", *words, "--output", tmp_path / "lightfield.json")
+    arguments = ("--scene", "smoke", "--rig", "LFCuboid_1x1x1")
+    run_program("make_lightfield.py", *arguments, "--output", tmp_path / "lightfield.json")
     run = subprocess.run(
         [sys.executable, "-c", HANG, tmp_path / "lightfield.json", room],
         env={"PYTHONPATH": str(SCRIPTS)},

@@ -182,9 +182,9 @@ def test_a_saved_map_is_read_back(tmp_path, name, samples):
     assert loaded.window == made.window
     for key, value in vars(made).items():
         if isinstance(value, np.ndarray):
-            found = getattr(loaded, key)
-            assert np.array_equal(found, value, equal_nan=True), key
-            assert isinstance(found, np.memmap) and found.flags.aligned, key
+            array = getattr(loaded, key)
+            assert np.array_equal(array, value, equal_nan=True), key
+            assert isinstance(array, np.memmap) and array.flags.aligned, key
     first = path.read_bytes()
     for again in (path, tmp_path / "of another name"):
         lens_map.save(again, made)
@@ -203,12 +203,12 @@ def test_a_mirrored_map_equals_one_computed_completely(monkeypatch, source, targ
     np.testing.assert_allclose(folded.source_cos, cosines, atol=1e-6)
     np.testing.assert_allclose(folded.target_cos, -target.pixel_rays()[..., 2], atol=1e-6)
     monkeypatch.setattr(Fold, "of_map", lambda *_: Fold((target.height, target.width)))
-    whole = lens_map.compute(source, target, rotation)
-    assert folded.window == whole.window and folded.summary == pytest.approx(whole.summary)
-    for name, array in vars(whole).items():
+    complete = lens_map.compute(source, target, rotation)
+    assert folded.window == complete.window and folded.summary == pytest.approx(complete.summary)
+    for name, array in vars(complete).items():
         if isinstance(array, np.ndarray):
-            found = getattr(folded, name)
-            assert np.allclose(found, array, rtol=0, atol=1e-6, equal_nan=True), name
+            computed_array = getattr(folded, name)
+            assert np.allclose(computed_array, array, rtol=0, atol=1e-6, equal_nan=True), name
 
 
 @pytest.mark.parametrize("name", ["nearest", "bicubic"])
@@ -225,8 +225,8 @@ def test_a_cube_maps_faces_continue_beyond_their_borders(name):
     for index, turn in enumerate(CUBE_FACES.values()):
         columns = slice(index * side, (index + 1) * side)
         # The place in the strip without borders that has the ray of a pixel in this face's plane.
-        found = cube.rays(*np.moveaxis(made.strip[:, columns].astype(float), -1, 0))
-        np.testing.assert_allclose(found, ahead @ turn.T, atol=1e-5)
+        rays_of_cube = cube.rays(*np.moveaxis(made.strip[:, columns].astype(float), -1, 0))
+        np.testing.assert_allclose(rays_of_cube, ahead @ turn.T, atol=1e-5)
         np.testing.assert_allclose(made.source_cos[:, columns], edge, atol=1e-6)
     # A map's coordinates count in the strip with borders.
     rays = rectilinear(20).pixel_rays() @ lens_map.rotation_matrix(40, 30, 0).T
@@ -260,7 +260,9 @@ def test_samples_are_the_pixels_of_a_finer_target(source):
     finer = lens_map.compute(source, rectilinear(60), rotation, "bicubic")
     assert made.coordinates.shape == (60, 60, 2) and made.centers.shape == (20, 20, 2)
     np.testing.assert_allclose(made.centers, made.coordinates[1::3, 1::3], atol=1e-4)
-    corners = [np.array([one.window[2], one.window[0]]) for one in (made, finer)]
+    corners = [
+        np.array([computed_map.window[2], computed_map.window[0]]) for computed_map in (made, finer)
+    ]
     np.testing.assert_allclose(
         made.coordinates + corners[0], finer.coordinates + corners[1], atol=1e-4
     )
@@ -301,8 +303,8 @@ def test_an_older_file_with_more_arrays_is_read(tmp_path):
 def test_maps_of_other_lenses_rotations_filters_or_samples_have_other_settings():
     asked = (FISHEYE, rectilinear(20), IDENTITY, "bicubic", 1)
     others = (rectilinear(9), rectilinear(21), -IDENTITY, "nearest", 2)
-    found = [asked, *(asked[:i] + others[i : i + 1] + asked[i + 1 :] for i in range(5))]
-    settings = [json.dumps(lens_map.settings(*arguments)) for arguments in found]
+    other_settings = [asked, *(asked[:i] + others[i : i + 1] + asked[i + 1 :] for i in range(5))]
+    settings = [json.dumps(lens_map.settings(*arguments)) for arguments in other_settings]
     assert len(set(settings)) == 6
     assert lens_map.compute(*asked).settings == lens_map.settings(*asked)
 
@@ -322,10 +324,10 @@ def test_a_changed_number_is_found(tmp_path):
     path = tmp_path / "map.npy"
     made = lens_map.compute(FISHEYE, rectilinear(20), IDENTITY)
     lens_map.save(path, made)
-    whole = path.read_bytes()
-    first = whole.index(made.centers.tobytes())
-    for place in (first, first + made.centers.nbytes // 2, len(whole) - 1):
-        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+    content = path.read_bytes()
+    first = content.index(made.centers.tobytes())
+    for place in (first, first + made.centers.nbytes // 2, len(content) - 1):
+        path.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
         with pytest.raises(UserError, match=r"map\.npy: is not .*: it is damaged: its checksum"):
             lens_map.load(path)
 

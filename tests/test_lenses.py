@@ -202,9 +202,9 @@ def test_kannala_brandt_is_opencvs_fisheye() -> None:
 def test_pixels_undo_rays_and_rays_undo_pixels_over_the_whole_frame(name: str, dtype: type) -> None:
     lens = EXAMPLES[name]
     exact, tolerance = dtype == np.float64, 4 * np.finfo(dtype).eps
-    for whole in (True, False):
+    for in_whole_frame in (True, False):
         x, y = grid(lens, dtype)
-        if not whole:
+        if not in_whole_frame:
             x, y = x[1:-1, 1:-1] + dtype(0.25), y[1:-1, 1:-1] + dtype(0.25)
         rays = lens.rays(x, y)
         seen = np.isfinite(rays[..., 0])
@@ -215,7 +215,7 @@ def test_pixels_undo_rays_and_rays_undo_pixels_over_the_whole_frame(name: str, d
         again = lens.rays(*pixels[seen].T)
         assert angle(again, rays[seen]).max() < (1e-9 if exact else 2e-5)
         # A pixel on a border between faces, at a pole or on the seam shares its ray with another.
-        if not whole or not isinstance(lens, CubeMap | Equirectangular):
+        if not in_whole_frame or not isinstance(lens, CubeMap | Equirectangular):
             error = np.abs(pixels - np.stack([x, y], axis=-1))[seen]
             assert error.max() < (1e-9 if exact else 0.01)
 
@@ -702,8 +702,8 @@ def test_the_registry_has_an_example_of_each_lens() -> None:
 
 
 def test_cycles_lenses_exist_as_blenders_cameras() -> None:
-    known = {name for name, lens in LENSES.items() if lens.in_cycles}
-    assert known == {"rectilinear", "equidistant", "equisolid", "polynomial", "equirectangular"}
+    names = {name for name, lens in LENSES.items() if lens.in_cycles}
+    assert names == {"rectilinear", "equidistant", "equisolid", "polynomial", "equirectangular"}
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
@@ -840,20 +840,22 @@ def test_a_projection_matrix_projects_like_the_lens(name: str) -> None:
     for z, expected in ((0.1, -1), (1000, 1)):
         points = np.concatenate([rays * z / -rays[..., 2:], np.ones((9, 9, 1))], axis=-1)
         clip = points @ matrix.T
-        found = clip[..., :3] / clip[..., 3:]
-        np.testing.assert_allclose(found[..., 0], 2 * x / lens.width - 1, atol=1e-9)
-        np.testing.assert_allclose(found[..., 1], 1 - 2 * y / lens.height, atol=1e-9)
-        np.testing.assert_allclose(found[..., 2], expected, atol=1e-9)
+        projected = clip[..., :3] / clip[..., 3:]
+        np.testing.assert_allclose(projected[..., 0], 2 * x / lens.width - 1, atol=1e-9)
+        np.testing.assert_allclose(projected[..., 1], 1 - 2 * y / lens.height, atol=1e-9)
+        np.testing.assert_allclose(projected[..., 2], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", sorted(LENSES.keys() - {"cube_map"}))
 def test_the_schema_describes_a_lens(name: str) -> None:
     schema = TypeAdapter(CameraSettings).json_schema()
     assert name in schema["discriminator"]["mapping"]
-    own = schema["$defs"][schema["discriminator"]["mapping"][name].rsplit("/", 1)[-1]]
-    assert own["properties"]["lens"]["const"] == name
-    assert {"lens", "resolution"} <= set(own["required"])
-    assert all("description" in part for key, part in own["properties"].items() if key != "lens")
+    own_schema = schema["$defs"][schema["discriminator"]["mapping"][name].rsplit("/", 1)[-1]]
+    assert own_schema["properties"]["lens"]["const"] == name
+    assert {"lens", "resolution"} <= set(own_schema["required"])
+    assert all(
+        "description" in part for key, part in own_schema["properties"].items() if key != "lens"
+    )
 
 
 @pytest.mark.parametrize(

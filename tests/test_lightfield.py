@@ -77,7 +77,7 @@ def test_unknown_keys_are_kept(tmp_path: Path) -> None:
 
 
 def test_a_view_is_placed_by_its_matrix_or_by_its_angles(tmp_path: Path) -> None:
-    whole = read(tmp_path, content())
+    complete = read(tmp_path, content())
     held = content()
     for frame in held["frames"]:
         del frame["position"], frame["rotation"]
@@ -86,16 +86,16 @@ def test_a_view_is_placed_by_its_matrix_or_by_its_angles(tmp_path: Path) -> None
     for frame in held["frames"]:
         del frame["world_matrix"]
     by_angles = read(tmp_path, held)
-    for found in (by_matrix, by_angles):
-        np.testing.assert_allclose(found.matrices, whole.matrices, atol=1e-11)
-        for view, same in zip(found.views, whole.views, strict=True):
+    for placed in (by_matrix, by_angles):
+        np.testing.assert_allclose(placed.matrices, complete.matrices, atol=1e-11)
+        for view, same in zip(placed.views, complete.views, strict=True):
             assert view.position.shape == view.rotation.shape == (3,)
             np.testing.assert_allclose(view.position, same.position, atol=1e-11)
             np.testing.assert_allclose(view.rotation, same.rotation, atol=1e-11)
-    view = View.placed("x", whole.views[1].matrix, {"split": "test"})
+    view = View.placed("x", complete.views[1].matrix, {"split": "test"})
     assert (view.position.shape, view.split) == ((3,), "test")
-    np.testing.assert_allclose(view.position, whole.views[1].position, atol=1e-11)
-    np.testing.assert_allclose(view.rotation, whole.views[1].rotation, atol=1e-11)
+    np.testing.assert_allclose(view.position, complete.views[1].position, atol=1e-11)
+    np.testing.assert_allclose(view.rotation, complete.views[1].rotation, atol=1e-11)
     assert View.placed("x", view.matrix).split is None
     # With both, the matrix decides.
     held = content()
@@ -233,7 +233,7 @@ def test_a_views_key_changes_with_everything_that_its_pixels_depend_on() -> None
     first = LightField.from_rig(PLANE, FISHEYE, depth="z", render={"samples": 4}, frame=1)
     view = first.views[0]
     moved = view.matrix + 1e-12 * np.eye(4)[[3, 1, 2, 0]]
-    found = [
+    view_keys = [
         keys.render_key(first, view),
         keys.render_key(first, View.placed("other", view.matrix)),
         keys.render_key(first, View.placed(view.name, moved)),
@@ -244,8 +244,8 @@ def test_a_views_key_changes_with_everything_that_its_pixels_depend_on() -> None
         keys.render_key(first.changed(frame=2), view),
         keys.render_key(first.changed(scene={"fingerprint": "0"}), view),
     ]
-    assert len(set(found)) == len(found)
-    assert all(len(key) == 64 for key in found)
+    assert len(set(view_keys)) == len(view_keys)
+    assert all(len(key) == 64 for key in view_keys)
 
 
 def test_a_views_key_follows_from_nothing_else(tmp_path: Path) -> None:
@@ -278,31 +278,35 @@ def test_a_scenes_fingerprint_follows_from_its_files_or_its_builder(
     with pytest.raises(UserError, match=r"a.blend: its sha256 is not known"):
         keys.scene_fingerprint(blend.model_copy(update={"sha256": None}))
     monkeypatch.setattr(keys, "BUILDERS", tmp_path)
-    found = set()
-    for common, own, seed in (("a", "b", 1), ("c", "b", 1), ("a", "d", 1), ("a", "b", 2)):
-        for folder, text in (("library", common), ("room", own)):
+    fingerprints = set()
+    for common, builder_text, seed in (("a", "b", 1), ("c", "b", 1), ("a", "d", 1), ("a", "b", 2)):
+        for folder, text in (("library", common), ("room", builder_text)):
             (tmp_path / folder).mkdir(exist_ok=True)
             (tmp_path / folder / "__init__.py").write_text(text)
-        found.add(keys.scene_fingerprint(SceneSource(builder="room", parameters={"seed": seed})))
-    assert len(found) == 4 and all(len(key) == 64 for key in found)
+        fingerprints.add(
+            keys.scene_fingerprint(SceneSource(builder="room", parameters={"seed": seed}))
+        )
+    assert len(fingerprints) == 4 and all(len(key) == 64 for key in fingerprints)
 
 
 def test_the_key_of_a_flow_changes_with_lens_poses_and_views(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     first = LightField.from_rig(PLANE, FISHEYE, depth="z")
-    one, other = first.views
-    found = [
-        keys.flow_key(first, one, other, ["a", "b"]),
-        keys.flow_key(first, other, one, ["a", "b"]),
-        keys.flow_key(first, one, one, ["a", "b"]),
-        keys.flow_key(first, other, other, ["a", "b"]),
-        keys.flow_key(first, one, other, ["b", "a"]),
-        keys.flow_key(first.changed(lens=WIDE, depth="distance"), one, other, ["a", "b"]),
+    first_view, second_view = first.views
+    flow_keys = [
+        keys.flow_key(first, first_view, second_view, ["a", "b"]),
+        keys.flow_key(first, second_view, first_view, ["a", "b"]),
+        keys.flow_key(first, first_view, first_view, ["a", "b"]),
+        keys.flow_key(first, second_view, second_view, ["a", "b"]),
+        keys.flow_key(first, first_view, second_view, ["b", "a"]),
+        keys.flow_key(
+            first.changed(lens=WIDE, depth="distance"), first_view, second_view, ["a", "b"]
+        ),
     ]
     monkeypatch.setattr(keys, "FLOW_VERSION", 2)
-    found.append(keys.flow_key(first, one, other, ["a", "b"]))
-    assert len(set(found)) == len(found)
+    flow_keys.append(keys.flow_key(first, first_view, second_view, ["a", "b"]))
+    assert len(set(flow_keys)) == len(flow_keys)
 
 
 def test_keys_never_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -315,13 +319,13 @@ def test_keys_never_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     scene, render = {"name": "a"}, {"samples": 4, "seed": 0}
     first = LightField.from_rig(PLANE, FISHEYE, depth="z", frame=1, scene=scene, render=render)
     blend = SceneSource(blend="a.blend", sha256="ab" * 32)
-    found = [
+    all_keys = [
         keys.render_key(first, first.views[1]),
         keys.names_key(first),
         keys.scene_fingerprint(SceneSource(builder="room")),
         keys.scene_fingerprint(blend, [("a.png", "cd" * 32), ("b.png", None)]),
     ]
-    assert [key[:12] for key in found] == [
+    assert [key[:12] for key in all_keys] == [
         "690b6266f822",
         "6a816a6ab618",
         "5cba495d5265",

@@ -60,13 +60,13 @@ def test_lightfield_and_views_name_the_machine_with_cycles_own_instructions(
     settings = tmp_path / "settings.json"
     write_json(settings, LightfieldSettings.of_capture(dataset).as_json())
     run_program("make_lightfield.py", "--settings", settings, "--output", written)
-    words = ("--blend", room, "--lightfield", written, "--views", "0:1", "--device", "cpu")
-    run_program("render_shard.py", *words, "--output", tmp_path / "exr")
+    arguments = ("--blend", room, "--lightfield", written, "--views", "0:1", "--device", "cpu")
+    run_program("render_shard.py", *arguments, "--output", tmp_path / "exr")
     (view,) = (tmp_path / "exr").iterdir()
     described = LightField.read(written).content["machine"]
     assert images.attribute(view, "plenoforge:machine") == described
 
     asked = [sys.executable, "-c", ASK_CYCLES]
-    told = subprocess.run(asked, capture_output=True, text=True, check=True).stdout
-    (capabilities,) = (line for line in told.splitlines() if "capabilities" in line)
+    output = subprocess.run(asked, capture_output=True, text=True, check=True).stdout
+    (capabilities,) = (line for line in output.splitlines() if "capabilities" in line)
     assert ("AVX2" in capabilities) == ("AVX2" in described)

@@ -36,15 +36,15 @@ def test_simultaneous_jobs_fit_into_memory(cores, shards, need, available, expec
 
 
 def test_this_machines_memory_is_within_every_limit(tmp_path, monkeypatch):
-    found = machine.available()
-    assert 0 < machine.peak() < found
+    available = machine.available()
+    assert 0 < machine.peak() < available
     monkeypatch.setattr(machine, "CONTROL_GROUPS", tmp_path)
     monkeypatch.setattr(machine, "OWN_GROUPS", tmp_path / "own")
-    assert machine.available() >= found
+    assert machine.available() >= available
 
 
 @pytest.mark.parametrize(
-    ("own", "limits"),
+    ("group", "limits"),
     [
         # The second version of control groups: a batch system limits a job, but not its steps.
         (
@@ -64,8 +64,8 @@ def test_this_machines_memory_is_within_every_limit(tmp_path, monkeypatch):
         ),
     ],
 )
-def test_the_tightest_of_nested_memory_limits_counts(own, limits, tmp_path, monkeypatch):
-    (tmp_path / "own").write_text(f"{own}\n")
+def test_the_tightest_of_nested_memory_limits_counts(group, limits, tmp_path, monkeypatch):
+    (tmp_path / "own").write_text(f"{group}\n")
     for name, limit in limits.items():
         path = tmp_path / "groups" / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -88,8 +88,8 @@ def test_a_job_requests_the_measured_memory_of_the_scene(tmp_path):
 
 
 def test_a_scene_is_measured_in_a_process_of_its_own(room):
-    found = scene_memory.measure(room, {"left_out": [], "fullest_frame": 1}, {})
-    assert 100e6 < found < 1e9
+    measured = scene_memory.measure(room, {"left_out": [], "fullest_frame": 1}, {})
+    assert 100e6 < measured < 1e9
 
 
 def test_a_scene_that_does_not_fit_is_refused_before_it_starts(tmp_path):

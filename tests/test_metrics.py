@@ -38,34 +38,34 @@ def expected(truth, deviation, exposure):
 
 def test_two_seeds_give_the_error_of_their_mean():
     truth, deviation = scene(), 0.02
-    found = reference(truth, deviation, 2)
+    estimate = reference(truth, deviation, 2)
     # The variance of a mean of two is half that of one.
-    wanted = expected(truth, deviation, found.exposure) / 2
+    wanted = expected(truth, deviation, estimate.exposure) / 2
     # The estimate deviates by √(2/n) for n values, and lacks the worst thousandth of squares.
-    assert found.own_error == pytest.approx(wanted, rel=0.05)
+    assert estimate.own_error == pytest.approx(wanted, rel=0.05)
     # The estimate also holds against the truth, which only a test knows.
-    actual = float((((found.colour - truth)[MASK] ** 2) * found.weights).mean())
-    assert found.own_error == pytest.approx(actual, rel=0.06)
+    actual = float((((estimate.colour - truth)[MASK] ** 2) * estimate.weights).mean())
+    assert estimate.own_error == pytest.approx(actual, rel=0.06)
 
 
 @pytest.mark.parametrize("renders", [2, 8])
 def test_the_references_own_error_is_not_counted(renders):
     truth = scene()
-    found = reference(truth, 0.02, renders)
+    estimate = reference(truth, 0.02, renders)
     # The image has half the noise of one of the reference's renders.
     image = noisy(truth, 0.01, 7)
-    wanted = expected(truth, 0.01, found.exposure)
-    assert metrics.relative_mse(image, found) == pytest.approx(wanted, rel=0.08)
+    wanted = expected(truth, 0.01, estimate.exposure)
+    assert metrics.relative_mse(image, estimate) == pytest.approx(wanted, rel=0.08)
 
 
 def test_the_exposure_puts_the_typical_pixel_at_middle_grey():
-    found = metrics.make_reference(
+    estimate = metrics.make_reference(
         [np.full((8, 8, 3), 0.72, np.float32)] * 2, None, MASK[28:36, 28:36]
     )
-    assert found.exposure == pytest.approx(-2)
+    assert estimate.exposure == pytest.approx(-2)
     # (0.72 · ¼)² + 0.01 under an error of 0.072 · ¼.
     image = np.full((8, 8, 3), 0.792, np.float32)
-    assert metrics.relative_mse(image, found) == pytest.approx(0.018**2 / 0.0424, rel=1e-5)
+    assert metrics.relative_mse(image, estimate) == pytest.approx(0.018**2 / 0.0424, rel=1e-5)
 
 
 def test_brightness_of_a_scene_does_not_change_its_error():
@@ -84,33 +84,33 @@ def test_brightness_of_a_scene_does_not_change_its_error():
 
 def test_a_few_fireflies_do_not_decide_but_many_do():
     truth = scene()
-    found = reference(truth, 1e-4, 4)
+    estimate = reference(truth, 1e-4, 4)
     image = noisy(truth, 0.02, 5)
-    calm = metrics.relative_mse(image, found)
+    calm = metrics.relative_mse(image, estimate)
     few, many = image.copy(), image.copy()
     few[32, 30:32] = 50
     many[32, 16:48] = 50
-    assert metrics.relative_mse(few, found) == pytest.approx(calm, rel=0.02)
-    assert metrics.relative_mse(many, found) > 100 * calm
+    assert metrics.relative_mse(few, estimate) == pytest.approx(calm, rel=0.02)
+    assert metrics.relative_mse(many, estimate) > 100 * calm
     # They do decide if all pixels count.
-    assert metrics.relative_mse(few, found, left_out=0) > 100 * calm
+    assert metrics.relative_mse(few, estimate, left_out=0) > 100 * calm
 
 
 def test_pixels_outside_the_image_circle_do_not_count():
     truth = scene()
-    found = reference(truth, 0.01, 4)
+    estimate = reference(truth, 0.01, 4)
     image = noisy(truth, 0.03, 5)
     spoilt = np.where(MASK[..., None], image, np.float32(9))
-    assert metrics.compare(spoilt, None, found) == metrics.compare(image, None, found)
+    assert metrics.compare(spoilt, None, estimate) == metrics.compare(image, None, estimate)
 
 
 def test_pictures_are_compared_as_opencv_and_scikit_image_do():
     truth = scene()
-    whole = np.ones_like(MASK)
-    found = metrics.make_reference([truth.astype(np.float32)] * 2, None, whole)
+    all_pixels = np.ones_like(MASK)
+    estimate = metrics.make_reference([truth.astype(np.float32)] * 2, None, all_pixels)
     image = noisy(truth, 0.03, 5)
-    errors = metrics.compare(image, None, found)
-    shown, wanted = metrics.developed(image, found), metrics.developed(truth, found)
+    errors = metrics.compare(image, None, estimate)
+    shown, wanted = metrics.developed(image, estimate), metrics.developed(truth, estimate)
     assert errors.psnr == pytest.approx(cv2.PSNR(wanted, shown, R=1.0), abs=1e-6)
     # Its own mean leaves out the border.
     similarity = structural_similarity(
@@ -124,28 +124,30 @@ def test_pictures_are_compared_as_opencv_and_scikit_image_do():
     assert errors.ssim == pytest.approx(similarity, abs=0.01)
     mean = flip_evaluator.evaluate(*(x.astype(np.float32) for x in (wanted, shown)), "LDR")[1]
     assert errors.flip == pytest.approx(mean, rel=1e-5)
-    same = metrics.compare(truth.astype(np.float32), None, found)
+    same = metrics.compare(truth.astype(np.float32), None, estimate)
     assert (same.psnr, same.ssim, same.flip) == (np.inf, pytest.approx(1), 0)
 
 
 def test_common_metrics_use_unexposed_light():
-    truth, whole = np.full((16, 16, 3), 0.5, np.float32), np.ones((16, 16), bool)
-    found = metrics.make_reference([truth] * 2, None, whole)
-    errors = metrics.compare(truth + np.float32(0.1), None, found)
+    truth, all_pixels = np.full((16, 16, 3), 0.5, np.float32), np.ones((16, 16), bool)
+    estimate = metrics.make_reference([truth] * 2, None, all_pixels)
+    errors = metrics.compare(truth + np.float32(0.1), None, estimate)
     assert errors.relative_mse_unexposed == pytest.approx(0.01 / 0.26, rel=1e-5)
     assert errors.mrse == pytest.approx(0.01 / 0.51**2, rel=1e-5)
 
 
 def test_bias_and_variance_are_separated_and_add_up():
     truth = scene()
-    found = reference(truth, 0.01, 8)
+    estimate = reference(truth, 0.01, 8)
     renders = [noisy(truth + 0.05, 0.03, seed) for seed in range(12)]
-    bias, variance = metrics.bias_and_variance(renders, found)
-    assert bias == pytest.approx(expected(truth, 0.05, found.exposure), rel=0.05)
-    assert variance == pytest.approx(expected(truth, 0.03, found.exposure), rel=0.05)
-    whole = np.mean([metrics.relative_mse(render, found, left_out=0) for render in renders])
-    assert bias + variance == pytest.approx(whole, rel=1e-9)
-    none, _ = metrics.bias_and_variance([noisy(truth, 0.03, seed) for seed in range(12)], found)
+    bias, variance = metrics.bias_and_variance(renders, estimate)
+    assert bias == pytest.approx(expected(truth, 0.05, estimate.exposure), rel=0.05)
+    assert variance == pytest.approx(expected(truth, 0.03, estimate.exposure), rel=0.05)
+    error_of_all_pixels = np.mean(
+        [metrics.relative_mse(render, estimate, left_out=0) for render in renders]
+    )
+    assert bias + variance == pytest.approx(error_of_all_pixels, rel=1e-9)
+    none, _ = metrics.bias_and_variance([noisy(truth, 0.03, seed) for seed in range(12)], estimate)
     assert abs(none) < variance / 12
 
 
@@ -200,19 +202,19 @@ def test_the_pareto_front_holds_the_points_that_none_beats():
 
 def test_independent_errors_disagree_fully_and_common_ones_not_at_all():
     truth = scene()
-    one, other = reference(truth, 1e-4, 4), reference(truth * 1.1, 1e-4, 4)
+    first, second = reference(truth, 1e-4, 4), reference(truth * 1.1, 1e-4, 4)
     everywhere = np.flatnonzero(MASK)
     common = np.random.default_rng(3).normal(0, 0.03, truth.shape)
     bias = [(picture + common).astype(np.float32) for picture in (truth, truth * 1.1)]
     noise = [noisy(truth, 0.03, 11), noisy(truth * 1.1, 0.03, 12)]
-    alike = metrics.disagreement(tuple(bias), (one, other), (everywhere, everywhere))
-    apart = metrics.disagreement(tuple(noise), (one, other), (everywhere, everywhere))
+    alike = metrics.disagreement(tuple(bias), (first, second), (everywhere, everywhere))
+    apart = metrics.disagreement(tuple(noise), (first, second), (everywhere, everywhere))
     assert alike.share == pytest.approx(0, abs=0.01)
     assert apart.share == pytest.approx(1, abs=0.05)
     # The error is a tenth of each pixel. The 0.01 in the denominator makes it smaller.
     assert 0.05 < apart.floor < 0.1
     assert apart.floor == pytest.approx(alike.floor, rel=0.01)
-    assert apart.added**2 == pytest.approx(2 * expected(truth, 0.03, one.exposure), rel=0.1)
+    assert apart.added**2 == pytest.approx(2 * expected(truth, 0.03, first.exposure), rel=0.1)
     assert apart.total**2 == pytest.approx(apart.added**2 + apart.floor**2, rel=0.05)
     assert alike.total == pytest.approx(alike.floor, rel=1e-3)
 

@@ -84,7 +84,7 @@ CHOICE = "scenes: hostile\nrigs: all\npreset: full\n"
 
 
 @pytest.mark.parametrize(
-    ("text", "own", "arguments"),
+    ("text", "config_text", "arguments"),
     [
         ("a0: &a0 [x]\n" + BOMB + "rigs: *a11\n", CHOICE, []),
         (yaml.safe_dump(RIGHT), CHOICE, ["work=a;id"]),
@@ -93,13 +93,15 @@ CHOICE = "scenes: hostile\nrigs: all\npreset: full\n"
     ],
 )
 @pytest.mark.slow
-def test_a_hostile_plan_ends_with_one_line_and_little_memory(text, own, arguments, tmp_path):
+def test_a_hostile_plan_ends_with_one_line_and_little_memory(
+    text, config_text, arguments, tmp_path
+):
     """The user's own folder has the user's config.yaml."""
     (tmp_path / "configs/scenes").mkdir(parents=True)
     (tmp_path / "configs/scenes/hostile.yaml").write_text(text)
-    (tmp_path / "config.yaml").write_text(own)
-    words = ("-n", "--cores", "1", "--snakefile", config.ROOT / "Snakefile")
-    command = [SNAKEMAKE, *words, *(["--config", *arguments] if arguments else [])]
+    (tmp_path / "config.yaml").write_text(config_text)
+    command_line = ("-n", "--cores", "1", "--snakefile", config.ROOT / "Snakefile")
+    command = [SNAKEMAKE, *command_line, *(["--config", *arguments] if arguments else [])]
     run = subprocess.run(
         [sys.executable, "-c", MEASURED, *map(str, command)],
         cwd=tmp_path,

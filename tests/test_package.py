@@ -55,13 +55,13 @@ def packed(folder, target, most=None):
 
 
 def test_a_package_has_the_same_bytes_whoever_packs_it_and_when(folder, tmp_path):
-    (one,) = packed(folder, tmp_path / "one" / f"{NAME}.tar")
+    (first_archive,) = packed(folder, tmp_path / "one" / f"{NAME}.tar")
     for path in folder.rglob("*"):
         path.chmod(0o777)
         os.utime(path, (1, 1))
     (two,) = packed(folder, tmp_path / "two" / f"{NAME}.tar")
-    assert one.read_bytes() == two.read_bytes()
-    with tarfile.open(one) as archive:
+    assert first_archive.read_bytes() == two.read_bytes()
+    with tarfile.open(first_archive) as archive:
         for entry in archive:
             assert (entry.mtime, entry.uid, entry.gid, entry.uname) == (0, 0, 0, "")
             assert entry.name.startswith(f"{NAME}/")
@@ -107,9 +107,11 @@ def test_the_card_describes_loading_and_citing(folder, tmp_path):
     )
     assert card["loaders"]["."].endswith("'./exr/view_0000f.exr').channels()")
     # This reader does not use nerfstudio's file.
-    found = {path for path, how in card["loaders"].items() if how.startswith("./instant-ngp")}
-    assert found == {"perspective/transforms.json"}
-    assert transforms(folder) == [folder / path for path in found]
+    instant_ngp_files = {
+        path for path, how in card["loaders"].items() if how.startswith("./instant-ngp")
+    }
+    assert instant_ngp_files == {"perspective/transforms.json"}
+    assert transforms(folder) == [folder / path for path in instant_ngp_files]
     assert all(text in readme for text in (*card["cite"], *card["loaders"].values()))
     assert "licence of the scene | not stated" in readme
     credited = load_scene("lone_monk_original")

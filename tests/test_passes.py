@@ -58,17 +58,17 @@ def test_objects_are_those_of_ray_casts_with_common_numbers(lens, made):
     expected = np.vectorize(lambda name: numbers.get(name, 0))(cast)
     np.testing.assert_array_equal(read(made / lens, "object")[..., 0], expected)
     materials = read_json(made / lens / "material" / "names.json")
-    found = read(made / lens, "material")[..., 0]
+    material_numbers = read(made / lens, "material")[..., 0]
     painted = {"floor": "grey", "wall": "red", "ball": "glass", "twin": "glow"}
-    for thing, surface in painted.items():
-        assert set(found[cast == thing]) == {materials[surface]}
+    for object_name, surface in painted.items():
+        assert set(material_numbers[cast == object_name]) == {materials[surface]}
 
 
 @pytest.mark.parametrize("lens", LENSES)
 def test_normals_are_those_of_the_planes_in_world_space(lens, made):
     cast, normal = np.load(made / "objects.npz")[lens], read(made / lens, "normal")
-    for thing, known in {"floor": (0, 0, 1), "wall": (0, -1, 0)}.items():
-        angle = np.linalg.norm(normal[cast == thing] - known, axis=-1)
+    for object_name, expected_normal in {"floor": (0, 0, 1), "wall": (0, -1, 0)}.items():
+        angle = np.linalg.norm(normal[cast == object_name] - expected_normal, axis=-1)
         assert angle.max() < 1e-5
     lengths = np.linalg.norm(normal, axis=-1)
     np.testing.assert_allclose(lengths[cast != ""], 1, atol=1e-5)
@@ -82,14 +82,14 @@ def test_motion_is_the_walls_movement_through_the_lens(lens, made):
     view, on_wall = content.views[0], cast == "wall"
     rays = content.lens.pixel_rays()[on_wall] @ view.matrix[:3, :3].T
     points = rays * ((WALL[1][1] - view.position[1]) / rays[:, 1:2])
-    for frame, found in ((0, motion[on_wall][:, :2]), (2, motion[on_wall][:, 2:])):
+    for frame, wall_motion in ((0, motion[on_wall][:, :2]), (2, motion[on_wall][:, 2:])):
         moved = points + np.subtract(WALL[frame], WALL[1])
         truth = content.lens.pixels(moved @ view.matrix[:3, :3])
         truth -= content.lens.pixels(points @ view.matrix[:3, :3])
         if lens == "panorama":
             truth[:, 0] -= 2 * SIZE * np.rint(truth[:, 0] / (2 * SIZE))
         assert np.abs(truth).max() > 0.3
-        np.testing.assert_allclose(found, truth, atol=1e-3)
+        np.testing.assert_allclose(wall_motion, truth, atol=1e-3)
     assert not motion[~on_wall].any()
 
 
@@ -111,8 +111,8 @@ def test_values_that_are_not_numbers_are_counted_and_become_0():
     wrong = np.array([[[np.nan, np.nan, np.nan], [0, 0, 1]]], np.float32)
     lens = lenses.from_camera(LENSES["panorama"])
     for name in ("normal", "diffuse_light"):
-        found = SimpleNamespace(normal=wrong, passes={name: wrong})
-        channels, attributes = shard.pass_channels(PASSES[name], found, found, lens)
+        geometry = SimpleNamespace(normal=wrong, passes={name: wrong})
+        channels, attributes = shard.pass_channels(PASSES[name], geometry, geometry, lens)
         assert attributes[images.NAN_ATTRIBUTE] == 3
         assert [plane[0].tolist() for plane in channels.values()] == [[0, 0], [0, 0], [0, 1]]
 
@@ -172,20 +172,20 @@ def test_the_eyes_of_an_omnidirectional_pair_circle_their_centre(eye, made):
     view = f"view_0000f_{('left', 'right')[eye]}"
     numbers, casts = read_json(made / "eyes/object/names.json"), np.load(made / "objects.npz")
     expected = np.vectorize(lambda name: numbers.get(name, 0))(casts[f"eye {eye}"])
-    found = read(made / "eyes", "object", view)[..., 0]
-    assert (found == expected).mean() > 0.998
+    numbers_in_pass = read(made / "eyes", "object", view)[..., 0]
+    assert (numbers_in_pass == expected).mean() > 0.998
     centre = np.vectorize(lambda name: numbers.get(name, 0))(casts[f"eye {1 - eye}"])
-    assert (found == centre).mean() < 0.97
+    assert (numbers_in_pass == centre).mean() < 0.97
     assert "Z" not in images.read_header(made / f"eyes/exr/{view}.exr").channels
 
 
 def test_views_without_a_centre_are_not_reprojected_nor_exported(made, tmp_path, run_program):
     source = made / "eyes"
-    words = ("--input-cfg", source / "lightfield.json")
+    arguments = ("--input-cfg", source / "lightfield.json")
     folders = ("--input-dir", source / "exr", "--output-dir", tmp_path)
     for program in (
-        ("reproject.py", *words, *folders, "--png", "--rectilinear", "18,36"),
-        ("export_instant_ngp.py", *words, "--output", tmp_path / "transforms.json"),
+        ("reproject.py", *arguments, *folders, "--png", "--rectilinear", "18,36"),
+        ("export_instant_ngp.py", *arguments, "--output", tmp_path / "transforms.json"),
     ):
         refused = run_program(*program, check=False)
         assert refused.returncode == 1
@@ -219,28 +219,28 @@ def in_fog(folder):
 
 @pytest.mark.parametrize("lens", LENSES)
 def test_a_matte_is_the_part_of_samples_that_hit_the_object(lens, made):
-    found, cast = mattes(made / lens), np.load(made / "objects.npz")[lens]
+    part_of, cast = mattes(made / lens), np.load(made / "objects.npz")[lens]
     clear = ~in_fog(made / lens)
     for name in ("floor", "wall", "ball", "metal"):
-        samples = found[name][clear] * RENDER["samples"]
+        samples = part_of[name][clear] * RENDER["samples"]
         np.testing.assert_allclose(samples, np.rint(samples), atol=1e-5)
         # Inside the object, the pixel shows nothing else.
         inside = clear & binary_erosion(cast == name, np.ones((5, 5)))
-        assert (found[name][inside] == 1).all()
-        assert found[name][cast == name].mean() > 0.7
-    covered = sum(found.values())
+        assert (part_of[name][inside] == 1).all()
+        assert part_of[name][cast == name].mean() > 0.7
+    covered = sum(part_of.values())
     np.testing.assert_array_less(covered[clear], 1 + 1e-6)
-    edges = (found["wall"] > 0) & (found["wall"] < 1) & clear
+    edges = (part_of["wall"] > 0) & (part_of["wall"] < 1) & clear
     assert edges.sum() > 20
 
 
 def test_alpha_is_the_sum_of_the_mattes_and_other_programs_read_them(made):
     alpha = images.read_image(made / "transparent/exr/view_0000f.exr").channels["A"]
-    found = mattes(made / "transparent")
+    part_of = mattes(made / "transparent")
     # Glass has less alpha. Outside the image circle, Cycles' alpha is opaque.
-    solid = binary_erosion(seen_by_fisheye(made), iterations=2) & (found["ball"] == 0)
+    solid = binary_erosion(seen_by_fisheye(made), iterations=2) & (part_of["ball"] == 0)
     solid &= ~in_fog(made / "transparent")
-    np.testing.assert_allclose(sum(found.values())[solid], alpha[solid], atol=1e-3)
+    np.testing.assert_allclose(sum(part_of.values())[solid], alpha[solid], atol=1e-3)
     # Blender's compositor finds the object by the hash of its name.
     read_there = images.read_image(made / "matte.exr", ["R"]).channels["R"]
     wall = mattes(made / "perspective")["wall"]
@@ -267,17 +267,17 @@ def test_the_parts_of_light_add_up_to_the_colour(lens, made):
 @pytest.mark.parametrize("view", ["view_0000f", "view_0001f"])
 def test_geometry_is_the_same_beside_a_denoised_colour(view, made):
     for name in ("normal", "object", "material"):
-        found = read(made / "denoised", name, view)
-        np.testing.assert_array_equal(found, read(made / "perspective", name, view))
+        denoised = read(made / "denoised", name, view)
+        np.testing.assert_array_equal(denoised, read(made / "perspective", name, view))
 
 
 def test_colour_and_depth_are_the_same_without_passes(made):
-    one, other = (
+    plain, with_passes = (
         images.read_image(made / name / "exr" / "view_0000f.exr").channels
         for name in ("perspective", "plain")
     )
     for channel in "RGBZ":
-        np.testing.assert_array_equal(one[channel], other[channel])
+        np.testing.assert_array_equal(plain[channel], with_passes[channel])
     assert {path.name for path in (made / "plain").iterdir()} == {"exr", "lightfield.json"}
 
 
@@ -410,7 +410,7 @@ def test_reprojected_passes_keep_their_meaning(made, tmp_path, run_program):
         *("--source-record", made / "fisheye.json", "--record", tmp_path / "record.json"),
     )
     content = LightField.read(target / "lightfield.json")
-    assert [found.name for found in content.passes] == names
+    assert [render_pass.name for render_pass in content.passes] == names
     files = read_json(tmp_path / "record.json")["files"]
     assert len(files) == 2 * (1 + len(names))
     assert "perspective/normal/view_0000f.exr" in files
@@ -423,9 +423,9 @@ def test_reprojected_passes_keep_their_meaning(made, tmp_path, run_program):
     pairs = {tuple(pair) for pair in original.reshape(-1, 12)[:, :2].tolist()}
     assert {tuple(pair) for pair in matte.reshape(-1, 12)[:, :2].tolist()} - pairs == set()
     assert mattes(target)["wall"][truth == numbers["wall"]].mean() > 0.9
-    normal, known = read(target, "normal"), read(made / "perspective", "normal")
+    normal, expected_normal = read(target, "normal"), read(made / "perspective", "normal")
     np.testing.assert_allclose(np.linalg.norm(normal, axis=-1)[truth > 0], 1, atol=1e-5)
-    cosine = np.sum(normal * known, axis=-1)
+    cosine = np.sum(normal * expected_normal, axis=-1)
     assert np.median(cosine[truth > 0]) > 1 - 1e-6
     total = sum(read(target, name).astype(np.float64) for name in PARTS_OF_LIGHT)
     # The bilinear filter has no negative lobes, which would change the sum of clamped parts. All

@@ -67,8 +67,8 @@ def test_a_spheres_name_has_its_elevation_and_diameter_in_centimetres(scene):
 @pytest.fixture
 def sphere(tmp_path):
     """The garden's sphere of 642 views at full size, with 6442 s each unless a probe tells more."""
-    (found,) = (d for d in scene_datasets("garden") if d.rig_name == "LFSphere_e100cm_d170cm")
-    return replace(found, work_root=str(tmp_path))
+    (dataset,) = (d for d in scene_datasets("garden") if d.rig_name == "LFSphere_e100cm_d170cm")
+    return replace(dataset, work_root=str(tmp_path))
 
 
 def test_shards_follow_from_the_jobs_of_a_cluster_and_from_a_probe(sphere):
@@ -111,12 +111,12 @@ def test_a_dataset_in_progress_keeps_its_shards(sphere):
 @pytest.mark.slow
 def test_a_clusters_dataset_keeps_its_shards_on_any_machine(tmp_path):
     folder = checkout(tmp_path)
-    words = ("--config", "rigs=LFSphere_e100cm_d170cm", "preset=full")
+    arguments = ("--config", "rigs=LFSphere_e100cm_d170cm", "preset=full")
     cluster = ("--executor", "cluster-generic", "--cluster-generic-submit-cmd", "sh")
     # One core each for 20 minutes is less than a view takes.
-    assert planned(folder, "--jobs", "100", *cluster, *words)["render"] == 642
+    assert planned(folder, "--jobs", "100", *cluster, *arguments)["render"] == 642
     shard_counts.note(str(folder / "work"), {"garden/LFSphere_e100cm_d170cm": (642, 300)})
-    assert planned(folder, *words)["render"] == 300
+    assert planned(folder, *arguments)["render"] == 300
 
 
 def test_the_table_adds_up_the_probes_measurements():
@@ -142,8 +142,8 @@ def test_the_table_adds_up_the_probes_measurements():
 def test_denoised_and_calibrated_times_are_beside_the_plain_ones():
     """Path tracing has the error 1 / N. Denoised renders have half, and cost three samples more."""
     unchanged = {
-        way: [{"samples": n, "seconds": n + more, "error": part / n} for n in (4, 8, 16)]
-        for way, more, part in (("path tracing", 0, 1), ("denoised", 3, 0.5))
+        method: [{"samples": n, "seconds": n + more, "error": part / n} for n in (4, 8, 16)]
+        for method, more, part in (("path tracing", 0, 1), ("denoised", 3, 0.5))
     }
     advice = {"own": {"samples": 256, "denoise": False}, "unchanged": unchanged}
     denoised, calibrated = plan.cheaper_parts(256, advice)
@@ -157,7 +157,9 @@ def test_denoised_and_calibrated_times_are_beside_the_plain_ones():
     assert plan.cheaper_parts(256, biased_advice) == (None, pytest.approx(100 / 256))
     # Without noise, or without a time, no estimate is possible.
     for figures in ({"error": 0.0}, {"seconds": 0.0}):
-        still = {way: [point | figures for point in points] for way, points in unchanged.items()}
+        still = {
+            method: [point | figures for point in points] for method, points in unchanged.items()
+        }
         assert plan.cheaper_parts(256, advice | {"unchanged": still}) == (None, None)
     assert plan.cheaper_parts(6, advice) == plan.cheaper_parts(256, None) == (None, None)
     probe = {"resolution": [64, 64], "samples": 256, "device": "CPU", "views": 100}
@@ -208,6 +210,6 @@ def test_a_rig_of_one_view_is_probed_with_it(tmp_path, monkeypatch):
     lightfield = LightField.from_rig(
         {"type": "plane", "cameras": [1, 1]}, lens, render={"samples": 4}
     )
-    found = probing.measure(lightfield, 3, 64, tmp_path, tmp_path, "cpu")
-    assert (found["view_seconds"], found["view_bytes"]) == ([8.0], [16.0])
-    assert "| a/b | 1 | 128 × 128 | 4 | 8 ± 0 |" in plan.table([("a/b", 1, found)], {})
+    probe = probing.measure(lightfield, 3, 64, tmp_path, tmp_path, "cpu")
+    assert (probe["view_seconds"], probe["view_bytes"]) == ([8.0], [16.0])
+    assert "| a/b | 1 | 128 × 128 | 4 | 8 ± 0 |" in plan.table([("a/b", 1, probe)], {})

@@ -16,10 +16,12 @@ def test_every_thread_may_use_all_processors_again():
         assert processors.available() == 1
         thread = threading.Thread(target=done.wait)
         thread.start()
-    found = [os.sched_getaffinity(int(task.name)) for task in Path("/proc/self/task").iterdir()]
+    processors_of_threads = [
+        os.sched_getaffinity(int(task.name)) for task in Path("/proc/self/task").iterdir()
+    ]
     done.set()
     thread.join()
-    assert all(affinity == allowed for affinity in found)
+    assert all(affinity == allowed for affinity in processors_of_threads)
     assert processors.available() == len(allowed)
 
 

@@ -226,8 +226,8 @@ def test_views_of_another_bpy_are_rendered_again_and_reported(shard):
     image = images.read_image(second)
     others[images.BPY_ATTRIBUTE] = version("bpy")
     images.write_exr(second, image.channels, others)
-    told = shard("--views", "0:2").stderr.splitlines()
-    assert [line for line in told if line.startswith("warning: ")] == [
+    lines = shard("--views", "0:2").stderr.splitlines()
+    assert [line for line in lines if line.startswith("warning: ")] == [
         f"warning: views rendered by bpy 4.2.0, which bpy {version('bpy')} renders again: 1"
     ]
     assert sha256(first) == right
@@ -276,8 +276,8 @@ def test_a_missing_device_is_an_error(shard):
     device = "metal"
     result = shard("--device", device, check=False)
     assert result.returncode == 1
-    told = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
-    assert told == [
+    errors = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
+    assert errors == [
         f"error: device: this machine has no {device} device that Cycles can use; "
         "use device=cpu, or device=auto to take what there is"
     ]
@@ -309,14 +309,14 @@ def test_colours_are_rec_709_whatever_space_a_blend_works_in(run_program, tmp_pa
     camera = {"lens": "rectilinear", "fov": 60, "resolution": [16, 16]}
     content = lightfield(camera, RENDER | {"passes": ["environment"]})
     content.write(tmp_path / "lightfield.json")
-    found = []
+    colours = []
     for name in ("ACEScg", "Linear Rec.709"):
-        words = ("--blend", tmp_path / f"{name}.blend", "--output", tmp_path / name / "exr")
-        run_program("render_shard.py", *words, "--lightfield", tmp_path / "lightfield.json")
+        arguments = ("--blend", tmp_path / f"{name}.blend", "--output", tmp_path / name / "exr")
+        run_program("render_shard.py", *arguments, "--lightfield", tmp_path / "lightfield.json")
         for folder in ("exr", "environment"):
             (path,) = (tmp_path / name / folder).iterdir()
-            found.append(images.read_image(path, "RGB").colour)
-    for colour in found:
+            colours.append(images.read_image(path, "RGB").colour)
+    for colour in colours:
         parts = colour / colour.sum(axis=-1, keepdims=True)
         assert np.abs(parts - expected / expected.sum()).max() < 1e-3
-        np.testing.assert_allclose(colour, found[-1], rtol=2e-3)
+        np.testing.assert_allclose(colour, colours[-1], rtol=2e-3)

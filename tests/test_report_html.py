@@ -350,13 +350,15 @@ def test_each_pass_of_the_middle_view_is_shown(show, tmp_path):
         "flow": {"X": 1, "V": left},
     }
     for view in lightfield.views:
-        for found in (*(PASSES[name] for name in shown[:-1]), FLOW):
-            name = view.flow if found == FLOW else view.name
+        for render_pass in (*(PASSES[name] for name in shown[:-1]), FLOW):
+            name = view.flow if render_pass == FLOW else view.name
             planes = {
-                channel: (0 * left + holds[found.name].get(channel, 0)).astype(found.dtype)
-                for channel in found.channels
+                channel: (0 * left + holds[render_pass.name].get(channel, 0)).astype(
+                    render_pass.dtype
+                )
+                for channel in render_pass.channels
             }
-            images.write_exr(found.path(tmp_path, name), planes)
+            images.write_exr(render_pass.path(tmp_path, name), planes)
     tab = show(make_page(tmp_path, rig))
     pictures = {
         name: decoded(tab.get_attribute(f"img[alt^='{name} of view']", "src"))[4, [4, -4]].tolist()
@@ -364,8 +366,8 @@ def test_each_pass_of_the_middle_view_is_shown(show, tmp_path):
     }
     assert tab.locator(".passes img").count() == len(shown)
     assert pictures["normal"] == [[128, 128, 255], [0, 0, 0]]
-    one, other = pictures["object"]
-    assert one != other and max(one) > 100 and max(other) > 100
+    first, second = pictures["object"]
+    assert first != second and max(first) > 100 and max(second) > 100
     assert max(pictures["cryptomatte"][0]) > 40 and pictures["cryptomatte"][1] == [0, 0, 0]
     assert pictures["motion"] == [[255, 0, 0], [255, 255, 255]]
     assert pictures["albedo"] == [[255, 0, 0], [0, 0, 0]]
@@ -422,10 +424,10 @@ def test_the_programs_make_pictures_and_page(run_program, tmp_path):
     figures, page = (tmp_path / name for name in ("figures.json", "page.json"))
     figures.write_text(json.dumps({"rig": rig}))
     page.write_text(json.dumps({"rig": rig, "yaml": YAML, "command": "make <it>"}))
-    words = ("--dataset", tmp_path, "--settings")
-    run_program("report_figures.py", *words, figures, "--output", tmp_path / "report")
-    words = (*words, page, "--name", "a/b")
-    run_program("report_html.py", *words, "--output", tmp_path / "x.html")
+    arguments = ("--dataset", tmp_path, "--settings")
+    run_program("report_figures.py", *arguments, figures, "--output", tmp_path / "report")
+    arguments = (*arguments, page, "--name", "a/b")
+    run_program("report_html.py", *arguments, "--output", tmp_path / "x.html")
     text = (tmp_path / "x.html").read_text()
     for part in (
         "view_0001f, the view in the middle",
@@ -468,8 +470,8 @@ def test_a_picture_of_16_bits_is_shown_with_8(tmp_path):
     images.write_png(tmp_path / "b.png", pixels * np.uint16(257))
     for fault in faults.collect(tmp_path, ["a", "b"]):
         assert (decoded(fault.colour) == pixels).all()
-    one, other = (contact_sheet.small_view(tmp_path / f"{name}.png", 8, 8) for name in "ab")
-    assert (one == pixels).all() and (other == pixels).all()
+    first, second = (contact_sheet.small_view(tmp_path / f"{name}.png", 8, 8) for name in "ab")
+    assert (first == pixels).all() and (second == pixels).all()
 
 
 @pytest.mark.parametrize(("views", "width", "height"), [(120, 1, 999), (1, 1, 999), (3, 999, 1)])

@@ -109,8 +109,8 @@ def test_the_papers_command(dataset, run):
     light = scene_color(np.array([1 / 24, -1 / 24, -1.0])) / 2
     light = light * (1 + light / 25) / (1 + light)
     expected = 255 * (1.055 * light ** (1 / 2.4) - 0.055)
-    found = [int(pixels[name][12, 12]) for name in "RGB"]
-    assert np.abs(found - expected).max() < 2
+    colour = [int(pixels[name][12, 12]) for name in "RGB"]
+    assert np.abs(colour - expected).max() < 2
     config = json.loads((out / "lightfield.json").read_text())
     assert config["resolution"] == [24, 24] and config["sensor_size"] == [36, 36]
     assert config["camera"]["type"] == "PERSP" and config["camera"]["focal_length"] == 18
@@ -138,8 +138,8 @@ def test_exr_has_depth_along_its_own_axis(dataset, run, precision):
     assert matrix[:3, 3].tolist() == [1, 0, 1]
     # The turned camera's centre shows the point of the world in its direction.
     light = scene_color(matrix[:3, :3] @ [0, 0, -1]) + 0.1
-    found = np.mean([[image.channels[c][11:13, 11:13].mean()] for c in "RGB"], axis=1)
-    assert np.abs(found - light).max() < 0.02
+    colour = np.mean([[image.channels[c][11:13, 11:13].mean()] for c in "RGB"], axis=1)
+    assert np.abs(colour - light).max() < 0.02
 
 
 def test_the_rotation_is_also_in_the_frames_euler_angles(dataset, run):
@@ -189,14 +189,14 @@ def test_a_copy_as_png_has_no_negative_depth_and_no_nan(dataset, run):
     channels = {**dict.fromkeys("RGB", ones), "G": ones.copy(), "Z": -ones}
     channels["G"][20, 20] = np.nan
     write_exr(dataset / "a.exr", channels)
-    words = ["--no-reproject", "--png", "--exr", "--depth-png", "1000", "--single"]
-    run(*words, str(dataset / "a.exr"), source=False)
-    found = {
+    arguments = ["--no-reproject", "--png", "--exr", "--depth-png", "1000", "--single"]
+    run(*arguments, str(dataset / "a.exr"), source=False)
+    channels_of = {
         name: read_image(dataset / "out" / name).channels for name in names(dataset / "out")[:3]
     }
-    assert not found["a_depth.png"]["Y"].any()
-    assert [found["a.png"][c][20, 20] for c in "RGBA"] == [0] * 4
-    assert [found["a.exr"][c][20, 20] for c in "RGB"] == [0] * 3
+    assert not channels_of["a_depth.png"]["Y"].any()
+    assert [channels_of["a.png"][c][20, 20] for c in "RGBA"] == [0] * 4
+    assert [channels_of["a.exr"][c][20, 20] for c in "RGB"] == [0] * 3
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg"])
@@ -206,8 +206,8 @@ def test_8_bit_images_are_read_as_srgb(dataset, run, suffix):
     path = dataset / f"gray{suffix}"
     assert cv2.imwrite(str(path), code)
     run("--nn", "--png", *PERSPECTIVE, "--exr", "--single", str(path), source=False)
-    found = read_image(dataset / "out" / "gray.png").channels["G"]
-    assert np.abs(found[:, [2, -3]].astype(int) - [40, 128]).max() <= 1
+    green = read_image(dataset / "out" / "gray.png").channels["G"]
+    assert np.abs(green[:, [2, -3]].astype(int) - [40, 128]).max() <= 1
     linear = read_image(dataset / "out" / "gray.exr").channels
     assert abs(float(linear["G"][12, 20]) - ((128 / 255 + 0.055) / 1.055) ** 2.4) < 5e-3
     assert "Z" not in linear
@@ -219,20 +219,20 @@ def test_transparent_pixels_of_a_png_give_no_colour(dataset, run):
     pixels[:, SIZE // 2 :, 3] = 255
     write_png(dataset / "half.png", pixels)
     run("--png", *PERSPECTIVE, "--single", str(dataset / "half.png"), source=False)
-    found = read_image(dataset / "out" / "half.png").channels
-    assert not found["A"][:, :11].any() and (found["A"][:, 13:] == 255).all()
-    assert (found["R"][:, 13:] == 200).all()
+    channels = read_image(dataset / "out" / "half.png").channels
+    assert not channels["A"][:, :11].any() and (channels["A"][:, 13:] == 255).all()
+    assert (channels["R"][:, 13:] == 200).all()
 
 
 def test_an_unreadable_file_is_named_and_the_others_are_done(dataset, run, capsys):
     (dataset / "exr" / "broken.exr").write_bytes(b"no image")
-    whole = (dataset / "exr" / "view_0001f.exr").read_bytes()
-    (dataset / "exr" / "view_0001f.exr").write_bytes(whole[: len(whole) // 2])
+    content = (dataset / "exr" / "view_0001f.exr").read_bytes()
+    (dataset / "exr" / "view_0001f.exr").write_bytes(content[: len(content) // 2])
     record = dataset / "record.json"
     with pytest.raises(UserError, match=r"2 of 4 views could not be reprojected, as .*broken\.exr"):
         run(*PERSPECTIVE, "--png", "--record", str(record))
-    told = capsys.readouterr().err
-    assert "broken.exr" in told and "view_0001f.exr" in told
+    message = capsys.readouterr().err
+    assert "broken.exr" in message and "view_0001f.exr" in message
     out = dataset / "out"
     assert names(out) == ["lightfield.json", "view_0000f.png", "view_0002f.png"]
     assert not record.exists()
@@ -293,15 +293,15 @@ def test_only_missing_or_outdated_files_are_made_again(dataset, run):
     out = dataset / "out"
     flags = (*PERSPECTIVE, "--png")
     run(*flags)
-    whole = (out / "view_0001f.png").read_bytes()
+    content = (out / "view_0001f.png").read_bytes()
     before = stamps()
     run(*flags)
     assert changed(before) == set()
     (out / "view_0000f.png").unlink()
-    (out / "view_0001f.png").write_bytes(whole[: len(whole) // 2])
+    (out / "view_0001f.png").write_bytes(content[: len(content) // 2])
     run(*flags)
     assert changed(before) == {"view_0000f.png", "view_0001f.png"}
-    assert (out / "view_0001f.png").read_bytes() == whole
+    assert (out / "view_0001f.png").read_bytes() == content
     before = stamps()
     write_exr(
         dataset / "exr" / "view_0002f.exr", view_channels(FISHEYE), {"plenoforge:key": "another"}
@@ -347,8 +347,8 @@ def test_a_saved_lens_map_gives_the_same_bytes(dataset, run, run_program):
         path.unlink()
     file = dataset / "map.npy"
     config = dataset / "lightfield.json"
-    told = run_program("lens_map.py", file, *PERSPECTIVE, "--input-cfg", config).stderr
-    assert "magnification: 0.7" in told and "100.0% of the image" in told
+    message = run_program("lens_map.py", file, *PERSPECTIVE, "--input-cfg", config).stderr
+    assert "magnification: 0.7" in message and "100.0% of the image" in message
     run(*PERSPECTIVE, "--png", "--exr", "--lens-map", str(file))
     assert {path.name: path.read_bytes() for path in out.glob("view*")} == made
     with pytest.raises(UserError, match=r"is a lens map for filter \"adaptive\""):
@@ -531,7 +531,7 @@ def test_every_lens_is_a_target_and_a_source(dataset, run, flags):
 
 
 @pytest.mark.parametrize(
-    ("flags", "told"),
+    ("flags", "message"),
     [
         (("--rectilinear", "18", "--png"), "--rectilinear 18: must have the form FOCAL_LENGTH"),
         (("--equidistant", "180", "--png"), "--equidistant 180: fov"),
@@ -557,10 +557,10 @@ def test_every_lens_is_a_target_and_a_source(dataset, run, flags):
         ),
     ],
 )
-def test_mistakes_are_named(run, flags, told):
+def test_mistakes_are_named(run, flags, message):
     with pytest.raises(UserError) as error:
         run(*flags)
-    assert told in str(error.value)
+    assert message in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -598,17 +598,17 @@ def test_a_settings_file_gives_the_bytes_of_the_flags(dataset, run, tmp_path, fl
 
 
 @pytest.mark.parametrize(
-    ("settings", "told"),
+    ("settings", "message"),
     [
         ({"bits": 16}, "formats: must be a list of exr, png, or both"),
         ({"formats": ["png"], "passes": ["normal"]}, "passes: is normal; "),
     ],
 )
-def test_settings_that_fit_no_run_are_refused(dataset, run, tmp_path, settings, told):
+def test_settings_that_fit_no_run_are_refused(dataset, run, tmp_path, settings, message):
     (tmp_path / "settings.json").write_text(json.dumps(settings))
     with pytest.raises(UserError) as error:
         run("--settings", str(tmp_path / "settings.json"))
-    assert told in str(error.value)
+    assert message in str(error.value)
     assert not (dataset / "out").exists()
 
 
@@ -716,17 +716,17 @@ def test_a_reprojection_equals_cycles_render_through_that_lens(renders, name):
     source = LENSES["fisheye"][0]
     made = lens_map.compute(source, lens, lens_map.rotation_matrix(*angles), "adaptive")
     # Leave out pixels on the rim of an image circle, which are partly dark.
-    known = (~np.isnan(made.target_cos)).astype(np.uint8)
-    whole = cv2.erode(known, np.ones((3, 3)), borderValue=0) > 0
-    seen = (made.flags == kernels.INSIDE) & whole
+    has_source = (~np.isnan(made.target_cos)).astype(np.uint8)
+    all_have_source = cv2.erode(has_source, np.ones((3, 3)), borderValue=0) > 0
+    seen = (made.flags == kernels.INSIDE) & all_have_source
     assert seen.mean() > 0.7
     row, end_row, column, end_column = made.window
     window = np.s_[row:end_row, column:end_column]
     color = renders["fisheye.1.color"][window]
-    found = resample_colour(widen(color, color, color), made)[..., 0]
-    one, other = renders[f"{name}.2.color"], renders[f"{name}.3.color"]
-    noise = np.sqrt(np.mean((one - other)[seen] ** 2) / 2)
-    error = (found - (one + other) / 2)[seen]
+    reprojected = resample_colour(widen(color, color, color), made)[..., 0]
+    first, second = renders[f"{name}.2.color"], renders[f"{name}.3.color"]
+    noise = np.sqrt(np.mean((first - second)[seen] ** 2) / 2)
+    error = (reprojected - (first + second) / 2)[seen]
     assert noise < 0.02
     assert np.sqrt(np.mean(error**2)) < 1.5 * noise
     assert abs(error.mean()) < noise / 5
@@ -752,8 +752,8 @@ def test_a_reprojection_equals_cycles_render_through_that_lens(renders, name):
 
 def test_the_benchmark_measures_every_method(tmp_path, run_program):
     program = Path(__file__).parents[1] / "benchmarks" / "reprojection.py"
-    told = run_program(program, tmp_path, "--size", 128, "--repeats", 1).stdout
-    assert "default filter adaptive: " in told
+    output = run_program(program, tmp_path, "--size", 128, "--repeats", 1).stdout
+    assert "default filter adaptive: " in output
     with (tmp_path / "reprojection.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert {row["scenario"] for row in rows} == {"minify by 8", "unity", "magnify by 3"}

@@ -137,8 +137,8 @@ def test_lanczos_weights_are_the_windowed_sinc():
     for t in (0.0, 1e-6, 0.1, 0.5, 0.77, 0.999):
         distance = t + 2 - np.arange(6)
         expected = np.sinc(distance) * np.sinc(distance / 3)
-        found = kernels.lanczos_weights(np.float32(t))
-        assert np.abs(np.array(found) - expected / expected.sum()).max() < 1e-6
+        weights = kernels.lanczos_weights(np.float32(t))
+        assert np.abs(np.array(weights) - expected / expected.sum()).max() < 1e-6
 
 
 def rms(values):
@@ -298,8 +298,8 @@ def test_every_pair_of_lenses_and_every_value_gives_an_answer(size):
             assert not np.isinf(out).any() and not (out < 0).any()
         depth = 10 ** rng.uniform(-6, 9, image.shape[:2])
         depth[0, 0] = np.inf
-        found = apply_depth(depth.astype("f4"), made, False, False)
-        finite = found[np.isfinite(found)]
+        resampled_depth = apply_depth(depth.astype("f4"), made, False, False)
+        finite = resampled_depth[np.isfinite(resampled_depth)]
         assert ((finite > 0.99e-6) & (finite < 1.01e9)).all()
 
 
@@ -378,12 +378,12 @@ def test_the_depth_of_planes_and_a_sphere_is_exact_away_from_edges(source, targe
         lambda rays: sphere_distance(rays, np.array([-0.7, 0.4, -2.5]), 1.5),
     ):
         distance = surface(rays_of(source))
-        found = apply_depth(
+        resampled = apply_depth(
             as_depth(distance, source), made, source.has_z_depth, target.has_z_depth
         )
         expected = surface(rays @ rotation.T)
         seen = ~np.isnan(made.centers[..., 0])
-        assert np.isnan(found[~seen]).all()
+        assert np.isnan(resampled[~seen]).all()
         if target.has_z_depth:
             expected = expected * -rays[..., 2]
         # Leave out three source pixels around the surface's end.
@@ -397,7 +397,7 @@ def test_the_depth_of_planes_and_a_sphere_is_exact_away_from_edges(source, targe
         )
         tested = seen & inside[row, column]
         covered += tested.sum()
-        assert np.abs(found[tested] / expected[tested] - 1).max(initial=0) < 1e-4
+        assert np.abs(resampled[tested] / expected[tested] - 1).max(initial=0) < 1e-4
     assert covered > 2000
 
 
@@ -424,17 +424,17 @@ def test_depth_stays_within_its_neighbourhood_and_missing_values_stay_in_place()
     distance[60:90, 60:90] = np.inf
     distance[120:150, 60:90] = np.nan
     made = lens_map.compute(source, narrow_lens(200), IDENTITY, "adaptive")
-    found = apply_depth(distance.astype("f4"), made, False, False)
+    resampled = apply_depth(distance.astype("f4"), made, False, False)
     low, high = (morphology(distance, np.ones((3, 3))) for morphology in (cv2.erode, cv2.dilate))
     row, column = (
         np.floor(made.centers[..., i] + made.window[2 * j]).astype(int) for i, j in ((1, 0), (0, 1))
     )
     finite = np.isfinite(low[row, column]) & np.isfinite(high[row, column])
     assert finite.mean() > 0.8
-    assert (found >= low[row, column] * (1 - 1e-6))[finite].all()
-    assert (found <= high[row, column] * (1 + 1e-6))[finite].all()
-    assert np.array_equal(np.isinf(found), np.isinf(distance[row, column]))
-    assert np.array_equal(np.isnan(found), np.isnan(distance[row, column]))
+    assert (resampled >= low[row, column] * (1 - 1e-6))[finite].all()
+    assert (resampled <= high[row, column] * (1 + 1e-6))[finite].all()
+    assert np.array_equal(np.isinf(resampled), np.isinf(distance[row, column]))
+    assert np.array_equal(np.isnan(resampled), np.isnan(distance[row, column]))
 
 
 def test_the_top_of_a_ridge_is_no_nearer_than_its_pixels():
@@ -442,16 +442,18 @@ def test_the_top_of_a_ridge_is_no_nearer_than_its_pixels():
     from_top = np.minimum(np.abs(np.arange(256) - 127.5), 3)
     distance = np.broadcast_to(1 / (1 - 0.05 * from_top**2), (256, 256))
     made = lens_map.compute(FISHEYE, narrow_lens(900, focal_length=90), IDENTITY, "adaptive")
-    found = apply_depth(distance.astype("f4"), made, False, False)
-    assert found.max() > 1.5
-    assert found.min() == pytest.approx(distance.min(), rel=1e-6)
+    resampled = apply_depth(distance.astype("f4"), made, False, False)
+    assert resampled.max() > 1.5
+    assert resampled.min() == pytest.approx(distance.min(), rel=1e-6)
 
 
 def test_depth_is_taken_at_the_pixel_centre_for_any_samples():
     source = Equidistant(width=256, height=256, fov=math.pi)
     depth = as_depth(plane_distance(rays_of(source), np.array([0.3, 0, -1.0]), 2.0), source)
-    one, many = (lens_map.compute(source, narrow_lens(64), IDENTITY, "bicubic", n) for n in (1, 4))
-    assert np.allclose(apply_depth(depth, one), apply_depth(depth, many), rtol=1e-6)
+    single, many = (
+        lens_map.compute(source, narrow_lens(64), IDENTITY, "bicubic", n) for n in (1, 4)
+    )
+    assert np.allclose(apply_depth(depth, single), apply_depth(depth, many), rtol=1e-6)
 
 
 def test_depth_reaches_as_far_as_colour_at_the_rim_of_the_image_circle():
@@ -483,6 +485,6 @@ def test_a_depth_of_zero_is_kept(dtype):
     depth = np.full((256, 256), 3, dtype)
     depth[100:104, 90] = 0
     for is_z in (False, True):
-        found = apply_depth(depth, made, is_z, is_z)
-        assert not found[100:104, 90].any()
-        assert np.allclose(found[110:140, 80:100], 3, rtol=1e-6)
+        resampled = apply_depth(depth, made, is_z, is_z)
+        assert not resampled[100:104, 90].any()
+        assert np.allclose(resampled[110:140, 80:100], 3, rtol=1e-6)

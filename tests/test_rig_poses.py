@@ -116,9 +116,9 @@ def test_random_places_are_seeded_and_a_thinned_rig_has_the_first_of_them():
     up = matrices(rig)[:, :3, 1]
     np.testing.assert_allclose(up, [[0, 0, 1]] * 40, atol=1e-9)
     # These places never change, because datasets are rendered again from them.
-    one = from_settings({"type": "random", "count": 2, "seed": 5}).poses()[1]
-    np.testing.assert_allclose(one.position, [-0.029277, 0.195880, 0.316538], atol=1e-6)
-    assert one.rotation == pytest.approx((np.pi / 2, 0, 4.864468), abs=1e-6)
+    pose = from_settings({"type": "random", "count": 2, "seed": 5}).poses()[1]
+    np.testing.assert_allclose(pose.position, [-0.029277, 0.195880, 0.316538], atol=1e-6)
+    assert pose.rotation == pytest.approx((np.pi / 2, 0, 4.864468), abs=1e-6)
 
 
 BUILD = """
@@ -134,9 +134,9 @@ bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2])
 def free_places(blend, rig, output):
     settings = blend.with_name("free_places.json")
     settings.write_text(json.dumps({"rig": rig}))
-    words = ["--blend", blend, "--settings", settings, "--output", output]
+    arguments = ["--blend", blend, "--settings", settings, "--output", output]
     return subprocess.run(
-        [sys.executable, SCRIPTS / "free_places.py", *words],
+        [sys.executable, SCRIPTS / "free_places.py", *arguments],
         capture_output=True,
         text=True,
         check=False,
@@ -150,13 +150,13 @@ def test_free_places_are_in_the_room_and_clear_of_all_that_stands_in_it(tmp_path
     output = tmp_path / "places.json"
     result = free_places(blend, RANDOM | {"clearance": 0.6}, output)
     assert result.returncode == 0, result.stderr
-    found = places(from_settings(RANDOM).placed(output))
-    assert len(np.unique(found, axis=0)) == 40
+    free = places(from_settings(RANDOM).placed(output))
+    assert len(np.unique(free, axis=0)) == 40
     # Distances to walls, floor and ceiling, to the ball, the box's own ball, and the pillar's axis.
-    assert (np.abs(found - [0, 0, 1.5]) <= np.array([3, 3, 1.5]) - 0.6 + 1e-6).all()
-    assert np.linalg.norm(found - [2, 1, 0.5], axis=-1).min() > 0.5 + 0.6 - 0.01
-    assert np.linalg.norm(found - [2.2, -1.2, 0.35], axis=-1).min() > 0.35 + 0.6
-    assert np.linalg.norm(found[:, :2] + 2, axis=-1).min() > 0.2 + 0.6 - 0.01
+    assert (np.abs(free - [0, 0, 1.5]) <= np.array([3, 3, 1.5]) - 0.6 + 1e-6).all()
+    assert np.linalg.norm(free - [2, 1, 0.5], axis=-1).min() > 0.5 + 0.6 - 0.01
+    assert np.linalg.norm(free - [2.2, -1.2, 0.35], axis=-1).min() > 0.35 + 0.6
+    assert np.linalg.norm(free[:, :2] + 2, axis=-1).min() > 0.2 + 0.6 - 0.01
     # No place in the box has half a metre free on the box's side.
     narrow = {"type": "random", "count": 3, "size": 0.6, "center": [2.2, -1.2, 0.35]}
     result = free_places(blend, narrow | {"clearance": 0.5}, tmp_path / "none.json")
@@ -186,16 +186,16 @@ def test_a_random_rigs_places_are_a_file_of_its_dataset(tmp_path, monkeypatch):
 @pytest.mark.parametrize("kind", ["plane", "cylinder"])
 def test_a_stereo_pair_stands_on_both_sides_of_its_position(kind, more):
     rig = {"type": kind, "cameras": [3, 2], "size": 2, **more}
-    one = from_settings(rig)
+    stereo_pair = from_settings(rig)
     pair = from_settings(rig | {"stereo": {"distance": 0.064}})
     assert pair.view_count == 12
     names = [pose.name for pose in pair.poses()]
     assert names == sorted(names)
     assert names[:2] == ["view_0000f_left", "view_0000f_right"]
     left, right = matrices(pair)[::2], matrices(pair)[1::2]
-    np.testing.assert_allclose(left[:, :3, :3], matrices(one)[:, :3, :3], atol=1e-9)
+    np.testing.assert_allclose(left[:, :3, :3], matrices(stereo_pair)[:, :3, :3], atol=1e-9)
     np.testing.assert_array_equal(left[:, :3, :3], right[:, :3, :3])
-    np.testing.assert_allclose((left + right)[:, :3, 3] / 2, places(one), atol=1e-9)
+    np.testing.assert_allclose((left + right)[:, :3, 3] / 2, places(stereo_pair), atol=1e-9)
     # In the camera's own axes, the right eye is on the right.
     apart = (right - left)[:, None, :3, 3] @ left[:, :3, :3]
     np.testing.assert_allclose(apart[:, 0], [[0.064, 0, 0]] * 6, atol=1e-9)

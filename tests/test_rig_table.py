@@ -198,9 +198,9 @@ def test_the_table_has_computed_figures_beside_the_printed_ones(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene, table, figures = (tmp_path / name for name in ("silvr.yaml", "rigs.md", "rigs.csv"))
-    own = tmp_path / "own.blend"
-    own.touch()
-    scene.write_text(SCENE.replace("FILE", str(own)))
+    own_blend = tmp_path / "own.blend"
+    own_blend.touch()
+    scene.write_text(SCENE.replace("FILE", str(own_blend)))
     arguments = ["rig_table.py", scene, "--markdown", table, "--csv", figures]
     monkeypatch.setattr(sys, "argv", list(map(str, arguments)))
     rig_table.main()

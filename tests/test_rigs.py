@@ -240,9 +240,9 @@ def test_a_sphere_is_symmetric_under_a_fifth_of_a_turn_without_repeated_places(
 
 
 def test_spheres_contain_the_coarser_ones() -> None:
-    found = nested(642)
-    assert [len(numbers) for numbers in found] == [162, 42, 12]
-    for subdivisions, numbers in zip((3, 2), found, strict=False):
+    coarser = nested(642)
+    assert [len(numbers) for numbers in coarser] == [162, 42, 12]
+    for subdivisions, numbers in zip((3, 2), coarser, strict=False):
         coarse = icosphere(subdivisions)
         away = np.linalg.norm(icosphere(4)[numbers][:, None] - coarse, axis=-1)
         assert sorted(away.argmin(axis=1)) == list(range(len(coarse)))
@@ -347,7 +347,7 @@ def test_the_row_of_a_sphere_is_its_ring_nearest_the_equator(
 
 
 @pytest.mark.parametrize(
-    ("kind", "own", "area"),
+    ("kind", "keys", "area"),
     [
         ("plane", {"cameras": [4, 3]}, 2 * 6),
         ("cuboid", {"cameras": [4, 3, 2]}, 2 * (2 * 4 + 4 * 6 + 6 * 2)),
@@ -356,8 +356,8 @@ def test_the_row_of_a_sphere_is_its_ring_nearest_the_equator(
         ("cylinder", {"cameras": [4, 3]}, 4 * math.hypot(1, 2) * 6),
     ],
 )
-def test_cells_cover_the_cameras_surface(kind: str, own: Any, area: float) -> None:
-    rig = from_settings({"type": kind, "size": [2, 4, 6], **own})
+def test_cells_cover_the_cameras_surface(kind: str, keys: Any, area: float) -> None:
+    rig = from_settings({"type": kind, "size": [2, 4, 6], **keys})
     places = np.array([pose.position for pose in rig.poses()])
     cells = rig.cells()
     assert cells is not None
@@ -366,9 +366,9 @@ def test_cells_cover_the_cameras_surface(kind: str, own: Any, area: float) -> No
     halves = [
         np.cross(corners[:, i] - corners[:, 0], corners[:, 2] - corners[:, 0]) for i in (1, 3)
     ]
-    one, other = (np.linalg.norm(half, axis=1) / 2 for half in halves)
-    np.testing.assert_allclose(one, other)
-    assert (one + other).sum() == pytest.approx(area)
+    first, second = (np.linalg.norm(half, axis=1) / 2 for half in halves)
+    np.testing.assert_allclose(first, second)
+    assert (first + second).sum() == pytest.approx(area)
 
 
 def test_the_cells_of_a_sphere_are_triangles_that_close_it() -> None:
@@ -382,7 +382,7 @@ def test_the_cells_of_a_sphere_are_triangles_that_close_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "own"),
+    ("kind", "keys"),
     [
         ("plane", {"cameras": [3, 3]}),
         ("cuboid", {"cameras": [3, 3, 3]}),
@@ -398,10 +398,10 @@ def test_the_cells_of_a_sphere_are_triangles_that_close_it() -> None:
         ),
     ],
 )
-def test_an_outline_reaches_as_far_as_the_rig(kind: str, own: Any) -> None:
+def test_an_outline_reaches_as_far_as_the_rig(kind: str, keys: Any) -> None:
     round_ones = ("sphere", "hemisphere", "ring")
     size = 2 if kind in round_ones else [2, 4, 6]
-    rig = from_settings({"type": kind, "size": size, "center": [1, 1, 1], **own})
+    rig = from_settings({"type": kind, "size": size, "center": [1, 1, 1], **keys})
     corners = np.concatenate(rig.outline())
     places = np.array([pose.position for pose in rig.poses()])
     assert rig.is_round == (kind in ("cylinder", *round_ones))
@@ -419,7 +419,7 @@ def test_an_outline_reaches_as_far_as_the_rig(kind: str, own: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "own", "volume"),
+    ("kind", "keys", "volume"),
     [
         ("cuboid", {"cameras": [2, 2, 2]}, 1),
         ("lattice", {"cameras": [2, 2, 2]}, 1),
@@ -429,8 +429,10 @@ def test_an_outline_reaches_as_far_as_the_rig(kind: str, own: Any) -> None:
         ("ring", {"count": 3}, None),
     ],
 )
-def test_the_part_of_its_box_that_a_rig_encloses(kind: str, own: Any, volume: float | None) -> None:
-    assert from_settings({"type": kind, **own}).unit_volume == volume
+def test_the_part_of_its_box_that_a_rig_encloses(
+    kind: str, keys: Any, volume: float | None
+) -> None:
+    assert from_settings({"type": kind, **keys}).unit_volume == volume
 
 
 def test_more_than_9999_views_have_different_names() -> None:
@@ -646,12 +648,17 @@ def test_every_rig_can_look_at_a_point():
         np.testing.assert_allclose(-matrix[:3, 2], toward / np.linalg.norm(toward), atol=1e-9)
     # Straight above and below, "up" is undefined: +X stays the world's.
     for height, up in ((5.0, 1.0), (-5.0, -1.0)):
-        one = {"type": "plane", "cameras": [1, 1], "center": [0, 0, height], "look_at": [0, 0, 0]}
-        (pose,) = rigs.from_settings(one).poses()
+        single = {
+            "type": "plane",
+            "cameras": [1, 1],
+            "center": [0, 0, height],
+            "look_at": [0, 0, 0],
+        }
+        (pose,) = rigs.from_settings(single).poses()
         np.testing.assert_allclose(pose.matrix()[:3, 0], (1, 0, 0), atol=1e-9)
         np.testing.assert_allclose(pose.matrix()[:3, 1], (0, up, 0), atol=1e-9)
     with pytest.raises(UserError, match="a camera stands at"):
-        rigs.from_settings({**one, "look_at": one["center"]}).poses()
+        rigs.from_settings({**single, "look_at": single["center"]}).poses()
     with pytest.raises(UserError, match="look_at: does not go with face_inside"):
         rigs.from_settings({**plane, "face_inside": True})
 

@@ -64,10 +64,10 @@ def of(name):
 def ray_cast(start, ray, **limits):
     """Cast a ray from ``start``. Return whether and where it hits, and the object and face."""
     graph = bpy.context.evaluated_depsgraph_get()
-    hit, place, _, face, thing, _ = bpy.context.scene.ray_cast(
+    hit, place, _, face, obj, _ = bpy.context.scene.ray_cast(
         graph, Vector(start), Vector(ray).normalized(), **limits
     )
-    return hit, place, thing, face
+    return hit, place, obj, face
 
 
 def meshes():
@@ -78,9 +78,9 @@ def meshes():
 
 
 def values(collection, name, size=3, kind=np.float32):
-    found = np.empty(size * len(collection), kind)
-    collection.foreach_get(name, found)
-    return found.reshape(-1, size)
+    array = np.empty(size * len(collection), kind)
+    collection.foreach_get(name, array)
+    return array.reshape(-1, size)
 
 
 def placed(points, matrix):
@@ -106,11 +106,11 @@ def cameras(scene):
 
 
 def test_objects_triangles_and_instancing(scene):
-    found, least = size(), LEAST[scene]
-    assert found.objects >= least.objects
-    assert found.seen >= least.seen
-    assert least.stored <= found.stored <= STORED_PART[scene] * found.seen
-    assert scene != "still_life" or found.stored < 300_000
+    actual, least = size(), LEAST[scene]
+    assert actual.objects >= least.objects
+    assert actual.seen >= least.seen
+    assert least.stored <= actual.stored <= STORED_PART[scene] * actual.seen
+    assert scene != "still_life" or actual.stored < 300_000
 
 
 @pytest.mark.parametrize("scene", ["barbershop", "garden", "lone_monk"], indirect=True)
@@ -124,9 +124,9 @@ def test_cameras_keep_clear(scene):
         if len(close):
             faces = [tuple(face.vertices) for face in data.polygons]
             tree = BVHTree.FromPolygons(points.tolist(), faces)
-            found = min(tree.find_nearest(Vector(place))[3] for place in close)
-            assert found >= CLEARANCE, name
-            nearest = min(nearest, found)
+            least_distance = min(tree.find_nearest(Vector(place))[3] for place in close)
+            assert least_distance >= CLEARANCE, name
+            nearest = min(nearest, least_distance)
     assert nearest < REACH
 
 
@@ -155,13 +155,13 @@ def test_it_is_closed_and_rich_on_every_side(scene):
     """Every ray from the middle hits the room or its window, and many surfaces on each side."""
     met, objects = {}, set()
     for ray in np.random.default_rng(7).normal(size=(3000, 3)):
-        hit, place, thing, face = ray_cast((0, 0, 1.05), ray)
+        hit, place, obj, face = ray_cast((0, 0, 1.05), ray)
         assert hit, ray
-        assert (np.abs(place) <= (2.501, 3.85, 3.001)).all() and place.z > -0.03, (place, thing)
+        assert (np.abs(place) <= (2.501, 3.85, 3.001)).all() and place.z > -0.03, (place, obj)
         axis = int(np.abs(ray).argmax())
-        surface = thing.name, thing.data.polygons[face].material_index
+        surface = obj.name, obj.data.polygons[face].material_index
         met.setdefault((axis, bool(ray[axis] > 0)), set()).add(surface)
-        objects.add(thing.name)
+        objects.add(obj.name)
     assert len(objects) >= 200
     assert len(met) == 6 and min(len(surfaces) for surfaces in met.values()) >= 12, met
 
@@ -191,10 +191,10 @@ def test_every_direction_has_something_to_see(scene):
         seen = set()
         for azimuth in np.radians(np.arange(30 * sector, 30 * sector + 30, 3)):
             for height in np.tan(np.radians([-50, -35, -22, -12, -6, -3, 0, 2, 5, 9, 14, 20])):
-                hit, _, thing, _ = ray_cast((0, 0, 1), (np.cos(azimuth), np.sin(azimuth), height))
+                hit, _, obj, _ = ray_cast((0, 0, 1), (np.cos(azimuth), np.sin(azimuth), height))
                 assert hit or height > 0.03
                 if hit:
-                    seen.add(thing.name)
+                    seen.add(obj.name)
         seen_by_sector.append(len(seen))
     assert min(seen_by_sector) >= 8
 
@@ -247,16 +247,16 @@ def world_points(thing):
 
 @of("still_life")
 def test_everything_is_on_the_board_and_far_from_the_cameras(scene):
-    things = [thing for thing in bpy.data.objects if thing.type in ("MESH", "CURVES")]
-    whole = np.concatenate([world_points(thing) for thing in things])
-    assert np.isfinite(whole).all()
-    assert np.hypot(*whole[:, :2].T).max() < 0.36
-    assert -0.4 < whole[:, 2].min() < -0.1 and 0.2 < whole[:, 2].max() < 0.25
-    for thing in things:
-        if thing.type == "MESH" and thing.name not in ("Cloth", "Board"):
-            assert world_points(thing)[:, 2].min() > -1e-3, thing.name
+    objs = [obj for obj in bpy.data.objects if obj.type in ("MESH", "CURVES")]
+    points = np.concatenate([world_points(obj) for obj in objs])
+    assert np.isfinite(points).all()
+    assert np.hypot(*points[:, :2].T).max() < 0.36
+    assert -0.4 < points[:, 2].min() < -0.1 and 0.2 < points[:, 2].max() < 0.25
+    for obj in objs:
+        if obj.type == "MESH" and obj.name not in ("Cloth", "Board"):
+            assert world_points(obj)[:, 2].min() > -1e-3, obj.name
     middle = np.array([0, 0, 0.05])
-    reach = np.linalg.norm(whole - middle, axis=-1).max()
+    reach = np.linalg.norm(points - middle, axis=-1).max()
     assert np.linalg.norm(cameras(scene) - middle, axis=-1).min() > reach + 0.5
 
 

@@ -41,9 +41,9 @@ LISTS = {"validation": ["view_0003f"], "test": ["view_0001f", "view_0007f"]}
     ],
 )
 def test_a_rig_says_the_purpose_of_its_views(split, validation, test):
-    found = [pose.split for pose in rigs.from_settings(PLANE | {"split": split}).poses()]
+    purposes = [pose.split for pose in rigs.from_settings(PLANE | {"split": split}).poses()]
     parts = dict.fromkeys(test, "test") | dict.fromkeys(validation, "validation")
-    assert found == [parts.get(number, "train") for number in range(12)]
+    assert purposes == [parts.get(number, "train") for number in range(12)]
 
 
 def test_the_faces_of_a_cube_map_stay_together():
@@ -157,8 +157,8 @@ def test_the_lists_of_nerfstudio_and_colmap_follow_the_split(scene, tmp_path):
     folder = exported(scene, "nerfstudio", tmp_path / "nerfstudio", points=200)
     content = json.loads((folder / "transforms.json").read_text())
     for part, names in NAMES.items():
-        found = content[f"{part}_filenames"]
-        assert sorted(found) == sorted(f"images/{name}.png" for name in names)
+        listed_names = content[f"{part}_filenames"]
+        assert sorted(listed_names) == sorted(f"images/{name}.png" for name in names)
     folder = exported(scene, "colmap", tmp_path / "colmap", format="text", points=200)
     assert (folder / "sparse/0/test.txt").read_text().split() == [
         f"along_view_000{i}f.png" for i in range(4)
@@ -201,8 +201,10 @@ def test_validation_finds_deviations_from_the_split(scene, tmp_path):
         return splits_check.check(path, dataset, read_sets(dataset, ["small"])[0]).problems
 
     def write():
-        found = {name: LightField.read(folder / name / "lightfield.json") for name in rig_names}
-        write_json(path, splits_content(found))
+        lightfields = {
+            name: LightField.read(folder / name / "lightfield.json") for name in rig_names
+        }
+        write_json(path, splits_content(lightfields))
         return json.loads(path.read_text())
 
     content = write()

@@ -49,8 +49,8 @@ def test_lens_pairs_are_within_their_bounds(chosen: list[str]) -> None:
     rows = list(stability.measure(lenses))
     assert len(rows) == 2 * len(chosen) ** 2
     assert [row["case"] for row in rows if row["verdict"] == "FAIL"] == []
-    own = [row for row in rows if len(set(row["case"].split(" → "))) == 1]
-    for row in own:
+    same_lens = [row for row in rows if len(set(row["case"].split(" → "))) == 1]
+    for row in same_lens:
         allowed = 0.01 if row["dtype"] == "float32" else 1e-9
         # At a lens's turning point rounding moves a pixel more, and processors round differently.
         one_rounding = row["round_trip_bound"] / stability.ROUNDINGS

@@ -31,8 +31,8 @@ def dataset(tmp_path, monkeypatch, capsys):
 
     def lines(others=()):
         folders = ("--results", tmp_path / "results", "--work", tmp_path / "work")
-        words = ("status.py", *folders, "--dataset", "scene/rig", 4, "flat", *others)
-        monkeypatch.setattr(sys, "argv", list(map(str, words)))
+        arguments = ("status.py", *folders, "--dataset", "scene/rig", 4, "flat", *others)
+        monkeypatch.setattr(sys, "argv", list(map(str, arguments)))
         status.main()
         return capsys.readouterr().out.splitlines()
 
@@ -113,9 +113,9 @@ def test_a_killed_shard_is_listed_until_its_views_are_finished(dataset):
 
 def test_a_process_on_another_machine_is_at_work_if_it_wrote_lately(dataset):
     dataset.render("a", "c")
-    there = started(5000, pid=1) | {"host": "another-node"}
-    dataset.journal("0-2", there, finished("a", 30))
-    dataset.journal("2-4", there, finished("c", 4000))
+    elsewhere = started(5000, pid=1) | {"host": "another-node"}
+    dataset.journal("0-2", elsewhere, finished("a", 30))
+    dataset.journal("2-4", elsewhere, finished("c", 4000))
     lines = dataset()
     assert any(
         re.fullmatch(r"  shards at work: 0:2 on another-node \(heard of 3\d s ago\)", line)
@@ -146,8 +146,8 @@ def test_a_validation_counts_only_for_the_present_views(dataset):
 
 def test_a_clock_that_is_ahead_gives_no_rate(dataset):
     dataset.render("a")
-    there = started(-5, pid=1) | {"host": "another-node"}
-    dataset.journal("0-4", there, finished("a", -7))
+    elsewhere = started(-5, pid=1) | {"host": "another-node"}
+    dataset.journal("0-4", elsewhere, finished("a", -7))
     assert dataset()[1] == "  rendered: 1 of 4, no rate yet"
 
 
@@ -161,8 +161,8 @@ def test_all_chosen_datasets_are_added_up(dataset):
 @pytest.mark.slow
 def test_snakemake_shows_the_status_without_a_lock(tmp_path):
     folders = (f"results={tmp_path / 'results'}", f"work={tmp_path / 'work'}")
-    words = ("--quiet", "all", "--nolock", "status", "--config", *folders, "preset=tiny")
-    result = snakemake(ROOT, *words)
+    arguments = ("--quiet", "all", "--nolock", "status", "--config", *folders, "preset=tiny")
+    result = snakemake(ROOT, *arguments)
     assert result.returncode == 0, result.stderr
     assert result.stdout.splitlines()[0] == "garden_tiny/LFSphere_e100cm_d170cm"
     assert result.stdout.splitlines()[-1] == "all: 0 of 12 views rendered, no rate yet"
@@ -171,12 +171,12 @@ def test_snakemake_shows_the_status_without_a_lock(tmp_path):
 def test_progress_starts_at_once_and_can_be_read_in_a_log(capsys, monkeypatch):
     now = [100.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
-    told = progress.Progress(10, "render scene/rig 0:12", already=2)
+    render_progress = progress.Progress(10, "render scene/rig 0:12", already=2)
     assert capsys.readouterr().err == "render scene/rig 0:12: 10 views to do, 2 already done\n"
     # The first view takes 100 s more than the others' 20 s.
     for seconds in (120, 20, 20):
         now[0] += seconds
-        told.done()
+        render_progress.done()
     assert capsys.readouterr().err.splitlines() == [
         "render scene/rig 0:12: 1 of 10 views, 120 s each, 18 min 00 s left",
         "render scene/rig 0:12: 2 of 10 views, 20 s each, 2 min 40 s left",
@@ -184,20 +184,20 @@ def test_progress_starts_at_once_and_can_be_read_in_a_log(capsys, monkeypatch):
     ]
     # Within the interval nothing is printed, except the end.
     now[0] += 1
-    told.done()
+    render_progress.done()
     assert capsys.readouterr().err == ""
-    told.done(6)
+    render_progress.done(6)
     assert capsys.readouterr().err.endswith("done in 2 min 41 s\n")
 
 
 def test_progress_works_while_nothing_is_finished(capsys, monkeypatch):
     now = [100.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
-    told = progress.Progress(10, "places", "cameras")
+    place_progress = progress.Progress(10, "places", "cameras")
     now[0] += 60
-    told.done(0)
+    place_progress.done(0)
     now[0] += 60
-    told.done(4)
+    place_progress.done(4)
     assert capsys.readouterr().err.splitlines() == [
         "places: 10 cameras to do",
         "places: 4 of 10 cameras, 30 s each, 3 min 00 s left",

@@ -69,9 +69,9 @@ def test_a_build_in_isolated_folders_loses_no_view_when_its_jobs_are_killed(smok
 
     for stage in ("render", "perspective"):
         record = f"work/{PANORAMAS}/{stage}/0-2.json"
-        found = shard_files.read_record(folder / record)
-        assert found == shard_files.read_record(smoke / record)
-        for name, (_, digest) in found.items():
+        files = shard_files.read_record(folder / record)
+        assert files == shard_files.read_record(smoke / record)
+        for name, (_, digest) in files.items():
             assert store.take(digest, tmp_path / name)
             assert (tmp_path / name).read_bytes() == (
                 smoke / "results" / PANORAMAS / name
@@ -146,15 +146,20 @@ def test_a_users_files_reach_jobs_in_isolated_folders(run_program, tmp_path):
     assert run.returncode == 0, said
 
     work, store = folder / "work", ViewStore(str(folder))
-    words = ("--blend", root / "blends/mine.blend", "--inventory", work / "brought/inventory.json")
-    words += ("--lightfield", folder / "results/brought/LFPlane/lightfield.json")
-    words += ("--output", tmp_path / "exr", "--record", tmp_path / "here.json")
-    run_program("render_shard.py", *words)
-    found = shard_files.read_record(work / "brought/LFPlane/render/0-2.json")
-    assert found == shard_files.read_record(tmp_path / "here.json")
+    arguments = (
+        "--blend",
+        root / "blends/mine.blend",
+        "--inventory",
+        work / "brought/inventory.json",
+    )
+    arguments += ("--lightfield", folder / "results/brought/LFPlane/lightfield.json")
+    arguments += ("--output", tmp_path / "exr", "--record", tmp_path / "here.json")
+    run_program("render_shard.py", *arguments)
+    files = shard_files.read_record(work / "brought/LFPlane/render/0-2.json")
+    assert files == shard_files.read_record(tmp_path / "here.json")
 
-    found = shard_files.read_record(work / "theirs/LFPlane/render/0-2.json")
-    for name, (_, digest) in found.items():
+    files = shard_files.read_record(work / "theirs/LFPlane/render/0-2.json")
+    for name, (_, digest) in files.items():
         assert digest == sha256(root / "published/LFPlane" / name)
         assert store.take(digest, tmp_path / "theirs" / name)
 

@@ -148,8 +148,10 @@ def test_a_wall_does_not_shine_through_a_panel_close_in_front():
 
 
 def test_pixels_that_no_view_sees_are_holes():
-    one = {"type": "plane", "cameras": [1, 1], "size": 0}
-    made = sources(look_at_ball, rig=one).synthesise(EYE, lenses.from_camera(EYES["panorama"]))
+    single_camera = {"type": "plane", "cameras": [1, 1], "size": 0}
+    made = sources(look_at_ball, rig=single_camera).synthesise(
+        EYE, lenses.from_camera(EYES["panorama"])
+    )
     lens = lenses.from_camera(EYES["panorama"])
     colour, _ = errors(made, look_at_ball, lens)
     # A single fisheye of 180 degrees sees half. The part behind the ball is a hole too.
@@ -284,17 +286,17 @@ def test_the_program_writes_a_dataset_and_a_video(dataset, tmp_path, run_program
     keys = [{"position": [0, 0, 0]}, {"position": [0.2, 0.1, 0]}]
     rig = {"type": "path", "count": 3, "keys": keys, "camera": EYES["perspective"]}
     (tmp_path / "rig.yaml").write_text(yaml.safe_dump(rig))
-    words = [dataset, "--poses", tmp_path / "rig.yaml", "--output", tmp_path / "walk"]
-    result = run_program("synthesize.py", *words)
+    arguments = [dataset, "--poses", tmp_path / "rig.yaml", "--output", tmp_path / "walk"]
+    result = run_program("synthesize.py", *arguments)
     assert "3 views of 6 each; holes: 0.000%" in result.stdout
     lightfield = LightField.read(tmp_path / "walk" / "lightfield.json")
     for view in lightfield.views:
-        found = images.read_image(tmp_path / "walk" / "exr" / f"{view.name}.exr")
-        assert set(found.channels) == {*"RGBAZ"}
+        image = images.read_image(tmp_path / "walk" / "exr" / f"{view.name}.exr")
+        assert set(image.channels) == {*"RGBAZ"}
         colour, distance = look(lightfield.lens, view.matrix)
         z = distance * -lightfield.lens.pixel_rays()[..., 2]
-        np.testing.assert_allclose(found.channels["Z"], z, rtol=0.02)
-        assert np.abs(found.colour - colour).max() < 0.05
+        np.testing.assert_allclose(image.channels["Z"], z, rtol=0.02)
+        assert np.abs(image.colour - colour).max() < 0.05
         assert (tmp_path / "walk" / "png" / f"{view.name}.png").is_file()
 
 
@@ -325,8 +327,8 @@ def measured(tmp_path_factory, run_program):
             light = dict.fromkeys("RGB", lit.astype(np.float16))
             images.write_exr(PASSES[name].path(ring, view.name), light)
     stem = out.with_name("quality")
-    words = [around, "--truth", ring, "--output", stem]
-    run_program("synthesis_quality.py", *words)
+    arguments = [around, "--truth", ring, "--output", stem]
+    run_program("synthesis_quality.py", *arguments)
     assert stem.with_suffix(".svg").is_file()
     with stem.with_suffix(".csv").open() as file:
         return list(csv.DictReader(file)), stem.with_suffix(".csv")
@@ -334,22 +336,22 @@ def measured(tmp_path_factory, run_program):
 
 def test_fewer_views_and_the_controls_are_worse(measured):
     means = summaries.means(measured[0])
-    found = {(row["variant"], row["value"]): row for row in means}
-    plain = found["all", "42"]
-    assert plain["psnr"] > found["views", "12"]["psnr"] + 0.5
-    assert plain["source_bytes"] > 3 * found["views", "12"]["source_bytes"]
+    mean_of = {(row["variant"], row["value"]): row for row in means}
+    plain = mean_of["all", "42"]
+    assert plain["psnr"] > mean_of["views", "12"]["psnr"] + 0.5
+    assert plain["source_bytes"] > 3 * mean_of["views", "12"]["source_bytes"]
     for control in ("nearest view alone", "shuffled depth"):
-        assert plain["psnr"] > found["control", control]["psnr"] + 2
+        assert plain["psnr"] > mean_of["control", control]["psnr"] + 2
 
 
 def test_regions_follow_the_light_that_pixels_show(measured):
     rows, _ = measured
     assert {row["region"] for row in rows} == {"all", "diffuse", "glossy"}
-    (whole,), (diffuse,), (glossy,) = (
+    (everywhere,), (diffuse,), (glossy,) = (
         summaries.means([row for row in rows if row["variant"] == "all"], region)
         for region in ("all", "diffuse", "glossy")
     )
-    assert whole["part"] == 1
+    assert everywhere["part"] == 1
     assert diffuse["part"] + glossy["part"] == pytest.approx(1)
     assert 0.02 < glossy["part"] < 0.5
     # In each view, the errors of all pixels are the weighted mean of the regions'.
@@ -375,24 +377,24 @@ def test_a_page_has_these_tables(measured):
     _, path = measured
     folder = path.parent / "synthesis" / "ball"
     folder.mkdir(parents=True)
-    found = tables.synthesis([shutil.copy(path, folder / "around.csv")], "ball/around")
-    places, regions = list(found.tables.values())[1:]
+    page_tables = tables.synthesis([shutil.copy(path, folder / "around.csv")], "ball/around")
+    places, regions = list(page_tables.tables.values())[1:]
     assert [row[:2] for row in places.rows] == [["dataset", "inside"], ["dataset", "edge"]]
     assert [row[1] for row in regions.rows] == ["all", "diffuse", "glossy"]
 
 
 @pytest.mark.parametrize(
-    ("words", "problem"),
+    ("arguments", "problem"),
     [
         (["--best", "0"], "--best: is 0; must be 1 or more"),
         (["--poses", "rig.yaml"], "camera: is missing"),
         (["--poses", "none.json"], "none.json"),
     ],
 )
-def test_mistakes_are_one_line(dataset, tmp_path, run_program, words, problem):
+def test_mistakes_are_one_line(dataset, tmp_path, run_program, arguments, problem):
     (tmp_path / "rig.yaml").write_text("type: plane\ncameras: [2, 2]\nsize: 1\n")
-    words = [word.replace("rig.yaml", str(tmp_path / "rig.yaml")) for word in words]
-    result = run_program("synthesize.py", dataset, *words, "--output", tmp_path, check=False)
+    arguments = [word.replace("rig.yaml", str(tmp_path / "rig.yaml")) for word in arguments]
+    result = run_program("synthesize.py", dataset, *arguments, "--output", tmp_path, check=False)
     assert result.returncode
     assert problem in result.stderr.splitlines()[-1]
     assert "Traceback" not in result.stderr

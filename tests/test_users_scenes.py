@@ -39,9 +39,9 @@ def write_lightfield(path, lens, places, **more):
 def checked(folder, run_program, blend, places):
     """Return the status of the check of cameras, and its warnings or error."""
     write_lightfield(folder / "checked.json", "flat", places)
-    words = ("--blend", folder / f"{blend}.blend", "--lightfield", folder / "checked.json")
+    arguments = ("--blend", folder / f"{blend}.blend", "--lightfield", folder / "checked.json")
     output = ("--output", folder / "cameras.json")
-    result = run_program("check_cameras.py", *words, *output, check=False)
+    result = run_program("check_cameras.py", *arguments, *output, check=False)
     return result.returncode, result.stderr.splitlines()
 
 
@@ -49,8 +49,8 @@ def rendered(folder, run_program, blend, lens):
     """Return the channels of a view, and of its pass object."""
     output = folder / f"{blend}_{lens}"
     write_lightfield(output / "lightfield.json", lens, [(0, -4, 0), (0.1, -4, 0)])
-    words = ("--blend", folder / f"{blend}.blend", "--lightfield", output / "lightfield.json")
-    run_program("render_shard.py", *words, "--views", "0:1", "--output", output / "exr")
+    arguments = ("--blend", folder / f"{blend}.blend", "--lightfield", output / "lightfield.json")
+    run_program("render_shard.py", *arguments, "--views", "0:1", "--output", output / "exr")
     view = images.read_image(output / "exr/view_0000f.exr").channels
     view |= images.read_image(output / "object/view_0000f.exr").channels
     return {name: pixels.astype(float) for name, pixels in view.items()}
@@ -77,8 +77,8 @@ def test_only_perspective_views_show_grease_pencil_and_only_in_their_colour(fold
 )
 def test_missing_grease_pencil_is_reported(lens, said, folder, run_program):
     write_lightfield(folder / "lightfield.json", lens, [(0, -4, 0), (0.1, -4, 0)])
-    words = ("--lightfield", folder / "lightfield.json", "--output", folder / "cameras.json")
-    result = run_program("check_cameras.py", "--blend", folder / "pencil.blend", *words)
+    arguments = ("--lightfield", folder / "lightfield.json", "--output", folder / "cameras.json")
+    result = run_program("check_cameras.py", "--blend", folder / "pencil.blend", *arguments)
     (warning,) = [line for line in result.stderr.splitlines() if line.startswith("warning: ")]
     assert said in warning
     assert "behind, drawing" in warning
@@ -121,10 +121,12 @@ def listed(folder, run_program, blend, frame):
     scenes.mkdir(parents=True, exist_ok=True)
     text = SIMULATED.format(blend=blend, frame=frame)
     (scenes / f"{blend}.yaml").write_text(text)
-    words = ("--scene", blend, "--blend", f"{blend}.blend", "--output", "inventory.json")
-    result = run_program("inventory.py", *words, cwd=folder, check=False)
-    told = [line for line in result.stderr.splitlines() if line.startswith(("warning: ", "error"))]
-    return result.returncode, told
+    arguments = ("--scene", blend, "--blend", f"{blend}.blend", "--output", "inventory.json")
+    result = run_program("inventory.py", *arguments, cwd=folder, check=False)
+    messages = [
+        line for line in result.stderr.splitlines() if line.startswith(("warning: ", "error"))
+    ]
+    return result.returncode, messages
 
 
 SIMULATED = """
@@ -168,8 +170,8 @@ def test_a_transparent_view_of_nothing_is_valid(lens, folder, run_program):
     places = [(0, 5, 0), (0, -5, 0)]
     more = {"passes": [], "transparent": True}
     write_lightfield(output / "lightfield.json", lens, places, **more)
-    words = ("--blend", folder / "box.blend", "--lightfield", output / "lightfield.json")
-    run_program("render_shard.py", *words, "--output", output / "exr")
+    arguments = ("--blend", folder / "box.blend", "--lightfield", output / "lightfield.json")
+    run_program("render_shard.py", *arguments, "--output", output / "exr")
     covered = [
         images.read_image(output / f"exr/view_{view}f.exr").channels["A"][16, 16]
         for view in ("0000", "0001")
@@ -197,10 +199,10 @@ def test_a_pixel_aspect_is_reported_as_ignored_and_pixels_are_square(folder, run
     said = run_program("inventory.py", *blend, "--output", "inventory.json", cwd=folder).stdout
     (note,) = [line for line in said.splitlines() if line.startswith("note: ")]
     assert "pixel aspect 2 ignored" in note
-    words = ("--scene", "aspect", "--rig", "View", "--inventory", "inventory.json")
-    run_program("make_lightfield.py", *words, "--output", "View/lightfield.json", cwd=folder)
-    words = ("--blend", "aspect.blend", "--lightfield", "View/lightfield.json")
-    run_program("render_shard.py", *words, "--output", "View/exr", cwd=folder)
+    arguments = ("--scene", "aspect", "--rig", "View", "--inventory", "inventory.json")
+    run_program("make_lightfield.py", *arguments, "--output", "View/lightfield.json", cwd=folder)
+    arguments = ("--blend", "aspect.blend", "--lightfield", "View/lightfield.json")
+    run_program("render_shard.py", *arguments, "--output", "View/exr", cwd=folder)
     depth = images.read_image(folder / "View/exr/view_0001f.exr").channels["Z"]
     seen = np.isfinite(depth)
     assert 4 < seen.any(axis=0).sum() == seen.any(axis=1).sum() < 32

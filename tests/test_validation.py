@@ -262,15 +262,15 @@ RIGHT = {
 def test_right_dataset_is_valid_with_margin(case: str, tmp_path: Path) -> None:
     result = validate(make_dataset(tmp_path / "room" / "rig", *RIGHT[case]))
     assert failed(result) == []
-    found = check(result, "geometry")
-    assert found.passed
-    assert not found.warnings
-    figures = found.figures
+    geometry_check = check(result, "geometry")
+    assert geometry_check.passed
+    assert not geometry_check.warnings
+    figures = geometry_check.figures
     assert figures["worst_contradiction"] < geometry.CONTRADICTIONS_LIMIT / 3
     assert figures["worst_displacement_pixels"] < geometry.DISPLACEMENT_LIMIT / 1.5
-    for what in ("angle", "depth"):
-        if figures.get(f"{what}_scale_deviation", 1) < geometry.SCALE_DEVIATION_LIMIT:
-            assert abs(figures[f"{what}_scale_error"]) < geometry.SCALE_LIMIT / 2
+    for key in ("angle", "depth"):
+        if figures.get(f"{key}_scale_deviation", 1) < geometry.SCALE_DEVIATION_LIMIT:
+            assert abs(figures[f"{key}_scale_error"]) < geometry.SCALE_LIMIT / 2
 
 
 def two_views_of_a_ball(folder: Path, fov: float, angle: float, recorded_fov: float) -> Result:
@@ -406,9 +406,9 @@ def test_only_the_wrong_view_is_named(case: str, dataset: Path) -> None:
     WRONG_VIEWS[case](dataset)
     result = validate(dataset)
     assert failed(result) == ["geometry"]
-    found = check(result, "geometry")
-    assert found.views == [names(dataset)[BAD]]
-    assert [problem.split(": ")[0] for problem in found.problems] == [
+    geometry = check(result, "geometry")
+    assert geometry.views == [names(dataset)[BAD]]
+    assert [problem.split(": ")[0] for problem in geometry.problems] == [
         f"exr/{names(dataset)[BAD]}.exr"
     ]
 
@@ -425,10 +425,10 @@ def test_with_few_pixels_a_curved_surface_passes_and_a_turn_of_a_pixel_fails(
 ) -> None:
     dataset = make_dataset(tmp_path / "room" / "spiral", *SMALL_SPIRAL)
     painted(lambda channels: {**channels, "Z": channels["Z"].astype(precision)})(dataset)
-    found = check(validate(dataset), "geometry")
-    assert found.passed
+    geometry_check = check(validate(dataset), "geometry")
+    assert geometry_check.passed
     # This is more than would pass with more pixels.
-    assert found.figures["worst_displacement_pixels"] > geometry.DISPLACEMENT_LIMIT
+    assert geometry_check.figures["worst_displacement_pixels"] > geometry.DISPLACEMENT_LIMIT
     for axis in range(3):
         copy = Path(shutil.copytree(dataset, tmp_path / str(axis) / "spiral"))
         relist(copy, turn([BAD], degrees(axis, 60 / 24)))
@@ -451,11 +451,11 @@ def test_a_small_error_of_the_lens_shows_in_all_pairs_together(
     rig = {"type": "plane", "cameras": [3, 3], "size": 0.5, "center": center}
     dataset = make_dataset(tmp_path / "room" / "plane", rig, FISHEYE, "distance")
     relist(dataset, recamera({"fov": fov}))
-    found = check(validate(dataset), "geometry")
-    assert found.passed is False
-    assert found.views == []
-    assert len(found.problems) == 1
-    assert "all angles" in found.problems[0]
+    geometry = check(validate(dataset), "geometry")
+    assert geometry.passed is False
+    assert geometry.views == []
+    assert len(geometry.problems) == 1
+    assert "all angles" in geometry.problems[0]
 
 
 def test_geometry_does_not_depend_on_the_worlds_origin(small_dataset: Path) -> None:
@@ -463,8 +463,8 @@ def test_geometry_does_not_depend_on_the_worlds_origin(small_dataset: Path) -> N
     here = check(validate(small_dataset), "geometry").figures
     for view in range(3):
         relist(small_dataset, move(view, (3, -2, 1)))
-    there = check(validate(small_dataset), "geometry").figures
-    assert there == pytest.approx(here, rel=1e-3)
+    elsewhere = check(validate(small_dataset), "geometry").figures
+    assert elsewhere == pytest.approx(here, rel=1e-3)
 
 
 def test_two_views_that_disagree_are_both_named(tmp_path: Path) -> None:
@@ -502,9 +502,9 @@ def test_a_check_without_data_does_not_pass(case: str, tmp_path: Path) -> None:
     *made, reason = UNCHECKED[case]
     result = validate(make_dataset(tmp_path / "room" / "rig", *made))
     assert result.valid
-    found = check(result, "geometry")
-    assert found.passed is None
-    assert reason in found.detail
+    geometry = check(result, "geometry")
+    assert geometry.passed is None
+    assert reason in geometry.detail
     assert re.search("not applicable: .*geometry", result.summary())
 
 
@@ -608,11 +608,11 @@ def test_broken_view_is_named(case: str, small_dataset: Path) -> None:
     spoil(small_dataset)
     result = validate(small_dataset)
     assert failed(result) == [name]
-    found = check(result, name)
-    assert found.views == [names(small_dataset)[BAD]]
-    assert len(found.problems) == 1
-    assert found.problems[0].startswith(f"exr/{names(small_dataset)[BAD]}.exr: ")
-    assert text in found.problems[0]
+    broken_check = check(result, name)
+    assert broken_check.views == [names(small_dataset)[BAD]]
+    assert len(broken_check.problems) == 1
+    assert broken_check.problems[0].startswith(f"exr/{names(small_dataset)[BAD]}.exr: ")
+    assert text in broken_check.problems[0]
     assert str(small_dataset) not in json.dumps(result.to_json())
 
 
@@ -847,12 +847,12 @@ def test_camera_inside_geometry_fails(small_dataset: Path, tmp_path: Path) -> No
 
 
 def test_misses_are_counted_in_a_scene_with_volumes(small_dataset: Path, tmp_path: Path) -> None:
-    one = small_dataset / "exr" / f"{names(small_dataset)[BAD]}.exr"
-    image = images.read_image(one)
+    view_path = small_dataset / "exr" / f"{names(small_dataset)[BAD]}.exr"
+    image = images.read_image(view_path)
     attributes = {k: v for k, v in image.attributes.items() if k.startswith("plenoforge:")}
     depth = image.channels["Z"].copy()
     depth[20:36, 24:40] = np.inf
-    images.write_exr(one, image.channels | {"Z": depth}, attributes)
+    images.write_exr(view_path, image.channels | {"Z": depth}, attributes)
     write_json(tmp_path / "inventory.json", {"volumes": ["Fog", "Smoke"]})
     result = validate(small_dataset, inventory=tmp_path / "inventory.json")
     assert result.valid
@@ -969,8 +969,12 @@ def test_transparent_views_have_alpha_and_may_be_empty(
     painted(alpha(1), slice(BAD))(small_dataset)
     painted(change, ONE)(small_dataset)
     result = validate(small_dataset)
-    problems = [one for name in ("images", "colour") for one in check(result, name).problems]
-    assert [problem in one for one in problems] == ([True] if problem else [])
+    problems = [
+        problem_line
+        for name in ("images", "colour")
+        for problem_line in check(result, name).problems
+    ]
+    assert [problem in problem_line for problem_line in problems] == ([True] if problem else [])
 
 
 # ---- passes ---------------------------------------------------------------------------------
@@ -979,22 +983,24 @@ def test_transparent_views_have_alpha_and_may_be_empty(
 def add_passes(dataset: Path) -> None:
     """Add valid passes of one object that covers everything."""
     wanted = [PASSES[name] for name in ("normal", "object", "cryptomatte", "emission")]
-    render = {"passes": [one.name for one in wanted]}
+    render = {"passes": [render_pass.name for render_pass in wanted]}
     rewrite(dataset, lambda held: held.update(render=render))
     write_json(dataset / "object" / NAMES, {"thing": 1})
-    for view, one in product(names(dataset), wanted):
-        planes = {channel: np.zeros((64, 64), one.dtype) for channel in one.channels}
+    for view, render_pass in product(names(dataset), wanted):
+        planes = {
+            channel: np.zeros((64, 64), render_pass.dtype) for channel in render_pass.channels
+        }
         header = {}
-        if one.name in ("normal", "object"):
+        if render_pass.name in ("normal", "object"):
             depth = images.read_image(dataset / "exr" / f"{view}.exr").channels["Z"]
-            planes["B" if one.name == "normal" else "Y"][np.isfinite(depth)] = 1
-        if one.name == "cryptomatte":
+            planes["B" if render_pass.name == "normal" else "Y"][np.isfinite(depth)] = 1
+        if render_pass.name == "cryptomatte":
             planes["CryptoObject00.R"][:], planes["CryptoObject00.G"][:] = 1, 0.6
             planes["CryptoObject00.B"][:], planes["CryptoObject00.A"][:] = 2, 0.4
             # The last two hold integers, not floats, and are written with other functions.
             hashes = ("3f800000", "40000000", "00000001", "ff800001")
             header = matte_header(dict(zip("abcd", hashes, strict=True)))
-        images.write_exr(one.path(dataset, view), planes, header)
+        images.write_exr(render_pass.path(dataset, view), planes, header)
 
 
 def in_pass(name: str, **pixels: float) -> Spoil:
@@ -1062,8 +1068,8 @@ def test_correct_passes_are_valid_with_a_warning_for_clamped_numbers(
     add_passes(small_dataset)
     in_pass("normal", B=1.00009)(small_dataset)
     for_floats = np.array([0x00800001, 0xFF000001], np.uint32).view(np.float32)
-    own = dict(zip(("CryptoObject00_R", "CryptoObject00_B"), for_floats, strict=True))
-    in_pass("cryptomatte", **own)(small_dataset)
+    own_channels = dict(zip(("CryptoObject00_R", "CryptoObject00_B"), for_floats, strict=True))
+    in_pass("cryptomatte", **own_channels)(small_dataset)
     # A name that covers nothing may be missing.
     in_pass("cryptomatte", CryptoObject01_R=3)(small_dataset)
     for view in names(small_dataset)[:2]:
@@ -1071,9 +1077,9 @@ def test_correct_passes_are_valid_with_a_warning_for_clamped_numbers(
         images.write_exr(path, images.read_image(path).channels, {images.NAN_ATTRIBUTE: 3})
     result = validate(small_dataset)
     assert failed(result) == []
-    found = check(result, "passes")
-    assert found.detail == "12 of 12 are there and hold what they must"
-    (warning,) = found.warnings
+    passes_check = check(result, "passes")
+    assert passes_check.detail == "12 of 12 are there and hold what they must"
+    (warning,) = passes_check.warnings
     assert warning.startswith("6 values in normal were not numbers to Cycles and are 0")
     assert {"normal/view_0000f.exr", f"object/{NAMES}"} <= result.checksums.keys()
     (small_dataset / "object" / NAMES).unlink()
@@ -1118,8 +1124,8 @@ def test_right_reprojection_is_valid(small_dataset: Path) -> None:
 
 def test_reprojected_views_are_as_coarse_as_their_source(small_dataset: Path) -> None:
     add_panoramas(small_dataset)
-    (own, reprojected), _ = files.read_sets(small_dataset, ["panorama"])
-    assert own.grain == 0
+    (rendered_set, reprojected), _ = files.read_sets(small_dataset, ["panorama"])
+    assert rendered_set.grain == 0
     assert reprojected.grain == pytest.approx(math.pi / 64)
 
 
@@ -1129,8 +1135,8 @@ def test_a_reprojected_view_of_one_colour_is_a_warning(small_dataset: Path) -> N
     add_panoramas(
         small_dataset, lambda c: {**c, **{name: np.full_like(c[name], 0.5) for name in "RGB"}}
     )
-    one = validate(small_dataset, ["panorama"])
-    for result, warnings in ((right, []), (one, ["6 images in panorama have one colour"])):
+    one_colour = validate(small_dataset, ["panorama"])
+    for result, warnings in ((right, []), (one_colour, ["6 images in panorama have one colour"])):
         assert check(result, "panorama/colour").warnings == warnings
         assert check(result, "colour").warnings == []
 
@@ -1204,9 +1210,9 @@ def test_a_reprojected_view_has_the_place_of_its_source(
 ) -> None:
     add_panoramas(one_view)
     relist(one_view / "panorama", change)
-    found = check(validate(one_view, ["panorama"]), "panorama/lightfield")
-    assert found.passed is (fault is None)
-    assert fault is None or fault in found.problems[0]
+    lightfield_check = check(validate(one_view, ["panorama"]), "panorama/lightfield")
+    assert lightfield_check.passed is (fault is None)
+    assert fault is None or fault in lightfield_check.problems[0]
 
 
 def test_a_transparent_view_of_nothing_may_be_reprojected(one_view: Path) -> None:
@@ -1251,12 +1257,15 @@ def test_only_pixels_of_transparent_views_may_be_clear_although_the_source_sees_
 
 def test_the_faces_of_a_cube_map_are_compared_with_their_view(one_view: Path) -> None:
     lens = lenses.from_camera({"lens": "rectilinear", "fov": 90, "resolution": [32, 32]})
-    own = LightField.read(one_view / NAME)
+    lightfield_of_view = LightField.read(one_view / NAME)
     for face, side in (("l", 1), ("r", -1)):
         turned = np.eye(4)
         turned[:3, :3] = degrees(1, 90 * side)
-        views = [View.placed(f"{view.name}_{face}", view.matrix @ turned) for view in own.views]
-        lightfield = own.changed(lens=lens, views=views, depth="distance")
+        views = [
+            View.placed(f"{view.name}_{face}", view.matrix @ turned)
+            for view in lightfield_of_view.views
+        ]
+        lightfield = lightfield_of_view.changed(lens=lens, views=views, depth="distance")
         # The fisheyes see only what is in front, which is half of each face.
         unseen = (np.arange(32) < 16) == (side > 0)
         for view in views:
@@ -1286,14 +1295,14 @@ def test_missing_picture_of_a_reprojection_is_named(small_dataset: Path) -> None
 
 
 def run(run_program: Any, dataset: Path, *more: Any) -> Any:
-    words = (dataset, "--output", dataset / "validation.json")
-    return run_program("validate.py", *words, "--sums", dataset.with_suffix(".sums"), *more)
+    arguments = (dataset, "--output", dataset / "validation.json")
+    return run_program("validate.py", *arguments, "--sums", dataset.with_suffix(".sums"), *more)
 
 
 def publish(run_program: Any, dataset: Path) -> Any:
-    words = ("--validation", dataset / "validation.json", "--page", "the page")
-    words += ("--sums", dataset.with_suffix(".sums"), "--output", dataset / "sha256sums.txt")
-    return run_program("publish_checksums.py", *words, check=False)
+    arguments = ("--validation", dataset / "validation.json", "--page", "the page")
+    arguments += ("--sums", dataset.with_suffix(".sums"), "--output", dataset / "sha256sums.txt")
+    return run_program("publish_checksums.py", *arguments, check=False)
 
 
 def test_the_program_needs_only_the_dataset(small_dataset: Path, run_program: Any) -> None:
@@ -1302,8 +1311,8 @@ def test_the_program_needs_only_the_dataset(small_dataset: Path, run_program: An
     assert ": valid: " in run_program("validate.py", small_dataset).stdout
     assert before == {path: path.stat().st_mtime_ns for path in small_dataset.rglob("*")}
     (small_dataset / "panorama" / "view_0001f.png").unlink()
-    words = (small_dataset, "--reprojection", "panorama/")
-    result = run_program("validate.py", *words, check=False)
+    arguments = (small_dataset, "--reprojection", "panorama/")
+    result = run_program("validate.py", *arguments, check=False)
     assert result.returncode == 1
     assert result.stderr.endswith(f"error: {small_dataset}: is not valid\n")
     assert "panorama/view_0001f.png: is missing" in result.stderr

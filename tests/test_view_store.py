@@ -142,14 +142,14 @@ def test_consumers_take_the_files_of_records_and_manifests(shard, store, run_pro
     (folder / export / "images").mkdir()
     (folder / export / "images/a.exr").write_bytes(b"copy")
     store.put_list(folder / export / "export.json", [folder / export / "images/a.exr"])
-    words = ("--results", "results", "--work", "work", RECORD, exported)
-    run_program("take_views.py", *words, cwd=other)
+    arguments = ("--results", "results", "--work", "work", RECORD, exported)
+    run_program("take_views.py", *arguments, cwd=other)
     assert (other / VIEW).read_bytes() == b"view"
     assert (exported.parent / "images/a.exr").read_bytes() == b"copy"
 
     (other / VIEW).unlink()
     write_json(other / RECORD, {"files": {"exr/a.exr": {"bytes": 4, "sha256": "f" * 64}}})
-    failed = run_program("take_views.py", *words, cwd=other, check=False)
+    failed = run_program("take_views.py", *arguments, cwd=other, check=False)
     assert failed.returncode == 1
     assert failed.stderr.splitlines()[-1].startswith("error: 1 files are not in the view store")
     assert f"as {VIEW}; --mend lets" in failed.stderr
@@ -168,10 +168,10 @@ def test_a_list_with_a_lost_file_is_removed_from_the_storage(
     assert stored.read_bytes() == (folder / RECORD).read_bytes()
     (Path(store.url) / "views/sums" / sha256(folder / VIEW)).unlink()
     (folder / VIEW).unlink()
-    words = ("--results", "results", "--work", "work", RECORD)
-    assert run_program("take_views.py", *words, cwd=folder, check=False).returncode == 1
+    arguments = ("--results", "results", "--work", "work", RECORD)
+    assert run_program("take_views.py", *arguments, cwd=folder, check=False).returncode == 1
     assert stored.exists()
-    failed = run_program("take_views.py", "--mend", *words, cwd=folder, check=False)
+    failed = run_program("take_views.py", "--mend", *arguments, cwd=folder, check=False)
     assert failed.stderr.splitlines()[-1].endswith(f"as {VIEW}; the next run makes them again")
     assert not stored.exists()
 
@@ -196,16 +196,16 @@ def test_a_stored_file_is_fetched_with_its_time(tmp_path, monkeypatch, store):
     monkeypatch.chdir(tmp_path)
     store.bring("results/lightfield.json")
     store.bring("results/missing.json")
-    found = tmp_path / "results/lightfield.json"
-    assert (found.read_text(), found.stat().st_mtime) == ("{}", 1000)
+    path = tmp_path / "results/lightfield.json"
+    assert (path.read_text(), path.stat().st_mtime) == ("{}", 1000)
     assert not (tmp_path / "results/missing.json").exists()
 
 
 def test_a_finished_dataset_is_fetched_by_its_checksums(tmp_path, monkeypatch, store, run_program):
     monkeypatch.chdir(tmp_path)
     dataset, stored = Path("results/s/rig"), tmp_path / "store/results/s/rig"
-    words = ("--store", store.url, str(dataset))
-    missing = run_program("take_dataset.py", *words, check=False)
+    arguments = ("--store", store.url, str(dataset))
+    missing = run_program("take_dataset.py", *arguments, check=False)
     assert "sha256sums.txt: is not in" in missing.stderr
 
     store.put(write(tmp_path / "view", b"view"), digest(b"view"))
@@ -213,7 +213,7 @@ def test_a_finished_dataset_is_fetched_by_its_checksums(tmp_path, monkeypatch, s
     write(stored / "report/index.html", b"page")
     sums = f"{digest(b'view')}  exr/a.exr\n{digest(b'lens')}  perspective/lightfield.json\n"
     write(stored / "sha256sums.txt", sums.encode())
-    taken = run_program("take_dataset.py", *words, check=False)
+    taken = run_program("take_dataset.py", *arguments, check=False)
     assert taken.returncode == 0, taken.stderr
     assert (dataset / "exr/a.exr").read_bytes() == b"view"
     assert (dataset / "perspective/lightfield.json").read_bytes() == b"lens"
@@ -221,7 +221,7 @@ def test_a_finished_dataset_is_fetched_by_its_checksums(tmp_path, monkeypatch, s
 
     write(stored / "perspective/lightfield.json", b"snel")
     shutil.rmtree(dataset)
-    wrong = run_program("take_dataset.py", *words, check=False)
+    wrong = run_program("take_dataset.py", *arguments, check=False)
     assert wrong.returncode == 1
     assert f"1 files are not in {store.url}" in wrong.stderr
     assert str(dataset / "perspective/lightfield.json") in wrong.stderr

@@ -100,8 +100,8 @@ def matrix_of(place, yaw, pitch):
     return matrix
 
 
-def psnr(one, other):
-    return -10 * math.log10(((one - other) ** 2).mean())
+def psnr(first, second):
+    return -10 * math.log10(((first - second) ** 2).mean())
 
 
 def test_the_canvas_equals_the_synthesis_and_the_truth(dataset, tab):

@@ -43,8 +43,8 @@ def failing(folder, *arguments):
 
 def files(folder):
     """Return the time of each file. A dry run must not change them."""
-    found = [path for name in ("results", "work") for path in (folder / name).rglob("*")]
-    return {path: path.stat().st_mtime_ns for path in found if path.is_file()}
+    paths = [path for name in ("results", "work") for path in (folder / name).rglob("*")]
+    return {path: path.stat().st_mtime_ns for path in paths if path.is_file()}
 
 
 def test_every_dataset_is_valid_and_its_checksums_hold(smoke):
@@ -86,9 +86,9 @@ def test_only_deleted_and_damaged_views_are_rendered_again(smoke, tmp_path):
     (pictures / "view_d0000f.png").unlink()
     (pictures / "view_f0000f.png").write_bytes((pictures / "view_r0000f.png").read_bytes())
 
-    found = files(folder)
+    times_before = files(folder)
     assert re.search(r"^render +1$", succeeding(folder, "-n", "--cores", "2", "smoke"), re.M)
-    assert files(folder) == found
+    assert files(folder) == times_before
     succeeding(folder, "--cores", "2", "smoke")
     again = rendered(folder) - before
     assert sorted(name for _, name in again.elements()) == [
