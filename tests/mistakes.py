@@ -473,7 +473,7 @@ EXPLAINED = [
     ("rigs.LFCuboid.size", -1, "rigs.LFCuboid.size: is -1; must be a number at least 0"),
     ("rigs.LFCuboid.center", [0, 1], "rigs.LFCuboid.center: is [0, 1]; must be a"),
     ("rigs", {}, "rigs: is {}; must have at least 1 item"),
-    ("rigs", {"../out": RIGHT["rigs"]["LFSphere"]}, "rigs: '../out' is no name"),
+    ("rigs", {"../out": RIGHT["rigs"]["LFSphere"]}, "rigs: '../out' is not a name"),
     (
         "reprojections.perspective.camera",
         {"lens": "rectilinear", "fov": 180, "resolution": [9, 9]},

@@ -300,7 +300,7 @@ def test_a_missing_picture_or_one_of_another_size_is_named(dataset, tmp_path, ru
         light["G"][3, 3] = np.nan if number else 0.5
         images.write_exr(renders / f"{view}.exr", light)
     result = run_program("evaluate.py", renders, *arguments, check=False)
-    problem = f"{TESTS[1]}.exr: has colour that is no number where it is compared"
+    problem = f"{TESTS[1]}.exr: has colour that is not a number where it is compared"
     assert (result.returncode, result.stderr.splitlines()[-1].endswith(problem)) == (1, True)
     assert [path.name for path in tmp_path.iterdir()] == ["renders"]
     source = SourceDataset(dataset, "perspective", ".exr")

@@ -456,7 +456,9 @@ def test_every_changed_coordinate_of_a_point_cloud_is_found(name, kind, dataset)
         struct.pack_into("<f", content, place, value + 1e-4)
     with changed(path, content):
         problem_lines = problems(dataset, name, kind)
-    expected = [f"points.ply: vertex {vertex}: is no point of a view's depth" for vertex in moved]
+    expected = [
+        f"points.ply: vertex {vertex}: is not a point of a view's depth" for vertex in moved
+    ]
     shown = [line.split("exports/")[1].split("/", 1)[1].split(";")[0] for line in problem_lines]
     if len(moved) > 100:
         assert f"{len(moved)} of" in problem_lines[-1]
@@ -466,7 +468,7 @@ def test_every_changed_coordinate_of_a_point_cloud_is_found(name, kind, dataset)
     (value,) = struct.unpack_from("<f", content, start + 12)
     struct.pack_into("<f", content, start + 12, value + 0.5)
     with changed(path, content):
-        assert "vertex 0: its normal is no unit vector" in problems(dataset, name, kind)[0]
+        assert "vertex 0: its normal is not a unit vector" in problems(dataset, name, kind)[0]
 
 
 def test_the_program_names_file_view_and_number_of_a_changed_matrix(dataset, run_program):

@@ -540,7 +540,7 @@ def test_hci_disparity_leads_from_view_to_view(tmp_path):
 
 
 def test_hci_is_for_regular_grids(dataset, tmp_path):
-    with pytest.raises(UserError, match="frames: are no grid of cameras that look in parallel"):
+    with pytest.raises(UserError, match="frames: are not a grid of cameras that look in parallel"):
         exported(dataset, "hci", "perspective", tmp_path)  # Rows are farther apart.
 
 
@@ -639,7 +639,7 @@ def test_every_image_with_finite_depth_has_a_point(tmp_path, capsys):
             np.testing.assert_allclose(rows[:, :2], model.project(places, turn, shift), atol=1e-6)
     alone = sum(len(track) == 1 for track in model.tracks.values())
     printed = capsys.readouterr().out
-    assert f"{len(model.positions)} points, of which one view alone sees {alone}" in printed
+    assert f"{len(model.positions)} points; one view alone sees {alone} of them" in printed
 
 
 def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(dataset, tmp_path):
@@ -671,12 +671,12 @@ def test_equal_exports_have_equal_bytes_and_a_manifest_that_validation_checks(da
     points.write_bytes(content)
     assert not checked()[2].passed
     points.unlink()
-    assert "is no file of the dataset" in checked()[2].problems[0]
+    assert "is not a file of the dataset" in checked()[2].problems[0]
     outside = tmp_path / "outside.txt"
     outside.touch()
     listed = {"files": {"../../../../outside.txt": sha256(outside)}}
     (target / "export.json").write_text(json.dumps(listed))
-    assert "outside.txt is no file of the dataset" in checked()[2].problems[0]
+    assert "outside.txt is not a file of the dataset" in checked()[2].problems[0]
 
 
 def test_a_failed_export_leaves_nothing(dataset, tmp_path):
@@ -707,13 +707,13 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
             "is a part of a panorama",
         ),
         ("nerfstudio", "views", VIEWS, {"splatfacto": True}, "taken for a pinhole by splatfacto"),
-        ("nerf_synthetic", "views", VIEWS, {}, "is no pinhole camera"),
+        ("nerf_synthetic", "views", VIEWS, {}, "is not a pinhole camera"),
         ("nerf_synthetic", "views", LENSES["shifted"] | {"sensor_size": 36}, {}, "off centre"),
         ("opendibr", "views", VIEWS | {"principal_point": [40, 48]}, {}, "axis off centre"),
         ("opendibr", "again", VIEWS, {}, "holds no depth; give it format: exr"),
         ("miv", "views", VIEWS, {}, "a fisheye of 180 degrees with longitude: .-90, 90."),
         ("miv", "views", LENSES["perspective"] | {"resolution": [64, 47]}, {}, "use even sizes"),
-        ("hci", "views", VIEWS, {}, "is no pinhole camera"),
+        ("hci", "views", VIEWS, {}, "is not a pinhole camera"),
         ("hci", "again", VIEWS, {}, "holds no depth; give it format: exr"),
         ("scannetpp", "views", VIEWS, {}, "no equidistant fisheye below 180 degrees"),
         ("poses_csv", "elsewhere", VIEWS, {}, "is 'elsewhere'; must be of views, again"),
@@ -748,7 +748,7 @@ def test_a_rig_that_a_consumer_cannot_take_is_refused_in_yaml():
     }
     assert TypeAdapter(Scene).validate_python(content).exports.hci
     content["exports"] = {"hci": {"sources": ["views"]}}
-    with pytest.raises(ValidationError, match="views is of the rig Ball, which is no plane"):
+    with pytest.raises(ValidationError, match="views is of the rig Ball, which is not a plane"):
         TypeAdapter(Scene).validate_python(content)
     content["rigs"] = {"One": RIG | {"camera": camera, "cameras": [1, 1]}}
     content["reprojections"] = {}
@@ -786,9 +786,9 @@ def test_other_files_in_an_earlier_exports_folder_are_kept(dataset, tmp_path):
 @pytest.mark.parametrize(
     ("name", "source", "why"),
     [
-        ("nerf_synthetic", "fisheye", "is no pinhole camera"),
+        ("nerf_synthetic", "fisheye", "is not a pinhole camera"),
         ("miv", "fisheye", "has a lens that MIV lacks"),
-        ("scannetpp", "perspective", "is no equidistant fisheye"),
+        ("scannetpp", "perspective", "is not an equidistant fisheye"),
         ("colmap", "views", "sees 180 degrees, where COLMAP's fisheye ends"),
     ],
 )

@@ -165,7 +165,7 @@ def test_a_header_with_damaged_text_is_read_or_named(tmp_path, channels):
     assert read_header(path).attributes["plenoforge:scale"] == 0.5
     assert same(np.ascontiguousarray(read_image(path).channels["Z"]), channels["Z"])
     path.write_bytes(content.replace(b"\0Z\0", b"\0\xda\0"))
-    with pytest.raises(UserError, match=r"a\.exr: is no image that can be read: .*utf-8"):
+    with pytest.raises(UserError, match=r"a\.exr: is not an image that can be read: .*utf-8"):
         read_header(path)
 
 
@@ -186,7 +186,7 @@ def test_a_missing_file_or_channel_is_named(tmp_path, channels):
     with pytest.raises(UserError, match=r"a\.exr: has no channel A; it has R, G, B, Z"):
         read_image(tmp_path / "a.exr", ["R", "A"])
     (tmp_path / "text.exr").write_text("no image")
-    with pytest.raises(UserError, match=r"text\.exr: is no image that can be read"):
+    with pytest.raises(UserError, match=r"text\.exr: is not an image that can be read"):
         read_header(tmp_path / "text.exr")
 
 

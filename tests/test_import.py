@@ -227,7 +227,7 @@ def test_linked_folders_are_rigs_by_the_names_of_their_links(published, tmp_path
 def test_a_folder_that_cannot_be_a_rig_is_named(published, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     published.rename(published.with_name("view sphere"))
-    with pytest.raises(UserError, match=r"theirs.yaml: rigs: 'view sphere' is no name; must"):
+    with pytest.raises(UserError, match=r"theirs.yaml: rigs: 'view sphere' is not a name; must"):
         checked(TypeAdapter(Scene), {"scene": {"dataset": "published"}}, "theirs.yaml")
 
 

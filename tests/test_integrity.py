@@ -236,7 +236,7 @@ def test_a_dataset_has_the_faults_of_its_own_files_only(small):
         path.write_bytes(content)
     stray = Path("results", small, "stray.txt")
     stray.touch()
-    assert problems_of(small) == {str(stray): "is no file of this dataset, or has no checksum"}
+    assert problems_of(small) == {str(stray): "is not a file of this dataset, or has no checksum"}
 
 
 def test_the_list_that_a_file_disagrees_with_is_named(small):
@@ -265,7 +265,7 @@ def test_a_copys_own_lists_must_agree(small):
     for missing in ("validation.json", "lightfield.json", "exr/view_0000f.exr"):
         write_checksums(folder, [name for name in listed if name != missing])
         assert problems_of(small, None) == {
-            f"{folder}/{missing}": "is no file of this dataset, or has no checksum",
+            f"{folder}/{missing}": "is not a file of this dataset, or has no checksum",
             sums: f"has no checksum of {missing}",
         }
     write_checksums(folder, listed)
@@ -302,7 +302,7 @@ def test_any_remaining_list_is_enough_for_a_view(small):
     for number, path in enumerate(lists):
         assert problems_of(small)[str(view)].startswith("its sha256 is "), number
         path.write_bytes(b"spoilt")
-    assert problems_of(small)[str(view)] == "is no file of this dataset, or has no checksum"
+    assert problems_of(small)[str(view)] == "is not a file of this dataset, or has no checksum"
     view.unlink()
     view.mkdir()
     assert str(view) in problems_of(small)

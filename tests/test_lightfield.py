@@ -165,7 +165,7 @@ BROKEN = {
     "a text for settings": (content(render="cycles"), "render: must be a mapping"),
     "no list of passes": (content(passes=3), "passes: must be of normal, object"),
     "a pass that there is not": (content(render={"passes": ["x"]}), "passes: must be of normal"),
-    "frame is no mapping": (content(frames=[3]), "frames[0]: must be a mapping, not 3"),
+    "frame is not a mapping": (content(frames=[3]), "frames[0]: must be a mapping, not 3"),
 }
 BROKEN_FRAMES: dict[str, tuple[dict[str, Any], str]] = {
     "no name": ({"name": GONE}, NO_NAME + "None"),

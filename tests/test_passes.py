@@ -366,7 +366,7 @@ SPOILED = {
         "albedo/view_0001f.exr: is missing",
     ),
     "ids": (spoil_ids, "object/view_0000f.exr: has [99], which object/names.json does not have"),
-    "normals": (spoil_normals, "normal/view_0001f.exr: 1024 normals are no unit vectors"),
+    "normals": (spoil_normals, "normal/view_0001f.exr: 1024 normals are not unit vectors"),
     "light": (spoil_light, "emission/view_0001f.exr: 3072 values are not finite"),
     "matte": (
         spoil_matte,

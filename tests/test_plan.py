@@ -100,7 +100,7 @@ def test_a_dataset_in_progress_keeps_its_shards(sphere):
     shard_counts.note(sphere.work_root, {sphere.name: (641, 400)})
     assert len(replace(begun).shards) == 100
     notes = Path(sphere.work_root, shard_counts.NAME)
-    # One digit differs at the same size, and one file is no JSON.
+    # One digit differs at the same size, and one file is not JSON.
     for damaged in (notes.read_text().replace("641", "642"), "{"):
         notes.write_text(damaged)
         assert len(replace(begun).shards) == 100

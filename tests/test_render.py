@@ -279,7 +279,7 @@ def test_a_missing_device_is_an_error(shard):
     errors = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
     assert errors == [
         f"error: device: this machine has no {device} device that Cycles can use; "
-        "use device=cpu, or device=auto to take what there is"
+        "use device=cpu, or device=auto to use the best device here"
     ]
     assert not shard.views.exists()
 

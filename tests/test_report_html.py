@@ -404,8 +404,8 @@ def test_an_index_leads_to_every_page(sphere, run_program, show):
         ("lightfield.json", '{"frames": []}', "lightfield.json: camera: is missing"),
         ("validation.json", "{}", "validation.json: is not what"),
         ("report/costs.json", "[]", "costs.json: is not what scripts/costs.py writes"),
-        ("report/overview.png", "no", "overview.png: is no image"),
-        ("exr/view_0001f.exr", "no", "view_0001f.exr: is no image"),
+        ("report/overview.png", "no", "overview.png: is not an image"),
+        ("exr/view_0001f.exr", "no", "view_0001f.exr: is not an image"),
     ],
 )
 def test_an_unreadable_file_is_an_error_of_one_line(tmp_path, file, text, expected):
@@ -500,7 +500,7 @@ def decoded(uri):
 def test_an_unreadable_view_is_no_error_of_the_page(tmp_path, view):
     write_dataset(tmp_path, LINE)
     (tmp_path / "exr" / f"{view}.exr").write_text("no image")
-    problem = f"exr/{view}.exr: is no image"
+    problem = f"exr/{view}.exr: is not an image"
     check = {"detail": "", "warnings": [], "figures": {}, "problems": [problem]}
     check |= {"name": "images", "passed": False, "views": [view]}
     write_json(tmp_path / "validation.json", {"valid": False, "checks": [check]})
@@ -543,7 +543,7 @@ KEYS = [{"position": [0, 0, 0]}, {"position": [0, 3, 0.5]}]
         ({"type": "path", "count": 9, "keys": KEYS}, PANORAMA, False),
     ],
 )
-def test_the_panorama_is_made_at_the_middle_of_the_views(rig, camera, expected):
+def test_a_panorama_needs_views_that_see_all_round(rig, camera, expected):
     rig = {**rig, "camera": camera, "center": [1, 2, 3]}
     assert overview.sees_all_round(rigs.from_settings(rig)) is expected
 

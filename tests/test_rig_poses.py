@@ -152,12 +152,12 @@ def test_free_places_are_in_the_room_and_clear_of_all_that_stands_in_it(tmp_path
     assert result.returncode == 0, result.stderr
     free = places(from_settings(RANDOM).placed(output))
     assert len(np.unique(free, axis=0)) == 40
-    # Distances to walls, floor and ceiling, to the ball, the box's own ball, and the pillar's axis.
+    # Distances to walls, floor and ceiling, to the ball, the ball in the box, and the pillar's axis.
     assert (np.abs(free - [0, 0, 1.5]) <= np.array([3, 3, 1.5]) - 0.6 + 1e-6).all()
     assert np.linalg.norm(free - [2, 1, 0.5], axis=-1).min() > 0.5 + 0.6 - 0.01
     assert np.linalg.norm(free - [2.2, -1.2, 0.35], axis=-1).min() > 0.35 + 0.6
     assert np.linalg.norm(free[:, :2] + 2, axis=-1).min() > 0.2 + 0.6 - 0.01
-    # No place in the box has half a metre free on the box's side.
+    # The scene's box lies in the rig's box, so no place has half a metre free.
     narrow = {"type": "random", "count": 3, "size": 0.6, "center": [2.2, -1.2, 0.35]}
     result = free_places(blend, narrow | {"clearance": 0.5}, tmp_path / "none.json")
     assert result.returncode == 1
@@ -312,8 +312,8 @@ def test_colmaps_pose_puts_a_point_before_the_camera_that_sees_it():
         ),
         ("images.txt", "1 1 0 0 0 0 0\n", "image 1: must be IMAGE_ID, QW"),
         ("images.txt", "1 1 0 x 0 0 0 0 1 v.png\n", "image 1: must be a finite number"),
-        ("images.bin", "\0" * 7, "is no images.bin of COLMAP's, or is cut short"),
-        ("images.bin", "\x02" + "\0" * 30, "is no images.bin of COLMAP's, or is cut short"),
+        ("images.bin", "\0" * 7, "is not COLMAP's images.bin, or is cut short"),
+        ("images.bin", "\x02" + "\0" * 30, "is not COLMAP's images.bin, or is cut short"),
     ],
 )
 def test_an_invalid_file_of_poses_is_refused(name, content, expected, tmp_path):

@@ -149,7 +149,7 @@ def test_loose_poses_span_no_surface(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("camera", [FISHEYE, NARROW, PANORAMA])
 @pytest.mark.parametrize("face_inside", [False, True])
-def test_the_volume_is_where_the_edge_is_farther_than_the_centre(
+def test_places_within_the_edge_make_up_the_volume(
     camera: Any, face_inside: bool
 ) -> None:
     center = np.array([3.0, -2, 1])

@@ -76,7 +76,7 @@ SCENE = {
     [
         ("rigs.around.split", "even", 'split: is "even"; must be odd or train, validation or test'),
         ("rigs.around.split", {"every": 1}, "split.every: is 1; must be a whole number at least 2"),
-        ("rigs.around.split", {"test": ["a", "a"]}, "'a' is there twice"),
+        ("rigs.around.split", {"test": ["a", "a"]}, "'a' occurs twice"),
         ("rigs.around.split", {"every": 2, "test": ["a"]}, "must be odd or .* have every, or test"),
         ("rigs.around.split", {"test": ["view_0012f"]}, "there is no view 'view_0012f'"),
         ("rigs.around.split", "test", "rigs.around.split: is test, but no rig trains"),

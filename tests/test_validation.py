@@ -793,8 +793,8 @@ def test_stray_files_fail(small_dataset: Path) -> None:
     result = validate(small_dataset)
     assert failed(result) == ["files"]
     assert check(result, "files").problems == [
-        "exr/view_9999f.exr: is no file of this dataset",
-        "old/notes.txt: is no file of this dataset",
+        "exr/view_9999f.exr: is not a file of this dataset",
+        "old/notes.txt: is not a file of this dataset",
     ]
 
 
@@ -908,8 +908,8 @@ def test_listed_files_belong_to_their_export(small_dataset: Path) -> None:
     images.write_png(small_dataset / "pictures" / "one.png", picture[:10])
     problems = check(validate(small_dataset), "exports").problems
     assert problems == [
-        "transforms_test.json: pictures/two.png is no file of the dataset",
-        "transforms_train.json: is no JSON with frames, each with a file_path",
+        "transforms_test.json: pictures/two.png is not a file of the dataset",
+        "transforms_train.json: is not JSON with frames, each with a file_path",
         "pictures/one.png: is 64 × 10; must be 64 × 64",
     ]
 
@@ -1035,8 +1035,8 @@ BROKEN_PASSES: dict[str, tuple[Spoil, str]] = {
         "has the channels Y:float32; must have Y:uint32",
     ),
     "not finite": (in_pass("emission", R=np.nan, G=np.inf), "2 values are not finite"),
-    "long normal": (in_pass("normal", B=1.00012), "1 normals are no unit vectors"),
-    "short normal": (in_pass("normal", B=0.99988), "1 normals are no unit vectors"),
+    "long normal": (in_pass("normal", B=1.00012), "1 normals are not unit vectors"),
+    "short normal": (in_pass("normal", B=0.99988), "1 normals are not unit vectors"),
     "unknown object": (in_pass("object", Y=7), "has [7], which object/names.json does not have"),
     "no object": (in_pass("object", Y=0), "1 pixels have a depth or an object, and not both"),
     "unknown matte": (
@@ -1455,7 +1455,7 @@ def test_the_program_names_faults_and_publishes_no_checksums(
     assert published.returncode == 1
     assert re.fullmatch(
         r"error: room/sphere is not valid: views: exr/view_0009f.exr: is missing; "
-        r"images: exr/view_0002f.exr: .+; files: stray: is no file of this dataset: "
+        r"images: exr/view_0002f.exr: .+; files: stray: is not a file of this dataset: "
         r"see the page\n",
         published.stderr,
     )

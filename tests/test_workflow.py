@@ -121,7 +121,7 @@ def test_an_invalid_dataset_gets_a_page_but_no_checksums_until_it_is_repaired(sm
     }
     write_json(record, content)
     simulated.note_again(folder, record.relative_to(folder))
-    # A stray file is no fault: it is moved away.
+    # A stray file is not a fault: it is moved away.
     (dataset / "notes.txt").touch()
 
     nan = "colour: exr/view_b0000f.exr: 40 values are not a number"

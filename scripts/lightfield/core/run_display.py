@@ -19,7 +19,7 @@ from lightfield.core.progress import duration
 
 # Seconds that a job takes beside its renders: to start a program, to read and write its files.
 JOB_SECONDS = 1.5
-# Without a terminal the first line of progress comes after so many seconds.
+# Without a terminal the first line of progress comes after this many seconds.
 FIRST_LINE = 30.0
 # Without a terminal the next line comes after this part of the elapsed time, or FIRST_LINE.
 NEXT_LINE = 0.1
