@@ -40,7 +40,7 @@ CONFIGURATION = """SlurmctldHost={host}(127.0.0.1)
 SlurmctldPort={controller_port}
 SlurmdPort={node_port}
 SlurmUser=root
-# A job that lost its node is submitted anew after so many seconds.
+# A job that lost its node is submitted again after this many seconds.
 AuthInfo=socket={folder}/munge.socket,cred_expire=20
 CredType=cred/munge
 StateSaveLocation={folder}/state
@@ -105,7 +105,7 @@ class Node:
             node_port=_free_port(),
         )
         if CONFIGURED.exists() and not _is_left_behind(CONFIGURED.read_text()):
-            sys.exit(f"error: {CONFIGURED} is there: this machine belongs to a cluster already")
+            sys.exit(f"error: {CONFIGURED} exists: this machine already belongs to a cluster")
         CONFIGURED.write_text(content)
         self.environment = os.environ | {"PATH": PATH, "TMPDIR": f"{folder}/disk"}
         self.own_disk = ["unshare", "--mount", "sh", "-c", DISK, f"{folder}/disk"]

@@ -40,7 +40,7 @@ LENSES = {
 
 
 def enlarged(camera, factor):
-    """Return a camera with so many times the pixels along each side."""
+    """Return a camera with ``factor`` times the pixels along each side."""
     pixels = {key: camera[key] for key in ("resolution", "principal_point") if key in camera}
     return camera | {key: [factor * side for side in pair] for key, pair in pixels.items()}
 
@@ -60,7 +60,7 @@ def look(lens, matrix):
 
 
 def look_at_ball(lens, matrix):
-    """What a camera sees of the sphere and of a ball in it."""
+    """Return linear colour, and distance, that a camera sees of the sphere with a ball in it."""
     colour, distance = look(lens, matrix)
     rays = lens.pixel_rays() @ matrix[:3, :3].T
     to_ball = BALL - matrix[:3, 3]

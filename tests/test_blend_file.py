@@ -36,7 +36,7 @@ class Server:
     def __init__(self):
         self.content = CONTENT
         self.ranges = True
-        self.cut_after = []  # After so many bytes each of the next transfers breaks off.
+        self.cut_after = []  # Each of the next transfers breaks off after this many bytes.
         self.asked = []  # The Range header of each request.
         owner = self
 

@@ -564,7 +564,7 @@ def test_a_stopped_run_says_so_and_the_next_one_continues(building):
     said = process.stderr.readline()
     while "stopping after SIGTERM" not in said:
         said = process.stderr.readline()
-        assert said, "it ended without a word"
+        assert said, "it ended without a message"
     (folder / "go").touch()
     *_, last = process.stderr.read().splitlines()
     assert process.wait() != 0

@@ -98,7 +98,7 @@ def test_a_wrong_case_fails_the_run(tmp_path, run_program):
     program.write_text(UNTRUE)
     result = run_program(program, ROOT / "benchmarks", tmp_path, check=False)
     assert result.returncode == 1
-    assert "error: 1 of 2 cases are wrong without a word: light of 65000" in result.stderr
+    assert "error: 1 of 2 cases are wrong without a warning: light of 65000" in result.stderr
 
 
 def checked(folder, run_program, blend, **rig):

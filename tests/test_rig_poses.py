@@ -152,7 +152,7 @@ def test_free_places_are_in_the_room_and_clear_of_all_that_stands_in_it(tmp_path
     assert result.returncode == 0, result.stderr
     free = places(from_settings(RANDOM).placed(output))
     assert len(np.unique(free, axis=0)) == 40
-    # Distances to walls, floor and ceiling, to the ball, the ball in the box, and the pillar's axis.
+    # Distances to walls, floor and ceiling, the ball, the ball in the box, and the pillar's axis.
     assert (np.abs(free - [0, 0, 1.5]) <= np.array([3, 3, 1.5]) - 0.6 + 1e-6).all()
     assert np.linalg.norm(free - [2, 1, 0.5], axis=-1).min() > 0.5 + 0.6 - 0.01
     assert np.linalg.norm(free - [2.2, -1.2, 0.35], axis=-1).min() > 0.35 + 0.6

@@ -149,9 +149,7 @@ def test_loose_poses_span_no_surface(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("camera", [FISHEYE, NARROW, PANORAMA])
 @pytest.mark.parametrize("face_inside", [False, True])
-def test_places_within_the_edge_make_up_the_volume(
-    camera: Any, face_inside: bool
-) -> None:
+def test_places_within_the_edge_make_up_the_volume(camera: Any, face_inside: bool) -> None:
     center = np.array([3.0, -2, 1])
     rig = {"type": "sphere", "subdivisions": 2, "size": 2, "center": center.tolist()}
     rig |= {"face_inside": face_inside, "camera": camera}

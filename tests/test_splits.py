@@ -186,7 +186,7 @@ def test_a_split_without_a_part_is_an_error():
     lens = rigs.from_settings(PLANE | {"camera": PERSPECTIVE}).camera.make()
     for split, missing in (("train", "test"), ("test", "train")):
         lightfield = LightField.from_rig(PLANE | {"split": split}, lens)
-        with pytest.raises(UserError, match=f"frames: none is there to {missing}"):
+        with pytest.raises(UserError, match=f"frames: no view is left to {missing}"):
             splits(lightfield)
 
 
