@@ -715,7 +715,7 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
         ("miv", "views", LENSES["perspective"] | {"resolution": [64, 47]}, {}, "use even sizes"),
         ("hci", "views", VIEWS, {}, "is not a pinhole camera"),
         ("hci", "again", VIEWS, {}, "holds no depth; give it format: exr"),
-        ("scannetpp", "views", VIEWS, {}, "no equidistant fisheye below 180 degrees"),
+        ("scannetpp", "views", VIEWS, {}, "not an equidistant fisheye below 180 degrees"),
         ("poses_csv", "elsewhere", VIEWS, {}, "is 'elsewhere'; must be of views, again"),
     ],
 )

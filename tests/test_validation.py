@@ -568,8 +568,8 @@ BROKEN_VIEWS: dict[str, tuple[Spoil, str, str]] = {
     ),
     "truncated": (on_file(truncate), "images", "cannot be read"),
     "end cut off": (on_file(cut_tail), "images", "cannot be read"),
-    "no image": (on_file(lambda path: path.write_bytes(b"no image")), "images", "no image"),
-    "empty file": (on_file(lambda path: path.write_bytes(b"")), "images", "no image"),
+    "no image": (on_file(lambda path: path.write_bytes(b"no image")), "images", "not an image"),
+    "empty file": (on_file(lambda path: path.write_bytes(b"")), "images", "not an image"),
     "wrong size": (painted(small, ONE), "images", "is 64 × 32; must be 64 × 64"),
     "no blue": (
         painted(lambda c: {name: c[name] for name in "RGZ"}, ONE),
@@ -1025,7 +1025,7 @@ def of_pass(name: str, change: Callable[[Path], Any]) -> Spoil:
 OUT_OF_ORDER = "1 pixels have parts below 0 or not in order"
 BROKEN_PASSES: dict[str, tuple[Spoil, str]] = {
     "missing": (of_pass("emission", Path.unlink), "is missing"),
-    "truncated": (of_pass("emission", truncate), "no image that can be read"),
+    "truncated": (of_pass("emission", truncate), "not an image that can be read"),
     "small": (
         of_pass("object", lambda path: images.write_exr(path, {"Y": np.zeros((64, 32), "u4")})),
         "is 32 × 64; must be 64 × 64",
