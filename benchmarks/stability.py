@@ -43,7 +43,7 @@ from lightfield.imaging.plots import BLUE, VERMILION, plot
 
 # Roundings, each of one eps, in the longest chain of operations of one step.
 ROUNDINGS = 16
-# A point within so many eps of the rim may count as inside or outside.
+# A point within this many eps of the rim may count as inside or outside.
 RIM = 32
 # If its bound is larger, in pixels, a case passes as ill-conditioned only.
 VAGUE = 0.5

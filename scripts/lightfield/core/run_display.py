@@ -19,7 +19,7 @@ from lightfield.core.progress import duration
 
 # After so many seconds of work, the run's rate counts.
 SURE_AFTER = 2.0
-# Without a terminal the first line of progress comes after so many seconds.
+# Without a terminal the first line of progress comes after this many seconds.
 FIRST_LINE = 30.0
 # Without a terminal the next line comes after this part of the elapsed time, or FIRST_LINE.
 NEXT_LINE = 0.1

@@ -87,7 +87,7 @@ class Estimate:
         return size + reprojected_size
 
     def memory_bytes(self, pixels: int) -> int:
-        """Return the memory in bytes of a process that renders views of so many pixels.
+        """Return the memory in bytes of a process that renders views of this many pixels.
 
         The inventory measures the scene's part, to which this adds a fifth.
         """

@@ -3,9 +3,9 @@
 Times are seconds, memory and sizes bytes, energy kWh. Wall and processor time of the views come
 from the journals of their shards. Journals survive kills. So they hold all the time that was spent,
 also on views that were lost or rendered again. Any other job counts with the time and memory of its
-last run, as Snakemake measured them. Snakemake looks every half second, and after a while every
-30 s. So processor time may be too short by as much. A job that ends before the first look counts as
-busy throughout.
+last run, as Snakemake measured them. Snakemake measures every half second, and after a while every
+30 s. So the processor time may be too short by that much. A job that ends before the first
+measurement counts as busy throughout.
 
     {
       "stages": [{"stage", "jobs", "wall_seconds", "cpu_seconds", "peak_memory_bytes", "bytes"}],
@@ -132,7 +132,7 @@ def shard_costs(name: str, runs: Sequence[journal.Run]) -> dict[str, Any]:
     latest = {view["view"]: view["wall_seconds"] for view in views}
     wall = sum(run.wall_seconds for run in runs)
     path_tracing = sum(view["render_seconds"] for view in views)
-    again = sum(view["wall_seconds"] for view in views) - sum(latest.values())
+    rendered_again = sum(view["wall_seconds"] for view in views) - sum(latest.values())
     return _rounded(
         {
             "shard": name,
@@ -145,7 +145,7 @@ def shard_costs(name: str, runs: Sequence[journal.Run]) -> dict[str, Any]:
             "views_rendered": len(views),
             "runs": len(runs),
             "killed_runs": sum(run.end is None for run in runs),
-            "repeated_seconds": again
+            "repeated_seconds": rendered_again
             + sum(run.start.get("start_up_seconds", 0.0) for run in runs[1:]),
         }
     )
@@ -174,7 +174,7 @@ def job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, Stage]:
         try:
             wall, cpu, memory = job_times(path)
         except (OSError, ValueError, LookupError, TypeError, StopIteration):
-            print(f"{path}: is no table of a job's time; the job is left out", file=sys.stderr)
+            print(f"{path}: is not a table of a job's time; the job is left out", file=sys.stderr)
             continue
         stage = stages.setdefault(name, Stage())
         stage.jobs += 1

@@ -26,15 +26,14 @@ from lightfield.measurement.sampling import (
     WINDOW_SIZE,
 )
 
-# The following were measured in the courtyard. A calibration's search makes this many renders of
-# each window.
+# These three were measured in the courtyard. A calibration's search renders each window this often.
 SEARCH_RENDERS = 9
-# Together they take this many times the samples that the target needs.
+# Together these renders take this many times the samples that the target needs.
 SEARCH_PART = 2.5
 # A render takes this many seconds beside its samples.
 WINDOW_SECONDS = 0.07
 
-# The formulas of the columns, which stand under the table.
+# The formulas of the columns, printed below the table.
 FORMULAS = f"""\
 CPU time = rendered pixels × (samples + {DENOISING_SAMPLES} if denoised) \
 × {1e6 * SECONDS_PER_SAMPLE:g} µs + reprojected pixels × {1e6 * REPROJECTION_SECONDS:g} µs
