@@ -33,7 +33,8 @@ from lightfield.dataset.capture import LightfieldSettings
 from lightfield.dataset.config import accept_blend, load_config, load_scene, scene_path
 from lightfield.dataset.dataset_paths import PICTURES, PLOTS
 from lightfield.dataset.description import Cluster
-from lightfield.dataset.exports import MANIFEST, VIEWS, InstantNgp, export_settings_of
+from lightfield.dataset.exports import MANIFEST, InstantNgp, export_settings_of
+from lightfield.dataset.names import VIEWS
 from lightfield.dataset.job_settings import (
     BuildSettings,
     FiguresSettings,

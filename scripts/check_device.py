@@ -3,7 +3,6 @@
 import argparse
 
 from lightfield.core.cli import run
-from lightfield.rendering.cycles import gpu
 
 
 def main() -> None:
@@ -11,7 +10,12 @@ def main() -> None:
     parser.add_argument(
         "device", choices=["auto", "cpu", "gpu", "optix", "cuda", "hip", "oneapi", "metal"]
     )
-    gpu(parser.parse_args().device)
+    device = parser.parse_args().device
+
+    # Only now, so that --help need not wait for it.
+    from lightfield.rendering.cycles import gpu
+
+    gpu(device)
 
 
 if __name__ == "__main__":

@@ -7,23 +7,26 @@ has the size of each dataset whose hours are estimated. Without the file none ar
 import argparse
 from pathlib import Path
 
-from lightfield.core import processors
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json, write_text
-from lightfield.core.settings import read_settings
-from lightfield.measurement import gpu_check, trials
+from lightfield.measurement import trial_flags
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    trials.add_arguments(parser, "lightfield.json")
-    trials.add_calibration(parser)
+    trial_flags.add_arguments(parser, "lightfield.json")
+    trial_flags.add_calibration(parser)
     parser.add_argument("--settings", type=Path, metavar="JSON", help="settings file")
     parser.add_argument("--output", required=True, type=Path, help="stem of the .json and .md")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.core import processors
+    from lightfield.core.settings import read_settings
+    from lightfield.measurement import gpu_check, trials
 
     settings = gpu_check.GpuCheckSettings()
     if arguments.settings:

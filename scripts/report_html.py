@@ -11,10 +11,6 @@ import argparse
 from pathlib import Path
 
 from lightfield.core.cli import run
-from lightfield.core.settings import read_settings
-from lightfield.dataset.inventory import read_inventory
-from lightfield.dataset.job_settings import PageSettings
-from lightfield.report import dataset_page
 
 
 def main() -> None:
@@ -29,6 +25,13 @@ def main() -> None:
     parser.add_argument("--inventory", type=Path, help="JSON of what the scene's .blend says")
     parser.add_argument("--output", required=True, type=Path, help="HTML file to write")
     arguments = parser.parse_args()
+
+    # Only now, so that --help need not wait for these.
+    from lightfield.core.settings import read_settings
+    from lightfield.dataset.inventory import read_inventory
+    from lightfield.dataset.job_settings import PageSettings
+    from lightfield.report import dataset_page
+
     settings = read_settings(PageSettings, arguments.settings)
     origin = dataset_page.Origin(
         rig=settings.rig,

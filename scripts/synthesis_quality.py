@@ -12,15 +12,6 @@ from pathlib import Path
 from lightfield.core.cli import positive, refuse_beside_settings, run
 from lightfield.core.files import write_csv
 from lightfield.core.progress import Progress
-from lightfield.core.settings import read_settings
-from lightfield.dataset.job_settings import SynthesisSettings
-from lightfield.export.source import SourceDataset
-from lightfield.export.trainer_splits import splits
-from lightfield.imaging import images, pictures
-from lightfield.measurement import summaries, synthesis_quality
-
-# isort: split
-import numpy as np
 
 
 def main() -> None:
@@ -31,8 +22,23 @@ def main() -> None:
     add("--output", type=Path, required=True, metavar="STEM")
     add_settings_flags(parser)
     arguments = parser.parse_args()
+    if arguments.settings:
+        refuse_beside_settings(arguments, add_settings_flags)
 
-    settings = settings_from(arguments)
+    # Only now, so that --help need not wait for these.
+    import numpy as np
+
+    from lightfield.core.settings import read_settings
+    from lightfield.dataset.job_settings import SynthesisSettings
+    from lightfield.export.source import SourceDataset
+    from lightfield.export.trainer_splits import splits
+    from lightfield.imaging import images, pictures
+    from lightfield.measurement import summaries, synthesis_quality
+
+    if arguments.settings:
+        settings = read_settings(SynthesisSettings, arguments.settings)
+    else:
+        settings = SynthesisSettings(truth=arguments.truth, views=arguments.views)
     source = SourceDataset(arguments.dataset, "", ".exr")
     truths = [
         SourceDataset(Path(folder), "", ".exr") for folder in settings.truth or [arguments.dataset]
@@ -76,14 +82,6 @@ def add_settings_flags(parser: argparse.ArgumentParser) -> None:
     flags.add_argument(
         "--views", type=positive, default=12, help="compared views of each truth (default: 12)"
     )
-
-
-def settings_from(arguments: argparse.Namespace) -> SynthesisSettings:
-    """Return the settings of --settings, or those of the flags."""
-    if arguments.settings:
-        refuse_beside_settings(arguments, add_settings_flags)
-        return read_settings(SynthesisSettings, arguments.settings)
-    return SynthesisSettings(truth=arguments.truth, views=arguments.views)
 
 
 if __name__ == "__main__":

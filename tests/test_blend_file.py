@@ -12,7 +12,7 @@ from checkouts import checkout, planned, snakemake
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
-from lightfield.dataset import config, download
+from lightfield.dataset import config, download, names
 from lightfield.dataset.loading import load_datasets, scene_datasets
 from lightfield.dataset.presence import check_presence
 
@@ -312,7 +312,7 @@ def test_scripts_and_drivers_in_a_blend_do_not_run(run_program, tmp_path):
         (tmp_path / name).write_text(text)
     folder = tmp_path / "scene"
     folder.mkdir()
-    scripts = config.BUILDERS.parent
+    scripts = names.BUILDERS.parent
     run_program(tmp_path / "make.py", folder, scripts)
     lines = run_program(tmp_path / "open.py", folder, scripts).stdout.splitlines()
     # If Blender is told to trust the file, the traps do work.

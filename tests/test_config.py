@@ -12,9 +12,8 @@ import pytest
 import yaml
 from mistakes import REMOVE, RIGHT, changed
 
-import schema
 from lightfield.core.errors import UserError
-from lightfield.dataset import config
+from lightfield.dataset import config, json_schema
 from lightfield.dataset.config import Preset
 from lightfield.dataset.loading import load_datasets, scene_datasets
 from lightfield.geometry.rigs import as_written
@@ -211,14 +210,14 @@ def test_every_scene_of_the_repository_is_right():
         config.read_scene(path)
 
 
-@pytest.mark.parametrize("name", schema.MODELS)
+@pytest.mark.parametrize("name", json_schema.MODELS)
 def test_the_schemas_for_editors_match_the_models(name):
-    path = schema.FOLDER / f"{name}.schema.json"
-    assert path.read_text() == schema.schema(name), "run scripts/schema.py"
+    path = config.ROOT / "configs/schema" / f"{name}.schema.json"
+    assert path.read_text() == json_schema.schema(name), "run scripts/schema.py"
 
 
 def test_the_schemas_accept_every_scene_and_find_its_mistakes():
-    validator = jsonschema.Draft202012Validator(json.loads(schema.schema("scene")))
+    validator = jsonschema.Draft202012Validator(json.loads(json_schema.schema("scene")))
     for path in config.SCENES.glob("*.yaml"):
         validator.validate(yaml.safe_load(path.read_text()))
     for path, value in (

@@ -1,6 +1,5 @@
 """The export for instant-ngp, read back as its loader reads it (nerf_loader.cu), in float32."""
 
-import argparse
 import json
 import math
 import re
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
+import export_instant_ngp
 from lightfield.core.errors import UserError
 from lightfield.dataset.exports import ExportSettings, InstantNgp
 from lightfield.dataset.lightfield import LightField
@@ -54,11 +54,9 @@ class Dataset:
 
     def export(self, *arguments: Any) -> dict[str, Any]:
         """Return the transforms.json that the program writes for these arguments."""
-        parser = argparse.ArgumentParser()
-        instant_ngp.add_arguments(parser)
         paths = ["--input-cfg", self.folder / "lightfield.json"]
         paths += ["--output", self.folder / "transforms.json"]
-        instant_ngp.export(parser.parse_args([*map(str, [*paths, *arguments])]))
+        export_instant_ngp.main([*map(str, [*paths, *arguments])])
         return self.read("transforms.json")
 
     def read(self, name: str) -> dict[str, Any]:
@@ -604,10 +602,8 @@ def test_an_impossible_export_is_an_error(
 def test_impossible_arguments_are_refused(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    parser = argparse.ArgumentParser()
-    instant_ngp.add_arguments(parser)
     with pytest.raises(SystemExit):
-        parser.parse_args(arguments)
+        export_instant_ngp.main(arguments)
     assert message in capsys.readouterr().err
 
 

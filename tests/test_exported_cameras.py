@@ -3,7 +3,6 @@
 The scene is a ball in a sphere. It has every export that this project writes.
 """
 
-import argparse
 import json
 import re
 import shutil
@@ -15,12 +14,13 @@ import pytest
 from pydantic import TypeAdapter
 from sphere import LENSES, look_at_ball, write_views
 
+import export_instant_ngp
 from lightfield import export
 from lightfield.core.files import read_json, write_json
 from lightfield.dataset.exports import settings_of
 from lightfield.dataset.lightfield import LightField
 from lightfield.dataset.splits_file import splits_content
-from lightfield.export import MANIFESTS, instant_ngp
+from lightfield.export import MANIFESTS
 from lightfield.export.source import SourceDataset
 from lightfield.validation import exported_cameras
 from lightfield.validation.exported_depth import ExportedDepth
@@ -108,23 +108,13 @@ def write_export(folder, name, kind, options, beside=None):
 
 
 def write_instant_ngp(folder, name, arguments):
-    parser = argparse.ArgumentParser()
-    instant_ngp.add_arguments(parser)
     folder_of_set = home(folder, name)
-    files = [
-        "--input-cfg",
-        folder_of_set / "lightfield.json",
-        "--output",
-        folder_of_set / "transforms.json",
-    ]
-    files += [
-        "--image-suffix",
-        ".exr",
-        "--image-dir",
-        folder / "exr" if folder_of_set == folder else folder_of_set,
-    ]
+    images = folder / "exr" if folder_of_set == folder else folder_of_set
+    files = ["--input-cfg", folder_of_set / "lightfield.json"]
+    files += ["--output", folder_of_set / "transforms.json"]
+    files += ["--image-suffix", ".exr", "--image-dir", images]
     files += ["--depth-dir", folder_of_set / "instant_ngp" / "depth"]
-    instant_ngp.export(parser.parse_args([*map(str, files), *arguments]))
+    export_instant_ngp.main([*map(str, files), *arguments])
 
 
 def problems(folder, name, kind):

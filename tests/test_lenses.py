@@ -959,7 +959,7 @@ def test_rays_of_all_pixel_centres(dtype: type) -> None:
 USE_IT = """
 import argparse, math
 from lightfield.geometry import lenses
-from lightfield.reprojection import flags
+from lightfield.reprojection import flag_settings, flags
 from lightfield.reprojection.geometry import Geometry
 
 lens = lenses.from_camera({"lens": "halved", "fov": 60, "resolution": [8, 8]})
@@ -969,8 +969,8 @@ flags.add_configuration_flags(parser)
 flags.add_lens_map_flags(parser)
 words = ["--no-configs", "8,8", "--i-halved", "1", "--halved", "0.5"]
 arguments = parser.parse_args(words)
-source = flags.read_source(arguments)[1]
-geometry = Geometry.of(flags.lens_map_settings(arguments, source), source)
+source = flag_settings.read_source(arguments)[1]
+geometry = Geometry.of(flag_settings.lens_map_settings(arguments, source), source)
 assert (geometry.source.fov, geometry.targets[0].lens.description) == (1, "halved fisheye, 28.65°")
 """
 

@@ -5,7 +5,7 @@ import shutil
 import numpy as np
 import pytest
 
-from lightfield.dataset import config, keys
+from lightfield.dataset import keys, names
 from lightfield.dataset.config import SceneSource
 from scenes.library.architecture import cut
 from scenes.library.points import evenly, lattice, mirrored, noise, polar, smoothstep
@@ -142,7 +142,7 @@ def test_less_detail_has_a_part_of_the_triangles():
 
 
 def test_builders_are_the_folders_beside_the_library():
-    assert config.builders() == ["barbershop", "garden", "lone_monk", "room", "still_life"]
+    assert names.builders() == ["barbershop", "garden", "lone_monk", "room", "still_life"]
 
 
 @pytest.mark.parametrize(
@@ -158,7 +158,7 @@ def test_a_fingerprint_covers_the_library_and_the_builders_own_files(
     file, changes, tmp_path, monkeypatch
 ):
     builders = tmp_path / "scenes"
-    shutil.copytree(config.BUILDERS, builders, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(names.BUILDERS, builders, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(keys, "BUILDERS", builders)
     source = SceneSource(builder="garden", parameters={"seed": 1})
     before = keys.scene_fingerprint(source)

@@ -33,7 +33,8 @@ from lightfield.core.settings import (
     suggestion,
 )
 from lightfield.dataset import published
-from lightfield.dataset.exports import VIEWS, Export, Exports
+from lightfield.dataset.exports import Export, Exports
+from lightfield.dataset.names import VIEWS, builders
 from lightfield.dataset.passes import FLOW, PASSES, in_order
 from lightfield.dataset.reprojections import (
     ReprojectionOptions,
@@ -51,7 +52,6 @@ ROOT = Path(__file__).resolve().parents[3]
 SCENES = ROOT / "configs" / "scenes"
 # The user's own scene YAMLs, relative to Snakemake's working folder.
 OWN_SCENES = Path("configs", "scenes")
-BUILDERS = ROOT / "scripts" / "scenes"
 
 FLOW_PLACES = "needs views from two or more places"
 
@@ -770,12 +770,6 @@ def read_scene(path: Path) -> Scene:
     """Read and check the scene YAML at ``path``, as `load_scene` does by name."""
     file = str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else str(path)
     return checked(_SCENE, read_yaml(path, file), file)
-
-
-def builders() -> list[str]:
-    """Return the names of the scene builders: the folders of scripts/scenes/ except library."""
-    folders = (file.parent.name for file in BUILDERS.glob("*/__init__.py"))
-    return sorted(name for name in folders if name != "library")
 
 
 def blend_sha256(scene: str, source: SceneSource) -> tuple[str | None, Path]:

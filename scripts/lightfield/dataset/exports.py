@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar, ge
 from pydantic import Field, model_validator
 
 from lightfield.core.settings import Settings, Vector, as_list
+from lightfield.dataset.names import VIEWS
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -20,8 +21,6 @@ from lightfield.geometry.rigs import Rig
 from lightfield.geometry.rigs.plane import Plane
 from lightfield.geometry.rigs.split_setting import PARTS
 
-# The name of the rendered views in `sources`.
-VIEWS = "views"
 # The list of an export's files, which is written last.
 MANIFEST = "export.json"
 

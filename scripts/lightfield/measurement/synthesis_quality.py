@@ -25,7 +25,8 @@ from lightfield.imaging import images, pictures, plots
 from lightfield.imaging.tonemap import encode_srgb, tone_map
 from lightfield.measurement import metrics
 from lightfield.measurement.summaries import PLACES, WHOLE
-from lightfield.synthesis.view import BEST, Sources, reader
+from lightfield.synthesis.defaults import BEST
+from lightfield.synthesis.view import Sources, reader
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core import processors
-from lightfield.core.cli import positive
 from lightfield.core.errors import UserError
 from lightfield.dataset import keys, passes
 from lightfield.dataset.inventory import read_inventory
@@ -29,7 +28,7 @@ from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
 from lightfield.measurement.metrics import Mask, Reference, make_reference
-from lightfield.measurement.sampling import PLAIN, WINDOW_SIZE, calibrated, without_target
+from lightfield.measurement.sampling import PLAIN, calibrated, without_target
 from lightfield.validation.consistency import Camera
 
 # Seeds of references begin here, those of trials at 1. So no trial is part of its reference.
@@ -127,7 +126,7 @@ class Trials:
 
     @classmethod
     def of(cls, arguments: argparse.Namespace, lightfield: LightField) -> "Trials":
-        """Return the trials for the arguments of `add_arguments`."""
+        """Return the trials for the arguments of `trial_flags.add_arguments`."""
         return cls(
             arguments.blend,
             arguments.inventory,
@@ -302,29 +301,6 @@ class Trials:
         cycles.set_window(0, 0, min(64, self.lens.width), min(64, self.lens.height))
         colour_pass.render_colour(self.lightfield.views[0].matrix, 0)
         self._started = True
-
-
-def add_arguments(parser: argparse.ArgumentParser, lightfield: str) -> None:
-    """Add the arguments of a program that renders windows. ``lightfield`` is a help text."""
-    parser.add_argument("--blend", required=True, type=Path, help="the scene")
-    parser.add_argument("--inventory", required=True, type=Path, help="what the scene contains")
-    parser.add_argument("--lightfield", required=True, type=Path, help=lightfield)
-    parser.add_argument(
-        "--size",
-        type=positive,
-        default=WINDOW_SIZE,
-        help="pixels of a window's sides (default: %(default)s)",
-    )
-    parser.add_argument("--device", default="auto", help="what Cycles renders on (default: auto)")
-    parser.add_argument("--threads", type=positive, default=1, help="CPU threads (default: 1)")
-    parser.add_argument("--cache", required=True, type=Path, help="folder that keeps the renders")
-
-
-def add_calibration(parser: argparse.ArgumentParser) -> None:
-    """Add the argument that `read_arguments` reads beside those of `add_arguments`."""
-    parser.add_argument(
-        "--calibration", type=Path, help="the file of scripts/calibrate.py for a target error"
-    )
 
 
 def read_arguments(arguments: argparse.Namespace) -> tuple[LightField, Trials]:

@@ -15,6 +15,7 @@ from lightfield.geometry.lenses import Lens
 from lightfield.report.packing import packed_bytes
 from lightfield.synthesis import kernels
 from lightfield.synthesis import view as synthesis
+from lightfield.synthesis.defaults import BEST
 
 Array = NDArray[Any]
 
@@ -53,7 +54,7 @@ def collect(lens: Lens, places: Array, distances: Array, *, fills_holes: bool) -
         "steepest": float(synthesis.steepest(lens)),
         "distances": synthesis.typical(1 / positive).tolist() if positive.size else [1.0, 1.0],
         "nearest": float(np.percentile(hit, 1)) if hit.size else 1.0,
-        "best": synthesis.BEST,
+        "best": BEST,
         "directions": synthesis.DIRECTIONS,
         "distance": synthesis.DISTANCE,
         "sharp": synthesis.SHARP,

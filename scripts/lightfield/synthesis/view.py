@@ -22,9 +22,8 @@ from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.imaging import images
 from lightfield.synthesis import kernels
+from lightfield.synthesis.defaults import BEST
 
-# A picture is made of this many views by default.
-BEST = 6
 # Views are chosen by how well they see points in this many directions across and down the picture,
 # at two distances that are typical of the scene.
 DIRECTIONS = 12
