@@ -51,7 +51,7 @@ def write_plot(path, seed):
 
 
 def write_page(path, seed):
-    keys = ("rig", "link", "resolution", "lens", "valid", "picture")
+    keys = ("rig", "link", "resolution", "lens", "projection", "state", "picture")
     page.write(
         path, "index.html.j2", datasets=[dict.fromkeys(keys) | {"scene": "a", "views": seed}]
     )

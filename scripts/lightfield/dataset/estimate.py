@@ -11,28 +11,18 @@ from lightfield.core.files import DAMAGE
 from lightfield.dataset import memory, passes
 from lightfield.dataset.config import FILE
 from lightfield.dataset.dataset_paths import DatasetPaths
+from lightfield.dataset.unit_costs import (
+    CHECK_SECONDS,
+    COMPRESSED,
+    DENOISING_SAMPLES,
+    MOST_SHOWN_VIEWS,
+    READ_SECONDS,
+    REPORT_SECONDS,
+    REPROJECTION_SECONDS,
+    SECONDS_PER_SAMPLE,
+    START_UP_SECONDS,
+)
 
-# These are only for planning. They were measured on one core of a 2-core x86-64 machine.
-# Path tracing of one sample of one pixel.
-SECONDS_PER_SAMPLE = 6e-6
-# Start-up of bpy, the scene, and Cycles' acceleration structures.
-START_UP_SECONDS = 3.0
-# Start-up of a job without Blender.
-JOB_SECONDS = 1.0
-# Reading a pixel of an imported view: EXR with depth, by benchmarks/reprojection.py with batches of
-# 16 views of 2048².
-READ_SECONDS = 4e-8
-# Computing a pixel of a reprojected view, measured in the same way.
-REPROJECTION_SECONDS = 1.5e-7
-# For each pixel of the views and their reprojections: each export, and the validation.
-CHECK_SECONDS = 1e-7
-# The same for the figures, and for the page. They show at most so many views.
-REPORT_SECONDS = 4e-7
-MOST_SHOWN_VIEWS = 120
-# Denoising a pixel costs as much as this many samples of it: 18 µs against 6. It was measured on
-# one core of an EPYC, in views of the garden of 256² and more. In small windows it costs up to
-# twice as much.
-DENOISING_SAMPLES = 3
 # A pixel's samples if a target error is given instead.
 GUESSED_SAMPLES = 256
 # Start-up takes at most this part of a shard's time.
@@ -43,8 +33,6 @@ USUAL_SHARDS = 64
 CLUSTER_JOB_MINUTES = 20
 # Planning more shards than this takes too long.
 MOST_SHARDS = 10_000
-# An EXR's size as a part of its uncompressed size, measured in the three scenes.
-COMPRESSED = 0.75
 # Bytes for a pixel of an 8-bit PNG.
 PNG_BYTES = 2
 

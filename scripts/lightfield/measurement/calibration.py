@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from statistics import fmean
 from typing import Any
 
-from lightfield.dataset.estimate import DENOISING_SAMPLES
+from lightfield.dataset.unit_costs import DENOISING_SAMPLES
 from lightfield.measurement import metrics, strata
 from lightfield.measurement.experiment import Experiment, Method, split_by_stratum
 from lightfield.measurement.sampling import (

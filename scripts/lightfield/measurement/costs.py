@@ -15,10 +15,10 @@ from pydantic import Field
 from lightfield.core.settings import Settings
 from lightfield.dataset import journal
 from lightfield.dataset.config import AtLeastOne, Energy
-from lightfield.dataset.estimate import DENOISING_SAMPLES
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, PASSES
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
+from lightfield.dataset.unit_costs import DENOISING_SAMPLES
 from lightfield.measurement.sampling import cost_in_samples, standard_error
 
 # The stages that every dataset has, in the order of the work. Other stages come between.

@@ -6,7 +6,7 @@ Every job reads this file with the rules, so it must import nothing that takes l
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from lightfield.dataset.estimate import (
+from lightfield.dataset.unit_costs import (
     CHECK_SECONDS,
     COMPRESSED,
     DENOISING_SAMPLES,

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lightfield.core.files import read_keys, reading
-from lightfield.dataset.estimate import DENOISING_SAMPLES
+from lightfield.dataset.unit_costs import DENOISING_SAMPLES
 
 # Keys of a `render` block that only its calibration reads: the target error, and a preset's limits.
 UNCALIBRATED = ("target_error", "most_samples", "denoise")
