@@ -46,16 +46,16 @@ def main() -> None:
     print(text)
     if not content["same"]:
         raise UserError(
-            f"{name}: the GPU renders another picture than the processor: colours differ by "
-            f"{content['colour']:.2f} of what noise makes, all light by {content['light']:.1f} "
-            f"standard errors, and {content['depth']:.2%} of the depths; try another driver, or "
-            "render with device=cpu"
+            f"{name}: the GPU renders another picture than the processor: colours differ "
+            f"{content['colour']:.2f} times as much as noise explains, all light by "
+            f"{content['light']:.1f} standard errors, and {content['depth']:.2%} of the depths "
+            "differ; try another driver, or render with device=cpu"
         )
     write_text(arguments.output.with_suffix(".md"), text)
     write_json(arguments.output.with_suffix(".json"), content)
     print(
-        f"note: {name}: the GPU renders the same picture; all datasets at full size take "
-        f"{sum(content['hours'].values()):.3g} hours of it"
+        f"note: {name}: the GPU renders the same picture; it takes "
+        f"{sum(content['hours'].values()):.3g} hours for all datasets at full size"
     )
 
 

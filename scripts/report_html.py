@@ -1,7 +1,7 @@
 """Make a dataset's page: one file that shows what it looks like, how good it is, what it cost.
 
 Everything is in the file, pictures too, so that it can be read without a network, kept and sent.
-What is not there (measurements that were not asked for, depth, costs) is left out, and is no error.
+Missing parts (measurements, depth, costs) are left out without an error.
 A settings file is JSON with these keys: `rig`, as in the scene YAML; `yaml`, that file's text;
 `command`, what makes the dataset again; `panorama`, whether the overview is one; `measurements`, a
 list of {"file": …}, the .csv, .json, .svg and .png that measurements wrote.

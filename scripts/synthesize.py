@@ -30,8 +30,8 @@ def main() -> None:
     add(
         "--poses",
         type=Path,
-        help="a lightfield.json, or a YAML of a rig with its camera (default: the views that the "
-        "dataset's split has to test with, from the others)",
+        help="a lightfield.json, or a YAML of a rig with its camera (default: synthesise the test "
+        "views of the dataset's split from its other views)",
     )
     help_text = f"views a picture is made of (default: {BEST})"
     add("--best", type=positive, default=BEST, metavar="K", help=help_text)

@@ -151,7 +151,7 @@ class LightfieldSettings(Settings):
     rig: Annotated[rigs.AnyRig, PlainSerializer(rigs.as_written)]
     flow: bool = Field(False, description="Whether each view has a neighbour for its flow.")
     panorama_width: AtLeastOne | None = Field(
-        None, description="Instead of the rig, a panorama from its centre, so many pixels wide."
+        None, description="Instead of the rig, a panorama from its centre, this many pixels wide."
     )
     fingerprint: str | None = Field(
         None, description="Changes with the builder's text, so that the scene is captured again."

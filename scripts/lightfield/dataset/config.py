@@ -225,7 +225,7 @@ class Configuration(Settings):
             if "." in name or name in SCENE_NEIGHBOURS:
                 used_names = ", ".join(sorted(SCENE_NEIGHBOURS))
                 raise ValueError(
-                    f"scenes: {name} is no name for a scene; no dots, and not {used_names}"
+                    f"scenes: {name} is not a name for a scene; no dots, and not {used_names}"
                 )
         for key in ("results", "work"):
             _check_folder(key, getattr(self, key))
@@ -738,7 +738,7 @@ def load_config(content: Any) -> Configuration:
 
 
 def read_config(path: Path) -> dict[str, Any]:
-    """Read a config.yaml. Raises `UserError` if it is no mapping. Does not check its keys."""
+    """Read a config.yaml. Raises `UserError` if it is not a mapping. Does not check its keys."""
     content = read_yaml(path, path.name)
     if not isinstance(content, dict):
         raise UserError(f"{path}: must be a mapping of keys to values")
@@ -886,19 +886,21 @@ def as_written(content: dict[str, Any], written: Mapping[str, Any]) -> None:
 def read_yaml(path: Path, file: str) -> Any:
     """Read a YAML file. Errors call it ``file``.
 
-    Raises `UserError` if it is no YAML, or too large. Repeated aliases count, too.
+    Raises `UserError` if it is not YAML, or too large. Repeated aliases count, too.
     """
     try:
         with path.open("rb") as stream:
             content = stream.read(LARGEST_YAML + 1)
         if len(content) > LARGEST_YAML:
             raise UserError(
-                f"{file}: is larger than {LARGEST_YAML // 1000} kB, so it is no settings"
+                f"{file}: is larger than {LARGEST_YAML // 1000} kB, so it is not a settings file"
             )
         loader = _UniqueKeyLoader(content.decode())
         node = loader.get_single_node()
         if _size(node, {}) > MOST_NODES:
-            raise UserError(f"{file}: its aliases (*name) repeat too much, so it is no settings")
+            raise UserError(
+                f"{file}: its aliases (*name) repeat too much, so it is not a settings file"
+            )
         return loader.construct_document(node) if node else None
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark

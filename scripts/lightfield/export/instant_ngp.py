@@ -61,7 +61,7 @@ def _pictures(path: Path) -> list[str]:
         depths = [frame["depth_path"] for frame in frames if "depth_path" in frame]
         return [str(frame["file_path"]) for frame in frames] + depths
     except (UserError, LookupError, TypeError):
-        raise UserError(f"{path}: is no JSON with frames, each with a file_path") from None
+        raise UserError(f"{path}: is not JSON with frames, each with a file_path") from None
 
 
 MANIFEST = Manifest("transforms*.json", _pictures, (MASK,))
@@ -400,7 +400,7 @@ def _ftheta(lens: Lens) -> list[float]:
     radius = np.linspace(0, reach, 4001)
     in_front = radius[np.abs(_angles(lens, radius)[0]) <= math.pi / 2]
     if len(in_front) < 5:
-        raise UserError(_not_followed("its view is no fisheye's"))
+        raise UserError(_not_followed("its view is not a fisheye's"))
     # Chebyshev's nodes keep the largest error of a polynomial fit near its minimum.
     nodes = in_front[-1] * (0.5 - 0.5 * np.cos(np.linspace(0, math.pi, 1001)))
     across, down = _angles(lens, nodes)

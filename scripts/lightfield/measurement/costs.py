@@ -18,7 +18,8 @@ from lightfield.dataset.config import AtLeastOne, Energy
 from lightfield.dataset.lightfield import NAME, LightField
 from lightfield.dataset.passes import FLOW, PASSES
 from lightfield.dataset.shard_files import JOURNAL_SUFFIX
-from lightfield.measurement.sampling import DENOISING_SAMPLES, cost_in_samples, standard_error
+from lightfield.dataset.unit_costs import DENOISING_SAMPLES
+from lightfield.measurement.sampling import cost_in_samples, standard_error
 
 # The stages that every dataset has, in the order of the work. Other stages come between.
 FIRST_STAGES = ("scene", "cameras", "render")
@@ -92,7 +93,7 @@ def shard_costs(name: str, runs: Sequence[journal.Run]) -> dict[str, Any]:
     latest = {view["view"]: view["wall_seconds"] for view in views}
     wall = sum(run.wall_seconds for run in runs)
     path_tracing = sum(view["render_seconds"] for view in views)
-    again = sum(view["wall_seconds"] for view in views) - sum(latest.values())
+    rendered_again = sum(view["wall_seconds"] for view in views) - sum(latest.values())
     return _rounded(
         {
             "shard": name,
@@ -105,7 +106,7 @@ def shard_costs(name: str, runs: Sequence[journal.Run]) -> dict[str, Any]:
             "views_rendered": len(views),
             "runs": len(runs),
             "killed_runs": sum(run.end is None for run in runs),
-            "repeated_seconds": again
+            "repeated_seconds": rendered_again
             + sum(run.start.get("start_up_seconds", 0.0) for run in runs[1:]),
         }
     )
@@ -134,7 +135,7 @@ def job_stages(dataset: Path, scene: Iterable[Path]) -> dict[str, Stage]:
         try:
             wall, cpu, memory = job_times(path)
         except (OSError, ValueError, LookupError, TypeError, StopIteration):
-            print(f"{path}: is no table of a job's time; the job is left out", file=sys.stderr)
+            print(f"{path}: is not a table of a job's time; the job is left out", file=sys.stderr)
             continue
         stage = stages.setdefault(name, Stage())
         stage.jobs += 1

@@ -38,7 +38,7 @@ REFERENCE_SEED = 1000
 R2 = (0.7548776662466927, 0.5698402909980532)
 # A window has at least this part of its pixels in the image circle, if possible.
 FULL_ENOUGH = 0.75
-# At most this many places of a window are tried.
+# Tries at most this many places for a window.
 MOST_PLACES = 64
 
 # The kinds of surfaces that a pilot finds, and the features by which the inventory lists their
@@ -316,7 +316,7 @@ def read_arguments(arguments: argparse.Namespace) -> tuple[LightField, Trials]:
     elif "samples" not in lightfield.render:
         raise UserError(
             f"{arguments.lightfield}: render has a target error and no samples; "
-            "give --calibration, what scripts/calibrate.py chose for it"
+            "give --calibration, the file that scripts/calibrate.py wrote for it"
         )
     return lightfield, Trials.of(arguments, lightfield)
 

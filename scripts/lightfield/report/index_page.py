@@ -35,6 +35,9 @@ def _entry(results: Path, path: Path) -> dict[str, Any]:
     lightfield = LightField.read(folder / NAME)
     scene, *rig = folder.relative_to(results).parts
     validation = tables.validation(folder / "validation.json")
+    state = "not validated"
+    if validation:
+        state = "valid" if validation["valid"] else "not valid"
     return {
         "scene": scene,
         "rig": "/".join(rig),
@@ -42,6 +45,7 @@ def _entry(results: Path, path: Path) -> dict[str, Any]:
         "views": len(lightfield.views),
         "resolution": f"{lightfield.lens.width} × {lightfield.lens.height}",
         "lens": lightfield.lens.description,
-        "valid": validation["valid"] if validation else None,
+        "projection": lightfield.lens.title,
+        "state": state,
         "picture": page.photo(path.parent / "overview.png", THUMBNAIL),
     }

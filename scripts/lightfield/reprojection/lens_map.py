@@ -443,7 +443,7 @@ def _strip_with_borders(source: CubeMap, border: int) -> Array:
     faces = [source.pixels(rays @ rotation.T) for rotation in CUBE_FACES.values()]
     exact = np.concatenate(faces, axis=1)
     strip = exact.astype(np.float32)
-    # Rounding must not move a pixel to the strip's next face, which is no neighbour in space.
+    # Rounding must not move a pixel to the strip's next face, which is not a neighbour in space.
     end = ((np.floor(exact[..., 0] / source.height) + 1) * source.height).astype(np.float32)
     strip[..., 0] = np.minimum(strip[..., 0], np.nextafter(end, np.float32(0)))
     return strip
