@@ -75,6 +75,14 @@ def phase_of(job):
     return PHASES.get(job.rule.name, PHASES.get(stem, stem))
 
 
+def is_of_dataset(job):
+    """Return whether a job belongs to one dataset. Packing a sequence belongs to several."""
+    wildcards = job.wildcards
+    return (
+        "rig" in wildcards.keys() and f"{wildcards.scene}/{wildcards.rig}" in DATASETS
+    )
+
+
 def estimated_seconds(job):
     """Return the estimated seconds of a job on one core. None if they are unknown."""
     name = job.rule.name
@@ -89,7 +97,7 @@ def estimated_seconds(job):
         return None
     if name in BLENDER_RULES:
         return START_UP_SECONDS
-    if "rig" not in wildcards.keys():
+    if not is_of_dataset(job):
         return JOB_SECONDS
     estimate = dataset_of(wildcards).estimate
     if name == RENDER:
@@ -249,10 +257,13 @@ def work_of(job, name):
 
 
 def dataset_name_of(job):
-    """Return the name of a job's dataset, as in its path. None if it belongs to no dataset."""
-    if "rig" not in job.wildcards.keys():
+    """Return the scene and rig of a job, as in its path. None if it belongs to no rig."""
+    wildcards = job.wildcards
+    if "rig" not in wildcards.keys():
         return None
-    dataset = dataset_of(job.wildcards)
+    if not is_of_dataset(job):
+        return f"{wildcards.scene}/{wildcards.rig}"
+    dataset = dataset_of(wildcards)
     return f"{dataset.scene_folder}/{dataset.rig_name}"
 
 

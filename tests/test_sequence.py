@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 import yaml
-from checkouts import checkout, planned
+from checkouts import checkout, planned, snakemake
 
 from lightfield.core.errors import UserError
 from lightfield.dataset import config
@@ -88,6 +88,17 @@ def test_every_stage_is_planned_for_every_frame(tmp_path):
         assert jobs[name] == 4
     # One archive has all frames of a sequence.
     assert jobs["pack"] == 2
+
+
+@pytest.mark.slow
+def test_a_forecast_has_a_row_for_all_frames_of_a_sequence(tmp_path):
+    folder = checkout(tmp_path, moving=SCENE)
+    result = snakemake(
+        folder, "package", "-n", "--config", "scenes=[moving]", "rigs=all", "preset=full"
+    )
+    rows = [line.split() for line in result.stdout.splitlines()]
+    views = {row[0]: row[2] for row in rows if row and row[0].startswith("moving/")}
+    assert views == {"moving/LFStill": "2", "moving/LFSequence": "3"}
 
 
 def test_fire_and_water_move_and_the_rest_stands_still(run_program, tmp_path):
