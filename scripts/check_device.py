@@ -9,7 +9,9 @@ from lightfield.rendering.cycles import gpu
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
-        "device", choices=["auto", "cpu", "gpu", "optix", "cuda", "hip", "oneapi", "metal"]
+        "device",
+        choices=["auto", "cpu", "gpu", "optix", "cuda", "hip", "oneapi", "metal"],
+        help="device to look for",
     )
     gpu(parser.parse_args().device)
 

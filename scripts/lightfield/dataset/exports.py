@@ -283,16 +283,18 @@ class PointCloud(Developed):
 class Exports(Settings):
     """The exports, by format."""
 
-    instant_ngp: InstantNgp | None = None
-    colmap: Colmap | None = None
-    nerfstudio: Nerfstudio | None = None
-    nerf_synthetic: NerfSynthetic | None = None
-    opendibr: OpenDibr | None = None
-    miv: Miv | None = None
-    hci: Hci | None = None
-    scannetpp: ScanNetPP | None = None
-    poses_csv: PosesCsv | None = None
-    point_cloud: PointCloud | None = None
+    instant_ngp: InstantNgp | None = Field(None, description="For instant-ngp.")
+    colmap: Colmap | None = Field(None, description="For gsplat, 3DGRUT and 3D Gaussian splatting.")
+    nerfstudio: Nerfstudio | None = Field(None, description="For nerfstudio.")
+    nerf_synthetic: NerfSynthetic | None = Field(
+        None, description="For readers of NeRF's synthetic scenes."
+    )
+    opendibr: OpenDibr | None = Field(None, description="For OpenDIBR.")
+    miv: Miv | None = Field(None, description="For TMIV.")
+    hci: Hci | None = Field(None, description="For readers of the HCI benchmark.")
+    scannetpp: ScanNetPP | None = Field(None, description="For 3DGRUT and Fisheye-GS.")
+    poses_csv: PosesCsv | None = Field(None, description="For anything: a table of poses.")
+    point_cloud: PointCloud | None = Field(None, description="For anything: a point cloud.")
 
     @property
     def selected(self) -> dict[str, Export]:

@@ -143,7 +143,7 @@ class Rig(Settings):
 
     model_config = ConfigDict(json_schema_extra=_require_camera)
 
-    type: str
+    type: str = Field(description="The type, which places the cameras.")
     size: Size = Field(
         1,
         description="Size along every axis, or along x, y and z.",
