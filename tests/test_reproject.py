@@ -460,7 +460,7 @@ def test_a_pngs_pixels_can_be_taken_back_to_light_by_its_header(dataset, run):
     said = {name: image.attributes[f"plenoforge:{name}"] for name in written}
     assert said == {name: str(value) for name, value in written.items()}
     light = read_image(dataset / "out/view_0000f.exr").colour
-    # As docs/formats.md has it: of the sRGB value y, with the maximum m.
+    # As docs/reference/files.md has it: of the sRGB value y, with the maximum m.
     y, m = decode_srgb(image.colour / 255), float(said["reinhard"])
     v = m**2 / 2 * (y - 1 + np.sqrt((1 - y) ** 2 + 4 * y / m**2))
     run(*optics, "--exr")
