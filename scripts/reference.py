@@ -6,6 +6,7 @@ Run this after a change of a model's key or of a program's flag, and scripts/sch
 import argparse
 import ast
 import json
+import math
 import re
 import runpy
 from collections.abc import Callable, Iterator
@@ -392,6 +393,9 @@ def _default(value: dict[str, Any]) -> str:
 
 
 def _number(value: float) -> str:
+    exponent = math.log10(abs(value)) if value else 0.0
+    if exponent.is_integer() and exponent >= 6:
+        return f"{'-' if value < 0 else ''}1e{exponent:.0f}"
     return str(value) if isinstance(value, int) else f"{value:.10g}"
 
 
