@@ -6,6 +6,13 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
+
+from lightfield.core.settings import checked
+from lightfield.dataset.config import Scene
+
+# isort: split
+from pydantic import TypeAdapter
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -85,6 +92,22 @@ def test_code_comments_and_messages_name_pages_that_exist():
         if file.is_file() and ".venv" not in file.parts:
             for named in NAMED_PAGE.findall(file.read_text(errors="ignore")):
                 assert (ROOT / named).is_file(), f"{file}: {named}"
+
+
+def complete_scenes():
+    """Return the examples of whole scene YAMLs, with the pages that show them."""
+    examples = []
+    for page in PAGES:
+        for code in re.findall(r"^```yaml\n(.*?)^```$", page.read_text(), re.M | re.S):
+            content = yaml.safe_load(code.replace("…", "x"))
+            if {"scene", "render", "rigs"} <= content.keys():
+                examples.append(pytest.param(content, id=name_of(page)))
+    return examples
+
+
+@pytest.mark.parametrize("content", complete_scenes())
+def test_an_example_of_a_scene_yaml_is_valid(content):
+    checked(TypeAdapter(Scene), content, "example")
 
 
 def test_pictures_are_shown_somewhere():
